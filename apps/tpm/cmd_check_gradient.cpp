@@ -27,9 +27,8 @@ int check(const GradientOptions& options, const Session& session) {
   wanted.random_points = static_cast<int>(points);
   wanted.seed = parse_whole_number(options.seed, "--seed", 0);
   const ExperimentResiduals function(read_fit_config(options.config));
-  std::vector<FitParameter> parameters;
-  for (const EstimatedParameter& p : function.config().parameters) parameters.push_back(p.fit);
-  const GradientCheck result = check_gradient(function, parameters, wanted);
+  const GradientCheck result =
+      check_gradient(function, searched_parameters(function.config()), wanted);
   say("{}", session.json() ? to_text(to_json(result)) : to_terminal_text(result));
   return result.passed() ? 0 : static_cast<int>(ExitCode::answer_is_no);
 }

@@ -19,12 +19,16 @@
 #include "tpm/core/random.hpp"
 #include "tpm/network/constraints.hpp"
 #include "tpm/network/filling.hpp"
-#include "tpm/network/indentation.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/liver_surface.hpp"
 #include "tpm/solve/lane_factor.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
+#if __has_include("tpm/network/indentation.hpp")
+#include "tpm/network/indentation.hpp"
+#else
+#include "indentation.hpp"
+#endif
 #if __has_include("tpm/network/stiffness_blocks.hpp")
 #include "tpm/network/stiffness_blocks.hpp"
 #else

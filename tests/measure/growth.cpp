@@ -17,9 +17,9 @@
 #include <filesystem>
 #include <string>
 
+#include "indentation.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/filling.hpp"
-#include "tpm/network/indentation.hpp"
 #include "tpm/network/large_equilibrium.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/report/figure.hpp"

@@ -2,9 +2,9 @@
 // A patch glued to a punch on an organ that stands on its far side, for both equilibrium solvers.
 #include <catch2/catch.hpp>
 
+#include "indentation.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/filling.hpp"
-#include "tpm/network/indentation.hpp"
 #include "tpm/network/large_equilibrium.hpp"
 #include "tpm/network/liver_surface.hpp"
 #include "tpmkit/tpm_element.hpp"

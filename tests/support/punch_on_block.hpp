@@ -2,7 +2,7 @@
 // A cube of a cubic lattice on a rigid ground, under a glued flat punch: for studies of refinement.
 #include <cmath>
 
-#include "tpm/network/indentation.hpp"
+#include "indentation.hpp"
 #include "tpm/network/large_equilibrium.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpmkit/tpm_element.hpp"

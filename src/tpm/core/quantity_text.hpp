@@ -1,6 +1,9 @@
 #pragma once
 #include <optional>
+#include <string>
 #include <string_view>
+
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 
@@ -15,5 +18,7 @@ struct QuantityText {
 
 /// A share such as "10%" or "0.1"; none if it is no finite number.
 [[nodiscard]] std::optional<double> find_share(std::string_view text);
+/// "0.613 N"; just the number if the unit is 1.
+[[nodiscard]] std::string with_unit(std::string_view number, const Unit& unit);
 
 }  // namespace tpm

@@ -375,6 +375,11 @@ std::optional<double> find_share(std::string_view text) {
   return share;
 }
 
+std::string with_unit(std::string_view number, const Unit& unit) {
+  if (unit.symbol.empty()) return std::string(number);
+  return fmt::format("{} {}", number, unit.symbol);
+}
+
 QuantityText split_quantity(std::string_view text) {
   const std::string_view t = trimmed(text);
   std::size_t split = std::min(t.find_first_of(" \t"), t.size());

@@ -92,10 +92,6 @@ void add_time_findings(const ImportedColumn& time, std::vector<ImportFinding>& f
                                       with_unit(longest_step, time.unit))});
 }
 
-bool is_spectrum(const ImportedSeries& series) {
-  return holds_spectrum(series);
-}
-
 /// Storage or loss, whatever their dimension.
 const ImportedColumn* find_part(const ImportedSeries& series, Quantity SpectrumQuantities::*part) {
   for (const Dimension dimension : {Dimension::stress, Dimension::stiffness}) {
@@ -194,7 +190,7 @@ std::string csv_text(const ImportedSeries& series, std::string_view provenance) 
 
 /// What every kind of curve has to fulfil, and what it measures.
 void check_and_measure(ImportedSeries& series, const std::string& file) {
-  if (is_spectrum(series)) {
+  if (holds_spectrum(series)) {
     require_spectrum(series, file);
     add_spectrum_measures(series);
     return;
@@ -218,7 +214,7 @@ bool holds_spectrum(const ImportedSeries& series) {
 Spectrum assemble_spectrum(ImportedSeries series, const std::string& file,
                            const ImportOptions& options, Provenance usual) {
   check_and_measure(series, file);
-  if (!is_spectrum(series))
+  if (!holds_spectrum(series))
     throw bad_input(file, "holds no spectrum", "frequency, storage and loss");
   Spectrum spectrum;
   spectrum.header = options.header;
@@ -240,7 +236,7 @@ Spectrum assemble_spectrum(ImportedSeries series, const std::string& file,
 RecordingFile assemble_recording(ImportedSeries series, const std::string& file,
                                  const ImportOptions& options, Provenance usual) {
   check_and_measure(series, file);
-  if (is_spectrum(series)) {
+  if (holds_spectrum(series)) {
     throw bad_input(file, "holds a spectrum (storage and loss over frequency)", "a recording");
   }
   RecordingFile result;
@@ -275,7 +271,7 @@ ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
   curve.description.header = options.header;
   std::string& note = curve.description.header.note;
   if (!series.note.empty()) note += (note.empty() ? "" : "; ") + series.note;
-  if (!is_spectrum(series)) curve.description.observable = observed(series).quantity;
+  if (!holds_spectrum(series)) curve.description.observable = observed(series).quantity;
   if (becomes_points(series, options)) {
     curve.description.kind = "points";
     const bool timed = find(series, Quantity::time) != nullptr;
@@ -286,7 +282,7 @@ ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
     add_imposed(series, file, options);
     curve.csv = csv_text(series, provenance_name(provenance));
   } else {
-    curve.description.kind = is_spectrum(series) ? "spectrum" : "recording";
+    curve.description.kind = holds_spectrum(series) ? "spectrum" : "recording";
     curve.description.provenance = provenance;
     curve.description.segments = std::move(series.segments);
     curve.csv = csv_text(series, {});

@@ -3,17 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/median.hpp"
+
 namespace tpm {
 namespace {
 
 constexpr double kNoise = 5.0;   // standard deviations of the noise that a floor stays within
 constexpr double kPart = 0.005;  // the same as a part of the peak, for recordings without noise
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double median_of(const std::vector<double>& values, std::size_t first, std::size_t last) {
   const auto begin = values.begin();

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/median.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/contact_onset.hpp"
 #include "tpm/curve/drive_pieces.hpp"
@@ -188,13 +190,12 @@ class Finder {
   /// The samples at the end of a phase in which the response stays at one level.
   [[nodiscard]] std::size_t start_of_constant_response(const Phase& phase) const {
     const std::size_t quarter = (phase.last - phase.first) / 4;
-    std::vector<double> end(response_.begin() + static_cast<std::ptrdiff_t>(phase.last - quarter),
-                            response_.begin() + static_cast<std::ptrdiff_t>(phase.last) + 1);
-    const auto middle = end.begin() + static_cast<std::ptrdiff_t>(end.size() / 2);
-    std::nth_element(end.begin(), middle, end.end());
-    const double band = std::max(5.0 * found_.noise_sd_estimate, 0.02 * std::abs(*middle));
+    const double level =
+        median({response_.begin() + static_cast<std::ptrdiff_t>(phase.last - quarter),
+                response_.begin() + static_cast<std::ptrdiff_t>(phase.last) + 1});
+    const double band = std::max(5.0 * found_.noise_sd_estimate, 0.02 * std::abs(level));
     std::size_t start = phase.last;
-    while (start > phase.first && std::abs(response_[start - 1] - *middle) <= band) --start;
+    while (start > phase.first && std::abs(response_[start - 1] - level) <= band) --start;
     return start;
   }
 
@@ -250,8 +251,7 @@ class Finder {
   }
   static std::string shown(double si, Dimension dimension) {
     const Unit unit = shown_unit(dimension);
-    return fmt::format("{}{}{}", significant(si / unit.to_si, 4), unit.symbol.empty() ? "" : " ",
-                       unit.symbol);
+    return with_unit(significant(si / unit.to_si, 4), unit);
   }
   void tell(std::string sentence) { found_.words.push_back(std::move(sentence)); }
 

@@ -94,6 +94,13 @@ std::unique_ptr<Model> make_model(const FitConfig& config) {
   return tpm::make_model(config.model, {config.tension, 1e-10});
 }
 
+std::vector<FitParameter> searched_parameters(const FitConfig& config) {
+  std::vector<FitParameter> parameters;
+  parameters.reserve(config.parameters.size());
+  for (const EstimatedParameter& p : config.parameters) parameters.push_back(p.fit);
+  return parameters;
+}
+
 std::vector<double> model_parameters(const FitConfig& config, std::span<const double> natural,
                                      std::size_t choice) {
   std::vector<double> values = config.fixed;
@@ -173,9 +180,8 @@ FitConfig parse_fit_config(const Json& written, std::string_view where,
   if (document.contains("hypotheses")) {
     parse_hypotheses(document.at("hypotheses"), config, place.key("hypotheses"));
   }
-  const bool known = config.data.front().noise.scale_known;
   for (const DataChoice& data : config.data) {
-    if (data.noise.scale_known == known) continue;
+    if (data.noise.scale_known == config.scale_known()) continue;
     throw bad_input(place.key("data").where, "some noise scales are known and others estimated",
                     "all known or all estimated");
   }

@@ -125,10 +125,16 @@ struct FitConfig {
   std::filesystem::path folder;  ///< where relative paths of data sets are looked up
   /// Asked before each evaluation; true ends the fit with Interrupted. Not part of the result.
   std::function<bool()> interrupted;
+
+  /// Whether the size of the noise is known: of all data sets, or of none.
+  [[nodiscard]] bool scale_known() const { return data.front().noise.scale_known; }
 };
 
 /// The model that the configuration names.
 [[nodiscard]] std::unique_ptr<Model> make_model(const FitConfig& config);
+
+/// What is estimated, without the model parameters that it sets.
+[[nodiscard]] std::vector<FitParameter> searched_parameters(const FitConfig& config);
 
 /// All model parameters for a data set, given the estimated ones.
 [[nodiscard]] std::vector<double> model_parameters(const FitConfig& config,

@@ -57,18 +57,11 @@ double binomial_test(int k, int n, double p) {
 CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t seed) {
   ExperimentResiduals function(config);
   refuse_what_cannot_be_simulated(config, function);
-  std::vector<FitParameter> parameters;
-  std::vector<double> true_value;
+  const std::vector<FitParameter> parameters = searched_parameters(function.config());
+  const std::vector<double> true_value = start_values(parameters);
   CoverageResult result;
-  for (const EstimatedParameter& p : function.config().parameters) {
-    parameters.push_back(p.fit);
-    true_value.push_back(p.fit.start);
-    result.parameters.push_back({p.fit.name, 0, 0, 1.0});
-  }
-  Threshold threshold;
-  threshold.level = config.level;
-  threshold.scale_known = config.data.front().noise.scale_known;
-  threshold.data_count = function.value_count();
+  for (const FitParameter& p : parameters) result.parameters.push_back({p.name, 0, 0, 1.0});
+  const Threshold threshold{config.level, config.scale_known(), function.value_count()};
   result.seed = seed;
   result.level = config.level;
 

@@ -26,7 +26,7 @@ struct Approach {
 /// What a search with a stand-in for the function finds; no profiles.
 FitResult survey(const ExperimentResiduals& stand_in, std::span<const FitParameter> parameters) {
   Threshold threshold;
-  threshold.scale_known = stand_in.config().data.front().noise.scale_known;
+  threshold.scale_known = stand_in.config().scale_known();
   threshold.data_count = static_cast<int>(stand_in.residual_count());
   return fit_residuals(stand_in, {parameters.begin(), parameters.end()},
                        fit_starts(stand_in, parameters), threshold, false, start_kind(stand_in));
@@ -35,8 +35,7 @@ FitResult survey(const ExperimentResiduals& stand_in, std::span<const FitParamet
 /// The configured start, and the minima of a cheap model.
 Approach surrogate_approach(const ExperimentResiduals& surrogate,
                             std::span<const FitParameter> parameters) {
-  Approach approach{{{}}, StartKind::solved};
-  for (const FitParameter& p : parameters) approach.starts.front().push_back(p.start);
+  Approach approach{{start_values(parameters)}, StartKind::solved};
   for (const DistinctMinimum& m : survey(surrogate, parameters).minima) {
     if (approach.starts.size() > kMostSurrogateMinima) break;
     approach.starts.push_back(m.minimum.natural);
@@ -67,10 +66,7 @@ FitResult search(const ExperimentResiduals& function, const std::vector<FitParam
         [&](std::span<const double> best) { return inflation_at(function, best); });
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical) throw;
-    std::vector<double> nominal;
-    nominal.reserve(parameters.size());
-    for (const FitParameter& p : parameters) nominal.push_back(p.start);
-    if (const auto reason = unpredicted_window(function, nominal)) throw *reason;
+    if (const auto reason = unpredicted_window(function, start_values(parameters))) throw *reason;
     throw;
   }
 }
@@ -122,14 +118,9 @@ FitResult run_fit(const FitConfig& config, const std::vector<DataSet>& data) {
 
 FitResult fit_experiments(const ExperimentResiduals& function) {
   const FitConfig& config = function.config();
-  std::vector<FitParameter> parameters;
-  for (const EstimatedParameter& p : config.parameters) parameters.push_back(p.fit);
-  Threshold threshold;
-  threshold.level = config.level;
-  threshold.scale_known = config.data.front().noise.scale_known;
-  threshold.data_count = function.value_count();
-  threshold.parameter_count = static_cast<int>(parameters.size());
-
+  std::vector<FitParameter> parameters = searched_parameters(config);
+  Threshold threshold{config.level, config.scale_known(), function.value_count(),
+                      static_cast<int>(parameters.size())};
   FitResult result = widened_search(function, parameters, threshold);
   threshold.inflation = result.inflation;
   result.config = config;

@@ -144,6 +144,11 @@ using InflationRule = std::function<double(std::span<const double>)>;
                                       StartKind kind = StartKind::anywhere,
                                       const InflationRule& inflation = {});
 
+/// Limits of the free parameters from the covariance alone, open at the bounds; none without one of
+/// full rank.
+void linear_intervals(FitResult& result, std::span<const FitParameter> parameters,
+                      const Threshold& threshold);
+
 /// Machine-readable result, keys in docs/fit_results.md, numbers rounded to 6 significant digits so
 /// that they agree between machines.
 [[nodiscard]] Json to_json(const FitResult& result);

@@ -173,27 +173,6 @@ void profile_all(const ResidualFunction& function, FitResult& result,
   throw Error(ExitCode::numerical, "profiles", "a deeper minimum was met again and again");
 }
 
-/// Limits from the covariance alone.
-void linear_intervals(FitResult& result, std::span<const FitParameter> parameters,
-                      const Threshold& threshold) {
-  const double wide =
-      std::sqrt(threshold.rise(result.best.deviance) /
-                (threshold.inflation * threshold.variance_factor(result.best.deviance)));
-  const Covariance& c = result.covariance;
-  for (std::size_t k = 0; c.full_rank && k < c.free.size(); ++k) {
-    const std::size_t i = c.free[k];
-    const FitParameter& p = parameters[i];
-    const double theta = p.theta(result.best.natural[i]);
-    const double half = wide * c.theta_sd[static_cast<Eigen::Index>(k)];
-    const double a = p.natural(std::max(theta - half, p.theta_lower()));
-    const double b = p.natural(std::min(theta + half, p.theta_upper()));
-    if (theta - half > p.theta_lower())
-      (p.reversed() ? result.parameters[i].upper : result.parameters[i].lower) = a;
-    if (theta + half < p.theta_upper())
-      (p.reversed() ? result.parameters[i].lower : result.parameters[i].upper) = b;
-  }
-}
-
 void describe_parameters(FitResult& result, double level, bool profiles) {
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterResult& p = result.parameters[i];
@@ -207,6 +186,25 @@ void describe_parameters(FitResult& result, double level, bool profiles) {
 }
 
 }  // namespace
+
+void linear_intervals(FitResult& result, std::span<const FitParameter> parameters,
+                      const Threshold& threshold) {
+  const Covariance& c = result.covariance;
+  if (!c.full_rank) return;
+  const double wide = threshold.multiplier(result.best.deviance);
+  for (std::size_t k = 0; k < c.free.size(); ++k) {
+    const std::size_t i = c.free[k];
+    const FitParameter& p = parameters[i];
+    const double theta = p.theta(result.best.natural[i]);
+    const double half = wide * c.theta_sd[static_cast<Eigen::Index>(k)];
+    const double a = p.natural(std::max(theta - half, p.theta_lower()));
+    const double b = p.natural(std::min(theta + half, p.theta_upper()));
+    if (theta - half > p.theta_lower())
+      (p.reversed() ? result.parameters[i].upper : result.parameters[i].lower) = a;
+    if (theta + half < p.theta_upper())
+      (p.reversed() ? result.parameters[i].lower : result.parameters[i].upper) = b;
+  }
+}
 
 FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParameter> parameters,
                         const std::vector<std::vector<double>>& starts, Threshold threshold,

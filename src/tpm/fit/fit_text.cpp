@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/verdict.hpp"
@@ -60,8 +61,8 @@ std::string minima_table(const FitResult& result) {
       const FitParameter& p = result.parameters[i].parameter;
       const std::string low = significant(m.low[i] / p.unit.to_si, 4);
       const std::string high = significant(m.high[i] / p.unit.to_si, 4);
-      text += fmt::format(" {} {}{}", p.name, low, low == high ? "" : " to " + high);
-      if (!p.unit.symbol.empty()) text += " " + p.unit.symbol;
+      text +=
+          fmt::format(" {} {}", p.name, with_unit(low == high ? low : low + " to " + high, p.unit));
       text += i + 1 < m.low.size() ? "," : "\n";
     }
   }
@@ -71,10 +72,7 @@ std::string minima_table(const FitResult& result) {
 /// "liver.csv: 500 of 600 samples fitted, rms residual 1.2 mN (0.4 % of the peak), ..."
 std::string recording_line(const FitResult& result, const RecordingFit& r) {
   const Unit unit = shown_unit(quantity_dimension(r.response_quantity));
-  const auto shown = [&](double si) {
-    return fmt::format("{}{}{}", significant(si / unit.to_si, 3), unit.symbol.empty() ? "" : " ",
-                       unit.symbol);
-  };
+  const auto shown = [&](double si) { return with_unit(significant(si / unit.to_si, 3), unit); };
   std::string text = fmt::format(
       "{}: {} of {} samples fitted, rms residual {}", result.config.data[r.choice].dataset,
       std::count(r.fitted.begin(), r.fitted.end(), true), r.time_s.size(), shown(r.rms_residual));

@@ -31,8 +31,7 @@ std::optional<PredictionBands> bands_of(const FitResult& result,
                                         const Threshold& threshold,
                                         const Eigen::VectorXd& predicted,
                                         const RowMatrix& sensitivity) {
-  const bool estimable = threshold.scale_known || threshold.data_count > threshold.parameter_count;
-  if (!result.covariance.full_rank || !estimable) return std::nullopt;
+  if (!result.covariance.full_rank || !threshold.estimable()) return std::nullopt;
   Eigen::VectorXd sd(predicted.size());
   for (Eigen::Index i = 0; i < sd.size(); ++i) {
     sd[i] = reading_sd(function, static_cast<std::size_t>(i), predicted[i], result.best.natural);

@@ -181,14 +181,9 @@ std::vector<FittedFile> fitted_files(const FitResult& fit) {
 }
 
 std::optional<LawUncertainty> uncertainty_of(const FitResult& fit, const LawSpec& spec) {
-  Threshold threshold;
-  threshold.level = fit.config.level;
-  threshold.scale_known = fit.config.data.front().noise.scale_known;
-  threshold.data_count = fit.value_count;
-  threshold.parameter_count = static_cast<int>(fit.config.parameters.size());
-  threshold.inflation = fit.inflation;
-  const bool estimable = threshold.scale_known || threshold.data_count > threshold.parameter_count;
-  if (!fit.covariance.full_rank || !estimable) return std::nullopt;
+  const Threshold threshold{fit.config.level, fit.config.scale_known(), fit.value_count,
+                            static_cast<int>(fit.config.parameters.size()), fit.inflation};
+  if (!fit.covariance.full_rank || !threshold.estimable()) return std::nullopt;
   const std::vector<Coordinate> coordinates = law_coordinates(fit, spec);
   const Eigen::MatrixXd change = coordinate_changes(fit, spec, coordinates);
   LawUncertainty u;

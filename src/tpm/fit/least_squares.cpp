@@ -85,6 +85,32 @@ const ExchangeOrder& ResidualFunction::exchange_order() const {
   return kNone;
 }
 
+Eigen::VectorXd theta_of(std::span<const FitParameter> parameters,
+                         std::span<const double> natural) {
+  Eigen::VectorXd theta(std::ssize(parameters));
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    theta[static_cast<Eigen::Index>(i)] = parameters[i].theta(natural[i]);
+  }
+  return theta;
+}
+
+Eigen::VectorXd natural_slopes(std::span<const FitParameter> parameters,
+                               const Eigen::VectorXd& theta) {
+  Eigen::VectorXd slope(theta.size());
+  for (Eigen::Index i = 0; i < slope.size(); ++i) {
+    slope[i] = parameters[static_cast<std::size_t>(i)].natural_slope(theta[i]);
+  }
+  return slope;
+}
+
+bool KnownPoint::evaluate(const ResidualFunction& function,
+                          std::span<const FitParameter> parameters) {
+  if (!function.evaluate(natural, residual, &jacobian)) return false;
+  theta = theta_of(parameters, natural);
+  jacobian = jacobian * natural_slopes(parameters, theta).asDiagonal();
+  return std::isfinite(cost()) && jacobian.allFinite();
+}
+
 double deviance_at(const ResidualFunction& function, std::span<const double> natural) {
   Eigen::VectorXd r;
   if (!function.evaluate(natural, r, nullptr)) return std::numeric_limits<double>::quiet_NaN();

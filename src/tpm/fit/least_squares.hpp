@@ -90,6 +90,26 @@ enum class FirstStep { bold, cautious };
                                     std::span<const FitParameter> parameters,
                                     std::span<const double> start, const FixedMask& fixed = {});
 
+/// Natural values in the coordinates that they are searched in.
+[[nodiscard]] Eigen::VectorXd theta_of(std::span<const FitParameter> parameters,
+                                       std::span<const double> natural);
+
+/// d natural / d theta
+[[nodiscard]] Eigen::VectorXd natural_slopes(std::span<const FitParameter> parameters,
+                                             const Eigen::VectorXd& theta);
+
+/// Residuals and their derivatives by theta at a point.
+struct KnownPoint {
+  std::vector<double> natural;
+  Eigen::VectorXd theta, residual;
+  RowMatrix jacobian;
+
+  [[nodiscard]] double cost() const { return residual.squaredNorm(); }
+  /// Sets all that follows from the natural values; false if it is not finite.
+  [[nodiscard]] bool evaluate(const ResidualFunction& function,
+                              std::span<const FitParameter> parameters);
+};
+
 /// Deviance at a point; NaN if it cannot be evaluated.
 [[nodiscard]] double deviance_at(const ResidualFunction& function, std::span<const double> natural);
 

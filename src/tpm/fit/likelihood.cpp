@@ -38,7 +38,7 @@ std::optional<Likelihood> likelihood_at(const ExperimentResiduals& function,
   const FitConfig& config = function.config();
   if (config.loss.kind != Loss::none || function.value_count() == 0) return std::nullopt;
   const Eigen::VectorXd answer = function.predict(natural, nullptr);
-  const bool scale_known = config.data.front().noise.scale_known;
+  const bool scale_known = config.scale_known();
   const double factor = scale_known ? 1.0 : std::sqrt(mean_square(function, answer, natural));
   if (!(factor > 0.0)) return std::nullopt;
   double sum = 0.0;

@@ -145,11 +145,6 @@ void apply_shape(const ErrorLaw& law, DatumResidual& residual) {
   residual.d_r *= shaped.slope;
 }
 
-double log_density(const Noise& noise, double sigma, double datum, double f) {
-  const double scale = noise.kind == NoiseKind::relative_to_model ? sigma * std::abs(f) : sigma;
-  return log_density(error_law(noise), datum, f, scale);
-}
-
 void apply_loss(const RobustLoss& loss, DatumResidual& residual) {
   if (loss.kind == Loss::none || residual.r == 0.0) return;
   std::array<double, 3> rho{};

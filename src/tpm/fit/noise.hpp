@@ -79,10 +79,6 @@ inline constexpr double kNormalisationOffset = 50.0;
 /// Applies the shape of the law to r and d_r, which stand for z; `normal` changes nothing.
 void apply_shape(const ErrorLaw& law, DatumResidual& residual);
 
-/// ln of the density of the datum, all constants included.
-/// @param sigma of sigma_of
-[[nodiscard]] double log_density(const Noise& noise, double sigma, double datum, double f);
-
 /// Applies the loss to r and d_r.
 void apply_loss(const RobustLoss& loss, DatumResidual& residual);
 

@@ -84,6 +84,13 @@ bool FitParameter::at_upper(double p) const {
   return close_in_theta(*this, p, upper);
 }
 
+std::vector<double> start_values(std::span<const FitParameter> parameters) {
+  std::vector<double> natural;
+  natural.reserve(parameters.size());
+  for (const FitParameter& p : parameters) natural.push_back(p.start);
+  return natural;
+}
+
 void require_valid(const FitParameter& p, std::string_view where) {
   const std::string place = fmt::format("{}: parameter '{}'", where, p.name);
   if (p.scale != Scale::linear && !(p.lower > 0.0 && std::isfinite(p.upper))) {

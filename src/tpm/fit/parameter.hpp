@@ -1,6 +1,8 @@
 #pragma once
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tpmkit/units.hpp"
 
@@ -39,6 +41,8 @@ struct FitParameter {
   [[nodiscard]] bool at_lower(double natural) const;
   [[nodiscard]] bool at_upper(double natural) const;
 };
+
+[[nodiscard]] std::vector<double> start_values(std::span<const FitParameter> parameters);
 
 /// Throws Error(bad_input) naming the parameter if its bounds, start and scale do not agree.
 void require_valid(const FitParameter& parameter, std::string_view where);

@@ -9,14 +9,6 @@
 namespace tpm::fit {
 namespace {
 
-/// Multiplier of the standard error for `constrained` linear functions at once.
-double band_multiplier(const Threshold& threshold, double minimum_deviance, int constrained) {
-  // rise / variance is the quantile of chi-square, or k times that of F; the inflation is in the
-  // covariance already.
-  const double variance = threshold.inflation * threshold.variance_factor(minimum_deviance);
-  return std::sqrt(threshold.rise(minimum_deviance, constrained) / variance);
-}
-
 void require_sizes(Eigen::Index predicted, const RowMatrix& sensitivity, std::size_t parameters,
                    Eigen::Index noise) {
   if (sensitivity.rows() == predicted &&
@@ -56,7 +48,7 @@ Eigen::VectorXd prediction_standard_errors(const RowMatrix& sensitivity,
 PredictionBands prediction_bands(const Eigen::VectorXd& predicted, const RowMatrix& sensitivity,
                                  std::span<const FitParameter> parameters, const Minimum& minimum,
                                  const Covariance& covariance, const Threshold& threshold,
-                                 const Eigen::VectorXd& noise_sd, BandKind kind) {
+                                 const Eigen::VectorXd& noise_sd) {
   require_sizes(predicted.size(), sensitivity, parameters.size(), noise_sd.size());
   if (!covariance.full_rank) {
     throw bad_input("prediction bands", "the data do not determine all parameters",
@@ -65,17 +57,14 @@ PredictionBands prediction_bands(const Eigen::VectorXd& predicted, const RowMatr
   PredictionBands bands;
   bands.standard_error =
       prediction_standard_errors(sensitivity, parameters, minimum.natural, covariance);
-  const double pointwise = band_multiplier(threshold, minimum.deviance, 1);
-  bands.multiplier =
-      kind == BandKind::pointwise
-          ? pointwise
-          : band_multiplier(threshold, minimum.deviance, static_cast<int>(covariance.free.size()));
+  bands.multiplier = threshold.multiplier(minimum.deviance);
   bands.lower = predicted - bands.multiplier * bands.standard_error;
   bands.upper = predicted + bands.multiplier * bands.standard_error;
   if (noise_sd.size() == 0) return bands;
   const double factor = threshold.variance_factor(minimum.deviance);
   const Eigen::VectorXd reading =
-      pointwise * (bands.standard_error.cwiseAbs2() + factor * noise_sd.cwiseAbs2()).cwiseSqrt();
+      bands.multiplier *
+      (bands.standard_error.cwiseAbs2() + factor * noise_sd.cwiseAbs2()).cwiseSqrt();
   bands.reading_lower = predicted - reading;
   bands.reading_upper = predicted + reading;
   return bands;

@@ -15,12 +15,6 @@ namespace tpm::fit {
                                                          std::span<const double> natural,
                                                          const Covariance& covariance);
 
-/// Whether a band holds at each point by itself or along the whole curve at once.
-enum class BandKind {
-  pointwise,
-  simultaneous,  ///< Scheffe: all linear functions of the parameters at once, so never too narrow
-};
-
 /// Symmetric limits about each prediction, SI.
 struct PredictionBands {
   Eigen::VectorXd standard_error;                ///< of the curve
@@ -29,11 +23,10 @@ struct PredictionBands {
   Eigen::VectorXd reading_lower, reading_upper;  ///< prediction: where one new reading falls
 };
 
-/// Linearised bands. The multiplier of the standard error is Student's t (with the residual degrees
-/// of freedom; normal if the noise scale is known) pointwise, and sqrt(k F) (sqrt(chi-square)) with
-/// k free parameters simultaneously (Seber & Wild, Nonlinear Regression (1989), 5.1). A reading
-/// always has the pointwise multiplier and the variance standard_error^2 + variance factor sigma^2;
-/// the noise is taken as normal.
+/// Linearised bands, each at its point alone. The multiplier of the standard error is Student's t
+/// (with the residual degrees of freedom; normal if the noise scale is known; Seber & Wild,
+/// Nonlinear Regression (1989), 5.1). A reading has the variance standard_error^2 + variance factor
+/// sigma^2; the noise is taken as normal.
 /// @param predicted n predictions, SI
 /// @param noise_sd declared standard deviation of a reading at each point, SI, n values; or empty:
 ///        the bands for readings then stay empty
@@ -43,7 +36,6 @@ struct PredictionBands {
                                                std::span<const FitParameter> parameters,
                                                const Minimum& minimum, const Covariance& covariance,
                                                const Threshold& threshold,
-                                               const Eigen::VectorXd& noise_sd,
-                                               BandKind kind = BandKind::pointwise);
+                                               const Eigen::VectorXd& noise_sd);
 
 }  // namespace tpm::fit

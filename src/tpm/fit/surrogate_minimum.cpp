@@ -16,41 +16,6 @@ constexpr double kRaise = 8.0;
 constexpr double kMostPull = 1e8;
 constexpr double kGoodShare = 0.5;  // of the gain that was promised
 
-/// Residuals of the costly function and their derivatives by theta at a point.
-struct KnownPoint {
-  std::vector<double> natural;
-  Eigen::VectorXd theta, residual;
-  RowMatrix jacobian;
-
-  [[nodiscard]] double cost() const { return residual.squaredNorm(); }
-};
-
-Eigen::VectorXd theta_of(std::span<const FitParameter> parameters,
-                         std::span<const double> natural) {
-  Eigen::VectorXd theta(std::ssize(parameters));
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    theta[static_cast<Eigen::Index>(i)] = parameters[i].theta(natural[i]);
-  }
-  return theta;
-}
-
-/// d natural / d theta
-Eigen::VectorXd slopes_at(std::span<const FitParameter> parameters, const Eigen::VectorXd& theta) {
-  Eigen::VectorXd slope(theta.size());
-  for (Eigen::Index i = 0; i < slope.size(); ++i) {
-    slope[i] = parameters[static_cast<std::size_t>(i)].natural_slope(theta[i]);
-  }
-  return slope;
-}
-
-bool evaluate(const ResidualFunction& function, std::span<const FitParameter> parameters,
-              KnownPoint& point) {
-  if (!function.evaluate(point.natural, point.residual, &point.jacobian)) return false;
-  point.theta = theta_of(parameters, point.natural);
-  point.jacobian = point.jacobian * slopes_at(parameters, point.theta).asDiagonal();
-  return std::isfinite(point.cost()) && point.jacobian.allFinite();
-}
-
 /// The surrogate with what it lacks at a point, and below its residuals the pull towards that
 /// point.
 class CorrectedSurrogate final : public ResidualFunction {
@@ -61,7 +26,7 @@ class CorrectedSurrogate final : public ResidualFunction {
   /// Corrects it at a point; false if the surrogate cannot be evaluated there.
   [[nodiscard]] bool correct_at(const KnownPoint& point) {
     KnownPoint own{point.natural, {}, {}, {}};
-    if (!tpm::fit::evaluate(surrogate_, parameters_, own)) return false;
+    if (!own.evaluate(surrogate_, parameters_)) return false;
     const RowMatrix slope = point.jacobian - own.jacobian;
     if (theta_.size() > 0) learn(point.theta - theta_, slope - slope_lacking_);
     theta_ = point.theta;
@@ -86,7 +51,7 @@ class CorrectedSurrogate final : public ResidualFunction {
     residual.conservativeResize(residual_count());
     residual.tail(moved.size()) = pull.cwiseProduct(moved);
     if (jacobian == nullptr) return true;
-    const Eigen::VectorXd per_natural = slopes_at(parameters_, theta_ + moved).cwiseInverse();
+    const Eigen::VectorXd per_natural = natural_slopes(parameters_, theta_ + moved).cwiseInverse();
     *jacobian += (slope_lacking_ + bend) * per_natural.asDiagonal();
     jacobian->conservativeResize(residual_count(), Eigen::NoChange);
     jacobian->bottomRows(moved.size()) = RowMatrix(pull.cwiseProduct(per_natural).asDiagonal());
@@ -147,7 +112,7 @@ Minimum minimise_by_surrogate(const ResidualFunction& function, const ResidualFu
   Minimum minimum;
   minimum.natural = here.natural;
   CorrectedSurrogate corrected(surrogate, parameters);
-  if (!evaluate(function, parameters, here) || !corrected.correct_at(here)) {
+  if (!here.evaluate(function, parameters) || !corrected.correct_at(here)) {
     return minimum;
   }
   const bool held = std::find(fixed.begin(), fixed.end(), true) != fixed.end();
@@ -163,7 +128,7 @@ Minimum minimise_by_surrogate(const ResidualFunction& function, const ResidualFu
     // A pull of this many times the curvature hides up to as many times what is promised.
     minimum.converged = promised * (1.0 + pull) <= small * here.cost() / count;
     if (minimum.converged || pull > kMostPull) break;
-    const bool known = evaluate(function, parameters, next);
+    const bool known = next.evaluate(function, parameters);
     const double gained = known ? here.cost() - next.cost() : -1.0;
     if (gained < kGoodShare * promised) {
       pull = std::max(kRaise * pull, kFirstPull);

@@ -41,6 +41,11 @@ double Threshold::rise(double minimum_deviance, int constrained) const {
   return factor * constrained * boost::math::quantile(f, level);
 }
 
+double Threshold::multiplier(double minimum_deviance) const {
+  const double variance = inflation * variance_factor(minimum_deviance);
+  return std::sqrt(rise(minimum_deviance) / variance);
+}
+
 double Threshold::p_value(double rise, double minimum_deviance, int constrained) const {
   rise = std::max(rise, 0.0) / inflation;
   if (scale_known) {
@@ -92,8 +97,7 @@ Covariance linear_covariance(const ResidualFunction& function,
   const Eigen::MatrixXd root = v * c.singular_values.cwiseInverse().asDiagonal();
   Eigen::MatrixXd covariance = root * root.transpose();
   covariance = length.cwiseInverse().asDiagonal() * covariance * length.cwiseInverse().asDiagonal();
-  const bool estimable = threshold.scale_known || threshold.data_count > threshold.parameter_count;
-  if (estimable) {
+  if (threshold.estimable()) {
     covariance *= threshold.inflation * threshold.variance_factor(minimum.deviance);
   }
   c.theta_sd = covariance.diagonal().cwiseSqrt();

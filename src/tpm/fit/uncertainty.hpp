@@ -26,8 +26,12 @@ struct Threshold {
   /// curve takes up as much of correlated noise as `inflation` parameters of independent noise
   /// would. Throws Error(bad_input) if it must be estimated and n <= k.
   [[nodiscard]] double variance_factor(double minimum_deviance) const;
+  /// Whether the size of the noise is known or can be estimated.
+  [[nodiscard]] bool estimable() const { return scale_known || data_count > parameter_count; }
   /// Rise of the deviance allowed for `constrained` (>= 1) parameters at once.
   [[nodiscard]] double rise(double minimum_deviance, int constrained = 1) const;
+  /// Half width of a linearised interval in standard errors, which hold the inflation already.
+  [[nodiscard]] double multiplier(double minimum_deviance) const;
   /// Probability of a rise at least this large if the constrained values are true.
   [[nodiscard]] double p_value(double rise, double minimum_deviance, int constrained = 1) const;
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 
 namespace tpm::fit {
@@ -42,8 +43,7 @@ std::string_view verdict_name(Verdict verdict) noexcept {
 }
 
 std::string in_unit(const FitParameter& parameter, double natural) {
-  const std::string number = significant(natural / parameter.unit.to_si, 4);
-  return parameter.unit.symbol.empty() ? number : number + " " + parameter.unit.symbol;
+  return with_unit(significant(natural / parameter.unit.to_si, 4), parameter.unit);
 }
 
 Verdict verdict_of(const ParameterResult& p) {

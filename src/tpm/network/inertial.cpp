@@ -73,14 +73,6 @@ void require_no_jump_of_depth(const Protocol& protocol) {
                   "a ramp");
 }
 
-void require_after(const InertialState& from, std::span<const double> times_s) {
-  for (const double time : times_s) {
-    if (time >= from.time_s) continue;
-    throw bad_input("times", fmt::format("{} s", shortest(time)),
-                    fmt::format("times from {} s on, where the run begins", shortest(from.time_s)));
-  }
-}
-
 /// One run: the state and how it is carried through the protocol.
 class MotionRun {
  public:
@@ -291,7 +283,7 @@ InertialRun Inertial::run(const Protocol& protocol, std::span<const double> time
                           const InertialObserver& observer, const InertialState* from) const {
   require_times_within(protocol, times_s);
   require_no_jump_of_depth(protocol);
-  if (from) require_after(*from, times_s);
+  if (from) require_later(times_s, from->time_s);
   return MotionRun(bonds_, rest_, constraints_, probes_,
                    inertia_of(bonds_, mass_kg_, lowest_, options_), options_,
                    lowest_.angular_frequency(), protocol, times_s, observer, from)

@@ -152,9 +152,4 @@ EquilibriumSearch LargeEquilibrium::find(Positions& position, const ViscousState
   return search;
 }
 
-std::vector<std::size_t> LargeEquilibrium::level_sizes() const {
-  const auto* multigrid = dynamic_cast<const Multigrid*>(preconditioner_.get());
-  return multigrid == nullptr ? std::vector<std::size_t>{} : multigrid->level_sizes();
-}
-
 }  // namespace tpm::organ

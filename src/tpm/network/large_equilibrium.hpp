@@ -66,8 +66,6 @@ class LargeEquilibrium {
   [[nodiscard]] const LargeEquilibriumWork& work() const { return work_; }
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
-  /// Nodes on each level of the last multigrid; empty without one.
-  [[nodiscard]] std::vector<std::size_t> level_sizes() const;
 
  private:
   [[nodiscard]] std::unique_ptr<Preconditioner> preconditioner() const;

@@ -416,14 +416,6 @@ void require_same_network(const QuasiStaticState& from, const BondSystem& bonds)
                   bonds.most_branches()));
 }
 
-void require_later(std::span<const double> times_s, double from_s) {
-  for (const double time : times_s) {
-    if (time >= from_s) continue;
-    throw bad_input("times", fmt::format("{} s", shortest(time)),
-                    fmt::format("times from {} s on, where the run begins", shortest(from_s)));
-  }
-}
-
 }  // namespace
 
 Probes::Probes(std::vector<Probe> all) : all_(std::move(all)) {
@@ -452,6 +444,14 @@ void require_valid(const Probes& probes, const Constraints& constraints) {
     if (driven.insert(probe.sphere).second) continue;
     throw bad_input("probe", fmt::format("sphere {} is driven twice", probe.sphere + 1),
                     "each sphere once");
+  }
+}
+
+void require_later(std::span<const double> times_s, double from_s) {
+  for (const double time : times_s) {
+    if (time >= from_s) continue;
+    throw bad_input("times", fmt::format("{} s", shortest(time)),
+                    fmt::format("times from {} s on, where the run begins", shortest(from_s)));
   }
 }
 

@@ -43,6 +43,9 @@ void require_valid(const Probe& probe, const Constraints& constraints);
 /// The same for each, and none may be driven twice.
 void require_valid(const Probes& probes, const Constraints& constraints);
 
+/// Throws Error(bad_input) if a time is asked for before the one that a run begins at.
+void require_later(std::span<const double> times_s, double from_s);
+
 /// Changes of one law of a BondSystem (viscous_law.hpp).
 struct LawChange {
   std::vector<double> share;               ///< of each gamma_j; they add up to 0

@@ -20,11 +20,6 @@ struct BlockRows {
   std::vector<Block> block;
 
   [[nodiscard]] std::size_t rows() const { return begin.size() - 1; }
-  /// Bytes that the arrays take.
-  [[nodiscard]] std::size_t bytes() const {
-    return begin.size() * sizeof(std::size_t) + column.size() * sizeof(std::uint32_t) +
-           block.size() * sizeof(Block);
-  }
 };
 
 /// y = A x.

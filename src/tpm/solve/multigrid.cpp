@@ -283,17 +283,4 @@ void Multigrid::apply(const BlockVector<3>& r, BlockVector<3>& z) const {
   cycle(0, fine_, r, z);
 }
 
-std::vector<std::size_t> Multigrid::level_sizes() const {
-  std::vector<std::size_t> sizes{finest_.rows()};
-  for (const auto& matrix : coarse_matrix_) sizes.push_back(matrix.rows());
-  return sizes;
-}
-
-std::size_t Multigrid::bytes() const {
-  std::size_t sum = fine_.prolongation.bytes() + fine_.inverse.size() * sizeof(Eigen::Matrix3d);
-  for (const auto& matrix : coarse_matrix_) sum += matrix.bytes();
-  for (const auto& grid : coarse_) sum += grid.prolongation.bytes();
-  return sum;
-}
-
 }  // namespace tpm

@@ -42,11 +42,6 @@ class Multigrid final : public Preconditioner {
   [[nodiscard]] bool definite() const override { return definite_; }
   void apply(const BlockVector<3>& r, BlockVector<3>& z) const override;
 
-  /// Nodes on each level, the finest first.
-  [[nodiscard]] std::vector<std::size_t> level_sizes() const;
-  /// Bytes of matrices and prolongations below the finest matrix.
-  [[nodiscard]] std::size_t bytes() const;
-
  private:
   template <int N>
   [[nodiscard]] const BlockRows<N, N>& matrix_of(std::size_t level) const;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "tpm/store/check_sum.hpp"
+#include "tpm/store/file.hpp"
 
 namespace tpm {
 namespace {
@@ -29,20 +30,6 @@ struct CheckSum {
   std::uint32_t nothing;
 };
 
-/// False if there are fewer bytes.
-bool read_checked(int file, void* to, std::uint64_t size, std::uint64_t from) {
-  auto* bytes = static_cast<char*>(to);
-  while (size > 0) {
-    const ssize_t n = ::pread(file, bytes, size, static_cast<off_t>(from));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    bytes += n;
-    from += static_cast<std::uint64_t>(n);
-    size -= static_cast<std::uint64_t>(n);
-  }
-  return true;
-}
-
 constexpr std::uint64_t kStretch = std::uint64_t{1} << 22U;
 
 /// Of a stretch of a file.
@@ -52,7 +39,7 @@ std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::u
   std::uint32_t crc = 0;
   while (from < to) {
     const std::uint64_t part = std::min(to - from, kInstantaneous);
-    if (!read_checked(file, bytes.data(), part, from)) return std::nullopt;
+    if (pread_all(file, bytes.data(), part, from) != part) return std::nullopt;
     crc = check_sum(bytes.data(), static_cast<std::size_t>(part), crc);
     from += part;
   }
@@ -77,34 +64,29 @@ std::optional<std::uint32_t> crc_of(int file, std::uint64_t size) {
 }  // namespace
 
 bool write_checksum(int descriptor, std::uint64_t size) {
-  CheckSum write_checksum{{}, size, 0, 0};
-  std::copy(kChecksumMagic.begin(), kChecksumMagic.end(), write_checksum.magic);
+  CheckSum sum{{}, size, 0, 0};
+  std::copy(kChecksumMagic.begin(), kChecksumMagic.end(), sum.magic);
   const auto crc = crc_of(descriptor, size);
   if (!crc) {
     if (errno == 0) errno = EIO;
     return false;
   }
-  write_checksum.crc = *crc;
-  const ssize_t n =
-      ::pwrite(descriptor, &write_checksum, sizeof write_checksum, static_cast<off_t>(size));
-  if (n >= 0 && n != sizeof write_checksum) errno = ENOSPC;
-  return n == sizeof write_checksum && ::fsync(descriptor) == 0;
+  sum.crc = *crc;
+  return pwrite_all(descriptor, &sum, sizeof sum, size) == sizeof sum && ::fsync(descriptor) == 0;
 }
 
 ChecksumState checksum_of(int descriptor) {
   struct stat found {};
   if (::fstat(descriptor, &found) != 0) return ChecksumState::none;
   const auto size = static_cast<std::uint64_t>(found.st_size);
-  CheckSum write_checksum{};
-  if (size < sizeof write_checksum ||
-      !read_checked(descriptor, &write_checksum, sizeof write_checksum,
-                    size - sizeof write_checksum) ||
-      !std::equal(kChecksumMagic.begin(), kChecksumMagic.end(), write_checksum.magic)) {
+  CheckSum sum{};
+  if (size < sizeof sum ||
+      pread_all(descriptor, &sum, sizeof sum, size - sizeof sum) != sizeof sum ||
+      !std::equal(kChecksumMagic.begin(), kChecksumMagic.end(), sum.magic)) {
     return ChecksumState::none;
   }
-  const bool whole = write_checksum.size + sizeof write_checksum == size &&
-                     write_checksum.nothing == 0 &&
-                     crc_of(descriptor, write_checksum.size) == write_checksum.crc;
+  const bool whole =
+      sum.size + sizeof sum == size && sum.nothing == 0 && crc_of(descriptor, sum.size) == sum.crc;
   return whole ? ChecksumState::whole : ChecksumState::broken;
 }
 

@@ -13,6 +13,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "tpm/store/descriptor.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpm/store/replacement.hpp"
 #include "tpmkit/error.hpp"
@@ -20,26 +21,6 @@
 namespace tpm {
 namespace fs = std::filesystem;
 namespace {
-
-/// Owns a file descriptor; close() reports what the destructor cannot.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-  int close() {
-    const int r = ::close(fd_);
-    fd_ = -1;
-    return r;
-  }
-
- private:
-  int fd_;
-};
 
 /// /dev/stdout, /dev/fd/3: links into /proc, which stand for a stream whatever it is connected to.
 bool is_open_stream(const fs::path& path) {
@@ -104,6 +85,33 @@ bool write_all(int descriptor, std::string_view bytes) {
     bytes.remove_prefix(static_cast<std::size_t>(n));
   }
   return true;
+}
+
+std::optional<std::size_t> pread_all(int descriptor, void* to, std::size_t size,
+                                     std::uint64_t from) {
+  std::size_t done = 0;
+  while (done < size) {
+    const ssize_t n = ::pread(descriptor, static_cast<char*>(to) + done, size - done,
+                              static_cast<off_t>(from + done));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return std::nullopt;
+    if (n == 0) break;
+    done += static_cast<std::size_t>(n);
+  }
+  return done;
+}
+
+std::size_t pwrite_all(int descriptor, const void* from, std::size_t size, std::uint64_t to) {
+  std::size_t done = 0;
+  while (done < size) {
+    const ssize_t n = ::pwrite(descriptor, static_cast<const char*>(from) + done, size - done,
+                               static_cast<off_t>(to + done));
+    if (n < 0 && errno == EINTR) continue;
+    if (n == 0) errno = ENOSPC;
+    if (n <= 0) break;
+    done += static_cast<std::size_t>(n);
+  }
+  return done;
 }
 
 namespace {

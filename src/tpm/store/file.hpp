@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -33,6 +34,13 @@ void require_replaceable(const std::filesystem::path& path);
 
 /// Writes all bytes; false with errno if that is not possible.
 [[nodiscard]] bool write_all(int descriptor, std::string_view bytes);
+/// Reads `size` bytes from a place of a file on. How many there were, fewer only at its end; none
+/// with errno if reading fails.
+[[nodiscard]] std::optional<std::size_t> pread_all(int descriptor, void* to, std::size_t size,
+                                                   std::uint64_t from);
+/// Writes `size` bytes from a place of a file on. How many were written, fewer only with errno.
+[[nodiscard]] std::size_t pwrite_all(int descriptor, const void* from, std::size_t size,
+                                     std::uint64_t to);
 
 /// Writes through a Replacement (replacement.hpp) and flushes to the disk, so that a reader sees
 /// the old file or the new one and a full disk leaves the old one alone; into a device or pipe as

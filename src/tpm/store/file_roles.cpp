@@ -57,6 +57,17 @@ void require_short_name(const fs::path& path) {
   if (path.filename().native().size() > kLongest) throw cannot_write(path, ENAMETOOLONG);
 }
 
+void announce(const std::vector<fs::path>& files, std::vector<fs::path> Roles::*list) {
+  for (const fs::path& file : files) require_short_name(file);
+  const std::lock_guard lock(roles_mutex);
+  if (!roles) return;
+  for (const fs::path& file : files) {
+    const auto identity = identity_of(file);
+    if (identity && roles->read.count(*identity) > 0) throw both_read_and_written(file);
+    ((*roles).*list).push_back(file);
+  }
+}
+
 }  // namespace
 
 FileRoles::FileRoles() {
@@ -70,25 +81,11 @@ FileRoles::~FileRoles() {
 }
 
 void will_write(const std::vector<fs::path>& results) {
-  for (const fs::path& result : results) require_short_name(result);
-  const std::lock_guard lock(roles_mutex);
-  if (!roles) return;
-  for (const fs::path& result : results) {
-    const auto file = identity_of(result);
-    if (file && roles->read.count(*file) > 0) throw both_read_and_written(result);
-    roles->results.push_back(result);
-  }
+  announce(results, &Roles::results);
 }
 
 void will_update(const std::vector<fs::path>& states) {
-  for (const fs::path& state : states) require_short_name(state);
-  const std::lock_guard lock(roles_mutex);
-  if (!roles) return;
-  for (const fs::path& state : states) {
-    const auto file = identity_of(state);
-    if (file && roles->read.count(*file) > 0) throw both_read_and_written(state);
-    roles->states.push_back(state);
-  }
+  announce(states, &Roles::states);
 }
 
 void note_reading(const fs::path& path, int descriptor) {

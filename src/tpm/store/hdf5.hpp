@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -78,13 +79,11 @@ class Hdf5Writer {
   /// Writes the numbers from `first` on, counted row by row through all dimensions, of the kind
   /// that the array has. Straight to where they stand in the file, past HDF5, which does one thing
   /// at a time: several threads may write while nobody calls another function.
-  void part(const std::string& name, std::uint64_t first, std::span<const double> values) const;
-  void part(const std::string& name, std::uint64_t first,
-            std::span<const std::int64_t> values) const;
-  void part(const std::string& name, std::uint64_t first,
-            std::span<const std::int32_t> values) const;
-  void part(const std::string& name, std::uint64_t first,
-            std::span<const std::uint8_t> values) const;
+  template <class T>
+  void part(const std::string& name, std::uint64_t first, std::span<const T> values) const {
+    write_at(places_.at(name) + first * sizeof(T), std::as_bytes(values));
+  }
+
   /// Makes a list the coordinate of a dimension: readers name the dimension after it.
   void dimension_scale(const std::string& name);
   void attach_scale(const std::string& array, unsigned dimension, const std::string& scale);
@@ -93,7 +92,7 @@ class Hdf5Writer {
  private:
   [[nodiscard]] std::uint64_t arrange(const std::string& name, Number kind,
                                       const std::vector<std::uint64_t>& extents);
-  void write_at(std::uint64_t place, std::size_t size, const void* values) const;
+  void write_at(std::uint64_t place, std::span<const std::byte> values) const;
 
   std::filesystem::path path_;
   Replacement place_;
@@ -136,8 +135,8 @@ class Hdf5Reader {
   [[nodiscard]] std::string attribute(const std::string& object, const std::string& name) const;
 
  private:
-  template <class Result>
-  [[nodiscard]] Result ask(const std::string& request) const;
+  template <class Result, class... Parts>
+  [[nodiscard]] Result ask(const Parts&... request) const;
 
   std::filesystem::path path_;
   ChecksumState check_sum_{};

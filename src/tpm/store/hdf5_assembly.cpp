@@ -112,8 +112,8 @@ void Hdf5Assembly::attach(const std::string& object, const std::string& name, hi
                   fmt::format("cannot write attribute {} of {}", name, object));
 }
 
-void Hdf5Assembly::attribute(const std::string& object, const std::string& name,
-                             const std::string& text) {
+void Hdf5Assembly::text_attribute(const std::string& object, const std::string& name,
+                                  const std::string& text) {
   const QuietErrors quiet;
   const char* pointer = text.c_str();
   attach(object, name, text_type().get(), {H5Screate(H5S_SCALAR), H5Sclose},
@@ -129,8 +129,8 @@ void Hdf5Assembly::fixed_text_attribute(const std::string& object, const std::st
   attach(object, name, type.get(), {H5Screate(H5S_SCALAR), H5Sclose}, text.data());
 }
 
-void Hdf5Assembly::attribute(const std::string& object, const std::string& name,
-                             const std::vector<std::int64_t>& values) {
+void Hdf5Assembly::number_attribute(const std::string& object, const std::string& name,
+                                    const std::vector<std::int64_t>& values) {
   const QuietErrors quiet;
   const hsize_t size = values.size();
   const Hdf5Handle space(size == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &size, nullptr),

@@ -22,11 +22,11 @@ class Hdf5Assembly {
   std::uint64_t array(const std::string& name, Hdf5Writer::Number kind,
                       const std::vector<std::uint64_t>& extents);
   void texts(const std::string& name, const std::vector<std::string>& values);
-  void attribute(const std::string& object, const std::string& name, const std::string& text);
+  void text_attribute(const std::string& object, const std::string& name, const std::string& text);
   void fixed_text_attribute(const std::string& object, const std::string& name,
                             const std::string& text);
-  void attribute(const std::string& object, const std::string& name,
-                 const std::vector<std::int64_t>& values);
+  void number_attribute(const std::string& object, const std::string& name,
+                        const std::vector<std::int64_t>& values);
   void dimension_scale(const std::string& name);
   void attach_scale(const std::string& array, unsigned dimension, const std::string& scale);
   /// Ends the file. @returns its size, bytes

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <memory>
 
+#include "tpm/store/file.hpp"
 #include "tpm/store/hdf5_parts.hpp"
 
 namespace tpm {
@@ -92,16 +93,9 @@ herr_t read_storage(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr
                     std::size_t size, void* to) {
   const OpenStorage& opened = of(file);
   auto* bytes = static_cast<char*>(to);
-  std::size_t done = 0;
-  while (done < size) {
-    const ssize_t n = ::pread(opened.storage->descriptor, bytes + done, size - done,
-                              static_cast<off_t>(from + done));
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) return -1;
-    if (n == 0) break;
-    done += static_cast<std::size_t>(n);
-  }
-  std::memset(bytes + done, 0, size - done);  // behind the end, as HDF5's own driver does
+  const auto done = pread_all(opened.storage->descriptor, bytes, size, from);
+  if (!done) return -1;
+  std::memset(bytes + *done, 0, size - *done);  // behind the end, as HDF5's own driver does
   lay_over(*opened.storage, from, size, bytes);
   return 0;
 }
@@ -114,12 +108,9 @@ herr_t write_storage(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, hadd
   const auto* bytes = static_cast<const char*>(from);
   opened.end_of_file = std::max<haddr_t>(opened.end_of_file, to + size);
   std::size_t done = 0;
-  while (storage.error_number == 0 && done < size) {
-    const ssize_t n =
-        ::pwrite(storage.descriptor, bytes + done, size - done, static_cast<off_t>(to + done));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) storage.error_number = n < 0 ? errno : ENOSPC;
-    if (n > 0) done += static_cast<std::size_t>(n);
+  if (storage.error_number == 0) {
+    done = pwrite_all(storage.descriptor, bytes, size, to);
+    if (done < size) storage.error_number = errno;
   }
   if (done < size) {
     auto& kept = storage.unwritten[to + done];

@@ -7,6 +7,7 @@
 
 #include "tpm/store/checksum.hpp"
 #include "tpm/store/contained.hpp"
+#include "tpm/store/descriptor.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpm/store/hdf5.hpp"
@@ -23,7 +24,6 @@ enum class Wish : std::uint8_t {
   has,
   members,
   numbers,
-  table,
   extents,
   part,
   texts,
@@ -31,41 +31,37 @@ enum class Wish : std::uint8_t {
   attribute
 };
 
+template <class Result, class... Arguments>
+std::string answer_by(Result (Hdf5Contents::*function)(Arguments...) const,
+                      const Hdf5Contents& file, Unpacker& request) {
+  return answered<Arguments...>(request,
+                                [&](const auto&... each) { return (file.*function)(each...); });
+}
+
 /// In the child.
-std::string answer(const Hdf5Contents& file, std::string_view request) {
-  Unpacker in(request, "");
+std::string answer(const Hdf5Contents& file, std::string_view bytes) {
+  Unpacker request(bytes, "");
   Wish wish{};
-  std::string name, second;
-  in.take(wish);
-  in.take(name);
-  Packer out;
+  request.take(wish);
   switch (wish) {
     case Wish::nothing:
       break;
     case Wish::has:
-      return out.put(static_cast<std::uint8_t>(file.has(name))).take();
+      return answer_by(&Hdf5Contents::has, file, request);
     case Wish::members:
-      return out.put(file.members(name)).take();
+      return answer_by(&Hdf5Contents::members, file, request);
     case Wish::numbers:
-      return out.put(file.real_numbers(name, 1)).take();
-    case Wish::table:
-      return out.put(file.real_numbers(name, 2)).take();
+      return answer_by(&Hdf5Contents::real_numbers, file, request);
     case Wish::extents:
-      return out.put(file.extents(name)).take();
-    case Wish::part: {
-      std::vector<std::uint64_t> first, counts;
-      in.take(first);
-      in.take(counts);
-      return out.put(file.part(name, first, counts)).take();
-    }
+      return answer_by(&Hdf5Contents::extents, file, request);
+    case Wish::part:
+      return answer_by(&Hdf5Contents::part, file, request);
     case Wish::texts:
-      return out.put(file.texts(name)).take();
+      return answer_by(&Hdf5Contents::texts, file, request);
     case Wish::has_attribute:
-      in.take(second);
-      return out.put(static_cast<std::uint8_t>(file.has_attribute(name, second))).take();
+      return answer_by(&Hdf5Contents::has_attribute, file, request);
     case Wish::attribute:
-      in.take(second);
-      return out.put(std::string_view(file.attribute(name, second))).take();
+      return answer_by(&Hdf5Contents::attribute, file, request);
   }
   return {};
 }
@@ -73,7 +69,7 @@ std::string answer(const Hdf5Contents& file, std::string_view request) {
 constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
 
 /// The open file. HDF5 says the same of a missing file and of garbage: here they are told apart.
-int opened(const fs::path& path) {
+Descriptor opened(const fs::path& path) {
   if (is_device_or_pipe(path)) throw bad_input(path.string(), "is a device or a pipe", "a file");
   std::error_code ec;
   // Not a file, not readable or empty: the reason is read_file's to tell.
@@ -81,10 +77,8 @@ int opened(const fs::path& path) {
     static_cast<void>(read_file(path, 1));
     throw bad_input(path.string(), "cannot be opened for reading", "a readable file");
   }
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (file < 0) {
-    throw cannot_read(path, errno);
-  }
+  Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (file.get() < 0) throw cannot_read(path, errno);
   return file;
 }
 
@@ -112,28 +106,21 @@ ContainedLimits limits_for(int file) {
 }  // namespace
 
 Hdf5Reader::Hdf5Reader(fs::path path) : path_(std::move(path)) {
-  const int file = opened(path_);
-  try {
-    note_reading(path_, file);
-    require_hdf5(path_, file);
-    check_sum_ = checksum_of(file);
-    if (check_sum_ == ChecksumState::broken) {
-      throw bad_input(path_.string(), "is damaged: its check sum is another",
-                      "the file as it was written");
-    }
-    child_ = std::make_unique<Contained>(
-        path_.string(), file, limits_for(file), [where = path_.string()](int descriptor) {
-          auto contents = std::make_shared<Hdf5Contents>(descriptor, where);
-          return [contents](std::string_view request) { return answer(*contents, request); };
-        });
-    static_cast<void>(child_->ask(Packer().put(Wish::nothing).put(std::string_view()).take()));
-  } catch (...) {
-    ::close(file);
-    throw;
+  const Descriptor file = opened(path_);
+  note_reading(path_, file.get());
+  require_hdf5(path_, file.get());
+  check_sum_ = checksum_of(file.get());
+  if (check_sum_ == ChecksumState::broken) {
+    throw bad_input(path_.string(), "is damaged: its check sum is another",
+                    "the file as it was written");
   }
-  ::close(file);
+  child_ = std::make_unique<Contained>(
+      path_.string(), file.get(), limits_for(file.get()), [where = path_.string()](int descriptor) {
+        auto contents = std::make_shared<Hdf5Contents>(descriptor, where);
+        return [contents](std::string_view request) { return answer(*contents, request); };
+      });
+  static_cast<void>(child_->ask(packed(Wish::nothing)));
 }
-
 Hdf5Reader::~Hdf5Reader() = default;
 Hdf5Reader::Hdf5Reader(Hdf5Reader&&) noexcept = default;
 Hdf5Reader& Hdf5Reader::operator=(Hdf5Reader&&) noexcept = default;
@@ -142,62 +129,50 @@ bool Hdf5Reader::has_checksum() const noexcept {
   return check_sum_ == ChecksumState::whole;
 }
 
-template <class Result>
-Result Hdf5Reader::ask(const std::string& request) const {
-  const std::string reply = child_->ask(request);
+template <class Result, class... Parts>
+Result Hdf5Reader::ask(const Parts&... request) const {
+  const std::string reply = child_->ask(packed(request...));
   Result result{};
   Unpacker(reply, path_.native()).take(result);
   return result;
 }
 
 bool Hdf5Reader::has(const std::string& name) const {
-  return ask<std::uint8_t>(Packer().put(Wish::has).put(std::string_view(name)).take()) != 0;
+  return ask<std::uint8_t>(Wish::has, name) != 0;
 }
 
 std::vector<std::string> Hdf5Reader::members(const std::string& group) const {
-  return ask<std::vector<std::string>>(
-      Packer().put(Wish::members).put(std::string_view(group)).take());
+  return ask<std::vector<std::string>>(Wish::members, group);
 }
 
 std::vector<double> Hdf5Reader::numbers(const std::string& name) const {
-  return ask<std::vector<double>>(Packer().put(Wish::numbers).put(std::string_view(name)).take());
+  return ask<std::vector<double>>(Wish::numbers, name, 1);
 }
 
 std::vector<double> Hdf5Reader::table(const std::string& name) const {
-  return ask<std::vector<double>>(Packer().put(Wish::table).put(std::string_view(name)).take());
+  return ask<std::vector<double>>(Wish::numbers, name, 2);
 }
 
 std::vector<std::uint64_t> Hdf5Reader::extents(const std::string& name) const {
-  return ask<std::vector<std::uint64_t>>(
-      Packer().put(Wish::extents).put(std::string_view(name)).take());
+  return ask<std::vector<std::uint64_t>>(Wish::extents, name);
 }
 
 std::vector<double> Hdf5Reader::part(const std::string& name,
                                      const std::vector<std::uint64_t>& first,
                                      const std::vector<std::uint64_t>& counts) const {
-  return ask<std::vector<double>>(
-      Packer().put(Wish::part).put(std::string_view(name)).put(first).put(counts).take());
+  return ask<std::vector<double>>(Wish::part, name, first, counts);
 }
 
 std::vector<std::string> Hdf5Reader::texts(const std::string& name) const {
-  return ask<std::vector<std::string>>(
-      Packer().put(Wish::texts).put(std::string_view(name)).take());
+  return ask<std::vector<std::string>>(Wish::texts, name);
 }
 
 bool Hdf5Reader::has_attribute(const std::string& object, const std::string& name) const {
-  return ask<std::uint8_t>(Packer()
-                               .put(Wish::has_attribute)
-                               .put(std::string_view(object))
-                               .put(std::string_view(name))
-                               .take()) != 0;
+  return ask<std::uint8_t>(Wish::has_attribute, object, name) != 0;
 }
 
 std::string Hdf5Reader::attribute(const std::string& object, const std::string& name) const {
-  return ask<std::string>(Packer()
-                              .put(Wish::attribute)
-                              .put(std::string_view(object))
-                              .put(std::string_view(name))
-                              .take());
+  return ask<std::string>(Wish::attribute, object, name);
 }
 
 }  // namespace tpm

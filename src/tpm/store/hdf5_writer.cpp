@@ -32,58 +32,39 @@ enum class Part : std::uint8_t {
   end
 };
 
+template <class Result, class... Arguments>
+std::string add_by(Result (Hdf5Assembly::*function)(Arguments...), Hdf5Assembly& file,
+                   Unpacker& request) {
+  return answered<Arguments...>(request,
+                                [&](const auto&... each) { return (file.*function)(each...); });
+}
+
 /// In the child: adds a part to the file.
-std::string add_part(Hdf5Assembly& file, std::string_view request) {
-  Unpacker in(request, "");
+std::string add_part(Hdf5Assembly& file, std::string_view bytes) {
+  Unpacker request(bytes, "");
   Part part{};
-  std::string name, second, third;
-  in.take(part);
-  in.take(name);
+  request.take(part);
   switch (part) {
     case Part::file:
       break;
     case Part::group:
-      file.group(name);
-      break;
-    case Part::array: {
-      Hdf5Writer::Number kind{};
-      std::vector<std::uint64_t> extents;
-      in.take(kind);
-      in.take(extents);
-      return Packer().put(file.array(name, kind, extents)).take();
-    }
-    case Part::texts: {
-      std::vector<std::string> values;
-      in.take(values);
-      file.texts(name, values);
-      break;
-    }
+      return add_by(&Hdf5Assembly::group, file, request);
+    case Part::array:
+      return add_by(&Hdf5Assembly::array, file, request);
+    case Part::texts:
+      return add_by(&Hdf5Assembly::texts, file, request);
     case Part::text_attribute:
+      return add_by(&Hdf5Assembly::text_attribute, file, request);
     case Part::fixed_text_attribute:
-      in.take(second);
-      in.take(third);
-      if (part == Part::text_attribute) file.attribute(name, second, third);
-      if (part == Part::fixed_text_attribute) file.fixed_text_attribute(name, second, third);
-      break;
-    case Part::number_attribute: {
-      std::vector<std::int64_t> values;
-      in.take(second);
-      in.take(values);
-      file.attribute(name, second, values);
-      break;
-    }
+      return add_by(&Hdf5Assembly::fixed_text_attribute, file, request);
+    case Part::number_attribute:
+      return add_by(&Hdf5Assembly::number_attribute, file, request);
     case Part::scale:
-      file.dimension_scale(name);
-      break;
-    case Part::attached_scale: {
-      unsigned dimension = 0;
-      in.take(dimension);
-      in.take(second);
-      file.attach_scale(name, dimension, second);
-      break;
-    }
+      return add_by(&Hdf5Assembly::dimension_scale, file, request);
+    case Part::attached_scale:
+      return add_by(&Hdf5Assembly::attach_scale, file, request);
     case Part::end:
-      return Packer().put(file.close()).take();
+      return add_by(&Hdf5Assembly::close, file, request);
   }
   return {};
 }
@@ -97,14 +78,15 @@ std::string add_whole_part(Hdf5Assembly& file, std::string_view request) {
   return reply;
 }
 
-Packer request_for(Part part, std::string_view name) {
-  Packer request;
-  request.put(part).put(name);
-  return request;
+template <class... Parts>
+void order(Contained& child, const Parts&... request) {
+  static_cast<void>(child.ask(packed(request...)));
 }
 
-std::uint64_t number_in(std::string_view reply) {
+template <class... Parts>
+std::uint64_t number_from(Contained& child, const Parts&... request) {
   std::uint64_t number = 0;
+  const std::string reply = child.ask(packed(request...));
   Unpacker(reply, "").take(number);
   return number;
 }
@@ -120,7 +102,7 @@ Hdf5Writer::Hdf5Writer(fs::path path) : path_(std::move(path)), place_(path_) {
         auto file = std::make_shared<Hdf5Assembly>(descriptor, where);
         return [file](std::string_view request) { return add_whole_part(*file, request); };
       });
-  static_cast<void>(child_->ask(request_for(Part::file, "").take()));
+  order(*child_, Part::file);
 }
 
 Hdf5Writer::~Hdf5Writer() = default;
@@ -134,66 +116,56 @@ void Hdf5Writer::reserve(std::uint64_t bytes) {
 }
 
 void Hdf5Writer::group(const std::string& name) {
-  static_cast<void>(child_->ask(request_for(Part::group, name).take()));
+  order(*child_, Part::group, name);
 }
 
 std::uint64_t Hdf5Writer::arrange(const std::string& name, Number kind,
                                   const std::vector<std::uint64_t>& extents) {
-  return number_in(child_->ask(request_for(Part::array, name).put(kind).put(extents).take()));
+  return number_from(*child_, Part::array, name, kind, extents);
 }
 
 void Hdf5Writer::numbers(const std::string& name, const std::vector<double>& values) {
-  write_at(arrange(name, Number::float64, {values.size()}), values.size() * sizeof(double),
-           values.data());
+  write_at(arrange(name, Number::float64, {values.size()}), std::as_bytes(std::span(values)));
 }
 
 void Hdf5Writer::table(const std::string& name, const std::vector<double>& values,
                        std::size_t columns) {
   write_at(arrange(name, Number::float64, {values.size() / columns, columns}),
-           values.size() * sizeof(double), values.data());
+           std::as_bytes(std::span(values)));
 }
 
 void Hdf5Writer::integers(const std::string& name, const std::vector<std::int32_t>& values,
                           std::size_t columns) {
   std::vector<std::uint64_t> extents{values.size() / columns};
   if (columns > 1) extents.push_back(columns);
-  write_at(arrange(name, Number::int32, extents), values.size() * sizeof(std::int32_t),
-           values.data());
+  write_at(arrange(name, Number::int32, extents), std::as_bytes(std::span(values)));
 }
 
 void Hdf5Writer::long_integers(const std::string& name, const std::vector<std::int64_t>& values) {
-  write_at(arrange(name, Number::int64, {values.size()}), values.size() * sizeof(std::int64_t),
-           values.data());
+  write_at(arrange(name, Number::int64, {values.size()}), std::as_bytes(std::span(values)));
 }
 
 void Hdf5Writer::bytes(const std::string& name, const std::vector<std::uint8_t>& values) {
-  write_at(arrange(name, Number::uint8, {values.size()}), values.size(), values.data());
+  write_at(arrange(name, Number::uint8, {values.size()}), std::as_bytes(std::span(values)));
 }
 
 void Hdf5Writer::texts(const std::string& name, const std::vector<std::string>& values) {
-  static_cast<void>(child_->ask(request_for(Part::texts, name).put(values).take()));
+  order(*child_, Part::texts, name, values);
 }
 
 void Hdf5Writer::attribute(const std::string& object, const std::string& name,
                            const std::string& text) {
-  static_cast<void>(child_->ask(request_for(Part::text_attribute, object)
-                                    .put(std::string_view(name))
-                                    .put(std::string_view(text))
-                                    .take()));
+  order(*child_, Part::text_attribute, object, name, text);
 }
 
 void Hdf5Writer::fixed_text_attribute(const std::string& object, const std::string& name,
                                       const std::string& text) {
-  static_cast<void>(child_->ask(request_for(Part::fixed_text_attribute, object)
-                                    .put(std::string_view(name))
-                                    .put(std::string_view(text))
-                                    .take()));
+  order(*child_, Part::fixed_text_attribute, object, name, text);
 }
 
 void Hdf5Writer::attribute(const std::string& object, const std::string& name,
                            const std::vector<std::int64_t>& values) {
-  static_cast<void>(child_->ask(
-      request_for(Part::number_attribute, object).put(std::string_view(name)).put(values).take()));
+  order(*child_, Part::number_attribute, object, name, values);
 }
 
 void Hdf5Writer::array(const std::string& name, Number kind,
@@ -201,50 +173,22 @@ void Hdf5Writer::array(const std::string& name, Number kind,
   places_[name] = arrange(name, kind, extents);
 }
 
-void Hdf5Writer::write_at(std::uint64_t place, std::size_t size, const void* values) const {
-  const char* bytes = static_cast<const char*>(values);
-  while (size > 0) {
-    const ssize_t n = ::pwrite(place_.descriptor(), bytes, size, static_cast<off_t>(place));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) throw cannot_write(path_, n < 0 ? errno : ENOSPC);
-    bytes += n;
-    place += static_cast<std::uint64_t>(n);
-    size -= static_cast<std::size_t>(n);
-  }
-}
-
-void Hdf5Writer::part(const std::string& name, std::uint64_t first,
-                      std::span<const double> values) const {
-  write_at(places_.at(name) + first * sizeof(double), values.size_bytes(), values.data());
-}
-
-void Hdf5Writer::part(const std::string& name, std::uint64_t first,
-                      std::span<const std::int64_t> values) const {
-  write_at(places_.at(name) + first * sizeof(std::int64_t), values.size_bytes(), values.data());
-}
-
-void Hdf5Writer::part(const std::string& name, std::uint64_t first,
-                      std::span<const std::int32_t> values) const {
-  write_at(places_.at(name) + first * sizeof(std::int32_t), values.size_bytes(), values.data());
-}
-
-void Hdf5Writer::part(const std::string& name, std::uint64_t first,
-                      std::span<const std::uint8_t> values) const {
-  write_at(places_.at(name) + first, values.size_bytes(), values.data());
+void Hdf5Writer::write_at(std::uint64_t place, std::span<const std::byte> values) const {
+  const std::size_t done = pwrite_all(place_.descriptor(), values.data(), values.size(), place);
+  if (done < values.size()) throw cannot_write(path_, errno);
 }
 
 void Hdf5Writer::dimension_scale(const std::string& name) {
-  static_cast<void>(child_->ask(request_for(Part::scale, name).take()));
+  order(*child_, Part::scale, name);
 }
 
 void Hdf5Writer::attach_scale(const std::string& array, unsigned dimension,
                               const std::string& scale) {
-  static_cast<void>(child_->ask(
-      request_for(Part::attached_scale, array).put(dimension).put(std::string_view(scale)).take()));
+  order(*child_, Part::attached_scale, array, dimension, scale);
 }
 
 void Hdf5Writer::commit() {
-  const std::uint64_t size = number_in(child_->ask(request_for(Part::end, "").take()));
+  const std::uint64_t size = number_from(*child_, Part::end);
   if (::ftruncate(place_.descriptor(), static_cast<off_t>(size)) != 0 ||
       !write_checksum(place_.descriptor(), size)) {
     throw cannot_write(path_, errno);

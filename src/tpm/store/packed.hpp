@@ -4,6 +4,7 @@
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -17,30 +18,33 @@ namespace tpm {
 class Packer {
  public:
   template <class T>
-  requires std::is_trivially_copyable_v<T> Packer& put(const T& value) {
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
-    return *this;
-  }
-  Packer& put(std::string_view text) {
+  requires std::is_trivially_copyable_v<T>
+  void put(const T& value) { bytes_.append(reinterpret_cast<const char*>(&value), sizeof value); }
+  void put(std::string_view text) {
     put(std::uint64_t{text.size()});
     bytes_.append(text);
-    return *this;
   }
   template <class T>
-  Packer& put(const std::vector<T>& list) {
+  void put(const std::vector<T>& list) {
     put(std::uint64_t{list.size()});
     if constexpr (std::is_trivially_copyable_v<T>) {
       bytes_.append(reinterpret_cast<const char*>(list.data()), list.size() * sizeof(T));
     } else {
       for (const T& value : list) put(std::string_view(value));
     }
-    return *this;
   }
   [[nodiscard]] std::string take() { return std::move(bytes_); }
 
  private:
   std::string bytes_;
 };
+
+template <class... Parts>
+[[nodiscard]] std::string packed(const Parts&... parts) {
+  Packer packer;
+  (packer.put(parts), ...);
+  return packer.take();
+}
 
 /// Takes apart what a Packer packed. The child may have been led astray by the file: nothing that
 /// it says is believed, and sizes are checked against what is there.
@@ -83,5 +87,19 @@ class Unpacker {
   std::string_view bytes_;
   std::string_view where_;
 };
+
+/// Takes arguments from a request, in their order, and calls with them.
+/// @return what the call returns, packed; empty if that is nothing
+template <class... Arguments, class Call>
+[[nodiscard]] std::string answered(Unpacker& request, const Call& call) {
+  std::tuple<std::remove_cvref_t<Arguments>...> arguments;
+  std::apply([&](auto&... each) { (request.take(each), ...); }, arguments);
+  if constexpr (std::is_void_v<std::invoke_result_t<Call, Arguments...>>) {
+    std::apply(call, arguments);
+    return {};
+  } else {
+    return packed(std::apply(call, arguments));
+  }
+}
 
 }  // namespace tpm

@@ -82,39 +82,24 @@ RowLogWriter::RowLogWriter(std::filesystem::path path, std::string_view header,
                            std::size_t row_bytes, Name name)
     : path_(std::move(path)), row_bytes_(row_bytes) {
   if (is_device_or_pipe(path_)) {
-    file_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+    file_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
   } else {
     begun_ = std::make_unique<Replacement>(path_);
-    file_ = ::fcntl(begun_->descriptor(), F_DUPFD_CLOEXEC, 0);
+    file_ = Descriptor(::fcntl(begun_->descriptor(), F_DUPFD_CLOEXEC, 0));
   }
-  if (file_ < 0) throw cannot_write_rows(path_, "cannot be written");
+  if (file_.get() < 0) throw cannot_write_rows(path_, "cannot be written");
   kept_.reserve(2 * kBlock);
   put(kept_, kMagic.data(), kMagic.size());
   put_number(kept_, static_cast<std::uint32_t>(row_bytes));
   put_text(kept_, header);
-  try {
-    flush();
-    if (name == Name::instantaneous) appear();
-  } catch (...) {
-    give_up();
-    throw;
-  }
+  flush();
+  if (name == Name::instantaneous) appear();
 }
 
 void RowLogWriter::appear() {
   if (begun_ == nullptr) return;
   begun_->put_in_place();
   begun_.reset();
-}
-
-void RowLogWriter::give_up() noexcept {
-  if (file_ >= 0) (void)::close(file_);
-  file_ = -1;
-  begun_.reset();  // removes what never appeared
-}
-
-RowLogWriter::~RowLogWriter() {
-  give_up();
 }
 
 void RowLogWriter::append(const void* row) {
@@ -128,7 +113,7 @@ void RowLogWriter::append(const void* row) {
 
 void RowLogWriter::flush() {
   const std::string_view bytes(reinterpret_cast<const char*>(kept_.data()), kept_.size());
-  if (!write_all(file_, bytes)) throw cannot_write_rows(path_, "cannot be written on");
+  if (!write_all(file_.get(), bytes)) throw cannot_write_rows(path_, "cannot be written on");
   kept_.clear();
 }
 
@@ -136,11 +121,10 @@ void RowLogWriter::close(std::string_view closing) {
   put_number(kept_, kClosing);
   put_text(kept_, closing);
   flush();
-  if (::fsync(file_) != 0 && errno != EINVAL) {  // EINVAL: a device or pipe, without a disk
+  if (::fsync(file_.get()) != 0 && errno != EINVAL) {  // EINVAL: a device or pipe, without a disk
     throw cannot_write_rows(path_, "cannot be brought to the disk");
   }
-  (void)::close(file_);
-  file_ = -1;
+  (void)file_.close();
 }
 
 namespace {

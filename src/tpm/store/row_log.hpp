@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/store/descriptor.hpp"
 #include "tpm/store/replacement.hpp"
 
 namespace tpm {
@@ -22,9 +23,6 @@ class RowLogWriter {
   enum class Name { instantaneous, later };
   RowLogWriter(std::filesystem::path path, std::string_view header, std::size_t row_bytes,
                Name name = Name::instantaneous);
-  ~RowLogWriter();
-  RowLogWriter(const RowLogWriter&) = delete;
-  RowLogWriter& operator=(const RowLogWriter&) = delete;
 
   /// Takes the place of a file of this name.
   void appear();
@@ -38,10 +36,8 @@ class RowLogWriter {
  private:
   std::filesystem::path path_;
   std::unique_ptr<Replacement> begun_;  ///< until it appears
-  int file_ = -1;
+  Descriptor file_;
   std::size_t row_bytes_;
-  void give_up() noexcept;
-
   std::uint32_t rows_ = 0;
   std::vector<std::byte> kept_;
 };

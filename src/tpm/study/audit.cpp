@@ -8,6 +8,7 @@
 #include <map>
 
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/audit_kinds.hpp"
 #include "tpmkit/error.hpp"

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/cause_search.hpp"
 #include "tpmkit/error.hpp"
@@ -83,14 +84,6 @@ bool satisfied(double left, const std::string& relation, double right) {
   return left >= right;
 }
 
-void append(std::vector<AuditInput>& inputs, std::vector<AuditInput> more) {
-  for (AuditInput& input : more) {
-    const bool known = std::any_of(inputs.begin(), inputs.end(),
-                                   [&](const AuditInput& i) { return i.name == input.name; });
-    if (!known) inputs.push_back(std::move(input));
-  }
-}
-
 }  // namespace
 
 AuditVerdict audit_verdict(DigitVerdict verdict) noexcept {
@@ -121,11 +114,6 @@ std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim) {
   return {std::move(low), std::move(high)};
 }
 
-std::string with_unit(std::string_view number, const Unit& unit) {
-  if (unit.symbol.empty()) return std::string(number);
-  return fmt::format("{} {}", number, unit.symbol);
-}
-
 void check_value(const ClaimReader& claim, Finding& finding) {
   const ClaimValue value(claim);
   const Scope scope = claim.scope();
@@ -144,6 +132,15 @@ void check_value(const ClaimReader& claim, Finding& finding) {
   }
 }
 
+void add_check(Finding& finding, std::string what, const DigitCheck& check, const Unit& unit) {
+  finding.verdict = std::max(finding.verdict, audit_verdict(check.verdict));
+  finding.details.push_back({std::move(what),
+                             with_unit(check.printed.text, unit),
+                             {check.computed, unit},
+                             check.words(),
+                             check.difference_percent});
+}
+
 void check_range(const ClaimReader& claim, Finding& finding) {
   const ClaimValue value(claim);
   const Unit unit = claim.unit();
@@ -159,12 +156,7 @@ void check_range(const ClaimReader& claim, Finding& finding) {
     const auto at_text = over.at(end).get<std::string>();
     scope.values[symbol] = claim.quantity(at_text, scope);
     const DigitCheck check = compare_digits(printed, value.total(scope) / unit.to_si);
-    finding.details.push_back({fmt::format("{} = {}", symbol, at_text),
-                               with_unit(printed.text, unit),
-                               {check.computed, unit},
-                               check.words(),
-                               check.difference_percent});
-    finding.verdict = std::max(finding.verdict, audit_verdict(check.verdict));
+    add_check(finding, fmt::format("{} = {}", symbol, at_text), check, unit);
     const double difference = check.difference_percent.value_or(0.0);
     if (!finding.recomputed || std::abs(difference) > std::abs(worst)) {
       finding.recomputed = {check.computed, unit};

@@ -29,13 +29,13 @@ void check_table(const ClaimReader& claim, Finding& finding);
 /// chi-square test at 95 %, without it there is nothing to hold "close" to.
 void check_misfit(const ClaimReader& claim, Finding& finding);
 
+/// Adds a comparison of digits to the details, and to the verdict unless that is worse already.
+void add_check(Finding& finding, std::string what, const DigitCheck& check, const Unit& unit);
+
 /// The audit's word for a comparison of digits.
 [[nodiscard]] AuditVerdict audit_verdict(DigitVerdict verdict) noexcept;
 
 /// Key "printed" of a range or a band: two numbers, low before high.
 [[nodiscard]] std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim);
-
-/// "0.613 N"; just the number if the unit is 1.
-[[nodiscard]] std::string with_unit(std::string_view number, const Unit& unit);
 
 }  // namespace tpm::study

@@ -4,6 +4,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/study/audit_kinds.hpp"
 #include "tpm/study/printed_number.hpp"
 #include "tpmkit/error.hpp"
@@ -139,14 +140,9 @@ void check_table(const ClaimReader& claim, Finding& finding) {
       ++cells.cells;
       cells.by_rounding += check.verdict == DigitVerdict::by_rounding ? 1 : 0;
       cells.by_truncation += check.verdict == DigitVerdict::by_truncation ? 1 : 0;
-      finding.verdict = std::max(finding.verdict, audit_verdict(check.verdict));
       const double difference = check.difference_percent.value_or(0.0);
       if (!check.explained() && std::abs(difference) > std::abs(worst)) worst = difference;
-      finding.details.push_back({fmt::format("{}, {}", row.words, s.column),
-                                 with_unit(check.printed.text, unit),
-                                 {check.computed, unit},
-                                 check.words(),
-                                 check.difference_percent});
+      add_check(finding, fmt::format("{}, {}", row.words, s.column), check, unit);
     }
   }
   finding.cells = cells;

@@ -47,15 +47,6 @@ SteppedForces law_forces(const LawFile& law, const Protocol& motion, double peri
 
 }  // namespace
 
-LawFile at_surface(const LawFile& law) {
-  LawFile plain = law;
-  const std::vector<LawParameter> parameters = law_parameters(law.spec);
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (parameters[i].nuisance) plain.values[i] = 0.0;
-  }
-  return plain;
-}
-
 namespace {
 
 void require_contact_law(const LawFile& law) {

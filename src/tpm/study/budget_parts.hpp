@@ -3,12 +3,9 @@
 #include <functional>
 
 #include "tpm/study/error_budget.hpp"
-#include "tpm/study/law_prediction.hpp"
+#include "tpm/study/prediction_parts.hpp"
 
 namespace tpm::study {
-
-/// The law without the recording's contact point and offset.
-[[nodiscard]] LawFile at_surface(const LawFile& law);
 
 /// The stage `law`: its exact answer along a motion.
 [[nodiscard]] BudgetStage law_stage(const LawFile& law, const Protocol& motion,

@@ -9,15 +9,12 @@
 #include <optional>
 #include <tuple>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {
 namespace {
-
-std::string with_unit(const std::string& number, const Unit& unit) {
-  return unit.symbol.empty() ? number : number + " " + unit.symbol;
-}
 
 Scope with_value(const Scope& scope, const std::string& name, double si) {
   Scope changed = scope;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {
@@ -54,11 +55,16 @@ void ClaimReader::bind(Scope& scope, const std::string& name, const std::string&
   scope.values[name] = *si;
 }
 
+void ClaimReader::bind_own(Scope& scope) const {
+  if (!has("with")) return;
+  for (const auto& [name, value] : required("with").items()) {
+    bind(scope, name, value.get<std::string>());
+  }
+}
+
 Scope ClaimReader::scope() const {
   Scope scope;
-  if (const auto with = claim_.find("with"); with != claim_.end()) {
-    for (const auto& [name, value] : with->items()) bind(scope, name, value.get<std::string>());
-  }
+  bind_own(scope);
   return scope;
 }
 
@@ -68,9 +74,7 @@ Scope ClaimReader::row_scope(const PrintedTable& table, std::size_t row) const {
   for (std::size_t c = 0; c < table.columns.size(); ++c) {
     scope.values[table.columns[c].name] = table.si(row, c, at_);
   }
-  if (const auto with = claim_.find("with"); with != claim_.end()) {
-    for (const auto& [name, value] : with->items()) bind(scope, name, value.get<std::string>());
-  }
+  bind_own(scope);
   return scope;
 }
 
@@ -92,7 +96,7 @@ std::vector<AuditInput> ClaimReader::inputs(const std::string& expression,
     const PrintedSymbol* symbol = set_.symbol(name);
     const Unit unit = symbol != nullptr ? symbol->unit : Unit{"", Dimension::dimensionless, 1.0};
     if (symbol != nullptr && !scope.values.contains(name)) {
-      input.printed = symbol->value + (unit.symbol.empty() ? "" : " " + unit.symbol);
+      input.printed = with_unit(symbol->value, unit);
       input.where = symbol->where;
       input.provenance = symbol->provenance;
     } else {
@@ -102,6 +106,14 @@ std::vector<AuditInput> ClaimReader::inputs(const std::string& expression,
     inputs.push_back(std::move(input));
   }
   return inputs;
+}
+
+void append(std::vector<AuditInput>& inputs, std::vector<AuditInput> more) {
+  for (AuditInput& input : more) {
+    const bool known = std::any_of(inputs.begin(), inputs.end(),
+                                   [&](const AuditInput& i) { return i.name == input.name; });
+    if (!known) inputs.push_back(std::move(input));
+  }
 }
 
 ClaimValue::ClaimValue(const ClaimReader& reader) : reader_(reader) {
@@ -161,11 +173,7 @@ std::vector<AuditInput> ClaimValue::inputs(const Scope& scope) const {
   if (unknown_.empty()) {
     std::vector<AuditInput> all;
     for (const std::string& t : terms_) {
-      for (AuditInput& input : reader_.inputs(t, scope)) {
-        const bool known = std::any_of(all.begin(), all.end(),
-                                       [&](const AuditInput& a) { return a.name == input.name; });
-        if (!known) all.push_back(std::move(input));
-      }
+      append(all, reader_.inputs(t, scope));
     }
     return all;
   }

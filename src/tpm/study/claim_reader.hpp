@@ -41,10 +41,15 @@ class ClaimReader {
                                                const Scope& scope) const;
 
  private:
+  void bind_own(Scope& scope) const;
+
   const ClaimSet& set_;
   const Json& claim_;
   std::string at_;
 };
+
+/// Adds the inputs that are not known yet.
+void append(std::vector<AuditInput>& inputs, std::vector<AuditInput> more);
 
 /// A number for a claim: a sum of terms, or the root of an equation (keys "expression", "terms" or
 /// "solve").

@@ -29,11 +29,7 @@ class Walker {
   }
 
   [[nodiscard]] Eigen::VectorXd theta_at_minimum() const {
-    Eigen::VectorXd theta(std::ssize(walk_.parameters));
-    for (Eigen::Index i = 0; i < theta.size(); ++i) {
-      theta[i] = parameter(i).theta(walk_.natural[static_cast<std::size_t>(i)]);
-    }
-    return theta;
+    return theta_of(walk_.parameters, walk_.natural);
   }
 
   /// Derivatives of the residuals by theta; none where they cannot be computed.
@@ -45,10 +41,7 @@ class Walker {
     }
     RowMatrix jacobian;
     if (!residuals_.evaluate(natural, residual, &jacobian)) return std::nullopt;
-    for (Eigen::Index i = 0; i < theta.size(); ++i) {
-      jacobian.col(i) *= parameter(i).natural_slope(theta[i]);
-    }
-    return jacobian;
+    return jacobian * natural_slopes(walk_.parameters, theta).asDiagonal();
   }
 
   /// One Gauss-Newton step of the others from `theta`, contact kept.

@@ -58,13 +58,6 @@ PlannedFit one_recording(const DesignProblem& problem, const PlannedExperiment& 
   return fit;
 }
 
-std::vector<double> starts_of(const FitConfig& config) {
-  std::vector<double> natural;
-  natural.reserve(config.parameters.size());
-  for (const EstimatedParameter& p : config.parameters) natural.push_back(p.fit.start);
-  return natural;
-}
-
 const PlannedNoise& noise_for(const DesignProblem& problem, const PlannedExperiment& experiment) {
   if (experiment.kind == ExperimentKind::ramp_hold) return problem.force_noise;
   if (problem.depth_noise) return *problem.depth_noise;
@@ -283,15 +276,13 @@ RecordingInformation recording_information(const DesignProblem& problem,
                                            const PlannedExperiment& experiment) {
   const PlannedFit fit = one_recording(problem, experiment);
   const ExperimentResiduals function(fit.config, fit.data);
-  const std::vector<double> natural = starts_of(fit.config);
+  const std::vector<FitParameter> parameters = searched_parameters(fit.config);
+  const std::vector<double> natural = start_values(parameters);
   RowMatrix sensitivity;
   const Eigen::VectorXd expected = function.predict(natural, &sensitivity);
   Eigen::MatrixXd jacobian =
       sigmas(noise_for(problem, experiment), expected).cwiseInverse().asDiagonal() * sensitivity;
-  for (std::size_t i = 0; i < natural.size(); ++i) {
-    const FitParameter& p = fit.config.parameters[i].fit;
-    jacobian.col(static_cast<Eigen::Index>(i)) *= p.natural_slope(p.theta(natural[i]));
-  }
+  jacobian = jacobian * natural_slopes(parameters, theta_of(parameters, natural)).asDiagonal();
   const Eigen::MatrixXd seen =
       without_nuisance(jacobian, static_cast<Eigen::Index>(problem.config.parameters.size()));
   RecordingInformation information;
@@ -391,7 +382,8 @@ PlannedFit planned_fit(const DesignProblem& problem,
   for (const PlannedExperiment& e : experiments) {
     const PlannedFit one = one_recording(problem, e);
     const ExperimentResiduals function(one.config, one.data);
-    const Eigen::VectorXd expected = function.predict(starts_of(one.config), nullptr);
+    const Eigen::VectorXd expected =
+        function.predict(start_values(searched_parameters(one.config)), nullptr);
     const Eigen::VectorXd sigma = sigmas(noise_for(problem, e), expected);
     PointSet points = std::get<PointSet>(one.data.front());
     for (std::size_t i = 0; i < points.data.size(); ++i) {

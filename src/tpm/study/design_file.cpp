@@ -16,25 +16,20 @@ using ExperimentKind = PlannedExperiment::Kind;
 /// More candidates than this are a mistake of the file.
 constexpr std::size_t kMostCandidates = 20000;
 
-std::string key_of(std::string_view where, std::string_view key) {
-  return where.find(": key ") == std::string_view::npos ? fmt::format("{}: key /{}", where, key)
-                                                        : fmt::format("{}/{}", where, key);
-}
-
-/// A quantity above `least` (or equal to it, if that is allowed).
-double quantity(const Json& value, Dimension dimension, const std::string& where,
+/// A quantity above 0 (or equal to it, if that is allowed).
+double quantity(const Json& value, Dimension dimension, const DocumentPlace& place,
                 bool zero_allowed = false) {
   const auto text = value.get<std::string>();
-  const double si = parse_quantity(text, dimension, where);
+  const double si = parse_quantity(text, dimension, place.where);
   if (si > 0.0 || (zero_allowed && si == 0.0)) return si;
-  throw bad_input(where, fmt::format("'{}'", printable(text)),
+  throw bad_input(place.where, fmt::format("'{}'", printable(text)),
                   zero_allowed ? "0 or more" : "more than 0");
 }
 
 std::vector<double> intervals_of(const Json& grid, const DocumentPlace& place) {
   std::vector<double> values;
   for (const auto& value : grid.at("interval"))
-    values.push_back(quantity(value, Dimension::time, place.key("interval").where));
+    values.push_back(quantity(value, Dimension::time, place.key("interval")));
   return values;
 }
 
@@ -76,36 +71,35 @@ void add_grid(const Json& grid, const DocumentPlace& place, std::vector<PlannedE
 }
 
 std::vector<PlannedExperiment> parse_grids(const Json& document, const char* key,
-                                           std::string_view where) {
+                                           const DocumentPlace& place) {
   std::vector<PlannedExperiment> list;
   if (!document.contains(key)) return list;
   std::size_t index = 0;
   for (const auto& grid : document.at(key)) {
-    add_grid(grid, DocumentPlace{std::string(where)}.key(key).key(std::to_string(index++)), list);
+    add_grid(grid, place.key(key).key(std::to_string(index++)), list);
   }
   return list;
 }
 
-PlannedNoise parse_noise(const Json& j, Dimension dimension, const std::string& where) {
-  return {quantity(j.at("absolute"), dimension, key_of(where, "absolute")),
-          j.value("relative", 0.0)};
+PlannedNoise parse_noise(const Json& j, Dimension dimension, const DocumentPlace& place) {
+  return {quantity(j.at("absolute"), dimension, place.key("absolute")), j.value("relative", 0.0)};
 }
 
-void parse_noises(const Json& j, DesignProblem& problem, const std::string& where) {
-  problem.force_noise = parse_noise(j.at("force"), Dimension::force, key_of(where, "force"));
+void parse_noises(const Json& j, DesignProblem& problem, const DocumentPlace& place) {
+  problem.force_noise = parse_noise(j.at("force"), Dimension::force, place.key("force"));
   if (j.contains("depth")) {
-    problem.depth_noise = parse_noise(j.at("depth"), Dimension::length, key_of(where, "depth"));
+    problem.depth_noise = parse_noise(j.at("depth"), Dimension::length, place.key("depth"));
   }
   problem.scale_known = j.value("scale", "known") == "known";
   if (j.contains("correlation_time")) {
-    problem.correlation_time_s = quantity(j.at("correlation_time"), Dimension::time,
-                                          key_of(where, "correlation_time"), true);
+    problem.correlation_time_s =
+        quantity(j.at("correlation_time"), Dimension::time, place.key("correlation_time"), true);
   }
 }
 
-void parse_limits(const Json& j, MachineLimits& limits, const std::string& where) {
+void parse_limits(const Json& j, MachineLimits& limits, const DocumentPlace& place) {
   const auto set = [&](const char* key, Dimension dimension, double& limit) {
-    if (j.contains(key)) limit = quantity(j.at(key), dimension, key_of(where, key));
+    if (j.contains(key)) limit = quantity(j.at(key), dimension, place.key(key));
   };
   set("rate", Dimension::speed, limits.rate_m_per_s);
   set("depth", Dimension::length, limits.depth_m);
@@ -116,7 +110,7 @@ void parse_limits(const Json& j, MachineLimits& limits, const std::string& where
 }
 
 /// The fit that the design prepares, through the reader of fit configurations.
-FitConfig parse_model(const Json& document, std::string_view where) {
+FitConfig parse_model(const Json& document, const DocumentPlace& place) {
   Json fit{{"title", document.at("title")}};
   for (const char* key : {"model", "law", "tension", "parameters", "fixed"}) {
     if (document.contains(key)) fit[key] = document.at(key);
@@ -124,9 +118,9 @@ FitConfig parse_model(const Json& document, std::string_view where) {
   fit["data"] = Json::array({{{"dataset", "planned"},
                               {"protocol", {{"kind", "measured"}}},
                               {"noise", {{"kind", "per_row"}}}}});
-  FitConfig config = parse_fit_config(fit, where);
+  FitConfig config = parse_fit_config(fit, place.where);
   if (config.law && config.law->drive != Quantity::indentation_depth) {
-    throw bad_input(key_of(where, "law/drive"), "a stretched strip", "indentation_depth");
+    throw bad_input(place.key("law/drive").where, "a stretched strip", "indentation_depth");
   }
   // The search of a simulated fit begins at the true values.
   config.starts = 1;
@@ -135,48 +129,48 @@ FitConfig parse_model(const Json& document, std::string_view where) {
 }
 
 std::size_t parameter_place(const FitConfig& config, const std::string& name,
-                            const std::string& where, std::string_view besides) {
+                            const DocumentPlace& place, std::string_view besides) {
   std::vector<std::string> known;
   for (const EstimatedParameter& p : config.parameters) {
     if (p.fit.name == name) return known.size();
     known.push_back(p.fit.name);
   }
-  throw bad_input(where, fmt::format("no parameter is called '{}'", printable(name)),
+  throw bad_input(place.where, fmt::format("no parameter is called '{}'", printable(name)),
                   fmt::format("{}{}", besides, fmt::join(known, ", ")));
 }
 
-void separate_nuisance(const Json& document, DesignProblem& problem, std::string_view where) {
+void separate_nuisance(const Json& document, DesignProblem& problem, const DocumentPlace& place) {
   if (!document.contains("nuisance")) return;
   auto& list = problem.config.parameters;
   for (const auto& name : document.at("nuisance")) {
-    const std::size_t i = parameter_place(problem.config, name.get<std::string>(),
-                                          key_of(where, "nuisance"), "one of ");
+    const std::size_t i =
+        parameter_place(problem.config, name.get<std::string>(), place.key("nuisance"), "one of ");
     problem.nuisance.push_back(list[i]);
     list.erase(list.begin() + static_cast<std::ptrdiff_t>(i));
   }
   if (!list.empty()) return;
-  throw bad_input(key_of(where, "nuisance"), "every parameter is a nuisance",
+  throw bad_input(place.key("nuisance").where, "every parameter is a nuisance",
                   "at least one that is not");
 }
 
-void require_sizes(const DesignProblem& problem, std::string_view where) {
+void require_sizes(const DesignProblem& problem, const DocumentPlace& place) {
   for (const EstimatedParameter& p : problem.config.parameters) {
     if (p.fit.start != 0.0) continue;
-    throw bad_input(key_of(where, fmt::format("parameters/{}/start", p.fit.name)),
+    throw bad_input(place.key(fmt::format("parameters/{}/start", p.fit.name)).where,
                     "0 has no relative error", "another value, or the parameter under /nuisance");
   }
 }
 
-void parse_known(const Json& document, DesignProblem& problem, std::string_view where) {
+void parse_known(const Json& document, DesignProblem& problem, const DocumentPlace& place) {
   problem.known.assign(problem.config.parameters.size(), std::numeric_limits<double>::infinity());
   if (!document.contains("known")) return;
-  const std::string place = key_of(where, "known");
   for (const auto& [name, error] : document.at("known").items()) {
-    problem.known[parameter_place(problem.config, name, place, "one of ")] = error.get<double>();
+    problem.known[parameter_place(problem.config, name, place.key("known"), "one of ")] =
+        error.get<double>();
   }
 }
 
-void parse_criterion(const Json& document, DesignProblem& problem, std::string_view where) {
+void parse_criterion(const Json& document, DesignProblem& problem, const DocumentPlace& place) {
   const std::string criterion = document.value("criterion", "worst");
   if (criterion == "all" || criterion == "worst") {
     problem.criterion = criterion == "all" ? Criterion::all : Criterion::worst;
@@ -184,17 +178,17 @@ void parse_criterion(const Json& document, DesignProblem& problem, std::string_v
   }
   problem.criterion = Criterion::parameter;
   problem.criterion_parameter =
-      parameter_place(problem.config, criterion, key_of(where, "criterion"), "all, worst, ");
+      parameter_place(problem.config, criterion, place.key("criterion"), "all, worst, ");
 }
 
-void require_creep_noise(const DesignProblem& problem, std::string_view where) {
+void require_creep_noise(const DesignProblem& problem, const DocumentPlace& place) {
   if (problem.depth_noise) return;
   const auto is_creep = [](const PlannedExperiment& e) { return e.kind == ExperimentKind::creep; };
   if (std::none_of(problem.candidates.begin(), problem.candidates.end(), is_creep) &&
       std::none_of(problem.previous.begin(), problem.previous.end(), is_creep)) {
     return;
   }
-  throw bad_input(key_of(where, "noise"), "creep without the noise of a depth",
+  throw bad_input(place.key("noise").where, "creep without the noise of a depth",
                   "it under /noise/depth");
 }
 
@@ -202,19 +196,20 @@ void require_creep_noise(const DesignProblem& problem, std::string_view where) {
 
 DesignProblem parse_design(const Json& written, std::string_view where) {
   const Json document = checked(written, "design", where);
+  const DocumentPlace place{std::string(where)};
   DesignProblem problem;
-  problem.config = parse_model(document, where);
-  separate_nuisance(document, problem, where);
-  require_sizes(problem, where);
-  parse_known(document, problem, where);
-  parse_noises(document.at("noise"), problem, key_of(where, "noise"));
+  problem.config = parse_model(document, place);
+  separate_nuisance(document, problem, place);
+  require_sizes(problem, place);
+  parse_known(document, problem, place);
+  parse_noises(document.at("noise"), problem, place.key("noise"));
   if (document.contains("limits")) {
-    parse_limits(document.at("limits"), problem.limits, key_of(where, "limits"));
+    parse_limits(document.at("limits"), problem.limits, place.key("limits"));
   }
-  problem.candidates = parse_grids(document, "candidates", where);
-  problem.previous = parse_grids(document, "previous", where);
-  require_creep_noise(problem, where);
-  parse_criterion(document, problem, where);
+  problem.candidates = parse_grids(document, "candidates", place);
+  problem.previous = parse_grids(document, "previous", place);
+  require_creep_noise(problem, place);
+  parse_criterion(document, problem, place);
   problem.factor = document.value("identified_factor", problem.factor);
   problem.config.level = document.value("level", problem.config.level);
   return problem;

@@ -50,12 +50,8 @@ std::optional<double> characteristic_time(const DesignProblem& problem, std::siz
   const FitParameter& p = problem.parameter(i);
   if (p.unit.dimension == Dimension::time) return p.start;
   if (p.unit.dimension != Dimension::viscosity || problem.config.law) return {};
-  std::vector<double> natural;
-  for (const EstimatedParameter& e : problem.config.parameters) natural.push_back(e.fit.start);
-  const std::vector<double> values = model_parameters(problem.config, natural, 0);
-  TpmVector vector{};
-  std::copy(values.begin(), values.end(), vector.begin());
-  return from_vector(vector).relaxation_time_s();
+  const std::vector<double> starts = start_values(searched_parameters(problem.config));
+  return from_vector(fitted_element(problem.config, starts)).relaxation_time_s();
 }
 
 /// What of a protocol keeps a time from being seen; empty if nothing obvious does.

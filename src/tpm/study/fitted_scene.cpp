@@ -5,18 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/text.hpp"
 #include "tpm/scene/organ_model.hpp"
 #include "tpm/study/organ_material_parts.hpp"
 
 namespace tpm::study {
 namespace {
-
-constexpr int kSceneDigits = 10;
-
-std::string with_si_unit(double value, Dimension dimension) {
-  return fmt::format("{} {}", shortest(rounded(value, kSceneDigits)), si_symbol(dimension));
-}
 
 /// A material that is not the paper's element, with the fitted values.
 /// @return its longest relaxation time, s
@@ -27,7 +20,8 @@ double set_material(Json& block, BondMaterial material,
   for (std::size_t i = 0; i < table.size(); ++i) {
     set_value(material, table[i].name, values[i], "the fitted material");
     if (table[i].name == "A0" || table[i].name == "l0") {
-      constants[std::string(table[i].name)] = with_si_unit(values[i], table[i].dimension);
+      constants[std::string(table[i].name)] =
+          scene_quantity(values[i], si_symbol(table[i].dimension));
     }
   }
   block = material_block(material, block);
@@ -43,7 +37,7 @@ double set_element(Json& scene, const std::vector<ParameterDescription>& table,
                    const std::vector<double>& values, double spacing_m) {
   for (std::size_t i = 0; i < table.size(); ++i) {
     const std::string name(table[i].name);
-    const std::string text = with_si_unit(values[i], table[i].dimension);
+    const std::string text = scene_quantity(values[i], si_symbol(table[i].dimension));
     if (name != "spacing") {
       scene["material"][name] = text;
     } else if (std::abs(values[i] - spacing_m) > 1e-9 * spacing_m) {
@@ -89,14 +83,6 @@ FittedRamp ramp_of(const FitResult& fit) {
   return ramp;
 }
 
-Json ramp_json(const FittedRamp& ramp) {
-  constexpr int kDigits = 4;
-  return {{"kind", "ramp_hold"},
-          {"depth", fmt::format("{} mm", significant(1e3 * ramp.depth_m, kDigits))},
-          {"rate", fmt::format("{} mm/s", significant(1e3 * ramp.rate_m_per_s, kDigits))},
-          {"hold", fmt::format("{} s", significant(ramp.hold_s, kDigits))}};
-}
-
 }  // namespace
 
 std::optional<FittedScene> fitted_scene(const FitResult& fit) {
@@ -116,7 +102,8 @@ std::optional<FittedScene> fitted_scene(const FitResult& fit) {
                                          config.organ->materials.materials.front(), table, values);
   scene["description"] = fmt::format("material: fitted, {}", config.title);
 
-  const Json ramp = ramp_json(ramp_of(fit));
+  const FittedRamp fitted = ramp_of(fit);
+  const Json ramp = ramp_hold_block(fitted.depth_m, fitted.rate_m_per_s, fitted.hold_s);
   scene["protocol"] = ramp;
   scene["contacts"] = Json::array({{{"kind", "sphere"}}});
   result.session = network_session(config.title, scene, ramp, slowest_s);

@@ -8,6 +8,7 @@
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/prediction_parts.hpp"
@@ -180,7 +181,7 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
   }
   const Unit unit = shown_unit(quantity_dimension(law.spec.drive));
   const auto text = [&](double value) {
-    return significant(value / unit.to_si, 3) + (unit.symbol.empty() ? "" : " " + unit.symbol);
+    return with_unit(significant(value / unit.to_si, 3), unit);
   };
   if (law.fitted_to && deepest > 1.001 * *law.fitted_to) {
     p.flags.push_back(fmt::format("extrapolates: {} deep, and the law was fitted to {}",
@@ -220,6 +221,15 @@ Eigen::MatrixXd covariance_root(const Eigen::MatrixXd& covariance) {
   const SymmetricModes modes =
       symmetric_modes(inverse.asDiagonal() * covariance * inverse.asDiagonal());
   return sd.asDiagonal() * modes.vectors * modes.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
+LawFile at_surface(const LawFile& law) {
+  LawFile plain = law;
+  const std::vector<LawParameter> parameters = law_parameters(law.spec);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].nuisance) plain.values[i] = 0.0;
+  }
+  return plain;
 }
 
 bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter) {
@@ -336,11 +346,8 @@ LawPrediction predict_by(const Model& model, const LawFile& law, const Protocol&
                     "surface or fitted");
   }
   const UncertainCoordinates u = fitted_coordinates(law, p.placement);
-  std::vector<double> values = law.values;
-  const std::vector<LawParameter> parameters = law_parameters(law.spec);
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (parameters[i].nuisance && p.placement == Placement::surface) values[i] = 0.0;
-  }
+  const std::vector<double> values =
+      p.placement == Placement::surface ? at_surface(law).values : law.values;
   p.contact = values[values.size() - 2];
   p.offset = values.back();
   p.time_s.assign(times_s.begin(), times_s.end());

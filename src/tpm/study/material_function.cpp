@@ -73,7 +73,6 @@ FunctionSizes sizes_of_function(const MaterialFunction& function) {
 /// @param branch number of the parameter's branch, from 0
 FitParameter function_bounds(const LawParameter& p, const FunctionSizes& sizes, int branch,
                              int branches) {
-  constexpr int kDigits = 4;
   constexpr double kBeyond = 10.0;  // of the times that were measured
   FitParameter fit;
   fit.name = p.name;
@@ -95,10 +94,7 @@ FitParameter function_bounds(const LawParameter& p, const FunctionSizes& sizes, 
     fit.upper = 1e3 * sizes.stiffness;
     fit.start = sizes.stiffness / (branches + 1);
   }
-  fit.lower = rounded(fit.lower, kDigits);
-  fit.upper = rounded(fit.upper, kDigits);
-  fit.start = std::clamp(rounded(fit.start, kDigits), fit.lower, fit.upper);
-  return fit;
+  return readable(std::move(fit));
 }
 
 Noise noise_of_function(const MaterialFunction& function, const FunctionSizes& sizes) {
@@ -134,26 +130,18 @@ double largest_residual_share(const FitResult& fit) {
 
 constexpr ProtocolSpans kEndlessHold{.hold_s = std::numeric_limits<double>::infinity()};
 
+std::vector<DataSet> data_set_of(const MaterialFunction& function) {
+  return {std::visit([](const auto& d) { return DataSet(d); }, function.data)};
+}
+
 Candidate fit_function(const LawSpec& law, const MaterialFunction& function, SetupOptions setup) {
-  Candidate candidate;
   setup.profiles = false;
-  const FitConfig config = function_config(law, function, setup);
-  candidate.law = config.law.value();
-  candidate.parameters = static_cast<int>(config.parameters.size()) + 1;  // and the noise's size
-  const std::vector<DataSet> data{
-      std::visit([](const auto& d) { return DataSet(d); }, function.data)};
-  try {
-    candidate.fit = run_fit(config, data);
-  } catch (const Error& error) {
-    // The stiffness of a spring-pot has no value at the step itself: a reading there is a reason
-    // against the law, not an error of the file.
-    const bool of_law = law.fractional != Fractional::none && error.code() == ExitCode::bad_input;
-    if (error.code() != ExitCode::numerical && !of_law) throw;
-    candidate.failed = true;
-    candidate.identified = false;
-    candidate.reason = error.what();
-    return candidate;
-  }
+  // The stiffness of a spring-pot has no value at the step itself: a reading there is a reason
+  // against the law, not an error of the file.
+  const bool refusal_counts = law.fractional != Fractional::none;
+  Candidate candidate =
+      fit_candidate(function_config(law, function, setup), data_set_of(function), refusal_counts);
+  if (candidate.failed) return candidate;
   candidate.rms_over_peak = largest_residual_share(candidate.fit);
   candidate.reason = not_identified(candidate, kEndlessHold);
   candidate.identified = candidate.reason.empty();
@@ -284,9 +272,8 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   rank_candidates(s);
   Candidate& chosen = s.candidates[s.recommended];
   if (options.setup.profiles) {
-    const std::vector<DataSet> data{
-        std::visit([](const auto& d) { return DataSet(d); }, function.data)};
-    chosen.fit = run_fit(function_config(chosen.law, function, options.setup), data);
+    chosen.fit =
+        run_fit(function_config(chosen.law, function, options.setup), data_set_of(function));
     reassess(chosen, kEndlessHold);
   }
   s.warnings = range_warnings(chosen.fit, sizes_of_function(function));

@@ -333,9 +333,7 @@ BondMaterial by_correspondence(OrganMaterial& m, const OrganLessLaw& organ, Bond
 /// Finds the material near a start whose force is the law's.
 void fit_to_law(OrganMaterial& m, const OrganLessLaw& function,
                 const std::vector<FitParameter>& parameters, std::string_view where) {
-  std::vector<double> begin;
-  for (const FitParameter& p : parameters) begin.push_back(p.start);
-  const Minimum best = minimise_near(function, parameters, begin);
+  const Minimum best = minimise_near(function, parameters, start_values(parameters));
   if (!best.usable) {
     throw Error(ExitCode::numerical, std::string(where), "the organ's material was not found",
                 "an organ that stands at the depths of the motion");

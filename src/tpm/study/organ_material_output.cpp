@@ -39,11 +39,6 @@ Json matrix_json(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
-std::string quantity(double value, std::string_view unit) {
-  constexpr int kDigits = 10;
-  return fmt::format("{} {}", shortest(rounded(value, kDigits)), unit);
-}
-
 /// Its name and SI unit: "Einf_Pa".
 std::string parameter_key(const FitParameter& parameter) {
   const std::string_view symbol = si_symbol(parameter.unit.dimension);
@@ -100,21 +95,6 @@ const MaterialCourse& deepest_course(const OrganMaterial& m) {
                            [](const MaterialCourse& a, const MaterialCourse& b) {
                              return deepest_of(a) < deepest_of(b);
                            });
-}
-
-/// The motion as a block of a scene, where the scene says nothing: a ramp and a hold.
-Json ramp_block(const MaterialCourse& c, double rate_m_per_s) {
-  const double deepest = deepest_of(c);
-  const double ramp_s = deepest / rate_m_per_s;
-  const double hold_s = std::max(c.time_s.back() - c.time_s.front() - ramp_s, 1.0);
-  constexpr int kDigits = 4;
-  const auto text = [](double value, const char* unit) {
-    return fmt::format("{} {}", significant(value, kDigits), unit);
-  };
-  return {{"kind", "ramp_hold"},
-          {"depth", text(1e3 * deepest, "mm")},
-          {"rate", text(1e3 * rate_m_per_s, "mm/s")},
-          {"hold", text(hold_s, "s")}};
 }
 
 /// Depth over time of the ramp: of the way from 10 to 90 % of the depth.
@@ -240,11 +220,28 @@ std::string placement_text(const OrganMaterial& m) {
 
 }  // namespace
 
+std::string scene_quantity(double value, std::string_view unit) {
+  constexpr int kDigits = 10;
+  return fmt::format("{} {}", shortest(rounded(value, kDigits)), unit);
+}
+
+Json ramp_hold_block(double depth_m, double rate_m_per_s, double hold_s) {
+  constexpr int kDigits = 4;
+  const auto text = [](double value, const char* unit) {
+    return fmt::format("{} {}", significant(value, kDigits), unit);
+  };
+  return {{"kind", "ramp_hold"},
+          {"depth", text(1e3 * depth_m, "mm")},
+          {"rate", text(1e3 * rate_m_per_s, "mm/s")},
+          {"hold", text(hold_s, "s")}};
+}
+
 Json material_block(const BondMaterial& m, const Json& before) {
-  Json block{{"Einf", quantity(m.equilibrium_Pa, "Pa")}, {"Eprime", quantity(m.lateral_Pa, "Pa")}};
+  Json block{{"Einf", scene_quantity(m.equilibrium_Pa, "Pa")},
+             {"Eprime", scene_quantity(m.lateral_Pa, "Pa")}};
   Json branches = Json::array();
   for (const auto& [modulus, time] : m.branches) {
-    branches.push_back({{"g", quantity(modulus, "Pa")}, {"tau", quantity(time, "s")}});
+    branches.push_back({{"g", scene_quantity(modulus, "Pa")}, {"tau", scene_quantity(time, "s")}});
   }
   if (!branches.empty()) block["branches"] = std::move(branches);
   const auto add_function = [&](const char* key, const ElongationFunction& function) {
@@ -258,7 +255,7 @@ Json material_block(const BondMaterial& m, const Json& before) {
         continue;
       }
       const Unit unit = shown_unit(p.dimension);
-      block[key][p.name] = quantity(value / unit.to_si, unit.symbol);
+      block[key][p.name] = scene_quantity(value / unit.to_si, unit.symbol);
     }
   };
   add_function("potential", m.potential);
@@ -288,7 +285,10 @@ Json network_session(std::string title, const Json& scene, const Json& ramp, dou
 
 void add_protocol_and_session(OrganMaterial& m) {
   const MaterialCourse& deepest = deepest_course(m);
-  const Json ramp = ramp_block(deepest, ramp_rate(deepest));
+  const double depth_m = deepest_of(deepest);
+  const double rate_m_per_s = ramp_rate(deepest);
+  const double held_s = deepest.time_s.back() - deepest.time_s.front() - depth_m / rate_m_per_s;
+  const Json ramp = ramp_hold_block(depth_m, rate_m_per_s, std::max(held_s, 1.0));
   m.scene["description"] = fmt::format("material: law {} put on the organ {}", m.law, m.motion);
   if (!m.scene.contains("protocol")) {
     m.scene["protocol"] = ramp;

@@ -8,6 +8,12 @@ namespace tpm::study {
 /// @param before the block in its place, whose A0, l0 and regions stay
 [[nodiscard]] Json material_block(const BondMaterial& material, const Json& before);
 
+/// "81 mm", as scenes write it.
+[[nodiscard]] std::string scene_quantity(double value, std::string_view unit);
+
+/// A ramp and hold as a block of a scene.
+[[nodiscard]] Json ramp_hold_block(double depth_m, double rate_m_per_s, double hold_s);
+
 /// A session that steps the network of a scene along a ramp and hold, and lets it recover.
 /// @param ramp with `depth`, `rate` and `hold`, as scenes write them
 /// @param slowest_s the tissue's longest relaxation time

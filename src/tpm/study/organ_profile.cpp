@@ -17,15 +17,6 @@ constexpr int kMostRetreats = 6;       // from where the model ends
 constexpr double kFirstDamping = 1e-3;
 constexpr double kMostDamping = 1e6;
 
-/// Residuals with their derivatives by theta.
-struct ProfiledPoint {
-  std::vector<double> natural;
-  Eigen::VectorXd theta, residual;
-  RowMatrix jacobian;
-
-  [[nodiscard]] double cost() const { return residual.squaredNorm(); }
-};
-
 class ShortWalk {
  public:
   ShortWalk(const ResidualFunction& function, std::span<const FitParameter> parameters,
@@ -124,19 +115,8 @@ class ShortWalk {
     return natural;
   }
 
-  [[nodiscard]] bool evaluate(ProfiledPoint& point) const {
-    if (!function_.evaluate(point.natural, point.residual, &point.jacobian)) return false;
-    point.theta.resize(std::ssize(parameters_));
-    for (std::size_t i = 0; i < parameters_.size(); ++i) {
-      const auto k = static_cast<Eigen::Index>(i);
-      point.theta[k] = parameters_[i].theta(point.natural[i]);
-      point.jacobian.col(k) *= parameters_[i].natural_slope(point.theta[k]);
-    }
-    return std::isfinite(point.cost()) && point.jacobian.allFinite();
-  }
-
   /// A damped Gauss-Newton step within the bounds, the profiled parameter fixed.
-  [[nodiscard]] ProfiledPoint step_from(const ProfiledPoint& here, double damping) const {
+  [[nodiscard]] KnownPoint step_from(const KnownPoint& here, double damping) const {
     const Eigen::VectorXd gradient = here.jacobian.transpose() * here.residual;
     std::vector<Eigen::Index> free;
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
@@ -155,7 +135,7 @@ class ShortWalk {
     gram.diagonal().array() += damping + kRidge;
     const Eigen::VectorXd step =
         -length.cwiseInverse().cwiseProduct(gram.ldlt().solve(unit.transpose() * here.residual));
-    ProfiledPoint next;
+    KnownPoint next;
     next.natural = here.natural;
     next.theta = here.theta;
     for (std::size_t i = 0; i < free.size(); ++i) {
@@ -169,20 +149,20 @@ class ShortWalk {
   }
 
   /// The others fitted again; nothing where the model cannot be evaluated.
-  [[nodiscard]] std::optional<ProfiledPoint> constrained(double theta,
-                                                         std::vector<double> start) const {
+  [[nodiscard]] std::optional<KnownPoint> constrained(double theta,
+                                                      std::vector<double> start) const {
     const FitParameter& p = parameters_[index_];
-    ProfiledPoint here;
+    KnownPoint here;
     here.natural = std::move(start);
     here.natural[index_] = std::clamp(p.natural(theta), p.lower, p.upper);
-    if (!evaluate(here)) return std::nullopt;
+    if (!here.evaluate(function_, parameters_)) return std::nullopt;
     double damping = 0.0;
     for (int i = 0; i < kMostSteps && damping <= kMostDamping; ++i) {
-      ProfiledPoint next = step_from(here, damping);
+      KnownPoint next = step_from(here, damping);
       const double promised =
           here.cost() - (here.residual + here.jacobian * (next.theta - here.theta)).squaredNorm();
       if (promised <= kEnough * rise_ && damping <= kFirstDamping) break;
-      if (evaluate(next) && next.cost() < here.cost()) {
+      if (next.evaluate(function_, parameters_) && next.cost() < here.cost()) {
         here = std::move(next);
         damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
       } else {
@@ -192,7 +172,7 @@ class ShortWalk {
     return here;
   }
 
-  [[nodiscard]] Minimum minimum_at(const ProfiledPoint& point) const {
+  [[nodiscard]] Minimum minimum_at(const KnownPoint& point) const {
     Minimum m;
     m.natural = point.natural;
     m.deviance = point.cost() - function_.offset();

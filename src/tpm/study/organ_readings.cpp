@@ -154,26 +154,6 @@ FitParameter placement_parameter(std::string name, Dimension dimension, double s
   return p;
 }
 
-/// Half widths of linearised intervals, in standard deviations of theta.
-double linear_quantile(const FitResult& fit, const Threshold& threshold) {
-  const double factor = threshold.inflation * threshold.variance_factor(fit.best.deviance);
-  return std::sqrt(threshold.rise(fit.best.deviance) / factor);
-}
-
-/// t intervals from the covariance, open at the bounds.
-void add_linear_intervals(FitResult& fit, const Threshold& threshold) {
-  const Covariance& c = fit.covariance;
-  if (!c.full_rank) return;
-  const double quantile = linear_quantile(fit, threshold);
-  for (std::size_t k = 0; k < c.free.size(); ++k) {
-    ParameterResult& p = fit.parameters[c.free[k]];
-    const double theta = p.parameter.theta(p.estimate);
-    const double half = quantile * c.theta_sd[static_cast<Eigen::Index>(k)];
-    if (theta - half > p.parameter.theta_lower()) p.lower = p.parameter.natural(theta - half);
-    if (theta + half < p.parameter.theta_upper()) p.upper = p.parameter.natural(theta + half);
-  }
-}
-
 /// Of the linearised interval in theta; a part of the bounds where there is none.
 double half_width(const FitResult& fit, std::size_t index, const Threshold& threshold) {
   const FitParameter& p = fit.parameters[index].parameter;
@@ -182,7 +162,7 @@ double half_width(const FitResult& fit, std::size_t index, const Threshold& thre
   const Covariance& c = fit.covariance;
   const auto place = std::find(c.free.begin(), c.free.end(), index);
   if (!c.full_rank || place == c.free.end()) return kPart * searched;
-  return linear_quantile(fit, threshold) * c.theta_sd[place - c.free.begin()];
+  return threshold.multiplier(fit.best.deviance) * c.theta_sd[place - c.free.begin()];
 }
 
 /// Profiles of the bonds' parameters, contacts and offsets fitted again at every point.
@@ -211,15 +191,14 @@ std::optional<Minimum> profile_bonds(FitResult& fit, const ResidualFunction& fun
 /// @param threshold on return with the inflation at that minimum
 FitResult fit_and_profile(const OrganLessReadings& function, const std::vector<FitParameter>& all,
                           std::size_t bonds, Threshold& threshold, bool profiles) {
-  std::vector<double> start;
-  for (const FitParameter& p : all) start.push_back(p.start);
+  std::vector<double> start = start_values(all);
   constexpr int kMostDescents = 5;
   for (int descents = 0; descents <= kMostDescents; ++descents) {
     FitResult fit = fit_residuals(
         function, all, {start}, threshold, false, StartKind::solved,
         [&](std::span<const double> best) { return function.correlation(best).inflation(); });
     threshold.inflation = fit.inflation;
-    add_linear_intervals(fit, threshold);
+    linear_intervals(fit, all, threshold);
     if (!profiles) return fit;
     std::optional<Minimum> deeper = profile_bonds(fit, function, all, bonds, threshold);
     if (!deeper) return fit;
@@ -265,11 +244,8 @@ ReadingsFit fit_to_readings(const OrganModel& model, const FittedBonds& bonds,
         placement_parameter("offset" + number, Dimension::force, r.offset_N, peak_N, peak_N));
   }
   const OrganLessReadings function(model, bonds, recordings, parameters.size());
-  Threshold threshold;
-  threshold.level = kReadingsLevel;
-  threshold.scale_known = false;
-  threshold.data_count = static_cast<int>(function.residual_count());
-  threshold.parameter_count = static_cast<int>(all.size());
+  Threshold threshold{kReadingsLevel, false, static_cast<int>(function.residual_count()),
+                      static_cast<int>(all.size())};
   ReadingsFit result;
   result.fit = fit_and_profile(function, all, parameters.size(), threshold, profiles);
   result.readings = threshold.data_count;

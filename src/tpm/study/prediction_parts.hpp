@@ -1,5 +1,6 @@
 #pragma once
 // Parts that predictions of a law, of an organ and of a recording share.
+#include "tpm/fit/fit.hpp"
 #include "tpm/study/law_prediction.hpp"
 #include "tpmkit/model.hpp"
 
@@ -15,6 +16,9 @@ struct UncertainCoordinates {
   std::vector<Coordinate> coordinate;
   Eigen::MatrixXd root;  ///< coordinates x independent directions
 };
+
+/// The law without the recording's contact point and offset.
+[[nodiscard]] LawFile at_surface(const LawFile& law);
 
 /// The slack length of a strip belongs to the specimen: it stays, as in select_law.
 [[nodiscard]] bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter);
@@ -55,6 +59,11 @@ struct OwnPlacement {
   std::vector<double> values;      ///< of the whole law
   std::vector<std::size_t> place;  ///< of what was found
 };
+/// Fits what belongs to a recording, with the parameters of the material as given.
+/// @param values of the whole law
+[[nodiscard]] FitResult fit_placement(const LawSpec& law, std::span<const double> values,
+                                      const PreparedRecording& recording,
+                                      const SetupOptions& setup);
 /// For the law itself, with the starts of a fit.
 [[nodiscard]] OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording);
 

@@ -106,21 +106,26 @@ void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& reco
 
 }  // namespace
 
+FitResult fit_placement(const LawSpec& law, std::span<const double> values,
+                        const PreparedRecording& recording, const SetupOptions& setup) {
+  FitConfig config = recording_config(law, std::span(&recording, 1), setup);
+  const std::vector<LawParameter> parameters = law_parameters(law);
+  std::erase_if(config.parameters, [&](const EstimatedParameter& p) {
+    const bool own =
+        p.sets.size() == 1 && belongs_to_recording(law, parameters[p.sets.front().parameter]);
+    return !own;
+  });
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (!belongs_to_recording(law, parameters[i])) config.fixed[i] = values[i];
+  }
+  return run_fit(config, data_sets(std::span(&recording, 1)));
+}
+
 OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording) {
   SetupOptions setup;
   setup.reference = law.spec.reference;
   setup.profiles = false;
-  FitConfig config = recording_config(law.spec, std::span(&recording, 1), setup);
-  const std::vector<LawParameter> parameters = law_parameters(law.spec);
-  std::erase_if(config.parameters, [&](const EstimatedParameter& p) {
-    const bool own =
-        p.sets.size() == 1 && belongs_to_recording(law.spec, parameters[p.sets.front().parameter]);
-    return !own;
-  });
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!belongs_to_recording(law.spec, parameters[i])) config.fixed[i] = law.values[i];
-  }
-  const FitResult fit = run_fit(config, data_sets(std::span(&recording, 1)));
+  const FitResult fit = fit_placement(law.spec, law.values, recording, setup);
   OwnPlacement result{model_parameters(fit.config, fit.best.natural, 0), {}};
   for (const std::size_t free : fit.covariance.free) {
     result.place.push_back(fit.config.parameters[free].sets.front().parameter);
@@ -165,10 +170,7 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
     values = own.values;
     add_own_directions(u, own, model, law, recording, motion);
   } else if (p.placement == Placement::surface) {
-    const std::vector<LawParameter> parameters = law_parameters(law.spec);
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      if (parameters[i].nuisance) values[i] = 0.0;
-    }
+    values = at_surface(law).values;
   }
   p.contact = values[values.size() - 2];
   p.offset = values.back();

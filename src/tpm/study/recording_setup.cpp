@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/median.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
@@ -30,15 +32,6 @@ struct Sizes {
 double start_drive(const PreparedRecording& r) {
   return r.phases.contact_found && !r.phases.preloaded ? r.phases.contact_drive
                                                        : r.recording.drive.front();
-}
-
-double median_step(const std::vector<double>& time_s) {
-  std::vector<double> steps;
-  steps.reserve(time_s.size());
-  for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
 }
 
 Sizes sizes_of(std::span<const PreparedRecording> recordings) {
@@ -68,15 +61,6 @@ Sizes sizes_of(std::span<const PreparedRecording> recordings) {
                   "a ramp that is answered by a rising response");
 }
 
-/// Bounds and starts need no more digits than people read.
-FitParameter readable(FitParameter fit) {
-  constexpr int kDigits = 4;
-  fit.lower = rounded(fit.lower, kDigits);
-  fit.upper = rounded(fit.upper, kDigits);
-  fit.start = std::clamp(rounded(fit.start, kDigits), fit.lower, fit.upper);
-  return fit;
-}
-
 /// Automatic bounds, and how far they may be moved out.
 struct AutomaticBounds {
   FitParameter fit;
@@ -85,10 +69,11 @@ struct AutomaticBounds {
 
 AutomaticBounds law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int branches) {
   constexpr double kFurther = 1e3;  // on a log scale
-  FitParameter fit;
+  const auto linear = [&p](double lower, double start, double upper) {
+    return FitParameter{p.name, shown_unit(p.dimension), Scale::linear, start, lower, upper};
+  };
+  FitParameter fit = linear(p.lower, p.lower, p.upper);
   WidestBounds widest{p.lower, p.upper};
-  fit.name = p.name;
-  fit.unit = shown_unit(p.dimension);
   const double stiffness = sizes.response / sizes.drive;
   if (p.dimension == Dimension::time) {
     fit.scale = Scale::log;
@@ -98,25 +83,13 @@ AutomaticBounds law_parameter_bounds(const LawParameter& p, const Sizes& sizes, 
     // What relaxes between two samples is not seen, however far the bound is moved.
     widest = {fit.lower, kFurther * fit.upper};
   } else if (p.name == "exponent") {
-    fit.scale = Scale::linear;
-    fit.lower = 1.0;
-    fit.upper = 6.0;
-    fit.start = 1.5;
+    fit = linear(1.0, 1.5, 6.0);
   } else if (p.name == "alpha") {
-    fit.scale = Scale::linear;
-    fit.lower = p.lower;
-    fit.upper = p.upper;
     fit.start = 0.3;
   } else if (p.name == "beta") {
-    fit.scale = Scale::linear;
-    fit.lower = p.lower;
-    fit.upper = p.upper;
     fit.start = 0.1;
   } else if (p.name == "tension_share") {
-    fit.scale = Scale::linear;
-    fit.lower = 0.0;
-    fit.upper = 1.0;
-    fit.start = 0.5;
+    fit = linear(0.0, 0.5, 1.0);
   } else {
     fit.scale = p.linear ? Scale::linear : Scale::log;
     fit.lower = p.linear ? 0.0 : 1e-4 * stiffness;
@@ -177,16 +150,11 @@ AutomaticBounds contact_bounds(const LawSpec& law, std::span<const PreparedRecor
 }
 
 AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
-  FitParameter fit;
-  fit.name = std::move(name);
-  fit.scale = Scale::linear;
-  fit.unit = shown_unit(quantity_dimension(law.response));
-  const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
-  fit.start = 0.0;
-  fit.lower = -peak;
-  fit.upper = peak;
   constexpr double kFurther = 10.0;
-  return {readable(std::move(fit)), {-kFurther * peak, kFurther * peak}};
+  const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
+  const Unit unit = shown_unit(quantity_dimension(law.response));
+  return {readable({std::move(name), unit, Scale::linear, 0.0, -peak, peak}),
+          {-kFurther * peak, kFurther * peak}};
 }
 
 Noise noise_of(const PreparedRecording& r) {
@@ -252,6 +220,21 @@ void add_nuisance(FitConfig& config, const LawModel& model,
 }
 
 }  // namespace
+
+double median_step(std::span<const double> time_s) {
+  std::vector<double> steps;
+  steps.reserve(time_s.size());
+  for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
+  return median(std::move(steps));
+}
+
+FitParameter readable(FitParameter fit) {
+  constexpr int kDigits = 4;
+  fit.lower = rounded(fit.lower, kDigits);
+  fit.upper = rounded(fit.upper, kDigits);
+  fit.start = std::clamp(rounded(fit.start, kDigits), fit.lower, fit.upper);
+  return fit;
+}
 
 PreparedRecording prepare_recording(std::string name, Recording recording,
                                     const PhaseOptions& options) {
@@ -372,8 +355,7 @@ Json import_json(const ImportOptions& import) {
 Json config_json(const FitConfig& config) {
   const std::unique_ptr<Model> model = make_model(config);
   const auto text = [](double value, const Unit& unit) {
-    return fmt::format("{}{}{}", shortest(value / unit.to_si), unit.symbol.empty() ? "" : " ",
-                       unit.symbol);
+    return with_unit(shortest(value / unit.to_si), unit);
   };
   Json j{{"title", config.title}};
   if (config.law) {

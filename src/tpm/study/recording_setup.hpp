@@ -1,6 +1,7 @@
 #pragma once
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,12 @@ struct SetupOptions {
   std::optional<double> exponent;
   std::function<bool()> interrupted;  ///< see FitConfig
 };
+
+/// Time between two samples, at the median.
+[[nodiscard]] double median_step(std::span<const double> time_s);
+
+/// Bounds and start with no more digits than people read.
+[[nodiscard]] FitParameter readable(FitParameter fit);
 
 /// A reference depth for the kernels: the largest drive above contact among the recordings, to two
 /// digits.

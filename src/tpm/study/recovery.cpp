@@ -131,12 +131,8 @@ void count_intervals(const ExperimentResiduals& function, const Trials& trials,
   // The search ends within 1e-4 standard deviations of a minimum.
   constexpr double kDeeper = 1e-3;
   if (least < fit.best.deviance * (1.0 - kDeeper / fit.value_count)) ++result.missed;
-  Threshold threshold;
-  threshold.level = kLevel;
-  threshold.scale_known = false;
-  threshold.data_count = fit.value_count;
-  threshold.parameter_count = static_cast<int>(parameters.size());
-  threshold.inflation = fit.inflation;
+  const Threshold threshold{kLevel, false, fit.value_count, static_cast<int>(parameters.size()),
+                            fit.inflation};
   const double rise = threshold.rise(least);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     for (ParameterCoverage& coverage : result.parameters) {

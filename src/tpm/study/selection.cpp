@@ -7,6 +7,7 @@
 
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/study/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {
@@ -121,24 +122,30 @@ bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
   return !candidate.law.solid && spans.too_short_to_end(longest_s);
 }
 
-namespace {
-
-Candidate fit_candidate(const LawSpec& law, std::span<const PreparedRecording> recordings,
-                        const std::vector<DataSet>& data, SetupOptions setup) {
+Candidate fit_candidate(const FitConfig& config, const std::vector<DataSet>& data,
+                        bool refusal_counts) {
   Candidate candidate;
-  setup.profiles = false;
-  const FitConfig config = recording_config(law, recordings, setup);
   candidate.law = config.law.value();
   candidate.parameters = static_cast<int>(config.parameters.size()) + 1;  // and the noise's size
   try {
     candidate.fit = run_fit(config, data);
   } catch (const Error& error) {
-    if (error.code() != ExitCode::numerical) throw;
+    const bool of_law = refusal_counts && error.code() == ExitCode::bad_input;
+    if (error.code() != ExitCode::numerical && !of_law) throw;
     candidate.failed = true;
     candidate.identified = false;
     candidate.reason = error.what();
-    return candidate;
   }
+  return candidate;
+}
+
+namespace {
+
+Candidate fit_to_recordings(const LawSpec& law, std::span<const PreparedRecording> recordings,
+                            const std::vector<DataSet>& data, SetupOptions setup) {
+  setup.profiles = false;
+  Candidate candidate = fit_candidate(recording_config(law, recordings, setup), data);
+  if (candidate.failed) return candidate;
   candidate.rms_over_peak = rms_over_peak(candidate.fit);
   const ProtocolSpans spans = protocol_spans(recordings);
   candidate.reason = not_identified(candidate, spans);
@@ -193,7 +200,7 @@ void add_laws_without_plateau(Selection& s, std::span<const PreparedRecording> r
     fluid.solid = false;
     const bool possible = !c.failed && c.law.branches > 0 && c.law.form == BranchForm::parallel &&
                           c.law.fractional == Fractional::none && plateau_is_not_told(c.fit);
-    if (possible) s.candidates.push_back(fit_candidate(fluid, recordings, data, options.setup));
+    if (possible) s.candidates.push_back(fit_to_recordings(fluid, recordings, data, options.setup));
   }
 }
 
@@ -207,21 +214,11 @@ HeldOut predict_one(const Candidate& candidate, std::span<const PreparedRecordin
   }
   setup.profiles = false;
   const FitResult fit = run_fit(recording_config(candidate.law, others, setup), data_sets(others));
-  FitConfig target = recording_config(candidate.law, recordings.subspan(left_out, 1), setup);
-  const auto values = model_parameters(fit.config, fit.best.natural, 0);
-  const auto table = law_parameters(candidate.law);
-  std::erase_if(target.parameters, [&](const EstimatedParameter& p) {
-    return p.fit.name != "offset" && p.fit.name != "contact";
-  });
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    // The slack length of a stretched specimen is its own and stays; offset and contact depth
-    // belong to the recording.
-    const bool of_recording = table[i].nuisance && target.law->drive != Quantity::relative_length;
-    if (!of_recording) target.fixed[i] = values[i];
-  }
   HeldOut held;
   held.what = recordings[left_out].name;
-  const FitResult prediction = run_fit(target, data_sets(recordings.subspan(left_out, 1)));
+  const FitResult prediction =
+      fit_placement(candidate.law, model_parameters(fit.config, fit.best.natural, 0),
+                    recordings[left_out], setup);
   const RecordingFit& r = prediction.recordings.front();
   held.rms = r.rms_residual;
   held.rms_over_peak = r.rms_residual / r.peak;
@@ -436,7 +433,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   s.prediction_factor = options.prediction_factor;
   Progress progress("fitting laws", laws.size());
   for (const LawSpec& law : laws) {
-    s.candidates.push_back(fit_candidate(law, recordings, data, options.setup));
+    s.candidates.push_back(fit_to_recordings(law, recordings, data, options.setup));
     progress.advance();
   }
   add_laws_without_plateau(s, recordings, data, options);

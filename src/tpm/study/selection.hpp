@@ -86,6 +86,11 @@ struct Selection {
 [[nodiscard]] Json to_json(const Selection& selection);
 [[nodiscard]] std::string to_terminal_text(const Selection& selection);
 
+/// One law fitted; that no start ends in a usable point is a reason against it.
+/// @param refusal_counts that it has no answer at a reading (bad input) is one, too
+[[nodiscard]] Candidate fit_candidate(const FitConfig& config, const std::vector<DataSet>& data,
+                                      bool refusal_counts = false);
+
 /// The law that select_law recommends with a given margin of BIC.
 /// @param candidates in any order, with their scores
 /// @return place in candidates. Throws Error(numerical) if no law could be fitted.

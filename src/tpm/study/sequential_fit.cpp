@@ -21,13 +21,6 @@ constexpr std::size_t kFirstPass = 12;
 constexpr std::size_t kKeptStarts = 4;
 constexpr double kFirstNoise = 1e-2;  // of the peak, until it is known
 
-double typical_interval(std::span<const double> time_s) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
-  std::nth_element(steps.begin(), steps.begin() + std::ssize(steps) / 2, steps.end());
-  return steps[steps.size() / 2];
-}
-
 double student_quantile(double degrees, double level) {
   // In long double, which Boost would take, a quantile costs more than the rest of a sample.
   using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
@@ -245,14 +238,11 @@ std::vector<std::vector<double>> SequentialFit::next_starts(const ResidualFuncti
   const std::size_t n = recording_.time_s.size();
   if (n < next_search_ && here_) return starts;
   next_search_ = 2 * n;
-  std::vector<FitParameter> parameters;
   std::vector<bool> linear;
-  for (std::size_t i = 0; i < config.parameters.size(); ++i) {
-    parameters.push_back(config.parameters[i].fit);
+  for (std::size_t i = 0; i < config.parameters.size(); ++i)
     linear.push_back(function.linear_in(i));
-  }
-  for (auto& start : projected_starts(function, parameters, linear, settings_.starts, kKeptStarts,
-                                      settings_.seed)) {
+  for (auto& start : projected_starts(function, searched_parameters(config), linear,
+                                      settings_.starts, kKeptStarts, settings_.seed)) {
     starts.push_back(std::move(start));
   }
   return starts;
@@ -267,14 +257,13 @@ void SequentialFit::pass_through_history() {
   const LawModel model(spec_);
   const FitConfig& config = so_far->config;
   const PreparedRecording* const prepared = &so_far->recording;
-  AutoregressiveNoise noise(here_ ? here_->noise.phi() : 0.0, typical_interval(recording_.time_s));
+  AutoregressiveNoise noise(here_ ? here_->noise.phi() : 0.0, median_step(recording_.time_s));
   const double guess = kFirstNoise * std::max(std::abs(prepared->phases.peak_response), 1e-12);
   const bool known = estimate_ && estimate_->sigma > 0.0;
   WhitenedPrefix function(model, config, *prepared, noise, known ? estimate_->sigma : guess);
   if (function.residual_count() <= std::ssize(config.parameters) + 2) return;
   ++passes_;
-  std::vector<FitParameter> parameters;
-  for (const EstimatedParameter& p : config.parameters) parameters.push_back(p.fit);
+  const std::vector<FitParameter> parameters = searched_parameters(config);
   Minimum best = least_of(function, parameters, next_starts(function, config));
   if (!best.usable) return;
   const auto correlation = improve_in_turn(function, parameters, noise, best);

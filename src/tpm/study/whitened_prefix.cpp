@@ -16,10 +16,7 @@ std::optional<AutoregressionEstimate> correlation_near(const WhitenedPrefix& fun
   Eigen::VectorXd residual;
   RowMatrix jacobian;
   if (!function.plain(natural, residual, &jacobian)) return std::nullopt;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const FitParameter& p = parameters[i];
-    jacobian.col(static_cast<Eigen::Index>(i)) *= p.natural_slope(p.theta(natural[i]));
-  }
+  jacobian = jacobian * natural_slopes(parameters, theta_of(parameters, natural)).asDiagonal();
   const Eigen::MatrixXd columns = jacobian(Eigen::all, off_bounds(parameters, natural));
   const bool enough = columns.cols() > 0 && residual.size() > columns.cols() + 2;
   if (!enough || !(residual.squaredNorm() > 0.0)) return std::nullopt;

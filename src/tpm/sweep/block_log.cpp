@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "tpm/store/check_sum.hpp"
+#include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpmkit/error.hpp"
 
@@ -48,21 +49,12 @@ bool take_all(std::string_view& from, std::vector<T>& values) {
   return true;
 }
 
-bool unpack(const Sweep& sweep, std::string_view bytes, CellBlock& block) {
-  const std::uint64_t first = block.number * sweep.block_cells;
-  const auto cells = static_cast<std::size_t>(std::min(sweep.block_cells, sweep.cells() - first));
-  block.status.resize(cells);
-  block.reason.resize(cells);
-  block.error_estimate.resize(cells);
-  block.model.resize(sweep.model->models().empty() ? 0 : cells);
+/// @param block empty_block()
+bool unpack(std::string_view bytes, CellBlock& block) {
   bool whole = take_all(bytes, block.status) && take_all(bytes, block.reason) &&
                take_all(bytes, block.error_estimate) && take_all(bytes, block.model);
-  block.counts.assign(sweep.model->counted().size(), std::vector<std::int64_t>(cells));
   for (auto& counts : block.counts) whole = whole && take_all(bytes, counts);
-  for (const SweepVariable& variable : sweep.variables) {
-    block.values.emplace_back(cells * variable.width());
-    whole = whole && take_all(bytes, block.values.back());
-  }
+  for (auto& values : block.values) whole = whole && take_all(bytes, values);
   while (whole && !bytes.empty()) {
     const std::size_t end = bytes.find('\0');
     if (end == std::string_view::npos) return false;
@@ -113,14 +105,14 @@ BlockLog::BlockLog(std::filesystem::path path, const Sweep& sweep,
   std::error_code ignored;
   if (path_.has_parent_path()) std::filesystem::create_directories(path_.parent_path(), ignored);
   open(O_RDWR | O_CREAT);
-  if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
+  if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0) {
     throw Error(ExitCode::environment, path_.string(), "another tpm sweep is writing it",
                 "one at a time, or shards with files of their own");
   }
   begin();
   find_blocks(note);
   // What stands behind the last block was cut short: new blocks take its place.
-  if (::ftruncate(file_, static_cast<off_t>(length_)) != 0) throw cannot_write_log(path_);
+  if (::ftruncate(file_.get(), static_cast<off_t>(length_)) != 0) throw cannot_write_log(path_);
 }
 
 BlockLog BlockLog::to_read(std::filesystem::path path, const Sweep& sweep,
@@ -138,24 +130,12 @@ BlockLog BlockLog::to_read(std::filesystem::path path, const Sweep& sweep,
   return log;
 }
 
-BlockLog::~BlockLog() {
-  if (file_ >= 0) ::close(file_);
-}
-
-BlockLog::BlockLog(BlockLog&& other) noexcept
-    : path_(std::move(other.path_)),
-      sweep_(other.sweep_),
-      file_(std::exchange(other.file_, -1)),
-      length_(other.length_),
-      size_(other.size_),
-      place_(std::move(other.place_)) {}
-
 void BlockLog::open(int flags) {
   if ((flags & O_CREAT) != 0) require_not_read(path_);
-  file_ = ::open(path_.c_str(), flags | O_CLOEXEC | O_NONBLOCK, 0666);
-  if (file_ >= 0 && (flags & O_CREAT) == 0) note_reading(path_, file_);
+  file_ = Descriptor(::open(path_.c_str(), flags | O_CLOEXEC | O_NONBLOCK, 0666));
+  if (file_.get() >= 0 && (flags & O_CREAT) == 0) note_reading(path_, file_.get());
   struct stat found {};
-  if (file_ < 0 || ::fstat(file_, &found) != 0) {
+  if (file_.get() < 0 || ::fstat(file_.get(), &found) != 0) {
     if ((flags & O_CREAT) != 0) throw cannot_write_log(path_);
     throw bad_input(path_.string(), std::strerror(errno), "a shard that tpm sweep has written");
   }
@@ -176,7 +156,7 @@ void BlockLog::begin() {
   if (!read_at(0, head, length_) || !right.starts_with(head)) {
     throw bad_input(path_.string(), "is no log of a sweep", "a file that tpm sweep has begun");
   }
-  if (::pwrite(file_, right.data(), right.size(), 0) != static_cast<ssize_t>(right.size())) {
+  if (pwrite_all(file_.get(), right.data(), right.size(), 0) < right.size()) {
     throw cannot_write_log(path_);
   }
   length_ = right.size();
@@ -185,15 +165,7 @@ void BlockLog::begin() {
 bool BlockLog::read_at(std::uint64_t offset, std::string& bytes, std::uint64_t size) const {
   if (offset > length_ || length_ - offset < size) return false;
   bytes.resize(size);
-  std::uint64_t done = 0;
-  while (done < size) {
-    const ssize_t n =
-        ::pread(file_, bytes.data() + done, size - done, static_cast<off_t>(offset + done));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    done += static_cast<std::uint64_t>(n);
-  }
-  return true;
+  return pread_all(file_.get(), bytes.data(), size, offset) == size;
 }
 
 bool BlockLog::record_at(std::uint64_t offset, std::uint64_t& number, std::string& payload,
@@ -239,9 +211,8 @@ void BlockLog::find_blocks(const std::function<void(const std::string&)>& note) 
   std::string payload;
   while (offset < length_) {
     if (record_at(offset, number, payload, end)) {
-      CellBlock block;
-      block.number = number;
-      if (place_[number] == 0 && unpack(*sweep_, payload, block)) {
+      CellBlock block = empty_block(*sweep_, number);
+      if (place_[number] == 0 && unpack(payload, block)) {
         place_[number] = offset;
         ++size_;
       }
@@ -261,19 +232,12 @@ void BlockLog::find_blocks(const std::function<void(const std::string&)>& note) 
 }
 
 void BlockLog::append(std::uint64_t number, std::string_view record) {
-  std::uint64_t done = 0;
-  while (done < record.size()) {
-    const ssize_t n = ::pwrite(file_, record.data() + done, record.size() - done,
-                               static_cast<off_t>(length_ + done));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) {
-      const Error error = cannot_write_log(path_);
-      if (::ftruncate(file_, static_cast<off_t>(length_)) != 0) {
-        // The next run cuts the half-written block off.
-      }
-      throw error;
+  if (pwrite_all(file_.get(), record.data(), record.size(), length_) < record.size()) {
+    const Error error = cannot_write_log(path_);
+    if (::ftruncate(file_.get(), static_cast<off_t>(length_)) != 0) {
+      // The next run cuts the half-written block off.
     }
-    done += static_cast<std::uint64_t>(n);
+    throw error;
   }
   place_[number] = length_;
   length_ += record.size();
@@ -301,11 +265,11 @@ void BlockLog::require_room(std::uint64_t blocks) const {
 }
 
 CellBlock BlockLog::read(std::uint64_t number) const {
-  CellBlock block;
+  CellBlock block = empty_block(*sweep_, number);
   std::string payload;
   std::uint64_t end = 0;
   if (!record_at(place_[number], block.number, payload, end) || block.number != number ||
-      !unpack(*sweep_, payload, block)) {
+      !unpack(payload, block)) {
     throw bad_input(path_.string(), fmt::format("block {} is damaged", number),
                     "a log that nobody writes into; the same command computes it again");
   }
@@ -313,7 +277,7 @@ CellBlock BlockLog::read(std::uint64_t number) const {
 }
 
 void BlockLog::sync() {
-  if (::fdatasync(file_) != 0) throw cannot_write_log(path_);
+  if (::fdatasync(file_.get()) != 0) throw cannot_write_log(path_);
 }
 
 }  // namespace tpm::study

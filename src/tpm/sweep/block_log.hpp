@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/store/descriptor.hpp"
 #include "tpm/sweep/cell_block.hpp"
 
 namespace tpm::study {
@@ -27,11 +28,6 @@ class BlockLog {
   /// Opens a log for reading alone.
   [[nodiscard]] static BlockLog to_read(std::filesystem::path path, const Sweep& sweep,
                                         const std::function<void(const std::string&)>& note);
-  ~BlockLog();
-  BlockLog(BlockLog&& other) noexcept;
-  BlockLog(const BlockLog&) = delete;
-  BlockLog& operator=(const BlockLog&) = delete;
-  BlockLog& operator=(BlockLog&&) = delete;
 
   [[nodiscard]] bool has(std::uint64_t block) const { return place_[block] != 0; }
   /// How many blocks there are.
@@ -62,7 +58,7 @@ class BlockLog {
 
   std::filesystem::path path_;
   const Sweep* sweep_;
-  int file_ = -1;
+  Descriptor file_;
   std::uint64_t length_ = 0;  ///< of the file
   std::uint64_t size_ = 0;
   std::vector<std::uint64_t> place_;  ///< of each block in the file; 0: it is not there

@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
+}  // namespace
+
 CellBlock empty_block(const Sweep& sweep, std::uint64_t number) {
   CellBlock block;
   block.number = number;
@@ -26,8 +28,6 @@ CellBlock empty_block(const Sweep& sweep, std::uint64_t number) {
   }
   return block;
 }
-
-}  // namespace
 
 /// The sweep's conditions and formulas with the names that they may use.
 struct CellRunner::Expressions {

@@ -32,6 +32,9 @@ struct CellBlock {
   [[nodiscard]] std::size_t cells() const { return status.size(); }
 };
 
+/// A block of a sweep before anything is found.
+[[nodiscard]] CellBlock empty_block(const Sweep& sweep, std::uint64_t number);
+
 /// Computes blocks, for one worker.
 class CellRunner {
  public:
