@@ -30,7 +30,7 @@ Panel waterfall_panel(const ErrorBudget& b) {
   const std::size_t at = instant_of_largest_sum(b);
   Panel panel{.title = fmt::format("adding up at {} s", significant(b.time_s[at], 4)),
               .x = {"", "", false, 0.5, 1.5 + static_cast<double>(b.lines.size())},
-              .y = {"sum so far, of the peak", "%", false, {}, {}}};
+              .y = {"sum so far, of the peak", "%"}};
   Series steps{.kind = Series::Kind::bracket, .label = "line", .provenance = "derived"};
   Series sums = line("sum so far", {}, {});
   sums.kind = Series::Kind::points;
@@ -65,8 +65,8 @@ Series threshold(const char* words, double share, double until) {
 Panel largest_panel(const ErrorBudget& b) {
   constexpr double kLeastDrawn = 1e-5;  // of the peak, on a logarithmic axis
   Panel panel{.title = "each line's own largest",
-              .x = {"", "", false, 0.5, {}},
-              .y = {"of the peak", "%", true, {}, {}}};
+              .x = {"", "", false, 0.5},
+              .y = {"of the peak", "%", true}};
   Series own{.kind = Series::Kind::points, .label = "largest of the line", .provenance = "derived"};
   const auto add = [&](const std::string& name, double part) {
     panel.x.names.push_back(name);
@@ -87,15 +87,14 @@ Panel largest_panel(const ErrorBudget& b) {
 }  // namespace
 
 Figure budget_figure(const ErrorBudget& budget) {
-  Figure figure;
-  figure.id = "budget";
-  figure.title = fmt::format("Error budget: {}", budget.title);
-  figure.caption = fmt::format(
-      "Signed differences between neighbouring stages in parts of the peak ({} N), added up at the "
-      "instant of their largest sum, and each line's own largest. {}.",
-      significant(budget.peak_N, 3), budget.sentences.empty() ? "" : budget.sentences.front());
-  figure.panels = {waterfall_panel(budget), largest_panel(budget)};
-  return figure;
+  return {"budget",
+          fmt::format("Error budget: {}", budget.title),
+          fmt::format("Signed differences between neighbouring stages in parts of the peak ({} N), "
+                      "added up at the "
+                      "instant of their largest sum, and each line's own largest. {}.",
+                      significant(budget.peak_N, 3),
+                      budget.sentences.empty() ? "" : budget.sentences.front()),
+          {waterfall_panel(budget), largest_panel(budget)}};
 }
 
 std::vector<std::string> write_budget_report(const std::filesystem::path& folder,

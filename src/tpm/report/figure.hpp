@@ -39,8 +39,8 @@ struct Axis {
   std::string quantity;  ///< "contact force"
   std::string unit;      ///< "N"; may be empty
   bool logarithmic = false;
-  std::optional<double> lower;  ///< limits; what is not given follows the data
-  std::optional<double> upper;
+  std::optional<double> lower{};  ///< limits; what is not given follows the data
+  std::optional<double> upper{};
   std::vector<std::string> names{};  ///< what stands at 1, 2, ...: for things that have no number
 };
 
@@ -56,7 +56,7 @@ struct Figure {
   std::string id;  ///< name of the file it is drawn into, without ending
   std::string title;
   std::string caption;
-  std::vector<Panel> panels;
+  std::vector<Panel> panels{};
   std::string note{};  ///< one line drawn below the panels: what the numbers depend on
 };
 

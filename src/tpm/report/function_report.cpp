@@ -34,19 +34,18 @@ Figure step_response_figure(const FitResult& fit, std::size_t choice) {
     law.x.push_back(time);
     law.y.push_back(value);
   }
-  Panel panel{"", {"time", "s", true, {}, {}}, {measured_name, unit.symbol, true, {}, {}}, {}};
+  Panel panel{"", {"time", "s", true}, {measured_name, unit.symbol, true}};
   if (!measured.x.empty()) panel.series.push_back(std::move(measured));
   panel.series.push_back(std::move(law));
-  Figure figure;
   const std::string name =
       std::filesystem::path(fit.config.data.at(choice).dataset).stem().string();
-  figure.id = fmt::format("fit_{}", name);
-  figure.title = fmt::format("{}: {}", name, law_name(fit.config.law.value()));
-  figure.caption = fmt::format(
-      "{} after a unit step at time 0, and the fitted law {}; bars are standard deviations.",
-      measured_name, law_name(*fit.config.law));
-  figure.panels = {std::move(panel)};
-  return figure;
+  return {
+      fmt::format("fit_{}", name),
+      fmt::format("{}: {}", name, law_name(fit.config.law.value())),
+      fmt::format(
+          "{} after a unit step at time 0, and the fitted law {}; bars are standard deviations.",
+          measured_name, law_name(*fit.config.law)),
+      {std::move(panel)}};
 }
 
 std::vector<std::string> write_function_report(const std::filesystem::path& folder,

@@ -95,7 +95,7 @@ std::string cost_sentence(const OrganStudy& study, const StudyCurves& set, std::
 /// A row per condition and reading, the tissues side by side.
 Table readings_table(const OrganStudy& study, const StudyCurves& set, Kind kind,
                      std::string caption) {
-  Table table{std::move(caption), {{"imposed"}, {"reading"}}, {}};
+  Table table{std::move(caption), {{"imposed"}, {"reading"}}};
   const bool compared = set.parameters.has_value();
   for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
     table.columns.push_back({study.config.tissues[t].name, true});
@@ -198,7 +198,7 @@ Cell hypothesis_cell(const HypothesisResult& h) {
 }
 
 Table fits_table(const OrganStudy& study) {
-  Table table{"Estimates with profile-likelihood intervals.", {{"data"}, {"tissue"}}, {}};
+  Table table{"Estimates with profile-likelihood intervals.", {{"data"}, {"tissue"}}};
   const FitConfig& any = study.config.fits.front().configs.front();
   for (const EstimatedParameter& p : any.parameters) table.columns.push_back({p.fit.name, true});
   table.columns.push_back({"chi-square", true});
@@ -231,8 +231,7 @@ Table answers_table(const OrganStudy& study, std::size_t fit) {
   Table table{fmt::format("Fit '{}': readings, and the answers of the fitted tissues. z is the "
                           "difference in standard deviations; 0 within a band.",
                           study.config.fits[fit].name),
-              {{"data set"}, {"reading"}, {"provenance"}, {"observed", true}},
-              {}};
+              {{"data set"}, {"reading"}, {"provenance"}, {"observed", true}}};
   const FitResult* first = nullptr;
   for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
     table.columns.push_back({study.config.tissues[t].name, true});

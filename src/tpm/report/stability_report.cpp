@@ -40,8 +40,7 @@ Table limits_table(const StabilityStudy& study) {
                {"theory"},
                {"theory, s", true},
                {"found, s", true},
-               {"found/theory", true}},
-              {}};
+               {"found/theory", true}}};
   for (const StabilityLimit& l : study.limits) {
     const bool good = std::abs(l.ratio() - 1.0) <= 0.02;
     table.rows.push_back({{l.problem},
@@ -60,8 +59,7 @@ Table servo_table(const StabilityStudy& study, const std::string& problem) {
           "{}, the paper's eta1 = 5 Pa s (tau = 0.208 ms), 4 mm at 90 mm/s and "
           "held, as a servo samples it at its ticks: largest force error there, of the peak.",
           problem),
-      {{"rate, Hz", true}},
-      {}};
+      {{"rate, Hz", true}}};
   for (const ServoRow& row : study.servo) {
     if (row.problem != problem) continue;
     if (table.columns.size() == 1) {
@@ -80,8 +78,7 @@ Table servo_table(const StabilityStudy& study, const std::string& problem) {
 
 Table corners_table(const StabilityStudy& study) {
   Table table{"Degenerate corners, step 1 ms. An answer that is not the expected one is marked.",
-              {{"corner"}, {"what is done"}, {"what is right"}},
-              {}};
+              {{"corner"}, {"what is done"}, {"what is right"}}};
   for (const StepRuleEntry& entry : kStepRules) table.columns.push_back({std::string(entry.text)});
   for (const StabilityCorner& corner : study.corners) {
     std::vector<Cell> row{{corner.name}, {corner.setup}, {corner.expected}};
@@ -128,8 +125,7 @@ Table maps_table(const StabilityStudy& study) {
   Table table{
       "Runs of the maps by class, and against the limit of linear theory: above it without "
       "growth, below it with growth (5 % around it left out).",
-      {{"map"}, {"rule"}},
-      {}};
+      {{"map"}, {"rule"}}};
   for (const StabilityClassEntry& entry : kStabilityClasses) {
     if (entry.meaning == StabilityClass::not_applicable) continue;
     table.columns.push_back({std::string(entry.text), true});
