@@ -8,7 +8,6 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
-#include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/units.hpp"
 
@@ -353,16 +352,8 @@ void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path&
   write_file(folder / "benchmark.json", to_text(to_json(record)));
   std::filesystem::remove(folder / kBenchmarkPart);
   const std::vector<Figure> figures = benchmark_figures(record);
-  std::map<std::string, double> seconds;
-  const auto drawings =
-      timed(seconds, "drawing", [&] { return draw_into(folder, figures, python); });
-  const Document document = benchmark_document(record, figures);
-  write_file(folder / "report.md", to_markdown(document));
-  write_file(folder / "report.html", to_html(document, drawings));
-  Json run = run_record(seconds);
-  run["drawing_python"] = python;
-  run["problems"] = record.runs;
-  write_file(folder / "report.run.json", to_text(run));
+  write_report(folder, benchmark_document(record, figures), figures, python, {},
+               Json{{"problems", record.runs}});
 }
 
 }  // namespace tpm::report

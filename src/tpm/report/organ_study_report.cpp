@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "tpm/core/text.hpp"
 #include "tpm/model/validity_limits.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/fit_cells.hpp"
-#include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm::report {
@@ -357,19 +355,13 @@ Document organ_study_document(const OrganStudy& study, const std::vector<Figure>
 
 void write_organ_study(const OrganStudy& study, const std::filesystem::path& folder,
                        const std::string& python, double seconds) {
-  std::map<std::string, double> parts{{"fits and curves", seconds}};
   const std::vector<Figure> figures = organ_study_figures(study);
-  const auto drawings = timed(parts, "drawing", [&] { return draw_into(folder, figures, python); });
-  const Document document = organ_study_document(study, figures);
-  write_file(folder / "report.md", to_markdown(document));
-  write_file(folder / "report.html", to_html(document, drawings));
+  write_report(folder, organ_study_document(study, figures), figures, python,
+               {{"fits and curves", seconds}});
   write_file(folder / "experiments.json", to_text(to_json(study)));
   write_file(folder / "readings.csv", readings_csv(study));
   write_file(folder / "fits.csv", fits_csv(study));
   write_file(folder / "curves.csv", curves_csv(study));
-  Json record = run_record(parts);
-  record["drawing_python"] = python;
-  write_file(folder / "report.run.json", to_text(record));
 }
 
 }  // namespace tpm::report

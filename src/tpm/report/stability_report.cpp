@@ -9,7 +9,6 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
-#include "tpm/report/run_record.hpp"
 #include "tpm/report/table_document.hpp"
 #include "tpm/store/file.hpp"
 
@@ -354,12 +353,8 @@ Json to_json(const StabilityStudy& study) {
 
 void write_stability(const StabilityStudy& study, const std::filesystem::path& folder,
                      const std::string& python, double seconds) {
-  std::map<std::string, double> parts{{"runs", seconds}};
   const std::vector<Figure> figures = stability_figures(study);
-  const auto drawings = timed(parts, "drawing", [&] { return draw_into(folder, figures, python); });
-  const Document document = stability_document(study, figures);
-  write_file(folder / "report.md", to_markdown(document));
-  write_file(folder / "report.html", to_html(document, drawings));
+  write_report(folder, stability_document(study, figures), figures, python, {{"runs", seconds}});
   write_file(folder / "stability.json", to_text(to_json(study)));
   if (!study.limits.empty()) write_file(folder / "limits.csv", stability_limits_csv(study));
   if (!study.corners.empty()) write_file(folder / "corners.csv", stability_corners_csv(study));
@@ -367,9 +362,6 @@ void write_stability(const StabilityStudy& study, const std::filesystem::path& f
   for (const std::string& id : map_ids(study)) {
     write_file(folder / fmt::format("map_{}.csv", id), stability_map_csv(study, id));
   }
-  Json record = run_record(parts);
-  record["drawing_python"] = python;
-  write_file(folder / "report.run.json", to_text(record));
 }
 
 }  // namespace tpm::report
