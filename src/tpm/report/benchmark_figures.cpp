@@ -63,8 +63,7 @@ Series trail_of(const BenchmarkResult& result, const std::string& curve, const C
     if (point.curve() != curve || point.failed()) continue;
     const std::optional<Cost> cost = cost_of(point);
     if (!cost) continue;
-    s.x.push_back(cost->value);
-    s.y.push_back(point.error);
+    s.add(cost->value, point.error);
     if (!spread) continue;
     s.lower.push_back(cost->lower);
     s.upper.push_back(cost->upper);

@@ -64,10 +64,8 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
   measured.label = predicted.label + ", on the simulated device";
   for (const BorderPoint& p : points) {
     if (p.delay_periods != delay || p.damping_N_s_per_m != damping) continue;
-    predicted.x.push_back(p.rate_Hz);
-    predicted.y.push_back(p.predicted);
-    measured.x.push_back(p.rate_Hz);
-    measured.y.push_back(p.measured);
+    predicted.add(p.rate_Hz, p.predicted);
+    measured.add(p.rate_Hz, p.measured);
   }
   panel.series.push_back(std::move(predicted));
   panel.series.push_back(std::move(measured));
@@ -77,8 +75,7 @@ Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
   Series s{.label = "Colgate-Schenkel 2b/T, all taut", .provenance = "model"};
   for (const BorderPoint& p : points) {
     if (p.delay_periods != 0 || p.damping_N_s_per_m != damping) continue;
-    s.x.push_back(p.rate_Hz);
-    s.y.push_back(2.0 * damping * p.rate_Hz);
+    s.add(p.rate_Hz, 2.0 * damping * p.rate_Hz);
   }
   return s;
 }
@@ -120,10 +117,8 @@ Figure rule_figure(const BorderStudy& study) {
     measured.label = predicted.label + ", on the simulated device";
     for (const RulePoint& p : study.rules) {
       if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
-      predicted.x.push_back(p.relaxation_time_s / kPeriod_s);
-      predicted.y.push_back(p.predicted_N_s_per_m / kHalfPeriod_s);
-      measured.x.push_back(p.relaxation_time_s / kPeriod_s);
-      measured.y.push_back(p.measured_N_s_per_m / kHalfPeriod_s);
+      predicted.add(p.relaxation_time_s / kPeriod_s, p.predicted_N_s_per_m / kHalfPeriod_s);
+      measured.add(p.relaxation_time_s / kPeriod_s, p.measured_N_s_per_m / kHalfPeriod_s);
     }
     panel.series.push_back(std::move(predicted));
     panel.series.push_back(std::move(measured));
@@ -269,8 +264,7 @@ Figure impact_figure(const BorderStudy& study) {
       figure.panels.push_back(std::move(panel));
     }
     Series& series = figure.panels.back().series[p.rests[1] ? 0 : 1];
-    series.x.push_back(p.speed_m_per_s);
-    series.y.push_back(p.share);
+    series.add(p.speed_m_per_s, p.share);
   }
   for (Panel& panel : figure.panels) {
     std::erase_if(panel.series, [](const Series& series) { return series.x.empty(); });

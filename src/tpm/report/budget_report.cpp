@@ -40,18 +40,13 @@ Panel waterfall_panel(const ErrorBudget& b) {
     const double next = sum + 100.0 * l.difference_N[at] / b.peak_N;
     const double x = static_cast<double>(panel.x.names.size() + 1);
     panel.x.names.push_back(l.name);
-    steps.x.push_back(x);
-    steps.lower.push_back(std::min(sum, next));
-    steps.upper.push_back(std::max(sum, next));
-    sums.x.push_back(x);
-    sums.y.push_back(next);
+    steps.add_range(x, std::min(sum, next), std::max(sum, next));
+    sums.add(x, next);
     sum = next;
   }
   panel.x.names.push_back("sum");
   const double end = static_cast<double>(panel.x.names.size());
-  steps.x.push_back(end);
-  steps.lower.push_back(std::min(sum, 0.0));
-  steps.upper.push_back(std::max(sum, 0.0));
+  steps.add_range(end, std::min(sum, 0.0), std::max(sum, 0.0));
   panel.series = {std::move(steps), std::move(sums)};
   return panel;
 }
@@ -70,8 +65,7 @@ Panel largest_panel(const ErrorBudget& b) {
   Series own{.kind = Series::Kind::points, .label = "largest of the line", .provenance = "derived"};
   const auto add = [&](const std::string& name, double part) {
     panel.x.names.push_back(name);
-    own.x.push_back(static_cast<double>(panel.x.names.size()));
-    own.y.push_back(100.0 * std::max(part, kLeastDrawn));
+    own.add(static_cast<double>(panel.x.names.size()), 100.0 * std::max(part, kLeastDrawn));
   };
   for (const BudgetLine& l : b.lines) add(l.name, l.largest);
   if (b.random) add("parameters", b.random->largest);

@@ -55,8 +55,7 @@ Panel parameter_panel(const DesignResult& result, const Direction& d, std::size_
     Series s =
         line(fmt::format(fmt::runtime(d.curve), significant(across / d.curve_to_si, 4)), {}, {});
     for (const auto& [x, y] : points) {
-      s.x.push_back(x);
-      s.y.push_back(y);
+      s.add(x, y);
     }
     panel.series.push_back(std::move(s));
   }

@@ -33,6 +33,16 @@ struct Series {
   std::vector<double> upper{};
   std::vector<double> z{};  ///< NaN: nothing there
   std::string text{};
+
+  void add(double at, double value) {
+    x.push_back(at);
+    y.push_back(value);
+  }
+  void add_range(double at, double least, double most) {
+    x.push_back(at);
+    lower.push_back(least);
+    upper.push_back(most);
+  }
 };
 
 struct Axis {

@@ -42,11 +42,9 @@ Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::strin
     unit = p.parameter.unit.to_si;
     axis = parameter_axis(p.parameter);
     interval.label = fmt::format("{:.4g} % interval", 100.0 * variant.result.config.level);
-    interval.x.push_back(variant.rate_m_per_s * 1e3);
-    interval.lower.push_back(p.lower.value_or(p.parameter.lower) / unit);
-    interval.upper.push_back(p.upper.value_or(p.parameter.upper) / unit);
-    estimate.x.push_back(variant.rate_m_per_s * 1e3);
-    estimate.y.push_back(p.estimate / unit);
+    interval.add_range(variant.rate_m_per_s * 1e3, p.lower.value_or(p.parameter.lower) / unit,
+                       p.upper.value_or(p.parameter.upper) / unit);
+    estimate.add(variant.rate_m_per_s * 1e3, p.estimate / unit);
   }
   interval.provenance = "derived";
   interval.assumed = "ramp rate";
@@ -73,8 +71,7 @@ std::vector<Series> profile_series(const ParameterResult& result,
     const double risen = point.deviance - least;
     if (risen > 2.0 * at.rise)
       continue;  // far above the limit it only squeezes the part that matters
-    profile.x.push_back(point.natural / si);
-    profile.y.push_back(risen / at.unit);
+    profile.add(point.natural / si, risen / at.unit);
   }
   Series limit =
       line(fmt::format("limit of the {:.4g} % interval", 100.0 * at.level),

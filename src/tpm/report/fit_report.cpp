@@ -41,8 +41,7 @@ Series measured_part(const std::vector<const FittedDatum*>& readings, bool stora
     if (is_storage(datum.quantity) != storage || datum.held_out != held_out) continue;
     s.provenance = std::string(provenance_name(datum.provenance));
     if (!(*datum.value > 0.0)) continue;
-    s.x.push_back(*datum.frequency_Hz);
-    s.y.push_back(*datum.value / unit);
+    s.add(*datum.frequency_Hz, *datum.value / unit);
     // A bar below 0 would leave the axis.
     s.sd.push_back(std::min(d->reading_sd, 0.99 * *datum.value) / unit);
   }
@@ -77,8 +76,7 @@ std::array<Series, 2> law_lines(const FitResult& fit, std::size_t choice,
     const double value = law.value[static_cast<Eigen::Index>(i)];
     if (!(value > 0.0)) continue;
     Series& s = lines[i / kPoints];
-    s.x.push_back(grid.frequency_Hz[i % kPoints]);
-    s.y.push_back(value / unit);
+    s.add(grid.frequency_Hz[i % kPoints], value / unit);
   }
   return lines;
 }
@@ -116,12 +114,9 @@ Panel specimen_panel(const SpecimenStudy& study, const PooledParameter& p) {
   for (std::size_t i = 0; i < study.rows.size(); ++i) {
     const ParameterResult* r = result_of(study.rows[i], p.parameter.name);
     if (r == nullptr || (logarithmic && !(r->estimate > 0.0))) continue;
-    estimate.x.push_back(static_cast<double>(i + 1));
-    estimate.y.push_back(r->estimate / unit);
+    estimate.add(static_cast<double>(i + 1), r->estimate / unit);
     if (!r->lower || !r->upper || (logarithmic && !(*r->lower > 0.0))) continue;
-    interval.x.push_back(static_cast<double>(i + 1));
-    interval.lower.push_back(*r->lower / unit);
-    interval.upper.push_back(*r->upper / unit);
+    interval.add_range(static_cast<double>(i + 1), *r->lower / unit, *r->upper / unit);
   }
   Series typical = line("typical specimen", {0.5, last}, {});
   typical.provenance = "derived";

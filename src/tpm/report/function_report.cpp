@@ -24,15 +24,13 @@ Figure step_response_figure(const FitResult& fit, std::size_t choice) {
     measured.provenance = provenance_name(d->datum.provenance);
     along.emplace_back(d->datum.time_s, d->predicted / unit.to_si);
     if (!(*d->datum.value > 0.0)) continue;
-    measured.x.push_back(d->datum.time_s);
-    measured.y.push_back(*d->datum.value / unit.to_si);
+    measured.add(d->datum.time_s, *d->datum.value / unit.to_si);
     // A bar below 0 would leave the axis.
     measured.sd.push_back(std::min(d->reading_sd, 0.99 * *d->datum.value) / unit.to_si);
   }
   std::sort(along.begin(), along.end());
   for (const auto& [time, value] : along) {
-    law.x.push_back(time);
-    law.y.push_back(value);
+    law.add(time, value);
   }
   Panel panel{"", {"time", "s", true}, {measured_name, unit.symbol, true}};
   if (!measured.x.empty()) panel.series.push_back(std::move(measured));

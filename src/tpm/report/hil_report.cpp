@@ -48,8 +48,7 @@ std::vector<Series> asked_depths(const HilRecording& recording, const std::vecto
     }
     before = place;
     if (!place) continue;
-    stretches.back().x.push_back(time);
-    stretches.back().y.push_back(1e3 * aim.value);
+    stretches.back().add(time, 1e3 * aim.value);
   }
   return stretches;
 }
@@ -62,8 +61,7 @@ Series some_points(std::string label, const std::vector<double>& x, const std::v
       .kind = Series::Kind::points, .label = std::move(label), .provenance = std::move(provenance)};
   const std::size_t stride = std::max<std::size_t>(1, x.size() / kPoints);
   for (std::size_t i = 0; i < x.size(); i += stride) {
-    series.x.push_back(x[i]);
-    series.y.push_back(y[i]);
+    series.add(x[i], y[i]);
   }
   return series;
 }

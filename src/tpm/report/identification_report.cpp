@@ -25,8 +25,7 @@ struct BrokenLine {
       pieces.push_back(line(name, {}, {}));
       pieces.back().provenance = "derived";
     }
-    pieces.back().x.push_back(x);
-    pieces.back().y.push_back(y);
+    pieces.back().add(x, y);
     last = sample;
   }
 };
@@ -79,8 +78,7 @@ Panel law_panel(const Identification& id) {
         .kind = Series::Kind::points, .label = law_name(id.laws[law]), .provenance = "derived"};
     for (const IdentifiedSample& sample : id.history) {
       if (sample.law != law) continue;
-      s.x.push_back(sample.time_s);
-      s.y.push_back(static_cast<double>(law + 1));
+      s.add(sample.time_s, static_cast<double>(law + 1));
     }
     if (!s.x.empty()) panel.series.push_back(std::move(s));
   }

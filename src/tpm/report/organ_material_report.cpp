@@ -14,8 +14,7 @@ Series less(const OrganMaterial& m, const char* label, std::vector<double> Mater
   Series s{.kind = Series::Kind::points, .label = label, .provenance = "derived"};
   for (const MaterialCourse& c : m.courses) {
     for (std::size_t i = 0; i < c.time_s.size(); ++i) {
-      s.x.push_back(1e3 * c.depth_m[i]);
-      s.y.push_back(100.0 * ((c.*force)[i] - c.law_N[i]) / m.peak_N);
+      s.add(1e3 * c.depth_m[i], 100.0 * ((c.*force)[i] - c.law_N[i]) / m.peak_N);
     }
   }
   return s;

@@ -58,9 +58,7 @@ Series brackets(std::string label, const std::vector<Datum>& data, double factor
   for (const Datum& d : data) {
     if (!d.is_band()) continue;
     s.provenance = std::string(provenance_name(d.provenance));
-    s.x.push_back(place(d));
-    s.lower.push_back(*d.lower * factor);
-    s.upper.push_back(*d.upper * factor);
+    s.add_range(place(d), *d.lower * factor, *d.upper * factor);
   }
   return s;
 }
@@ -87,8 +85,7 @@ Series printed_relaxation(const PointSet& relaxation, double ramp_s) {
   for (const Datum& d : relaxation.data) {
     if (!d.value || !d.time_s || !d.depth_m || std::abs(*d.depth_m - kDepth_m) > 1e-9) continue;
     s.provenance = std::string(provenance_name(d.provenance));
-    s.x.push_back(ramp_s + *d.time_s);
-    s.y.push_back(*d.value);
+    s.add(ramp_s + *d.time_s, *d.value);
   }
   return s;
 }

@@ -23,9 +23,7 @@ Series band(const LawPrediction& p, const char* label, const std::vector<double>
   Series s{.kind = Series::Kind::band, .label = label, .provenance = "model"};
   for (std::size_t i = 0; i < lower.size(); i += stride_of(p)) {
     if (!std::isfinite(lower[i]) || !std::isfinite(upper[i])) continue;
-    s.x.push_back(p.time_s[i]);
-    s.lower.push_back(lower[i] / unit);
-    s.upper.push_back(upper[i] / unit);
+    s.add_range(p.time_s[i], lower[i] / unit, upper[i] / unit);
   }
   return s;
 }
@@ -37,8 +35,7 @@ Series prediction_readings(const LawPrediction& p, bool fitted, double unit, boo
   const PredictedRecording& r = p.recording.value();
   for (std::size_t i = 0; i < r.observed.size(); i += stride_of(p)) {
     if (r.was_fitted[i] != fitted || !std::isfinite(p.response[i])) continue;
-    s.x.push_back(p.time_s[i]);
-    s.y.push_back((residual ? p.response[i] - r.observed[i] : r.observed[i]) / unit);
+    s.add(p.time_s[i], (residual ? p.response[i] - r.observed[i] : r.observed[i]) / unit);
   }
   return s;
 }
@@ -65,8 +62,7 @@ Figure prediction_figure(const LawPrediction& p) {
   Series mean = line("mean", {}, {});
   for (std::size_t i = 0; i < p.time_s.size(); i += stride_of(p)) {
     if (!std::isfinite(p.response[i])) continue;
-    mean.x.push_back(p.time_s[i]);
-    mean.y.push_back(p.response[i] / unit.to_si);
+    mean.add(p.time_s[i], p.response[i] / unit.to_si);
   }
   add_if_any(panel, std::move(mean));
   figure.panels.push_back(std::move(panel));

@@ -39,8 +39,7 @@ Series sampled(Series series, const RecordingFit& r, const std::vector<double>& 
   const std::size_t stride = 1 + r.time_s.size() / kMostDrawn;
   for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
     if (!wanted(i) || !std::isfinite(y[i])) continue;
-    series.x.push_back(x[i] / x_unit);
-    series.y.push_back(y[i] / y_unit);
+    series.add(x[i] / x_unit, y[i] / y_unit);
   }
   return series;
 }
@@ -58,9 +57,7 @@ void add_band(Panel& panel, const RecordingFit& r, double y_unit) {
   const std::size_t stride = 1 + r.time_s.size() / kMostDrawn;
   for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
     if (!r.fitted[i] || !std::isfinite(r.lower[i]) || !std::isfinite(r.upper[i])) continue;
-    band.x.push_back(r.time_s[i]);
-    band.lower.push_back(r.lower[i] / y_unit);
-    band.upper.push_back(r.upper[i] / y_unit);
+    band.add_range(r.time_s[i], r.lower[i] / y_unit, r.upper[i] / y_unit);
   }
   add_if_any(panel, std::move(band));
 }
@@ -106,8 +103,7 @@ Series laws_at(const Selection& s, bool bic, bool recommended) {
   for (std::size_t i = 0; i < s.candidates.size(); ++i) {
     const Candidate& c = s.candidates[i];
     if (c.failed || (i == s.recommended) != recommended) continue;
-    series.x.push_back(c.parameters - 1);
-    series.y.push_back(bic ? c.delta_bic : 100.0 * c.rms_over_peak);
+    series.add(c.parameters - 1, bic ? c.delta_bic : 100.0 * c.rms_over_peak);
   }
   return series;
 }
@@ -178,8 +174,8 @@ Figure waterfall_figure(const FitResult& fit) {
   Panel panel{.x = {"start, sorted", ""}, .y = {"deviance above the best", ""}};
   Series ends{.kind = Series::Kind::points, .label = "end of a start", .provenance = "model"};
   for (std::size_t i = 0; i < fit.waterfall.deviances.size(); ++i) {
-    ends.x.push_back(static_cast<double>(i + 1));
-    ends.y.push_back(fit.waterfall.deviances[i] - fit.waterfall.deviances.front());
+    ends.add(static_cast<double>(i + 1),
+             fit.waterfall.deviances[i] - fit.waterfall.deviances.front());
   }
   add_if_any(panel, std::move(ends));
   figure.panels = {std::move(panel)};

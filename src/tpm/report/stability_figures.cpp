@@ -33,8 +33,7 @@ Panel map_panel(const StabilityMap& map) {
         .kind = Series::Kind::points, .label = std::string(entry.text), .provenance = "model"};
     for (const StabilityPoint& p : map.points) {
       if (p.verdict.found != entry.meaning) continue;
-      found.x.push_back(p.x);
-      found.y.push_back(p.step_s);
+      found.add(p.x, p.step_s);
     }
     if (!found.x.empty()) panel.series.push_back(std::move(found));
   }

@@ -74,8 +74,7 @@ Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
   const Axis size_axis{c.size_text, unit_size.symbol, true};
   Series cells = line("model", {}, {});
   for (std::size_t i = 0; i < c.size.size(); ++i) {
-    cells.x.push_back(c.size[i] / unit_size.to_si);
-    cells.y.push_back(c.value[i] / unit.to_si);
+    cells.add(c.size[i] / unit_size.to_si, c.value[i] / unit.to_si);
   }
   Series dots = cells;
   dots.kind = Series::Kind::points;
@@ -95,10 +94,9 @@ Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
   for (std::size_t i = 0; i < c.size.size(); ++i) {
     const double distance = std::abs(c.value[i] - finest.extrapolated);
     if (!(distance > 0.0)) continue;
-    away.x.push_back(c.size[i] / unit_size.to_si);
-    away.y.push_back(distance / unit.to_si);
-    slope.x.push_back(c.size[i] / unit_size.to_si);
-    slope.y.push_back(last * std::pow(c.size[i] / c.size.back(), finest.order) / unit.to_si);
+    away.add(c.size[i] / unit_size.to_si, distance / unit.to_si);
+    slope.add(c.size[i] / unit_size.to_si,
+              last * std::pow(c.size[i] / c.size.back(), finest.order) / unit.to_si);
   }
   Panel distances{
       "",

@@ -170,8 +170,7 @@ std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
     Series cloud{.kind = Series::Kind::points, .label = v.name, .provenance = "model"};
     for (const std::size_t i : chosen) {
       if (!std::isfinite(found[i])) continue;
-      cloud.x.push_back(values[i] / unit_x.to_si);
-      cloud.y.push_back(found[i]);
+      cloud.add(values[i] / unit_x.to_si, found[i]);
     }
     panels.push_back({name,
                       {name, unit_x.symbol, sampled_in_logarithm(sweep, axis, name)},
@@ -230,16 +229,14 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
       if (found[2][i] != 0.0) continue;
       front.emplace_back(found[0][i], found[1][i]);
       if (cell % stride != 0) continue;
-      cloud.x.push_back(found[0][i] / unit_x.to_si);
-      cloud.y.push_back(found[1][i] / unit_y.to_si);
+      cloud.add(found[0][i] / unit_x.to_si, found[1][i] / unit_y.to_si);
     }
     front = pareto_front(std::move(front));  // what was seen so far needs no more
   });
   if (front.empty()) throw bad_input("sweep", "no cell is done", "cells to choose from");
   Series best = line("Pareto front", {}, {});
   for (const auto& [x, y] : front) {
-    best.x.push_back(x / unit_x.to_si);
-    best.y.push_back(y / unit_y.to_si);
+    best.add(x / unit_x.to_si, y / unit_y.to_si);
   }
   Panel panel{"", {second, unit_x.symbol}, {first, unit_y.symbol}};
   if (!cloud.x.empty()) panel.series.push_back(std::move(cloud));

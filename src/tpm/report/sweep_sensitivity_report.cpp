@@ -34,9 +34,7 @@ Panel index_panel(const std::string& what, const SweepSensitivity& s,
   Series value{.kind = Series::Kind::points, .label = "index", .provenance = "model"};
   for (std::size_t i = 0; i < s.parameters.size(); ++i) {
     const IndexEstimate& index = s.indices.inputs[i].*of;
-    interval.x.push_back(static_cast<double>(i + 1));
-    interval.lower.push_back(index.low);
-    interval.upper.push_back(index.high);
+    interval.add_range(static_cast<double>(i + 1), index.low, index.high);
     value.y.push_back(index.value);
   }
   value.x = interval.x;
