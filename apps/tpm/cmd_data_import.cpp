@@ -19,28 +19,25 @@ namespace tpm::app {
 namespace fs = std::filesystem;
 namespace {
 
-/// The command line as it was typed; options() turns it into numbers and checks it.
+/// The command line as it was typed; options_of() turns it into numbers and checks it.
 struct ImportArguments {
   std::vector<std::string> files;
   std::string output;
   bool force = false;
-  std::string from = "auto";
+  ImportOptions options;  ///< what needs no reading: columns, segments, names
   std::string separator = "auto";
   std::string decimal = "auto";
   std::string encoding = "auto";
   std::string header_rows;
-  std::string time, drive, response, sd;
-  std::string frequency, storage, loss;
   std::string drive_quantity, response_quantity;
   std::vector<std::string> units;
   std::string negate = "none";
   std::string contact_force;
   std::string contact_samples = "3";
   std::string spring_constant;
-  std::vector<std::string> segments;
-  std::string x, y, dataset, depth, load;
+  std::string x, y, depth, load;
   std::string time_origin = "none";
-  std::string provenance, title, citation, doi, specimen, probe_shape, probe_diameter, note;
+  std::string provenance, probe_diameter;
 };
 
 int parse_count(const std::string& text, int least, const std::string& option) {
@@ -69,44 +66,13 @@ DelimitedOptions text_options(const ImportArguments& arguments) {
   return text;
 }
 
-CurveHeader header_options(const ImportArguments& arguments, Provenance provenance) {
-  CurveHeader header;
-  header.title = arguments.title;
-  header.citation = arguments.citation;
-  header.doi = arguments.doi;
-  header.specimen = arguments.specimen;
-  header.note = arguments.note;
-  header.probe.shape = arguments.probe_shape;
-  if (!arguments.probe_diameter.empty()) {
-    header.probe.diameter_m =
-        positive(arguments.probe_diameter, Dimension::length, "--probe-diameter");
-  }
-  if (header.probe.diameter_m || !header.probe.shape.empty()) header.probe.provenance = provenance;
-  return header;
-}
-
 ImportOptions options_of(const ImportArguments& arguments) {
-  ImportOptions options;
-  options.format = arguments.from;
+  ImportOptions options = arguments.options;
   options.text = text_options(arguments);
   if (!arguments.header_rows.empty()) {
     options.header_rows = parse_count(arguments.header_rows, 0, "--header-rows");
   }
-  options.time_column = arguments.time;
-  options.drive_column = arguments.drive;
-  options.response_column = arguments.response;
-  options.sd_column = arguments.sd;
-  options.frequency_column = arguments.frequency;
-  options.storage_column = arguments.storage;
-  options.loss_column = arguments.loss;
-  if (!arguments.drive_quantity.empty()) {
-    options.drive_quantity = parse_quantity_name(arguments.drive_quantity, "--drive-quantity");
-  }
-  if (!arguments.response_quantity.empty()) {
-    options.response_quantity =
-        parse_quantity_name(arguments.response_quantity, "--response-quantity");
-  }
-  options.units = unit_options(arguments.units);
+  set_quantities(options, arguments.drive_quantity, arguments.response_quantity, arguments.units);
   options.negate_drive = arguments.negate == "drive" || arguments.negate == "both";
   options.negate_response = arguments.negate == "response" || arguments.negate == "both";
   if (!arguments.contact_force.empty()) {
@@ -118,10 +84,8 @@ ImportOptions options_of(const ImportArguments& arguments) {
     options.spring_constant_N_per_m =
         positive(arguments.spring_constant, Dimension::stiffness, "--spring-constant");
   }
-  options.segments = arguments.segments;
   if (!arguments.x.empty()) options.x = parse_axis(arguments.x, "--x");
   if (!arguments.y.empty()) options.y = parse_axis(arguments.y, "--y");
-  options.dataset = arguments.dataset;
   if (!arguments.depth.empty()) {
     options.depth_m = positive(arguments.depth, Dimension::length, "--depth");
   }
@@ -132,7 +96,13 @@ ImportOptions options_of(const ImportArguments& arguments) {
   if (!arguments.provenance.empty()) {
     options.provenance = parse_provenance(arguments.provenance, "--provenance");
   }
-  options.header = header_options(arguments, options.provenance.value_or(Provenance::measured));
+  ProbeShape& probe = options.header.probe;
+  if (!arguments.probe_diameter.empty()) {
+    probe.diameter_m = positive(arguments.probe_diameter, Dimension::length, "--probe-diameter");
+  }
+  if (probe.diameter_m || !probe.shape.empty()) {
+    probe.provenance = options.provenance.value_or(Provenance::measured);
+  }
   return options;
 }
 
@@ -263,7 +233,7 @@ int import_files(const Session& session, const ImportArguments& arguments) {
 
 void add_text_options(CLI::App& command, ImportArguments& a) {
   const std::vector<std::string> formats = import_formats();
-  command.add_option("--from", a.from, fmt::format("{}", fmt::join(formats, ", ")))
+  command.add_option("--from", a.options.format, fmt::format("{}", fmt::join(formats, ", ")))
       ->check(CLI::IsMember(formats));
   command.add_option("--separator", a.separator, "auto, comma, semicolon or tab")
       ->check(CLI::IsMember({"auto", "comma", "semicolon", "tab"}));
@@ -279,13 +249,13 @@ void add_machine_options(CLI::App& command, ImportArguments& a) {
     return command.add_option(name, target, help)->group(group);
   };
   add("--header-rows", a.header_rows, "Rows above the samples, if not found by themselves");
-  add("--time", a.time, "Time column: title, or number from 1");
-  add("--drive", a.drive, "Column of what was imposed (displacement)");
-  add("--response", a.response, "Column of what was observed (force)");
-  add("--sd", a.sd, "Column of the standard deviation of the response");
-  add("--frequency", a.frequency, "Frequency column of a spectrum");
-  add("--storage", a.storage, "Column of its storage modulus or stiffness");
-  add("--loss", a.loss, "Column of its loss modulus or stiffness");
+  add("--time", a.options.time_column, "Time column: title, or number from 1");
+  add("--drive", a.options.drive_column, "Column of what was imposed (displacement)");
+  add("--response", a.options.response_column, "Column of what was observed (force)");
+  add("--sd", a.options.sd_column, "Column of the standard deviation of the response");
+  add("--frequency", a.options.frequency_column, "Frequency column of a spectrum");
+  add("--storage", a.options.storage_column, "Column of its storage modulus or stiffness");
+  add("--loss", a.options.loss_column, "Column of its loss modulus or stiffness");
   add("--drive-quantity", a.drive_quantity, "indentation_depth, relative_length or abscissa");
   add("--response-quantity", a.response_quantity, "contact_force, stress or ordinate");
   command.add_option("--unit", a.units, "COLUMN=UNIT where the file does not say, repeatable")
@@ -305,7 +275,8 @@ void add_jpk_options(CLI::App& command, ImportArguments& a) {
                   "Of the cantilever instead of that of the file, such as \"0.05 N/m\"")
       ->group(group);
   command
-      .add_option("--segments", a.segments, "Kinds to read, such as extend,pause; all if left out")
+      .add_option("--segments", a.options.segments,
+                  "Kinds to read, such as extend,pause; all if left out")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->group(group);
@@ -318,7 +289,7 @@ void add_figure_options(CLI::App& command, ImportArguments& a) {
   };
   add("--x", a.x, "What the x axis shows, such as time:s or indentation_depth:mm");
   add("--y", a.y, "What the y axis shows, such as contact_force:N");
-  add("--dataset", a.dataset, "Only the dataset of this name");
+  add("--dataset", a.options.dataset, "Only the dataset of this name");
   add("--depth", a.depth, "Imposed depth of a relaxation curve, such as \"4 mm\"");
   add("--load", a.load, "Imposed load of a creep curve, such as \"0.98 N\"");
   add("--time-origin", a.time_origin, "With --depth or --load: end_of_ramp or load_applied");
@@ -330,13 +301,13 @@ void add_description_options(CLI::App& command, ImportArguments& a) {
     return command.add_option(name, target, help)->group(group);
   };
   add("--provenance", a.provenance, "Else measured for machines and digitized for figures");
-  add("--title", a.title, "One line that says what the curve is");
-  add("--citation", a.citation, "Authors, journal, year, pages");
-  add("--doi", a.doi, "Bare DOI");
-  add("--specimen", a.specimen, "What was tested");
-  add("--probe-shape", a.probe_shape, "hemisphere, sphere, flat punch or cone");
+  add("--title", a.options.header.title, "One line that says what the curve is");
+  add("--citation", a.options.header.citation, "Authors, journal, year, pages");
+  add("--doi", a.options.header.doi, "Bare DOI");
+  add("--specimen", a.options.header.specimen, "What was tested");
+  add("--probe-shape", a.options.header.probe.shape, "hemisphere, sphere, flat punch or cone");
   add("--probe-diameter", a.probe_diameter, "Such as \"4 mm\"");
-  add("--note", a.note, "What a reader has to know");
+  add("--note", a.options.header.note, "What a reader has to know");
 }
 
 }  // namespace

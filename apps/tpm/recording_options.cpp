@@ -10,31 +10,34 @@
 
 namespace tpm::app {
 
-std::map<std::string, std::string> unit_options(const std::vector<std::string>& pairs) {
-  std::map<std::string, std::string> units;
-  for (const std::string& pair : pairs) {
+void set_quantities(ImportOptions& import, const std::string& drive, const std::string& response,
+                    const std::vector<std::string>& units) {
+  if (!drive.empty()) import.drive_quantity = parse_quantity_name(drive, "--drive-quantity");
+  if (!response.empty()) {
+    import.response_quantity = parse_quantity_name(response, "--response-quantity");
+  }
+  for (const std::string& pair : units) {
     const auto equals = pair.rfind('=');
     if (equals == std::string::npos || equals == 0) {
       throw Error(ExitCode::usage, "--unit", fmt::format("'{}' has no '='", printable(pair)),
                   "COLUMN=UNIT, such as \"Force=N\"");
     }
     static_cast<void>(parse_unit(pair.substr(equals + 1), "--unit"));
-    units[pair.substr(0, equals)] = pair.substr(equals + 1);
+    import.units[pair.substr(0, equals)] = pair.substr(equals + 1);
   }
-  return units;
 }
 
 void add_recording_options(CLI::App& command, RecordingOptions& options) {
   const auto add = [&](const char* name, std::string& target, const char* help) {
     command.add_option(name, target, help)->group("What the files do not say");
   };
-  add("--time", options.time, "Column of the times: name, or number from 1");
-  add("--drive", options.drive, "Column of the depth or relative length");
-  add("--response", options.response, "Column of the force or stress");
-  add("--sd", options.sd, "Column of the response's standard deviation");
-  add("--frequency", options.frequency, "Column of the frequency of a spectrum");
-  add("--storage", options.storage, "Column of the storage modulus");
-  add("--loss", options.loss, "Column of the loss modulus");
+  add("--time", options.import.time_column, "Column of the times: name, or number from 1");
+  add("--drive", options.import.drive_column, "Column of the depth or relative length");
+  add("--response", options.import.response_column, "Column of the force or stress");
+  add("--sd", options.import.sd_column, "Column of the response's standard deviation");
+  add("--frequency", options.import.frequency_column, "Column of the frequency of a spectrum");
+  add("--storage", options.import.storage_column, "Column of the storage modulus");
+  add("--loss", options.import.loss_column, "Column of the loss modulus");
   add("--drive-quantity", options.drive_quantity, "indentation_depth, strain or relative_length");
   add("--response-quantity", options.response_quantity,
       "contact_force, stress, relaxation_modulus or creep_compliance");
@@ -47,17 +50,17 @@ void add_recording_options(CLI::App& command, RecordingOptions& options) {
   add("--spring-constant", options.spring_constant,
       "JPK force files: of the cantilever, instead of that of the file");
   command
-      .add_option("--segments", options.segments,
+      .add_option("--segments", options.import.segments,
                   "JPK force files: kinds to read, such as extend,pause; default: all")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->group("What the files do not say");
   command
-      .add_flag("--negate-drive", options.negate_drive,
+      .add_flag("--negate-drive", options.import.negate_drive,
                 "The machine counts the imposed motion negative")
       ->group("What the files do not say");
   command
-      .add_flag("--negate-response", options.negate_response,
+      .add_flag("--negate-response", options.import.negate_response,
                 "The machine counts the force or stress negative")
       ->group("What the files do not say");
   add("--contact-force", options.contact_response,
@@ -65,24 +68,8 @@ void add_recording_options(CLI::App& command, RecordingOptions& options) {
 }
 
 ImportOptions import_options(const RecordingOptions& options) {
-  ImportOptions import;
-  import.time_column = options.time;
-  import.drive_column = options.drive;
-  import.response_column = options.response;
-  import.sd_column = options.sd;
-  import.frequency_column = options.frequency;
-  import.storage_column = options.storage;
-  import.loss_column = options.loss;
-  if (!options.drive_quantity.empty()) {
-    import.drive_quantity = parse_quantity_name(options.drive_quantity, "--drive-quantity");
-  }
-  if (!options.response_quantity.empty()) {
-    import.response_quantity =
-        parse_quantity_name(options.response_quantity, "--response-quantity");
-  }
-  import.units = unit_options(options.units);
-  import.negate_drive = options.negate_drive;
-  import.negate_response = options.negate_response;
+  ImportOptions import = options.import;
+  set_quantities(import, options.drive_quantity, options.response_quantity, options.units);
   const auto size = [](const std::string& text, Dimension dimension,
                        const char* option) -> std::optional<double> {
     if (text.empty()) return std::nullopt;
@@ -94,7 +81,6 @@ ImportOptions import_options(const RecordingOptions& options) {
   import.area_m2 = size(options.area, Dimension::area, "--area");
   import.spring_constant_N_per_m =
       size(options.spring_constant, Dimension::stiffness, "--spring-constant");
-  import.segments = options.segments;
   return import;
 }
 

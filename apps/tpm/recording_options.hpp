@@ -1,6 +1,5 @@
 #pragma once
 #include <CLI/CLI.hpp>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -12,20 +11,18 @@ namespace tpm::app {
 /// What the user says about recordings that are read without a description.
 struct RecordingOptions {
   std::vector<std::string> files;
-  std::string time, drive, response, sd;
-  std::string frequency, storage, loss;
+  ImportOptions import;  ///< what needs no reading: columns, segments, signs
   std::string drive_quantity, response_quantity;
   std::vector<std::string> units;
   std::string contact_response;
   std::string rest_length, area;
   std::string spring_constant;
-  std::vector<std::string> segments;
-  bool negate_drive = false, negate_response = false;
 };
 
-/// "COLUMN=UNIT" pairs. Throws Error(usage).
-[[nodiscard]] std::map<std::string, std::string> unit_options(
-    const std::vector<std::string>& pairs);
+/// Reads --drive-quantity, --response-quantity (may be empty) and the pairs "COLUMN=UNIT" of
+/// --unit. Throws Error(usage).
+void set_quantities(ImportOptions& import, const std::string& drive, const std::string& response,
+                    const std::vector<std::string>& units);
 
 /// Adds the options above; `files` is the command's own.
 void add_recording_options(CLI::App& command, RecordingOptions& options);

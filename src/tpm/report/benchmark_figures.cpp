@@ -63,8 +63,7 @@ Series trail_of(const BenchmarkResult& result, const std::string& curve, const C
     if (point.curve() != curve || point.failed()) continue;
     const std::optional<Cost> cost = cost_of(point);
     if (!cost) continue;
-    s.x.push_back(cost->value);
-    s.y.push_back(point.error);
+    s.add(cost->value, point.error);
     if (!spread) continue;
     s.lower.push_back(cost->lower);
     s.upper.push_back(cost->upper);
@@ -128,27 +127,21 @@ bool any_placed(const Panel& panel) {
 }
 
 Axis error_axis(const BenchmarkResult& result) {
-  return {fmt::format("error of the {} over its peak", result.response), "", true, {}, {}};
+  return {fmt::format("error of the {} over its peak", result.response), "", true};
 }
 
 Figure wall_figure(const BenchmarkResult& result) {
-  Figure figure{result.name,
-                fmt::format("{}: error against wall time", result.title),
+  Figure figure{result.name, fmt::format("{}: error against wall time", result.title),
                 "Each point is one setting of a method, median and quartiles of its repeats. Above "
                 "the panels: settings that failed, at the cost at which they did. (a) Left of the "
-                "line a method keeps up with real time.",
-                {}};
-  Panel per_second{"(a) all settings",
-                   {"wall time per simulated second", "s/s", true, {}, {}},
-                   error_axis(result),
-                   {}};
+                "line a method keeps up with real time."};
+  Panel per_second{
+      "(a) all settings", {"wall time per simulated second", "s/s", true}, error_axis(result)};
   add_points(per_second, result, wall_per_second(result), true, true);
   per_second.series.push_back(limit(Series::Kind::upright, 1.0, "real time"));
   figure.panels.push_back(std::move(per_second));
-  Panel per_step{"(b) fixed steps of 1 ms or less",
-                 {"wall time of a step", "s", true, {}, {}},
-                 error_axis(result),
-                 {}};
+  Panel per_step{
+      "(b) fixed steps of 1 ms or less", {"wall time of a step", "s", true}, error_axis(result)};
   add_points(per_step, result, wall_per_step(), true, false);
   if (any_placed(per_step)) {
     figure.caption +=
@@ -162,18 +155,14 @@ Figure wall_figure(const BenchmarkResult& result) {
 }
 
 Figure count_figure(const BenchmarkResult& result) {
-  Figure figure{result.name + "_counts",
-                fmt::format("{}: error against work", result.title),
+  Figure figure{result.name + "_counts", fmt::format("{}: error against work", result.title),
                 "The same against counts, which do not depend on the machine. (a) Evaluations of "
                 "the forces of all bonds, or of the right-hand side; (b) factorisations of a "
-                "stiffness or Newton matrix. What counts none of them is not in the panel.",
-                {}};
-  Panel rates{
-      "(a)", {"evaluations per simulated second", "1/s", true, {}, {}}, error_axis(result), {}};
+                "stiffness or Newton matrix. What counts none of them is not in the panel."};
+  Panel rates{"(a)", {"evaluations per simulated second", "1/s", true}, error_axis(result)};
   add_points(rates, result, count_per_second(result, &MethodWork::rates), false, true);
   figure.panels.push_back(std::move(rates));
-  Panel factors{
-      "(b)", {"factorisations per simulated second", "1/s", true, {}, {}}, error_axis(result), {}};
+  Panel factors{"(b)", {"factorisations per simulated second", "1/s", true}, error_axis(result)};
   add_points(factors, result, count_per_second(result, &MethodWork::factorisations), false, false);
   if (any_placed(factors)) figure.panels.push_back(std::move(factors));
   return figure;

@@ -8,7 +8,6 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
-#include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/units.hpp"
 
@@ -62,8 +61,7 @@ std::string cheapest_words(const BenchmarkResult& result, const BenchmarkPoint& 
 Table aims_table(const BenchmarkResult& result, bool timing) {
   Table table{timing ? "Wall time per simulated second of the cheapest setting within an error"
                      : "Evaluations of the cheapest setting within an error",
-              {{"method"}},
-              {}};
+              {{"method"}}};
   for (const double aim : kAims) table.columns.push_back({percent_words(aim), true});
   table.columns.push_back({"least error", true});
   for (const std::string& curve : curves_of(result)) {
@@ -123,8 +121,7 @@ Table servo_table(const BenchmarkResult& result) {
                {"error at 1 kHz", true},
                {"a step", true},
                {"error at 4 kHz", true},
-               {"a step", true}},
-              {}};
+               {"a step", true}}};
   for (const std::string& curve : curves_of(result)) {
     std::vector<Cell> row{{curve}};
     bool any = false;
@@ -139,7 +136,7 @@ Table servo_table(const BenchmarkResult& result) {
 }
 
 Table failure_table(const BenchmarkResult& result) {
-  Table table{"What failed", {{"method"}, {"how"}, {"settings"}, {"reason (of the first)"}}, {}};
+  Table table{"What failed", {{"method"}, {"how"}, {"settings"}, {"reason (of the first)"}}};
   for (const std::string& curve : curves_of(result)) {
     std::vector<std::string> ends;
     for (const BenchmarkPoint& p : result.points) {
@@ -198,8 +195,7 @@ Cell against(double value, double target, const std::string& words,
 /// The largest error and times of each model over its relaxation times.
 Table targets_table(const BenchmarkResult& result, bool timing) {
   Table table{"The largest over all relaxation times, and what is asked for",
-              {{"model"}, {"error", true}},
-              {}};
+              {{"model"}, {"error", true}}};
   if (timing) {
     for (const char* title : {"a step, median", "a step, 99th percentile", "built in"}) {
       table.columns.push_back({title, true});
@@ -231,7 +227,7 @@ Table targets_table(const BenchmarkResult& result, bool timing) {
 /// One column for each setting that any curve has.
 Table settings_table(const BenchmarkResult& result, const std::string& caption,
                      const std::function<std::string(const BenchmarkPoint&)>& words) {
-  Table table{caption, {{"model"}}, {}};
+  Table table{caption, {{"model"}}};
   std::vector<double> values;
   for (const BenchmarkPoint& p : result.points) {
     if (std::find(values.begin(), values.end(), p.value) != values.end()) continue;
@@ -326,7 +322,7 @@ const BenchmarkPoint* cheapest_within(const BenchmarkResult& result, const std::
 }
 
 Document benchmark_document(const BenchmarkRecord& record, const std::vector<Figure>& figures) {
-  Document document{"Speed against accuracy", "What `tpm benchmark` measured", {}};
+  Document document{"Speed against accuracy", "What `tpm benchmark` measured"};
   document.paragraph(introduction(record.options));
   for (const BenchmarkResult& result : record.results) {
     document.heading(2, fmt::format("{} (`{}`)", result.title, result.name));
@@ -356,16 +352,8 @@ void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path&
   write_file(folder / "benchmark.json", to_text(to_json(record)));
   std::filesystem::remove(folder / kBenchmarkPart);
   const std::vector<Figure> figures = benchmark_figures(record);
-  std::map<std::string, double> seconds;
-  const auto drawings =
-      timed(seconds, "drawing", [&] { return draw_into(folder, figures, python); });
-  const Document document = benchmark_document(record, figures);
-  write_file(folder / "report.md", to_markdown(document));
-  write_file(folder / "report.html", to_html(document, drawings));
-  Json run = run_record(seconds);
-  run["drawing_python"] = python;
-  run["problems"] = record.runs;
-  write_file(folder / "report.run.json", to_text(run));
+  write_report(folder, benchmark_document(record, figures), figures, python, {},
+               Json{{"problems", record.runs}});
 }
 
 }  // namespace tpm::report

@@ -10,7 +10,7 @@ namespace tpm::report {
 namespace {
 
 constexpr int kBorderDigits = 6;
-const Axis kRate{"rate", "Hz", true, std::nullopt, std::nullopt};
+const Axis kRate{"rate", "Hz", true};
 
 std::string_view word_of_rule(ElementRule rule) {
   switch (rule) {
@@ -64,10 +64,8 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
   measured.label = predicted.label + ", on the simulated device";
   for (const BorderPoint& p : points) {
     if (p.delay_periods != delay || p.damping_N_s_per_m != damping) continue;
-    predicted.x.push_back(p.rate_Hz);
-    predicted.y.push_back(p.predicted);
-    measured.x.push_back(p.rate_Hz);
-    measured.y.push_back(p.measured);
+    predicted.add(p.rate_Hz, p.predicted);
+    measured.add(p.rate_Hz, p.measured);
   }
   panel.series.push_back(std::move(predicted));
   panel.series.push_back(std::move(measured));
@@ -77,41 +75,37 @@ Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
   Series s{.label = "Colgate-Schenkel 2b/T, all taut", .provenance = "model"};
   for (const BorderPoint& p : points) {
     if (p.delay_periods != 0 || p.damping_N_s_per_m != damping) continue;
-    s.x.push_back(p.rate_Hz);
-    s.y.push_back(2.0 * damping * p.rate_Hz);
+    s.add(p.rate_Hz, 2.0 * damping * p.rate_Hz);
   }
   return s;
 }
 
 Figure border_figure(const BorderStudy& study) {
   const double damping = study.plant.damping_N_s_per_m;
-  const Axis stiffness{"largest instantaneous stiffness", "N/m", true, std::nullopt, std::nullopt};
-  Panel passive{
-      fmt::format("passive, device with {} N s/m", significant(damping, 3)), kRate, stiffness, {}};
-  Panel stable{"stable with the arm of one operator", kRate, stiffness, {}};
+  const Axis stiffness{"largest instantaneous stiffness", "N/m", true};
+  Panel passive{fmt::format("passive, device with {} N s/m", significant(damping, 3)), kRate,
+                stiffness};
+  Panel stable{"stable with the arm of one operator", kRate, stiffness};
   for (const int delay : {0, 1, 2, 5}) {
     add_rate_curve(passive, study.passive, delay, damping);
     add_rate_curve(stable, study.stable, delay, damping);
   }
   passive.series.push_back(colgate_line(study.passive, damping));
-  Figure figure;
-  figure.id = "borders";
-  figure.title = "Passivity and stability of the contact (simulated device)";
-  figure.caption =
+  return {
+      "borders",
+      "Passivity and stability of the contact (simulated device)",
       "Lines: passivity by the condition of Colgate and Schenkel with the discrete transfer "
       "function of the exactly updated Zener contact, stability by the spectral radius of the "
       "loop. Points: measured on the simulated device by bisection. Passivity is safe with every "
       "passive operator and found at the worst frequency; stability belongs to one operator, and "
-      "asks for less.";
-  figure.panels = {std::move(passive), std::move(stable)};
-  return figure;
+      "asks for less.",
+      {std::move(passive), std::move(stable)}};
 }
 
 Figure rule_figure(const BorderStudy& study) {
   Panel panel{"friction that the device needs at 1 kHz",
-              {"relaxation time over period", "", true, std::nullopt, std::nullopt},
-              {"friction over T/2", "N/m", true, std::nullopt, std::nullopt},
-              {}};
+              {"relaxation time over period", "", true},
+              {"friction over T/2", "N/m", true}};
   constexpr double kHalfPeriod_s = 0.5e-3, kPeriod_s = 1e-3;
   for (const ElementRule rule :
        {ElementRule::exact, ElementRule::forward_euler, ElementRule::mass_spring}) {
@@ -123,29 +117,27 @@ Figure rule_figure(const BorderStudy& study) {
     measured.label = predicted.label + ", on the simulated device";
     for (const RulePoint& p : study.rules) {
       if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
-      predicted.x.push_back(p.relaxation_time_s / kPeriod_s);
-      predicted.y.push_back(p.predicted_N_s_per_m / kHalfPeriod_s);
-      measured.x.push_back(p.relaxation_time_s / kPeriod_s);
-      measured.y.push_back(p.measured_N_s_per_m / kHalfPeriod_s);
+      predicted.add(p.relaxation_time_s / kPeriod_s, p.predicted_N_s_per_m / kHalfPeriod_s);
+      measured.add(p.relaxation_time_s / kPeriod_s, p.measured_N_s_per_m / kHalfPeriod_s);
     }
     panel.series.push_back(std::move(predicted));
     panel.series.push_back(std::move(measured));
   }
-  Figure figure;
-  figure.id = "rules";
-  figure.title = "Three ways to advance the contact (simulated device)";
-  figure.caption = fmt::format(
-      "A contact of {0} N/m instantaneously and {1} N/m at equilibrium. The exact update needs "
-      "between {1} T/2 "
-      "and "
-      "{0} T/2 at every relaxation time; forward Euler diverges below T/2, to the left of where "
-      "its "
-      "curve ends, at the paper's parameters (0.208 ms) too; the mass-spring model has nothing "
-      "that "
-      "relaxes.",
-      significant(study.stiffness_N_per_m, 3), significant(0.5 * study.stiffness_N_per_m, 3));
-  figure.panels = {std::move(panel)};
-  return figure;
+  return {
+      "rules",
+      "Three ways to advance the contact (simulated device)",
+      fmt::format(
+          "A contact of {0} N/m instantaneously and {1} N/m at equilibrium. The exact update needs "
+          "between {1} T/2 "
+          "and "
+          "{0} T/2 at every relaxation time; forward Euler diverges below T/2, to the left of "
+          "where "
+          "its "
+          "curve ends, at the paper's parameters (0.208 ms) too; the mass-spring model has nothing "
+          "that "
+          "relaxes.",
+          significant(study.stiffness_N_per_m, 3), significant(0.5 * study.stiffness_N_per_m, 3)),
+      {std::move(panel)}};
 }
 
 }  // namespace
@@ -254,20 +246,17 @@ std::string corner_text(const BorderStudy& study) {
 
 /// Where impacts come to rest with the slip of a session, a panel for each delay.
 Figure impact_figure(const BorderStudy& study) {
-  Figure figure;
-  figure.id = "impacts";
-  figure.title = "Impacts with the slip of a session (simulated device)";
-  figure.caption =
+  Figure figure{
+      "impacts", "Impacts with the slip of a session (simulated device)",
       "A hand runs into the one-sided contact and stays 4 mm deep; stiffness over that at which "
       "the linear, two-sided loop becomes unstable. The rise of the force is limited to 400 N/s "
-      "by a slip of the model's tool, its size to 8 N.";
+      "by a slip of the model's tool, its size to 8 N."};
   for (const ImpactPoint& p : study.impacts) {
     const std::string title = fmt::format("delay {} periods", p.delay_periods);
     if (figure.panels.empty() || figure.panels.back().title != title) {
       Panel panel{title,
-                  {"speed of the hand", "m/s", true, std::nullopt, std::nullopt},
-                  {"stiffness over the linear border", "", true, std::nullopt, std::nullopt},
-                  {}};
+                  {"speed of the hand", "m/s", true},
+                  {"stiffness over the linear border", "", true}};
       for (const char* label : {"comes to rest", "oscillates"}) {
         Series series{.kind = Series::Kind::points, .label = label, .provenance = "simulated"};
         panel.series.push_back(std::move(series));
@@ -275,8 +264,7 @@ Figure impact_figure(const BorderStudy& study) {
       figure.panels.push_back(std::move(panel));
     }
     Series& series = figure.panels.back().series[p.rests[1] ? 0 : 1];
-    series.x.push_back(p.speed_m_per_s);
-    series.y.push_back(p.share);
+    series.add(p.speed_m_per_s, p.share);
   }
   for (Panel& panel : figure.panels) {
     std::erase_if(panel.series, [](const Series& series) { return series.x.empty(); });

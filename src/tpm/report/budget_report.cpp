@@ -30,7 +30,7 @@ Panel waterfall_panel(const ErrorBudget& b) {
   const std::size_t at = instant_of_largest_sum(b);
   Panel panel{.title = fmt::format("adding up at {} s", significant(b.time_s[at], 4)),
               .x = {"", "", false, 0.5, 1.5 + static_cast<double>(b.lines.size())},
-              .y = {"sum so far, of the peak", "%", false, {}, {}}};
+              .y = {"sum so far, of the peak", "%"}};
   Series steps{.kind = Series::Kind::bracket, .label = "line", .provenance = "derived"};
   Series sums = line("sum so far", {}, {});
   sums.kind = Series::Kind::points;
@@ -40,18 +40,13 @@ Panel waterfall_panel(const ErrorBudget& b) {
     const double next = sum + 100.0 * l.difference_N[at] / b.peak_N;
     const double x = static_cast<double>(panel.x.names.size() + 1);
     panel.x.names.push_back(l.name);
-    steps.x.push_back(x);
-    steps.lower.push_back(std::min(sum, next));
-    steps.upper.push_back(std::max(sum, next));
-    sums.x.push_back(x);
-    sums.y.push_back(next);
+    steps.add_range(x, std::min(sum, next), std::max(sum, next));
+    sums.add(x, next);
     sum = next;
   }
   panel.x.names.push_back("sum");
   const double end = static_cast<double>(panel.x.names.size());
-  steps.x.push_back(end);
-  steps.lower.push_back(std::min(sum, 0.0));
-  steps.upper.push_back(std::max(sum, 0.0));
+  steps.add_range(end, std::min(sum, 0.0), std::max(sum, 0.0));
   panel.series = {std::move(steps), std::move(sums)};
   return panel;
 }
@@ -65,13 +60,12 @@ Series threshold(const char* words, double share, double until) {
 Panel largest_panel(const ErrorBudget& b) {
   constexpr double kLeastDrawn = 1e-5;  // of the peak, on a logarithmic axis
   Panel panel{.title = "each line's own largest",
-              .x = {"", "", false, 0.5, {}},
-              .y = {"of the peak", "%", true, {}, {}}};
+              .x = {"", "", false, 0.5},
+              .y = {"of the peak", "%", true}};
   Series own{.kind = Series::Kind::points, .label = "largest of the line", .provenance = "derived"};
   const auto add = [&](const std::string& name, double part) {
     panel.x.names.push_back(name);
-    own.x.push_back(static_cast<double>(panel.x.names.size()));
-    own.y.push_back(100.0 * std::max(part, kLeastDrawn));
+    own.add(static_cast<double>(panel.x.names.size()), 100.0 * std::max(part, kLeastDrawn));
   };
   for (const BudgetLine& l : b.lines) add(l.name, l.largest);
   if (b.random) add("parameters", b.random->largest);
@@ -87,15 +81,14 @@ Panel largest_panel(const ErrorBudget& b) {
 }  // namespace
 
 Figure budget_figure(const ErrorBudget& budget) {
-  Figure figure;
-  figure.id = "budget";
-  figure.title = fmt::format("Error budget: {}", budget.title);
-  figure.caption = fmt::format(
-      "Signed differences between neighbouring stages in parts of the peak ({} N), added up at the "
-      "instant of their largest sum, and each line's own largest. {}.",
-      significant(budget.peak_N, 3), budget.sentences.empty() ? "" : budget.sentences.front());
-  figure.panels = {waterfall_panel(budget), largest_panel(budget)};
-  return figure;
+  return {"budget",
+          fmt::format("Error budget: {}", budget.title),
+          fmt::format("Signed differences between neighbouring stages in parts of the peak ({} N), "
+                      "added up at the "
+                      "instant of their largest sum, and each line's own largest. {}.",
+                      significant(budget.peak_N, 3),
+                      budget.sentences.empty() ? "" : budget.sentences.front()),
+          {waterfall_panel(budget), largest_panel(budget)}};
 }
 
 std::vector<std::string> write_budget_report(const std::filesystem::path& folder,

@@ -49,15 +49,13 @@ Panel parameter_panel(const DesignResult& result, const Direction& d, std::size_
     curves[c.experiment.*d.across][c.experiment.*d.along / d.to_si] = 100.0 * p.relative_error;
   }
   Panel panel{result.problem.parameter(i).name,
-              {d.quantity, d.unit, true, {}, {}},
-              {"expected relative standard error", "%", true, {}, {}},
-              {}};
+              {d.quantity, d.unit, true},
+              {"expected relative standard error", "%", true}};
   for (const auto& [across, points] : curves) {
     Series s =
         line(fmt::format(fmt::runtime(d.curve), significant(across / d.curve_to_si, 4)), {}, {});
     for (const auto& [x, y] : points) {
-      s.x.push_back(x);
-      s.y.push_back(y);
+      s.add(x, y);
     }
     panel.series.push_back(std::move(s));
   }
@@ -79,8 +77,7 @@ Figure empty_figure(const DesignResult& result, const Direction& d, std::size_t 
           fmt::format("What the {} decides", d.quantity),
           fmt::format("Expected standard errors from the Fisher information; otherwise as in the "
                       "best candidate: {}.",
-                      experiment_words(result.ranked.front().experiment)),
-          {}};
+                      experiment_words(result.ranked.front().experiment))};
 }
 
 }  // namespace

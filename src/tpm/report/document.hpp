@@ -38,7 +38,7 @@ struct Bullets {
 struct Table {
   std::string caption;
   std::vector<Column> columns;
-  std::vector<std::vector<Cell>> rows;  ///< each as long as `columns`
+  std::vector<std::vector<Cell>> rows{};  ///< each as long as `columns`
 };
 
 struct Picture {
@@ -53,7 +53,7 @@ using Block = std::variant<Heading, Paragraph, Bullets, Table, Picture>;
 struct Document {
   std::string title;
   std::string subtitle;
-  std::vector<Block> blocks;
+  std::vector<Block> blocks{};
 
   void heading(int level, std::string text);
   void paragraph(std::string text);

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
@@ -161,6 +162,19 @@ std::map<std::string, std::string> draw_into(const std::filesystem::path& folder
     drawings[figure.id] = read_file(folder / "figures" / (figure.id + ".svg"));
   }
   return drawings;
+}
+
+void write_report(const std::filesystem::path& folder, const Document& document,
+                  const std::vector<Figure>& figures, const std::string& python,
+                  std::map<std::string, double> seconds, const Json& more) {
+  const auto drawings =
+      timed(seconds, "drawing", [&] { return draw_into(folder, figures, python); });
+  write_file(folder / "report.md", to_markdown(document));
+  write_file(folder / "report.html", to_html(document, drawings));
+  Json record = run_record(seconds);
+  record["drawing_python"] = python;
+  record.update(more);
+  write_file(folder / "report.run.json", to_text(record));
 }
 
 void draw_network(const std::string& python, const std::filesystem::path& picture_json,

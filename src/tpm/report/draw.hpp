@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/report/document.hpp"
 #include "tpm/report/figure.hpp"
 
 namespace tpm::report {
@@ -33,6 +34,14 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
 [[nodiscard]] std::map<std::string, std::string> draw_into(const std::filesystem::path& folder,
                                                            const std::vector<Figure>& figures,
                                                            const std::string& python);
+
+/// Writes a report into `folder`: report.md, report.html, figures.json, figures/ID.svg, and
+/// report.run.json with what changes from run to run. Throws as draw_figures does.
+/// @param seconds wall time of each part of the run; that of drawing is added
+/// @param more further keys of report.run.json
+void write_report(const std::filesystem::path& folder, const Document& document,
+                  const std::vector<Figure>& figures, const std::string& python,
+                  std::map<std::string, double> seconds, const Json& more = Json::object());
 
 /// Draws a network_picture() as STEM.svg and STEM.png with scripts/draw_network.py. Throws as
 /// draw_figures does.

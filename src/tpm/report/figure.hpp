@@ -33,14 +33,24 @@ struct Series {
   std::vector<double> upper{};
   std::vector<double> z{};  ///< NaN: nothing there
   std::string text{};
+
+  void add(double at, double value) {
+    x.push_back(at);
+    y.push_back(value);
+  }
+  void add_range(double at, double least, double most) {
+    x.push_back(at);
+    lower.push_back(least);
+    upper.push_back(most);
+  }
 };
 
 struct Axis {
   std::string quantity;  ///< "contact force"
   std::string unit;      ///< "N"; may be empty
   bool logarithmic = false;
-  std::optional<double> lower;  ///< limits; what is not given follows the data
-  std::optional<double> upper;
+  std::optional<double> lower{};  ///< limits; what is not given follows the data
+  std::optional<double> upper{};
   std::vector<std::string> names{};  ///< what stands at 1, 2, ...: for things that have no number
 };
 
@@ -56,7 +66,7 @@ struct Figure {
   std::string id;  ///< name of the file it is drawn into, without ending
   std::string title;
   std::string caption;
-  std::vector<Panel> panels;
+  std::vector<Panel> panels{};
   std::string note{};  ///< one line drawn below the panels: what the numbers depend on
 };
 

@@ -12,7 +12,7 @@ namespace tpm::report {
 namespace {
 
 Axis parameter_axis(const FitParameter& p) {
-  return {p.name, p.unit.symbol, p.scale != Scale::linear, {}, {}};
+  return {p.name, p.unit.symbol, p.scale != Scale::linear};
 }
 
 /// The declared noise scale holds for a fit only if it holds for each of its data sets.
@@ -32,10 +32,8 @@ double interval_rise(const FitResult& fit) {
 
 Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::string& name,
                         double stated) {
-  Series interval;
-  interval.kind = Series::Kind::bracket;
-  Series estimate;
-  estimate.kind = Series::Kind::points;
+  Series interval{.kind = Series::Kind::bracket};
+  Series estimate{.kind = Series::Kind::points};
   Axis axis;
   double unit = 1.0;
   for (const FitVariant& variant : study.variants) {
@@ -44,11 +42,9 @@ Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::strin
     unit = p.parameter.unit.to_si;
     axis = parameter_axis(p.parameter);
     interval.label = fmt::format("{:.4g} % interval", 100.0 * variant.result.config.level);
-    interval.x.push_back(variant.rate_m_per_s * 1e3);
-    interval.lower.push_back(p.lower.value_or(p.parameter.lower) / unit);
-    interval.upper.push_back(p.upper.value_or(p.parameter.upper) / unit);
-    estimate.x.push_back(variant.rate_m_per_s * 1e3);
-    estimate.y.push_back(p.estimate / unit);
+    interval.add_range(variant.rate_m_per_s * 1e3, p.lower.value_or(p.parameter.lower) / unit,
+                       p.upper.value_or(p.parameter.upper) / unit);
+    estimate.add(variant.rate_m_per_s * 1e3, p.estimate / unit);
   }
   interval.provenance = "derived";
   interval.assumed = "ramp rate";
@@ -59,8 +55,7 @@ Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::strin
   value.provenance = "text";
   Panel panel{fmt::format("noise {}", noise_words(noise)),
               {"assumed ramp rate", "mm/s", false, 0.0, 5.0},
-              std::move(axis),
-              {}};
+              std::move(axis)};
   panel.series = {std::move(interval), std::move(estimate), std::move(value)};
   return panel;
 }
@@ -76,8 +71,7 @@ std::vector<Series> profile_series(const ParameterResult& result,
     const double risen = point.deviance - least;
     if (risen > 2.0 * at.rise)
       continue;  // far above the limit it only squeezes the part that matters
-    profile.x.push_back(point.natural / si);
-    profile.y.push_back(risen / at.unit);
+    profile.add(point.natural / si, risen / at.unit);
   }
   Series limit =
       line(fmt::format("limit of the {:.4g} % interval", 100.0 * at.level),
@@ -111,16 +105,13 @@ std::string noise_words(NoiseKind noise) {
 }
 
 Figure profile_figure(const FitStudy& study) {
-  Figure figure{"fit_profiles",
-                "Likelihood profiles",
+  Figure figure{"fit_profiles", "Likelihood profiles",
                 "Each parameter is held at a value and the others are fitted again. Where the "
-                "curve stays below the limit, the data cannot tell the values apart.",
-                {}};
+                "curve stays below the limit, the data cannot tell the values apart."};
   const double rise = interval_rise(study.reference);
   for (const DrawnProfile& drawn : study.profiles) {
     const ParameterResult& result = study.reference.parameters[drawn.parameter];
-    Panel panel{
-        "", parameter_axis(result.parameter), {"rise of the deviance", "", false, 0.0, {}}, {}};
+    Panel panel{"", parameter_axis(result.parameter), {"rise of the deviance", "", false, 0.0}};
     panel.y.upper = 1.6 * rise;
     panel.series = profile_series(result, drawn.points, study.reference.best.deviance,
                                   {study.reference.config.level, rise});
@@ -134,8 +125,7 @@ Figure sensitivity_figure(const FitStudy& study, const std::string& parameter, d
                 fmt::format("What {} depends on", parameter),
                 "The ramp rate and the kind of noise are not stated in the paper. Each bar is the "
                 "interval of one fit; a bar that ends at the edge of the searched range is open "
-                "there.",
-                {}};
+                "there."};
   for (const NoiseKind noise :
        {NoiseKind::relative_to_datum, NoiseKind::log, NoiseKind::relative_to_model}) {
     figure.panels.push_back(sensitivity_panel(study, noise, parameter, stated));

@@ -41,8 +41,7 @@ Series measured_part(const std::vector<const FittedDatum*>& readings, bool stora
     if (is_storage(datum.quantity) != storage || datum.held_out != held_out) continue;
     s.provenance = std::string(provenance_name(datum.provenance));
     if (!(*datum.value > 0.0)) continue;
-    s.x.push_back(*datum.frequency_Hz);
-    s.y.push_back(*datum.value / unit);
+    s.add(*datum.frequency_Hz, *datum.value / unit);
     // A bar below 0 would leave the axis.
     s.sd.push_back(std::min(d->reading_sd, 0.99 * *datum.value) / unit);
   }
@@ -77,8 +76,7 @@ std::array<Series, 2> law_lines(const FitResult& fit, std::size_t choice,
     const double value = law.value[static_cast<Eigen::Index>(i)];
     if (!(value > 0.0)) continue;
     Series& s = lines[i / kPoints];
-    s.x.push_back(grid.frequency_Hz[i % kPoints]);
-    s.y.push_back(value / unit);
+    s.add(grid.frequency_Hz[i % kPoints], value / unit);
   }
   return lines;
 }
@@ -96,10 +94,7 @@ const ParameterResult* result_of(const SpecimenRow& row, const std::string& para
 Series pooled_band(const PooledParameter& p, const EffectInterval& range, std::string label,
                    double last) {
   const double unit = p.parameter.unit.to_si;
-  Series band;
-  band.kind = Series::Kind::band;
-  band.label = std::move(label);
-  band.provenance = "derived";
+  Series band{.kind = Series::Kind::band, .label = std::move(label), .provenance = "derived"};
   band.x = {0.5, last};
   band.lower.assign(2, p.parameter.natural(range.lower) / unit);
   band.upper.assign(2, p.parameter.natural(range.upper) / unit);
@@ -111,26 +106,17 @@ Panel specimen_panel(const SpecimenStudy& study, const PooledParameter& p) {
   const double last = static_cast<double>(study.rows.size()) + 0.5;
   Panel panel{"",
               {"recording", "", false, 0.5, last},
-              {p.parameter.name, p.parameter.unit.symbol, p.parameter.scale == Scale::log, {}, {}},
-              {}};
-  Series interval;
-  interval.kind = Series::Kind::bracket;
-  interval.label = "its interval";
-  interval.provenance = "derived";
-  Series estimate;
-  estimate.kind = Series::Kind::points;
-  estimate.label = "estimate of a recording";
-  estimate.provenance = "derived";
+              {p.parameter.name, p.parameter.unit.symbol, p.parameter.scale == Scale::log}};
+  Series interval{.kind = Series::Kind::bracket, .label = "its interval", .provenance = "derived"};
+  Series estimate{
+      .kind = Series::Kind::points, .label = "estimate of a recording", .provenance = "derived"};
   const bool logarithmic = panel.y.logarithmic;
   for (std::size_t i = 0; i < study.rows.size(); ++i) {
     const ParameterResult* r = result_of(study.rows[i], p.parameter.name);
     if (r == nullptr || (logarithmic && !(r->estimate > 0.0))) continue;
-    estimate.x.push_back(static_cast<double>(i + 1));
-    estimate.y.push_back(r->estimate / unit);
+    estimate.add(static_cast<double>(i + 1), r->estimate / unit);
     if (!r->lower || !r->upper || (logarithmic && !(*r->lower > 0.0))) continue;
-    interval.x.push_back(static_cast<double>(i + 1));
-    interval.lower.push_back(*r->lower / unit);
-    interval.upper.push_back(*r->upper / unit);
+    interval.add_range(static_cast<double>(i + 1), *r->lower / unit, *r->upper / unit);
   }
   Series typical = line("typical specimen", {0.5, last}, {});
   typical.provenance = "derived";
@@ -172,19 +158,19 @@ Figure spectrum_figure(const FitResult& fit, std::size_t choice) {
   const Unit unit = shown_unit(dimension);
   const auto hidden = std::count_if(readings.begin(), readings.end(),
                                     [](const FittedDatum* d) { return !(*d->datum.value > 0.0); });
-  Figure figure;
-  figure.id = fmt::format("spectrum_{}", name);
-  figure.title = fmt::format("{}: {}", name, law_name(fit.config.law.value()));
-  figure.caption = fmt::format(
-      "Storage and loss of small oscillations over their frequency, and the fitted law {}; bars "
-      "are standard deviations.{}",
-      law_name(*fit.config.law),
-      hidden > 0 ? fmt::format(" {} readings are not above 0 and not drawn.", hidden) : "");
+  Figure figure{
+      fmt::format("spectrum_{}", name),
+      fmt::format("{}: {}", name, law_name(fit.config.law.value())),
+      fmt::format(
+          "Storage and loss of small oscillations over their frequency, and the fitted law {}; "
+          "bars "
+          "are standard deviations.{}",
+          law_name(*fit.config.law),
+          hidden > 0 ? fmt::format(" {} readings are not above 0 and not drawn.", hidden) : "")};
   Panel panel{
       "",
-      {"frequency", "Hz", true, {}, {}},
-      {dimension == Dimension::stress ? "modulus" : "dynamic stiffness", unit.symbol, true, {}, {}},
-      {}};
+      {"frequency", "Hz", true},
+      {dimension == Dimension::stress ? "modulus" : "dynamic stiffness", unit.symbol, true}};
   for (const bool held_out : {false, true}) {
     for (const bool storage : {true, false}) {
       Series s = measured_part(readings, storage, held_out, unit.to_si);
@@ -203,15 +189,15 @@ std::vector<Figure> specimen_figures(const SpecimenStudy& study) {
   std::vector<Figure> figures;
   for (std::size_t i = 0; i < study.pooled.size(); ++i) {
     if (i % kPanels == 0) {
-      Figure figure;
-      figure.id = fmt::format("specimens{}", i == 0 ? "" : fmt::format("_{}", 1 + i / kPanels));
-      figure.title = fmt::format("{} recordings: {}", study.rows.size(), law_name(study.law));
-      figure.caption = fmt::format(
-          "Each recording fitted by itself, and what they have in common (random effects). "
-          "An estimate without a bar has an interval that is open.{} Recordings: {}.",
-          depends_on_reference(study.law) ? fmt::format(" The {}.", reference_words(study.law))
-                                          : std::string(),
-          numbered_recordings(study));
+      Figure figure{
+          fmt::format("specimens{}", i == 0 ? "" : fmt::format("_{}", 1 + i / kPanels)),
+          fmt::format("{} recordings: {}", study.rows.size(), law_name(study.law)),
+          fmt::format(
+              "Each recording fitted by itself, and what they have in common (random effects). "
+              "An estimate without a bar has an interval that is open.{} Recordings: {}.",
+              depends_on_reference(study.law) ? fmt::format(" The {}.", reference_words(study.law))
+                                              : std::string(),
+              numbered_recordings(study))};
       figures.push_back(std::move(figure));
     }
     figures.back().panels.push_back(specimen_panel(study, study.pooled[i]));

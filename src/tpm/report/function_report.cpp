@@ -24,29 +24,26 @@ Figure step_response_figure(const FitResult& fit, std::size_t choice) {
     measured.provenance = provenance_name(d->datum.provenance);
     along.emplace_back(d->datum.time_s, d->predicted / unit.to_si);
     if (!(*d->datum.value > 0.0)) continue;
-    measured.x.push_back(d->datum.time_s);
-    measured.y.push_back(*d->datum.value / unit.to_si);
+    measured.add(d->datum.time_s, *d->datum.value / unit.to_si);
     // A bar below 0 would leave the axis.
     measured.sd.push_back(std::min(d->reading_sd, 0.99 * *d->datum.value) / unit.to_si);
   }
   std::sort(along.begin(), along.end());
   for (const auto& [time, value] : along) {
-    law.x.push_back(time);
-    law.y.push_back(value);
+    law.add(time, value);
   }
-  Panel panel{"", {"time", "s", true, {}, {}}, {measured_name, unit.symbol, true, {}, {}}, {}};
+  Panel panel{"", {"time", "s", true}, {measured_name, unit.symbol, true}};
   if (!measured.x.empty()) panel.series.push_back(std::move(measured));
   panel.series.push_back(std::move(law));
-  Figure figure;
   const std::string name =
       std::filesystem::path(fit.config.data.at(choice).dataset).stem().string();
-  figure.id = fmt::format("fit_{}", name);
-  figure.title = fmt::format("{}: {}", name, law_name(fit.config.law.value()));
-  figure.caption = fmt::format(
-      "{} after a unit step at time 0, and the fitted law {}; bars are standard deviations.",
-      measured_name, law_name(*fit.config.law));
-  figure.panels = {std::move(panel)};
-  return figure;
+  return {
+      fmt::format("fit_{}", name),
+      fmt::format("{}: {}", name, law_name(fit.config.law.value())),
+      fmt::format(
+          "{} after a unit step at time 0, and the fitted law {}; bars are standard deviations.",
+          measured_name, law_name(*fit.config.law)),
+      {std::move(panel)}};
 }
 
 std::vector<std::string> write_function_report(const std::filesystem::path& folder,

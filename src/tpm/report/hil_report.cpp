@@ -48,8 +48,7 @@ std::vector<Series> asked_depths(const HilRecording& recording, const std::vecto
     }
     before = place;
     if (!place) continue;
-    stretches.back().x.push_back(time);
-    stretches.back().y.push_back(1e3 * aim.value);
+    stretches.back().add(time, 1e3 * aim.value);
   }
   return stretches;
 }
@@ -62,8 +61,7 @@ Series some_points(std::string label, const std::vector<double>& x, const std::v
       .kind = Series::Kind::points, .label = std::move(label), .provenance = std::move(provenance)};
   const std::size_t stride = std::max<std::size_t>(1, x.size() / kPoints);
   for (std::size_t i = 0; i < x.size(); i += stride) {
-    series.x.push_back(x[i]);
-    series.y.push_back(y[i]);
+    series.add(x[i], y[i]);
   }
   return series;
 }
@@ -86,29 +84,23 @@ void add_measured(std::vector<Series>& series, const HilRecording& recording) {
 
 Figure session_figure(const HilRecording& recording, const Verification& v) {
   const std::vector<double> time = thinned(v.time_s);
-  const Axis seconds{"time", "s", false, std::nullopt, std::nullopt};
-  Figure figure;
-  figure.id = "session";
-  figure.title = recording.simulated() ? "The session, on a simulated device" : "The session";
-  figure.caption =
+  const Axis seconds{"time", "s"};
+  Figure figure{
+      "session", recording.simulated() ? "The session, on a simulated device" : "The session",
       "Depth of the tool below the surface at rest and where the phases ask it to be, force sent "
       "to "
-      "the device on the curve of the reference under the recorded motion, and their difference.";
+      "the device on the curve of the reference under the recorded motion, and their difference."};
   std::vector<Series> forces{line("reference", time, thinned(v.reference_N)),
                              some_points("commanded", v.time_s, v.commanded_N, "model")};
   add_measured(forces, recording);
   std::vector<Series> depths = asked_depths(recording, time);
   depths.push_back(line("tool", time, thinned(v.depth_m, 1e3)));
-  figure.panels = {
-      {"motion", seconds, {"depth", "mm", false, std::nullopt, std::nullopt}, std::move(depths)},
-      {"force",
-       seconds,
-       {"contact force", "N", false, std::nullopt, std::nullopt},
-       std::move(forces)},
-      {"commanded less reference",
-       seconds,
-       {"force error", "mN", false, std::nullopt, std::nullopt},
-       {line("error", time, thinned(v.error_N, 1e3))}}};
+  figure.panels = {{"motion", seconds, {"depth", "mm"}, std::move(depths)},
+                   {"force", seconds, {"contact force", "N"}, std::move(forces)},
+                   {"commanded less reference",
+                    seconds,
+                    {"force error", "mN"},
+                    {line("error", time, thinned(v.error_N, 1e3))}}};
   return figure;
 }
 
@@ -119,18 +111,15 @@ Figure energy_figure(const HilRecording& recording) {
     observed.push_back(1e3 * row.observed_J);
     leak.push_back(1e3 * row.leak_J);
   }
-  Figure figure;
-  figure.id = "energy";
-  figure.title = "Energy";
-  figure.caption =
-      "Work of the hand on what is rendered, which must not fall below zero but for "
-      "what the held force leaks, and the leak as predicted, K dx^2/2 a period.";
-  figure.panels = {{"energy",
-                    {"time", "s", false, std::nullopt, std::nullopt},
-                    {"energy", "mJ", false, std::nullopt, std::nullopt},
-                    {line("observed", thinned(time), thinned(observed)),
-                     line("predicted leak", thinned(time), thinned(leak))}}};
-  return figure;
+  return {"energy",
+          "Energy",
+          "Work of the hand on what is rendered, which must not fall below zero but for "
+          "what the held force leaks, and the leak as predicted, K dx^2/2 a period.",
+          {{"energy",
+            {"time", "s"},
+            {"energy", "mJ"},
+            {line("observed", thinned(time), thinned(observed)),
+             line("predicted leak", thinned(time), thinned(leak))}}}};
 }
 
 /// Largest and smallest difference from the readings, in words.
@@ -188,7 +177,7 @@ void add_glance(Document& d, const HilRecording& r, const Verification& v,
 
 void add_identity(Document& d, const HilRecording& r) {
   const Json& device = r.header.at("device");
-  Table table{"", {{"what"}, {"value"}}, {}};
+  Table table{"", {{"what"}, {"value"}}};
   const auto row = [&](const char* what, std::string value) {
     table.rows.push_back({{what}, {value.empty() ? "not known" : std::move(value)}});
   };
@@ -224,8 +213,7 @@ void add_plan(Document& d, const Json& plan) {
                           plan.at("choice").get<std::string>(),
                           significant(100.0 * plan.at("tolerance").get<double>(), 3),
                           significant(plan.at("rate_Hz").get<double>(), 4)),
-              {{"candidate"}, {"a period, us"}, {"claimed error"}, {"verified"}, {"why not"}},
-              {}};
+              {{"candidate"}, {"a period, us"}, {"claimed error"}, {"verified"}, {"why not"}}};
   for (const Json& c : plan.at("candidates")) {
     if (c.at("claimed_error").is_null()) continue;
     table.rows.push_back({{c.at("name").get<std::string>()},
@@ -261,8 +249,7 @@ void add_fidelity(Document& d, const Verification& v) {
                {"rms mN", true},
                {"max mN", true},
                {"max of peak", true},
-               {"depth um", true}},
-              {}};
+               {"depth um", true}}};
   for (const PhaseFidelity& p : v.phases) {
     const bool good = p.force.max_N <= kMostError * v.all.peak_N;
     table.rows.push_back({{p.phase.name},
@@ -288,8 +275,7 @@ void add_experiment(Document& d, const Verification& v) {
                {"reading"},
                {"measured N", true},
                {"commanded N", true},
-               {"difference", true}},
-              {}};
+               {"difference", true}}};
   for (const BesideExperiment& e : v.experiment) {
     table.rows.push_back({{significant(1e3 * e.depth_m, 3)},
                           {significant(1e3 * e.rate_m_per_s, 3)},

@@ -25,16 +25,14 @@ struct BrokenLine {
       pieces.push_back(line(name, {}, {}));
       pieces.back().provenance = "derived";
     }
-    pieces.back().x.push_back(x);
-    pieces.back().y.push_back(y);
+    pieces.back().add(x, y);
     last = sample;
   }
 };
 
 /// Over the samples at which a law was the least.
 Panel width_panel(const Identification& id) {
-  Panel panel{.x = {"time", "s", false, {}, {}},
-              .y = {"half width of the interval", "% of the estimate", true, {}, {}}};
+  Panel panel{.x = {"time", "s"}, .y = {"half width of the interval", "% of the estimate", true}};
   const std::size_t law = id.result().law;
   std::map<std::string, BrokenLine> lines;
   std::vector<std::string> order;
@@ -73,15 +71,14 @@ Panel width_panel(const Identification& id) {
 
 Panel law_panel(const Identification& id) {
   Panel panel{
-      .x = {"time", "s", false, {}, {}},
+      .x = {"time", "s"},
       .y = {"least law, by its place", "", false, 0.5, 0.5 + static_cast<double>(id.laws.size())}};
   for (std::size_t law = 0; law < id.laws.size(); ++law) {
     Series s{
         .kind = Series::Kind::points, .label = law_name(id.laws[law]), .provenance = "derived"};
     for (const IdentifiedSample& sample : id.history) {
       if (sample.law != law) continue;
-      s.x.push_back(sample.time_s);
-      s.y.push_back(static_cast<double>(law + 1));
+      s.add(sample.time_s, static_cast<double>(law + 1));
     }
     if (!s.x.empty()) panel.series.push_back(std::move(s));
   }
@@ -91,16 +88,13 @@ Panel law_panel(const Identification& id) {
 }  // namespace
 
 Figure identification_figure(const Identification& id) {
-  Figure figure;
-  figure.id = "identification";
   const std::string name = std::filesystem::path(id.name).stem().string();
-  figure.title = fmt::format("{}, sample by sample", name);
-  figure.caption = fmt::format(
-      "Half width of the {} % intervals of {} while the recording is replayed, and the least law "
-      "at each sample.",
-      significant(100.0 * id.options.level, 3), law_name(id.laws[id.result().law]));
-  figure.panels = {width_panel(id), law_panel(id)};
-  return figure;
+  return {"identification",
+          fmt::format("{}, sample by sample", name),
+          fmt::format("Half width of the {} % intervals of {} while the recording is replayed, and "
+                      "the least law at each sample.",
+                      significant(100.0 * id.options.level, 3), law_name(id.laws[id.result().law])),
+          {width_panel(id), law_panel(id)}};
 }
 
 std::vector<std::string> write_identification_report(const std::filesystem::path& folder,

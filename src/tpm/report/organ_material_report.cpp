@@ -14,8 +14,7 @@ Series less(const OrganMaterial& m, const char* label, std::vector<double> Mater
   Series s{.kind = Series::Kind::points, .label = label, .provenance = "derived"};
   for (const MaterialCourse& c : m.courses) {
     for (std::size_t i = 0; i < c.time_s.size(); ++i) {
-      s.x.push_back(1e3 * c.depth_m[i]);
-      s.y.push_back(100.0 * ((c.*force)[i] - c.law_N[i]) / m.peak_N);
+      s.add(1e3 * c.depth_m[i], 100.0 * ((c.*force)[i] - c.law_N[i]) / m.peak_N);
     }
   }
   return s;
@@ -24,8 +23,8 @@ Series less(const OrganMaterial& m, const char* label, std::vector<double> Mater
 Panel force_panel(const MaterialCourse& c, bool titled) {
   Panel forces;
   if (titled) forces.title = c.name;
-  forces.x = {"time", "s", false, {}, {}};
-  forces.y = {"contact force", "N", false, {}, {}};
+  forces.x = {"time", "s"};
+  forces.y = {"contact force", "N"};
   if (!c.measured_N.empty()) {
     Series readings = line("recording", c.time_s, c.measured_N);
     readings.kind = Series::Kind::points;
@@ -46,9 +45,8 @@ Panel force_panel(const MaterialCourse& c, bool titled) {
 Panel material_profile_panel(const ReadingsFit& readings, const ParameterResult& result) {
   const FitParameter& p = result.parameter;
   Panel panel{"",
-              {p.name, p.unit.symbol, p.scale == Scale::log, {}, {}},
-              {"rise of the deviance over its limit", "", false, 0.0, 1.6},
-              {}};
+              {p.name, p.unit.symbol, p.scale == Scale::log},
+              {"rise of the deviance over its limit", "", false, 0.0, 1.6}};
   panel.series = profile_series(result, result.profile.points, readings.fit.best.deviance,
                                 {readings.level, readings.rise, readings.rise});
   return panel;
@@ -58,12 +56,10 @@ Panel material_profile_panel(const ReadingsFit& readings, const ParameterResult&
 std::vector<Figure> material_figures(const OrganMaterial& m) {
   std::vector<Figure> figures{organ_material_figure(m)};
   if (m.intervals != MaterialIntervals::profiles) return figures;
-  Figure figure;
-  figure.id = "material_profiles";
-  figure.title = fmt::format("Profiles of {} on an organ", m.law);
-  figure.caption =
+  Figure figure{
+      "material_profiles", fmt::format("Profiles of {} on an organ", m.law),
       "Each parameter of the bonds is held, and the others, contacts and offsets among them, are "
-      "fitted again to the readings.";
+      "fitted again to the readings."};
   for (std::size_t i = 0; i < m.parameters.size(); ++i) {
     const ParameterResult& p = m.readings->fit.parameters[i];
     if (!p.profile.points.empty()) figure.panels.push_back(material_profile_panel(*m.readings, p));
@@ -75,19 +71,18 @@ std::vector<Figure> material_figures(const OrganMaterial& m) {
 }  // namespace
 
 Figure organ_material_figure(const OrganMaterial& m) {
-  Figure figure;
-  figure.id = "material";
-  figure.title = fmt::format("{} put on an organ", m.law);
-  figure.caption = fmt::format(
-      "The contact of the organ with the fitted bonds answers within {} % of the law's peak ({} % "
-      "rms); the start by correspondence within {} %.",
-      significant(100.0 * m.organ.largest, 3), significant(100.0 * m.organ.rms, 3),
-      significant(100.0 * m.start.largest, 3));
+  Figure figure{
+      "material", fmt::format("{} put on an organ", m.law),
+      fmt::format("The contact of the organ with the fitted bonds answers within {} % of the law's "
+                  "peak ({} % "
+                  "rms); the start by correspondence within {} %.",
+                  significant(100.0 * m.organ.largest, 3), significant(100.0 * m.organ.rms, 3),
+                  significant(100.0 * m.start.largest, 3))};
   for (const MaterialCourse& c : m.courses) {
     figure.panels.push_back(force_panel(c, m.courses.size() > 1));
   }
-  Panel misses{.x = {"depth", "mm", false, {}, {}},
-               .y = {"organ less law, of the peak", "%", false, {}, {}},
+  Panel misses{.x = {"depth", "mm"},
+               .y = {"organ less law, of the peak", "%"},
                .series = {less(m, "by correspondence less law", &MaterialCourse::correspondence_N),
                           less(m, "fitted less law", &MaterialCourse::organ_N)}};
   figure.panels.push_back(std::move(misses));

@@ -105,18 +105,15 @@ std::string set_words(const StudyCurves& set) {
 Figure static_figure(const OrganStudy& study, std::size_t condition) {
   const StudyCondition& c = study.config.conditions[condition];
   Figure figure{
-      "static",
-      "Static force against depth",
+      "static", "Static force against depth",
       "At equilibrium. Compare Fig. 6 of the paper. The bands are ranges over "
       "three pigs; between them nothing is known. Of a fit that meets every band the curve is "
-      "one of many.",
-      {}};
+      "one of many."};
   const StudyData* data = data_of(study, Kind::static_);
   for (const StudyCurves* set : shown_sets(study)) {
     Panel panel{lettered(figure.panels.size(), set_words(*set)),
                 {"indentation depth", "mm", false, 0.0, 1.05e3 * c.depth_m},
-                {"contact force", "N", false, 0.0, {}},
-                {}};
+                {"contact force", "N", false, 0.0}};
     for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
       add_curve(panel, set->at(condition, t), study.config.tissues[t].name, 1e3, 1.0);
     }
@@ -146,9 +143,8 @@ std::vector<Panel> ramp_panels(const OrganStudy& study, const StudyCurves& set,
   double longest = 0.0;
   for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
     Panel panel{lettered(t, study.config.tissues[t].name),
-                {"time since first contact", "s", false, 0.0, {}},
-                {"contact force", "N", false, 0.0, {}},
-                {}};
+                {"time since first contact", "s", false, 0.0},
+                {"contact force", "N", false, 0.0}};
     for (const std::size_t c : conditions) {
       const std::string text = label(study.config.conditions[c]);
       const StudyCurve& curve = set.at(c, t);
@@ -215,14 +211,12 @@ Figure creep_figure(const OrganStudy& study, std::size_t condition, std::size_t 
                 fmt::format("Creep under {} N", significant(c.load_N, 4)),
                 "Compare Figs. 8 and 9 of the paper. That the band belongs to the end of the creep "
                 "is assumed. The bands do not tell eta1: the course in (b) is one of many, its end "
-                "is what is fitted.",
-                {}};
+                "is what is fitted."};
   const StudyData* data = data_of(study, Kind::creep);
   for (const StudyCurves* set : shown_sets(study)) {
     Panel panel{lettered(figure.panels.size(), set_words(*set)),
                 {"time under load", "s", false, -0.02 * c.duration_s, 1.06 * c.duration_s},
-                {"indentation depth", "mm", false, 0.0, {}},
-                {}};
+                {"indentation depth", "mm", false, 0.0}};
     for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
       add_curve(panel, set->at(condition, t), study.config.tissues[t].name, 1.0, 1e3);
     }

@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "tpm/core/text.hpp"
 #include "tpm/model/validity_limits.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/fit_cells.hpp"
-#include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm::report {
@@ -95,7 +93,7 @@ std::string cost_sentence(const OrganStudy& study, const StudyCurves& set, std::
 /// A row per condition and reading, the tissues side by side.
 Table readings_table(const OrganStudy& study, const StudyCurves& set, Kind kind,
                      std::string caption) {
-  Table table{std::move(caption), {{"imposed"}, {"reading"}}, {}};
+  Table table{std::move(caption), {{"imposed"}, {"reading"}}};
   const bool compared = set.parameters.has_value();
   for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
     table.columns.push_back({study.config.tissues[t].name, true});
@@ -198,7 +196,7 @@ Cell hypothesis_cell(const HypothesisResult& h) {
 }
 
 Table fits_table(const OrganStudy& study) {
-  Table table{"Estimates with profile-likelihood intervals.", {{"data"}, {"tissue"}}, {}};
+  Table table{"Estimates with profile-likelihood intervals.", {{"data"}, {"tissue"}}};
   const FitConfig& any = study.config.fits.front().configs.front();
   for (const EstimatedParameter& p : any.parameters) table.columns.push_back({p.fit.name, true});
   table.columns.push_back({"chi-square", true});
@@ -231,8 +229,7 @@ Table answers_table(const OrganStudy& study, std::size_t fit) {
   Table table{fmt::format("Fit '{}': readings, and the answers of the fitted tissues. z is the "
                           "difference in standard deviations; 0 within a band.",
                           study.config.fits[fit].name),
-              {{"data set"}, {"reading"}, {"provenance"}, {"observed", true}},
-              {}};
+              {{"data set"}, {"reading"}, {"provenance"}, {"observed", true}}};
   const FitResult* first = nullptr;
   for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
     table.columns.push_back({study.config.tissues[t].name, true});
@@ -358,19 +355,13 @@ Document organ_study_document(const OrganStudy& study, const std::vector<Figure>
 
 void write_organ_study(const OrganStudy& study, const std::filesystem::path& folder,
                        const std::string& python, double seconds) {
-  std::map<std::string, double> parts{{"fits and curves", seconds}};
   const std::vector<Figure> figures = organ_study_figures(study);
-  const auto drawings = timed(parts, "drawing", [&] { return draw_into(folder, figures, python); });
-  const Document document = organ_study_document(study, figures);
-  write_file(folder / "report.md", to_markdown(document));
-  write_file(folder / "report.html", to_html(document, drawings));
+  write_report(folder, organ_study_document(study, figures), figures, python,
+               {{"fits and curves", seconds}});
   write_file(folder / "experiments.json", to_text(to_json(study)));
   write_file(folder / "readings.csv", readings_csv(study));
   write_file(folder / "fits.csv", fits_csv(study));
   write_file(folder / "curves.csv", curves_csv(study));
-  Json record = run_record(parts);
-  record["drawing_python"] = python;
-  write_file(folder / "report.run.json", to_text(record));
 }
 
 }  // namespace tpm::report

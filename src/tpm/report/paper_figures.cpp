@@ -48,7 +48,7 @@ Axis time_axis(double to_s) {
 }
 
 Axis force_axis() {
-  return {"contact force", "N", false, 0.0, {}};
+  return {"contact force", "N", false, 0.0};
 }
 
 /// Ranges as brackets, each at the place `place` of its datum, values times `factor`.
@@ -58,9 +58,7 @@ Series brackets(std::string label, const std::vector<Datum>& data, double factor
   for (const Datum& d : data) {
     if (!d.is_band()) continue;
     s.provenance = std::string(provenance_name(d.provenance));
-    s.x.push_back(place(d));
-    s.lower.push_back(*d.lower * factor);
-    s.upper.push_back(*d.upper * factor);
+    s.add_range(place(d), *d.lower * factor, *d.upper * factor);
   }
   return s;
 }
@@ -81,15 +79,13 @@ Series ramp_response(const TpmParameters& p, double rate_m_per_s, std::string la
 
 /// The printed peak and end at 4 mm. Their time axis counts from the end of the ramp.
 Series printed_relaxation(const PointSet& relaxation, double ramp_s) {
-  Series s;
-  s.kind = Series::Kind::points;
-  s.label = "pig liver, peak and 30 s (Table 2)";
-  s.assumed = "time";
+  Series s{.kind = Series::Kind::points,
+           .label = "pig liver, peak and 30 s (Table 2)",
+           .assumed = "time"};
   for (const Datum& d : relaxation.data) {
     if (!d.value || !d.time_s || !d.depth_m || std::abs(*d.depth_m - kDepth_m) > 1e-9) continue;
     s.provenance = std::string(provenance_name(d.provenance));
-    s.x.push_back(ramp_s + *d.time_s);
-    s.y.push_back(*d.value);
+    s.add(ramp_s + *d.time_s, *d.value);
   }
   return s;
 }
@@ -107,7 +103,7 @@ Figure static_force_figure(const PaperFigureData& data) {
     relaxed.push_back(step_relaxation_force_N(p, lambda1, e, kForever));
     instantaneous.push_back(step_relaxation_force_N(p, lambda1, e, 0.0));
   }
-  Panel panel{"", {"indentation depth", "mm", false, 0.0, 8.4}, force_axis(), {}};
+  Panel panel{"", {"indentation depth", "mm", false, 0.0, 8.4}, force_axis()};
   panel.series = {
       line("relaxed force (t → ∞)", depth_mm, relaxed),
       line("force at once (t = 0+)", depth_mm, instantaneous),
@@ -125,7 +121,7 @@ Figure relaxation_figure(const PaperFigureData& data) {
   constexpr double kRate = 4e-3;
   const double ramp_s = kDepth_m / kRate;
   const auto panel = [&](std::string title, const TpmParameters& p, std::string label) {
-    Panel made{std::move(title), time_axis(ramp_s + kHold_s + 1.0), force_axis(), {}};
+    Panel made{std::move(title), time_axis(ramp_s + kHold_s + 1.0), force_axis()};
     made.y.upper = 0.75;
     made.series = {ramp_response(p, kRate, std::move(label)),
                    printed_relaxation(data.relaxation, ramp_s)};
@@ -153,7 +149,7 @@ Figure creep_figure(const PaperFigureData& data, const PrintedCreep& printed) {
     return scaled(model->respond(protocol, times, to_vector(data.paper), Want::values).value, 1e3);
   };
   const auto panel = [&](std::string title, Axis x, const std::vector<double>& times, double end) {
-    Panel made{std::move(title), std::move(x), {"indentation depth", "mm", false, 0.0, {}}, {}};
+    Panel made{std::move(title), std::move(x), {"indentation depth", "mm", false, 0.0}};
     made.y.upper = std::max(8.0, 1.3 * printed.end_depth_m * 1e3);
     Series band = brackets("range over livers", bands, 1e3,
                            [](const Datum& d) { return d.time_s.value_or(kCreep_s); });
@@ -187,7 +183,7 @@ Figure creep_figure(const PaperFigureData& data, const PrintedCreep& printed) {
 
 Figure rates_figure(const PaperFigureData& data) {
   const auto panel = [&](std::string title, const TpmParameters& p) {
-    Panel made{std::move(title), time_axis(35.0), force_axis(), {}};
+    Panel made{std::move(title), time_axis(35.0), force_axis()};
     made.y.upper = 0.75;
     for (const double rate_mm_per_s : {4.0, 2.0, 1.0}) {
       made.series.push_back(
@@ -228,8 +224,8 @@ Series elastography(const ValueSet& values, std::string_view name, std::string l
 Figure spectrum_figure(const PaperFigureData& data) {
   const std::vector<double> frequency_Hz = evenly_in_log(1e-3, 1e3, 180);
   const Axis x{"frequency", "Hz", true, 1e-3, 1e3};
-  Panel moduli{"(a) storage and loss modulus", x, {"modulus", "kPa", true, 1e-6, 100.0}, {}};
-  Panel viscosity{"(b) complex viscosity", x, {"viscosity", "Pa s", true, 0.5, 5e6}, {}};
+  Panel moduli{"(a) storage and loss modulus", x, {"modulus", "kPa", true, 1e-6, 100.0}};
+  Panel viscosity{"(b) complex viscosity", x, {"viscosity", "Pa s", true, 0.5, 5e6}};
   const auto draw = [&](const TpmParameters& p, const std::string& label) {
     const SpectrumResponse r = element_spectrum(to_vector(p), frequency_Hz, Want::values);
     moduli.series.push_back(line("storage, " + label, frequency_Hz, scaled(r.storage, 1e-3)));

@@ -112,12 +112,7 @@ Document paper_document(const PaperReport& report) {
 
 void write_paper_report(const PaperReport& report, const fs::path& folder,
                         const std::string& python) {
-  std::map<std::string, double> seconds = report.seconds;
-  const auto drawings =
-      timed(seconds, "drawing", [&] { return draw_into(folder, report.figures, python); });
-  const Document document = paper_document(report);
-  write_file(folder / "report.md", to_markdown(document));
-  write_file(folder / "report.html", to_html(document, drawings));
+  write_report(folder, paper_document(report), report.figures, python, report.seconds);
   const TableDocument tables = tables_document(report.tables);
   write_file(folder / "tables.md", render(tables, TableStyle::markdown));
   write_file(folder / "tables.tex", render(tables, TableStyle::latex));
@@ -127,9 +122,6 @@ void write_paper_report(const PaperReport& report, const fs::path& folder,
   write_json(folder / "fit_relaxation.json", to_json(report.fits.reference));
   write_json(folder / "fit_sensitivity.json", variants_json(report.fits));
   write_json(folder / "fit_held_out.json", held_out_json(report.fits));
-  Json record = run_record(seconds);
-  record["drawing_python"] = python;
-  write_file(folder / "report.run.json", to_text(record));
 }
 
 }  // namespace tpm::report

@@ -23,9 +23,7 @@ Series band(const LawPrediction& p, const char* label, const std::vector<double>
   Series s{.kind = Series::Kind::band, .label = label, .provenance = "model"};
   for (std::size_t i = 0; i < lower.size(); i += stride_of(p)) {
     if (!std::isfinite(lower[i]) || !std::isfinite(upper[i])) continue;
-    s.x.push_back(p.time_s[i]);
-    s.lower.push_back(lower[i] / unit);
-    s.upper.push_back(upper[i] / unit);
+    s.add_range(p.time_s[i], lower[i] / unit, upper[i] / unit);
   }
   return s;
 }
@@ -37,8 +35,7 @@ Series prediction_readings(const LawPrediction& p, bool fitted, double unit, boo
   const PredictedRecording& r = p.recording.value();
   for (std::size_t i = 0; i < r.observed.size(); i += stride_of(p)) {
     if (r.was_fitted[i] != fitted || !std::isfinite(p.response[i])) continue;
-    s.x.push_back(p.time_s[i]);
-    s.y.push_back((residual ? p.response[i] - r.observed[i] : r.observed[i]) / unit);
+    s.add(p.time_s[i], (residual ? p.response[i] - r.observed[i] : r.observed[i]) / unit);
   }
   return s;
 }
@@ -48,15 +45,13 @@ Series prediction_readings(const LawPrediction& p, bool fitted, double unit, boo
 Figure prediction_figure(const LawPrediction& p) {
   const Quantity answer = p.drive_kind == Drive::force ? p.spec.drive : p.spec.response;
   const Unit unit = shown_unit(p.response_dimension());
-  Figure figure;
-  figure.id = "prediction";
-  figure.title = fmt::format("{}: predicted {}", p.subject(), spaced(quantity_name(answer)));
-  figure.caption = fmt::format(
-      "The {} answer with the {} % band of its mean and the {} % band for one new reading.",
-      p.organ_spheres > 0 ? "organ's" : "law's", significant(100.0 * p.level, 3),
-      significant(100.0 * p.level, 3));
-  Panel panel{.x = {"time", "s", false, {}, {}},
-              .y = {spaced(quantity_name(answer)), unit.symbol, false, {}, {}}};
+  Figure figure{
+      "prediction", fmt::format("{}: predicted {}", p.subject(), spaced(quantity_name(answer))),
+      fmt::format(
+          "The {} answer with the {} % band of its mean and the {} % band for one new reading.",
+          p.organ_spheres > 0 ? "organ's" : "law's", significant(100.0 * p.level, 3),
+          significant(100.0 * p.level, 3))};
+  Panel panel{.x = {"time", "s"}, .y = {spaced(quantity_name(answer)), unit.symbol}};
   add_if_any(panel,
              band(p, "band for a new reading", p.reading_lower, p.reading_upper, unit.to_si));
   add_if_any(panel, band(p, "band of the mean", p.mean_lower, p.mean_upper, unit.to_si));
@@ -67,14 +62,12 @@ Figure prediction_figure(const LawPrediction& p) {
   Series mean = line("mean", {}, {});
   for (std::size_t i = 0; i < p.time_s.size(); i += stride_of(p)) {
     if (!std::isfinite(p.response[i])) continue;
-    mean.x.push_back(p.time_s[i]);
-    mean.y.push_back(p.response[i] / unit.to_si);
+    mean.add(p.time_s[i], p.response[i] / unit.to_si);
   }
   add_if_any(panel, std::move(mean));
   figure.panels.push_back(std::move(panel));
   if (!p.recording) return figure;
-  Panel residual{.x = {"time", "s", false, {}, {}},
-                 .y = {"prediction less measured, of the peak", "%", false, {}, {}}};
+  Panel residual{.x = {"time", "s"}, .y = {"prediction less measured, of the peak", "%"}};
   const auto about_zero = [&](const std::vector<double>& limit) {
     std::vector<double> shifted;
     for (std::size_t i = 0; i < limit.size(); ++i) shifted.push_back(limit[i] - p.response[i]);

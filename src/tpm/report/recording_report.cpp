@@ -39,8 +39,7 @@ Series sampled(Series series, const RecordingFit& r, const std::vector<double>& 
   const std::size_t stride = 1 + r.time_s.size() / kMostDrawn;
   for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
     if (!wanted(i) || !std::isfinite(y[i])) continue;
-    series.x.push_back(x[i] / x_unit);
-    series.y.push_back(y[i] / y_unit);
+    series.add(x[i] / x_unit, y[i] / y_unit);
   }
   return series;
 }
@@ -58,9 +57,7 @@ void add_band(Panel& panel, const RecordingFit& r, double y_unit) {
   const std::size_t stride = 1 + r.time_s.size() / kMostDrawn;
   for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
     if (!r.fitted[i] || !std::isfinite(r.lower[i]) || !std::isfinite(r.upper[i])) continue;
-    band.x.push_back(r.time_s[i]);
-    band.lower.push_back(r.lower[i] / y_unit);
-    band.upper.push_back(r.upper[i] / y_unit);
+    band.add_range(r.time_s[i], r.lower[i] / y_unit, r.upper[i] / y_unit);
   }
   add_if_any(panel, std::move(band));
 }
@@ -71,11 +68,8 @@ Panel response_panel(const RecordingFit& r, bool over_time) {
   const std::vector<double>& x = over_time ? r.time_s : r.drive;
   const double x_unit = over_time ? 1.0 : units.drive.to_si;
   panel.x = {over_time ? "time" : spaced(quantity_name(r.drive_quantity)),
-             over_time ? "s" : units.drive.symbol,
-             false,
-             {},
-             {}};
-  panel.y = {spaced(quantity_name(r.response_quantity)), units.response.symbol, false, {}, {}};
+             over_time ? "s" : units.drive.symbol};
+  panel.y = {spaced(quantity_name(r.response_quantity)), units.response.symbol};
   const double y_unit = units.response.to_si;
   const auto inside = [&](std::size_t i) { return r.fitted[i]; };
   const auto outside = [&](std::size_t i) { return !r.fitted[i]; };
@@ -93,7 +87,7 @@ Panel response_panel(const RecordingFit& r, bool over_time) {
 }
 
 Panel residual_panel(const RecordingFit& r) {
-  Panel panel{.x = {"time", "s", false, {}, {}}, .y = {"residual over peak", "%", false, {}, {}}};
+  Panel panel{.x = {"time", "s"}, .y = {"residual over peak", "%"}};
   std::vector<double> residual(r.observed.size());
   for (std::size_t i = 0; i < residual.size(); ++i) residual[i] = r.predicted[i] - r.observed[i];
   Series s{.kind = Series::Kind::points, .label = "law less measured", .provenance = "derived"};
@@ -109,8 +103,7 @@ Series laws_at(const Selection& s, bool bic, bool recommended) {
   for (std::size_t i = 0; i < s.candidates.size(); ++i) {
     const Candidate& c = s.candidates[i];
     if (c.failed || (i == s.recommended) != recommended) continue;
-    series.x.push_back(c.parameters - 1);
-    series.y.push_back(bic ? c.delta_bic : 100.0 * c.rms_over_peak);
+    series.add(c.parameters - 1, bic ? c.delta_bic : 100.0 * c.rms_over_peak);
   }
   return series;
 }
@@ -134,13 +127,12 @@ Figure recording_figure(const FitResult& fit, std::size_t recording) {
   const RecordingFit& r = fit.recordings.at(recording);
   const std::string name = file_stem(fit.config.data[r.choice].dataset);
   const std::string law = fit.config.law ? law_name(*fit.config.law) : fit.config.model;
-  Figure figure;
-  figure.id = fmt::format("fit_{}", name);
-  figure.title = fmt::format("{}: {}", name, law);
-  figure.caption = fmt::format(
-      "{} and the law {}, driven by the measured {}; rms residual {} % of the peak where fitted.",
-      spaced(quantity_name(r.response_quantity)), law, spaced(quantity_name(r.drive_quantity)),
-      significant(100.0 * r.rms_residual / r.peak, 3));
+  Figure figure{fmt::format("fit_{}", name), fmt::format("{}: {}", name, law),
+                fmt::format("{} and the law {}, driven by the measured {}; rms residual {} % of "
+                            "the peak where fitted.",
+                            spaced(quantity_name(r.response_quantity)), law,
+                            spaced(quantity_name(r.drive_quantity)),
+                            significant(100.0 * r.rms_residual / r.peak, 3))};
   if (r.not_predicted > 0) {
     figure.caption += fmt::format(
         " The law's line ends where it predicts nothing: {} samples beyond.", r.not_predicted);
@@ -156,18 +148,17 @@ Figure recording_figure(const FitResult& fit, std::size_t recording) {
 }
 
 Figure selection_figure(const Selection& selection) {
-  Figure figure;
-  figure.id = "selection";
-  figure.title = "Which law";
-  figure.caption = fmt::format(
-      "Every law that was fitted: residual, and BIC above the best with {} effective readings, "
-      "over the number of estimated parameters. The recommended law is {}.",
-      significant(selection.effective_count, 3),
-      law_name(selection.candidates[selection.recommended].law));
+  Figure figure{
+      "selection", "Which law",
+      fmt::format(
+          "Every law that was fitted: residual, and BIC above the best with {} effective readings, "
+          "over the number of estimated parameters. The recommended law is {}.",
+          significant(selection.effective_count, 3),
+          law_name(selection.candidates[selection.recommended].law))};
   Panel residual;
-  residual.x = {"estimated parameters", "", false, {}, {}};
-  residual.y = {"rms residual over peak", "%", true, {}, {}};
-  Panel bic{.x = residual.x, .y = {"BIC above the best", "", false, {}, {}}};
+  residual.x = {"estimated parameters", ""};
+  residual.y = {"rms residual over peak", "%", true};
+  Panel bic{.x = residual.x, .y = {"BIC above the best", ""}};
   for (const bool recommended : {false, true}) {
     add_if_any(residual, laws_at(selection, false, recommended));
     add_if_any(bic, laws_at(selection, true, recommended));
@@ -177,17 +168,14 @@ Figure selection_figure(const Selection& selection) {
 }
 
 Figure waterfall_figure(const FitResult& fit) {
-  Figure figure;
-  figure.id = "waterfall";
-  figure.title = "Where the starts ended";
-  figure.caption = fmt::format("Deviance of the end of each start that was followed, sorted: {}.",
-                               fit.waterfall.words);
-  Panel panel{.x = {"start, sorted", "", false, {}, {}},
-              .y = {"deviance above the best", "", false, {}, {}}};
+  Figure figure{"waterfall", "Where the starts ended",
+                fmt::format("Deviance of the end of each start that was followed, sorted: {}.",
+                            fit.waterfall.words)};
+  Panel panel{.x = {"start, sorted", ""}, .y = {"deviance above the best", ""}};
   Series ends{.kind = Series::Kind::points, .label = "end of a start", .provenance = "model"};
   for (std::size_t i = 0; i < fit.waterfall.deviances.size(); ++i) {
-    ends.x.push_back(static_cast<double>(i + 1));
-    ends.y.push_back(fit.waterfall.deviances[i] - fit.waterfall.deviances.front());
+    ends.add(static_cast<double>(i + 1),
+             fit.waterfall.deviances[i] - fit.waterfall.deviances.front());
   }
   add_if_any(panel, std::move(ends));
   figure.panels = {std::move(panel)};

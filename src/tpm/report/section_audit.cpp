@@ -66,8 +66,7 @@ Table empty_table() {
            {"printed", true},
            {"recomputed", true},
            {"verdict"},
-           {"what follows"}},
-          {}};
+           {"what follows"}}};
 }
 
 std::vector<Cell> row(const Finding& f) {

@@ -35,7 +35,7 @@ std::string reading(const Datum& d, Observable observable) {
 }
 
 Table readings(const PointSet& set) {
-  Table table{"", {{"imposed"}, {"reading", true}, {"provenance"}, {"printed in"}}, {}};
+  Table table{"", {{"imposed"}, {"reading", true}, {"provenance"}, {"printed in"}}};
   const bool time_assumed = set.time_provenance == Provenance::assumed;
   for (const Datum& d : set.data) {
     const std::string note = time_assumed && d.time_s ? "; time assumed" : "";
@@ -94,7 +94,7 @@ void add_validity(Document& document, const PaperReport& report) {
   document.paragraph(
       "The paper limits its model to 10 mm of indentation, reports damage from 12 mm on, and lets "
       "its bonds turn by less than 30 degrees.");
-  Table table{"", {{"case"}, {"depth", true}, {"limits passed"}}, {}};
+  Table table{"", {{"case"}, {"depth", true}, {"limits passed"}}};
   for (const ValidityCase& c : reached_depths(report)) {
     const auto flags = validity_flags(c.spacing_m, c.depth_m);
     table.rows.push_back({{c.name},

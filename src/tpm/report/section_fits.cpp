@@ -25,8 +25,7 @@ Table estimates_table(const FitResult& fit) {
                {"estimate", true},
                {"standard error", true},
                {fmt::format("{:.4g} % interval", 100.0 * fit.config.level), true},
-               {"verdict"}},
-              {}};
+               {"verdict"}}};
   for (const ParameterResult& p : fit.parameters) {
     table.rows.push_back({{p.parameter.name},
                           {in_unit(p.parameter, p.estimate)},
@@ -62,8 +61,7 @@ std::string spread(const FitParameter& p, double low, double high) {
 Table minima_table(const FitResult& fit) {
   Table table{fmt::format("Where {} starts ended ({} failed). {} agree with the best to 5 digits.",
                           fit.starts_run, fit.starts_failed, fit.starts_agreeing),
-              {{"deviance", true}, {"starts", true}},
-              {}};
+              {{"deviance", true}, {"starts", true}}};
   for (const ParameterResult& p : fit.parameters) table.columns.push_back({p.parameter.name, true});
   for (const DistinctMinimum& m : fit.minima) {
     std::vector<Cell> row{{significant(m.minimum.deviance, 6)}, {std::to_string(m.starts)}};
@@ -76,10 +74,13 @@ Table minima_table(const FitResult& fit) {
 }
 
 Table readings_table(const FitResult& fit) {
-  Table table{
-      "Readings and the fitted model. z is the difference in standard deviations.",
-      {{"data set"}, {"reading"}, {"provenance"}, {"observed", true}, {"model", true}, {"z", true}},
-      {}};
+  Table table{"Readings and the fitted model. z is the difference in standard deviations.",
+              {{"data set"},
+               {"reading"},
+               {"provenance"},
+               {"observed", true},
+               {"model", true},
+               {"z", true}}};
   for (const FittedDatum& d : fit.data) {
     table.rows.push_back({{fit.config.data[d.datum.choice].dataset},
                           {d.datum.label},
@@ -107,8 +108,7 @@ std::vector<Cell> assumptions_of(const FitVariant& v) {
 
 Table sensitivity_table(const FitStudy& study) {
   Table table{"Estimates and intervals of the same fit under other assumptions.",
-              {{"ramp rate", true}, {"noise"}},
-              {}};
+              {{"ramp rate", true}, {"noise"}}};
   for (const ParameterResult& p : study.reference.parameters) {
     table.columns.push_back(
         {fmt::format("{} [{}]", p.parameter.name, p.parameter.unit.symbol), true});
@@ -127,8 +127,7 @@ Table sensitivity_table(const FitStudy& study) {
 
 Table claims_table(const FitStudy& study) {
   Table table{"Whether the data exclude a claim, and its p, under the same assumptions.",
-              {{"ramp rate", true}, {"noise"}},
-              {}};
+              {{"ramp rate", true}, {"noise"}}};
   for (const Hypothesis& h : study.reference.config.hypotheses) table.columns.push_back({h.name});
   for (const FitVariant& v : study.variants) {
     std::vector<Cell> row = assumptions_of(v);
@@ -151,8 +150,7 @@ Table held_out_table(const FitStudy& study) {
        {"observed", true},
        {"predicted", true},
        {"difference", true},
-       {"z", true}},
-      {}};
+       {"z", true}}};
   for (const HeldOutFit& h : study.held_out) {
     for (const FittedDatum& d : h.result.data) {
       if (!d.datum.held_out || !d.datum.value) continue;

@@ -51,8 +51,7 @@ Table relaxation_table(const TablesResult& tables, double depth_m) {
                {"force at once [N]"},
                {"relaxed force [N]"},
                {"liver, peak [N]", true},
-               {"liver, 30 s [N]", true}},
-              {}};
+               {"liver, 30 s [N]", true}}};
   for (const TableRow& row : tables.rows) {
     if (row.depth_m != depth_m) continue;
     where = row.printed_where;
@@ -69,8 +68,7 @@ Table relaxation_table(const TablesResult& tables, double depth_m) {
 
 Table band_table(const TablesResult& tables) {
   Table table{"Table 5: relaxed force against the range over three pigs",
-              {{"depth [mm]", true}, {"force [N]"}, {"range [N]", true}, {"inside"}},
-              {}};
+              {{"depth [mm]", true}, {"force [N]"}, {"range [N]", true}, {"inside"}}};
   for (const BandRow& row : tables.bands) {
     table.rows.push_back({{fmt::format("{:.4g}", row.depth_m * 1e3)},
                           printed_cell(row.force, 1.0),
@@ -89,8 +87,7 @@ Table consistent_table(const TablesResult& consistent) {
                {"end of ramp [N]", true},
                {"30 s later [N]", true},
                {"liver, peak (misfit)", true},
-               {"liver, 30 s (misfit)", true}},
-              {}};
+               {"liver, 30 s (misfit)", true}}};
   for (const TableRow& row : consistent.rows) {
     if (std::abs(row.spacing_m - kChosenSpacing_m) > 1e-9) continue;
     table.rows.push_back({{fmt::format("{:.4g}", row.depth_m * 1e3)},

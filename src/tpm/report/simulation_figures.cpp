@@ -95,9 +95,9 @@ Panel panel_of(const std::vector<FiguredRun>& runs, bool imposed) {
   const bool by_depth = runs.front().scene->protocol.drive() == Drive::displacement;
   const bool length = imposed == by_depth;
   Panel panel{.title = imposed ? "Imposed" : "Response",
-              .x = {"time", "s", false, {}, {}},
-              .y = length ? Axis{"indentation depth", "mm", false, {}, {}}
-                          : Axis{imposed ? "load" : "contact force", "N", false, {}, {}}};
+              .x = {"time", "s"},
+              .y = length ? Axis{"indentation depth", "mm"}
+                          : Axis{imposed ? "load" : "contact force", "N"}};
   for (const FiguredRun& figured : runs) {
     std::vector<double> x;
     std::vector<double> y;
@@ -114,14 +114,11 @@ Panel panel_of(const std::vector<FiguredRun>& runs, bool imposed) {
 }  // namespace
 
 Figure response_figure(const std::vector<FiguredRun>& runs) {
-  Figure figure;
-  figure.id = "response";
-  figure.title = runs.front().scene->tissue.title;
-  figure.caption =
-      fmt::format("Sphere {} of {}, computed by tpm {}", runs.front().scene->probe().sphere + 1,
-                  runs.front().scene->tissue.network.organ.size(), version());
-  figure.panels = {panel_of(runs, true), panel_of(runs, false)};
-  return figure;
+  return {"response",
+          runs.front().scene->tissue.title,
+          fmt::format("Sphere {} of {}, computed by tpm {}", runs.front().scene->probe().sphere + 1,
+                      runs.front().scene->tissue.network.organ.size(), version()),
+          {panel_of(runs, true), panel_of(runs, false)}};
 }
 
 Json deformation_pictures(const std::vector<FiguredRun>& runs) {

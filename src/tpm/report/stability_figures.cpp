@@ -26,15 +26,14 @@ const StabilityMap* map_of(const StabilityStudy& study, const std::string& id, S
 
 Panel map_panel(const StabilityMap& map) {
   Panel panel{.title = fmt::format("{}: step against {}", step_rule_name(map.rule), map.quantity),
-              .x = {map.quantity, map.unit, true, std::nullopt, std::nullopt},
-              .y = {"step", "s", true, std::nullopt, std::nullopt}};
+              .x = {map.quantity, map.unit, true},
+              .y = {"step", "s", true}};
   for (const StabilityClassEntry& entry : kStabilityClasses) {
     Series found{
         .kind = Series::Kind::points, .label = std::string(entry.text), .provenance = "model"};
     for (const StabilityPoint& p : map.points) {
       if (p.verdict.found != entry.meaning) continue;
-      found.x.push_back(p.x);
-      found.y.push_back(p.step_s);
+      found.add(p.x, p.step_s);
     }
     if (!found.x.empty()) panel.series.push_back(std::move(found));
   }
@@ -55,15 +54,15 @@ std::vector<Figure> stability_figures(const StabilityStudy& study) {
       const StabilityMap* second = map_of(study, pair.second, entry.meaning);
       if (first == nullptr || second == nullptr) continue;
       const bool limited = !first->limit_x.empty() || !second->limit_x.empty();
-      Figure figure;
-      figure.id = fmt::format("{}_{}", step_rule_name(entry.meaning), pair.name);
-      figure.title = fmt::format("{}: where it fails", step_rule_name(entry.meaning));
-      figure.caption = fmt::format(
-          "Left: {}. Right: {}. Runs of 300 steps (with a rising load: 300 after it), compared "
-          "over "
-          "the last 32.{}",
-          first->problem, second->problem,
-          limited ? "" : " Linear theory gives this rule no limit here.");
+      Figure figure{
+          fmt::format("{}_{}", step_rule_name(entry.meaning), pair.name),
+          fmt::format("{}: where it fails", step_rule_name(entry.meaning)),
+          fmt::format(
+              "Left: {}. Right: {}. Runs of 300 steps (with a rising load: 300 after it), compared "
+              "over "
+              "the last 32.{}",
+              first->problem, second->problem,
+              limited ? "" : " Linear theory gives this rule no limit here.")};
       figure.panels = {map_panel(*first), map_panel(*second)};
       figures.push_back(std::move(figure));
     }

@@ -9,7 +9,6 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
-#include "tpm/report/run_record.hpp"
 #include "tpm/report/table_document.hpp"
 #include "tpm/store/file.hpp"
 
@@ -40,8 +39,7 @@ Table limits_table(const StabilityStudy& study) {
                {"theory"},
                {"theory, s", true},
                {"found, s", true},
-               {"found/theory", true}},
-              {}};
+               {"found/theory", true}}};
   for (const StabilityLimit& l : study.limits) {
     const bool good = std::abs(l.ratio() - 1.0) <= 0.02;
     table.rows.push_back({{l.problem},
@@ -60,8 +58,7 @@ Table servo_table(const StabilityStudy& study, const std::string& problem) {
           "{}, the paper's eta1 = 5 Pa s (tau = 0.208 ms), 4 mm at 90 mm/s and "
           "held, as a servo samples it at its ticks: largest force error there, of the peak.",
           problem),
-      {{"rate, Hz", true}},
-      {}};
+      {{"rate, Hz", true}}};
   for (const ServoRow& row : study.servo) {
     if (row.problem != problem) continue;
     if (table.columns.size() == 1) {
@@ -80,8 +77,7 @@ Table servo_table(const StabilityStudy& study, const std::string& problem) {
 
 Table corners_table(const StabilityStudy& study) {
   Table table{"Degenerate corners, step 1 ms. An answer that is not the expected one is marked.",
-              {{"corner"}, {"what is done"}, {"what is right"}},
-              {}};
+              {{"corner"}, {"what is done"}, {"what is right"}}};
   for (const StepRuleEntry& entry : kStepRules) table.columns.push_back({std::string(entry.text)});
   for (const StabilityCorner& corner : study.corners) {
     std::vector<Cell> row{{corner.name}, {corner.setup}, {corner.expected}};
@@ -128,8 +124,7 @@ Table maps_table(const StabilityStudy& study) {
   Table table{
       "Runs of the maps by class, and against the limit of linear theory: above it without "
       "growth, below it with growth (5 % around it left out).",
-      {{"map"}, {"rule"}},
-      {}};
+      {{"map"}, {"rule"}}};
   for (const StabilityClassEntry& entry : kStabilityClasses) {
     if (entry.meaning == StabilityClass::not_applicable) continue;
     table.columns.push_back({std::string(entry.text), true});
@@ -358,12 +353,8 @@ Json to_json(const StabilityStudy& study) {
 
 void write_stability(const StabilityStudy& study, const std::filesystem::path& folder,
                      const std::string& python, double seconds) {
-  std::map<std::string, double> parts{{"runs", seconds}};
   const std::vector<Figure> figures = stability_figures(study);
-  const auto drawings = timed(parts, "drawing", [&] { return draw_into(folder, figures, python); });
-  const Document document = stability_document(study, figures);
-  write_file(folder / "report.md", to_markdown(document));
-  write_file(folder / "report.html", to_html(document, drawings));
+  write_report(folder, stability_document(study, figures), figures, python, {{"runs", seconds}});
   write_file(folder / "stability.json", to_text(to_json(study)));
   if (!study.limits.empty()) write_file(folder / "limits.csv", stability_limits_csv(study));
   if (!study.corners.empty()) write_file(folder / "corners.csv", stability_corners_csv(study));
@@ -371,9 +362,6 @@ void write_stability(const StabilityStudy& study, const std::filesystem::path& f
   for (const std::string& id : map_ids(study)) {
     write_file(folder / fmt::format("map_{}.csv", id), stability_map_csv(study, id));
   }
-  Json record = run_record(parts);
-  record["drawing_python"] = python;
-  write_file(folder / "report.run.json", to_text(record));
 }
 
 }  // namespace tpm::report

@@ -68,22 +68,19 @@ std::string fixed_text(const SweepConvergence& c) {
 Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
   const Unit unit = shown_unit_of(c.unit), unit_size = shown_unit_of(c.size_unit);
   const GridConvergence& finest = c.threes.back();
-  Figure figure{fmt::format("convergence_{}", c.variable),
-                c.variable,
+  Figure figure{fmt::format("convergence_{}", c.variable), c.variable,
                 fmt::format("{}: {} over {}{}: {}.", title, c.variable, c.size_text, fixed_text(c),
-                            verdict(c)),
-                {}};
-  const Axis size_axis{c.size_text, unit_size.symbol, true, {}, {}};
+                            verdict(c))};
+  const Axis size_axis{c.size_text, unit_size.symbol, true};
   Series cells = line("model", {}, {});
   for (std::size_t i = 0; i < c.size.size(); ++i) {
-    cells.x.push_back(c.size[i] / unit_size.to_si);
-    cells.y.push_back(c.value[i] / unit.to_si);
+    cells.add(c.size[i] / unit_size.to_si, c.value[i] / unit.to_si);
   }
   Series dots = cells;
   dots.kind = Series::Kind::points;
   dots.label = "sizes";
   dots.provenance = "model";
-  Panel values{"", size_axis, {c.variable, unit.symbol, false, {}, {}}, {cells, std::move(dots)}};
+  Panel values{"", size_axis, {c.variable, unit.symbol}, {cells, std::move(dots)}};
   if (!c.monotone()) {
     figure.panels.push_back(std::move(values));
     return figure;
@@ -97,15 +94,14 @@ Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
   for (std::size_t i = 0; i < c.size.size(); ++i) {
     const double distance = std::abs(c.value[i] - finest.extrapolated);
     if (!(distance > 0.0)) continue;
-    away.x.push_back(c.size[i] / unit_size.to_si);
-    away.y.push_back(distance / unit.to_si);
-    slope.x.push_back(c.size[i] / unit_size.to_si);
-    slope.y.push_back(last * std::pow(c.size[i] / c.size.back(), finest.order) / unit.to_si);
+    away.add(c.size[i] / unit_size.to_si, distance / unit.to_si);
+    slope.add(c.size[i] / unit_size.to_si,
+              last * std::pow(c.size[i] / c.size.back(), finest.order) / unit.to_si);
   }
   Panel distances{
       "",
       size_axis,
-      {fmt::format("distance of {} from the extrapolated", c.variable), unit.symbol, true, {}, {}},
+      {fmt::format("distance of {} from the extrapolated", c.variable), unit.symbol, true},
       {std::move(away), std::move(slope)}};
   figure.panels.push_back(std::move(distances));
   return figure;

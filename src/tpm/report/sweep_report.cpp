@@ -41,7 +41,7 @@ bool even_in_logarithm(const std::vector<double>& places) {
 }
 
 Axis axis_of(const ReadAxis& axis) {
-  return {axis.name, shown_unit_of(axis.unit).symbol, even_in_logarithm(axis.places), {}, {}};
+  return {axis.name, shown_unit_of(axis.unit).symbol, even_in_logarithm(axis.places)};
 }
 
 /// Its own parameter's place, with the unit; else its number.
@@ -103,10 +103,7 @@ Panel sweep_map(const SweepReader& sweep, const ReadVariable& v, const std::stri
   const auto rows = some_of(up.places.size(), kMostPlaces);
   const Unit unit = shown_unit_of(v.unit), unit_x = shown_unit_of(across.unit),
              unit_y = shown_unit_of(up.unit);
-  Series heat;
-  heat.kind = Series::Kind::heat;
-  heat.label = v.name;
-  heat.provenance = "model";
+  Series heat{.kind = Series::Kind::heat, .label = v.name, .provenance = "model"};
   for (const std::size_t c : columns) heat.x.push_back(across.places[c] / unit_x.to_si);
   for (const std::size_t r : rows) {
     heat.y.push_back(up.places[r] / unit_y.to_si);
@@ -121,8 +118,7 @@ Panel sweep_family(const SweepReader& sweep, const ReadVariable& v, const std::s
                    const std::optional<std::string>& of, const FixedPlaces& fixed) {
   const ReadAxis& across = sweep.axes()[sweep.axis(x)];
   const Unit unit = shown_unit_of(v.unit);
-  Panel panel{
-      named_in_unit(v.name, unit), axis_of(across), {v.name, unit.symbol, false, {}, {}}, {}};
+  Panel panel{named_in_unit(v.name, unit), axis_of(across), {v.name, unit.symbol}};
   const std::vector<double> places = in_shown_unit(across.places, shown_unit_of(across.unit));
   if (!of) {
     add_lines(v.name, places, in_shown_unit(sweep.slice(v.name, {}, x, fixed), unit), panel.series);
@@ -142,10 +138,7 @@ Panel sweep_curves(const SweepReader& sweep, const ReadVariable& v, const std::s
                    const FixedPlaces& fixed) {
   const ReadAxis& axis = sweep.axes()[sweep.axis(of)];
   const Unit unit = shown_unit_of(v.unit);
-  Panel panel{v.name,
-              {"time", "s", even_in_logarithm(v.times_s), {}, {}},
-              {v.name, unit.symbol, false, {}, {}},
-              {}};
+  Panel panel{v.name, {"time", "s", even_in_logarithm(v.times_s)}, {v.name, unit.symbol}};
   for (const std::size_t place : some_of(axis.places.size(), kLines)) {
     FixedPlaces here = fixed;
     here.emplace_back(of, place);
@@ -177,13 +170,11 @@ std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
     Series cloud{.kind = Series::Kind::points, .label = v.name, .provenance = "model"};
     for (const std::size_t i : chosen) {
       if (!std::isfinite(found[i])) continue;
-      cloud.x.push_back(values[i] / unit_x.to_si);
-      cloud.y.push_back(found[i]);
+      cloud.add(values[i] / unit_x.to_si, found[i]);
     }
     panels.push_back({name,
-                      {name, unit_x.symbol, sampled_in_logarithm(sweep, axis, name), {}, {}},
-                      {v.name, unit.symbol, false, {}, {}},
-                      {}});
+                      {name, unit_x.symbol, sampled_in_logarithm(sweep, axis, name)},
+                      {v.name, unit.symbol}});
     if (!cloud.x.empty()) panels.back().series.push_back(std::move(cloud));
   }
   return panels;
@@ -204,7 +195,7 @@ Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const Sweep
   for (std::size_t a = axes.size(); a-- > 0 && !y;) {
     if (axes[a].name != x && !is_fixed(axes[a].name)) y = axes[a].name;
   }
-  Figure figure{v.name, v.name, fmt::format("{}: {}.", sweep.title(), v.meaning), {}};
+  Figure figure{v.name, v.name, fmt::format("{}: {}.", sweep.title(), v.meaning)};
   std::vector<std::string> free{x};
   if (!v.times_s.empty()) {
     figure.panels.push_back(sweep_curves(sweep, v, x, wished.fixed));
@@ -238,19 +229,16 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
       if (found[2][i] != 0.0) continue;
       front.emplace_back(found[0][i], found[1][i]);
       if (cell % stride != 0) continue;
-      cloud.x.push_back(found[0][i] / unit_x.to_si);
-      cloud.y.push_back(found[1][i] / unit_y.to_si);
+      cloud.add(found[0][i] / unit_x.to_si, found[1][i] / unit_y.to_si);
     }
     front = pareto_front(std::move(front));  // what was seen so far needs no more
   });
   if (front.empty()) throw bad_input("sweep", "no cell is done", "cells to choose from");
   Series best = line("Pareto front", {}, {});
   for (const auto& [x, y] : front) {
-    best.x.push_back(x / unit_x.to_si);
-    best.y.push_back(y / unit_y.to_si);
+    best.add(x / unit_x.to_si, y / unit_y.to_si);
   }
-  Panel panel{
-      "", {second, unit_x.symbol, false, {}, {}}, {first, unit_y.symbol, false, {}, {}}, {}};
+  Panel panel{"", {second, unit_x.symbol}, {first, unit_y.symbol}};
   if (!cloud.x.empty()) panel.series.push_back(std::move(cloud));
   Series ends = best;
   ends.kind = Series::Kind::points;

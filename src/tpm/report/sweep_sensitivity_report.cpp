@@ -30,22 +30,17 @@ Json fixed_json(const std::vector<FixedValue>& fixed) {
 /// Indices beside each other, with their intervals; `of` picks one of the two kinds.
 Panel index_panel(const std::string& what, const SweepSensitivity& s,
                   IndexEstimate InputSensitivity::*of) {
-  Series interval;
-  interval.kind = Series::Kind::bracket;
-  interval.label = "95 % interval";
-  interval.provenance = "model";
+  Series interval{.kind = Series::Kind::bracket, .label = "95 % interval", .provenance = "model"};
   Series value{.kind = Series::Kind::points, .label = "index", .provenance = "model"};
   for (std::size_t i = 0; i < s.parameters.size(); ++i) {
     const IndexEstimate& index = s.indices.inputs[i].*of;
-    interval.x.push_back(static_cast<double>(i + 1));
-    interval.lower.push_back(index.low);
-    interval.upper.push_back(index.high);
+    interval.add_range(static_cast<double>(i + 1), index.low, index.high);
     value.y.push_back(index.value);
   }
   value.x = interval.x;
   const Axis parameters{"parameter", "", false, 0.5, static_cast<double>(value.x.size()) + 0.5,
                         s.parameters};
-  return {what, parameters, {what, "", false, {}, {}}, {std::move(interval), std::move(value)}};
+  return {what, parameters, {what, ""}, {std::move(interval), std::move(value)}};
 }
 
 }  // namespace
