@@ -28,8 +28,6 @@ class VirtualOmega7 final : public HapticDevice {
   void stop() noexcept override;
   void cut_forces() noexcept override;
 
-  [[nodiscard]] const VirtualPlant& plant() const { return plant_; }
-
  private:
   PlantSettings settings_;
   OperatorScript script_;

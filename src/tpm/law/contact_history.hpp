@@ -76,8 +76,6 @@ class ContactHistory {
   /// up to edge.met_s.
   [[nodiscard]] double force_within(const ContactEdge& edge) const;
   [[nodiscard]] Slopes force_slopes_within(const ContactEdge& edge) const;
-  /// The probe does not touch the surface.
-  [[nodiscard]] bool detached() const { return free_; }
 
  private:
   /// A depth u of the surface, V(u), and their derivatives by all parameters.

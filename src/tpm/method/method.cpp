@@ -325,8 +325,6 @@ class ElementProblem final : public MethodProblem {
   }
 
   [[nodiscard]] const Protocol& protocol() const override { return protocol_; }
-  [[nodiscard]] double relaxation_time_s() const override { return material_.relaxation_time_s(); }
-  [[nodiscard]] bool has_masses() const override { return mass_.has_value(); }
   [[nodiscard]] MethodRun run(const MethodSettings& settings,
                               std::span<const double> times_s) const override {
     require_valid(settings);
@@ -353,10 +351,6 @@ class NetworkProblem final : public MethodProblem {
   }
 
   [[nodiscard]] const Protocol& protocol() const override { return protocol_; }
-  [[nodiscard]] double relaxation_time_s() const override {
-    return network_.bonds.shortest_relaxation_time_s();
-  }
-  [[nodiscard]] bool has_masses() const override { return mass_.has_value(); }
   [[nodiscard]] MethodRun run(const MethodSettings& settings,
                               std::span<const double> times_s) const override {
     require_valid(settings);

@@ -114,8 +114,6 @@ class MethodProblem {
  public:
   virtual ~MethodProblem() = default;
   [[nodiscard]] virtual const Protocol& protocol() const = 0;
-  [[nodiscard]] virtual double relaxation_time_s() const = 0;  ///< the shortest
-  [[nodiscard]] virtual bool has_masses() const = 0;
   /// @param times_s rising, within the protocol
   /// Throws Error(bad_input) for settings out of range; what a method cannot do is in the result.
   [[nodiscard]] virtual MethodRun run(const MethodSettings& settings,

@@ -40,17 +40,10 @@ void put(const Eigen::Matrix3d& matrix, const CondensedFrame& frame,
   for (const auto& [i, j] : kEntries) row[k++] = 0.5 * (local(i, j) + local(j, i));
 }
 
-Eigen::Matrix3d taken(const Eigen::Matrix<double, 18, 1>& values, Eigen::Index from) {
-  Eigen::Matrix3d matrix;
-  for (const auto& [i, j] : kEntries) matrix(i, j) = matrix(j, i) = values[from++];
-  return matrix;
-}
-
 }  // namespace
 
 CondensedMatrices::CondensedMatrices(const CondensedFrame& frame,
-                                     std::span<const CondensedMetric> metrics)
-    : frame_(frame) {
+                                     std::span<const CondensedMetric> metrics) {
   const auto count = static_cast<Eigen::Index>(metrics.size());
   Eigen::MatrixXd rows(count, kTerms);
   Eigen::Matrix<double, 18, Eigen::Dynamic> values(18, count);
@@ -62,11 +55,6 @@ CondensedMatrices::CondensedMatrices(const CondensedFrame& frame,
     put(at.second_energy, frame, values.col(m).segment<6>(12));
   }
   coefficients_ = least_squares(rows, values.transpose()).transpose();
-}
-
-CondensedMatrices::Values CondensedMatrices::at(const Eigen::Vector3d& w_m) const {
-  const Eigen::Matrix<double, 18, 1> values = coefficients_ * terms(frame_, w_m);
-  return {taken(values, 0), taken(values, 6), taken(values, 12)};
 }
 
 }  // namespace tpm::organ

@@ -12,24 +12,15 @@ class CondensedMatrices {
   /// Powers of the depth up to 4, each tangent times those up to 2, products of the tangents.
   static constexpr int kTerms = 5 + 2 * 3 + 3;
 
-  struct Values {
-    Eigen::Matrix3d mobility = Eigen::Matrix3d::Zero();  ///< (J' g J)^-1, m/N
-    Eigen::Matrix3d coupling = Eigen::Matrix3d::Zero();  ///< P' g P, N/m
-    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();    ///< energy of q, N/m
-  };
-
-  CondensedMatrices() = default;
   CondensedMatrices(const CondensedFrame& frame, std::span<const CondensedMetric> metrics);
 
-  /// @param w_m local
-  [[nodiscard]] Values at(const Eigen::Vector3d& w_m) const;
-  /// Rows: entries 00, 11, 22, 01, 02, 12 of mobility, coupling, second. Columns: terms.
+  /// Rows: entries 00, 11, 22, 01, 02, 12 of the mobility (J' g J)^-1, m/N, the coupling P' g P,
+  /// N/m, and the energy of q, N/m. Columns: terms.
   [[nodiscard]] const Eigen::Matrix<double, 18, Eigen::Dynamic>& coefficients() const {
     return coefficients_;
   }
 
  private:
-  CondensedFrame frame_;
   Eigen::Matrix<double, 18, Eigen::Dynamic> coefficients_;
 };
 

@@ -63,9 +63,6 @@ class ZoneNetwork final : public ContactModel {
   [[nodiscard]] BalanceWork work() const noexcept;
   /// Displacements of the surroundings beside those that follow the edge.
   [[nodiscard]] Eigen::Index own_displacements() const noexcept { return own_; }
-  /// The least eigenvalue of the equilibrium stiffness of the surroundings before negative ones
-  /// were taken out, over the largest.
-  [[nodiscard]] double softest() const noexcept { return softest_; }
 
  private:
   /// A dense matrix for PanelKernels.
@@ -105,7 +102,6 @@ class ZoneNetwork final : public ContactModel {
   std::vector<char> zone_role_;        ///< of each sphere: 0 held, 1 outside, 2 in the zone
   std::vector<std::size_t> outside_;
   Eigen::Index own_ = 0;
-  double softest_ = 0.0;
   Eigen::Matrix3d instantaneous_, equilibrium_;
 
   ServoBonds at_contact_, elsewhere_;

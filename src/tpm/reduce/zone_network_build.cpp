@@ -23,11 +23,9 @@ Eigen::MatrixXd flat_columns(const Fields& fields) {
 }
 
 /// The part of a symmetric matrix with eigenvalues of 0 and above.
-Eigen::MatrixXd not_negative(const Eigen::MatrixXd& matrix, double& softest) {
+Eigen::MatrixXd not_negative(const Eigen::MatrixXd& matrix) {
   const SymmetricModes modes = symmetric_modes(matrix);
-  const Eigen::VectorXd& values = modes.values;
-  softest = values[0] / values[values.size() - 1];
-  return modes.vectors * values.cwiseMax(0.0).asDiagonal() * modes.vectors.transpose();
+  return modes.vectors * modes.values.cwiseMax(0.0).asDiagonal() * modes.vectors.transpose();
 }
 
 }  // namespace
@@ -131,7 +129,7 @@ ZoneNetwork::Parts ZoneNetwork::build(PushedContact& tissue) {
     const Eigen::MatrixXd all = flat_columns(basis);
     const Eigen::MatrixXd lasting = all.transpose() * flat_columns(resist);
     const Eigen::MatrixXd relaxing = all.transpose() * flat_columns(relax);
-    parts.lasting = not_negative(0.5 * (lasting + lasting.transpose()), softest_);
+    parts.lasting = not_negative(0.5 * (lasting + lasting.transpose()));
     parts.relaxing = 0.5 * (relaxing + relaxing.transpose());
   }
   relaxing_.put(parts.relaxing);

@@ -32,8 +32,6 @@ class FrontalFactor {
   ///          to 16 bytes
   void solve(float* x) noexcept;
 
-  [[nodiscard]] const FrontalPattern& pattern() const { return *pattern_; }
-
  private:
   struct Place {
     std::uint32_t first, own;     ///< nodes

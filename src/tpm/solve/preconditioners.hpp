@@ -22,8 +22,6 @@ class IncompleteCholesky final : public Preconditioner {
   explicit IncompleteCholesky(const BlockRows<3, 3>& matrix);
   [[nodiscard]] bool definite() const override { return !inverse_.empty(); }
   void apply(const BlockVector<3>& r, BlockVector<3>& z) const override;
-  /// By which part the diagonal was enlarged.
-  [[nodiscard]] double shift() const { return shift_; }
 
  private:
   [[nodiscard]] bool factorise(const BlockRows<3, 3>& matrix);

@@ -31,7 +31,6 @@ class RowLogWriter {
   /// Passes everything to the system: from here on it survives the process.
   void flush();
   void close(std::string_view closing);
-  [[nodiscard]] std::uint32_t rows() const noexcept { return rows_; }
 
  private:
   std::filesystem::path path_;

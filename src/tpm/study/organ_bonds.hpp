@@ -39,7 +39,6 @@ class FittedBonds {
   /// "Einf", "g1", "tau1", "stiffening".
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] std::size_t size() const { return names().size(); }
-  [[nodiscard]] const BondMaterial& form() const { return form_; }
 
   /// @param natural one value for each name, SI
   [[nodiscard]] BondMaterial material(std::span<const double> natural) const;

@@ -13,7 +13,6 @@ struct Shard {
   std::uint64_t index = 0;  ///< from 0
   std::uint64_t count = 1;
 
-  [[nodiscard]] bool has(std::uint64_t block) const { return block % count == index; }
   /// How many of so many blocks.
   [[nodiscard]] std::uint64_t size(std::uint64_t blocks) const {
     return blocks / count + (index < blocks % count ? 1 : 0);
