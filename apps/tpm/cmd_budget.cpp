@@ -80,8 +80,7 @@ int run_budget(const BudgetCommand& command, const Session& session) {
       command.scene.empty() ? budget_of_contact(command, law) : budget_of_organ(command, law);
   std::string text = session.json() ? to_text(to_json(budget)) : to_terminal_text(budget);
   if (!command.folder.empty()) {
-    const auto files = write_budget_report(command.folder, budget);
-    if (!session.json()) text += written(command.folder, files);
+    text += written(session, command.folder, write_budget_report(command.folder, budget));
   }
   deliver(text, command.output);
   deliver_csv(to_csv(budget), csv);

@@ -234,7 +234,7 @@ int fit_configuration(const FitOptions& options, const Session& session) {
   if (!options.folder.empty() && !options.no_draw) {
     auto files = write_fit_report(options.folder, result);
     write_scene(options.folder, result, files);
-    if (!session.json()) text += written(options.folder, files);
+    text += written(session, options.folder, files);
   }
   deliver(text, options.output);
   deliver_csv(parameters_csv(result), csv);
@@ -274,7 +274,7 @@ int fit_folder(const FitOptions& options, const Session& session) {
     const std::string folder = figure_folder(options, options.recordings.files.front());
     auto files = write_specimen_report(folder, study);
     write_moduli(folder, moduli, files);
-    if (!session.json()) text += written(folder, files);
+    text += written(session, folder, files);
   }
   deliver(text, options.output);
   deliver_csv(pooled_csv(study), csv);
@@ -315,7 +315,7 @@ int fit_recordings(const FitOptions& options, const Session& session) {
     const std::string folder = figure_folder(options, recordings.front().name);
     auto files = write_recording_report(folder, selection);
     write_moduli(folder, moduli, files);
-    if (!session.json()) text += written(folder, files);
+    text += written(session, folder, files);
   }
   if (!session.json()) {
     text += fmt::format("\nthe configuration (edit it and run: tpm fit {}):\n{}",
@@ -340,8 +340,7 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
                         to_terminal_text(selection), to_terminal_text(best));
   if (!options.no_draw) {
     const std::string folder = figure_folder(options, function.name);
-    const auto files = write_function_report(folder, function, selection);
-    if (!session.json()) text += written(folder, files);
+    text += written(session, folder, write_function_report(folder, function, selection));
   }
   deliver(text, options.output);
   deliver_csv(parameters_csv(best), csv);

@@ -52,9 +52,9 @@ int run_identify(const IdentifyCommand& command, const Session& session) {
   }
   if (session.json()) text = to_text(json);
   if (!command.folder.empty()) {
-    const auto files =
-        write_identification_report(command.folder, id, identified_law(id, recording), json);
-    if (!session.json()) text += written(command.folder, files);
+    text += written(
+        session, command.folder,
+        write_identification_report(command.folder, id, identified_law(id, recording), json));
   }
   deliver(text, command.output);
   deliver_csv(json_table_csv(json.at("history"), "/parameters"), csv);

@@ -74,8 +74,7 @@ int run_material(const MaterialCommand& command, const Session& session) {
   if (!command.output.empty()) deliver(to_text(result.scene), command.output);
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
   if (!command.folder.empty()) {
-    const auto files = write_organ_material_report(command.folder, result);
-    if (!session.json()) text += written(command.folder, files);
+    text += written(session, command.folder, write_organ_material_report(command.folder, result));
   }
   write_output(text);
   return 0;

@@ -76,8 +76,8 @@ int predict(const PredictOptions& options, const Session& session) {
   }
   if (session.json()) text = to_text(json);
   if (!options.folder.empty()) {
-    const auto files = write_prediction_report(options.folder, prediction, json);
-    if (!session.json()) text += written(options.folder, files);
+    text +=
+        written(session, options.folder, write_prediction_report(options.folder, prediction, json));
   }
   deliver(text, options.output);
   deliver_csv(to_csv(prediction), csv);

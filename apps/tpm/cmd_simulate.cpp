@@ -202,11 +202,8 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
 }
 
 int list_formulations(const Session& session) {
-  if (session.json()) {
-    say("{}", to_text(Json{{"formulations", formulations_json()}}));
-  } else {
-    say("{}", formulations_text());
-  }
+  say("{}",
+      session.json() ? to_text(Json{{"formulations", formulations_json()}}) : formulations_text());
   return 0;
 }
 

@@ -107,11 +107,7 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
   for (const std::string& name : names) {
     all.push_back(convergence_of(sweep, name, axis, choice.size, fixed));
   }
-  if (session.json()) {
-    say("{}", to_text(convergence_json(all)));
-  } else {
-    say("{}", convergence_text(all));
-  }
+  say("{}", session.json() ? to_text(convergence_json(all)) : convergence_text(all));
   draw_into(choice.figure_folder, convergence_figures(all, sweep.title()));
   const bool none = std::none_of(all.begin(), all.end(), [](auto& c) { return c.monotone(); });
   return static_cast<int>(none ? ExitCode::answer_is_no : ExitCode::success);

@@ -9,11 +9,8 @@ void add_version_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("version", "Print the version of tpm");
   add_format_option(*command, session);
   set_run(*command, session, [&session] {
-    if (session.json()) {
-      say("{}", to_text(Json{{"version", version()}}));
-    } else {
-      say("tpm {}\n", version());
-    }
+    say("{}", session.json() ? to_text(Json{{"version", version()}})
+                             : fmt::format("tpm {}\n", version()));
     return 0;
   });
 }

@@ -40,8 +40,9 @@ void deliver(const std::string& text, const std::string& file);
 /// Writes it, unless the name is empty.
 void deliver_csv(const std::string& csv, const std::filesystem::path& file);
 
-/// The line that says which files were written into a folder.
-[[nodiscard]] std::string written(const std::string& folder, const std::vector<std::string>& files);
+/// The line that says which files were written into a folder; empty where the answer is JSON.
+[[nodiscard]] std::string written(const Session& session, const std::string& folder,
+                                  const std::vector<std::string>& files);
 
 /// Announces the files of these names in a folder, before they are computed (will_write()); none if
 /// the folder is empty.

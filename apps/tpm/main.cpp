@@ -71,7 +71,9 @@ void deliver_csv(const std::string& csv, const std::filesystem::path& file) {
   if (!file.empty()) write_file(file, csv);
 }
 
-std::string written(const std::string& folder, const std::vector<std::string>& files) {
+std::string written(const Session& session, const std::string& folder,
+                    const std::vector<std::string>& files) {
+  if (session.json()) return {};
   return fmt::format("\nwritten to {}: {}\n", folder, fmt::join(files, ", "));
 }
 

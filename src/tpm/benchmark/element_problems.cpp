@@ -121,39 +121,33 @@ Eigen::VectorXd integrated_depth(const PosedBond& bond, double load_N) {
 }  // namespace
 
 BenchmarkProblem bond_paper_problem() {
-  RuleSettings rules;
-  rules.steps_s = {0.5, 0.1, 1e-2, 2e-3, 1e-3, 5e-4, 4e-4, 2.5e-4, 1e-4, 5e-5};
-  rules.tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10};
   return exact_problem(
       ramped_bond(kPaperEta1_Pa_s), "bond_paper", "One bond, the paper's own eta1",
       "The star of the paper with E1 = E2 = E' = 12 kPa, x = 30 mm and eta1 = 5 Pa s: a relaxation "
       "time of 0.208 ms. Pushed 8 mm deep at 4 mm/s and held to 31 s. Stiff: nothing happens on "
       "the "
       "scale of the relaxation time, and explicit rules still have to follow it.",
-      rules);
+      {.steps_s = {0.5, 0.1, 1e-2, 2e-3, 1e-3, 5e-4, 4e-4, 2.5e-4, 1e-4, 5e-5},
+       .tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10}});
 }
 
 BenchmarkProblem bond_fitted_problem() {
-  RuleSettings rules;
-  rules.steps_s = {2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 1e-2, 1e-3, 2.5e-4};
-  rules.tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10};
   return exact_problem(
       ramped_bond(kFittedEta1_Pa_s), "bond_fitted", "One bond, eta1 as fitted",
       "The same with eta1 = 257.3 kPa s, as `tpm fit configs/liver_relaxation.json` finds it: a "
       "relaxation time of 10.7 s. Not stiff: here the order of a method shows.",
-      rules);
+      {.steps_s = {2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 1e-2, 1e-3, 2.5e-4},
+       .tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10}});
 }
 
 BenchmarkProblem star_creep_problem() {
-  RuleSettings rules;
-  rules.steps_s = {10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 1e-2, 1e-3};
-  rules.tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10};
   const PosedBond bond = posed_bond(kFittedEta1_Pa_s, creep(0.98, 60.0), times_every(1.0, 60.0));
   return exact_problem(
       bond, "star_creep", "Creep of the star under 0.98 N",
       "The larger of the paper's loads, put on at once and kept for 60 s; eta1 = 257.3 kPa s, the "
       "true lambda1 of each depth. The exact answer is a quadrature over depth.",
-      rules);
+      {.steps_s = {10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 1e-2, 1e-3},
+       .tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10}});
 }
 
 BenchmarkProblem bond_mass_problem() {

@@ -47,12 +47,16 @@ struct Referee {
   double worst_floor;
 };
 
-BenchmarkProblem massless_problem(const Tissue& tissue, const Protocol& protocol,
+BenchmarkProblem massless_problem(std::string name, std::string title, std::string text,
+                                  const Tissue& tissue, const Protocol& protocol,
                                   const std::vector<double>& times_s, const RuleSettings& rules,
                                   const Referee& referee) {
   const std::shared_ptr<const PosedNetwork> posed = posed_liver(tissue, protocol, times_s);
   const std::shared_ptr<const MethodProblem> rule_problem = rules_on(posed);
   BenchmarkProblem problem;
+  problem.name = std::move(name);
+  problem.title = std::move(title);
+  problem.text = std::move(text);
   const bool loaded = posed->protocol.drive() == Drive::force;
   problem.response = loaded ? "depth" : "contact force";
   problem.unit = loaded ? "m" : "N";
@@ -96,56 +100,44 @@ std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue, bool guid
 }  // namespace
 
 BenchmarkProblem organ_hold_problem() {
-  RuleSettings rules;
-  rules.steps_s = {2.0, 1.0, 0.5, 0.2, 1e-3};
-  rules.tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
-  rules.sweeps = {1, 10, 100};
-  rules.most_rates = 20'000;
-  BenchmarkProblem problem = massless_problem(
-      liver(kFittedEta1_Pa_s), ramp_and_hold(8e-3, 4e-3, 29.0), times_every(0.5, 31.0), rules,
-      {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
-  problem.name = "organ_hold";
-  problem.title = "Organ, ramp and hold";
-  problem.text =
+  return massless_problem(
+      "organ_hold", "Organ, ramp and hold",
       "The liver of 424 spheres (configs/liver_scene.json) with eta1 = 257.3 kPa s, pushed 8 mm "
-      "deep at sphere 71 at 4 mm/s and held to 31 s.";
-  return problem;
+      "deep at sphere 71 at 4 mm/s and held to 31 s.",
+      liver(kFittedEta1_Pa_s), ramp_and_hold(8e-3, 4e-3, 29.0), times_every(0.5, 31.0),
+      {.steps_s = {2.0, 1.0, 0.5, 0.2, 1e-3},
+       .tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6},
+       .sweeps = {1, 10, 100},
+       .most_rates = 20'000},
+      {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
 }
 
 BenchmarkProblem organ_poke_problem() {
   const Protocol protocol(Drive::displacement, {{0.0, 0.0}, {0.08, 8e-3}, {0.12, 8e-3}, {0.2, 0.0}},
                           "poke");
-  RuleSettings rules;
-  rules.steps_s = {2e-2, 5e-3, 2e-3, 1e-3, 2.5e-4};
-  rules.tolerances = {1e-2, 1e-4, 1e-6};
-  rules.sweeps = {1, 10, 100};
-  rules.most_rates = 20'000;
-  BenchmarkProblem problem = massless_problem(
-      liver(), protocol, with_moments_after_kinks(times_every(5e-3, 0.2), protocol), rules,
-      {StepRule::cvode_bdf, 1e-11, "CVODE, BDF, at 1e-11", 1e-6});
-  problem.name = "organ_poke";
-  problem.title = "Organ, poked at 100 mm/s";
-  problem.text =
+  return massless_problem(
+      "organ_poke", "Organ, poked at 100 mm/s",
       "The same liver with the paper's eta1 = 5 Pa s (relaxation time 0.208 ms): 8 mm in at 100 "
-      "mm/s, held for 40 ms, and out again, 0.2 s in all.";
-  return problem;
+      "mm/s, held for 40 ms, and out again, 0.2 s in all.",
+      liver(), protocol, with_moments_after_kinks(times_every(5e-3, 0.2), protocol),
+      {.steps_s = {2e-2, 5e-3, 2e-3, 1e-3, 2.5e-4},
+       .tolerances = {1e-2, 1e-4, 1e-6},
+       .sweeps = {1, 10, 100},
+       .most_rates = 20'000},
+      {StepRule::cvode_bdf, 1e-11, "CVODE, BDF, at 1e-11", 1e-6});
 }
 
 BenchmarkProblem organ_creep_problem() {
-  RuleSettings rules;
-  rules.steps_s = {20.0, 10.0, 5.0, 2.0, 1e-3};
-  rules.tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
-  rules.sweeps = {1, 10, 100};
-  rules.most_rates = 20'000;
-  BenchmarkProblem problem =
-      massless_problem(liver(kFittedEta1_Pa_s), creep(0.196, 300.0), times_every(5.0, 300.0), rules,
-                       {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
-  problem.name = "organ_creep";
-  problem.title = "Organ, 300 s of creep";
-  problem.text =
+  return massless_problem(
+      "organ_creep", "Organ, 300 s of creep",
       "The same liver with eta1 = 257.3 kPa s under the smaller of the paper's loads, 0.196 N, put "
-      "on at once and kept for 300 s.";
-  return problem;
+      "on at once and kept for 300 s.",
+      liver(kFittedEta1_Pa_s), creep(0.196, 300.0), times_every(5.0, 300.0),
+      {.steps_s = {20.0, 10.0, 5.0, 2.0, 1e-3},
+       .tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6},
+       .sweeps = {1, 10, 100},
+       .most_rates = 20'000},
+      {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
 }
 
 BenchmarkProblem poke_with_mass_problem(const std::shared_ptr<const PosedNetwork>& posed) {

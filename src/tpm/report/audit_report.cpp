@@ -86,21 +86,4 @@ std::string audit_text(const AuditReport& report, bool all) {
   return out + summary_text(report);
 }
 
-TableDocument audit_document(const AuditReport& report) {
-  TableDocument document;
-  document.title = "Audit";
-  document.introduction = {report.title};
-  TableSection section;
-  section.title = "Claims recomputed";
-  section.columns = {"claim", "where", "printed", "recomputed", "verdict", "consequence"};
-  for (const Finding& finding : report.findings) {
-    section.rows.push_back({finding.id, finding.where, finding.printed, finding.recomputed_words(),
-                            finding.verdict_words(), finding.consequence});
-  }
-  document.sections.push_back(std::move(section));
-  document.conclusion = {summary_text(report)};
-  document.conclusion.front().pop_back();
-  return document;
-}
-
 }  // namespace tpm::report

@@ -53,15 +53,17 @@ std::string value(double v) {
   return std::isfinite(v) ? significant(v, 4) : "diverges";
 }
 
+Series measured_beside(const Series& predicted) {
+  return {.kind = Series::Kind::points,
+          .label = predicted.label + ", on the simulated device",
+          .provenance = "simulated"};
+}
+
 /// One curve and its measured points, over the rate, for one delay.
 void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int delay,
                     double damping) {
-  Series predicted, measured;
-  measured.kind = Series::Kind::points;
-  predicted.provenance = "model";
-  measured.provenance = "simulated";
-  predicted.label = delay == 0 ? "no delay" : fmt::format("delay {} periods", delay);
-  measured.label = predicted.label + ", on the simulated device";
+  Series predicted = line(delay == 0 ? "no delay" : fmt::format("delay {} periods", delay), {}, {});
+  Series measured = measured_beside(predicted);
   for (const BorderPoint& p : points) {
     if (p.delay_periods != delay || p.damping_N_s_per_m != damping) continue;
     predicted.add(p.rate_Hz, p.predicted);
@@ -72,7 +74,7 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
 }
 
 Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
-  Series s{.label = "Colgate-Schenkel 2b/T, all taut", .provenance = "model"};
+  Series s = line("Colgate-Schenkel 2b/T, all taut", {}, {});
   for (const BorderPoint& p : points) {
     if (p.delay_periods != 0 || p.damping_N_s_per_m != damping) continue;
     s.add(p.rate_Hz, 2.0 * damping * p.rate_Hz);
@@ -109,12 +111,8 @@ Figure rule_figure(const BorderStudy& study) {
   constexpr double kHalfPeriod_s = 0.5e-3, kPeriod_s = 1e-3;
   for (const ElementRule rule :
        {ElementRule::exact, ElementRule::forward_euler, ElementRule::mass_spring}) {
-    Series predicted, measured;
-    measured.kind = Series::Kind::points;
-    predicted.provenance = "model";
-    measured.provenance = "simulated";
-    predicted.label = std::string(word_of_rule(rule));
-    measured.label = predicted.label + ", on the simulated device";
+    Series predicted = line(std::string(word_of_rule(rule)), {}, {});
+    Series measured = measured_beside(predicted);
     for (const RulePoint& p : study.rules) {
       if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
       predicted.add(p.relaxation_time_s / kPeriod_s, p.predicted_N_s_per_m / kHalfPeriod_s);

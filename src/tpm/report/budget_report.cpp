@@ -32,9 +32,7 @@ Panel waterfall_panel(const ErrorBudget& b) {
               .x = {"", "", false, 0.5, 1.5 + static_cast<double>(b.lines.size())},
               .y = {"sum so far, of the peak", "%"}};
   Series steps{.kind = Series::Kind::bracket, .label = "line", .provenance = "derived"};
-  Series sums = line("sum so far", {}, {});
-  sums.kind = Series::Kind::points;
-  sums.provenance = "derived";
+  Series sums{.kind = Series::Kind::points, .label = "sum so far", .provenance = "derived"};
   double sum = 0.0;
   for (const BudgetLine& l : b.lines) {
     const double next = sum + 100.0 * l.difference_N[at] / b.peak_N;
@@ -52,9 +50,7 @@ Panel waterfall_panel(const ErrorBudget& b) {
 }
 
 Series threshold(const char* words, double share, double until) {
-  Series s = line(words, {0.5, until}, {100.0 * share, 100.0 * share});
-  s.provenance = "abstract";
-  return s;
+  return line(words, {0.5, until}, {100.0 * share, 100.0 * share}, "abstract");
 }
 
 Panel largest_panel(const ErrorBudget& b) {

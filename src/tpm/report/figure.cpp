@@ -133,10 +133,11 @@ Json to_json(const std::vector<Figure>& figures) {
   return Json{{"figures", std::move(list)}};
 }
 
-Series line(std::string label, std::vector<double> x, std::vector<double> y) {
+Series line(std::string label, std::vector<double> x, std::vector<double> y,
+            std::string provenance) {
   return {.kind = Series::Kind::line,
           .label = std::move(label),
-          .provenance = "model",
+          .provenance = std::move(provenance),
           .x = std::move(x),
           .y = std::move(y)};
 }

@@ -74,7 +74,8 @@ struct Figure {
 /// or hold a number that is not finite.
 [[nodiscard]] Json to_json(const std::vector<Figure>& figures);
 
-[[nodiscard]] Series line(std::string label, std::vector<double> x, std::vector<double> y);
+[[nodiscard]] Series line(std::string label, std::vector<double> x, std::vector<double> y,
+                          std::string provenance = "model");
 
 /// Adds a series to a panel, unless it is empty.
 void add_if_any(Panel& panel, Series series);

@@ -32,8 +32,11 @@ double interval_rise(const FitResult& fit) {
 
 Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::string& name,
                         double stated) {
-  Series interval{.kind = Series::Kind::bracket};
-  Series estimate{.kind = Series::Kind::points};
+  Series interval{.kind = Series::Kind::bracket, .provenance = "derived", .assumed = "ramp rate"};
+  Series estimate{.kind = Series::Kind::points,
+                  .label = "best fit",
+                  .provenance = "derived",
+                  .assumed = "ramp rate"};
   Axis axis;
   double unit = 1.0;
   for (const FitVariant& variant : study.variants) {
@@ -46,18 +49,11 @@ Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::strin
                        p.upper.value_or(p.parameter.upper) / unit);
     estimate.add(variant.rate_m_per_s * 1e3, p.estimate / unit);
   }
-  interval.provenance = "derived";
-  interval.assumed = "ramp rate";
-  estimate.label = "best fit";
-  estimate.provenance = "derived";
-  estimate.assumed = "ramp rate";
-  Series value = line("stated in the paper", {0.0, 5.0}, {stated / unit, stated / unit});
-  value.provenance = "text";
-  Panel panel{fmt::format("noise {}", noise_words(noise)),
-              {"assumed ramp rate", "mm/s", false, 0.0, 5.0},
-              std::move(axis)};
-  panel.series = {std::move(interval), std::move(estimate), std::move(value)};
-  return panel;
+  return {fmt::format("noise {}", noise_words(noise)),
+          {"assumed ramp rate", "mm/s", false, 0.0, 5.0},
+          std::move(axis),
+          {std::move(interval), std::move(estimate),
+           line("stated in the paper", {0.0, 5.0}, {stated / unit, stated / unit}, "text")}};
 }
 
 }  // namespace

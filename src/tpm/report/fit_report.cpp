@@ -118,9 +118,8 @@ Panel specimen_panel(const SpecimenStudy& study, const PooledParameter& p) {
     if (!r->lower || !r->upper || (logarithmic && !(*r->lower > 0.0))) continue;
     interval.add_range(static_cast<double>(i + 1), *r->lower / unit, *r->upper / unit);
   }
-  Series typical = line("typical specimen", {0.5, last}, {});
-  typical.provenance = "derived";
-  typical.y.assign(2, p.parameter.natural(p.effects.mean) / unit);
+  const double mean = p.parameter.natural(p.effects.mean) / unit;
+  Series typical = line("typical specimen", {0.5, last}, {mean, mean}, "derived");
   if (p.effects.new_specimen) {
     panel.series.push_back(pooled_band(p, *p.effects.new_specimen, "a new specimen", last));
   } else if (p.effects.tau_squared && *p.effects.tau_squared > 0.0) {

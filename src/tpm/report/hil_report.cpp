@@ -42,9 +42,7 @@ std::vector<Series> asked_depths(const HilRecording& recording, const std::vecto
     const OperatorAim aim = script.at(time);
     const bool place = aim.aim == OperatorPiece::Aim::place;
     if (place && !before) {
-      stretches.emplace_back();
-      stretches.back().label = "asked for";
-      stretches.back().provenance = "model";
+      stretches.push_back(line("asked for", {}, {}));
     }
     before = place;
     if (!place) continue;

@@ -22,8 +22,7 @@ struct BrokenLine {
 
   void add(const std::string& name, std::size_t sample, double x, double y) {
     if (pieces.empty() || sample != last + 1) {
-      pieces.push_back(line(name, {}, {}));
-      pieces.back().provenance = "derived";
+      pieces.push_back(line(name, {}, {}, "derived"));
     }
     pieces.back().add(x, y);
     last = sample;
@@ -59,12 +58,10 @@ Panel width_panel(const Identification& id) {
     to = std::max(to, drawn.x.back());
   }
   const double target = 100.0 * id.options.target;
-  panel.series.push_back(line("target", {from, to}, {target, target}));
-  panel.series.back().provenance = "assumed";
+  panel.series.push_back(line("target", {from, to}, {target, target}, "assumed"));
   if (id.stopped) {
     const double stop = id.history[*id.stopped].time_s;
-    panel.series.push_back(line("stopped", {stop, stop}, {least, most}));
-    panel.series.back().provenance = "derived";
+    panel.series.push_back(line("stopped", {stop, stop}, {least, most}, "derived"));
   }
   return panel;
 }

@@ -26,19 +26,12 @@ Panel force_panel(const MaterialCourse& c, bool titled) {
   forces.x = {"time", "s"};
   forces.y = {"contact force", "N"};
   if (!c.measured_N.empty()) {
-    Series readings = line("recording", c.time_s, c.measured_N);
-    readings.kind = Series::Kind::points;
-    readings.provenance = "measured";
-    forces.series.push_back(std::move(readings));
+    forces.series.push_back(line("recording", c.time_s, c.measured_N, "measured"));
+    forces.series.back().kind = Series::Kind::points;
   }
-  const auto add = [&](const char* label, const std::vector<double>& force) {
-    Series s = line(label, c.time_s, force);
-    s.provenance = "model";
-    forces.series.push_back(std::move(s));
-  };
-  add("law", c.law_N);
-  add("organ, by correspondence", c.correspondence_N);
-  add("organ, fitted", c.organ_N);
+  forces.series.push_back(line("law", c.time_s, c.law_N));
+  forces.series.push_back(line("organ, by correspondence", c.time_s, c.correspondence_N));
+  forces.series.push_back(line("organ, fitted", c.time_s, c.organ_N));
   return forces;
 }
 

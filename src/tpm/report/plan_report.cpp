@@ -124,32 +124,30 @@ std::optional<std::pair<std::string, double>> run_offline(const Plan& plan) {
   return std::pair{found->name, *found->cost_s_per_s * plan.duration_s};
 }
 
-std::string choice_text(const Plan& plan) {
-  if (plan.choice) {
-    const PlannedCandidate& c = plan.chosen();
-    std::string text = fmt::format(
-        "pick: {} ({}{}{})\n  claimed error at most {}, verified {}; margin {} times\n  costs {} "
-        "per "
-        "simulated second{}\n",
-        c.name, c.formulation, c.settings.empty() ? "" : ", ", c.settings,
-        share_text(*c.claimed_error), share_text(*c.verified_error),
-        significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
-        time_text(*c.cost_s_per_s),
-        c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
-    const std::string offline = offline_text(plan);
-    if (!offline.empty()) text += "  " + offline;
-    if (c.verified_response_error) {
-      text += fmt::format("  nothing is claimed of the {}: verified error {}\n",
-                          plan.by_depth ? "contact force" : "indentation depth",
-                          share_text(*c.verified_response_error));
-    }
-    if (plan.needs_full) {
-      text += "  the scene needs the full nonlinear model: no reduced one meets the tolerance\n";
-    }
-    return text;
+std::string pick_text(const Plan& plan) {
+  const PlannedCandidate& c = plan.chosen();
+  std::string text = fmt::format(
+      "pick: {} ({}{}{})\n  claimed error at most {}, verified {}; margin {} times\n  costs {} "
+      "per "
+      "simulated second{}\n",
+      c.name, c.formulation, c.settings.empty() ? "" : ", ", c.settings,
+      share_text(*c.claimed_error), share_text(*c.verified_error),
+      significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
+      time_text(*c.cost_s_per_s),
+      c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
+  const std::string offline = offline_text(plan);
+  if (!offline.empty()) text += "  " + offline;
+  if (c.verified_response_error) {
+    text += fmt::format("  nothing is claimed of the {}: verified error {}\n",
+                        plan.by_depth ? "contact force" : "indentation depth",
+                        share_text(*c.verified_response_error));
   }
-  std::string text = "no model meets tolerance and budget\n";
-  if (plan.without_budget) {
+  return text;
+}
+
+std::string choice_text(const Plan& plan) {
+  std::string text = plan.choice ? pick_text(plan) : "no model meets tolerance and budget\n";
+  if (!plan.choice && plan.without_budget) {
     const PlannedCandidate& c = plan.candidates[*plan.without_budget];
     text += fmt::format("  without the budget: {}, {} per simulated second, verified error {}\n",
                         c.name, time_text(*c.cost_s_per_s), share_text(*c.verified_error));

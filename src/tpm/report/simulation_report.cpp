@@ -14,8 +14,11 @@
 namespace tpm::report {
 namespace {
 
-constexpr int kSimulationDigits = 9;
 constexpr std::size_t kMostNamed = 12;
+
+double nine_digits(double value) {
+  return rounded(value, 9);
+}
 
 bool by_depth(const ExperimentScene& scene) {
   return scene.protocol.drive() == Drive::displacement;
@@ -50,16 +53,15 @@ const CurvePoint& hardest(const SimulationRecord& record) {
 Json validity_json(const Validity& validity, bool depth_limits) {
   Json json{{"kept", validity.whole()},
             {"depth_limits_apply", depth_limits},
-            {"deepest_m", rounded(validity.deepest_m, kSimulationDigits)},
-            {"most_turned_rad", rounded(validity.most_turned_rad, kSimulationDigits)}};
+            {"deepest_m", nine_digits(validity.deepest_m)},
+            {"most_turned_rad", nine_digits(validity.most_turned_rad)}};
   json["limits"] = Json::array();
   for (std::size_t k = 0; k < kValidityLimits; ++k) {
     const auto limit = static_cast<ValidityLimit>(k);
     const ValidityBreach& breach = validity.of(limit);
     Json entry{{"limit", key_of(limit)}, {"passed", breach.first_time_s.has_value()}};
-    entry["first_time_s"] = breach.first_time_s
-                                ? Json(rounded(*breach.first_time_s, kSimulationDigits))
-                                : Json(nullptr);
+    entry["first_time_s"] =
+        breach.first_time_s ? Json(nine_digits(*breach.first_time_s)) : Json(nullptr);
     entry["spheres"] = Json::array();
     for (const std::size_t sphere : breach.spheres) entry["spheres"].push_back(sphere + 1);
     json["limits"].push_back(entry);
@@ -70,43 +72,41 @@ Json validity_json(const Validity& validity, bool depth_limits) {
 Json energy_json(const SimulationRun& run) {
   if (run.record.inertial_energy) {
     const InertialEnergy& e = *run.record.inertial_energy;
-    return {
-        {"work_J", rounded(e.work, kSimulationDigits)},
-        {"stored_J", rounded(e.stored, kSimulationDigits)},
-        {"dissipated_J", rounded(e.bond_heat + e.damping_heat + e.contact_heat, kSimulationDigits)},
-        {"contact_heat_J", rounded(e.contact_heat, kSimulationDigits)},
-        {"kinetic_J", rounded(e.kinetic, kSimulationDigits)}};
+    return {{"work_J", nine_digits(e.work)},
+            {"stored_J", nine_digits(e.stored)},
+            {"dissipated_J", nine_digits(e.bond_heat + e.damping_heat + e.contact_heat)},
+            {"contact_heat_J", nine_digits(e.contact_heat)},
+            {"kinetic_J", nine_digits(e.kinetic)}};
   }
   const QuasiStaticEnergy& e = run.record.curve.back().energy;
-  return {{"work_J", rounded(e.work_J, kSimulationDigits)},
-          {"stored_J", rounded(e.stored_J, kSimulationDigits)},
-          {"dissipated_J", rounded(e.dissipated_J, kSimulationDigits)}};
+  return {{"work_J", nine_digits(e.work_J)},
+          {"stored_J", nine_digits(e.stored_J)},
+          {"dissipated_J", nine_digits(e.dissipated_J)}};
 }
 
 /// What spheres with mass have besides: blows, forces that a load does not name, and what the
 /// stiffness of contacts changes.
 Json motion_json(const ExperimentScene& scene, const SimulationRun& run) {
-  const auto number = [](double x) { return Json(rounded(x, kSimulationDigits)); };
   const std::vector<ProbeBlow>& blows = run.record.blows;
   Json json{{"blows", {{"count", blows.size()}}}};
   if (const ProbeBlow* most = largest_blow(blows)) {
-    json["blows"]["largest"] = {{"time_s", number(most->time_s)},
-                                {"impulse_on_tissue_N_s", number(most->impulse_on_tissue_N_s)},
-                                {"impulse_of_probe_N_s", number(most->impulse_N_s)}};
+    json["blows"]["largest"] = {{"time_s", nine_digits(most->time_s)},
+                                {"impulse_on_tissue_N_s", nine_digits(most->impulse_on_tissue_N_s)},
+                                {"impulse_of_probe_N_s", nine_digits(most->impulse_N_s)}};
   }
   if (!by_depth(scene)) {
     const CurvePoint& most = hardest(run.record);
-    json["largest_force_on_tissue"] = {{"time_s", number(most.time_s)},
-                                       {"force_N", number(most.force_on_tissue_N)}};
+    json["largest_force_on_tissue"] = {{"time_s", nine_digits(most.time_s)},
+                                       {"force_N", nine_digits(most.force_on_tissue_N)}};
   }
   json["contact_check"] = nullptr;
   if (run.contact_check) {
     const ContactCheck& check = *run.contact_check;
     json["contact_check"] = {{"times_softer", ContactCheck::kSofter},
-                             {"largest_response", number(check.largest)},
-                             {"largest_response_softer", number(check.largest_softer)},
-                             {"response_at_end", number(check.end)},
-                             {"response_at_end_softer", number(check.end_softer)},
+                             {"largest_response", nine_digits(check.largest)},
+                             {"largest_response_softer", nine_digits(check.largest_softer)},
+                             {"response_at_end", nine_digits(check.end)},
+                             {"response_at_end_softer", nine_digits(check.end_softer)},
                              {"difference", rounded(check.difference, 3)},
                              {"difference_at_one_time", rounded(check.at_one_time, 3)},
                              {"depends_on_stiffness", check.depends_on_stiffness()}};
@@ -135,11 +135,9 @@ Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
     if (contact.is_tool()) {
       const ToolState& state = states[tool];
       const auto list_of = [](const Eigen::Vector3d& v) {
-        return Json{rounded(v.x(), kSimulationDigits), rounded(v.y(), kSimulationDigits),
-                    rounded(v.z(), kSimulationDigits)};
+        return Json{nine_digits(v.x()), nine_digits(v.y()), nine_digits(v.z())};
       };
-      json["contact_stiffness_N_per_m"] =
-          rounded(network.driven.tools[tool].stiffness_N_per_m, kSimulationDigits);
+      json["contact_stiffness_N_per_m"] = nine_digits(network.driven.tools[tool].stiffness_N_per_m);
       json["last"] = {{"position_m", list_of(state.position)},
                       {"force_on_tissue_N", list_of(state.force)},
                       {"touching", state.touching},
@@ -202,11 +200,10 @@ std::string contacts_text(const ExperimentScene& scene, const RunNetwork& networ
 
 Json smoothness_json(const std::optional<Smoothness>& smoothness) {
   if (!smoothness) return nullptr;
-  Json json{{"near_contact", rounded(smoothness->near_contact, kSimulationDigits)},
+  Json json{{"near_contact", nine_digits(smoothness->near_contact)},
             {"near_spheres", smoothness->near_spheres},
             {"rim_spheres", smoothness->rim_spheres}};
-  json["at_rim"] =
-      smoothness->at_rim ? Json(rounded(*smoothness->at_rim, kSimulationDigits)) : Json(nullptr);
+  json["at_rim"] = smoothness->at_rim ? Json(nine_digits(*smoothness->at_rim)) : Json(nullptr);
   return json;
 }
 
@@ -306,7 +303,7 @@ std::string equations_text(const ExperimentScene& scene, const SimulationRun& ru
 Json solver_json(const SolverChoice& solver) {
   Json json{{"kind", solver.direct ? "direct" : "iterative"}};
   if (solver.operations > 0.0) {
-    json["factor_operations"] = rounded(solver.operations, kSimulationDigits);
+    json["factor_operations"] = nine_digits(solver.operations);
     json["factor_bytes"] = solver.bytes;
   }
   return json;
@@ -342,9 +339,9 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
             {"imposed", depth ? "depth_m" : "load_N"},
             {"response", depth ? "force_N" : "depth_m"}};
   const auto point = [](const CurvePoint& p) {
-    return Json{{"time_s", rounded(p.time_s, kSimulationDigits)},
-                {"imposed", rounded(p.imposed, kSimulationDigits)},
-                {"response", rounded(p.response, kSimulationDigits)}};
+    return Json{{"time_s", nine_digits(p.time_s)},
+                {"imposed", nine_digits(p.imposed)},
+                {"response", nine_digits(p.response)}};
   };
   json["largest"] = point(largest(record, f.tolerance));
   json["last"] = point(record.curve.back());

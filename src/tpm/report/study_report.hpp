@@ -19,7 +19,4 @@ namespace tpm::report {
 /// @param all also the findings that hold, else only their number
 [[nodiscard]] std::string audit_text(const AuditReport& report, bool all);
 
-/// The audit as one table: claim, where, printed, recomputed, verdict, consequence.
-[[nodiscard]] TableDocument audit_document(const AuditReport& report);
-
 }  // namespace tpm::report

@@ -40,9 +40,9 @@ std::string verdict(const SweepConvergence& c) {
       break;
   }
   std::string text = fmt::format(
-      "order {}; extrapolated {}{}{}; the finest value is uncertain by {} (grid convergence index)",
-      significant(finest.order, 3), significant(finest.extrapolated / unit.to_si, 5),
-      unit.symbol.empty() ? "" : " ", unit.symbol, percent_of(relative_index(finest)));
+      "order {}; extrapolated {}; the finest value is uncertain by {} (grid convergence index)",
+      significant(finest.order, 3), value_words(finest.extrapolated, unit, 5),
+      percent_of(relative_index(finest)));
   if (c.threes.size() == 1) return text + "; one set of three says nothing about that order";
   const GridConvergence& before = c.threes[c.threes.size() - 2];
   if (before.behaviour != Behaviour::monotone) {
@@ -53,24 +53,12 @@ std::string verdict(const SweepConvergence& c) {
                             significant(before.extrapolated / unit.to_si, 5));
 }
 
-/// " at depth = 2 mm, rate = 4 mm/s"
-std::string fixed_text(const SweepConvergence& c) {
-  std::string text;
-  for (const FixedValue& h : c.fixed) {
-    const Unit unit = shown_unit_of(h.unit);
-    text += fmt::format("{} {} = {}{}{}", text.empty() ? " at" : ",", h.axis,
-                        significant(h.value / unit.to_si, 5), unit.symbol.empty() ? "" : " ",
-                        unit.symbol);
-  }
-  return text;
-}
-
 Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
   const Unit unit = shown_unit_of(c.unit), unit_size = shown_unit_of(c.size_unit);
   const GridConvergence& finest = c.threes.back();
   Figure figure{fmt::format("convergence_{}", c.variable), c.variable,
-                fmt::format("{}: {} over {}{}: {}.", title, c.variable, c.size_text, fixed_text(c),
-                            verdict(c))};
+                fmt::format("{}: {} over {}{}: {}.", title, c.variable, c.size_text,
+                            fixed_words(c.fixed, 5), verdict(c))};
   const Axis size_axis{c.size_text, unit_size.symbol, true};
   Series cells = line("model", {}, {});
   for (std::size_t i = 0; i < c.size.size(); ++i) {
@@ -115,7 +103,7 @@ std::string convergence_text(const std::vector<SweepConvergence>& all) {
     const Unit unit = shown_unit_of(c.unit), unit_size = shown_unit_of(c.size_unit);
     text += fmt::format("{}{} over axis {}", text.empty() ? "" : "\n",
                         named_in_unit(c.variable, unit), c.axis);
-    text += fixed_text(c);
+    text += fixed_words(c.fixed, 5);
     if (c.left_out > 0) text += fmt::format(", {} places without a number left out", c.left_out);
     text += fmt::format("\n{:>20} {:>14} {:>12} {:>8} {:>14} {:>10}\n",
                         named_in_unit(c.size_text, unit_size), "value", "behaviour", "order",
@@ -151,14 +139,10 @@ Json convergence_json(const std::vector<SweepConvergence>& all) {
       entry["index"] = limit ? Json(rounded(g.index, 6)) : Json();
       threes.push_back(std::move(entry));
     }
-    Json fixed = Json::array();
-    for (const FixedValue& h : c.fixed) {
-      fixed.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
-    }
     list.push_back({{"variable", c.variable},
                     {"unit", c.unit},
                     {"axis", c.axis},
-                    {"fixed", std::move(fixed)},
+                    {"fixed", fixed_json(c.fixed)},
                     {"size_is", c.size_text},
                     {"size", c.size},
                     {"value", c.value},

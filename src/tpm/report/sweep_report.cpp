@@ -46,12 +46,11 @@ Axis axis_of(const ReadAxis& axis) {
 
 /// Its own parameter's place, with the unit; else its number.
 std::string place_words(const ReadAxis& axis, std::uint64_t place) {
-  const Unit unit = shown_unit_of(axis.unit);
-  return fmt::format("{} = {}{}{}", axis.name, significant(axis.places[place] / unit.to_si, 4),
-                     unit.symbol.empty() ? "" : " ", unit.symbol);
+  return fmt::format("{} = {}", axis.name,
+                     value_words(axis.places[place], shown_unit_of(axis.unit), 4));
 }
 
-std::string fixed_words(const SweepReader& sweep, const std::vector<std::string>& free,
+std::string slice_words(const SweepReader& sweep, const std::vector<std::string>& free,
                         const FixedPlaces& fixed) {
   std::string words;
   for (const ReadAxis& axis : sweep.axes()) {
@@ -210,7 +209,7 @@ Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const Sweep
   }
   if (!v.times_s.empty() || across.parameters != std::vector{across.name}) free = {x};
   refuse_free(free, wished.fixed, v.name);
-  const std::string slice = fixed_words(sweep, free, wished.fixed);
+  const std::string slice = slice_words(sweep, free, wished.fixed);
   figure.caption += slice;
   figure.note = slice.empty() ? slice : slice.substr(1);
   return figure;
@@ -272,6 +271,28 @@ FoundRange range_of(const SweepReader& sweep, const std::string& name) {
 
 std::string named_in_unit(const std::string& name, const Unit& unit) {
   return unit.symbol.empty() ? name : fmt::format("{} [{}]", name, unit.symbol);
+}
+
+std::string value_words(double value, const Unit& unit, int digits) {
+  return fmt::format("{}{}{}", significant(value / unit.to_si, digits),
+                     unit.symbol.empty() ? "" : " ", unit.symbol);
+}
+
+std::string fixed_words(const std::vector<FixedValue>& fixed, int digits) {
+  std::string words;
+  for (const FixedValue& h : fixed) {
+    words += fmt::format("{} {} = {}", words.empty() ? " at" : ",", h.axis,
+                         value_words(h.value, shown_unit_of(h.unit), digits));
+  }
+  return words;
+}
+
+Json fixed_json(const std::vector<FixedValue>& fixed) {
+  Json list = Json::array();
+  for (const FixedValue& h : fixed) {
+    list.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
+  }
+  return list;
 }
 
 Unit shown_unit_of(const std::string& si_unit) {

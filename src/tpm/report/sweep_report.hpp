@@ -15,6 +15,13 @@ namespace tpm::report {
 /// "depth [mm]"
 [[nodiscard]] std::string named_in_unit(const std::string& name, const Unit& unit);
 
+/// "4 mm" of a value in SI units
+[[nodiscard]] std::string value_words(double value, const Unit& unit, int digits);
+
+/// " at depth = 2 mm, rate = 4 mm/s"; empty if there is no other axis.
+[[nodiscard]] std::string fixed_words(const std::vector<FixedValue>& fixed, int digits);
+[[nodiscard]] Json fixed_json(const std::vector<FixedValue>& fixed);
+
 /// What a file of results holds: axes, variables with their ranges, cells and reasons.
 [[nodiscard]] std::string sweep_text(const SweepReader& sweep);
 [[nodiscard]] Json sweep_json(const SweepReader& sweep);

@@ -7,26 +7,6 @@
 namespace tpm::report {
 namespace {
 
-/// ", at depth = 4 mm, rate = 2 mm/s"; empty if there is no other axis.
-std::string fixed_values_words(const std::vector<FixedValue>& fixed) {
-  std::string words;
-  for (const FixedValue& h : fixed) {
-    const Unit unit = shown_unit_of(h.unit);
-    words += fmt::format("{}{} = {}{}{}", words.empty() ? ", at " : ", ", h.axis,
-                         significant(h.value / unit.to_si, 4), unit.symbol.empty() ? "" : " ",
-                         unit.symbol);
-  }
-  return words;
-}
-
-Json fixed_json(const std::vector<FixedValue>& fixed) {
-  Json list = Json::array();
-  for (const FixedValue& h : fixed) {
-    list.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
-  }
-  return list;
-}
-
 /// Indices beside each other, with their intervals; `of` picks one of the two kinds.
 Panel index_panel(const std::string& what, const SweepSensitivity& s,
                   IndexEstimate InputSensitivity::*of) {
@@ -56,7 +36,7 @@ std::string sensitivity_text(const std::vector<SweepSensitivity>& all) {
                         significant(s.indices.standard_deviation, 4), s.design.replicates,
                         s.design.points);
     if (s.indices.left_out > 0) text += fmt::format(", {} points left out", s.indices.left_out);
-    text += fixed_values_words(s.fixed);
+    if (!s.fixed.empty()) text += "," + fixed_words(s.fixed, 4);
     text += "\n";
     if (s.indices.inputs.empty()) {
       text += "it does not vary\n";
@@ -109,7 +89,7 @@ std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all
          fmt::format("{}: shares of the variance of {} with 95 % intervals.", title, s.variable),
          {index_panel("first-order index", s, &InputSensitivity::first_order),
           index_panel("total index", s, &InputSensitivity::total)},
-         s.fixed.empty() ? std::string() : fixed_values_words(s.fixed).substr(2)});
+         s.fixed.empty() ? std::string() : fixed_words(s.fixed, 4).substr(1)});
   }
   return figures;
 }

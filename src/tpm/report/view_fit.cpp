@@ -17,7 +17,7 @@ constexpr int kShownDigits = 6;
 std::string put_numbers(ViewPage& page, const Json& list) {
   std::vector<double> numbers;
   for (const Json& v : list) numbers.push_back(v.is_number() ? v.get<double>() : std::nan(""));
-  return page.put(std::span<const double>(numbers));
+  return page.put(numbers);
 }
 
 Json series_of(ViewPage& page, const Json& series) {

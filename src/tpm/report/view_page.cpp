@@ -71,6 +71,14 @@ void ViewPage::fact(std::string_view name, std::string_view value) {
   if (!value.empty()) description["facts"].push_back({name, value});
 }
 
+void ViewPage::plot_over_time(std::string_view title, std::string_view unit, Json series) {
+  description["plots"].push_back({{"title", title},
+                                  {"x", {{"quantity", "time"}, {"unit", "s"}}},
+                                  {"y", {{"quantity", title}, {"unit", unit}}},
+                                  {"time", true},
+                                  {"series", std::move(series)}});
+}
+
 std::string ViewPage::html() const {
   std::string page = read_page("view.html");
   const std::size_t at = page.find(kPlaceOfData);

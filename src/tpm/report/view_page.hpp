@@ -20,6 +20,13 @@ class ViewPage {
   [[nodiscard]] std::string put(std::span<const float> numbers);
   [[nodiscard]] std::string put(std::span<const double> numbers);
   [[nodiscard]] std::string put(std::span<const std::uint32_t> numbers);
+  template <class Number>
+  [[nodiscard]] std::string put(const std::vector<Number>& numbers) {
+    return put(std::span<const Number>(numbers));
+  }
+
+  /// Adds a plot of curves over time.
+  void plot_over_time(std::string_view title, std::string_view unit, Json series);
 
   /// One row of the table "What this is": where the file came from and what it rests on.
   void fact(std::string_view name, std::string_view value);

@@ -34,8 +34,7 @@ class RowCurves {
     for (std::size_t i = 0; i < rows_.size(); i += part_) {
       cycles.push_back(static_cast<std::uint32_t>(rows_[i].cycle));
     }
-    time_ = {{"whole", page_.put(std::span<const std::uint32_t>(cycles))},
-             {"times", recording.session.servo.period_s}};
+    time_ = {{"whole", page_.put(cycles)}, {"times", recording.session.servo.period_s}};
   }
   [[nodiscard]] std::size_t part() const { return part_; }
   [[nodiscard]] std::size_t samples() const { return rows_.size(); }
@@ -53,16 +52,9 @@ class RowCurves {
       most.push_back(static_cast<float>(scale * high));
     }
     Json json{{"kind", "line"}, {"label", label}, {"x", time_}};
-    json["y"] = page_.put(std::span<const float>(least));
-    if (part_ > 1) json["most"] = page_.put(std::span<const float>(most));
+    json["y"] = page_.put(least);
+    if (part_ > 1) json["most"] = page_.put(most);
     return json;
-  }
-  void plot(const char* title, const char* unit, Json series) const {
-    page_.description["plots"].push_back({{"title", title},
-                                          {"x", {{"quantity", "time"}, {"unit", "s"}}},
-                                          {"y", {{"quantity", title}, {"unit", unit}}},
-                                          {"time", true},
-                                          {"series", std::move(series)}});
   }
 
  private:
@@ -76,7 +68,7 @@ class RowCurves {
 void add_curves(const HilRecording& recording, std::size_t most_samples, ViewPage& page) {
   constexpr double kMilli = 1e3, kMicro = 1e6;
   const RowCurves curves(recording, most_samples, page);
-  curves.plot(
+  page.plot_over_time(
       "depth", "mm",
       {curves.series(
            "tool", [](const HilRecording&, const ServoRecord& row) { return row.tool_depth_m; },
@@ -85,7 +77,7 @@ void add_curves(const HilRecording& recording, std::size_t most_samples, ViewPag
            "tissue's surface",
            [](const HilRecording&, const ServoRecord& row) { return row.surface_depth_m; },
            kMilli)});
-  curves.plot(
+  page.plot_over_time(
       "force", "N",
       {curves.series(
            "sent to the device",
@@ -93,19 +85,19 @@ void add_curves(const HilRecording& recording, std::size_t most_samples, ViewPag
        curves.series(
            "of the model",
            [](const HilRecording&, const ServoRecord& row) { return row.model_force_N; }, 1.0)});
-  curves.plot(
+  page.plot_over_time(
       "work of the hand", "mJ",
       {curves.series(
           "work", [](const HilRecording&, const ServoRecord& row) { return row.observed_J; },
           kMilli)});
   if (recording.header.value("time", "") == "real") {
-    curves.plot("time of a cycle's work", "us",
-                {curves.series(
-                    "work",
-                    [](const HilRecording&, const ServoRecord& row) {
-                      return static_cast<double>(row.busy_s);
-                    },
-                    kMicro)});
+    page.plot_over_time("time of a cycle's work", "us",
+                        {curves.series(
+                            "work",
+                            [](const HilRecording&, const ServoRecord& row) {
+                              return static_cast<double>(row.busy_s);
+                            },
+                            kMicro)});
   }
   page.description["samples"] = curves.samples();
   page.description["samples_per_value"] = curves.part();
@@ -155,9 +147,9 @@ class RecordedOrgan {
                {"push", {shape_.push.x(), shape_.push.y(), shape_.push.z()}},
                {"shown", said_}};
     organ["rest_m"] = page.put({rest.data(), static_cast<std::size_t>(rest.size())});
-    organ["bonds"] = page.put(std::span<const std::uint32_t>(ends));
-    organ["time_s"] = page.put(std::span<const double>(times_s_));
-    organ["displacement_m"] = page.put(std::span<const float>(shown_m_));
+    organ["bonds"] = page.put(ends);
+    organ["time_s"] = page.put(times_s_);
+    organ["displacement_m"] = page.put(shown_m_);
     page.description["organ"] = std::move(organ);
   }
 

@@ -81,22 +81,17 @@ void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::s
   std::vector<double> shown_times;
   for (const std::size_t k : shown) shown_times.push_back(times[k]);
   constexpr std::uint64_t kAny = std::uint64_t{1} << 31U;
-  organ["rest_m"] = page.put(std::span<const float>(floats(rest)));
-  organ["layer"] =
-      page.put(std::span<const std::uint32_t>(whole_numbers(file, path, "/spheres/layer", kAny)));
+  organ["rest_m"] = page.put(floats(rest));
+  organ["layer"] = page.put(whole_numbers(file, path, "/spheres/layer", kAny));
   // Files of version 0.1 name it by another word.
   const char* const constraint =
       file.has("/spheres/constraint") ? "/spheres/constraint" : "/spheres/held";
-  organ["constraint"] =
-      page.put(std::span<const std::uint32_t>(whole_numbers(file, path, constraint, 3)));
-  organ["bonds"] =
-      page.put(std::span<const std::uint32_t>(whole_numbers(file, path, "/bonds/ends", spheres)));
-  organ["time_s"] = page.put(std::span<const double>(shown_times));
-  organ["displacement_m"] =
-      page.put(std::span<const float>(states_of(file, path, "displacement_m", shown, spheres)));
+  organ["constraint"] = page.put(whole_numbers(file, path, constraint, 3));
+  organ["bonds"] = page.put(whole_numbers(file, path, "/bonds/ends", spheres));
+  organ["time_s"] = page.put(shown_times);
+  organ["displacement_m"] = page.put(states_of(file, path, "displacement_m", shown, spheres));
   if (file.has(step_name(0, "force_N"))) {
-    organ["force_N"] =
-        page.put(std::span<const float>(states_of(file, path, "force_N", shown, spheres)));
+    organ["force_N"] = page.put(states_of(file, path, "force_N", shown, spheres));
     organ["force_words"] = "force of the bonds on the sphere";
   }
   if (file.has("/probe/sphere")) organ["contact"] = file.numbers("/probe/sphere").at(0) - 1.0;
@@ -110,20 +105,13 @@ void add_plot(ViewPage& page, const std::string& time, const Hdf5Reader& file,
   if (!file.has(name)) return;
   std::vector<double> values = file.numbers(name);
   for (double& v : values) v *= scale;
-  page.description["plots"].push_back({{"title", title},
-                                       {"x", {{"quantity", "time"}, {"unit", "s"}}},
-                                       {"y", {{"quantity", title}, {"unit", unit}}},
-                                       {"time", true},
-                                       {"series",
-                                        {{{"kind", "line"},
-                                          {"label", title},
-                                          {"x", time},
-                                          {"y", page.put(std::span<const double>(values))}}}}});
+  page.plot_over_time(title, unit,
+                      {{{"kind", "line"}, {"label", title}, {"x", time}, {"y", page.put(values)}}});
 }
 
 void add_curves(const Hdf5Reader& file, ViewPage& page) {
   constexpr double kMilli = 1e3;
-  const std::string time = page.put(std::span<const double>(file.numbers("/curve/time_s")));
+  const std::string time = page.put(file.numbers("/curve/time_s"));
   add_plot(page, time, file, "/curve/depth_m", "depth", "mm", kMilli);
   add_plot(page, time, file, "/curve/force_N", "contact force", "N", 1.0);
   add_plot(page, time, file, "/curve/load_N", "load", "N", 1.0);
