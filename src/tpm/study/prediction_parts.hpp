@@ -59,11 +59,6 @@ struct OwnPlacement {
   std::vector<double> values;      ///< of the whole law
   std::vector<std::size_t> place;  ///< of what was found
 };
-/// Fits what belongs to a recording, with the parameters of the material as given.
-/// @param values of the whole law
-[[nodiscard]] FitResult fit_placement(const LawSpec& law, std::span<const double> values,
-                                      const PreparedRecording& recording,
-                                      const SetupOptions& setup);
 /// For the law itself, with the starts of a fit.
 [[nodiscard]] OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording);
 

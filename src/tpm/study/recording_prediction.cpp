@@ -106,21 +106,6 @@ void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& reco
 
 }  // namespace
 
-FitResult fit_placement(const LawSpec& law, std::span<const double> values,
-                        const PreparedRecording& recording, const SetupOptions& setup) {
-  FitConfig config = recording_config(law, std::span(&recording, 1), setup);
-  const std::vector<LawParameter> parameters = law_parameters(law);
-  std::erase_if(config.parameters, [&](const EstimatedParameter& p) {
-    const bool own =
-        p.sets.size() == 1 && belongs_to_recording(law, parameters[p.sets.front().parameter]);
-    return !own;
-  });
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!belongs_to_recording(law, parameters[i])) config.fixed[i] = values[i];
-  }
-  return run_fit(config, data_sets(std::span(&recording, 1)));
-}
-
 OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording) {
   SetupOptions setup;
   setup.reference = law.spec.reference;

@@ -8,6 +8,7 @@
 #include "tpm/curve/phases.hpp"
 #include "tpm/fit/config.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
+#include "tpm/fit/fit.hpp"
 
 namespace tpm::study {
 
@@ -75,5 +76,11 @@ struct SetupOptions {
 
 /// The configuration file that tpm fit reads, with the same meaning.
 [[nodiscard]] Json config_json(const FitConfig& config);
+
+/// Fits what belongs to a recording, with the parameters of the material as given.
+/// @param values of the whole law
+[[nodiscard]] FitResult fit_placement(const LawSpec& law, std::span<const double> values,
+                                      const PreparedRecording& recording,
+                                      const SetupOptions& setup);
 
 }  // namespace tpm::study

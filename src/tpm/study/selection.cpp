@@ -7,7 +7,7 @@
 
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/study/prediction_parts.hpp"
+#include "tpm/study/recording_setup.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {
