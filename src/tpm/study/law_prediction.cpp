@@ -232,11 +232,6 @@ LawFile at_surface(const LawFile& law) {
   return plain;
 }
 
-bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter) {
-  if (!parameter.nuisance) return false;
-  return parameter.name == "offset" || spec.drive != Quantity::relative_length;
-}
-
 UncertainCoordinates fitted_coordinates(const LawFile& law, Placement placement) {
   const LawUncertainty& u = uncertainty_of(law);
   const std::vector<LawParameter> parameters = law_parameters(law.spec);

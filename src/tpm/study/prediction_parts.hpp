@@ -20,9 +20,6 @@ struct UncertainCoordinates {
 /// The law without the recording's contact point and offset.
 [[nodiscard]] LawFile at_surface(const LawFile& law);
 
-/// The slack length of a strip belongs to the specimen: it stays, as in select_law.
-[[nodiscard]] bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter);
-
 /// Those of the fit that apply: without the recording's own contact and offset unless they are
 /// the ones of the fit.
 [[nodiscard]] UncertainCoordinates fitted_coordinates(const LawFile& law, Placement placement);

@@ -416,6 +416,11 @@ Json config_json(const FitConfig& config) {
   return j;
 }
 
+bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter) {
+  if (!parameter.nuisance) return false;
+  return parameter.name == "offset" || spec.drive != Quantity::relative_length;
+}
+
 FitResult fit_placement(const LawSpec& law, std::span<const double> values,
                         const PreparedRecording& recording, const SetupOptions& setup) {
   FitConfig config = recording_config(law, std::span(&recording, 1), setup);

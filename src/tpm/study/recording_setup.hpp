@@ -77,6 +77,9 @@ struct SetupOptions {
 /// The configuration file that tpm fit reads, with the same meaning.
 [[nodiscard]] Json config_json(const FitConfig& config);
 
+/// The slack length of a strip belongs to the specimen: it stays, as in select_law.
+[[nodiscard]] bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter);
+
 /// Fits what belongs to a recording, with the parameters of the material as given.
 /// @param values of the whole law
 [[nodiscard]] FitResult fit_placement(const LawSpec& law, std::span<const double> values,
