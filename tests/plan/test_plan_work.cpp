@@ -98,6 +98,28 @@ TEST_CASE("what a plan has no time for is said, and done where it is thorough", 
   }
 }
 
+TEST_CASE("a run that the plan cuts short breaks nothing", "[heavy]") {
+  // Room for a try as long as the scene as it is, which deeper ones exceed.
+  for (const double tries : {1.01, 1.2, 2.0, 3.0}) {
+    CAPTURE(tries);
+    const PlanScene scene(pushed_liver());
+    const PlanSurrogate surrogate(scene, {}, false);
+    const PlanModels models = plan_models(scene);
+    const double once_s = nominal_costs().seconds_of(surrogate.work_of_claims());
+    const PlanAllowance allowance(scene, spent_s(scene) + 3.0 * tries * once_s);
+    PlanRequest lenient;
+    lenient.tolerance = 0.5;
+    for (const PlanChange& change :
+         plan_changes(surrogate, *models.front(), lenient, 1.0, allowance)) {
+      CHECK_THAT(change.breaks, !Contains("as long as it may"));
+    }
+    for (const PlanRelevance& part :
+         plan_relevance(surrogate, 0.01, PlanAllowance(scene, spent_s(scene) + 1.01 * once_s))) {
+      CHECK_THAT(part.note, !Contains("as long as it may"));
+    }
+  }
+}
+
 TEST_CASE("what planning takes is expected from its first run", "[heavy]") {
   constexpr double kTwice = 2.0;
   for (const double tolerance : {0.07, 0.01, 1e-4}) {

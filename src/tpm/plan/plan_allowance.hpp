@@ -17,6 +17,8 @@ class PlanAllowance {
   [[nodiscard]] double spent_s() const { return nominal_costs().seconds_of(scene_.spent().all()); }
   /// May be below 0.
   [[nodiscard]] double left_s() const { return most_s_ - spent_s(); }
+  /// A run that failed then may have been cut short.
+  [[nodiscard]] bool is_spent() const { return left_s() <= 0.0; }
   [[nodiscard]] bool permits(const OperationCount& work) const {
     return nominal_costs().seconds_of(work) <= left_s();
   }

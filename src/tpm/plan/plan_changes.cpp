@@ -84,7 +84,9 @@ class Survival {
       if (result.survived == kMostChange || !may_try()) return result;
       factor = std::min(factor, kMostChange);
       ++tries;
-      if (const auto broken = breaks_at(factor)) {
+      const auto broken = breaks_at(factor);
+      if (broken && allowance_.is_spent()) return result;  // cut short: that breaks nothing
+      if (broken) {
         result.factor = factor;
         result.breaks = *broken;
       } else {
@@ -94,7 +96,9 @@ class Survival {
     double broken_at = result.factor.value_or(kMostChange);
     for (; broken_at / result.survived > kFoundTo && tries < most_tries_ && may_try(); ++tries) {
       const double middle = std::sqrt(result.survived * broken_at);
-      if (const auto there = breaks_at(middle)) {
+      const auto there = breaks_at(middle);
+      if (there && allowance_.is_spent()) break;
+      if (there) {
         broken_at = middle;
         result.breaks = *there;
       } else {

@@ -50,7 +50,8 @@ PlanRelevance switched_off(const PlanSurrogate& surrogate, const PlanAllowance& 
     result.error = trajectory_error(answer_of(without, surrogate, allowance), surrogate.coarse(),
                                     surrogate.measure());
   } catch (const Error& error) {
-    result.note = fmt::format("cannot be switched off: {}", error.what());
+    result.note = allowance.is_spent() ? "not found: the plan may not take longer (--thorough)"
+                                       : fmt::format("cannot be switched off: {}", error.what());
   }
   return result;
 }
