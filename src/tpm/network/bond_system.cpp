@@ -257,7 +257,12 @@ std::vector<char> BondSystem::closed_contacts(const Positions& position) const {
 
 void BondSystem::elongations(const Positions& position, Eigen::VectorXd& elongation) const {
   elongation.resize(rest_length_.size());
-  for (std::size_t i = 0; i < size(); ++i) {
+  for (std::size_t i = 0; i < first_contact(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    elongation[row] =
+        (position.col(end_b_[i]) - position.col(end_a_[i])).norm() - rest_length_[row];
+  }
+  for (std::size_t i = first_contact(); i < size(); ++i) {
     elongation[static_cast<Eigen::Index>(i)] = line(i, position).elongation;
   }
 }
@@ -368,10 +373,12 @@ void BondSystem::add_stiffness_times(const Positions& position, const ViscousSta
 }
 
 double BondSystem::potential_J(const Positions& position, const ViscousState& viscous_state) const {
+  Eigen::VectorXd elongation;
+  elongations(position, elongation);
   double energy = 0.0;
   for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    const double l = line(i, position).elongation;
+    const double l = elongation[row];
     if (!carries(i, l, viscous_state.closed)) continue;
     const double k = stiffness_[row];
     const double g = relaxing_[row];
@@ -398,10 +405,12 @@ void BondSystem::require_branches(const Eigen::Ref<const Eigen::MatrixXd>& visco
 double BondSystem::stored_energy_J(const Positions& position,
                                    const Eigen::Ref<const Eigen::MatrixXd>& viscous) const {
   require_branches(viscous);
+  Eigen::VectorXd elongation;
+  elongations(position, elongation);
   double energy = 0.0;
   for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    const double l = line(i, position).elongation;
+    const double l = elongation[row];
     if (!carries(i, l, {})) continue;
     const double g = relaxing_[row];
     if (i >= first_contact()) {
@@ -409,11 +418,12 @@ double BondSystem::stored_energy_J(const Positions& position,
       continue;
     }
     const ViscousLaw& law = laws_[law_[i]];
-    energy += (stiffness_[row] - g) * law.equilibrium_integral(l);
+    energy += (stiffness_[row] - g) * (linear_ ? 0.5 * l * l : law.equilibrium_integral(l));
     if (!(g > 0.0)) continue;
     Eigen::Index j = 0;
     for (const ViscousLaw::Branch& branch : law.branches) {
-      energy += g * branch.share * law.kernel.gap(l, viscous(row, j++));
+      const double m = viscous(row, j++);
+      energy += g * branch.share * (linear_ ? 0.5 * (l - m) * (l - m) : law.kernel.gap(l, m));
     }
   }
   return energy;
@@ -422,12 +432,14 @@ double BondSystem::stored_energy_J(const Positions& position,
 double BondSystem::dissipation_W(const Positions& position,
                                  const Eigen::Ref<const Eigen::MatrixXd>& viscous) const {
   require_branches(viscous);
+  Eigen::VectorXd elongation;
+  elongations(position, elongation);
   double power = 0.0;
   for (std::size_t i = 0; i < first_contact(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     if (!(relaxing_[row] > 0.0)) continue;
     const ViscousLaw& law = laws_[law_[i]];
-    const double l = line(i, position).elongation;
+    const double l = elongation[row];
     Eigen::Index j = 0;
     for (const ViscousLaw::Branch& branch : law.branches) {
       const double m = viscous(row, j++);

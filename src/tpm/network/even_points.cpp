@@ -24,30 +24,6 @@ int sweeps_for(std::size_t count) {
   return count <= 20'000 ? 120 : 30;
 }
 
-/// Pairs of points that move a little between one question and the next: a list that reaches a
-/// little farther serves until a point has moved through half of the difference (Verlet 1967).
-class NearPairs {
- public:
-  explicit NearPairs(double reach) : reach_(reach) {}
-
-  /// As pairs_within(points, reach), and perhaps some that are farther apart.
-  const std::vector<NeighbourPair>& of(const Positions& points) {
-    const double margin = kMargin * reach_;
-    if (points_.cols() == 0 ||
-        (points - points_).colwise().squaredNorm().maxCoeff() > 0.25 * margin * margin) {
-      pairs_ = pairs_within(points, reach_ + margin);
-      points_ = points;
-    }
-    return pairs_;
-  }
-
- private:
-  static constexpr double kMargin = 0.25;
-  double reach_;
-  Positions points_;  ///< when the list was made
-  std::vector<NeighbourPair> pairs_;
-};
-
 /// Each point is pushed away from those nearer than the reach, then put back on the surface.
 /// @param near reaches as far
 void repel(const Surface& surface, double spacing, double step, NearPairs& near,

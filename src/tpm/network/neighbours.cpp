@@ -62,6 +62,17 @@ std::vector<NeighbourPair> pairs_within(const Positions& points, double radius) 
   return pairs;
 }
 
+const std::vector<NeighbourPair>& NearPairs::of(const Positions& points) {
+  constexpr double kMargin = 0.25;  // of the reach
+  const double margin = kMargin * reach_;
+  if (points_.cols() == 0 ||
+      (points - points_).colwise().squaredNorm().maxCoeff() > 0.25 * margin * margin) {
+    pairs_ = pairs_within(points, reach_ + margin);
+    points_ = points;
+  }
+  return pairs_;
+}
+
 std::vector<double> distances_to_nearest(const Positions& points) {
   const PointCloud cloud(points);
   const Tree tree(3, cloud);

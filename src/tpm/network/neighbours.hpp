@@ -20,6 +20,22 @@ struct NeighbourPair {
 /// @param radius m, finite, above 0; Error(bad_input) otherwise
 [[nodiscard]] std::vector<NeighbourPair> pairs_within(const Positions& points, double radius);
 
+/// Pairs of points that move a little between one question and the next: a list that reaches a
+/// little farther serves until a point has moved through half of the difference (Verlet 1967).
+class NearPairs {
+ public:
+  /// @param reach m, finite, above 0
+  explicit NearPairs(double reach) : reach_(reach) {}
+
+  /// As pairs_within(points, reach), and perhaps some that are farther apart.
+  const std::vector<NeighbourPair>& of(const Positions& points);
+
+ private:
+  double reach_;
+  Positions points_;  ///< when the list was made
+  std::vector<NeighbourPair> pairs_;
+};
+
 /// For every point the distance to the nearest other one, m. At least two points.
 [[nodiscard]] std::vector<double> distances_to_nearest(const Positions& points);
 

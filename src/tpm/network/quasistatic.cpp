@@ -147,8 +147,8 @@ class Run {
   }
 
   /// The account of the energy where the tissue is in a state.
-  [[nodiscard]] QuasiStaticEnergy energy_of(const TissueState& state,
-                                            QuasiStaticEnergy spent) const {
+  template <class State>
+  [[nodiscard]] QuasiStaticEnergy energy_of(const State& state, QuasiStaticEnergy spent) const {
     spent.stored_J = tissue_.bonds().stored_energy_J(state.position, state.viscous);
     return spent;
   }
@@ -333,10 +333,10 @@ class Run {
   /// Responses within the step just found, with the states there.
   void show_within(std::span<const double> fractions, double h, double rate,
                    const std::optional<StepEnergy>& energy) {
-    const auto [responses, states] = stages_.states_within(state_, fractions, h, rate);
+    std::vector<QuasiStaticState> states = stages_.states_within(state_, fractions, h, rate);
     for (std::size_t i = 0; i < fractions.size(); ++i) {
-      const double response = responses[static_cast<Eigen::Index>(i)];
-      put(response, states[i], energy ? with(energy->until(fractions[i], response)) : energy_);
+      const double response = states[i].response;
+      show(states[i], energy ? with(energy->until(fractions[i], response)) : energy_);
     }
   }
 
@@ -373,13 +373,18 @@ class Run {
   }
 
   void put(double response, const TissueState& state, const QuasiStaticEnergy& spent) {
-    const double time_s = times_s_[order_[next_]];
-    put(response);
-    if (!observer_) return;
-    QuasiStaticState shown{time_s,         state.imposed, response,
+    if (!observer_) return put(response);
+    QuasiStaticState shown{state.time_s,   state.imposed, response,
                            state.position, state.viscous, std::nullopt};
-    if (options_.energies) shown.energy = energy_of(state, spent);
-    observer_(shown);
+    show(shown, spent);
+  }
+
+  /// Puts the response of a state, and shows it at the time that was asked for.
+  void show(QuasiStaticState& state, const QuasiStaticEnergy& spent) {
+    state.time_s = times_s_[order_[next_]];
+    put(state.response);
+    if (options_.energies) state.energy = energy_of(state, spent);
+    observer_(state);
   }
 
   const Protocol& protocol_;

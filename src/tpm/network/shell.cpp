@@ -105,6 +105,7 @@ class InnerLayers {
       : surface_(surface),
         organ_(organ),
         step_(plan.step),
+        near_(kClearance * plan.step),
         fixed_(static_cast<Eigen::Index>(plan.in_layer(0))) {}
 
   void settle() {
@@ -129,7 +130,7 @@ class InnerLayers {
     const double clearance = kClearance * step_;
     Positions push = Positions::Zero(3, organ_.position.cols());
     std::vector<bool> touched(organ_.size(), false);
-    for (const NeighbourPair& pair : pairs_within(organ_.position, clearance)) {
+    for (const NeighbourPair& pair : near_.of(organ_.position)) {
       const auto a = static_cast<Eigen::Index>(pair.first);
       const auto b = static_cast<Eigen::Index>(pair.second);
       if (b < fixed_) continue;  // both in the outer layer
@@ -162,6 +163,7 @@ class InnerLayers {
   const Surface& surface_;
   Organ& organ_;
   double step_;
+  NearPairs near_;
   Eigen::Index fixed_;
 };
 

@@ -71,27 +71,30 @@ LaneVector StageBalance::responses_within(const TissueState& state,
   return responses(within(state, fractions, h, rate));
 }
 
-StatesWithin StageBalance::states_within(const TissueState& state,
-                                         std::span<const double> fractions, double h, double rate) {
-  const Within states = within(state, fractions, h, rate);
-  StatesWithin all{responses(states), std::vector<TissueState>(fractions.size(), state)};
+std::vector<QuasiStaticState> StageBalance::states_within(const TissueState& state,
+                                                          std::span<const double> fractions,
+                                                          double h, double rate) {
+  const Within all = within(state, fractions, h, rate);
+  const LaneVector response = responses(all);
   d_ = force_;  // what responses() left of them
   factor_.solve(d_);
   tissue_.constraints().project(d_);
+  work_.back_solves += static_cast<int>(fractions.size());
+  std::vector<QuasiStaticState> states;
   Eigen::MatrixXd viscous;
   for (std::size_t lane = 0; lane < fractions.size(); ++lane) {
     const auto row = static_cast<Eigen::Index>(lane);
-    TissueState& at = all.states[lane];
-    ++work_.back_solves;
-    at.time_s += fractions[lane] * h;
-    at.imposed = states.imposed[row];
-    const Eigen::RowVectorXd place = states.position.row(row) + d_.row(row);
+    QuasiStaticState& at = states.emplace_back();
+    at.time_s = state.time_s + fractions[lane] * h;
+    at.imposed = all.imposed[row];
+    at.response = response[row];
+    const Eigen::RowVectorXd place = all.position.row(row) + d_.row(row);
     at.position = Eigen::Map<const Positions>(place.data(), 3, coordinates_ / 3);
-    tissue_.bonds().followed(at.position, at.followed);
-    viscous_in_lane(states.weights, followed_, begin_, row, viscous);
-    put_viscous(viscous, at);
+    viscous_in_lane(all.weights, followed_, begin_, row, viscous);
+    at.viscous = state.viscous;
+    put_viscous(viscous, at.viscous);
   }
-  return all;
+  return states;
 }
 
 LaneVector StageBalance::heat_W(const Within& states) const {

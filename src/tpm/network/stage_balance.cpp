@@ -213,19 +213,14 @@ void StageBalance::viscous_in_lane(const StepWeights& weights, const LaneMatrix&
   }
 }
 
-void StageBalance::put_viscous(const Eigen::MatrixXd& viscous, TissueState& state) const {
+void StageBalance::put_viscous(const Eigen::MatrixXd& viscous, Eigen::MatrixXd& of_bonds) const {
   for (const LaneBonds::Group& group : bonds_.groups()) {
-    const std::vector<ViscousLaw::Branch>& branches = tissue_.bonds().laws()[group.law].branches;
+    const auto branches =
+        static_cast<Eigen::Index>(tissue_.bonds().laws()[group.law].branches.size());
     for (Eigen::Index i = group.first; i < group.first + group.count; ++i) {
-      const auto bond =
-          static_cast<Eigen::Index>(bonds_.relaxing_bonds()[static_cast<std::size_t>(i)]);
-      double mean = 0.0;
-      for (std::size_t b = 0; b < branches.size(); ++b) {
-        const auto j = static_cast<Eigen::Index>(b);
-        state.viscous(bond, j) = viscous(j, i);
-        mean += branches[b].share * viscous(j, i);
-      }
-      state.mean[bond] = mean;
+      const std::size_t bond = bonds_.relaxing_bonds()[static_cast<std::size_t>(i)];
+      of_bonds.row(static_cast<Eigen::Index>(bond)).head(branches) =
+          viscous.col(i).head(branches).transpose();
     }
   }
 }
@@ -460,7 +455,8 @@ void StageBalance::accept(TissueState& state, double h, double rate) {
   tissue_.bonds().followed(state.position, state.followed);
   Eigen::MatrixXd viscous;
   viscous_in_lane(weights_, followed_, begin_, stages_ - 1, viscous);
-  put_viscous(viscous, state);
+  put_viscous(viscous, state.viscous);
+  state.mean = tissue_.bonds().mean_viscous(state.viscous);
   ++work_.steps;
   see(tissue_.response(state));
 }

@@ -52,12 +52,6 @@ class StepEnergy {
   double response_at_start_ = 0.0, response_at_end_ = 0.0;  ///< of a load
 };
 
-/// Responses and states at fractions of a step.
-struct StatesWithin {
-  LaneVector response;
-  std::vector<TissueState> states;
-};
-
 /// Balances the stages of a step together, side by side in lanes: a fixed-point iteration with one
 /// factorisation, with Anderson acceleration. Lanes beyond the last stage repeat it.
 class StageBalance {
@@ -96,9 +90,9 @@ class StageBalance {
   /// The tissue at fractions of the step just balanced; its forces are balanced once more there,
   /// for all fractions at once.
   /// @param fractions in [0, 1], at most kLanes of them
-  [[nodiscard]] StatesWithin states_within(const TissueState& state,
-                                           std::span<const double> fractions, double h,
-                                           double rate);
+  [[nodiscard]] std::vector<QuasiStaticState> states_within(const TissueState& state,
+                                                            std::span<const double> fractions,
+                                                            double h, double rate);
   /// Work done and heat made within the step just balanced.
   [[nodiscard]] StepEnergy energy_of_step(const TissueState& state, double h, double rate);
   /// Moves the state to the end of the step just balanced.
@@ -132,8 +126,8 @@ class StageBalance {
   /// Every viscous elongation in one lane, by (branch, bond).
   void viscous_in_lane(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
                        Eigen::Index lane, Eigen::MatrixXd& viscous) const;
-  /// Puts viscous elongations of the relaxing bonds in a state.
-  void put_viscous(const Eigen::MatrixXd& viscous, TissueState& state) const;
+  /// Puts viscous elongations of the relaxing bonds among those of all.
+  void put_viscous(const Eigen::MatrixXd& viscous, Eigen::MatrixXd& of_bonds) const;
 
   /// How states at fractions of a step follow from its stages, lane by lane.
   struct Shapes {

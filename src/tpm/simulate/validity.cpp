@@ -63,48 +63,47 @@ bool depth_limits_apply(const Tissue& tissue) {
 ValidityWatch::ValidityWatch(const Network& network, const Probe& probe, bool depth_limits)
     : network_(network), probe_(probe), depth_limits_(depth_limits) {}
 
-double ValidityWatch::turned_rad(const Bond& bond, const Positions& position) const {
-  const Positions& rest = network_.organ.position;
-  const Eigen::Vector3d before = rest.col(bond.b) - rest.col(bond.a);
-  const Eigen::Vector3d now = position.col(bond.b) - position.col(bond.a);
-  return std::atan2(before.cross(now).norm(), before.dot(now));
-}
-
-bool ValidityWatch::may_have_turned_beyond(const Bond& bond, const Positions& position,
-                                           double tangent) const {
-  const Positions& rest = network_.organ.position;
-  const Eigen::Vector3d before = rest.col(bond.b) - rest.col(bond.a);
-  const Eigen::Vector3d now = position.col(bond.b) - position.col(bond.a);
-  const double along = before.dot(now);
-  if (along <= 0.0) return true;
-  const double across = tangent * along;
-  return before.cross(now).squaredNorm() >= across * across;
-}
-
 double ValidityWatch::indentation_m(Eigen::Index sphere, const Positions& position) const {
   return (position.col(sphere) - network_.organ.position.col(sphere)).dot(probe_.direction);
 }
 
 std::vector<std::int32_t> ValidityWatch::flags(const Positions& position) const {
+  double most_turned_rad = kValidTurning_rad;
+  return flags(position, most_turned_rad);
+}
+
+std::vector<std::int32_t> ValidityWatch::flags(const Positions& position,
+                                               double& most_turned_rad) const {
   std::vector<std::int32_t> flags(network_.organ.size(), 0);
   for (std::size_t i = 0; depth_limits_ && i < flags.size(); ++i) {
     const double indentation = indentation_m(static_cast<Eigen::Index>(i), position);
     if (indentation > kValidIndentation_m + kRounding_m) flags[i] |= 1;
     if (indentation > kDamageIndentation_m + kRounding_m) flags[i] |= 2;
   }
-  const double tangent = cautious_tangent(kValidTurning_rad);
+  const Positions& rest = network_.organ.position;
+  double tangent = cautious_tangent(std::min(most_turned_rad, kValidTurning_rad));
   for (const Bond& bond : network_.bonds) {
     if (bond.kind != BondKind::lateral) continue;
-    if (!may_have_turned_beyond(bond, position, tangent)) continue;
-    if (!(turned_rad(bond, position) > kValidTurning_rad)) continue;
-    flags[bond.a] |= 4;
-    flags[bond.b] |= 4;
+    const Eigen::Vector3d before = rest.col(bond.b) - rest.col(bond.a);
+    const Eigen::Vector3d now = position.col(bond.b) - position.col(bond.a);
+    const double along = before.dot(now);
+    const double across = tangent * along;
+    const double turning = before.cross(now).squaredNorm();
+    if (along > 0.0 && turning < across * across) continue;  // without the cost of an angle
+    const double turned_rad = std::atan2(std::sqrt(turning), along);
+    if (turned_rad > kValidTurning_rad) {
+      flags[bond.a] |= 4;
+      flags[bond.b] |= 4;
+    }
+    if (!(turned_rad > most_turned_rad)) continue;
+    most_turned_rad = turned_rad;
+    tangent = cautious_tangent(std::min(most_turned_rad, kValidTurning_rad));
   }
   return flags;
 }
 
 void ValidityWatch::see(double time_s, const Positions& position) {
-  const std::vector<std::int32_t> now = flags(position);
+  const std::vector<std::int32_t> now = flags(position, seen_.most_turned_rad);
   for (std::size_t i = 0; i < now.size(); ++i) {
     seen_.deepest_m =
         std::max(seen_.deepest_m, indentation_m(static_cast<Eigen::Index>(i), position));
@@ -114,15 +113,6 @@ void ValidityWatch::see(double time_s, const Positions& position) {
       if (!breach.first_time_s) breach.first_time_s = time_s;
       insert(breach.spheres, i);
     }
-  }
-  double tangent = cautious_tangent(seen_.most_turned_rad);
-  for (const Bond& bond : network_.bonds) {
-    if (bond.kind != BondKind::lateral) continue;
-    if (!may_have_turned_beyond(bond, position, tangent)) continue;
-    const double turned = turned_rad(bond, position);
-    if (!(turned > seen_.most_turned_rad)) continue;
-    seen_.most_turned_rad = turned;
-    tangent = cautious_tangent(turned);
   }
 }
 

@@ -31,11 +31,10 @@ class ValidityWatch {
   void restore(Validity earlier) { seen_ = std::move(earlier); }
 
  private:
-  /// False if a bond has turned by less than an angle of that tangent, without the cost of angles.
-  [[nodiscard]] bool may_have_turned_beyond(const Bond& bond, const Positions& position,
-                                            double tangent) const;
-  /// The angle by which a bond has turned since rest.
-  [[nodiscard]] double turned_rad(const Bond& bond, const Positions& position) const;
+  /// The same.
+  /// @param most_turned_rad an angle; afterwards the largest of it and of all lateral bonds
+  [[nodiscard]] std::vector<std::int32_t> flags(const Positions& position,
+                                                double& most_turned_rad) const;
   [[nodiscard]] double indentation_m(Eigen::Index sphere, const Positions& position) const;
 
   const Network& network_;
