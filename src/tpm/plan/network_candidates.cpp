@@ -194,7 +194,9 @@ class InertialCandidate final : public PlanModel {
                                  const PlanBudget& /*budget*/) const override {
     const Trajectory& answer = surrogate.with_masses(tolerance_);
     const Trajectory& finer = surrogate.with_masses(0.1 * tolerance_);
-    return {kSafety * trajectory_error(answer, finer, surrogate.measure()), answer.work, {}};
+    // Steps follow the instants that are asked for: the next run may not be as lucky as these two.
+    const double error = std::max(trajectory_error(answer, finer, surrogate.measure()), tolerance_);
+    return {kSafety * error, answer.work, {}};
   }
   [[nodiscard]] Trajectory run(const PlanSurrogate& surrogate, const PlanBudget& /*budget*/,
                                const std::vector<double>& times_s) const override {
