@@ -7,6 +7,7 @@
 
 #include "tpm/network/filling.hpp"
 #include "tpm/network/neighbours.hpp"
+#include "tpm/network/parallel.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -41,11 +42,11 @@ void repel(const Surface& surface, double spacing, double step, NearPairs& near,
     push.col(a) -= share;
     push.col(b) += share;
   }
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+  for_each_in_parallel(points.cols(), [&](Eigen::Index i) {
     // The point was on the surface, so that this is no farther away than it was pushed.
     const double within = push.col(i).norm() + kRounding * spacing;
     points.col(i) = surface.nearest_position(points.col(i) + push.col(i), within);
-  }
+  });
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "tpm/network/parallel.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -245,10 +246,10 @@ TriangleMesh liver_mesh(const LiverShape& shape) {
   const LiverFunction liver(shape);
   TriangleMesh mesh = icosphere(kSubdivisions);
   const double farthest = shape.width + shape.height + shape.depth;
-  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
+  for_each_in_parallel(mesh.vertices.cols(), [&](Eigen::Index v) {
     const Vector3d direction = mesh.vertices.col(v);
     mesh.vertices.col(v) = liver.middle() + reach_along(liver, direction, farthest) * direction;
-  }
+  });
   return mesh;
 }
 

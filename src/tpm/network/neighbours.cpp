@@ -8,6 +8,7 @@
 #include <nanoflann.hpp>
 #include <utility>
 
+#include "tpm/network/parallel.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -42,24 +43,31 @@ std::vector<NeighbourPair> pairs_within(const Positions& points, double radius) 
   if (!std::isfinite(radius) || !(radius > 0.0)) {
     throw bad_input("support radius", fmt::format("{} m", radius), "a length above 0");
   }
-  std::vector<NeighbourPair> pairs;
-  if (points.cols() < 2) return pairs;
+  if (points.cols() < 2) return {};
   const PointCloud cloud(points);
   const Tree tree(3, cloud);
   // The tree keeps what lies strictly inside the squared radius; a point on it counts.
   const double squared = std::nextafter(radius * radius, 2.0 * radius * radius);
-  std::vector<std::pair<std::size_t, double>> found;
-  for (std::size_t i = 0; i < cloud.kdtree_get_point_count(); ++i) {
-    const double* centre = points.col(static_cast<Eigen::Index>(i)).data();
-    tree.radiusSearch(centre, squared, found, nanoflann::SearchParams(0, 0.0F, false));
-    const std::size_t before = pairs.size();
-    for (const auto& [j, distance] : found) {
-      if (j > i) pairs.push_back({i, j});
+  constexpr std::size_t kStretch = 512;  // points
+  const std::size_t count = cloud.kdtree_get_point_count();
+  std::vector<std::vector<NeighbourPair>> of_stretch((count + kStretch - 1) / kStretch);
+  for_each_in_parallel(of_stretch.size(), [&](std::size_t stretch) {
+    std::vector<NeighbourPair>& pairs = of_stretch[stretch];
+    std::vector<std::pair<std::size_t, double>> found;
+    for (std::size_t i = stretch * kStretch; i < std::min(count, (stretch + 1) * kStretch); ++i) {
+      const double* centre = points.col(static_cast<Eigen::Index>(i)).data();
+      tree.radiusSearch(centre, squared, found, nanoflann::SearchParams(0, 0.0F, false));
+      const std::size_t before = pairs.size();
+      for (const auto& [j, distance] : found) {
+        if (j > i) pairs.push_back({i, j});
+      }
+      std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(before), pairs.end(),
+                [](const NeighbourPair& a, const NeighbourPair& b) { return a.second < b.second; });
     }
-    std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(before), pairs.end(),
-              [](const NeighbourPair& a, const NeighbourPair& b) { return a.second < b.second; });
-  }
-  return pairs;
+  });
+  std::vector<NeighbourPair> all;
+  for (const auto& pairs : of_stretch) all.insert(all.end(), pairs.begin(), pairs.end());
+  return all;
 }
 
 const std::vector<NeighbourPair>& NearPairs::of(const Positions& points) {

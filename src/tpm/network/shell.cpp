@@ -7,6 +7,7 @@
 #include "tpm/network/filling.hpp"
 #include "tpm/network/landing_site.hpp"
 #include "tpm/network/neighbours.hpp"
+#include "tpm/network/parallel.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -112,7 +113,7 @@ class InnerLayers {
     std::vector<Eigen::Index> moved(static_cast<std::size_t>(organ_.position.cols() - fixed_));
     std::iota(moved.begin(), moved.end(), fixed_);
     for (int sweep = 0; sweep < kSweeps && !moved.empty(); ++sweep) {
-      for (const Eigen::Index i : moved) keep_depth(i);
+      for_each_in_parallel(moved.size(), [&](std::size_t i) { keep_depth(moved[i]); });
       moved = push_apart();
     }
   }

@@ -14,7 +14,8 @@ struct SurfacePoint {
   Eigen::Vector3d normal;
 };
 
-/// A closed surface that bounds one body: what a filling asks of a shape. All lengths in m.
+/// A closed surface that bounds one body: what a filling asks of a shape, by several threads at
+/// once. All lengths in m.
 class Surface {
  public:
   Surface() = default;

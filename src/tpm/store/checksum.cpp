@@ -34,11 +34,11 @@ constexpr std::uint64_t kStretch = std::uint64_t{1} << 22U;
 
 /// Of a stretch of a file.
 std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::uint64_t to) {
-  constexpr std::uint64_t kInstantaneous = std::uint64_t{1} << 17U;
-  std::vector<char> bytes(static_cast<std::size_t>(std::min(to - from, kInstantaneous)));
+  constexpr std::uint64_t kPiece = std::uint64_t{1} << 17U;
+  std::vector<char> bytes(static_cast<std::size_t>(std::min(to - from, kPiece)));
   std::uint32_t crc = 0;
   while (from < to) {
-    const std::uint64_t part = std::min(to - from, kInstantaneous);
+    const std::uint64_t part = std::min(to - from, kPiece);
     if (pread_all(file, bytes.data(), part, from) != part) return std::nullopt;
     crc = check_sum(bytes.data(), static_cast<std::size_t>(part), crc);
     from += part;

@@ -157,9 +157,9 @@ std::vector<double> SweepReader::curve(const std::string& name, const FixedPlace
 void SweepReader::each(
     const std::vector<std::string>& names,
     const std::function<void(const std::vector<std::vector<double>>&)>& see) const {
-  constexpr std::uint64_t kInstantaneous = 1'000'000;
+  constexpr std::uint64_t kMostNumbers = 1'000'000;
   const std::uint64_t rows = axes_.front().places.size(), in_row = cells() / rows;
-  const std::uint64_t step = std::max<std::uint64_t>(kInstantaneous / in_row, 1);
+  const std::uint64_t step = std::max<std::uint64_t>(kMostNumbers / in_row, 1);
   std::vector<std::uint64_t> first(axes_.size(), 0), counts;
   for (const ReadAxis& axis : axes_) counts.push_back(axis.places.size());
   for (first[0] = 0; first[0] < rows; first[0] += step) {
