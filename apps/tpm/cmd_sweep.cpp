@@ -251,8 +251,7 @@ int merge(const SweepChoice& choice, const Session& session) {
   }
   std::uint64_t missing = 0;
   for (std::uint64_t b = 0; b < sweep.blocks(); ++b) {
-    missing +=
-        std::none_of(logs.begin(), logs.end(), [b](auto& log) { return log.has(b); }) ? 1 : 0;
+    missing += std::ranges::none_of(logs, [b](auto& log) { return log.has(b); }) ? 1 : 0;
   }
   if (missing > 0) {
     throw bad_input(output.string(),

@@ -42,8 +42,7 @@ void flag_outliers(FitResult& result, const ExperimentResiduals& function) {
 }
 
 void flag_noise(FitResult& result) {
-  const bool estimated = std::any_of(result.config.data.begin(), result.config.data.end(),
-                                     [](const DataChoice& d) { return d.estimates_sigma(); });
+  const bool estimated = std::ranges::any_of(result.config.data, &DataChoice::estimates_sigma);
   if (estimated) {
     result.flags.push_back(
         fmt::format("the size of the noise is estimated from {} values: intervals are those of "

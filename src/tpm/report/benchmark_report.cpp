@@ -203,8 +203,7 @@ Table targets_table(const BenchmarkResult& result, bool timing) {
   }
   for (const std::string& curve : curves_of(result)) {
     const WorstOf worst = worst_of(result, curve);
-    const auto named = std::find_if(result.targets.begin(), result.targets.end(),
-                                    [&](const BenchmarkTarget& t) { return t.curve == curve; });
+    const auto named = std::ranges::find(result.targets, curve, &BenchmarkTarget::curve);
     const BenchmarkTarget target = named == result.targets.end() ? BenchmarkTarget{} : *named;
     std::vector<Cell> row{{curve}};
     row.push_back(worst.failed ? Cell{"fails", Tone::bad}

@@ -135,9 +135,8 @@ Table maps_table(const StabilityStudy& study) {
     std::vector<Cell> row{{map.quantity}, {step_rule_name(map.rule)}};
     for (const StabilityClassEntry& entry : kStabilityClasses) {
       if (entry.meaning == StabilityClass::not_applicable) continue;
-      const auto count = std::count_if(map.points.begin(), map.points.end(), [&](const auto& p) {
-        return p.verdict.found == entry.meaning;
-      });
+      const auto count = std::ranges::count_if(
+          map.points, [&](const auto& p) { return p.verdict.found == entry.meaning; });
       row.push_back({std::to_string(count)});
     }
     const Disagreement d = disagreement(map);

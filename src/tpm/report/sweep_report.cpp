@@ -182,8 +182,7 @@ std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
 Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const SweepFigures& wished) {
   const auto& axes = sweep.axes();
   const auto is_fixed = [&](const std::string& name) {
-    return std::any_of(wished.fixed.begin(), wished.fixed.end(),
-                       [&](const auto& h) { return h.first == name; });
+    return std::ranges::any_of(wished.fixed, [&](const auto& h) { return h.first == name; });
   };
   std::string x = wished.x.value_or(axes.back().name);
   for (std::size_t a = axes.size(); a-- > 0 && !wished.x && is_fixed(x);) {
@@ -383,8 +382,7 @@ Json sweep_json(const SweepReader& sweep) {
 std::vector<Figure> sweep_figures(const SweepReader& sweep, const SweepFigures& wished) {
   std::vector<Figure> figures;
   for (const ReadVariable& v : sweep.variables()) {
-    const bool named = std::find(wished.variables.begin(), wished.variables.end(), v.name) !=
-                       wished.variables.end();
+    const bool named = std::ranges::find(wished.variables, v.name) != wished.variables.end();
     if (named || (wished.variables.empty() && !v.name.starts_with("count_"))) {
       figures.push_back(sweep_figure(sweep, v, wished));
     }

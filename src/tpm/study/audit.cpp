@@ -33,8 +33,7 @@ constexpr auto kKinds = std::to_array<ClaimKind>({
 });
 
 const ClaimKind& kind_named(const std::string& name, std::string_view at) {
-  const auto found = std::find_if(kKinds.begin(), kKinds.end(),
-                                  [&](const ClaimKind& k) { return k.name == name; });
+  const auto found = std::ranges::find(kKinds, name, &ClaimKind::name);
   if (found != kKinds.end()) return *found;
   std::string known;
   for (const ClaimKind& k : kKinds) known += (known.empty() ? "" : ", ") + std::string(k.name);
@@ -150,8 +149,7 @@ bool Finding::stands() const noexcept {
 }
 
 int AuditReport::count(AuditVerdict verdict) const noexcept {
-  return static_cast<int>(std::count_if(findings.begin(), findings.end(),
-                                        [&](const Finding& f) { return f.verdict == verdict; }));
+  return static_cast<int>(std::ranges::count(findings, verdict, &Finding::verdict));
 }
 
 AuditReport run_audit(const Json& claims, std::string_view file) {

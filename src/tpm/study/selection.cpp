@@ -408,11 +408,10 @@ void rank_candidates(Selection& s) {
     c.delta_aicc = c.aicc - best_aicc;
     c.delta_bic = c.bic - best_bic;
   }
-  std::stable_sort(s.candidates.begin(), s.candidates.end(),
-                   [](const Candidate& a, const Candidate& b) {
-                     if (a.failed != b.failed) return b.failed;
-                     return a.bic < b.bic;
-                   });
+  std::ranges::stable_sort(s.candidates, [](const Candidate& a, const Candidate& b) {
+    if (a.failed != b.failed) return b.failed;
+    return a.bic < b.bic;
+  });
   s.recommended = least_within(s.candidates, s.margin);
 }
 
