@@ -128,9 +128,7 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
   }
   if (!has_element(result.config)) return;  // the limits are those of the paper's element
   const TpmVector element = fitted_element(result.config, result.best.natural);
-  for (std::string& flag : validity_flags(element[kSpacing], deepest)) {
-    result.flags.push_back(std::move(flag));
-  }
+  std::ranges::move(validity_flags(element[kSpacing], deepest), std::back_inserter(result.flags));
 }
 
 }  // namespace tpm::fit

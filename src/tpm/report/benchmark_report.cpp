@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/store/file.hpp"
@@ -292,13 +293,7 @@ std::string introduction(const BenchmarkOptions& options) {
 }  // namespace
 
 std::vector<std::string> curves_of(const BenchmarkResult& result) {
-  std::vector<std::string> curves;
-  for (const BenchmarkPoint& point : result.points) {
-    if (std::find(curves.begin(), curves.end(), point.curve()) == curves.end()) {
-      curves.push_back(point.curve());
-    }
-  }
-  return curves;
+  return each_once(result.points, &BenchmarkPoint::curve);
 }
 
 std::string setting_words(const BenchmarkPoint& point) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
@@ -273,8 +274,7 @@ std::string named_in_unit(const std::string& name, const Unit& unit) {
 }
 
 std::string value_words(double value, const Unit& unit, int digits) {
-  return fmt::format("{}{}{}", significant(value / unit.to_si, digits),
-                     unit.symbol.empty() ? "" : " ", unit.symbol);
+  return with_unit(significant(value / unit.to_si, digits), unit);
 }
 
 std::string fixed_words(const std::vector<FixedValue>& fixed, int digits) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
@@ -156,12 +157,10 @@ void run_trial(const Trials& trials, const SelectionOptions& options, Random& ra
 }
 
 std::string coverage_text(const std::vector<ParameterCoverage>& parameters, int trials) {
-  std::string text;
-  for (const ParameterCoverage& p : parameters) {
-    text += fmt::format("{}{} {:.1f}{}", text.empty() ? "" : ", ", p.name,
-                        100.0 * p.covered / trials, p.p_value < 0.001 ? "!" : "");
-  }
-  return text;
+  return listed(parameters, [&](const ParameterCoverage& p) {
+    return fmt::format("{} {:.1f}{}", p.name, 100.0 * p.covered / trials,
+                       p.p_value < 0.001 ? "!" : "");
+  });
 }
 
 /// The laws that were returned instead, most frequent first.
@@ -171,11 +170,8 @@ std::string others_text(const ChoiceCount& c, const std::string& true_values) {
     if (name != true_values) others.emplace_back(-count, name);
   }
   std::sort(others.begin(), others.end());
-  std::string text;
-  for (const auto& [count, name] : others) {
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", -count, name);
-  }
-  return text;
+  return listed(others,
+                [](const auto& other) { return fmt::format("{} {}", -other.first, other.second); });
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "tpm/core/give_up.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -107,13 +108,10 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
   SpecimenRow row;
   row.name = one.front().name;
   row.specimen = one.front().specimen;
-  try {
+  row.reason = gave_up([&] {
     row.fit = run_fit(recording_config(law, one, setup), data_sets(one));
     row.place = branches_by_time(law, *row.fit);
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::numerical) throw;
-    row.reason = error.what();
-  }
+  });
   return row;
 }
 
