@@ -107,8 +107,7 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
   }
   say("{}", session.json() ? to_text(convergence_json(all)) : convergence_text(all));
   draw_into(choice.figure_folder, convergence_figures(all, sweep.title()));
-  const bool none = std::none_of(all.begin(), all.end(), [](auto& c) { return c.monotone(); });
-  return static_cast<int>(none ? ExitCode::answer_is_no : ExitCode::success);
+  return exit_code(std::ranges::any_of(all, &SweepConvergence::monotone));
 }
 
 /// Paths in a configuration of tpm fit are relative to it: they are kept when it is moved.
@@ -152,10 +151,7 @@ int best(const SweepViewChoice& choice, const Session& session) {
   for (const BestCell& cell : cells) {
     say("{} = {}:", choice.best_output, significant(cell.value, 6));
     for (const CellParameter& p : cell.parameters) {
-      const Unit unit = p.unit.empty() ? Unit{"", Dimension::dimensionless, 1.0}
-                                       : shown_unit(parse_unit(p.unit, p.name).dimension);
-      say(" {} = {}{}{}", p.name, significant(p.value / unit.to_si, 6),
-          unit.symbol.empty() ? "" : " ", unit.symbol);
+      say(" {} = {}", p.name, value_words(p.value, shown_unit_of(p.unit), 6));
     }
     say("\n");
   }
