@@ -36,8 +36,7 @@ void add_audit_command(CLI::App& app, Session& session) {
   const auto options = std::make_shared<AuditOptions>();
   command->add_option("claims", options->claims,
                       "Claims file (default: the paper's, data/paper_claims.json)");
-  command->add_option("-o,--output", options->output,
-                      "Write here instead of to the terminal; beside JSON the table as .csv");
+  add_output_option(*command, options->output);
   command->add_flag("--all", options->all, "Also show the claims that hold");
   add_format_option(*command, session);
   command->footer(

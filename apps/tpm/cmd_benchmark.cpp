@@ -31,15 +31,18 @@ struct BenchmarkChoice {
   std::string commit = "unknown";
 };
 
-int list_problems(const Session& session) {
+/// Says names and summaries as text, or returns them for JSON.
+Json list_entries(const auto& entries, int width, const Session& session) {
   Json json = Json::array();
-  for (const BenchmarkEntry& entry : benchmark_entries()) {
-    if (session.json()) {
-      json.push_back({{"name", entry.name}, {"summary", entry.summary}});
-    } else {
-      say("{:<18} {}\n", entry.name, entry.summary);
-    }
+  for (const auto& entry : entries) {
+    json.push_back({{"name", entry.name}, {"summary", entry.summary}});
+    if (!session.json()) say("{:<{}} {}\n", entry.name, width, entry.summary);
   }
+  return json;
+}
+
+int list_problems(const Session& session) {
+  Json json = list_entries(benchmark_entries(), 18, session);
   if (session.json()) {
     say("{}", to_text(Json{{"problems", std::move(json)}, {"formulations", formulations_json()}}));
   } else {
@@ -72,14 +75,7 @@ void print_summary(const BenchmarkRecord& record) {
 }
 
 int list_works(const Session& session) {
-  Json json = Json::array();
-  for (const SpeedWork& work : speed_works()) {
-    if (session.json()) {
-      json.push_back({{"name", work.name}, {"summary", work.summary}});
-    } else {
-      say("{:<22} {}\n", work.name, work.summary);
-    }
-  }
+  Json json = list_entries(speed_works(), 22, session);
   if (session.json()) say("{}", to_text(Json{{"works", std::move(json)}}));
   return 0;
 }

@@ -122,8 +122,7 @@ void add_budget_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--folder", options->folder,
                       "Write budget.json, budget.csv and the waterfall into this folder");
-  command->add_option("-o,--output", options->output,
-                      "Write here instead of to the terminal; beside JSON the table as .csv");
+  add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);
   command->footer(

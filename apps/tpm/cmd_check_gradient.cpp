@@ -30,7 +30,7 @@ int check(const GradientOptions& options, const Session& session) {
   const GradientCheck result =
       check_gradient(function, searched_parameters(function.config()), wanted);
   say("{}", session.json() ? to_text(to_json(result)) : to_terminal_text(result));
-  return result.passed() ? 0 : static_cast<int>(ExitCode::answer_is_no);
+  return exit_code(result.passed());
 }
 
 }  // namespace

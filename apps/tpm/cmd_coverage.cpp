@@ -1,4 +1,5 @@
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 
@@ -33,10 +34,8 @@ int coverage(const CoverageOptions& options, const Session& session) {
   deliver(session.json() ? to_text(to_json(result)) : to_terminal_text(result), options.output);
   deliver_csv(coverage_csv(result), csv);
   constexpr double kSuspicious = 0.001;
-  for (const ParameterCoverage& p : result.parameters) {
-    if (p.p_value < kSuspicious) return static_cast<int>(ExitCode::answer_is_no);
-  }
-  return 0;
+  return exit_code(std::ranges::none_of(
+      result.parameters, [](const ParameterCoverage& p) { return p.p_value < kSuspicious; }));
 }
 
 }  // namespace
@@ -54,8 +53,7 @@ void add_coverage_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed, 0 or more, or 'clock'")
       ->capture_default_str();
-  command->add_option("-o,--output", options->output,
-                      "Write here instead of to the terminal; beside JSON the table as .csv");
+  add_output_option(*command, options->output);
   add_format_option(*command, session);
   command->footer(
       "Exit code 1 if a coverage differs from its level at the 0.1 % level (exact binomial test).\n"

@@ -88,7 +88,7 @@ int check(const Session& session, const std::vector<std::string>& files) {
     }
   }
   if (session.json()) say("{}", to_text(report));
-  return static_cast<int>(sound ? ExitCode::success : ExitCode::answer_is_no);
+  return exit_code(sound);
 }
 
 int pack(const Session& session, const std::vector<std::string>& arguments,

@@ -245,9 +245,7 @@ void add_text_options(CLI::App& command, ImportArguments& a) {
 
 void add_machine_options(CLI::App& command, ImportArguments& a) {
   const char* group = "Testing machines";
-  const auto add = [&](const char* name, std::string& target, const char* help) {
-    return command.add_option(name, target, help)->group(group);
-  };
+  const auto add = options_of_group(command, group);
   add("--header-rows", a.header_rows, "Rows above the samples, if not found by themselves");
   add("--time", a.options.time_column, "Time column: title, or number from 1");
   add("--drive", a.options.drive_column, "Column of what was imposed (displacement)");
@@ -283,10 +281,7 @@ void add_jpk_options(CLI::App& command, ImportArguments& a) {
 }
 
 void add_figure_options(CLI::App& command, ImportArguments& a) {
-  const char* group = "Digitised figures";
-  const auto add = [&](const char* name, std::string& target, const char* help) {
-    return command.add_option(name, target, help)->group(group);
-  };
+  const auto add = options_of_group(command, "Digitised figures");
   add("--x", a.x, "What the x axis shows, such as time:s or indentation_depth:mm");
   add("--y", a.y, "What the y axis shows, such as contact_force:N");
   add("--dataset", a.options.dataset, "Only the dataset of this name");
@@ -296,10 +291,7 @@ void add_figure_options(CLI::App& command, ImportArguments& a) {
 }
 
 void add_description_options(CLI::App& command, ImportArguments& a) {
-  const char* group = "Description";
-  const auto add = [&](const char* name, std::string& target, const char* help) {
-    return command.add_option(name, target, help)->group(group);
-  };
+  const auto add = options_of_group(command, "Description");
   add("--provenance", a.provenance, "Else measured for machines and digitized for figures");
   add("--title", a.options.header.title, "One line that says what the curve is");
   add("--citation", a.options.header.citation, "Authors, journal, year, pages");

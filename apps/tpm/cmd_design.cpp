@@ -62,8 +62,7 @@ void add_design_command(CLI::App& app, Session& session) {
   command->add_option("--seed", options->seed, "Seed of the simulations")->capture_default_str();
   command->add_option("--top", options->top, "How many candidates to list")->capture_default_str();
   command->add_option("--draw", options->folder, "Write figures into this folder");
-  command->add_option("-o,--output", options->output,
-                      "Write here instead of to the terminal; beside JSON the table as .csv");
+  add_output_option(*command, options->output);
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm design configs/design_liver.json --draw out/design\n"

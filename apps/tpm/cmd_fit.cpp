@@ -216,6 +216,16 @@ void write_moduli(const std::filesystem::path& folder, const std::optional<Young
   files.insert(files.end(), {"young_moduli.json", "young_moduli.csv"});
 }
 
+/// The answer to recordings, with the moduli if there are any.
+std::string with_moduli(Json json, std::string text, const std::optional<YoungModuli>& moduli,
+                        const Session& session) {
+  if (moduli) {
+    json["young_moduli"] = to_json(*moduli);
+    text += "\n" + to_terminal_text(*moduli);
+  }
+  return session.json() ? to_text(json) : text;
+}
+
 /// Of a fit with an organ: the organ with its material, and a session that feels it.
 void write_scene(const std::filesystem::path& folder, const FitResult& fit,
                  std::vector<std::string>& files) {
@@ -261,15 +271,7 @@ int fit_folder(const FitOptions& options, const Session& session) {
   if (const auto probe = probe_of(options)) {
     moduli = pooled_moduli(study, *probe, options.poisson.empty());
   }
-  std::string text;
-  if (session.json()) {
-    Json json = to_json(study);
-    if (moduli) json["young_moduli"] = to_json(*moduli);
-    text = to_text(json);
-  } else {
-    text = to_terminal_text(study);
-    if (moduli) text += "\n" + to_terminal_text(*moduli);
-  }
+  std::string text = with_moduli(to_json(study), to_terminal_text(study), moduli, session);
   if (!options.no_draw) {
     const std::string folder = figure_folder(options, options.recordings.files.front());
     auto files = write_specimen_report(folder, study);
@@ -298,19 +300,13 @@ int fit_recordings(const FitOptions& options, const Session& session) {
     moduli = young_moduli(best, *probe, options.poisson.empty());
   }
   std::string text;
-  if (session.json()) {
-    Json json = to_json(selection);
-    if (moduli) json["young_moduli"] = to_json(*moduli);
-    text = to_text(json);
-  } else {
-    for (const PreparedRecording& r : recordings) {
-      if (!r.read_as.empty()) text += fmt::format("{}\n", r.read_as);
-      for (const std::string& words : r.phases.words) text += fmt::format("{}\n", words);
-    }
-    text += fmt::format("\n{}\n{}", to_terminal_text(selection), to_terminal_text(best));
-    for (const std::string& words : outside_words(best)) text += fmt::format("! {}\n", words);
-    if (moduli) text += "\n" + to_terminal_text(*moduli);
+  for (const PreparedRecording& r : recordings) {
+    if (!r.read_as.empty()) text += fmt::format("{}\n", r.read_as);
+    for (const std::string& words : r.phases.words) text += fmt::format("{}\n", words);
   }
+  text += fmt::format("\n{}\n{}", to_terminal_text(selection), to_terminal_text(best));
+  for (const std::string& words : outside_words(best)) text += fmt::format("! {}\n", words);
+  text = with_moduli(to_json(selection), std::move(text), moduli, session);
   if (!options.no_draw) {
     const std::string folder = figure_folder(options, recordings.front().name);
     auto files = write_recording_report(folder, selection);
@@ -421,9 +417,7 @@ void add_fit_command(CLI::App& app, Session& session) {
       "Folder: what tells the specimens apart: a pattern of the file names with one "
       "group, e.g. \"(liver[0-9]+)_\", or a column or key of the files");
   add_format_option(*command, session);
-  const auto add_probe = [&](const char* name, std::string& target, const char* help) {
-    command->add_option(name, target, help)->group("Young's modulus of an indentation, in Pa");
-  };
+  const auto add_probe = options_of_group(*command, "Young's modulus of an indentation, in Pa");
   add_probe("--radius", options->radius,
             "Of the sphere that was pressed in (Hertz), e.g. \"2 mm\"");
   add_probe("--cone-angle", options->cone_angle,

@@ -42,7 +42,7 @@ int check_hil(const CheckChoice& choice, const Session& session) {
   const JitterCheck check = check_jitter(chosen_device(choice.device), hil, duration,
                                          chosen_wish(choice.device), InterruptWatch::seen);
   say("{}", session.json() ? to_text(check_json(check)) : check_text(check));
-  return static_cast<int>(check.fit ? ExitCode::success : ExitCode::answer_is_no);
+  return exit_code(check.fit);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ int export_hil(const ExportChoice& choice, const Session& session) {
     say("{}\n{}{}wrote {}: {} rows\n", device_line(recording), damage, damage.empty() ? "" : "\n",
         choice.output, recording.rows.size());
   }
-  return static_cast<int>(recording.damaged == 0 ? ExitCode::success : ExitCode::answer_is_no);
+  return exit_code(recording.damaged == 0);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ int try_hazards(const HazardChoice& choice, const Session& session) {
     const Json json = as_json(study);
     deliver(session.json() ? to_text(json) : as_text(study), choice.output);
     deliver_csv(json_table_csv(json.at("rows")), csv);
-    return static_cast<int>(study.safe() ? ExitCode::success : ExitCode::answer_is_no);
+    return exit_code(study.safe());
   };
   if (choice.wall_clock) {
     return answer(study_hazards_on_the_clock(told), clock_hazard_json, clock_hazard_text);
@@ -44,8 +44,7 @@ void add_hil_hazards_command(CLI::App& hil, Session& session) {
       "What can go wrong in a session, tried on the simulated device; exit code 1 if "
       "force, energy, travel or time leave their bounds");
   auto choice = std::make_shared<HazardChoice>();
-  command->add_option("-o,--output", choice->output,
-                      "Write here instead of to the terminal; beside JSON the table as .csv");
+  add_output_option(*command, choice->output);
   command->add_flag("--wall-clock", choice->wall_clock,
                     "Those that take time of their own: hangs, stalls, interruptions; half a "
                     "minute, times differ from run to run");

@@ -30,17 +30,13 @@ VerifyOptions options_of(const VerifyChoice& choice) {
               "a tolerance and a spacing above 0, a window of 0 or more");
 }
 
-/// What is left of a damaged recording is verified; the answer is no all the same.
-int exit_code_of(const HilRecording& recording) {
-  return static_cast<int>(recording.damaged == 0 ? ExitCode::success : ExitCode::answer_is_no);
-}
-
 int verify_hil(const VerifyChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));
   say("{}",
       session.json() ? to_text(verification_json(recording, v)) : verification_text(recording, v));
-  return exit_code_of(recording);
+  // What is left of a damaged recording is verified; the answer is no all the same.
+  return exit_code(recording.damaged == 0);
 }
 
 int report_hil(const VerifyChoice& choice, const Session& session) {
@@ -55,7 +51,7 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
     say("{}wrote {}/report.html, report.md and report.json\n", verification_text(recording, v),
         choice.output);
   }
-  return exit_code_of(recording);
+  return exit_code(recording.damaged == 0);
 }
 
 std::shared_ptr<VerifyChoice> add_choice(CLI::App& command, Session& session) {

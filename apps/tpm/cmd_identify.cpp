@@ -89,8 +89,7 @@ void add_identify_command(CLI::App& app, Session& session) {
                     "Do not hand the laws over to a model in the loop");
   command->add_option("--folder", options->folder,
                       "Write identification.json, law.json and the figure into this folder");
-  command->add_option("-o,--output", options->output,
-                      "Write here instead of to the terminal; beside JSON the table as .csv");
+  add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);
   command->footer(

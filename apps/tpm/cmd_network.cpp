@@ -100,9 +100,8 @@ int check(const NetworkChoice& choice, const Session& session) {
               : "; motions of the whole were not looked for, there are too many spheres");
     }
   }
-  if (fault.empty()) return 0;
-  tell_user("tpm: {}\n", fault);
-  return static_cast<int>(ExitCode::answer_is_no);
+  if (!fault.empty()) tell_user("tpm: {}\n", fault);
+  return exit_code(fault.empty());
 }
 
 int show(const NetworkChoice& choice) {

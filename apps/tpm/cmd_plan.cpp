@@ -184,7 +184,7 @@ int run_plan(const PlanCommand& command, const Session& session) {
   if (!chosen.scene) {
     const Json json{{"spheres_choice", spheres_json(*chosen.spheres)}};
     deliver(session.json() ? to_text(json) : spheres_text(*chosen.spheres), command.output);
-    return static_cast<int>(ExitCode::answer_is_no);
+    return exit_code(false);
   }
   if (command.estimate) {
     const ExpectedPlanWork work = expected_work(*chosen.scene, request);
@@ -201,7 +201,7 @@ int run_plan(const PlanCommand& command, const Session& session) {
   }
   deliver(session.json() ? to_text(json) : text, command.output);
   deliver_csv(json_table_csv(json.at("frontier")), csv);
-  return plan.choice ? 0 : static_cast<int>(ExitCode::answer_is_no);
+  return exit_code(plan.choice.has_value());
 }
 
 }  // namespace

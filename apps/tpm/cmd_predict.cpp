@@ -117,8 +117,7 @@ void add_predict_command(CLI::App& app, Session& session) {
                     "Say whether the law predicts the recording, by the rule of tpm select");
   command->add_option("--folder", options->folder,
                       "Write prediction.csv, prediction.json and the figure into this folder");
-  command->add_option("-o,--output", options->output,
-                      "Write here instead of to the terminal; beside JSON the table as .csv");
+  add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);
   command->footer(

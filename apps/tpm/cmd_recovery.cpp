@@ -60,9 +60,7 @@ int recovery(const RecoveryCommandOptions& options, const Session& session) {
   }
   deliver(session.json() ? to_text(to_json(results)) : to_terminal_text(results), options.output);
   deliver_csv(recovery_csv(results), csv);
-  const bool all = std::all_of(results.begin(), results.end(),
-                               [](const RecoveryResult& r) { return r.fulfilled(); });
-  return static_cast<int>(all ? ExitCode::success : ExitCode::answer_is_no);
+  return exit_code(std::ranges::all_of(results, &RecoveryResult::fulfilled));
 }
 
 }  // namespace

@@ -191,13 +191,8 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_scene(scene, times, scene.formulation.entry().can().field);
   write_scene_run(scene, times, answer, choice.output);
-  if (session.json()) {
-    Json json = scene_run_json(scene, times, answer);
-    json["files"] = {choice.output};
-    say("{}", to_text(json));
-    return 0;
-  }
-  say("{}wrote {}\n", scene_run_text(scene, times, answer), choice.output);
+  say_with_files(session, scene_run_json(scene, times, answer),
+                 scene_run_text(scene, times, answer), {choice.output});
   return 0;
 }
 
@@ -220,16 +215,14 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
   }
   const std::vector<Simulated> all = simulate_all(choice, std::move(scene));
   const std::vector<std::string> files = write_all(choice, all);
-  if (session.json()) {
-    Json json = simulation_json(all.front().scene, all.front().network, all.front().run);
-    if (all.size() > 1)
-      json["mass_spring"] = simulation_json(all[1].scene, all[1].network, all[1].run);
-    json["files"] = files;
-    say("{}", to_text(json));
-    return 0;
+  Json json;
+  std::string text;
+  for (const Simulated& s : all) {
+    Json of_one = simulation_json(s.scene, s.network, s.run);
+    (json.is_null() ? json : json["mass_spring"]) = std::move(of_one);
+    text += simulation_text(s.scene, s.network, s.run);
   }
-  for (const Simulated& s : all) say("{}", simulation_text(s.scene, s.network, s.run));
-  say("wrote {}\n", fmt::join(files, ", "));
+  say_with_files(session, std::move(json), text, files);
   return 0;
 }
 
@@ -246,18 +239,13 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   const Plan plan = planned(scene, std::move(request));
   if (!plan.choice) {
     say("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
-    return static_cast<int>(ExitCode::answer_is_no);
+    return exit_code(false);
   }
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_planned(plan, scene, times);
   write_planned_run(plan, scene, times, answer, choice.output);
-  if (session.json()) {
-    Json json = planned_run_json(plan, scene, times, answer);
-    json["files"] = {choice.output};
-    say("{}", to_text(json));
-    return 0;
-  }
-  say("{}wrote {}\n", planned_run_text(plan, times, answer), choice.output);
+  say_with_files(session, planned_run_json(plan, scene, times, answer),
+                 planned_run_text(plan, times, answer), {choice.output});
   return 0;
 }
 

@@ -118,25 +118,17 @@ WrittenSweep write_results(const Sweep& sweep, const SweepRun& run,
 /// @returns the exit code: a sweep of which no cell has an answer has none either
 int print_results(const Sweep& sweep, const CellTally& tally, const std::vector<std::string>& files,
                   const Session& session) {
-  const bool none = tally.done == 0 && tally.failed > 0;
-  const int code = static_cast<int>(none ? ExitCode::answer_is_no : ExitCode::success);
-  if (session.json()) {
-    Json json = tally_json(sweep, tally);
-    json["files"] = files;
-    say("{}", to_text(json));
-    return code;
-  }
-  say("{} cells: {} done, {} skipped, {} failed\n", sweep.cells(), tally.done, tally.skipped,
-      tally.failed);
+  std::string text = fmt::format("{} cells: {} done, {} skipped, {} failed\n", sweep.cells(),
+                                 tally.done, tally.skipped, tally.failed);
   constexpr std::size_t kShown = 5;
   for (std::size_t i = 0; i < std::min(kShown, tally.reasons.size()); ++i) {
-    say("- {}\n", printable(tally.reasons[i], 160));
+    text += fmt::format("- {}\n", printable(tally.reasons[i], 160));
   }
   if (tally.reasons.size() > kShown) {
-    say("- and {} more reasons: /reason_text\n", tally.reasons.size() - kShown);
+    text += fmt::format("- and {} more reasons: /reason_text\n", tally.reasons.size() - kShown);
   }
-  say("wrote {}\n", fmt::join(files, ", "));
-  return code;
+  say_with_files(session, tally_json(sweep, tally), text, files);
+  return exit_code(tally.done > 0 || tally.failed == 0);
 }
 
 /// "2/8": the second of eight.
@@ -251,8 +243,7 @@ int merge(const SweepChoice& choice, const Session& session) {
   }
   std::uint64_t missing = 0;
   for (std::uint64_t b = 0; b < sweep.blocks(); ++b) {
-    missing +=
-        std::none_of(logs.begin(), logs.end(), [b](auto& log) { return log.has(b); }) ? 1 : 0;
+    missing += std::ranges::none_of(logs, [b](auto& log) { return log.has(b); }) ? 1 : 0;
   }
   if (missing > 0) {
     throw bad_input(output.string(),

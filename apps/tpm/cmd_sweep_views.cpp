@@ -54,9 +54,8 @@ std::pair<std::string, std::uint64_t> parse_fixed(const std::string& text,
     throw Error(ExitCode::usage, "--at " + name, fmt::format("{} {}", shortest(wished), axis.unit),
                 fmt::format("{} to {} {}", shortest(*least), shortest(*largest), axis.unit));
   }
-  const auto nearest = std::min_element(
-      axis.places.begin(), axis.places.end(),
-      [&](double a, double b) { return std::abs(a - wished) < std::abs(b - wished); });
+  const auto nearest = std::ranges::min_element(
+      axis.places, [&](double a, double b) { return std::abs(a - wished) < std::abs(b - wished); });
   if (std::abs(*nearest - wished) > slack) {
     tell_user("tpm: --at {}: {} {} lies between places of that axis; {} {} is taken\n", name,
               shortest(wished), axis.unit, shortest(*nearest), axis.unit);
@@ -78,10 +77,9 @@ int sensitivity(const SweepViewChoice& choice, const Session& session) {
   for (const std::string& text : choice.at) fixed.push_back(parse_fixed(text, sweep));
   std::vector<SweepSensitivity> all;
   for (const ReadVariable& v : sweep.variables()) {
-    const bool wished =
-        choice.variables.empty()
-            ? v.times_s.empty() && !v.name.starts_with("count_")
-            : std::count(choice.variables.begin(), choice.variables.end(), v.name) > 0;
+    const bool wished = choice.variables.empty()
+                            ? v.times_s.empty() && !v.name.starts_with("count_")
+                            : std::ranges::count(choice.variables, v.name) > 0;
     if (wished) all.push_back(sensitivity_of(sweep, v.name, fixed));
   }
   for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
@@ -109,8 +107,7 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
   }
   say("{}", session.json() ? to_text(convergence_json(all)) : convergence_text(all));
   draw_into(choice.figure_folder, convergence_figures(all, sweep.title()));
-  const bool none = std::none_of(all.begin(), all.end(), [](auto& c) { return c.monotone(); });
-  return static_cast<int>(none ? ExitCode::answer_is_no : ExitCode::success);
+  return exit_code(std::ranges::any_of(all, &SweepConvergence::monotone));
 }
 
 /// Paths in a configuration of tpm fit are relative to it: they are kept when it is moved.
@@ -154,10 +151,7 @@ int best(const SweepViewChoice& choice, const Session& session) {
   for (const BestCell& cell : cells) {
     say("{} = {}:", choice.best_output, significant(cell.value, 6));
     for (const CellParameter& p : cell.parameters) {
-      const Unit unit = p.unit.empty() ? Unit{"", Dimension::dimensionless, 1.0}
-                                       : shown_unit(parse_unit(p.unit, p.name).dimension);
-      say(" {} = {}{}{}", p.name, significant(p.value / unit.to_si, 6),
-          unit.symbol.empty() ? "" : " ", unit.symbol);
+      say(" {} = {}", p.name, value_words(p.value, shown_unit_of(p.unit), 6));
     }
     say("\n");
   }

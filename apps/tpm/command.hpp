@@ -12,6 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
+
 namespace tpm::app {
 
 /// What every command shares. A command registers its options on a CLI11 subcommand and sets `run`
@@ -29,6 +32,21 @@ void set_run(CLI::App& command, Session& session, std::function<int()> work);
 
 /// Adds --format text|json to a command.
 void add_format_option(CLI::App& command, Session& session);
+
+/// Adds -o, --output for an answer beside which a table stands (csv_beside()).
+void add_output_option(CLI::App& command, std::string& output);
+
+/// Adds options that are texts to a group of the help.
+inline auto options_of_group(CLI::App& command, const char* group) {
+  return [&command, group](const char* name, std::string& target, const char* help) {
+    return command.add_option(name, target, help)->group(group);
+  };
+}
+
+/// Of a command that ran to its end: 0, or 1 where the answer is no.
+[[nodiscard]] constexpr int exit_code(bool yes) {
+  return static_cast<int>(yes ? ExitCode::success : ExitCode::answer_is_no);
+}
 
 /// Prints the text, or writes it to `file` if that is not empty.
 void deliver(const std::string& text, const std::string& file);
@@ -74,6 +92,10 @@ template <class... Arguments>
 void tell_user(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
   write_message(fmt::format(text, std::forward<Arguments>(arguments)...));
 }
+
+/// Prints an answer and the files that were written, which JSON has under "files".
+void say_with_files(const Session& session, Json json, std::string_view text,
+                    const std::vector<std::string>& files);
 
 // One function per file cmd_*.cpp.
 void add_version_command(CLI::App& app, Session& session);

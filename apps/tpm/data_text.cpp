@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/units.hpp"
 
@@ -18,9 +19,8 @@ Unit shown_unit_of(Quantity quantity) {
 }
 
 std::string title(Quantity quantity, const std::string& extra = {}) {
-  const Unit shown = shown_unit_of(quantity);
-  return fmt::format("{}{}{}{}", quantity_short_name(quantity), extra,
-                     shown.symbol.empty() ? "" : " ", shown.symbol);
+  return with_unit(fmt::format("{}{}", quantity_short_name(quantity), extra),
+                   shown_unit_of(quantity));
 }
 
 std::string cell(const std::optional<double>& si, double to_si) {

@@ -33,6 +33,11 @@ void add_format_option(CLI::App& command, Session& session) {
       ->capture_default_str();
 }
 
+void add_output_option(CLI::App& command, std::string& output) {
+  command.add_option("-o,--output", output,
+                     "Write here instead of to the terminal; beside JSON the table as .csv");
+}
+
 void set_run(CLI::App& command, Session& session, std::function<int()> work) {
   command.callback([&session, work = std::move(work)] { session.run = work; });
 }
@@ -75,6 +80,13 @@ std::string written(const Session& session, const std::string& folder,
                     const std::vector<std::string>& files) {
   if (session.json()) return {};
   return fmt::format("\nwritten to {}: {}\n", folder, fmt::join(files, ", "));
+}
+
+void say_with_files(const Session& session, Json json, std::string_view text,
+                    const std::vector<std::string>& files) {
+  json["files"] = files;
+  write_output(session.json() ? to_text(json)
+                              : fmt::format("{}wrote {}\n", text, fmt::join(files, ", ")));
 }
 
 void will_write_into(const std::filesystem::path& folder,

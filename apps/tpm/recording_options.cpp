@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "command.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/study/selection.hpp"
 #include "tpmkit/error.hpp"
@@ -28,9 +29,7 @@ void set_quantities(ImportOptions& import, const std::string& drive, const std::
 }
 
 void add_recording_options(CLI::App& command, RecordingOptions& options) {
-  const auto add = [&](const char* name, std::string& target, const char* help) {
-    command.add_option(name, target, help)->group("What the files do not say");
-  };
+  const auto add = options_of_group(command, "What the files do not say");
   add("--time", options.import.time_column, "Column of the times: name, or number from 1");
   add("--drive", options.import.drive_column, "Column of the depth or relative length");
   add("--response", options.import.response_column, "Column of the force or stress");

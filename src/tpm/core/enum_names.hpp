@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "tpm/core/lists.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -46,11 +47,7 @@ constexpr auto find_entry(const Words& words, std::string_view text) noexcept {
 /// "a, b, c"
 template <typename Words>
 std::string listed(const Words& words) {
-  std::string list;
-  for (const auto& word : words) {
-    list += fmt::format("{}{}", list.empty() ? "" : ", ", word.text);
-  }
-  return list;
+  return listed(words, [](const auto& word) { return word.text; });
 }
 
 /// The value that a text stands for. Throws Error(bad_input) that names all of them.

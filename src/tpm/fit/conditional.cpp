@@ -104,10 +104,9 @@ std::vector<bool> dependents(const FitResult& result, const ResidualFunction& fu
 }
 
 void add_condition(ParameterResult& p, const Condition& condition) {
-  const bool known =
-      std::any_of(p.conditional_on.begin(), p.conditional_on.end(), [&](const Condition& c) {
-        return c.parameter == condition.parameter && c.upper == condition.upper;
-      });
+  const bool known = std::ranges::any_of(p.conditional_on, [&](const Condition& c) {
+    return c.parameter == condition.parameter && c.upper == condition.upper;
+  });
   if (!known) p.conditional_on.push_back(condition);
 }
 
@@ -136,9 +135,8 @@ std::string bound_flag(const FitResult& result, const ParameterResult& nuisance)
 std::string condition_words(const ParameterResult& p, const std::vector<ParameterResult>& all) {
   std::string words;
   for (const Condition& c : p.conditional_on) {
-    const auto of = std::find_if(all.begin(), all.end(), [&](const ParameterResult& other) {
-      return other.parameter.name == c.parameter;
-    });
+    const auto of = std::ranges::find_if(
+        all, [&](const ParameterResult& other) { return other.parameter.name == c.parameter; });
     words += fmt::format("; {} {} at its {} bound {}",
                          c.at_estimate ? "this holds only with" : "its interval ends with",
                          c.parameter, c.upper ? "upper" : "lower", in_unit(of->parameter, c.value));

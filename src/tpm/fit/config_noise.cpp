@@ -117,8 +117,7 @@ void parse_noise(const Json& j, DataChoice& data, Dimension readings, const Docu
 }
 
 void name_noise_parameters(FitConfig& config) {
-  const auto several = std::count_if(config.data.begin(), config.data.end(),
-                                     [](const DataChoice& d) { return d.estimates_sigma(); }) > 1;
+  const auto several = std::ranges::count_if(config.data, &DataChoice::estimates_sigma) > 1;
   for (DataChoice& data : config.data) {
     const std::string after = several ? " " + data.dataset : std::string{};
     if (data.sigma_a == kDefaultName) data.sigma_a = "sigma_a" + after;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/config_parts.hpp"
@@ -16,14 +17,11 @@ namespace tpm::fit {
 namespace {
 
 std::size_t parse_target(std::string_view name, const Model& model, const DocumentPlace& place) {
-  std::vector<std::string_view> known;
-  known.reserve(model.parameters().size());
-  for (const ParameterDescription& p : model.parameters()) {
-    if (p.name == name) return known.size();
-    known.push_back(p.name);
-  }
+  const auto all = model.parameters();
+  const auto found = std::ranges::find(all, name, &ParameterDescription::name);
+  if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
   throw bad_input(place.where, fmt::format("no model parameter is called '{}'", printable(name)),
-                  fmt::format("one of {}", fmt::join(known, ", ")));
+                  fmt::format("one of {}", listed(all, &ParameterDescription::name)));
 }
 
 /// The places of the data sets named under "for".

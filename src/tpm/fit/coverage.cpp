@@ -6,6 +6,7 @@
 #include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 
+#include "tpm/core/give_up.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
@@ -77,7 +78,8 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
     }
     ++result.sets;
     progress.advance();
-    try {
+    // A set that cannot be fitted counts as not covered, and is reported.
+    const std::string failure = gave_up([&] {
       const FitResult fit = fit_residuals(function, parameters, fit_starts(function, parameters),
                                           threshold, true, start_kind(function));
       for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -85,11 +87,8 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
         if (holds(p, true_value[i])) ++result.parameters[i].covered;
         if (p.verdict != Verdict::identified) ++result.parameters[i].one_sided;
       }
-    } catch (const Error& error) {
-      // A set that cannot be fitted counts as not covered, and is reported.
-      if (error.code() != ExitCode::numerical) throw;
-      ++result.failed;
-    }
+    });
+    if (!failure.empty()) ++result.failed;
   }
   for (ParameterCoverage& p : result.parameters) {
     p.p_value = binomial_test(p.covered, result.sets, result.level);

@@ -81,8 +81,7 @@ void ExchangeOrder::sort(std::vector<double>& natural) const {
   if (parts_.size() < 2) return;
   const std::vector<double> before = natural;
   std::vector<Part> rising = parts_;
-  std::stable_sort(rising.begin(), rising.end(),
-                   [&](const Part& a, const Part& b) { return before[a.key] < before[b.key]; });
+  std::ranges::stable_sort(rising, {}, [&](const Part& a) { return before[a.key]; });
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     natural[parts_[i].key] = before[rising[i].key];
     for (std::size_t c = 0; c < parts_[i].companions.size(); ++c) {
@@ -102,8 +101,7 @@ bool ExchangeOrder::is_sorted(std::span<const double> natural) const {
 std::vector<FitParameter> ExchangeOrder::bounds_around(std::span<const FitParameter> parameters,
                                                        std::size_t held, double value) const {
   std::vector<FitParameter> bounded(parameters.begin(), parameters.end());
-  const auto place = std::find_if(parts_.begin(), parts_.end(),
-                                  [held](const Part& part) { return part.key == held; });
+  const auto place = std::ranges::find(parts_, held, &Part::key);
   if (place == parts_.end()) return bounded;
   for (auto part = parts_.begin(); part != parts_.end(); ++part) {
     FitParameter& p = bounded[part->key];

@@ -19,8 +19,7 @@ using Kind = ProtocolChoice::Kind;
 using Part = Oscillation::Part;
 
 bool matches_any(const std::vector<Selector>& selectors, const Datum& datum) {
-  return std::any_of(selectors.begin(), selectors.end(),
-                     [&](const Selector& s) { return s.matches(datum); });
+  return std::ranges::any_of(selectors, [&](const Selector& s) { return s.matches(datum); });
 }
 
 std::string condition_of(const Datum& d) {

@@ -32,17 +32,15 @@ void ExperimentResiduals::set_up_surrogate() {
 
 void ExperimentResiduals::find_linear() {
   const bool noise_stays =
-      config_.loss.kind == Loss::none &&
-      std::all_of(config_.data.begin(), config_.data.end(), [](const DataChoice& d) {
+      config_.loss.kind == Loss::none && std::ranges::all_of(config_.data, [](const DataChoice& d) {
         return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model &&
                d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
       });
   // What answers a load with a depth is linear in a compliance, not in a stiffness.
-  const bool by_load =
-      std::any_of(experiments_.begin(), experiments_.end(), [](const Experiment& e) {
-        const auto* course = std::get_if<TimeCourse>(&e.imposed);
-        return course != nullptr && course->protocol.drive() == Drive::force;
-      });
+  const bool by_load = std::ranges::any_of(experiments_, [](const Experiment& e) {
+    const auto* course = std::get_if<TimeCourse>(&e.imposed);
+    return course != nullptr && course->protocol.drive() == Drive::force;
+  });
   linear_.clear();
   linear_.reserve(config_.parameters.size());
   for (const EstimatedParameter& p : config_.parameters) {
@@ -55,8 +53,7 @@ void ExperimentResiduals::find_linear() {
 
 void ExperimentResiduals::leave_out_held_out() {
   fitted_.clear();
-  const bool any =
-      std::any_of(data_.begin(), data_.end(), [](const auto& d) { return d.held_out; });
+  const bool any = std::ranges::any_of(data_, [](const auto& d) { return d.held_out; });
   if (!any) return;
   fitted_ = experiments_;
   for (Experiment& experiment : fitted_) {
@@ -149,15 +146,13 @@ void ExperimentResiduals::evaluate_plain(std::span<const double> natural, Eigen:
 }
 
 int ExperimentResiduals::value_count() const {
-  return static_cast<int>(std::count_if(data_.begin(), data_.end(), [](const FitDatum& d) {
-    return d.value.has_value() && !d.held_out;
-  }));
+  return static_cast<int>(std::ranges::count_if(
+      data_, [](const FitDatum& d) { return d.value.has_value() && !d.held_out; }));
 }
 
 int ExperimentResiduals::band_count() const {
-  return static_cast<int>(std::count_if(data_.begin(), data_.end(), [](const FitDatum& d) {
-    return !d.value.has_value() && !d.held_out;
-  }));
+  return static_cast<int>(std::ranges::count_if(
+      data_, [](const FitDatum& d) { return !d.value.has_value() && !d.held_out; }));
 }
 
 Response ExperimentResiduals::respond_to(const Experiment& experiment,

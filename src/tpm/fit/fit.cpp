@@ -76,9 +76,8 @@ FitResult search(const ExperimentResiduals& function, const std::vector<FitParam
 FitResult widened_search(const ExperimentResiduals& function, std::vector<FitParameter>& parameters,
                          const Threshold& threshold) {
   const FitConfig& config = function.config();
-  const bool automatic =
-      std::any_of(config.parameters.begin(), config.parameters.end(),
-                  [](const EstimatedParameter& p) { return p.widest.has_value(); });
+  const bool automatic = std::ranges::any_of(
+      config.parameters, [](const EstimatedParameter& p) { return p.widest.has_value(); });
   for (;;) {
     // Profiles are walked only from an estimate that stays.
     if (automatic && config.profiles) {

@@ -42,8 +42,7 @@ void flag_outliers(FitResult& result, const ExperimentResiduals& function) {
 }
 
 void flag_noise(FitResult& result) {
-  const bool estimated = std::any_of(result.config.data.begin(), result.config.data.end(),
-                                     [](const DataChoice& d) { return d.estimates_sigma(); });
+  const bool estimated = std::ranges::any_of(result.config.data, &DataChoice::estimates_sigma);
   if (estimated) {
     result.flags.push_back(
         fmt::format("the size of the noise is estimated from {} values: intervals are those of "
@@ -129,9 +128,7 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
   }
   if (!has_element(result.config)) return;  // the limits are those of the paper's element
   const TpmVector element = fitted_element(result.config, result.best.natural);
-  for (std::string& flag : validity_flags(element[kSpacing], deepest)) {
-    result.flags.push_back(std::move(flag));
-  }
+  std::ranges::move(validity_flags(element[kSpacing], deepest), std::back_inserter(result.flags));
 }
 
 }  // namespace tpm::fit

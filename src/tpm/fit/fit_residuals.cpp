@@ -75,8 +75,7 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
         ExitCode::numerical, "fit",
         fmt::format("none of {} starts ended in a point that can be evaluated", starts.size()));
   }
-  std::stable_sort(ends.begin(), ends.end(),
-                   [](const Minimum& a, const Minimum& b) { return a.deviance < b.deviance; });
+  std::ranges::stable_sort(ends, {}, &Minimum::deviance);
   for (const Minimum& m : ends) add_to_cluster(result.minima, m);
   const Minimum& best = ends.front();
   for (const Minimum& m : ends) {

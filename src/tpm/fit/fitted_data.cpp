@@ -60,8 +60,7 @@ std::vector<std::vector<double>> recording_residuals(const ExperimentResiduals& 
 
 std::optional<Correlation> correlation_at(const ExperimentResiduals& function,
                                           std::span<const double> natural) {
-  const bool any = std::any_of(function.experiments().begin(), function.experiments().end(),
-                               [](const Experiment& e) { return e.is_recording; });
+  const bool any = std::ranges::any_of(function.experiments(), &Experiment::is_recording);
   if (!any) return std::nullopt;
   const auto residuals = recording_residuals(function, natural);
   const std::vector<std::span<const double>> parts(residuals.begin(), residuals.end());
@@ -186,8 +185,7 @@ void fill_data(FitResult& result, const ExperimentResiduals& function,
     if (experiment.is_recording) describe_recording(result.recordings.back(), experiment, bands);
   }
   const bool known_normal =
-      threshold.scale_known &&
-      std::all_of(result.config.data.begin(), result.config.data.end(), [](const DataChoice& d) {
+      threshold.scale_known && std::ranges::all_of(result.config.data, [](const DataChoice& d) {
         return d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
       });
   if (known_normal && result.degrees_of_freedom > 0 && result.config.loss.kind == Loss::none) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -200,15 +201,11 @@ Json number_or_null(double value) {
 }  // namespace
 
 std::string_view gradient_verdict_name(GradientVerdict verdict) noexcept {
-  switch (verdict) {
-    case GradientVerdict::agrees:
-      return "agrees";
-    case GradientVerdict::wrong:
-      return "wrong";
-    case GradientVerdict::undecided:
-      return "undecided";
-  }
-  return "";
+  static constexpr auto kNames =
+      std::to_array<Word<GradientVerdict>>({{GradientVerdict::agrees, "agrees"},
+                                            {GradientVerdict::wrong, "wrong"},
+                                            {GradientVerdict::undecided, "undecided"}});
+  return word_for(kNames, verdict);
 }
 
 bool GradientCheck::passed() const {

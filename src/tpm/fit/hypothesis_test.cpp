@@ -31,9 +31,8 @@ HypothesisResult test_hypothesis(const ExperimentResiduals& function, const FitR
   result.hypothesis = hypothesis;
   FixedMask fixed(parameters.size(), false);
   std::vector<std::vector<double>> starts{fit.best.natural};
-  for (auto& start : latin_hypercube_starts(parameters, 10, fit.config.seed)) {
-    starts.push_back(std::move(start));
-  }
+  std::ranges::move(latin_hypercube_starts(parameters, 10, fit.config.seed),
+                    std::back_inserter(starts));
   for (const auto& [name, value] : hypothesis.values) {
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       if (parameters[i].name != name) continue;

@@ -249,9 +249,8 @@ void add_measurements(const Table& measurements, const Table& conditions, const 
     const auto place = static_cast<std::size_t>(known - groups.begin());
     if (known == groups.end()) {
       // A way of imposing more than the first is told apart by its number.
-      const auto same = std::count_if(groups.begin(), groups.end(), [&](const std::string& g) {
-        return g.starts_with(id + "{");
-      });
+      const auto same = std::ranges::count_if(
+          groups, [&](const std::string& g) { return g.starts_with(id + "{"); });
       groups.push_back(group);
       PointSet points;
       points.header.id = same == 0 ? id : fmt::format("{} {}", id, same + 1);

@@ -146,8 +146,7 @@ std::vector<std::vector<double>> projected_starts(const ResidualFunction& functi
     if (!solved.empty() && std::isfinite(deviance))
       ranked.emplace_back(deviance, std::move(solved));
   }
-  std::stable_sort(ranked.begin(), ranked.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::ranges::stable_sort(ranked, [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<std::vector<double>> starts;
   for (auto& [deviance, start] : ranked) {
     if (starts.size() >= keep) break;

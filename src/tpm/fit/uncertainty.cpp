@@ -364,8 +364,7 @@ Profile profile_likelihood(const ResidualFunction& function,
   }
   profile.lower = all->lower;
   profile.upper = all->upper;
-  std::sort(profile.points.begin(), profile.points.end(),
-            [](const ProfilePoint& a, const ProfilePoint& b) { return a.natural < b.natural; });
+  std::ranges::sort(profile.points, {}, &ProfilePoint::natural);
   return profile;
 }
 

@@ -171,8 +171,7 @@ bool nearly(double a, double b) {
 }
 
 bool all_on_scale(std::span<const FitParameter> named, Scale scale) {
-  return std::all_of(named.begin(), named.end(),
-                     [scale](const FitParameter& p) { return p.scale == scale; });
+  return std::ranges::all_of(named, [scale](const FitParameter& p) { return p.scale == scale; });
 }
 
 bool all_equal(std::span<const double> steps) {

@@ -50,9 +50,8 @@ Waterfall waterfall(std::span<const double> deviances, double margin) {
   std::sort(w.deviances.begin(), w.deviances.end());
   w.failed = w.starts - static_cast<int>(w.deviances.size());
   w.clusters = clusters_of(w.deviances);
-  w.near_best =
-      static_cast<int>(std::count_if(w.deviances.begin(), w.deviances.end(),
-                                     [&](double d) { return d - w.deviances.front() <= margin; }));
+  w.near_best = static_cast<int>(std::ranges::count_if(
+      w.deviances, [&](double d) { return d - w.deviances.front() <= margin; }));
   w.words = waterfall_words(w);
   return w;
 }

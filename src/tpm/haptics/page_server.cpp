@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <httplib.h>
-#include <poll.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -10,6 +9,7 @@
 #include <charconv>
 #include <chrono>
 #include <csignal>
+#include <semaphore>
 #include <thread>
 
 #include "tpm/store/file.hpp"
@@ -26,145 +26,33 @@ constexpr std::size_t kMostWaiting = 16;    // accepted beside them; more wait w
 constexpr std::size_t kMostBytes = 16'384;  // of a request
 constexpr auto kTimeToAsk = 500ms;          // a browser on the same machine asks at once
 constexpr auto kTimeToAnswer = 2s;
-constexpr auto kLook = 50;  // ms between looks at whether all is over
-constexpr int kNice = 10;   // nice value of the page's threads
+constexpr auto kLook = 50ms;  // between looks at whether all is over
+constexpr int kNice = 10;     // nice value of the page's threads
 
-/// Of the calling thread: Linux keeps a nice value for each.
+/// Of the calling thread and those that it starts: Linux keeps a nice value for each.
 void lower_priority() {
   (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
 }
 
-/// One connection, of which so many bytes are read and which has so much time.
-class BoundedStream final : public httplib::Stream {
- public:
-  BoundedStream(socket_t socket, const std::atomic<bool>& ending)
-      : socket_(socket), ending_(ending), deadline_(PageClock::now() + kTimeToAsk) {}
-
-  [[nodiscard]] bool is_readable() const override { return waited(POLLIN); }
-  [[nodiscard]] bool is_writable() const override { return waited(POLLOUT); }
-  ssize_t read(char* to, size_t size) override {
-    if (next_ == filled_ && !fill()) return -1;
-    const std::size_t count = std::min(size, filled_ - next_);
-    std::copy_n(buffer_.data() + next_, count, to);
-    next_ += count;
-    return static_cast<ssize_t>(count);
-  }
-  ssize_t write(const char* from, size_t size) override {
-    if (!answering_ && !late()) deadline_ = PageClock::now() + kTimeToAnswer;
-    answering_ = true;
-    if (!waited(POLLOUT)) return -1;
-    const ssize_t count = ::send(socket_, from, size, MSG_NOSIGNAL | MSG_DONTWAIT);
-    answered_ = answered_ || count > 0;
-    return count;
-  }
-  using Stream::write;
-  void get_remote_ip_and_port(std::string& ip, int& port) const override {
-    ip = "127.0.0.1";
-    port = 0;
-  }
-  void get_local_ip_and_port(std::string& ip, int& port) const override {
-    get_remote_ip_and_port(ip, port);
-  }
-  [[nodiscard]] socket_t socket() const override { return socket_; }
-
-  /// A short answer of our own, where the library has given none. It finds room with the system,
-  /// or is not given.
-  void refuse_if_unanswered() {
-    if (answered_) return;
-    const std::string_view status = late() ? "408 Request Timeout" : "400 Bad Request";
-    const std::string text = fmt::format(
-        "HTTP/1.1 {}\r\nConnection: close\r\nContent-Type: text/plain\r\nContent-Length: {}"
-        "\r\n\r\n{}\n",
-        status, status.size() + 1, status);
-    (void)::send(socket_, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-  }
-  /// Says that nothing more is sent, and takes what is still under way, a little: closing before
-  /// would make the system withdraw the answer.
-  void close() {
-    (void)::shutdown(socket_, SHUT_WR);
-    deadline_ = PageClock::now() + 100ms;
-    for (std::size_t taken = 0; taken < 8 * kMostBytes && waited(POLLIN);) {
-      const ssize_t count = ::recv(socket_, buffer_.data(), buffer_.size(), MSG_DONTWAIT);
-      if (count <= 0) break;
-      taken += static_cast<std::size_t>(count);
-    }
-    (void)::close(socket_);
-  }
-
- private:
-  [[nodiscard]] bool late() const { return PageClock::now() >= deadline_; }
-  [[nodiscard]] bool waited(short what) const {
-    while (!late() && !ending_) {
-      pollfd wanted{socket_, what, 0};
-      const int ready = ::poll(&wanted, 1, kLook);
-      if (ready > 0) return true;
-      if (ready < 0 && errno != EINTR) return false;
-    }
-    return false;
-  }
-  bool fill() {
-    if (read_ >= kMostBytes || !waited(POLLIN)) return false;
-    const ssize_t count = ::recv(socket_, buffer_.data(), buffer_.size(), MSG_DONTWAIT);
-    if (count <= 0) return false;
-    next_ = 0;
-    filled_ = static_cast<std::size_t>(count);
-    read_ += filled_;
-    return true;
-  }
-
-  socket_t socket_;
-  const std::atomic<bool>& ending_;
-  PageClock::time_point deadline_;
-  std::array<char, 4096> buffer_{};
-  std::size_t next_ = 0, filled_ = 0, read_ = 0;
-  bool answering_ = false, answered_ = false;
-};
-
 /// httplib's pool with a bound: when it is full, no more connections are accepted for a while.
-class BoundedQueue final : public httplib::TaskQueue {
+class BoundedQueue final : public httplib::ThreadPool {
  public:
-  BoundedQueue() {
-    for (std::size_t i = 0; i < kThreads; ++i) {
-      threads_.emplace_back([this] { work(); });
-    }
-  }
+  BoundedQueue() : ThreadPool(kThreads) {}
   void enqueue(std::function<void()> task) override {
-    std::unique_lock<std::mutex> lock(mutex_);
-    room_.wait(lock, [this] { return tasks_.size() < kMostWaiting; });
-    tasks_.push_back(std::move(task));
-    more_.notify_one();
-  }
-  void shutdown() override {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      over_ = true;
-    }
-    more_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
+    room_.acquire();
+    ThreadPool::enqueue([this, task = std::move(task)] {
+      room_.release();
+      task();
+    });
   }
 
  private:
-  void work() {
-    lower_priority();
-    for (;;) {
-      std::unique_lock<std::mutex> lock(mutex_);
-      more_.wait(lock, [this] { return over_ || !tasks_.empty(); });
-      if (tasks_.empty()) return;
-      const std::function<void()> task = std::move(tasks_.front());
-      tasks_.pop_front();
-      lock.unlock();
-      room_.notify_one();
-      task();
-    }
-  }
-
-  std::mutex mutex_;
-  std::condition_variable more_, room_;
-  std::deque<std::function<void()>> tasks_;
-  std::vector<std::thread> threads_;
-  bool over_ = false;
+  std::counting_semaphore<kMostWaiting> room_{kMostWaiting};
 };
 
+/// The library's own limits do not do: its timeouts begin anew with each byte, a line has no
+/// greatest length until it has ended, and headers no greatest number. So a request is read whole
+/// before the library sees it.
 class HttpServer final : public httplib::Server {
  public:
   std::atomic<bool> ending{false};
@@ -172,20 +60,64 @@ class HttpServer final : public httplib::Server {
  private:
   /// One request a connection: nobody keeps a thread.
   bool process_and_close_socket(socket_t socket) override {
-    BoundedStream stream(socket, ending);
-    bool closed = true, answered = false;
-    try {
-      // Compression would cost time, and ranges could ask for the same bytes many times over.
-      answered = process_request(stream, true, closed, [](httplib::Request& request) {
-        request.ranges.clear();
-        request.headers.erase("Accept-Encoding");
-      });
-    } catch (const std::exception&) {  // of a stranger's request: nothing of ours is broken
-      answered = false;
+    const std::string answer = answer_to_request(socket);
+    const auto until = PageClock::now() + kTimeToAnswer;
+    for (std::string_view left = answer; !left.empty() && !over(until);) {
+      const ssize_t count = ::send(socket, left.data(), left.size(), MSG_NOSIGNAL);
+      if (failed(count)) break;
+      if (count > 0) left.remove_prefix(static_cast<std::size_t>(count));
     }
-    stream.refuse_if_unanswered();
-    stream.close();
-    return answered;
+    // Says that nothing more is sent, and takes what is still under way, a little: closing before
+    // would make the system withdraw the answer.
+    (void)::shutdown(socket, SHUT_WR);
+    (void)received(socket, 8 * kMostBytes, PageClock::now() + 100ms, nullptr);
+    (void)::close(socket);
+    return true;
+  }
+
+  /// A short one of our own where the library is not asked or has none.
+  std::string answer_to_request(socket_t socket) {
+    const auto until = PageClock::now() + kTimeToAsk;
+    try {
+      constexpr const char* kEnd = "\n\r\n";
+      const std::string request = received(socket, kMostBytes, until, kEnd);
+      httplib::detail::BufferStream stream;  // the answer is appended to the request
+      (void)stream.write(request.data(), request.size());
+      bool closed = true;
+      // Compression would cost time, and ranges could ask for the same bytes many times over.
+      if (request.find(kEnd) != std::string::npos &&
+          process_request(stream, true, closed, [](httplib::Request& asked) {
+            asked.ranges.clear();
+            asked.headers.erase("Accept-Encoding");
+          })) {
+        return stream.get_buffer().substr(request.size());
+      }
+    } catch (const std::exception&) {  // of a stranger's request: nothing of ours is broken
+    }
+    const std::string_view status = over(until) ? "408 Request Timeout" : "400 Bad Request";
+    return fmt::format(
+        "HTTP/1.1 {}\r\nConnection: close\r\nContent-Type: text/plain\r\nContent-Length: {}"
+        "\r\n\r\n{}\n",
+        status, status.size() + 1, status);
+  }
+
+  /// What comes until `most` bytes are passed, `end` is among them or the time is over.
+  std::string received(socket_t socket, std::size_t most, PageClock::time_point until,
+                       const char* end) const {
+    std::string bytes;
+    std::array<char, 4096> block{};
+    while (bytes.size() < most && !over(until)) {
+      const ssize_t count = ::recv(socket, block.data(), block.size(), 0);
+      if (count == 0 || failed(count)) break;
+      if (count > 0) bytes.append(block.data(), static_cast<std::size_t>(count));
+      if (end != nullptr && bytes.find(end) != std::string::npos) break;
+    }
+    return bytes;
+  }
+  /// Not so if nothing could be sent or received for the time that the server's timeouts say.
+  static bool failed(ssize_t count) { return count < 0 && errno != EAGAIN && errno != EINTR; }
+  [[nodiscard]] bool over(PageClock::time_point until) const {
+    return ending || PageClock::now() >= until;
   }
 };
 
@@ -219,6 +151,8 @@ class PageServer::Service {
       (void)setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
     });
     http_->set_payload_max_length(0);
+    http_->set_read_timeout(kLook);
+    http_->set_write_timeout(kLook);
     port_ = port == 0 ? http_->bind_to_any_port("127.0.0.1")
                       : (http_->bind_to_port("127.0.0.1", port) ? port : -1);
     if (port_ < 0) {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/study_report.hpp"
 
@@ -10,8 +11,7 @@ constexpr std::size_t kWidth = 100;
 constexpr std::size_t kLabel = 13;
 
 std::string with_unit(const AuditQuantity& quantity, int digits) {
-  const std::string number = significant(quantity.value, digits);
-  return quantity.unit.symbol.empty() ? number : number + " " + quantity.unit.symbol;
+  return tpm::with_unit(significant(quantity.value, digits), quantity.unit);
 }
 
 std::string entry(std::string_view label, std::string_view text) {
@@ -20,14 +20,11 @@ std::string entry(std::string_view label, std::string_view text) {
 }
 
 std::string inputs_text(const Finding& finding) {
-  std::string text;
-  for (const AuditInput& input : finding.inputs) {
-    if (!text.empty()) text += ", ";
-    text += fmt::format("{} = {}", input.name,
-                        input.printed.empty() ? with_unit(input.value, 4) : input.printed);
-    if (input.provenance == "assumed") text += " (assumed)";
-  }
-  return text;
+  return listed(finding.inputs, [](const AuditInput& input) {
+    return fmt::format("{} = {}{}", input.name,
+                       input.printed.empty() ? with_unit(input.value, 4) : input.printed,
+                       input.provenance == "assumed" ? " (assumed)" : "");
+  });
 }
 
 /// Cells that follow need no line of their own.
@@ -60,14 +57,10 @@ std::string finding_text(const Finding& finding) {
 }
 
 std::string summary_text(const AuditReport& report) {
-  std::string text;
-  for (const AuditVerdict verdict :
-       {AuditVerdict::holds, AuditVerdict::holds_by_truncation, AuditVerdict::last_digit_off,
-        AuditVerdict::differs, AuditVerdict::contradicted, AuditVerdict::cannot_be_told}) {
-    if (!text.empty()) text += ", ";
-    text += fmt::format("{} {}", report.count(verdict), verdict_name(verdict));
-  }
-  return fmt::format("{} claims: {}.\n", report.findings.size(), text);
+  return fmt::format("{} claims: {}.\n", report.findings.size(),
+                     listed(kAuditVerdicts, [&](const auto& verdict) {
+                       return fmt::format("{} {}", report.count(verdict.meaning), verdict.text);
+                     }));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/benchmark_report.hpp"
 
@@ -111,13 +112,9 @@ void add_points(Panel& panel, const BenchmarkResult& result, const CostOf& cost_
     }
   }
   panel.series.push_back(limit(Series::Kind::level, result.reference.floor, "reference known to"));
-  std::vector<double> drawn;
-  for (const BenchmarkTarget& target : result.targets) {
-    if (std::find(drawn.begin(), drawn.end(), target.error) != drawn.end()) continue;
-    drawn.push_back(target.error);
-    panel.series.push_back(
-        limit(Series::Kind::level, target.error,
-              fmt::format("asked for: {} %", significant(100.0 * target.error, 2))));
+  for (const double error : each_once(result.targets, &BenchmarkTarget::error)) {
+    panel.series.push_back(limit(Series::Kind::level, error,
+                                 fmt::format("asked for: {} %", significant(100.0 * error, 2))));
   }
 }
 

@@ -180,8 +180,7 @@ constexpr auto kResultFields = [](auto& in, auto& result) {
 
 std::size_t place_in_list(std::string_view name) {
   const auto entries = benchmark_entries();
-  const auto at = std::find_if(entries.begin(), entries.end(),
-                               [&](const BenchmarkEntry& e) { return e.name == name; });
+  const auto at = std::ranges::find(entries, name, &BenchmarkEntry::name);
   return static_cast<std::size_t>(at - entries.begin());
 }
 
@@ -258,10 +257,9 @@ void put_result(BenchmarkRecord& record, BenchmarkResult result, Json run) {
   // As it will be read, so that a run that goes on writes the same bytes as one that was whole.
   result = read_record(to_json(BenchmarkRecord{{result}, record.options, {}})).results.front();
   if (record.options.timing && !run.is_null()) record.runs[result.name] = std::move(run);
-  const auto at =
-      std::find_if(record.results.begin(), record.results.end(), [&](const BenchmarkResult& other) {
-        return place_in_list(other.name) >= place_in_list(result.name);
-      });
+  const auto at = std::ranges::find_if(record.results, [&](const BenchmarkResult& other) {
+    return place_in_list(other.name) >= place_in_list(result.name);
+  });
   if (at != record.results.end() && at->name == result.name) {
     *at = std::move(result);
   } else {

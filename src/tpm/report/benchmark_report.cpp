@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/store/file.hpp"
@@ -203,8 +204,7 @@ Table targets_table(const BenchmarkResult& result, bool timing) {
   }
   for (const std::string& curve : curves_of(result)) {
     const WorstOf worst = worst_of(result, curve);
-    const auto named = std::find_if(result.targets.begin(), result.targets.end(),
-                                    [&](const BenchmarkTarget& t) { return t.curve == curve; });
+    const auto named = std::ranges::find(result.targets, curve, &BenchmarkTarget::curve);
     const BenchmarkTarget target = named == result.targets.end() ? BenchmarkTarget{} : *named;
     std::vector<Cell> row{{curve}};
     row.push_back(worst.failed ? Cell{"fails", Tone::bad}
@@ -293,13 +293,7 @@ std::string introduction(const BenchmarkOptions& options) {
 }  // namespace
 
 std::vector<std::string> curves_of(const BenchmarkResult& result) {
-  std::vector<std::string> curves;
-  for (const BenchmarkPoint& point : result.points) {
-    if (std::find(curves.begin(), curves.end(), point.curve()) == curves.end()) {
-      curves.push_back(point.curve());
-    }
-  }
-  return curves;
+  return each_once(result.points, &BenchmarkPoint::curve);
 }
 
 std::string setting_words(const BenchmarkPoint& point) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 
 namespace tpm::report {
@@ -12,17 +13,10 @@ namespace {
 constexpr int kBorderDigits = 6;
 const Axis kRate{"rate", "Hz", true};
 
-std::string_view word_of_rule(ElementRule rule) {
-  switch (rule) {
-    case ElementRule::exact:
-      return "TPM, exact update";
-    case ElementRule::forward_euler:
-      return "TPM, forward Euler";
-    case ElementRule::mass_spring:
-      break;
-  }
-  return "MSM";
-}
+constexpr auto kRuleWords =
+    std::to_array<Word<ElementRule>>({{ElementRule::exact, "TPM, exact update"},
+                                      {ElementRule::forward_euler, "TPM, forward Euler"},
+                                      {ElementRule::mass_spring, "MSM"}});
 
 Json number_or_null(double value) {
   return std::isfinite(value) ? Json(rounded(value, kBorderDigits)) : Json(nullptr);
@@ -109,9 +103,8 @@ Figure rule_figure(const BorderStudy& study) {
               {"relaxation time over period", "", true},
               {"friction over T/2", "N/m", true}};
   constexpr double kHalfPeriod_s = 0.5e-3, kPeriod_s = 1e-3;
-  for (const ElementRule rule :
-       {ElementRule::exact, ElementRule::forward_euler, ElementRule::mass_spring}) {
-    Series predicted = line(std::string(word_of_rule(rule)), {}, {});
+  for (const auto& [rule, words] : kRuleWords) {
+    Series predicted = line(std::string(words), {}, {});
     Series measured = measured_beside(predicted);
     for (const RulePoint& p : study.rules) {
       if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
@@ -275,7 +268,7 @@ Figure impact_figure(const BorderStudy& study) {
 Json border_json(const BorderStudy& study) {
   Json rules = Json::array();
   for (const RulePoint& p : study.rules) {
-    rules.push_back({{"rule", word_of_rule(p.rule)},
+    rules.push_back({{"rule", word_for(kRuleWords, p.rule)},
                      {"relaxation_time_s", rounded(p.relaxation_time_s, kBorderDigits)},
                      {"measured_N_s_per_m", number_or_null(p.measured_N_s_per_m)},
                      {"predicted_N_s_per_m", number_or_null(p.predicted_N_s_per_m)}});
@@ -323,7 +316,7 @@ std::string border_text(const BorderStudy& study) {
       significant(study.stiffness_N_per_m, 3));
   for (const RulePoint& p : study.rules) {
     text += fmt::format("{:>7} ms  {:<20} {} / {}\n", significant(1e3 * p.relaxation_time_s, 3),
-                        word_of_rule(p.rule), value(p.measured_N_s_per_m),
+                        word_for(kRuleWords, p.rule), value(p.measured_N_s_per_m),
                         value(p.predicted_N_s_per_m));
   }
   for (std::size_t i = 0; i < study.shortest.size(); ++i) {

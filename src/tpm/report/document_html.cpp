@@ -3,6 +3,7 @@
 #include <cctype>
 #include <string_view>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/report/document.hpp"
 #include "tpmkit/error.hpp"
 
@@ -79,24 +80,13 @@ std::string html_escaped(const std::string& text) {
   return out;
 }
 
-std::string_view tone_class(Tone tone) {
-  switch (tone) {
-    case Tone::good:
-      return "good";
-    case Tone::fair:
-      return "fair";
-    case Tone::bad:
-      return "bad";
-    case Tone::plain:
-      break;
-  }
-  return "";
-}
+constexpr auto kToneClasses =
+    std::to_array<Word<Tone>>({{Tone::good, "good"}, {Tone::fair, "fair"}, {Tone::bad, "bad"}});
 
 /// ` class="number good"`, or nothing.
 std::string class_attribute(bool numeric, Tone tone) {
   std::string classes = numeric ? "number" : "";
-  const std::string_view tint = tone_class(tone);
+  const std::string_view tint = word_for(kToneClasses, tone);
   if (!tint.empty()) classes += (classes.empty() ? "" : " ") + std::string(tint);
   return classes.empty() ? "" : fmt::format(" class=\"{}\"", classes);
 }

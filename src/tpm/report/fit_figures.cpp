@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/fit/uncertainty.hpp"
 #include "tpmkit/error.hpp"
 
@@ -89,11 +90,9 @@ const ParameterResult& parameter_of(const FitResult& fit, const std::string& nam
 }
 
 std::string estimate_words(const FitResult& fit) {
-  std::vector<std::string> words;
-  for (const ParameterResult& p : fit.parameters) {
-    words.push_back(fmt::format("{} = {}", p.parameter.name, in_unit(p.parameter, p.estimate)));
-  }
-  return fmt::format("{}", fmt::join(words, ", "));
+  return listed(fit.parameters, [](const ParameterResult& p) {
+    return fmt::format("{} = {}", p.parameter.name, in_unit(p.parameter, p.estimate));
+  });
 }
 
 std::string noise_words(NoiseKind noise) {

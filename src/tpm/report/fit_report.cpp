@@ -172,13 +172,10 @@ Figure spectrum_figure(const FitResult& fit, std::size_t choice) {
       {dimension == Dimension::stress ? "modulus" : "dynamic stiffness", unit.symbol, true}};
   for (const bool held_out : {false, true}) {
     for (const bool storage : {true, false}) {
-      Series s = measured_part(readings, storage, held_out, unit.to_si);
-      if (!s.x.empty()) panel.series.push_back(std::move(s));
+      add_if_any(panel, measured_part(readings, storage, held_out, unit.to_si));
     }
   }
-  for (Series& s : law_lines(fit, choice, readings, unit.to_si)) {
-    if (!s.x.empty()) panel.series.push_back(std::move(s));
-  }
+  for (Series& s : law_lines(fit, choice, readings, unit.to_si)) add_if_any(panel, std::move(s));
   figure.panels = {std::move(panel)};
   return figure;
 }

@@ -78,8 +78,7 @@ std::string hazard_text(const HazardStudy& study) {
                         in(row.delivered_J, 1e3, ran(row)), in(row.to_zero_s, 1e3, stopped(row)),
                         in(row.travel_m, 1e3, stopped(row)), row.within ? "yes" : "NO");
   }
-  const auto within = std::count_if(study.rows.begin(), study.rows.end(),
-                                    [](const HazardRow& row) { return row.within; });
+  const auto within = std::ranges::count_if(study.rows, &HazardRow::within);
   text += fmt::format(
       "\n{} of {} rows are within bounds: force {} N, rise {} N in a period unless the passivity "
       "controller damps; energy given to the hand {} mJ, of a session that is stopped {} mJ, which "
@@ -126,8 +125,7 @@ std::string clock_hazard_text(const ClockHazardStudy& study) {
                         significant(row.largest_force_N, 3), in(row.to_zero_s, 1e3, stopped_by_it),
                         in(row.bound_s, 1e3, stopped_by_it), row.tries, row.within ? "yes" : "NO");
   }
-  const auto within = std::count_if(study.rows.begin(), study.rows.end(),
-                                    [](const ClockHazardRow& row) { return row.within; });
+  const auto within = std::ranges::count_if(study.rows, &ClockHazardRow::within);
   return text + fmt::format(
                     "\n{} of {} rows are within bounds: the end that belongs to the hazard, in "
                     "time, no force above {} N, every missed period counted; other programs can "

@@ -62,8 +62,7 @@ class FlatTable {
       if (value.is_object()) {
         flatten(value, column + "_", row);
       } else if (value.is_array()) {
-        const bool plain = std::none_of(value.begin(), value.end(),
-                                        [](const Json& v) { return v.is_structured(); });
+        const bool plain = std::ranges::none_of(value, &Json::is_structured);
         if (!plain || value.empty()) continue;
         std::string cell;
         for (const Json& v : value) cell += (cell.empty() ? "" : " ") + scalar_cell(v);

@@ -183,8 +183,7 @@ Figure relaxation_figure(const OrganStudy& study, const StudyCurves& set, const 
         *data, 1.0, [](const Datum&) { return true; },
         [&](const Datum& d) { return d.depth_m.value_or(0.0) / rate + d.time_s.value_or(0.0); }));
     const Series& points = panel.series.back();
-    panel.y.upper =
-        std::max(*panel.y.upper, 1.08 * *std::max_element(points.y.begin(), points.y.end()));
+    panel.y.upper = std::max(*panel.y.upper, 1.08 * *std::ranges::max_element(points.y));
   }
   figure.caption += missing_words(study, set, conditions);
   return figure;

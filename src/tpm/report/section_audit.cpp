@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/report/sections.hpp"
 
 namespace tpm::report {
@@ -36,22 +37,11 @@ std::string consequence(const Finding& finding) {
 /// "holds 20, holds by truncation 2, ..." with every verdict that occurs.
 std::string counts(const AuditReport& audit) {
   std::vector<std::string> parts;
-  for (const AuditVerdict verdict :
-       {AuditVerdict::holds, AuditVerdict::holds_by_truncation, AuditVerdict::last_digit_off,
-        AuditVerdict::differs, AuditVerdict::contradicted, AuditVerdict::cannot_be_told}) {
+  for (const auto& [verdict, name] : kAuditVerdicts) {
     const int n = audit.count(verdict);
-    if (n > 0) parts.push_back(fmt::format("{} {}", verdict_name(verdict), n));
+    if (n > 0) parts.push_back(fmt::format("{} {}", name, n));
   }
   return fmt::format("{}", fmt::join(parts, ", "));
-}
-
-/// Topics in the order in which they first occur.
-std::vector<std::string> topics(const AuditReport& audit) {
-  std::vector<std::string> list;
-  for (const Finding& f : audit.findings) {
-    if (std::find(list.begin(), list.end(), f.topic) == list.end()) list.push_back(f.topic);
-  }
-  return list;
 }
 
 /// "2 Eq. 18" -> "Claims: Eq. 18"; the number only orders the claims file.
@@ -86,7 +76,7 @@ void add_audit(Document& document, const PaperReport& report) {
   document.paragraph(
       fmt::format("{} claims of the paper, each recomputed from its own equations and numbers: {}.",
                   audit.findings.size(), counts(audit)));
-  for (const std::string& topic : topics(audit)) {
+  for (const std::string& topic : each_once(audit.findings, &Finding::topic)) {
     Table table = empty_table();
     for (const Finding& f : audit.findings) {
       if (f.topic == topic) table.rows.push_back(row(f));

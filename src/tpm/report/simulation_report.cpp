@@ -35,19 +35,14 @@ const CurvePoint& largest(const SimulationRecord& record, double tolerance) {
 
 /// The blow that the tissue feels most; none if there is none.
 const ProbeBlow* largest_blow(const std::vector<ProbeBlow>& blows) {
-  const auto most =
-      std::max_element(blows.begin(), blows.end(), [](const ProbeBlow& a, const ProbeBlow& b) {
-        return std::abs(a.impulse_on_tissue_N_s) < std::abs(b.impulse_on_tissue_N_s);
-      });
+  const auto most = std::ranges::max_element(
+      blows, {}, [](const ProbeBlow& a) { return std::abs(a.impulse_on_tissue_N_s); });
   return most == blows.end() ? nullptr : &*most;
 }
 
 /// The point of the largest force on the tissue.
 const CurvePoint& hardest(const SimulationRecord& record) {
-  return *std::max_element(record.curve.begin(), record.curve.end(),
-                           [](const CurvePoint& a, const CurvePoint& b) {
-                             return a.force_on_tissue_N < b.force_on_tissue_N;
-                           });
+  return *std::ranges::max_element(record.curve, {}, &CurvePoint::force_on_tissue_N);
 }
 
 Json validity_json(const Validity& validity, bool depth_limits) {
@@ -152,8 +147,7 @@ Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
 /// A driven sphere is no tool: nothing holds it across the push unless the scene does.
 std::string sideways_words(const ExperimentScene& scene, const Probe& probe) {
   const std::vector<Slider>& sliders = scene.tissue.sliders;
-  const bool guided = std::any_of(sliders.begin(), sliders.end(),
-                                  [&](const Slider& g) { return g.sphere == probe.sphere; });
+  const bool guided = std::ranges::find(sliders, probe.sphere, &Slider::sphere) != sliders.end();
   return fmt::format("sphere {} is driven along its push and {} across it\n", probe.sphere + 1,
                      guided ? "guided" : "free");
 }

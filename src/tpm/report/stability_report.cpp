@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/table_document.hpp"
@@ -135,9 +136,8 @@ Table maps_table(const StabilityStudy& study) {
     std::vector<Cell> row{{map.quantity}, {step_rule_name(map.rule)}};
     for (const StabilityClassEntry& entry : kStabilityClasses) {
       if (entry.meaning == StabilityClass::not_applicable) continue;
-      const auto count = std::count_if(map.points.begin(), map.points.end(), [&](const auto& p) {
-        return p.verdict.found == entry.meaning;
-      });
+      const auto count = std::ranges::count_if(
+          map.points, [&](const auto& p) { return p.verdict.found == entry.meaning; });
       row.push_back({std::to_string(count)});
     }
     const Disagreement d = disagreement(map);
@@ -195,12 +195,11 @@ std::vector<std::string> stability_sentences(const StabilityStudy& study) {
   }
   for (const ServoRow& row : study.servo) {
     if (row.rate_Hz != 1000.0) continue;
-    std::vector<std::string> words;
-    for (const ServoCell& cell : row.cells) {
-      words.push_back(fmt::format("{} {}", step_rule_name(cell.rule), verdict_words(cell.verdict)));
-    }
+    const auto words = [](const ServoCell& cell) {
+      return fmt::format("{} {}", step_rule_name(cell.rule), verdict_words(cell.verdict));
+    };
     sentences.push_back(
-        fmt::format("{} at 1 kHz, paper's eta1: {}.", row.problem, fmt::join(words, "; ")));
+        fmt::format("{} at 1 kHz, paper's eta1: {}.", row.problem, listed(row.cells, words, "; ")));
   }
   std::size_t wrong = 0, cells = 0;
   for (const StabilityCorner& corner : study.corners) {
@@ -237,13 +236,9 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
     document.table(limits_table(study));
   }
   if (!study.servo.empty()) document.heading(2, "At servo rate");
-  std::vector<std::string> problems;
-  for (const ServoRow& row : study.servo) {
-    if (std::find(problems.begin(), problems.end(), row.problem) == problems.end()) {
-      problems.push_back(row.problem);
-    }
+  for (const std::string& problem : each_once(study.servo, &ServoRow::problem)) {
+    document.table(servo_table(study, problem));
   }
-  for (const std::string& problem : problems) document.table(servo_table(study, problem));
   if (!study.corners.empty()) {
     document.heading(2, "Degenerate corners");
     document.table(corners_table(study));

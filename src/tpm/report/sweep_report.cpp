@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
@@ -182,8 +183,7 @@ std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
 Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const SweepFigures& wished) {
   const auto& axes = sweep.axes();
   const auto is_fixed = [&](const std::string& name) {
-    return std::any_of(wished.fixed.begin(), wished.fixed.end(),
-                       [&](const auto& h) { return h.first == name; });
+    return std::ranges::any_of(wished.fixed, [&](const auto& h) { return h.first == name; });
   };
   std::string x = wished.x.value_or(axes.back().name);
   for (std::size_t a = axes.size(); a-- > 0 && !wished.x && is_fixed(x);) {
@@ -274,8 +274,7 @@ std::string named_in_unit(const std::string& name, const Unit& unit) {
 }
 
 std::string value_words(double value, const Unit& unit, int digits) {
-  return fmt::format("{}{}{}", significant(value / unit.to_si, digits),
-                     unit.symbol.empty() ? "" : " ", unit.symbol);
+  return with_unit(significant(value / unit.to_si, digits), unit);
 }
 
 std::string fixed_words(const std::vector<FixedValue>& fixed, int digits) {
@@ -383,8 +382,7 @@ Json sweep_json(const SweepReader& sweep) {
 std::vector<Figure> sweep_figures(const SweepReader& sweep, const SweepFigures& wished) {
   std::vector<Figure> figures;
   for (const ReadVariable& v : sweep.variables()) {
-    const bool named = std::find(wished.variables.begin(), wished.variables.end(), v.name) !=
-                       wished.variables.end();
+    const bool named = std::ranges::find(wished.variables, v.name) != wished.variables.end();
     if (named || (wished.variables.empty() && !v.name.starts_with("count_"))) {
       figures.push_back(sweep_figure(sweep, v, wished));
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/study_report.hpp"
 #include "tpm/study/printed_number.hpp"
@@ -19,10 +20,6 @@ constexpr double kKilo = 1e-3;
 
 std::string millimetres(double metres) {
   return significant(metres * kMillimetres, 6) + " mm";
-}
-
-std::string with_unit(const std::string& number, const Unit& unit) {
-  return unit.symbol.empty() ? number : number + " " + unit.symbol;
 }
 
 /// A line of a section: one quantity at one depth and spacing.

@@ -33,12 +33,10 @@ constexpr auto kKinds = std::to_array<ClaimKind>({
 });
 
 const ClaimKind& kind_named(const std::string& name, std::string_view at) {
-  const auto found = std::find_if(kKinds.begin(), kKinds.end(),
-                                  [&](const ClaimKind& k) { return k.name == name; });
+  const auto found = std::ranges::find(kKinds, name, &ClaimKind::name);
   if (found != kKinds.end()) return *found;
-  std::string known;
-  for (const ClaimKind& k : kKinds) known += (known.empty() ? "" : ", ") + std::string(k.name);
-  throw bad_input(at, fmt::format("unknown kind '{}'", printable(name)), "one of " + known);
+  throw bad_input(at, fmt::format("unknown kind '{}'", printable(name)),
+                  "one of " + listed(kKinds, &ClaimKind::name));
 }
 
 using Placeholders = std::map<std::string, std::string, std::less<>>;
@@ -117,15 +115,7 @@ Finding examine(const ClaimSet& set, const Json& item) {
 }  // namespace
 
 std::string_view verdict_name(AuditVerdict verdict) noexcept {
-  static constexpr auto kNames = std::to_array<Word<AuditVerdict>>({
-      {AuditVerdict::holds, "holds"},
-      {AuditVerdict::holds_by_truncation, "holds by truncation"},
-      {AuditVerdict::last_digit_off, "last digit off"},
-      {AuditVerdict::differs, "differs"},
-      {AuditVerdict::contradicted, "contradicted"},
-      {AuditVerdict::cannot_be_told, "cannot be told"},
-  });
-  return word_for(kNames, verdict);
+  return word_for(kAuditVerdicts, verdict);
 }
 
 std::string Finding::verdict_words() const {
@@ -150,8 +140,7 @@ bool Finding::stands() const noexcept {
 }
 
 int AuditReport::count(AuditVerdict verdict) const noexcept {
-  return static_cast<int>(std::count_if(findings.begin(), findings.end(),
-                                        [&](const Finding& f) { return f.verdict == verdict; }));
+  return static_cast<int>(std::ranges::count(findings, verdict, &Finding::verdict));
 }
 
 AuditReport run_audit(const Json& claims, std::string_view file) {

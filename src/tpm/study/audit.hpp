@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/study/claims.hpp"
 
 namespace tpm::study {
@@ -17,6 +18,14 @@ enum class AuditVerdict {
   cannot_be_told,       ///< the paper gives no number to hold it to
 };
 
+inline constexpr auto kAuditVerdicts = std::to_array<Word<AuditVerdict>>({
+    {AuditVerdict::holds, "holds"},
+    {AuditVerdict::holds_by_truncation, "holds by truncation"},
+    {AuditVerdict::last_digit_off, "last digit off"},
+    {AuditVerdict::differs, "differs"},
+    {AuditVerdict::contradicted, "contradicted"},
+    {AuditVerdict::cannot_be_told, "cannot be told"},
+});
 [[nodiscard]] std::string_view verdict_name(AuditVerdict verdict) noexcept;
 
 /// A number in the unit in which people read it.

@@ -80,10 +80,8 @@ Json to_json(const AuditReport& report) {
   json["title"] = report.title;
   json["findings"] = array_json(report.findings, finding_json);
   Json counts;
-  for (const AuditVerdict verdict :
-       {AuditVerdict::holds, AuditVerdict::holds_by_truncation, AuditVerdict::last_digit_off,
-        AuditVerdict::differs, AuditVerdict::contradicted, AuditVerdict::cannot_be_told}) {
-    counts[std::string(verdict_name(verdict))] = report.count(verdict);
+  for (const auto& [verdict, name] : kAuditVerdicts) {
+    counts[std::string(name)] = report.count(verdict);
   }
   json["summary"] = std::move(counts);
   return json;

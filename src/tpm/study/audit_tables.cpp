@@ -4,6 +4,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/quantity_text.hpp"
 #include "tpm/study/audit_kinds.hpp"
 #include "tpm/study/printed_number.hpp"
@@ -61,12 +62,8 @@ std::vector<Series> series_of(const ClaimReader& claim) {
 }
 
 std::string expressions(const std::vector<Series>& all) {
-  std::string text;
-  for (const Series& s : all) {
-    if (!text.empty()) text += "; ";
-    text += fmt::format("{} = {}", s.column, s.expression);
-  }
-  return text;
+  const auto words = [](const Series& s) { return fmt::format("{} = {}", s.column, s.expression); };
+  return listed(all, words, "; ");
 }
 
 void check_single_band(const ClaimReader& claim, Finding& finding) {

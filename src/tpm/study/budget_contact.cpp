@@ -171,9 +171,8 @@ ErrorBudget contact_budget(const LawFile& law, const Protocol& motion, std::vect
   }
   const LawFile plain = at_surface(law);
   std::vector<BudgetStage> stages{law_stage(plain, motion, times_s)};
-  for (BudgetStage& stage : loop_stages(plain, motion, times_s, options.device)) {
-    stages.push_back(std::move(stage));
-  }
+  std::ranges::move(loop_stages(plain, motion, times_s, options.device),
+                    std::back_inserter(stages));
   ErrorBudget budget = budget_of(std::move(times_s), std::move(stages));
   budget.title = fmt::format("{} at one contact", law_name(law.spec));
   add_random_part(budget, plain, motion, options);
@@ -201,9 +200,8 @@ ErrorBudget contact_budget(const LawFile& law, const PreparedRecording& recordin
   }
   const LawFile plain = at_surface(law);
   std::vector<BudgetStage> stages{std::move(readings), law_stage(plain, motion, times_s)};
-  for (BudgetStage& stage : loop_stages(plain, motion, times_s, options.device)) {
-    stages.push_back(std::move(stage));
-  }
+  std::ranges::move(loop_stages(plain, motion, times_s, options.device),
+                    std::back_inserter(stages));
   ErrorBudget budget = budget_of(std::move(times_s), std::move(stages));
   budget.title = fmt::format("{} along {}", law_name(law.spec),
                              std::filesystem::path(recording.name).filename().string());

@@ -33,9 +33,7 @@ ExperimentScene guided(ExperimentScene scene) {
                     "a scene with one contact of the kind sphere and a protocol of depths");
   }
   std::vector<Slider>& sliders = scene.tissue.sliders;
-  const bool there = std::any_of(sliders.begin(), sliders.end(), [&](const Slider& slider) {
-    return slider.sphere == probe.sphere;
-  });
+  const bool there = std::ranges::find(sliders, probe.sphere, &Slider::sphere) != sliders.end();
   if (!there) sliders.push_back({probe.sphere, probe.direction});
   return scene;
 }

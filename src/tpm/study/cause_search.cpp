@@ -186,9 +186,8 @@ std::vector<AuditCause> search_causes(const ClaimReader& reader, const ClaimValu
     search.try_any_value(input);
   }
   std::vector<AuditCause> causes = search.take();
-  std::stable_sort(causes.begin(), causes.end(), [](const AuditCause& a, const AuditCause& b) {
-    return std::tuple(!a.only_printed, a.digits, a.relative_change) <
-           std::tuple(!b.only_printed, b.digits, b.relative_change);
+  std::ranges::stable_sort(causes, {}, [](const AuditCause& a) {
+    return std::tuple(!a.only_printed, a.digits, a.relative_change);
   });
   if (causes.size() > limit) causes.resize(limit);
   return causes;

@@ -110,8 +110,7 @@ std::vector<AuditInput> ClaimReader::inputs(const std::string& expression,
 
 void append(std::vector<AuditInput>& inputs, std::vector<AuditInput> more) {
   for (AuditInput& input : more) {
-    const bool known = std::any_of(inputs.begin(), inputs.end(),
-                                   [&](const AuditInput& i) { return i.name == input.name; });
+    const bool known = std::ranges::find(inputs, input.name, &AuditInput::name) != inputs.end();
     if (!known) inputs.push_back(std::move(input));
   }
 }

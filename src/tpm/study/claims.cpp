@@ -88,8 +88,7 @@ void require_unique(const Range& range, const Name& name_of, std::string_view at
 }  // namespace
 
 bool PrintedTable::has_column(std::string_view name) const noexcept {
-  return std::any_of(columns.begin(), columns.end(),
-                     [&](const PrintedColumn& c) { return c.name == name; });
+  return std::ranges::any_of(columns, [&](const PrintedColumn& c) { return c.name == name; });
 }
 
 std::size_t PrintedTable::column(std::string_view name, std::string_view at) const {
@@ -105,8 +104,7 @@ double PrintedTable::si(std::size_t row, std::size_t column, std::string_view at
 }
 
 const PrintedSymbol* ClaimSet::symbol(std::string_view name) const noexcept {
-  const auto found = std::find_if(symbols.begin(), symbols.end(),
-                                  [&](const PrintedSymbol& s) { return s.name == name; });
+  const auto found = std::ranges::find(symbols, name, &PrintedSymbol::name);
   return found == symbols.end() ? nullptr : &*found;
 }
 

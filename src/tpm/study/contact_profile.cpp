@@ -130,9 +130,7 @@ IntervalFactors profile_contact(const ResidualFunction& residuals, const Contact
   const std::vector<AtContact> contacts =
       walker.contacts(kContactStep * s * std::sqrt(variance[place]), most * most / degrees);
   if (contacts.empty()) return factors;
-  const auto least = std::min_element(
-      contacts.begin(), contacts.end(),
-      [](const AtContact& a, const AtContact& b) { return a.deviance < b.deviance; });
+  const auto least = std::ranges::min_element(contacts, {}, &AtContact::deviance);
   const double s2 = least->deviance / degrees;
   const Eigen::VectorXd theta = walker.theta_at_minimum();
   for (Eigen::Index k = 0; k < p; ++k) {

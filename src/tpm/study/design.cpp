@@ -212,13 +212,12 @@ void evaluate_candidates(DesignResult& result, const Knowledge& before) {
 }
 
 void rank(DesignResult& result) {
-  std::stable_sort(result.ranked.begin(), result.ranked.end(),
-                   [](const DesignCandidate& a, const DesignCandidate& b) {
-                     if (a.expected.score != b.expected.score) {
-                       return a.expected.score < b.expected.score;
-                     }
-                     return a.experiment.total_s() < b.experiment.total_s();
-                   });
+  std::ranges::stable_sort(result.ranked, [](const DesignCandidate& a, const DesignCandidate& b) {
+    if (a.expected.score != b.expected.score) {
+      return a.expected.score < b.expected.score;
+    }
+    return a.experiment.total_s() < b.experiment.total_s();
+  });
   for (std::size_t i = 0; i < result.ranked.size(); ++i) {
     if (!result.ranked[i].expected.all_identified()) continue;
     if (!result.cheapest || result.ranked[i].experiment.total_s() <
@@ -263,8 +262,7 @@ double PlannedExperiment::samples() const {
 }
 
 bool Expectation::all_identified() const {
-  return std::all_of(parameters.begin(), parameters.end(),
-                     [](const ExpectedParameter& p) { return p.identified; });
+  return std::ranges::all_of(parameters, [](const ExpectedParameter& p) { return p.identified; });
 }
 
 double inflation(double interval_s, double correlation_time_s, double samples) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/give_up.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
@@ -138,15 +139,13 @@ DesignCheck check_design(const DesignProblem& problem, const PlannedExperiment& 
       data.emplace_back(scattered(std::get<PointSet>(planned.data[i]), neighbours[i], random));
     }
     progress.advance();
-    try {
+    const std::string failure = gave_up([&] {
       const FitResult fit = run_fit(planned.config, data);
       collect(fit, errors);
       ++check.sets;
       if (on_a_bound(fit, material)) ++check.at_bound;
-    } catch (const Error& error) {
-      if (error.code() != ExitCode::numerical) throw;
-      ++check.failed;
-    }
+    });
+    if (!failure.empty()) ++check.failed;
   }
   if (2 * check.sets < sets) {
     throw Error(

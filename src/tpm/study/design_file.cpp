@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/store/renamed_names.hpp"
@@ -130,13 +131,11 @@ FitConfig parse_model(const Json& document, const DocumentPlace& place) {
 
 std::size_t parameter_place(const FitConfig& config, const std::string& name,
                             const DocumentPlace& place, std::string_view besides) {
-  std::vector<std::string> known;
-  for (const EstimatedParameter& p : config.parameters) {
-    if (p.fit.name == name) return known.size();
-    known.push_back(p.fit.name);
-  }
+  const std::vector<FitParameter> all = searched_parameters(config);
+  const auto found = std::ranges::find(all, name, &FitParameter::name);
+  if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
   throw bad_input(place.where, fmt::format("no parameter is called '{}'", printable(name)),
-                  fmt::format("{}{}", besides, fmt::join(known, ", ")));
+                  fmt::format("{}{}", besides, listed(all, &FitParameter::name)));
 }
 
 void separate_nuisance(const Json& document, DesignProblem& problem, const DocumentPlace& place) {

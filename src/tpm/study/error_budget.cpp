@@ -88,9 +88,8 @@ std::string waste_sentence(const ErrorBudget& budget) {
 }
 
 std::string largest_sentence(const ErrorBudget& budget) {
-  const auto most =
-      std::max_element(budget.lines.begin(), budget.lines.end(),
-                       [](const auto& a, const auto& b) { return a.largest < b.largest; });
+  const auto most = std::ranges::max_element(
+      budget.lines, [](const auto& a, const auto& b) { return a.largest < b.largest; });
   if (budget.random && budget.random->largest > most->largest) {
     return fmt::format("the largest is the uncertainty of the law's parameters, {} of the peak",
                        part_text(budget.random->largest));
@@ -113,8 +112,7 @@ ErrorBudget budget_of(std::vector<double> time_s, std::vector<BudgetStage> stage
   budget.time_s = std::move(time_s);
   for (const BudgetStage& stage : stages) {
     if (stage.force_N.size() == budget.time_s.size() &&
-        std::all_of(stage.force_N.begin(), stage.force_N.end(),
-                    [](double f) { return std::isfinite(f); })) {
+        std::ranges::all_of(stage.force_N, [](double f) { return std::isfinite(f); })) {
       continue;
     }
     throw bad_input(fmt::format("budget: stage {}", stage.name),

@@ -77,8 +77,7 @@ DrawnProfile drawn_profile(const ExperimentResiduals& residuals, const FitResult
       drawn.points.push_back({start[index], minimum.deviance});
     }
   }
-  std::sort(drawn.points.begin(), drawn.points.end(),
-            [](const ProfilePoint& a, const ProfilePoint& b) { return a.natural < b.natural; });
+  std::ranges::sort(drawn.points, {}, &ProfilePoint::natural);
   return drawn;
 }
 

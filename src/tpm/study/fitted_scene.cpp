@@ -45,8 +45,7 @@ double set_element(Json& scene, const std::vector<ParameterDescription>& table,
     }
   }
   const auto constant = [&](std::string_view name) {
-    const auto at = std::find_if(table.begin(), table.end(),
-                                 [&](const ParameterDescription& p) { return p.name == name; });
+    const auto at = std::ranges::find(table, name, &ParameterDescription::name);
     return values[static_cast<std::size_t>(at - table.begin())];
   };
   return constant("eta1") / (constant("E1") + constant("E2"));

@@ -55,8 +55,7 @@ class HoldWatch {
 
 /// Intervals hold only where contact and offset are off their bounds.
 bool any_at_bound(const SequentialEstimate& estimate) {
-  return std::any_of(estimate.parameters.begin(), estimate.parameters.end(),
-                     [](const SequentialParameter& p) { return p.at_bound; });
+  return std::ranges::any_of(estimate.parameters, &SequentialParameter::at_bound);
 }
 
 /// Watches the widths and says when to stop.

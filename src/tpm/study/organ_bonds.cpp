@@ -88,8 +88,7 @@ Eigen::MatrixXd FittedBonds::along(const OrganModel& model) const {
   const std::vector<std::string> all = names();
   Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(std::ssize(table), std::ssize(all));
   const auto row = [&](std::string_view name) {
-    const auto found =
-        std::find_if(table.begin(), table.end(), [&](const auto& p) { return p.name == name; });
+    const auto found = std::ranges::find_if(table, [&](const auto& p) { return p.name == name; });
     return static_cast<Eigen::Index>(found - table.begin());
   };
   // Einf and every g_j, then the times, then the parameters of the potential.

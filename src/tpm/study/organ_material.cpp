@@ -7,6 +7,7 @@
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/give_up.hpp"
 #include "tpm/fit/least_squares.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/organ_bonds.hpp"
@@ -133,7 +134,7 @@ class OrganLessLaw final : public ResidualFunction {
     residual.resize(residual_count());
     if (jacobian != nullptr) jacobian->resize(residual_count(), along.cols());
     Eigen::Index row = 0;
-    try {
+    const std::string buckled = gave_up([&] {
       for (std::size_t i = 0; i < motions_.size(); ++i) {
         const Response response =
             model_.respond_along(motions_[i].protocol, motions_[i].time_s, values, along);
@@ -143,11 +144,8 @@ class OrganLessLaw final : public ResidualFunction {
         if (jacobian != nullptr) jacobian->middleRows(row, n) = response.sensitivity / unit;
         row += n;
       }
-    } catch (const Error& error) {  // an organ that buckles: the search turns away
-      if (error.code() != ExitCode::numerical) throw;
-      return false;
-    }
-    return residual.allFinite();
+    });
+    return buckled.empty() && residual.allFinite();  // the search turns away
   }
 
  private:

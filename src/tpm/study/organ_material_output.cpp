@@ -91,10 +91,7 @@ double deepest_of(const MaterialCourse& c) {
 
 /// The one that reaches deepest.
 const MaterialCourse& deepest_course(const OrganMaterial& m) {
-  return *std::max_element(m.courses.begin(), m.courses.end(),
-                           [](const MaterialCourse& a, const MaterialCourse& b) {
-                             return deepest_of(a) < deepest_of(b);
-                           });
+  return *std::ranges::max_element(m.courses, {}, deepest_of);
 }
 
 /// Depth over time of the ramp: of the way from 10 to 90 % of the depth.

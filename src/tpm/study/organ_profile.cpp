@@ -196,8 +196,7 @@ Profile short_profile(const ResidualFunction& function, std::span<const FitParam
   profile.points.push_back({best.natural[index], best.deviance});
   walk.run(-1, half_width, profile, profile.below, profile.lower);
   if (!profile.better) walk.run(+1, half_width, profile, profile.above, profile.upper);
-  std::sort(profile.points.begin(), profile.points.end(),
-            [](const ProfilePoint& a, const ProfilePoint& b) { return a.natural < b.natural; });
+  std::ranges::sort(profile.points, {}, &ProfilePoint::natural);
   return profile;
 }
 

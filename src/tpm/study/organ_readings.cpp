@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 
+#include "tpm/core/give_up.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpm/study/organ_profile.hpp"
@@ -77,14 +78,12 @@ class OrganLessReadings final : public ResidualFunction {
     residual.resize(residual_count());
     if (jacobian != nullptr) jacobian->setZero(residual_count(), std::ssize(natural));
     Eigen::Index row = 0;
-    try {
+    const std::string buckled = gave_up([&] {
       for (std::size_t i = 0; i < recordings_.size(); ++i) {
         row = add_rows(i, natural, row, residual, jacobian);
       }
-    } catch (const Error& error) {  // an organ that buckles: the search turns away
-      if (error.code() != ExitCode::numerical) throw;
-      return false;
-    }
+    });
+    if (!buckled.empty()) return false;  // the search turns away
     return residual.allFinite() && (jacobian == nullptr || jacobian->allFinite());
   }
 

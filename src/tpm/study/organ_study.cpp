@@ -8,6 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "tpm/core/give_up.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
@@ -77,24 +78,14 @@ void answer_creep(const Model& model, const StudyCondition& c, const TpmVector& 
 }
 
 StudyCurve answer(const Model& model, const StudyCondition& condition, const TpmVector& values) {
-  StudyCurve curve;
-  try {
-    switch (condition.kind) {
-      case Kind::ramp_hold:
-        answer_ramp(model, condition, values, curve);
-        break;
-      case Kind::creep:
-        answer_creep(model, condition, values, curve);
-        break;
-      default:
-        answer_static(model, condition, values, curve);
-    }
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::numerical) throw;
-    curve = {};
-    curve.failure = error.what();
-  }
-  return curve;
+  StudyCurve curve, failed;
+  failed.failure = gave_up([&] {
+    const auto& answer_to = condition.kind == Kind::ramp_hold ? answer_ramp
+                            : condition.kind == Kind::creep   ? answer_creep
+                                                              : answer_static;
+    answer_to(model, condition, values, curve);
+  });
+  return failed.failure.empty() ? curve : failed;
 }
 
 void compare_with_first(const StudyCurve& first, StudyCurve& curve) {
@@ -113,12 +104,7 @@ std::optional<std::size_t> own_fit(const OrganStudyConfig& config, Kind kind) {
 
 TissueFit fitted(const FitConfig& config, std::size_t fit, std::size_t tissue) {
   TissueFit made{fit, tissue, std::nullopt, {}};
-  try {
-    made.result = run_fit(config);
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::numerical) throw;
-    made.failure = error.what();
-  }
+  made.failure = gave_up([&] { made.result = run_fit(config); });
   return made;
 }
 

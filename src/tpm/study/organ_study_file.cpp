@@ -92,9 +92,8 @@ Hypothesis parse_fixed(const Json& hold, const std::string& name, const FitConfi
                        const DocumentPlace& place) {
   Hypothesis fixed{name, {}};
   for (const auto& [parameter, text] : hold.items()) {
-    const auto found =
-        std::find_if(config.parameters.begin(), config.parameters.end(),
-                     [&key = parameter](const auto& p) { return p.fit.name == key; });
+    const auto found = std::ranges::find_if(
+        config.parameters, [&key = parameter](const auto& p) { return p.fit.name == key; });
     const DocumentPlace here = place.key(parameter);
     if (found == config.parameters.end()) {
       throw bad_input(here.where, "is not estimated", "a name under /parameters");
@@ -120,8 +119,7 @@ std::vector<StudyMaterial> parse_materials(const Json& list, const std::vector<S
   for (const auto& j : list) {
     const DocumentPlace here = place.key(std::to_string(index++));
     const auto fit_name = j.at("fit").get<std::string>();
-    const auto fit = std::find_if(fits.begin(), fits.end(),
-                                  [&](const StudyFit& f) { return f.name == fit_name; });
+    const auto fit = std::ranges::find(fits, fit_name, &StudyFit::name);
     if (fit == fits.end()) {
       throw bad_input(here.key("fit").where, fmt::format("no fit '{}'", printable(fit_name)),
                       "a name under /fits");

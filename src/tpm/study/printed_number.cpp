@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -74,17 +75,13 @@ std::string percent_text(double percent, int decimals) {
 }
 
 std::string_view verdict_name(DigitVerdict verdict) noexcept {
-  switch (verdict) {
-    case DigitVerdict::by_rounding:
-      return "exact by rounding";
-    case DigitVerdict::by_truncation:
-      return "exact by truncation";
-    case DigitVerdict::last_digit_off:
-      return "last digit off";
-    case DigitVerdict::differs:
-      return "differs";
-  }
-  return "";
+  static constexpr auto kNames = std::to_array<Word<DigitVerdict>>({
+      {DigitVerdict::by_rounding, "exact by rounding"},
+      {DigitVerdict::by_truncation, "exact by truncation"},
+      {DigitVerdict::last_digit_off, "last digit off"},
+      {DigitVerdict::differs, "differs"},
+  });
+  return word_for(kNames, verdict);
 }
 
 std::optional<double> DigitCheck::window_percent() const noexcept {

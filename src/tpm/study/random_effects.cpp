@@ -146,9 +146,8 @@ Repeats by_specimen(std::span<const SpecimenEstimate> repeats) {
   };
   Repeats groups;
   for (const SpecimenEstimate& e : repeats) {
-    const auto known = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
-      return specimen_of(group.front()) == specimen_of(e);
-    });
+    const auto known = std::ranges::find_if(
+        groups, [&](const auto& group) { return specimen_of(group.front()) == specimen_of(e); });
     (known == groups.end() ? groups.emplace_back() : *known).push_back(e);
   }
   return groups;

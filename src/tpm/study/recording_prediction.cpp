@@ -60,9 +60,7 @@ void add_own_directions(UncertainCoordinates& u, const OwnPlacement& own, const 
 bool has_read(const LawFile& law, const PreparedRecording& recording) {
   const std::string& sha256 = recording.recording.header.sha256;
   const auto& data = law.uncertainty->data;
-  return !sha256.empty() && std::any_of(data.begin(), data.end(), [&](const FittedFile& file) {
-    return file.sha256 == sha256;
-  });
+  return !sha256.empty() && std::ranges::find(data, sha256, &FittedFile::sha256) != data.end();
 }
 
 void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& recording) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
@@ -79,9 +80,8 @@ void count_choice(const Selection& selection, const Trials& trials, ChoiceCount&
   const std::string true_values = law_name(trials.law);
   const std::string name = law_name(chosen.law);
   ++count.chosen[name];
-  const auto generating =
-      std::find_if(selection.candidates.begin(), selection.candidates.end(),
-                   [&](const Candidate& c) { return law_name(c.law) == true_values; });
+  const auto generating = std::ranges::find_if(
+      selection.candidates, [&](const Candidate& c) { return law_name(c.law) == true_values; });
   if (name == true_values) {
     ++count.returned;
   } else if (predicts_true_curve(chosen.fit, trials)) {
@@ -126,8 +126,7 @@ void count_intervals(const ExperimentResiduals& function, const Trials& trials,
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     deviance.push_back(profile_deviance(function, parameters, starts, i, true_values[i]));
   }
-  const double least =
-      std::min(fit.best.deviance, *std::min_element(deviance.begin(), deviance.end()));
+  const double least = std::min(fit.best.deviance, *std::ranges::min_element(deviance));
   // The search ends within 1e-4 standard deviations of a minimum.
   constexpr double kDeeper = 1e-3;
   if (least < fit.best.deviance * (1.0 - kDeeper / fit.value_count)) ++result.missed;
@@ -158,12 +157,10 @@ void run_trial(const Trials& trials, const SelectionOptions& options, Random& ra
 }
 
 std::string coverage_text(const std::vector<ParameterCoverage>& parameters, int trials) {
-  std::string text;
-  for (const ParameterCoverage& p : parameters) {
-    text += fmt::format("{}{} {:.1f}{}", text.empty() ? "" : ", ", p.name,
-                        100.0 * p.covered / trials, p.p_value < 0.001 ? "!" : "");
-  }
-  return text;
+  return listed(parameters, [&](const ParameterCoverage& p) {
+    return fmt::format("{} {:.1f}{}", p.name, 100.0 * p.covered / trials,
+                       p.p_value < 0.001 ? "!" : "");
+  });
 }
 
 /// The laws that were returned instead, most frequent first.
@@ -173,11 +170,8 @@ std::string others_text(const ChoiceCount& c, const std::string& true_values) {
     if (name != true_values) others.emplace_back(-count, name);
   }
   std::sort(others.begin(), others.end());
-  std::string text;
-  for (const auto& [count, name] : others) {
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", -count, name);
-  }
-  return text;
+  return listed(others,
+                [](const auto& other) { return fmt::format("{} {}", -other.first, other.second); });
 }
 
 }  // namespace
@@ -211,8 +205,7 @@ std::vector<double> visible_parameters(const LawSpec& law, double order) {
 }
 
 bool RecoveryResult::fulfilled() const {
-  return std::all_of(choices.begin(), choices.end(),
-                     [](const ChoiceCount& c) { return c.fulfilled(); });
+  return std::ranges::all_of(choices, [](const ChoiceCount& c) { return c.fulfilled(); });
 }
 
 bool ChoiceCount::fulfilled() const {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/give_up.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/recording_setup.hpp"
@@ -29,9 +30,7 @@ std::vector<std::vector<double>> standardised_runs(const FitResult& fit) {
 
 Correlation correlation_of(const FitResult& fit) {
   const auto runs = standardised_runs(fit);
-  std::vector<std::span<const double>> views;
-  views.reserve(runs.size());
-  for (const auto& run : runs) views.emplace_back(run);
+  const std::vector<std::span<const double>> views(runs.begin(), runs.end());
   return residual_correlation(views);
 }
 
@@ -267,7 +266,7 @@ void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
   // Coefficients go from one recording to another only at one reference depth.
   SetupOptions setup = options.setup;
   setup.reference = c.law.reference;
-  try {
+  const std::string failure = gave_up([&] {
     if (recordings.size() == 1) {
       const auto held = predict_second_half(c, recordings.front(), setup);
       if (held) c.held_out.push_back(*held);
@@ -276,13 +275,10 @@ void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
         c.held_out.push_back(predict_one(c, recordings, i, setup));
       }
     }
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::numerical) throw;
-    c.held_out.push_back({fmt::format("failed: {}", error.what()),
-                          std::numeric_limits<double>::infinity(),
-                          std::numeric_limits<double>::infinity(),
-                          std::numeric_limits<double>::infinity(), 0.0, false});
-  }
+  });
+  if (failure.empty()) return;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  c.held_out.push_back({"failed: " + failure, kInfinity, kInfinity, kInfinity, 0.0, false});
 }
 
 /// A law predicts what it has not seen if it comes as near as the nearest law does that has.
@@ -408,11 +404,10 @@ void rank_candidates(Selection& s) {
     c.delta_aicc = c.aicc - best_aicc;
     c.delta_bic = c.bic - best_bic;
   }
-  std::stable_sort(s.candidates.begin(), s.candidates.end(),
-                   [](const Candidate& a, const Candidate& b) {
-                     if (a.failed != b.failed) return b.failed;
-                     return a.bic < b.bic;
-                   });
+  std::ranges::stable_sort(s.candidates, [](const Candidate& a, const Candidate& b) {
+    if (a.failed != b.failed) return b.failed;
+    return a.bic < b.bic;
+  });
   s.recommended = least_within(s.candidates, s.margin);
 }
 
@@ -469,9 +464,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
     chosen.fit = run_fit(recording_config(chosen.law, recordings, options.setup), data);
     reassess(chosen, protocol_spans(recordings));
   }
-  for (std::string& warning : protocol_warnings(chosen.fit, recordings)) {
-    s.warnings.push_back(std::move(warning));
-  }
+  std::ranges::move(protocol_warnings(chosen.fit, recordings), std::back_inserter(s.warnings));
   describe(s);
   return s;
 }

@@ -45,8 +45,7 @@ std::vector<std::string> unit_warnings(std::span<const PreparedRecording> record
   std::vector<std::string> warnings;
   for (const PreparedRecording& r : recordings) {
     if (r.recording.drive_quantity != Quantity::indentation_depth) continue;
-    const auto [low, high] =
-        std::minmax_element(r.recording.drive.begin(), r.recording.drive.end());
+    const auto [low, high] = std::ranges::minmax_element(r.recording.drive);
     if (*high - *low <= kDeepest_m) continue;
     warnings.push_back(
         fmt::format("{}: the depth changes by {} m: is its unit right? (--unit \"COLUMN=mm\")",

@@ -241,10 +241,9 @@ std::vector<std::vector<double>> SequentialFit::next_starts(const ResidualFuncti
   std::vector<bool> linear;
   for (std::size_t i = 0; i < config.parameters.size(); ++i)
     linear.push_back(function.linear_in(i));
-  for (auto& start : projected_starts(function, searched_parameters(config), linear,
-                                      settings_.starts, kKeptStarts, settings_.seed)) {
-    starts.push_back(std::move(start));
-  }
+  std::ranges::move(projected_starts(function, searched_parameters(config), linear,
+                                     settings_.starts, kKeptStarts, settings_.seed),
+                    std::back_inserter(starts));
   return starts;
 }
 

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "tpm/core/give_up.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -31,9 +32,8 @@ std::vector<Tally> tally_laws(std::span<const PreparedRecording> recordings,
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     const Selection selection = select_law(recordings.subspan(i, 1), options);
     for (const Candidate& c : selection.candidates) {
-      const auto found = std::find_if(tallies.begin(), tallies.end(), [&](const Tally& t) {
-        return law_name(t.law) == law_name(c.law);
-      });
+      const auto found = std::ranges::find_if(
+          tallies, [&](const Tally& t) { return law_name(t.law) == law_name(c.law); });
       Tally& tally =
           found == tallies.end() ? tallies.emplace_back(Tally{c.law, 0, 0, 0, 0}) : *found;
       if (c.failed) continue;
@@ -94,9 +94,8 @@ std::vector<std::size_t> branches_by_time(const LawSpec& law, const FitResult& f
     if (k && tau) branches.emplace_back(*k, *tau);
   }
   auto sorted = branches;
-  std::stable_sort(sorted.begin(), sorted.end(), [&](const auto& a, const auto& b) {
-    return fit.parameters[a.second].estimate < fit.parameters[b.second].estimate;
-  });
+  std::ranges::stable_sort(sorted, {},
+                           [&](const auto& a) { return fit.parameters[a.second].estimate; });
   for (std::size_t i = 0; i < branches.size(); ++i) {
     place[branches[i].first] = sorted[i].first;
     place[branches[i].second] = sorted[i].second;
@@ -109,13 +108,10 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
   SpecimenRow row;
   row.name = one.front().name;
   row.specimen = one.front().specimen;
-  try {
+  row.reason = gave_up([&] {
     row.fit = run_fit(recording_config(law, one, setup), data_sets(one));
     row.place = branches_by_time(law, *row.fit);
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::numerical) throw;
-    row.reason = error.what();
-  }
+  });
   return row;
 }
 

@@ -18,8 +18,7 @@ constexpr int kKept = 6;  // significant digits in JSON
 /// Largest depth above contact among the fitted samples.
 std::optional<double> fitted_depth(const FitResult& fit) {
   const std::vector<LawParameter> table = law_parameters(fit.config.law.value());
-  const auto contact = std::find_if(table.begin(), table.end(),
-                                    [](const LawParameter& p) { return p.name == "contact"; });
+  const auto contact = std::ranges::find(table, "contact", &LawParameter::name);
   std::optional<double> deepest;
   for (const RecordingFit& r : fit.recordings) {
     const double begins = model_parameters(

@@ -61,8 +61,7 @@ SweepConvergence convergence_of(const SweepReader& sweep, const std::string& var
   const std::vector<double> values = sweep.slice(variable, {}, axis.name, fixed);
   std::vector<std::size_t> order(sizes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return sizes[a] > sizes[b]; });
+  std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return sizes[a] > sizes[b]; });
   for (const std::size_t place : order) {
     if (!std::isfinite(values[place])) {
       ++found.left_out;

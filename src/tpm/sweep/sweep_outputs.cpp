@@ -160,10 +160,9 @@ void require_identifier(const std::string& name, std::string_view where) {
   const auto letter = [](char c) {
     return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_';
   };
-  const bool good =
-      !name.empty() && letter(name.front()) && std::all_of(name.begin(), name.end(), [&](char c) {
-        return letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0;
-      });
+  const bool good = !name.empty() && letter(name.front()) && std::ranges::all_of(name, [&](char c) {
+    return letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0;
+  });
   if (good) return;
   throw bad_input(where, fmt::format("'{}' cannot be a name", printable(name)),
                   "letters, digits and _, no digit first");

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "tpm/core/lists.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {
@@ -11,16 +12,6 @@ namespace {
 
 std::string path_of(const std::string& name) {
   return fmt::format("/{}", name);
-}
-
-template <class List>
-std::string names_in(const List& list) {
-  std::string names;
-  for (const auto& entry : list) {
-    names += names.empty() ? "" : ", ";
-    names += entry.name;
-  }
-  return names;
 }
 
 }  // namespace
@@ -51,19 +42,17 @@ SweepReader::SweepReader(const std::filesystem::path& file) : file_(file) {
 }
 
 const ReadVariable& SweepReader::variable(const std::string& name) const {
-  const auto found = std::find_if(variables_.begin(), variables_.end(),
-                                  [&](const ReadVariable& v) { return v.name == name; });
+  const auto found = std::ranges::find(variables_, name, &ReadVariable::name);
   if (found != variables_.end()) return *found;
   throw bad_input("sweep", fmt::format("no variable '{}'", printable(name)),
-                  fmt::format("one of {}", names_in(variables_)));
+                  fmt::format("one of {}", listed(variables_, &ReadVariable::name)));
 }
 
 std::size_t SweepReader::axis(const std::string& name) const {
-  const auto found =
-      std::find_if(axes_.begin(), axes_.end(), [&](const ReadAxis& a) { return a.name == name; });
+  const auto found = std::ranges::find_if(axes_, [&](const ReadAxis& a) { return a.name == name; });
   if (found != axes_.end()) return static_cast<std::size_t>(found - axes_.begin());
   throw bad_input("sweep", fmt::format("no axis '{}'", printable(name)),
-                  fmt::format("one of {}", names_in(axes_)));
+                  fmt::format("one of {}", listed(axes_, &ReadAxis::name)));
 }
 
 std::uint64_t SweepReader::cells() const {

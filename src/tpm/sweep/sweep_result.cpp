@@ -161,8 +161,7 @@ class ResultWriter {
       const std::string name = path_to(sweep_.axes[a].name);
       out_.array(name, Number::float64, {sweep_.axes[a].size});
       const auto own =
-          std::find_if(sweep_.parameters.begin(), sweep_.parameters.end(),
-                       [&](const SweptParameter& p) { return p.name == sweep_.axes[a].name; });
+          std::ranges::find(sweep_.parameters, sweep_.axes[a].name, &SweptParameter::name);
       write_along(name, a, own == sweep_.parameters.end() ? nullptr : &*own);
       out_.dimension_scale(name);
     }
