@@ -128,10 +128,9 @@ Json network_picture(const Tissue& tissue) {
     json["normal"].push_back({rounded(n.x(), kNetworkDigits), rounded(n.y(), kNetworkDigits),
                               rounded(n.z(), kNetworkDigits)});
   }
-  json["bonds"] = Json::array();
-  for (const Bond& bond : tissue.network.bonds) {
-    json["bonds"].push_back({bond.a, bond.b, bond.kind == BondKind::radial ? 0 : 1});
-  }
+  json["bonds"] = array_json(tissue.network.bonds, [](const Bond& bond) {
+    return Json{bond.a, bond.b, bond.kind == BondKind::radial ? 0 : 1};
+  });
   return json;
 }
 

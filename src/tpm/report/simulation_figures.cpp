@@ -33,9 +33,7 @@ Json rows_json(const Positions& position) {
 
 template <class Numbers>
 Json list_json(const Numbers& numbers, double unit) {
-  Json list = Json::array();
-  for (const double value : numbers) list.push_back(rounded(value / unit, kDrawnDigits));
-  return list;
+  return array_json(numbers, [&](double value) { return rounded(value / unit, kDrawnDigits); });
 }
 
 std::string roughness_words(const std::optional<Smoothness>& found) {
@@ -132,8 +130,7 @@ Json deformation_pictures(const std::vector<FiguredRun>& runs) {
   json["contact"] = scene.probe().sphere;
   json["tools"] = tools_json(runs.front().network->driven, runs.front().network->driven.rest);
   json["direction"] = {d.x(), d.y(), d.z()};
-  json["states"] = Json::array();
-  for (const FiguredRun& figured : runs) json["states"].push_back(state_json(figured));
+  json["states"] = array_json(runs, state_json);
   return json;
 }
 

@@ -57,8 +57,7 @@ Json validity_json(const Validity& validity, bool depth_limits) {
     Json entry{{"limit", key_of(limit)}, {"passed", breach.first_time_s.has_value()}};
     entry["first_time_s"] =
         breach.first_time_s ? Json(nine_digits(*breach.first_time_s)) : Json(nullptr);
-    entry["spheres"] = Json::array();
-    for (const std::size_t sphere : breach.spheres) entry["spheres"].push_back(sphere + 1);
+    entry["spheres"] = array_json(breach.spheres, [](std::size_t sphere) { return sphere + 1; });
     json["limits"].push_back(entry);
   }
   return json;
