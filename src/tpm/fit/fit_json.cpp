@@ -133,16 +133,10 @@ Json linearised_json(const FitResult& result) {
   Json j{{"full_rank", c.full_rank}};
   j["parameters"] =
       array_json(c.free, [&](std::size_t i) { return result.parameters[i].parameter.name; });
-  Json rows = Json::array();
-  for (Eigen::Index r = 0; r < c.correlation.rows(); ++r) {
-    Json row = Json::array();
-    for (Eigen::Index k = 0; k < c.correlation.cols(); ++k) {
-      // Rounded to 6 decimals, not digits: a correlation of 1e-17 is 0.
-      row.push_back(std::round(c.correlation(r, k) * 1e6) / 1e6 + 0.0);
-    }
-    rows.push_back(std::move(row));
-  }
-  j["correlation"] = std::move(rows);
+  // Rounded to 6 decimals, not digits: a correlation of 1e-17 is 0.
+  const auto decimals = [](double r) { return std::round(r * 1e6) / 1e6 + 0.0; };
+  j["correlation"] = array_json(c.correlation.rowwise(),
+                                [&](const auto& row) { return array_json(row, decimals); });
   j["singular_values_of_scaled_jacobian"] = array_json(c.singular_values, number);
   j["weakest_direction"] = result.weakest_words;
   return j;
