@@ -30,12 +30,10 @@ std::vector<Curve> load_all(const std::string& argument) {
 int list(const Session& session) {
   const auto curves = list_curves();
   if (session.json()) {
-    Json json = Json::array();
-    for (const CurveSummary& curve : curves) {
-      json.push_back(
-          {{"id", curve.id}, {"kind", curve.kind}, {"rows", curve.size}, {"title", curve.title}});
-    }
-    say("{}", to_text(json));
+    const auto words = [](const CurveSummary& c) {
+      return Json{{"id", c.id}, {"kind", c.kind}, {"rows", c.size}, {"title", c.title}};
+    };
+    say("{}", to_text(array_json(curves, words)));
     return 0;
   }
   std::vector<std::vector<std::string>> table{{"id", "kind", "rows", "title"}};
@@ -58,8 +56,7 @@ int show(const Session& session, const std::string& argument, bool all_rows) {
   const auto described = description_beside(argument);
   const bool in_segments = described && !described->segments.empty();
   if (session.json()) {
-    Json json = Json::array();
-    for (const Curve& curve : curves) json.push_back(curve_json(curve));
+    Json json = array_json(curves, curve_json);
     if (in_segments) json.front()["segments"] = description_json(*described).at("segments");
     say("{}", to_text(is_packed(argument) ? json : json.front()));
     return 0;

@@ -198,16 +198,15 @@ void print_text(const std::vector<Target>& targets, bool written) {
 }
 
 void print_json(const std::vector<Target>& targets, bool written) {
-  Json report = Json::array();
-  for (const Target& target : targets) {
+  const Json report = array_json(targets, [&](const Target& target) {
     Json understood = Json::object();
     for (const ImportFinding& finding : target.curve.findings)
       understood[finding.what] = finding.value;
-    report.push_back({{"source", target.source},
-                      {"csv", written ? Json(target.csv.string()) : Json(nullptr)},
-                      {"id", target.curve.description.header.id},
-                      {"understood", understood}});
-  }
+    return Json{{"source", target.source},
+                {"csv", written ? Json(target.csv.string()) : Json(nullptr)},
+                {"id", target.curve.description.header.id},
+                {"understood", understood}};
+  });
   say("{}", to_text(report));
 }
 

@@ -54,10 +54,7 @@ Json parameter_json(const LawParameter& p) {
 Json law_json(const LawSpec& spec, bool with_parameters) {
   Json json{{"law", law_name(spec)}, {"words", law_words(spec)}};
   if (!with_parameters) return json;
-  json["parameters"] = Json::array();
-  for (const LawParameter& p : law_parameters(spec)) {
-    json["parameters"].push_back(parameter_json(p));
-  }
+  json["parameters"] = array_json(law_parameters(spec), parameter_json);
   return json;
 }
 
@@ -92,11 +89,8 @@ std::string answer(const std::string& name, const Session& session) {
     return session.json() ? to_text(law_json(spec, true)) : one_law_text(spec);
   }
   if (!session.json()) return family_text();
-  Json json{{"names", grammar()}, {"laws", Json::array()}};
-  for (const char* example : kExamples) {
-    json["laws"].push_back(law_json(parse_law_name(example, "laws"), false));
-  }
-  return to_text(json);
+  const auto law = [](const char* text) { return law_json(parse_law_name(text, "laws"), false); };
+  return to_text(Json{{"names", grammar()}, {"laws", array_json(kExamples, law)}});
 }
 
 }  // namespace

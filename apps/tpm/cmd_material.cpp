@@ -6,6 +6,7 @@
 #include "command.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
+#include "tpm/core/lists.hpp"
 #include "tpm/report/organ_material_report.hpp"
 #include "tpm/scene/protocol_file.hpp"
 #include "tpm/store/json.hpp"
@@ -53,11 +54,9 @@ std::vector<MaterialMotion> chosen_motions(const MaterialCommand& command, const
   if (const auto file = chosen_protocol(ramp, command.recordings.files)) {
     return {motion_of_protocol(file->protocol, file->times_s)};
   }
-  std::vector<MaterialMotion> motions;
-  for (const PreparedRecording& recording : read_recordings(command.recordings)) {
-    motions.push_back(motion_of_recording(law, recording));
-  }
-  return motions;
+  return mapped<MaterialMotion>(
+      read_recordings(command.recordings),
+      [&](const PreparedRecording& recording) { return motion_of_recording(law, recording); });
 }
 
 int run_material(const MaterialCommand& command, const Session& session) {

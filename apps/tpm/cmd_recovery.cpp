@@ -38,9 +38,8 @@ double parse_order(const std::string& text) {
 }
 
 Json to_json(const std::vector<RecoveryResult>& results) {
-  Json list = Json::array();
-  for (const RecoveryResult& result : results) list.push_back(tpm::study::to_json(result));
-  return Json{{"laws", std::move(list)}};
+  const auto law = [](const RecoveryResult& result) { return tpm::study::to_json(result); };
+  return Json{{"laws", array_json(results, law)}};
 }
 
 int recovery(const RecoveryCommandOptions& options, const Session& session) {

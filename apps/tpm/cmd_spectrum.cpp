@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "command.hpp"
+#include "tpm/core/evenly.hpp"
 #include "tpm/core/namespaces.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/law/law_json.hpp"
@@ -33,12 +34,7 @@ std::vector<double> frequencies(const SpectrumTexts& texts) {
     throw Error(ExitCode::usage, "spectrum", "no range of frequencies",
                 "--from above 0 Hz and below --to, and at most 100000 points");
   }
-  std::vector<double> result;
-  for (std::uint64_t i = 0; i < points; ++i) {
-    const double share = static_cast<double>(i) / static_cast<double>(points - 1);
-    result.push_back(from * std::pow(to / from, share));
-  }
-  return result;
+  return evenly_in_log(from, to, static_cast<int>(points));
 }
 
 std::optional<double> operating_depth(const SpectrumTexts& texts, const LawSpec& spec) {
@@ -72,9 +68,7 @@ Json json_of(const LawFile& law, const std::vector<double>& frequency_Hz,
   constexpr int kDigits = 10;
   const bool strip = law.spec.response == Quantity::stress;
   const auto list = [&](const auto& values) {
-    Json json = Json::array();
-    for (const double v : values) json.push_back(rounded(v, kDigits));
-    return json;
+    return array_json(values, [](double v) { return rounded(v, kDigits); });
   };
   Json json{{"law", to_json(law)}, {"frequency_Hz", list(frequency_Hz)}};
   json[strip ? "storage_Pa" : "storage_N_per_m"] = list(r.storage);

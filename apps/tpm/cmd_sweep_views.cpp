@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "command.hpp"
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/sweep_convergence_report.hpp"
@@ -100,11 +101,9 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
     if (!choice.variables.empty() || !v.times_s.empty() || v.name.starts_with("count_")) continue;
     names.push_back(v.name);
   }
-  std::vector<SweepConvergence> all;
-  all.reserve(names.size());
-  for (const std::string& name : names) {
-    all.push_back(convergence_of(sweep, name, axis, choice.size, fixed));
-  }
+  const auto all = mapped<SweepConvergence>(names, [&](const std::string& name) {
+    return convergence_of(sweep, name, axis, choice.size, fixed);
+  });
   say("{}", session.json() ? to_text(convergence_json(all)) : convergence_text(all));
   draw_into(choice.figure_folder, convergence_figures(all, sweep.title()));
   return exit_code(std::ranges::any_of(all, &SweepConvergence::monotone));
@@ -135,16 +134,15 @@ int best(const SweepViewChoice& choice, const Session& session) {
     write_file(choice.start, to_text(fit));
   }
   if (session.json()) {
-    Json list = Json::array();
-    for (const BestCell& cell : cells) {
+    Json list = array_json(cells, [&](const BestCell& cell) {
       Json parameters;
       for (const CellParameter& p : cell.parameters) {
         parameters[p.name] = {{"target", p.target}, {"unit", p.unit}, {"value", p.value}};
       }
-      list.push_back({{"places", cell.places},
-                      {choice.best_output, cell.value},
-                      {"parameters", std::move(parameters)}});
-    }
+      return Json{{"places", cell.places},
+                  {choice.best_output, cell.value},
+                  {"parameters", std::move(parameters)}};
+    });
     say("{}", to_text(Json{{"best", std::move(list)}}));
     return 0;
   }

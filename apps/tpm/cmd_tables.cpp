@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "command.hpp"
+#include "tpm/core/lists.hpp"
 #include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/study_report.hpp"
@@ -53,10 +54,8 @@ std::vector<double> lengths(const std::string& text, std::string_view option) {
   }
   const std::string_view last = split_quantity(parts.back()).unit;
   const std::string unit(last.empty() ? "mm" : last);
-  std::vector<double> values;
-  values.reserve(parts.size());
-  for (const std::string& part : parts) values.push_back(in_unit(part, unit, option));
-  return values;
+  return mapped<double>(parts,
+                        [&](const std::string& part) { return in_unit(part, unit, option); });
 }
 
 TableRequest request_of(const TableOptions& options) {

@@ -220,8 +220,7 @@ void add_json(Json& json, const Spectrum& spectrum) {
 }
 
 void add_json(Json& json, const ValueSet& set) {
-  json["values"] = Json::array();
-  for (const NamedValue& value : set.values) {
+  json["values"] = array_json(set.values, [](const NamedValue& value) {
     Json entry{{"name", value.name},
                {"quantity", value.quantity},
                {"unit_SI", si_symbol(value.unit.dimension)}};
@@ -233,8 +232,8 @@ void add_json(Json& json, const ValueSet& set) {
     put(entry, "where", value.where);
     put(entry, "formula", value.formula);
     put(entry, "note", value.note);
-    json["values"].push_back(std::move(entry));
-  }
+    return entry;
+  });
 }
 
 std::size_t width_of(const std::string& text) {

@@ -17,6 +17,15 @@ std::string listed(const Items& items, Text text, std::string_view between = ", 
   return fmt::format("{}", fmt::join(items | std::views::transform(text), between));
 }
 
+/// What `value` makes of the items, a member or a function.
+template <class Made, class Items, class Value>
+std::vector<Made> mapped(Items&& items, Value value) {
+  std::vector<Made> all;
+  if constexpr (std::ranges::sized_range<Items>) all.reserve(std::ranges::size(items));
+  for (auto&& item : items) all.emplace_back(std::invoke(value, item));
+  return all;
+}
+
 /// What `value` says of the items, a member or a function: each once, in the order in which they
 /// first occur.
 template <class Items, class Value>

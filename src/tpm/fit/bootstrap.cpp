@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/correlation.hpp"
@@ -218,10 +219,7 @@ struct Refits {
   }
 
   [[nodiscard]] std::vector<double> of_parameter(std::size_t index) const {
-    std::vector<double> values;
-    values.reserve(natural.size());
-    for (const std::vector<double>& row : natural) values.push_back(row[index]);
-    return values;
+    return mapped<double>(natural, [&](const std::vector<double>& row) { return row[index]; });
   }
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/fit/config_parts.hpp"
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/scene/organ_model.hpp"
@@ -95,10 +96,7 @@ std::unique_ptr<Model> make_model(const FitConfig& config) {
 }
 
 std::vector<FitParameter> searched_parameters(const FitConfig& config) {
-  std::vector<FitParameter> parameters;
-  parameters.reserve(config.parameters.size());
-  for (const EstimatedParameter& p : config.parameters) parameters.push_back(p.fit);
-  return parameters;
+  return mapped<FitParameter>(config.parameters, &EstimatedParameter::fit);
 }
 
 std::vector<double> model_parameters(const FitConfig& config, std::span<const double> natural,

@@ -99,15 +99,13 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
 Json to_json(const CoverageResult& result) {
   Json j{{"seed", result.seed}, {"confidence_level", result.level}, {"data_sets", result.sets}};
   j["failed"] = result.failed;
-  Json list = Json::array();
-  for (const ParameterCoverage& p : result.parameters) {
-    list.push_back({{"name", p.name},
-                    {"covered", p.covered},
-                    {"coverage", rounded(static_cast<double>(p.covered) / result.sets, 6)},
-                    {"open_intervals", p.one_sided},
-                    {"binomial_p_value", rounded(p.p_value, 6)}});
-  }
-  j["parameters"] = std::move(list);
+  j["parameters"] = array_json(result.parameters, [&](const ParameterCoverage& p) {
+    return Json{{"name", p.name},
+                {"covered", p.covered},
+                {"coverage", rounded(static_cast<double>(p.covered) / result.sets, 6)},
+                {"open_intervals", p.one_sided},
+                {"binomial_p_value", rounded(p.p_value, 6)}};
+  });
   return j;
 }
 

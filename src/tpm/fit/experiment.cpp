@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/protocol/straight_pieces.hpp"
 #include "tpmkit/curve_file.hpp"
@@ -268,19 +269,14 @@ void add_spectrum(ExperimentSet& set, const FitConfig& config, std::size_t choic
 }  // namespace
 
 std::vector<DataSet> load_data(const FitConfig& config) {
-  std::vector<DataSet> data;
-  data.reserve(config.data.size());
-  for (const DataChoice& choice : config.data) {
+  return mapped<DataSet>(config.data, [&](const DataChoice& choice) -> DataSet {
     const std::string path = data_path(config, choice.dataset);
     if (choice.protocol.kind == Kind::measured) {
-      data.emplace_back(read_recording_file(path, choice.import).recording);
-    } else if (choice.protocol.kind == Kind::oscillation) {
-      data.emplace_back(read_spectrum_file(path, choice.import));
-    } else {
-      data.emplace_back(load_points(path));
+      return read_recording_file(path, choice.import).recording;
     }
-  }
-  return data;
+    if (choice.protocol.kind == Kind::oscillation) return read_spectrum_file(path, choice.import);
+    return load_points(path);
+  });
 }
 
 ExperimentSet set_up_experiments(const FitConfig& config, const std::vector<DataSet>& data) {

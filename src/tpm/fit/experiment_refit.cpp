@@ -6,6 +6,7 @@
 #include <array>
 
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/lists.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -61,13 +62,10 @@ std::vector<std::size_t> ExperimentRefit::recording_lengths() const {
 
 std::vector<double> ExperimentRefit::standardised_residuals(std::span<const double> natural) const {
   const Eigen::VectorXd answer = function_.predict(natural, nullptr);
-  std::vector<double> z;
-  z.reserve(readings_.size());
-  for (const std::size_t i : readings_) {
+  return mapped<double>(readings_, [&](std::size_t i) {
     // Refittable counts data less answers, a residual the other way round.
-    z.push_back(-function_.standardised(i, answer[static_cast<Eigen::Index>(i)], natural));
-  }
-  return z;
+    return -function_.standardised(i, answer[static_cast<Eigen::Index>(i)], natural);
+  });
 }
 
 std::unique_ptr<ResidualFunction> ExperimentRefit::with_residuals(std::span<const double> natural,

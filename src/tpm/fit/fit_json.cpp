@@ -76,14 +76,12 @@ Json correlation_json(const Correlation& c) {
 }
 
 Json conditions_json(const ParameterResult& p) {
-  Json list = Json::array();
-  for (const Condition& c : p.conditional_on) {
-    list.push_back({{"parameter", c.parameter},
-                    {"bound", c.upper ? "upper" : "lower"},
-                    {"bound_SI", number(c.value)},
-                    {"at_estimate", c.at_estimate}});
-  }
-  return list;
+  return array_json(p.conditional_on, [](const Condition& c) {
+    return Json{{"parameter", c.parameter},
+                {"bound", c.upper ? "upper" : "lower"},
+                {"bound_SI", number(c.value)},
+                {"at_estimate", c.at_estimate}};
+  });
 }
 
 Json parameter_json(const ParameterResult& p) {
@@ -103,11 +101,9 @@ Json parameter_json(const ParameterResult& p) {
   }
   if (!p.conditional_on.empty()) j["conditional_on"] = conditions_json(p);
   j["words"] = p.words;
-  Json points = Json::array();
-  for (const ProfilePoint& point : p.profile.points) {
-    points.push_back({number(point.natural), number(point.deviance)});
-  }
-  j["profile_SI_and_deviance"] = std::move(points);
+  j["profile_SI_and_deviance"] = array_json(p.profile.points, [](const ProfilePoint& point) {
+    return Json{number(point.natural), number(point.deviance)};
+  });
   Json failed = Json::array();
   if (has_failed(p.profile.below)) failed.push_back("lower");
   if (has_failed(p.profile.above)) failed.push_back("upper");
@@ -122,44 +118,32 @@ Json parameter_json(const ParameterResult& p) {
 }
 
 Json minima_json(const FitResult& result) {
-  Json list = Json::array();
-  for (const DistinctMinimum& m : result.minima) {
+  return array_json(result.minima, [&](const DistinctMinimum& m) {
     Json j{{"deviance", number(m.minimum.deviance)}, {"starts", m.starts}};
     j["converged"] = m.minimum.converged;
     j["parameters"] = parameter_values(result, m.minimum.natural);
     j["lowest"] = parameter_values(result, m.low);
     j["highest"] = parameter_values(result, m.high);
-    list.push_back(std::move(j));
-  }
-  return list;
+    return j;
+  });
 }
 
 Json linearised_json(const FitResult& result) {
   const Covariance& c = result.covariance;
   Json j{{"full_rank", c.full_rank}};
-  Json names = Json::array();
-  for (const std::size_t i : c.free) names.push_back(result.parameters[i].parameter.name);
-  j["parameters"] = std::move(names);
-  Json rows = Json::array();
-  for (Eigen::Index r = 0; r < c.correlation.rows(); ++r) {
-    Json row = Json::array();
-    for (Eigen::Index k = 0; k < c.correlation.cols(); ++k) {
-      // Rounded to 6 decimals, not digits: a correlation of 1e-17 is 0.
-      row.push_back(std::round(c.correlation(r, k) * 1e6) / 1e6 + 0.0);
-    }
-    rows.push_back(std::move(row));
-  }
-  j["correlation"] = std::move(rows);
-  Json values = Json::array();
-  for (const double s : c.singular_values) values.push_back(number(s));
-  j["singular_values_of_scaled_jacobian"] = std::move(values);
+  j["parameters"] =
+      array_json(c.free, [&](std::size_t i) { return result.parameters[i].parameter.name; });
+  // Rounded to 6 decimals, not digits: a correlation of 1e-17 is 0.
+  const auto decimals = [](double r) { return std::round(r * 1e6) / 1e6 + 0.0; };
+  j["correlation"] = array_json(c.correlation.rowwise(),
+                                [&](const auto& row) { return array_json(row, decimals); });
+  j["singular_values_of_scaled_jacobian"] = array_json(c.singular_values, number);
   j["weakest_direction"] = result.weakest_words;
   return j;
 }
 
 Json data_json(const FitResult& result) {
-  Json list = Json::array();
-  for (const FittedDatum& d : result.data) {
+  return array_json(result.data, [&](const FittedDatum& d) {
     const auto key = [&](std::string_view what) {
       return si_key(what, quantity_dimension(d.datum.quantity));
     };
@@ -179,15 +163,13 @@ Json data_json(const FitResult& result) {
       j[key("prediction_band")] = pair_json(d.prediction->lower, d.prediction->upper);
     }
     j["standardised_residual"] = number(d.standardised);
-    list.push_back(std::move(j));
-  }
-  return list;
+    return j;
+  });
 }
 
 /// Numbers about each recording; its samples are in the data.
 Json recordings_json(const FitResult& result) {
-  Json list = Json::array();
-  for (const RecordingFit& r : result.recordings) {
+  return array_json(result.recordings, [&](const RecordingFit& r) {
     const auto fitted = std::count(r.fitted.begin(), r.fitted.end(), true);
     Json j{{"dataset", result.config.data[r.choice].dataset}};
     j["quantity"] = quantity_name(r.response_quantity);
@@ -202,28 +184,24 @@ Json recordings_json(const FitResult& result) {
     if (r.not_predicted > 0) j["samples_not_predicted"] = r.not_predicted;
     j["share_inside_prediction_band"] = optional_number(r.share_inside);
     if (r.correlation) j["correlation"] = correlation_json(*r.correlation);
-    list.push_back(std::move(j));
-  }
-  return list;
+    return j;
+  });
 }
 
 Json hypotheses_json(const FitResult& result) {
-  Json list = Json::array();
-  for (const HypothesisResult& h : result.hypotheses) {
+  return array_json(result.hypotheses, [&](const HypothesisResult& h) {
     Json j{{"name", h.hypothesis.name}, {"deviance", number(h.minimum.deviance)}};
     j["rise"] = number(h.rise);
     j["p_value"] = number(h.p_value);
     j["excluded"] = h.excluded;
     j["parameters"] = parameter_values(result, h.minimum.natural);
     j["words"] = h.words;
-    list.push_back(std::move(j));
-  }
-  return list;
+    return j;
+  });
 }
 
 Json assumptions_json(const FitConfig& config) {
-  Json list = Json::array();
-  for (const DataChoice& d : config.data) {
+  return array_json(config.data, [&](const DataChoice& d) {
     Json j{{"dataset", d.dataset}, {"protocol", protocol_kind_name(d.protocol.kind)}};
     if (d.protocol.kind == ProtocolChoice::Kind::ramp_hold) {
       j["rate_m_per_s"] = number(d.protocol.rate_m_per_s);
@@ -256,9 +234,8 @@ Json assumptions_json(const FitConfig& config) {
       j["noise_absolute_SI"] = number(d.noise.absolute);
     }
     j["noise_scale"] = d.noise.scale_known ? "known" : "estimated";
-    list.push_back(std::move(j));
-  }
-  return list;
+    return j;
+  });
 }
 
 }  // namespace
@@ -315,9 +292,7 @@ Json to_json(const FitResult& result) {
                  {"agreeing_to_5_digits", result.starts_agreeing},
                  {"seed", result.config.seed},
                  {"words", result.waterfall.words}};
-  Json ends = Json::array();
-  for (const double d : result.waterfall.deviances) ends.push_back(number(d));
-  j["starts"]["end_deviances"] = std::move(ends);
+  j["starts"]["end_deviances"] = array_json(result.waterfall.deviances, number);
   if (result.bootstrap) j["bootstrap"] = bootstrap_json(*result.bootstrap);
   j["minima"] = minima_json(result);
   j["hypotheses"] = hypotheses_json(result);

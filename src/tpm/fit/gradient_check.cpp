@@ -251,8 +251,7 @@ Json to_json(const GradientCheck& check) {
          {"wrong", check.wrong},
          {"undecided", check.undecided},
          {"unusable_points", check.unusable}};
-  Json points = Json::array();
-  for (const GradientPoint& point : check.points) {
+  Json points = array_json(check.points, [](const GradientPoint& point) {
     Json list = Json::array();
     for (std::size_t i = 0; i < point.parameters.size(); ++i) {
       const ParameterGradient& g = point.parameters[i];
@@ -264,8 +263,8 @@ Json to_json(const GradientCheck& check) {
                       {"spread_of_differences", number_or_null(g.spread)},
                       {"residual", g.residual}});
     }
-    points.push_back({{"parameters", std::move(list)}});
-  }
+    return Json{{"parameters", std::move(list)}};
+  });
   j["points"] = std::move(points);
   return j;
 }

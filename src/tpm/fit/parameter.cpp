@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -85,10 +86,7 @@ bool FitParameter::at_upper(double p) const {
 }
 
 std::vector<double> start_values(std::span<const FitParameter> parameters) {
-  std::vector<double> natural;
-  natural.reserve(parameters.size());
-  for (const FitParameter& p : parameters) natural.push_back(p.start);
-  return natural;
+  return mapped<double>(parameters, &FitParameter::start);
 }
 
 void require_valid(const FitParameter& p, std::string_view where) {

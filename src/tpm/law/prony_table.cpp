@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "tpm/core/evenly.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
 #include "tpm/solve/nonnegative.hpp"
@@ -58,15 +59,6 @@ double fractional_relaxation(Fractional law, std::span<const double> values, dou
   return end + values[at] * (has_two_springpots(law)
                                  ? series_relaxation(alpha, values[at + 3], t)
                                  : mittag_leffler(alpha, 1.0, std::pow(t, alpha)));
-}
-
-std::vector<double> evenly_in_log(double from, double to, int count) {
-  std::vector<double> values(static_cast<std::size_t>(count));
-  for (int i = 0; i < count; ++i) {
-    const double share = count > 1 ? static_cast<double>(i) / (count - 1) : 0.5;
-    values[static_cast<std::size_t>(i)] = from * std::pow(to / from, share);
-  }
-  return values;
 }
 
 void require_window(const PronyWindow& window) {

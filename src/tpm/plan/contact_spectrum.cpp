@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "tpm/core/dense_algebra.hpp"
+#include "tpm/core/evenly.hpp"
 #include "tpm/network/driven_tissue.hpp"
 #include "tpm/network/material_refusal.hpp"
 #include "tpmkit/error.hpp"
@@ -71,8 +72,7 @@ void set_rates(ContactSpectrum& spectrum, const std::vector<ViscousLaw::Branch>&
     spectrum.stiffness_N_per_m.push_back(stiffness_there);
   };
   add(0.0, stiffness.front());
-  for (int i = 0; i < count; ++i) {
-    const double at = first * std::pow(last / first, static_cast<double>(i) / (count - 1));
+  for (const double at : evenly_in_log(first, last, count)) {
     add(at, between(theta, stiffness, relaxed_share(branches, at)));
   }
   add(kEver, stiffness.back());

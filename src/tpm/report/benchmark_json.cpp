@@ -206,15 +206,14 @@ BenchmarkRecord read_record(const Json& json) {
 Json to_json(const BenchmarkRecord& record) {
   Json json{{"timing", record.options.timing}};
   if (record.options.timing) json["repeats"] = record.options.repeats;
-  json["problems"] = Json::array();
-  for (const BenchmarkResult& result : record.results) {
+  json["problems"] = array_json(record.results, [&](const BenchmarkResult& result) {
     Json problem;
     RecordFields writer(problem);
     kResultFields(writer, result);
     const auto run = record.runs.find(result.name);
     if (run != record.runs.end()) problem["run"] = run->second;
-    json["problems"].push_back(std::move(problem));
-  }
+    return problem;
+  });
   return json;
 }
 

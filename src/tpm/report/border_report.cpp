@@ -24,15 +24,13 @@ Json number_or_null(double value) {
 
 Json points_json(const std::vector<BorderPoint>& points, const char* measured,
                  const char* predicted) {
-  Json list = Json::array();
-  for (const BorderPoint& p : points) {
-    list.push_back({{"rate_Hz", rounded(p.rate_Hz, kBorderDigits)},
-                    {"delay_s", rounded(p.delay_periods / p.rate_Hz, kBorderDigits)},
-                    {"damping_N_s_per_m", rounded(p.damping_N_s_per_m, kBorderDigits)},
-                    {measured, number_or_null(p.measured)},
-                    {predicted, number_or_null(p.predicted)}});
-  }
-  return list;
+  return array_json(points, [&](const BorderPoint& p) {
+    return Json{{"rate_Hz", rounded(p.rate_Hz, kBorderDigits)},
+                {"delay_s", rounded(p.delay_periods / p.rate_Hz, kBorderDigits)},
+                {"damping_N_s_per_m", rounded(p.damping_N_s_per_m, kBorderDigits)},
+                {measured, number_or_null(p.measured)},
+                {predicted, number_or_null(p.predicted)}};
+  });
 }
 
 double worst_difference(const std::vector<BorderPoint>& points) {
@@ -136,8 +134,7 @@ Figure rule_figure(const BorderStudy& study) {
 namespace {
 
 Json impacts_json(const BorderStudy& study) {
-  Json list = Json::array();
-  for (const ImpactPoint& p : study.impacts) {
+  return array_json(study.impacts, [&](const ImpactPoint& p) {
     Json json{{"delay_periods", p.delay_periods},
               {"speed_m_per_s", p.speed_m_per_s},
               {"share_of_linear_border", p.share},
@@ -150,14 +147,12 @@ Json impacts_json(const BorderStudy& study) {
           {"delivered_to_hand_J", number_or_null(p.delivered_J[which])}};
     }
     json["by_limit_of_rise"] = std::move(by_limit);
-    list.push_back(std::move(json));
-  }
-  return list;
+    return json;
+  });
 }
 
 Json corners_json(const BorderStudy& study) {
-  Json list = Json::array();
-  for (const DeviceCorner& c : study.corners) {
+  return array_json(study.corners, [](const DeviceCorner& c) {
     Json json{{"device", c.device},
               {"stiffness_N_per_m", c.stiffness_N_per_m},
               {"damping_N_s_per_m", c.damping_N_s_per_m},
@@ -170,9 +165,8 @@ Json corners_json(const BorderStudy& study) {
                                             c.assumed_friction_N_s_per_m->second};
       json["passive"] = c.assumed_friction_N_s_per_m->first > c.needed_N_s_per_m;
     }
-    list.push_back(std::move(json));
-  }
-  return list;
+    return json;
+  });
 }
 
 /// A letter for each limit of the rise: the tool comes to rest, or it does not.
@@ -266,13 +260,12 @@ Figure impact_figure(const BorderStudy& study) {
 }  // namespace
 
 Json border_json(const BorderStudy& study) {
-  Json rules = Json::array();
-  for (const RulePoint& p : study.rules) {
-    rules.push_back({{"rule", word_for(kRuleWords, p.rule)},
-                     {"relaxation_time_s", rounded(p.relaxation_time_s, kBorderDigits)},
-                     {"measured_N_s_per_m", number_or_null(p.measured_N_s_per_m)},
-                     {"predicted_N_s_per_m", number_or_null(p.predicted_N_s_per_m)}});
-  }
+  const Json rules = array_json(study.rules, [](const RulePoint& p) {
+    return Json{{"rule", word_for(kRuleWords, p.rule)},
+                {"relaxation_time_s", rounded(p.relaxation_time_s, kBorderDigits)},
+                {"measured_N_s_per_m", number_or_null(p.measured_N_s_per_m)},
+                {"predicted_N_s_per_m", number_or_null(p.predicted_N_s_per_m)}};
+  });
   return {{"simulated_device", true},
           {"assumptions", assumptions_of(study.plant)},
           {"relaxation_time_s", rounded(study.relaxation_time_s, kBorderDigits)},

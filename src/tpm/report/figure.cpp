@@ -34,18 +34,13 @@ std::string_view kind_name(Series::Kind kind) {
 constexpr int kFigureDigits = 6;
 
 Json numbers(const std::vector<double>& values) {
-  Json list = Json::array();
-  for (const double v : values) list.push_back(rounded(v, kFigureDigits));
-  return list;
+  return array_json(values, [](double v) { return rounded(v, kFigureDigits); });
 }
 
 /// Of a map of colours, with null where there is nothing.
 Json numbers_or_null(const std::vector<double>& values) {
-  Json list = Json::array();
-  for (const double v : values) {
-    list.push_back(std::isnan(v) ? Json() : Json(rounded(v, kFigureDigits)));
-  }
-  return list;
+  return array_json(
+      values, [](double v) { return std::isnan(v) ? Json() : Json(rounded(v, kFigureDigits)); });
 }
 
 /// The arrays that a kind needs are as long as each other.
@@ -104,11 +99,10 @@ Json series_json(const Series& s) {
 }
 
 Json panel_json(const Panel& panel, const std::string& where) {
-  Json series = Json::array();
-  for (const Series& s : panel.series) {
+  Json series = array_json(panel.series, [&](const Series& s) {
     require_drawable(s, fmt::format("{}, '{}'", where, s.label));
-    series.push_back(series_json(s));
-  }
+    return series_json(s);
+  });
   return Json{{"title", panel.title},
               {"x", axis_json(panel.x)},
               {"y", axis_json(panel.y)},
@@ -120,10 +114,9 @@ Json panel_json(const Panel& panel, const std::string& where) {
 Json to_json(const std::vector<Figure>& figures) {
   Json list = Json::array();
   for (const Figure& figure : figures) {
-    Json panels = Json::array();
-    for (const Panel& panel : figure.panels) {
-      panels.push_back(panel_json(panel, fmt::format("figure {}", figure.id)));
-    }
+    Json panels = array_json(figure.panels, [&](const Panel& panel) {
+      return panel_json(panel, fmt::format("figure {}", figure.id));
+    });
     list.push_back(Json{{"id", figure.id},
                         {"title", figure.title},
                         {"caption", figure.caption},

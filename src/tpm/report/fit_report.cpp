@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/evenly.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/oscillation.hpp"
 #include "tpm/report/draw.hpp"
@@ -61,10 +62,7 @@ std::array<Series, 2> law_lines(const FitResult& fit, std::size_t choice,
   }
   Spectrum grid;
   grid.dimension = quantity_dimension(readings.front()->datum.quantity);
-  for (std::size_t i = 0; i < kPoints; ++i) {
-    const double share = static_cast<double>(i) / (kPoints - 1);
-    grid.frequency_Hz.push_back(low * std::pow(high / low, share));
-  }
+  grid.frequency_Hz = evenly_in_log(low, high, kPoints);
   Oscillation oscillation = oscillation_of(fit.config, fit.config.data[choice], grid);
   for (const auto part : {Oscillation::Part::storage, Oscillation::Part::loss}) {
     for (std::size_t i = 0; i < kPoints; ++i) oscillation.readings.push_back({i, part});

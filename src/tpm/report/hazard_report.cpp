@@ -32,24 +32,23 @@ std::string in(double value, double scale, bool shown) {
 
 Json hazard_json(const HazardStudy& study) {
   const HazardBounds& b = study.bounds;
-  Json rows = Json::array();
-  for (const HazardRow& row : study.rows) {
+  Json rows = array_json(study.rows, [](const HazardRow& row) {
     const auto number = [&](double value, bool shown) {
       return shown ? Json(rounded(value, kHazardDigits)) : Json();
     };
-    rows.push_back({{"hazard", row.hazard},
-                    {"setting", row.setting},
-                    {"accepted_unstable", row.accepted},
-                    {"refused", ran(row) ? Json() : Json(row.refused)},
-                    {"cause", ran(row) ? Json(word_of(row.cause)) : Json()},
-                    {"largest_force_N", number(row.largest_force_N, ran(row))},
-                    {"largest_rise_N", number(row.largest_rise_N, ran(row))},
-                    {"delivered_to_hand_J", number(row.delivered_J, ran(row))},
-                    {"to_zero_force_s", number(row.to_zero_s, stopped(row))},
-                    {"travel_m", number(row.travel_m, stopped(row))},
-                    {"passive", row.passive},
-                    {"within_bounds", row.within}});
-  }
+    return Json{{"hazard", row.hazard},
+                {"setting", row.setting},
+                {"accepted_unstable", row.accepted},
+                {"refused", ran(row) ? Json() : Json(row.refused)},
+                {"cause", ran(row) ? Json(word_of(row.cause)) : Json()},
+                {"largest_force_N", number(row.largest_force_N, ran(row))},
+                {"largest_rise_N", number(row.largest_rise_N, ran(row))},
+                {"delivered_to_hand_J", number(row.delivered_J, ran(row))},
+                {"to_zero_force_s", number(row.to_zero_s, stopped(row))},
+                {"travel_m", number(row.travel_m, stopped(row))},
+                {"passive", row.passive},
+                {"within_bounds", row.within}};
+  });
   return {{"simulated_device", true},
           {"safe", study.safe()},
           {"bounds",
@@ -90,21 +89,20 @@ std::string hazard_text(const HazardStudy& study) {
 }
 
 Json clock_hazard_json(const ClockHazardStudy& study) {
-  Json rows = Json::array();
-  for (const ClockHazardRow& row : study.rows) {
+  Json rows = array_json(study.rows, [](const ClockHazardRow& row) {
     const bool stopped_by_it = row.expected != StopCause::finished;
-    rows.push_back(
-        {{"hazard", row.hazard},
-         {"setting", row.setting},
-         {"cause", word_of(row.cause)},
-         {"expected_cause", word_of(row.expected)},
-         {"consecutive_missed_periods", row.consecutive_missed},
-         {"largest_force_N", rounded(row.largest_force_N, kHazardDigits)},
-         {"to_zero_force_s", stopped_by_it ? Json(rounded(row.to_zero_s, kHazardDigits)) : Json()},
-         {"to_zero_force_bound_s", stopped_by_it ? Json(row.bound_s) : Json()},
-         {"tries", row.tries},
-         {"within_bounds", row.within}});
-  }
+    return Json{
+        {"hazard", row.hazard},
+        {"setting", row.setting},
+        {"cause", word_of(row.cause)},
+        {"expected_cause", word_of(row.expected)},
+        {"consecutive_missed_periods", row.consecutive_missed},
+        {"largest_force_N", rounded(row.largest_force_N, kHazardDigits)},
+        {"to_zero_force_s", stopped_by_it ? Json(rounded(row.to_zero_s, kHazardDigits)) : Json()},
+        {"to_zero_force_bound_s", stopped_by_it ? Json(row.bound_s) : Json()},
+        {"tries", row.tries},
+        {"within_bounds", row.within}};
+  });
   return {{"simulated_device", true},       {"scheduling", study.scheduling},
           {"most_tries", study.most_tries}, {"force_limit_N", study.force_limit_N},
           {"safe", study.safe()},           {"rows", std::move(rows)}};

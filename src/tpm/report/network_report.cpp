@@ -119,19 +119,14 @@ Json network_picture(const Tissue& tissue) {
   json["contact"] = organ.contact ? Json(*organ.contact) : Json(nullptr);
   json["anchors"] = tissue.anchors;
   json["layer"] = organ.layer;
-  json["position_m"] = Json::array();
-  json["normal"] = Json::array();
-  for (Eigen::Index i = 0; i < organ.position.cols(); ++i) {
-    const auto& p = organ.position.col(i);
-    const auto& n = organ.normal.col(i);
-    json["position_m"].push_back({p.x(), p.y(), p.z()});
-    json["normal"].push_back({rounded(n.x(), kNetworkDigits), rounded(n.y(), kNetworkDigits),
-                              rounded(n.z(), kNetworkDigits)});
-  }
-  json["bonds"] = Json::array();
-  for (const Bond& bond : tissue.network.bonds) {
-    json["bonds"].push_back({bond.a, bond.b, bond.kind == BondKind::radial ? 0 : 1});
-  }
+  json["position_m"] = array_json(organ.position.colwise(),
+                                  [](const auto& p) { return array_json(p, std::identity()); });
+  json["normal"] = array_json(organ.normal.colwise(), [](const auto& n) {
+    return array_json(n, [](double v) { return rounded(v, kNetworkDigits); });
+  });
+  json["bonds"] = array_json(tissue.network.bonds, [](const Bond& bond) {
+    return Json{bond.a, bond.b, bond.kind == BondKind::radial ? 0 : 1};
+  });
   return json;
 }
 

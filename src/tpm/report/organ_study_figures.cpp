@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/organ_study_report.hpp"
 
@@ -29,9 +30,8 @@ std::vector<std::size_t> conditions_of(const OrganStudy& study, Kind kind) {
 /// Different values of a member among conditions, rising.
 std::vector<double> values_of(const OrganStudy& study, const std::vector<std::size_t>& conditions,
                               double StudyCondition::*member) {
-  std::vector<double> values;
-  values.reserve(conditions.size());
-  for (const std::size_t c : conditions) values.push_back(study.config.conditions[c].*member);
+  auto values =
+      mapped<double>(conditions, [&](std::size_t c) { return study.config.conditions[c].*member; });
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
   return values;
@@ -234,10 +234,8 @@ Figure creep_figure(const OrganStudy& study, std::size_t condition, std::size_t 
 }  // namespace
 
 std::vector<Figure> organ_study_figures(const OrganStudy& study) {
-  std::vector<Figure> figures;
-  for (const std::size_t c : conditions_of(study, Kind::static_)) {
-    figures.push_back(static_figure(study, c));
-  }
+  auto figures = mapped<Figure>(conditions_of(study, Kind::static_),
+                                [&](std::size_t c) { return static_figure(study, c); });
   if (!conditions_of(study, Kind::ramp_hold).empty()) {
     figures.push_back(relaxation_figure(study, study.curves.front(), "relaxation_one_material"));
     figures.push_back(relaxation_figure(study, study.curves.back(), "relaxation_own_fit"));

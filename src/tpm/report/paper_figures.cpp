@@ -32,11 +32,8 @@ std::vector<double> evenly_in_log(double from, double to, int intervals) {
 }
 
 std::vector<double> scaled(const Eigen::VectorXd& values, double factor) {
-  std::vector<double> out(static_cast<std::size_t>(values.size()));
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    out[static_cast<std::size_t>(i)] = values[i] * factor;
-  }
-  return out;
+  const Eigen::VectorXd out = values * factor;
+  return {out.begin(), out.end()};
 }
 
 std::string mm(double metres) {

@@ -46,15 +46,13 @@ Json candidate_json(const PlannedCandidate& c) {
 }
 
 Json relevance_json(const Plan& plan) {
-  Json list = Json::array();
-  for (const PlanRelevance& r : plan.relevance) {
-    list.push_back({{"part", r.part},
-                    {"error", number(r.error)},
-                    {"estimated", r.estimated},
-                    {"matters", r.matters},
-                    {"note", r.note}});
-  }
-  return list;
+  return array_json(plan.relevance, [](const PlanRelevance& r) {
+    return Json{{"part", r.part},
+                {"error", number(r.error)},
+                {"estimated", r.estimated},
+                {"matters", r.matters},
+                {"note", r.note}};
+  });
 }
 
 std::string change_text(const PlanChange& c) {
@@ -77,14 +75,12 @@ std::string change_text(const PlanChange& c) {
 }
 
 Json changes_json(const Plan& plan) {
-  Json list = Json::array();
-  for (const PlanChange& c : plan.changes) {
-    list.push_back({{"change", c.change},
-                    {"factor", number(c.factor)},
-                    {"survived", rounded(c.survived, kPlanDigits)},
-                    {"breaks", c.factor ? Json(c.breaks) : Json(nullptr)}});
-  }
-  return list;
+  return array_json(plan.changes, [](const PlanChange& c) {
+    return Json{{"change", c.change},
+                {"factor", number(c.factor)},
+                {"survived", rounded(c.survived, kPlanDigits)},
+                {"breaks", c.factor ? Json(c.breaks) : Json(nullptr)}};
+  });
 }
 
 std::string budget_text(const PlanBudget& budget) {
@@ -176,16 +172,15 @@ std::string frontier_text(const Plan& plan) {
 }  // namespace
 
 Json spheres_json(const SpheresPlan& plan) {
-  Json tried = Json::array();
-  for (const TriedSpheres& t : plan.tried) {
-    tried.push_back({{"spheres", t.filling.spheres},
-                     {"spacing_m", rounded(t.spacing_m, kPlanDigits)},
-                     {"area_ratio", number(t.area_ratio)},
-                     {"peak", number(t.peak)},
-                     {"claimed_error", number(t.claimed_error)},
-                     {"run_s", rounded(t.operations_s, kPlanDigits)},
-                     {"reason", t.reason.empty() ? Json(nullptr) : Json(t.reason)}});
-  }
+  Json tried = array_json(plan.tried, [](const TriedSpheres& t) {
+    return Json{{"spheres", t.filling.spheres},
+                {"spacing_m", rounded(t.spacing_m, kPlanDigits)},
+                {"area_ratio", number(t.area_ratio)},
+                {"peak", number(t.peak)},
+                {"claimed_error", number(t.claimed_error)},
+                {"run_s", rounded(t.operations_s, kPlanDigits)},
+                {"reason", t.reason.empty() ? Json(nullptr) : Json(t.reason)}};
+  });
   return {{"tolerance", plan.request.tolerance},
           {"most", plan.request.most},
           {"spheres", plan.choice ? Json(plan.chosen().filling.spheres) : Json(nullptr)},
@@ -282,8 +277,7 @@ Json plan_json(const Plan& plan) {
   json["work"] = {{"first_run_s", rounded(plan.work.first_run_s, kPlanDigits)},
                   {"reference_s", rounded(plan.work.reference_s, kPlanDigits)},
                   {"all_s", rounded(plan.work.all_s, kPlanDigits)}};
-  json["frontier"] = Json::array();
-  for (const PlannedCandidate& c : plan.candidates) json["frontier"].push_back(candidate_json(c));
+  json["frontier"] = array_json(plan.candidates, candidate_json);
   json["relevance"] = relevance_json(plan);
   json["changes"] = changes_json(plan);
   json["validity_passed"] = plan.validity;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/report/sections.hpp"
 #include "tpm/study/printed_number.hpp"
 #include "tpmkit/error.hpp"
@@ -73,9 +74,7 @@ std::vector<Cell> verdicts(const PaperReport& report) {
 }  // namespace
 
 std::vector<std::string> summary_sentences(const PaperReport& report) {
-  std::vector<std::string> sentences;
-  for (const Cell& verdict : verdicts(report)) sentences.push_back(verdict.text);
-  return sentences;
+  return mapped<std::string>(verdicts(report), &Cell::text);
 }
 
 Picture caption_of(const PaperReport& report, const std::string& figure_id) {

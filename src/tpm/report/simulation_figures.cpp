@@ -21,21 +21,13 @@ std::string name_of(const FiguredRun& figured) {
   return figured.scene->formulation.mass_spring ? "MSM" : "TPM";
 }
 
-Json rows_json(const Positions& position) {
-  Json rows = Json::array();
-  for (Eigen::Index i = 0; i < position.cols(); ++i) {
-    const auto& p = position.col(i);
-    rows.push_back(
-        {rounded(p.x(), kDrawnDigits), rounded(p.y(), kDrawnDigits), rounded(p.z(), kDrawnDigits)});
-  }
-  return rows;
+template <class Numbers>
+Json list_json(const Numbers& numbers, double unit = 1.0) {
+  return array_json(numbers, [&](double value) { return rounded(value / unit, kDrawnDigits); });
 }
 
-template <class Numbers>
-Json list_json(const Numbers& numbers, double unit) {
-  Json list = Json::array();
-  for (const double value : numbers) list.push_back(rounded(value / unit, kDrawnDigits));
-  return list;
+Json rows_json(const Positions& position) {
+  return array_json(position.colwise(), [](const auto& p) { return list_json(p); });
 }
 
 std::string roughness_words(const std::optional<Smoothness>& found) {
@@ -49,17 +41,13 @@ std::string roughness_words(const std::optional<Smoothness>& found) {
 /// The tools of a network where they stand.
 /// @param position of spheres and tools
 Json tools_json(const DrivenNetwork& network, const Positions& position) {
-  const auto list_of = [](const Eigen::Vector3d& v) {
-    return Json{rounded(v.x(), kDrawnDigits), rounded(v.y(), kDrawnDigits),
-                rounded(v.z(), kDrawnDigits)};
-  };
   Json tools = Json::array();
   for (std::size_t i = 0; i < network.tools.size(); ++i) {
     const Tool& tool = network.tools[i].tool;
     tools.push_back({{"kind", tool.shape.kind == ToolKind::sphere ? "ball" : "punch"},
                      {"radius_m", tool.shape.radius_m},
-                     {"direction", list_of(tool.direction)},
-                     {"position_m", list_of(position.col(network.column_of_tool(i)))}});
+                     {"direction", list_json(tool.direction)},
+                     {"position_m", list_json(position.col(network.column_of_tool(i)))}});
   }
   return tools;
 }
@@ -132,8 +120,7 @@ Json deformation_pictures(const std::vector<FiguredRun>& runs) {
   json["contact"] = scene.probe().sphere;
   json["tools"] = tools_json(runs.front().network->driven, runs.front().network->driven.rest);
   json["direction"] = {d.x(), d.y(), d.z()};
-  json["states"] = Json::array();
-  for (const FiguredRun& figured : runs) json["states"].push_back(state_json(figured));
+  json["states"] = array_json(runs, state_json);
   return json;
 }
 

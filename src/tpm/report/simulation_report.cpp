@@ -57,8 +57,7 @@ Json validity_json(const Validity& validity, bool depth_limits) {
     Json entry{{"limit", key_of(limit)}, {"passed", breach.first_time_s.has_value()}};
     entry["first_time_s"] =
         breach.first_time_s ? Json(nine_digits(*breach.first_time_s)) : Json(nullptr);
-    entry["spheres"] = Json::array();
-    for (const std::size_t sphere : breach.spheres) entry["spheres"].push_back(sphere + 1);
+    entry["spheres"] = array_json(breach.spheres, [](std::size_t sphere) { return sphere + 1; });
     json["limits"].push_back(entry);
   }
   return json;
@@ -129,12 +128,9 @@ Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
     }
     if (contact.is_tool()) {
       const ToolState& state = states[tool];
-      const auto list_of = [](const Eigen::Vector3d& v) {
-        return Json{nine_digits(v.x()), nine_digits(v.y()), nine_digits(v.z())};
-      };
       json["contact_stiffness_N_per_m"] = nine_digits(network.driven.tools[tool].stiffness_N_per_m);
-      json["last"] = {{"position_m", list_of(state.position)},
-                      {"force_on_tissue_N", list_of(state.force)},
+      json["last"] = {{"position_m", array_json(state.position, nine_digits)},
+                      {"force_on_tissue_N", array_json(state.force, nine_digits)},
                       {"touching", state.touching},
                       {"overlap_m", rounded(state.overlap_m, 3)}};
       ++tool;

@@ -58,9 +58,8 @@ void append_speed_record(const std::filesystem::path& file, const std::vector<Sp
 }
 
 Json speed_json(const std::vector<SpeedRow>& rows, const SpeedOrigin& origin) {
-  Json json{{"commit", origin.commit}, {"run", run_record({})}, {"works", Json::array()}};
-  for (const SpeedRow& row : rows) json["works"].push_back(row_json(row));
-  return json;
+  return {
+      {"commit", origin.commit}, {"run", run_record({})}, {"works", array_json(rows, row_json)}};
 }
 
 std::string speed_text(const std::vector<SpeedRow>& rows) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/sweep_report.hpp"
 
@@ -127,8 +128,7 @@ std::string convergence_text(const std::vector<SweepConvergence>& all) {
 }
 
 Json convergence_json(const std::vector<SweepConvergence>& all) {
-  Json list = Json::array();
-  for (const SweepConvergence& c : all) {
+  Json list = array_json(all, [](const SweepConvergence& c) {
     Json threes = Json::array();
     for (std::size_t k = 0; k < c.threes.size(); ++k) {
       const GridConvergence& g = c.threes[k];
@@ -139,26 +139,19 @@ Json convergence_json(const std::vector<SweepConvergence>& all) {
       entry["index"] = limit ? Json(rounded(g.index, 6)) : Json();
       threes.push_back(std::move(entry));
     }
-    list.push_back({{"variable", c.variable},
-                    {"unit", c.unit},
-                    {"axis", c.axis},
-                    {"fixed", fixed_json(c.fixed)},
-                    {"size_is", c.size_text},
-                    {"size", c.size},
-                    {"value", c.value},
-                    {"places_left_out", c.left_out},
-                    {"monotone", c.monotone()},
-                    {"threes", std::move(threes)}});
-  }
+    return Json{{"variable", c.variable},   {"unit", c.unit},
+                {"axis", c.axis},           {"fixed", fixed_json(c.fixed)},
+                {"size_is", c.size_text},   {"size", c.size},
+                {"value", c.value},         {"places_left_out", c.left_out},
+                {"monotone", c.monotone()}, {"threes", std::move(threes)}};
+  });
   return Json{{"convergence", std::move(list)}};
 }
 
 std::vector<Figure> convergence_figures(const std::vector<SweepConvergence>& all,
                                         const std::string& title) {
-  std::vector<Figure> figures;
-  figures.reserve(all.size());
-  for (const SweepConvergence& c : all) figures.push_back(convergence_figure(c, title));
-  return figures;
+  return mapped<Figure>(all,
+                        [&](const SweepConvergence& c) { return convergence_figure(c, title); });
 }
 
 }  // namespace tpm::report

@@ -287,11 +287,9 @@ std::string fixed_words(const std::vector<FixedValue>& fixed, int digits) {
 }
 
 Json fixed_json(const std::vector<FixedValue>& fixed) {
-  Json list = Json::array();
-  for (const FixedValue& h : fixed) {
-    list.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
-  }
-  return list;
+  return array_json(fixed, [](const FixedValue& h) {
+    return Json{{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}};
+  });
 }
 
 Unit shown_unit_of(const std::string& si_unit) {

@@ -57,24 +57,23 @@ Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
     return Json{
         {"value", rounded(e.value, 6)}, {"low", rounded(e.low, 6)}, {"high", rounded(e.high, 6)}};
   };
-  Json list = Json::array();
-  for (const SweepSensitivity& s : all) {
+  Json list = array_json(all, [&](const SweepSensitivity& s) {
     Json inputs = Json::array();
     for (std::size_t i = 0; i < s.indices.inputs.size(); ++i) {
       inputs.push_back({{"parameter", s.parameters[i]},
                         {"first_order", numbers(s.indices.inputs[i].first_order)},
                         {"total", numbers(s.indices.inputs[i].total)}});
     }
-    list.push_back({{"variable", s.variable},
-                    {"mean", rounded(s.indices.mean, 6)},
-                    {"standard_deviation", rounded(s.indices.standard_deviation, 6)},
-                    {"level", s.indices.level},
-                    {"points", s.design.points},
-                    {"replicates", s.design.replicates},
-                    {"points_left_out", s.indices.left_out},
-                    {"fixed", fixed_json(s.fixed)},
-                    {"inputs", std::move(inputs)}});
-  }
+    return Json{{"variable", s.variable},
+                {"mean", rounded(s.indices.mean, 6)},
+                {"standard_deviation", rounded(s.indices.standard_deviation, 6)},
+                {"level", s.indices.level},
+                {"points", s.design.points},
+                {"replicates", s.design.replicates},
+                {"points_left_out", s.indices.left_out},
+                {"fixed", fixed_json(s.fixed)},
+                {"inputs", std::move(inputs)}};
+  });
   return Json{{"sensitivity", std::move(list)}};
 }
 

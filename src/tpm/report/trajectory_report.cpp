@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/store/file.hpp"
@@ -74,9 +75,8 @@ std::string trajectory_text(bool by_depth, const std::vector<double>& times_s,
 void write_trajectory(const ExperimentScene& scene, const std::vector<double>& times_s,
                       const Trajectory& answer, Hdf5Writer& file) {
   const bool by_depth = driven_by_depth(scene);
-  std::vector<double> imposed;
-  imposed.reserve(times_s.size());
-  for (const double time : times_s) imposed.push_back(value_at(scene.protocol, time));
+  const auto imposed =
+      mapped<double>(times_s, [&](double time) { return value_at(scene.protocol, time); });
   const std::vector<double> response(answer.response.begin(), answer.response.end());
   file.numbers("/curve/time_s", times_s);
   file.numbers(by_depth ? "/curve/depth_m" : "/curve/load_N", imposed);
@@ -127,15 +127,13 @@ void write_scene_run(const ExperimentScene& scene, const std::vector<double>& ti
 }
 
 Json formulations_json() {
-  Json list = Json::array();
-  for (const Formulation* f : formulations()) {
-    list.push_back({{"name", f->name()},
-                    {"meaning", f->meaning()},
-                    {"can", words_of(f->can())},
-                    {"for", users_of(*f)},
-                    {"keys", f->keys()}});
-  }
-  return list;
+  return array_json(formulations(), [](const Formulation* f) {
+    return Json{{"name", f->name()},
+                {"meaning", f->meaning()},
+                {"can", words_of(f->can())},
+                {"for", users_of(*f)},
+                {"keys", f->keys()}};
+  });
 }
 
 namespace {
@@ -152,13 +150,12 @@ bool runs_at_servo_rate(const ElongationShape& shape) {
 Json shapes_json() {
   Json list = Json::array();
   for (const ElongationShape* shape : elongation_shapes()) {
-    Json parameters = Json::array();
-    for (const MaterialParameter& p : shape->parameters()) {
-      parameters.push_back({{"name", p.name},
-                            {"unit", si_symbol(p.dimension)},
-                            {"range", range_of(p)},
-                            {"meaning", p.meaning}});
-    }
+    Json parameters = array_json(shape->parameters(), [](const MaterialParameter& p) {
+      return Json{{"name", p.name},
+                  {"unit", si_symbol(p.dimension)},
+                  {"range", range_of(p)},
+                  {"meaning", p.meaning}};
+    });
     list.push_back({{"name", shape->name()},
                     {"meaning", shape->meaning()},
                     {"parameters", std::move(parameters)},

@@ -3,22 +3,13 @@
 #include <cmath>
 #include <functional>
 
+#include "tpm/core/evenly.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/stability/checked_problem.hpp"
 #include "tpm/stability/study.hpp"
 
 namespace tpm::study {
 namespace {
-
-/// So many values from `first` to `last`, evenly in the logarithm.
-std::vector<double> decades(int along, double first, double last) {
-  std::vector<double> values;
-  values.reserve(static_cast<std::size_t>(along));
-  for (int i = 0; i < along; ++i) {
-    values.push_back(first * std::pow(last / first, static_cast<double>(i) / (along - 1)));
-  }
-  return values;
-}
 
 /// What is varied, and how a problem follows from it.
 struct MapPlan {
@@ -37,8 +28,8 @@ MapPlan over_relaxation_time(int along) {
           "relaxation time",
           "s",
           "element, a depth of 4 mm at once and held",
-          decades(along, 1e-4, 1e2),
-          decades(along, 1e-5, 1e3),
+          evenly_in_log(1e-4, 1e2, along),
+          evenly_in_log(1e-5, 1e3, along),
           [](double tau, double h) {
             return massless_problem(paper_element(tau), step_and_hold(kDepth_m, kStudySteps * h),
                                     h);
@@ -62,8 +53,8 @@ MapPlan over_load_rate(int along) {
           "load rate",
           "N/s",
           "element without tension, tau = 0.1 s, a load rising to 0.3 N and held",
-          decades(along, 0.1, 1e3),
-          decades(along, 1e-3, 10.0),
+          evenly_in_log(0.1, 1e3, along),
+          evenly_in_log(1e-3, 10.0, along),
           [](double rate, double h) {
             const double rises = kLoad_N / rate;
             const double ends = rises + kStudySteps * h;
@@ -83,8 +74,8 @@ MapPlan over_depth(int along) {
           "depth in the end",
           "m",
           "element with tension, tau = 0.1 s, a load at once and held that leads to the depth",
-          decades(along, 1e-3, 4e-2),
-          decades(along, 1e-3, 1e3),
+          evenly_in_log(1e-3, 4e-2, along),
+          evenly_in_log(1e-3, 1e3, along),
           [load](double depth, double h) {
             return massless_problem(paper_element(kTau_s), creep(load(depth), kStudySteps * h), h);
           },
@@ -95,7 +86,7 @@ MapPlan over_depth(int along) {
 MapPlan in_motion(std::string id, std::string quantity, std::string unit, std::string problem,
                   std::vector<double> x, std::function<LinearElement(double)> linear,
                   std::function<BondElement(double)> material) {
-  std::vector<double> steps = decades(static_cast<int>(x.size()), 1e-6, 1e2);
+  std::vector<double> steps = evenly_in_log(1e-6, 1e2, static_cast<int>(x.size()));
   MapPlan plan{std::move(id),
                std::move(quantity),
                std::move(unit),
@@ -128,7 +119,7 @@ MapPlan over_stiffness(int along) {
   return in_motion(
       "stiffness", "E1 = E2", "Pa",
       "sphere of 4.4 g, drag 20 1/s, tau = 0.1 s, a load at once and held that leads to 4 mm",
-      decades(along, 1e2, 1e8),
+      evenly_in_log(1e2, 1e8, along),
       [material](double x) { return sphere(material(x), kSphereMass_kg, kDrag_per_s); }, material);
 }
 
@@ -136,7 +127,7 @@ MapPlan over_mass(int along) {
   return in_motion(
       "mass", "mass", "kg",
       "E1 = E2 = 12 kPa, drag 20 1/s, tau = 0.1 s, a load at once and held that leads to 4 mm",
-      decades(along, 1e-8, 1e1),
+      evenly_in_log(1e-8, 1e1, along),
       [](double x) { return sphere(without_tension(kTau_s), x, kDrag_per_s); },
       [](double) { return without_tension(kTau_s); });
 }
@@ -145,7 +136,7 @@ MapPlan over_damping(int along) {
   return in_motion(
       "damping", "drag", "1/s",
       "sphere of 4.4 g, E1 = E2 = 12 kPa, tau = 0.1 s, a load at once and held that leads to 4 mm",
-      decades(along, 1e-1, 1e6),
+      evenly_in_log(1e-1, 1e6, along),
       [](double x) { return sphere(without_tension(kTau_s), kSphereMass_kg, x); },
       [](double) { return without_tension(kTau_s); });
 }

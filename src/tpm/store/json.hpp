@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -8,6 +9,14 @@ namespace tpm {
 
 /// Keys keep the order in which they were written: reports are compared byte for byte.
 using Json = nlohmann::ordered_json;
+
+/// What `convert` makes of the items, a member or a function.
+template <class Items, class Convert>
+[[nodiscard]] Json array_json(const Items& items, Convert convert) {
+  Json array = Json::array();
+  for (const auto& item : items) array.push_back(std::invoke(convert, item));
+  return array;
+}
 
 /// Strict JSON: duplicate keys, numbers that overflow and anything after the value are errors
 /// (Error(bad_input) with file, line and column), which nlohmann-json alone lets pass.

@@ -41,13 +41,6 @@ Json detail_json(const AuditDetail& detail) {
           {"difference_percent", optional_number(detail.difference_percent)}};
 }
 
-template <class Item>
-Json array_json(const std::vector<Item>& items, Json (*convert)(const Item&)) {
-  Json array = Json::array();
-  for (const Item& item : items) array.push_back(convert(item));
-  return array;
-}
-
 Json finding_json(const Finding& finding) {
   Json json;
   json["id"] = finding.id;

@@ -54,11 +54,9 @@ struct Series {
 };
 
 std::vector<Series> series_of(const ClaimReader& claim) {
-  std::vector<Series> all;
-  for (const Json& item : claim.required("series")) {
-    all.push_back({item.at("column").get<std::string>(), item.at("expression").get<std::string>()});
-  }
-  return all;
+  return mapped<Series>(claim.required("series"), [](const Json& item) {
+    return Series{item.at("column").get<std::string>(), item.at("expression").get<std::string>()};
+  });
 }
 
 std::string expressions(const std::vector<Series>& all) {

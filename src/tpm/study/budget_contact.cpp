@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/law_contact.hpp"
 #include "tpm/study/budget_parts.hpp"
@@ -123,10 +124,7 @@ void add_device_stages(std::vector<BudgetStage>& stages, const SteppedForces& sm
                        const SteppedForces& quantised, const std::vector<double>& times_s,
                        const BudgetDevice& device, const BudgetStage& loop) {
   const auto late = [&](const SteppedForces& forces, double late_s) {
-    std::vector<double> values;
-    values.reserve(times_s.size());
-    for (const double t : times_s) values.push_back(force_at(forces, t - late_s));
-    return values;
+    return mapped<double>(times_s, [&](double t) { return force_at(forces, t - late_s); });
   };
   const double late_s = device.delay_periods * device.period_s;
   stages.push_back(loop);

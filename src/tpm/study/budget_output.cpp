@@ -35,8 +35,7 @@ Json to_json(const ErrorBudget& b) {
   const auto stored = [](double value) { return rounded(value, kStoredDigits6); };
   Json stages = Json::array(), lines = Json::array();
   for (const BudgetStage& stage : b.stages) {
-    Json force = Json::array();
-    for (const double f : stage.force_N) force.push_back(stored(f));
+    const Json force = array_json(stage.force_N, stored);
     stages.push_back({{"name", stage.name}, {"words", stage.words}, {"force_N", force}});
   }
   for (const BudgetLine& line : b.lines) {

@@ -28,10 +28,9 @@ double quantity(const Json& value, Dimension dimension, const DocumentPlace& pla
 }
 
 std::vector<double> intervals_of(const Json& grid, const DocumentPlace& place) {
-  std::vector<double> values;
-  for (const auto& value : grid.at("interval"))
-    values.push_back(quantity(value, Dimension::time, place.key("interval")));
-  return values;
+  return mapped<double>(grid.at("interval"), [&](const auto& value) {
+    return quantity(value, Dimension::time, place.key("interval"));
+  });
 }
 
 std::vector<int> repeats_of(const Json& grid) {

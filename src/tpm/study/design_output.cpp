@@ -58,18 +58,17 @@ Json to_json(const Expectation& expected, const DesignProblem& problem) {
 }
 
 Json to_json(const DesignCheck& check) {
-  Json list = Json::array();
-  for (const CheckedParameter& p : check.parameters) {
-    list.push_back({{"name", p.name},
-                    {"predicted_theta_sd", finite_json(p.predicted)},
-                    {"observed_theta_sd", finite_json(p.observed)},
-                    {"ratio", finite_json(p.ratio)},
-                    {"ratio_error", finite_json(p.ratio_error)},
-                    {"bias_in_predicted_sd", finite_json(p.bias)},
-                    {"bias_error", finite_json(p.bias_error)},
-                    {"covered", p.covered},
-                    {"agrees", p.agrees}});
-  }
+  Json list = array_json(check.parameters, [](const CheckedParameter& p) {
+    return Json{{"name", p.name},
+                {"predicted_theta_sd", finite_json(p.predicted)},
+                {"observed_theta_sd", finite_json(p.observed)},
+                {"ratio", finite_json(p.ratio)},
+                {"ratio_error", finite_json(p.ratio_error)},
+                {"bias_in_predicted_sd", finite_json(p.bias)},
+                {"bias_error", finite_json(p.bias_error)},
+                {"covered", p.covered},
+                {"agrees", p.agrees}};
+  });
   return {
       {"seed", check.seed},         {"data_sets", check.sets},       {"failed", check.failed},
       {"at_bound", check.at_bound}, {"parameters", std::move(list)}, {"warnings", check.warnings}};

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <set>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/study/model_functions.hpp"
 #include "tpmkit/error.hpp"
 
@@ -147,11 +148,9 @@ struct Evaluator::Impl {
              Known& known_values) {
     CompiledFormula& formula = compiled(text, where);
     // Looked up first: a definition may use the same formula and so the same storage.
-    std::vector<double> values;
-    values.reserve(formula.names.size());
-    for (const auto& name : formula.names) {
-      values.push_back(lookup(name, scope, where, depth, known_values));
-    }
+    const auto values = mapped<double>(formula.names, [&](const auto& name) {
+      return lookup(name, scope, where, depth, known_values);
+    });
     std::copy(values.begin(), values.end(), formula.values.begin());
     double result = 0.0;
     try {

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/curve_file.hpp"
@@ -59,8 +60,7 @@ DrawnProfile drawn_profile(const ExperimentResiduals& residuals, const FitResult
                            std::size_t index) {
   constexpr int kIntervalsPerSide = 24;
   const auto& walked = fit.parameters[index].profile.points;
-  std::vector<FitParameter> parameters;
-  for (const ParameterResult& p : fit.parameters) parameters.push_back(p.parameter);
+  const auto parameters = mapped<FitParameter>(fit.parameters, &ParameterResult::parameter);
   const FitParameter& own = parameters[index];
   FixedMask fixed(parameters.size(), false);
   fixed[index] = true;
@@ -111,21 +111,18 @@ FitStudy run_fit_study(const FitConfig& config) {
 }
 
 Json variants_json(const FitStudy& study) {
-  Json list = Json::array();
-  for (const FitVariant& v : study.variants) {
+  Json list = array_json(study.variants, [](const FitVariant& v) {
     Json item{{"rate_m_per_s", v.rate_m_per_s}, {"noise", noise_kind_name(v.noise)}};
     item["fit"] = to_json(v.result);
-    list.push_back(std::move(item));
-  }
+    return item;
+  });
   return Json{{"variants", std::move(list)}};
 }
 
 Json held_out_json(const FitStudy& study) {
-  Json list = Json::array();
-  for (const HeldOutFit& h : study.held_out) {
-    list.push_back(Json{{"depth_m", rounded(h.depth_m, 6)}, {"fit", to_json(h.result)}});
-  }
-  return Json{{"held_out", std::move(list)}};
+  return Json{{"held_out", array_json(study.held_out, [](const HeldOutFit& h) {
+                 return Json{{"depth_m", rounded(h.depth_m, 6)}, {"fit", to_json(h.result)}};
+               })}};
 }
 
 }  // namespace tpm::study

@@ -24,8 +24,7 @@ std::string si_suffix(const LawSpec& spec) {
 
 Json sample_parameters_json(const IdentifiedSample& sample, const LawSpec& law) {
   const std::vector<LawParameter> table = law_parameters(law);
-  Json list = Json::array();
-  for (const SequentialParameter& p : sample.estimate.parameters) {
+  return array_json(sample.estimate.parameters, [&](const SequentialParameter& p) {
     Json entry{{"name", law_key(table[p.place])},
                {"estimate", finite(p.estimate)},
                {"lower", finite(p.at_bound ? NAN : p.lower)},
@@ -34,9 +33,8 @@ Json sample_parameters_json(const IdentifiedSample& sample, const LawSpec& law) 
                {"degrees_of_freedom", finite(p.degrees_of_freedom)}};
     if (p.nuisance) entry["nuisance"] = true;
     if (p.at_bound) entry["at_bound"] = true;
-    list.push_back(std::move(entry));
-  }
-  return list;
+    return entry;
+  });
 }
 
 Json sample_json(const Identification& id, const IdentifiedSample& sample) {

@@ -22,10 +22,8 @@ std::string unit_suffix(Dimension dimension) {
 }
 
 Json numbers(const std::vector<double>& values) {
-  Json list = Json::array();
-  for (const double v : values)
-    list.push_back(std::isfinite(v) ? Json(rounded(v, kStored)) : Json());
-  return list;
+  return array_json(values,
+                    [](double v) { return std::isfinite(v) ? Json(rounded(v, kStored)) : Json(); });
 }
 
 std::string drive_key(const LawPrediction& p) {

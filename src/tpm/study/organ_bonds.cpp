@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/scene/protocol_file.hpp"
 #include "tpmkit/error.hpp"
@@ -76,11 +77,8 @@ BondMaterial FittedBonds::material(std::span<const double> natural) const {
 }
 
 std::vector<double> FittedBonds::values(const OrganModel& model, const BondMaterial& material) {
-  std::vector<double> values;
-  for (const ParameterDescription& p : model.parameters()) {
-    values.push_back(*value_of(material, p.name));
-  }
-  return values;
+  return mapped<double>(model.parameters(),
+                        [&](const ParameterDescription& p) { return *value_of(material, p.name); });
 }
 
 Eigen::MatrixXd FittedBonds::along(const OrganModel& model) const {

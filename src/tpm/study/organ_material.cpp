@@ -8,6 +8,7 @@
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/enum_names.hpp"
 #include "tpm/core/give_up.hpp"
+#include "tpm/core/lists.hpp"
 #include "tpm/fit/least_squares.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/organ_bonds.hpp"
@@ -108,9 +109,8 @@ class OrganLessLaw final : public ResidualFunction {
 
   /// Along every motion.
   [[nodiscard]] std::vector<std::vector<double>> forces(const BondMaterial& m) const {
-    std::vector<std::vector<double>> all;
-    for (const MaterialMotion& motion : motions_) all.push_back(force(m, motion.protocol, motion));
-    return all;
+    return mapped<std::vector<double>>(
+        motions_, [&](const MaterialMotion& motion) { return force(m, motion.protocol, motion); });
   }
   [[nodiscard]] std::vector<double> force(const BondMaterial& m, const Protocol& protocol,
                                           const MaterialMotion& motion) const {
@@ -217,8 +217,7 @@ Eigen::MatrixXd law_slopes(const LawFile& law, const std::vector<MaterialMotion>
 /// where the readings give none.
 void carry_uncertainty(OrganMaterial& m, const OrganLessLaw& function, const LawFile& law,
                        const std::vector<MaterialMotion>& motions) {
-  std::vector<double> natural;
-  for (const OrganMaterialParameter& p : m.parameters) natural.push_back(p.value);
+  const auto natural = mapped<double>(m.parameters, &OrganMaterialParameter::value);
   if (!law.uncertainty) {
     if (!m.readings) m.flags.emplace_back("the law carries no uncertainty: no intervals");
     return;
@@ -351,13 +350,12 @@ void go_on_to_readings(OrganMaterial& m, const OrganLessLaw& function, const Org
     parameters.push_back(p.parameter);
     parameters.back().start = p.by_law;
   }
-  std::vector<OrganReadings> recordings;
-  for (const MaterialMotion& motion : motions) {
+  const auto recordings = mapped<OrganReadings>(motions, [&](const MaterialMotion& motion) {
     const auto [contact, offset] = motion.placement;
     OrganReadings r{*motion.drive, motion.time_s, motion.measured_N, contact, offset};
     for (double& f : r.force_N) f += offset;
-    recordings.push_back(std::move(r));
-  }
+    return r;
+  });
   ReadingsFit readings = fit_to_readings(model, function.bonds(), parameters, recordings, profiles);
   const std::vector<ParameterResult>& found = readings.fit.parameters;
   for (std::size_t i = 0; i < m.parameters.size(); ++i) {

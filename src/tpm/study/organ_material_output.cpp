@@ -30,13 +30,8 @@ std::string mismatch_words(std::string_view what, const ForceMismatch& m) {
 }
 
 Json matrix_json(const Eigen::MatrixXd& matrix) {
-  Json rows = Json::array();
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    Json row = Json::array();
-    for (Eigen::Index k = 0; k < matrix.cols(); ++k) row.push_back(matrix(i, k));
-    rows.push_back(std::move(row));
-  }
-  return rows;
+  return array_json(matrix.rowwise(),
+                    [](const auto& row) { return array_json(row, std::identity()); });
 }
 
 /// Its name and SI unit: "Einf_Pa".

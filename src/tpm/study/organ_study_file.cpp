@@ -48,15 +48,14 @@ Json fit_document(const Json& study, const StudyTissue& tissue, const std::strin
   for (const char* key : {"parameters", "fixed", "starts", "profile", "hypotheses"}) {
     if (study.contains(key)) document[key] = study.at(key);
   }
-  document["data"] = Json::array();
-  for (const auto& name : data_names) {
+  document["data"] = array_json(data_names, [&](const Json& name) {
     const auto text = name.get<std::string>();
     if (!study.at("data").contains(text)) {
       throw bad_input(place.key("fits").key(fit).where,
                       fmt::format("no data '{}'", printable(text)), "a name under /data");
     }
-    document["data"].push_back(study.at("data").at(text));
-  }
+    return study.at("data").at(text);
+  });
   return document;
 }
 

@@ -40,15 +40,13 @@ Json materials_json(const OrganStudy& study) {
 }
 
 Json fits_json(const OrganStudy& study) {
-  Json list = Json::array();
-  for (const TissueFit& made : study.fits) {
+  return array_json(study.fits, [&](const TissueFit& made) {
     Json j{{"fit", study.config.fits[made.fit].name},
            {"tissue", study.config.tissues[made.tissue].name}};
     j["failure"] = made.failure.empty() ? Json(nullptr) : Json(made.failure);
     j["result"] = made.result ? to_json(*made.result) : Json(nullptr);
-    list.push_back(std::move(j));
-  }
-  return list;
+    return j;
+  });
 }
 
 /// What was imposed, under keys with units.
@@ -77,37 +75,32 @@ Json curve_json(const OrganStudy& study, const StudyCurve& curve) {
   Json j = condition_json(c);
   j["tissue"] = study.config.tissues[curve.tissue].name;
   j["failure"] = curve.failure.empty() ? Json(nullptr) : Json(curve.failure);
-  j["readings"] = Json::array();
-  for (const StudyReading& r : curve.readings) {
+  j["readings"] = array_json(curve.readings, [&](const StudyReading& r) {
     Json reading{{"label", r.label}};
     reading[place_key(c.kind)] = number(r.x);
     reading[response_key(c.kind)] = number(r.response);
     if (r.against_first) reading["against_first"] = rounded(*r.against_first, 4);
-    j["readings"].push_back(std::move(reading));
-  }
+    return reading;
+  });
   return j;
 }
 
 Json curves_json(const OrganStudy& study) {
-  Json list = Json::array();
-  for (const StudyCurves& set : study.curves) {
+  return array_json(study.curves, [&](const StudyCurves& set) {
     Json j{{"material", set.material}, {"answers", Json::array()}};
     for (const StudyCurve& curve : set.curves) {
       j["answers"].push_back(curve_json(study, curve));
     }
-    list.push_back(std::move(j));
-  }
-  return list;
+    return j;
+  });
 }
 
 }  // namespace
 
 Json to_json(const OrganStudy& study) {
-  Json tissues = Json::array();
-  for (const StudyTissue& t : study.config.tissues) {
-    tissues.push_back(
-        {{"name", t.name}, {"scene", t.scene.empty() ? Json(nullptr) : Json(t.scene)}});
-  }
+  Json tissues = array_json(study.config.tissues, [](const StudyTissue& t) {
+    return Json{{"name", t.name}, {"scene", t.scene.empty() ? Json(nullptr) : Json(t.scene)}};
+  });
   Json j{{"title", study.config.title}, {"tissues", std::move(tissues)}};
   j["materials"] = materials_json(study);
   j["fits"] = fits_json(study);

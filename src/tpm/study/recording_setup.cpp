@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/median.hpp"
 #include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
@@ -314,10 +315,7 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
 }
 
 std::vector<DataSet> data_sets(std::span<const PreparedRecording> recordings) {
-  std::vector<DataSet> sets;
-  sets.reserve(recordings.size());
-  for (const PreparedRecording& r : recordings) sets.emplace_back(r.recording);
-  return sets;
+  return mapped<DataSet>(recordings, &PreparedRecording::recording);
 }
 
 namespace {
@@ -380,9 +378,8 @@ Json config_json(const FitConfig& config) {
     }
     entry["sets"] = std::move(sets);
     if (!p.sets.front().data.empty()) {
-      Json scope = Json::array();
-      for (const std::size_t i : p.sets.front().data) scope.push_back(config.data[i].dataset);
-      entry["for"] = std::move(scope);
+      entry["for"] =
+          array_json(p.sets.front().data, [&](std::size_t i) { return config.data[i].dataset; });
     }
     parameters[p.fit.name] = std::move(entry);
   }
@@ -394,8 +391,7 @@ Json config_json(const FitConfig& config) {
     fixed[std::string(p.name)] = text(config.fixed[i], shown_unit(p.dimension));
   }
   if (!fixed.empty()) j["fixed"] = std::move(fixed);
-  Json data = Json::array();
-  for (const DataChoice& d : config.data) {
+  Json data = array_json(config.data, [&](const DataChoice& d) {
     Json entry{{"dataset", d.dataset}};
     entry["protocol"] = {{"kind", protocol_kind_name(d.protocol.kind)}};
     entry["noise"] = {{"kind", noise_kind_name(d.noise.kind)}};
@@ -408,8 +404,8 @@ Json config_json(const FitConfig& config) {
     if (const Json import = import_json(d.import); !import.empty()) entry["import"] = import;
     if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, shown_unit(Dimension::time));
     if (std::isfinite(d.to_s)) entry["to"] = text(d.to_s, shown_unit(Dimension::time));
-    data.push_back(std::move(entry));
-  }
+    return entry;
+  });
   j["data"] = std::move(data);
   j["starts"] = {{"count", config.starts}, {"seed", config.seed}};
   j["profile"] = {{"level", config.level}, {"enabled", config.profiles}};

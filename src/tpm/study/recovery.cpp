@@ -107,19 +107,16 @@ ExperimentResiduals generating_residuals(const PreparedRecording& recording, con
 /// test, are 0 there.
 std::vector<double> true_estimates(const FitResult& fit, const Trials& trials) {
   const LawModel model(trials.law);
-  std::vector<double> natural;
-  for (const ParameterResult& p : fit.parameters) {
-    natural.push_back(trials.true_values[model.index(p.parameter.name)]);
-  }
-  return natural;
+  return mapped<double>(fit.parameters, [&](const ParameterResult& p) {
+    return trials.true_values[model.index(p.parameter.name)];
+  });
 }
 
 /// Counts which profile-likelihood intervals contain the true value.
 void count_intervals(const ExperimentResiduals& function, const Trials& trials,
                      RecoveryResult& result) {
   const FitResult fit = fit_experiments(function);
-  std::vector<FitParameter> parameters;
-  for (const ParameterResult& p : fit.parameters) parameters.push_back(p.parameter);
+  const auto parameters = mapped<FitParameter>(fit.parameters, &ParameterResult::parameter);
   const std::vector<double> true_values = true_estimates(fit, trials);
   const std::vector<std::vector<double>> starts{fit.best.natural, true_values};
   std::vector<double> deviance;
@@ -197,11 +194,9 @@ Recording simulated_recording(const LawSpec& law, std::span<const double> parame
 }
 
 std::vector<double> visible_parameters(const LawSpec& law, double order) {
-  std::vector<double> values;
-  for (const LawParameter& p : law_parameters(law)) {
-    values.push_back(visible_value(p, law.branches, order));
-  }
-  return values;
+  return mapped<double>(law_parameters(law), [&](const LawParameter& p) {
+    return visible_value(p, law.branches, order);
+  });
 }
 
 bool RecoveryResult::fulfilled() const {
@@ -258,8 +253,7 @@ Json choice_json(const ChoiceCount& c) {
 Json to_json(const RecoveryResult& r) {
   Json j{{"law", law_name(r.law)}, {"noise_over_peak", r.noise}, {"seed", r.seed},
          {"trials", r.trials},     {"failed", r.failed},         {"missed_minimum", r.missed}};
-  j["choices"] = Json::array();
-  for (const ChoiceCount& c : r.choices) j["choices"].push_back(choice_json(c));
+  j["choices"] = array_json(r.choices, choice_json);
   Json list = Json::array();
   const LawModel model(r.law);
   for (const ParameterCoverage& p : r.parameters) {

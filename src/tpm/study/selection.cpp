@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/give_up.hpp"
+#include "tpm/core/lists.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/recording_setup.hpp"
@@ -16,16 +17,14 @@ namespace {
 
 /// Residuals of a fit, one run for each recording, in the order of time.
 std::vector<std::vector<double>> standardised_runs(const FitResult& fit) {
-  std::vector<std::vector<double>> runs;
-  for (const RecordingFit& r : fit.recordings) {
+  return mapped<std::vector<double>>(fit.recordings, [](const RecordingFit& r) {
     std::vector<double> run;
     run.reserve(r.observed.size());
     for (std::size_t i = 0; i < r.observed.size(); ++i) {
       if (r.fitted[i]) run.push_back(r.standardised[i]);
     }
-    runs.push_back(std::move(run));
-  }
-  return runs;
+    return run;
+  });
 }
 
 Correlation correlation_of(const FitResult& fit) {

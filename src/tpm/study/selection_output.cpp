@@ -11,16 +11,14 @@ double kept_digits(double value) {
 }
 
 Json held_out_json(const Candidate& c) {
-  Json list = Json::array();
-  for (const HeldOut& h : c.held_out) {
-    list.push_back({{"what", h.what},
-                    {"rms_SI", kept_digits(h.rms)},
-                    {"rms_over_peak", kept_digits(h.rms_over_peak)},
-                    {"rms_over_sd", kept_digits(h.rms_standardised)},
-                    {"rms_if_fitted_SI", kept_digits(h.rms_if_fitted)},
-                    {"predicts", h.predicts}});
-  }
-  return list;
+  return array_json(c.held_out, [](const HeldOut& h) {
+    return Json{{"what", h.what},
+                {"rms_SI", kept_digits(h.rms)},
+                {"rms_over_peak", kept_digits(h.rms_over_peak)},
+                {"rms_over_sd", kept_digits(h.rms_standardised)},
+                {"rms_if_fitted_SI", kept_digits(h.rms_if_fitted)},
+                {"predicts", h.predicts}};
+  });
 }
 
 Json candidate_json(const Candidate& c) {
@@ -56,8 +54,7 @@ Json to_json(const Selection& s) {
          {"margin_bic", s.margin},
          {"samples", s.samples},
          {"effective_readings", kept_digits(s.effective_count)}};
-  Json laws = Json::array();
-  for (const Candidate& c : s.candidates) laws.push_back(candidate_json(c));
+  Json laws = array_json(s.candidates, candidate_json);
   j["laws"] = std::move(laws);
   j["words"] = s.words;
   j["warnings"] = s.warnings;

@@ -205,8 +205,7 @@ Json to_json(const SpecimenStudy& study) {
   Json j{{"law", law_name(study.law)}, {"why", study.why}};
   j[si_key(study.law.drive, "reference")] = rounded(study.law.reference, 6);
   j["coefficients_depend_on_reference"] = depends_on_reference(study.law);
-  Json rows = Json::array();
-  for (const SpecimenRow& row : study.rows) {
+  j["recordings"] = array_json(study.rows, [](const SpecimenRow& row) {
     Json entry{{"recording", row.name}, {"fitted", row.fit.has_value()}};
     if (!row.specimen.empty()) entry["specimen"] = row.specimen;
     if (row.fit) {
@@ -219,9 +218,8 @@ Json to_json(const SpecimenStudy& study) {
     } else {
       entry["reason"] = row.reason;
     }
-    rows.push_back(std::move(entry));
-  }
-  j["recordings"] = std::move(rows);
+    return entry;
+  });
   Json pooled = Json::array();
   for (const PooledParameter& p : study.pooled) {
     const RandomEffects& e = p.effects;

@@ -99,10 +99,8 @@ Json request_json(const TableRequest& request) {
 Json to_json(const TablesResult& result) {
   Json json;
   json["request"] = request_json(result.request);
-  json["rows"] = Json::array();
-  for (const TableRow& row : result.rows) json["rows"].push_back(row_json(row));
-  json["static_bands"] = Json::array();
-  for (const BandRow& row : result.bands) json["static_bands"].push_back(band_json(row));
+  json["rows"] = array_json(result.rows, row_json);
+  json["static_bands"] = array_json(result.bands, band_json);
   json["summary"] = {
       {"lambda1", counts_json(result.summary.lambda1)},
       {"force_from_printed_lambda1", counts_json(result.summary.force_from_printed_lambda1)},

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/lists.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/solve/creep_exact.hpp"
@@ -224,11 +225,9 @@ class ContactModel final : public SweepModel {
   [[nodiscard]] std::uint64_t usual_block() const override { return 8192; }
   [[nodiscard]] std::unique_ptr<CellModel> cell_model(
       const std::vector<SweptTarget>& targets) const override {
-    std::vector<std::size_t> swept;
-    swept.reserve(targets.size());
-    for (const SweptTarget& target : targets) {
-      swept.push_back(parse_word(kContactParameters, "parameter", target.target, "sweep"));
-    }
+    auto swept = mapped<std::size_t>(targets, [](const SweptTarget& target) {
+      return parse_word(kContactParameters, "parameter", target.target, "sweep");
+    });
     for (const ContactParameter& parameter : kContactParameters) {
       if (!setup_.uses(parameter.meaning) || !std::isnan(setup_.values[parameter.meaning]) ||
           std::find(swept.begin(), swept.end(), parameter.meaning) != swept.end()) {

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/sample/sensitivity.hpp"
 #include "tpm/store/file.hpp"
@@ -318,8 +319,7 @@ std::uint64_t Sweep::cells() const {
 
 std::vector<SweptTarget> Sweep::swept() const {
   constexpr std::uint64_t kLooked = 4096;  // evenly: what lies between changes a range little
-  std::vector<SweptTarget> swept;
-  for (const SweptParameter& p : parameters) {
+  return mapped<SweptTarget>(parameters, [&](const SweptParameter& p) {
     SweptTarget target{p.target, p.axis, axes[p.axis].size, p.values.at(0), p.values.at(0)};
     const std::uint64_t step = (target.places + kLooked - 1) / kLooked;
     for (std::uint64_t i = 0; i < target.places; i += step) {
@@ -329,9 +329,8 @@ std::vector<SweptTarget> Sweep::swept() const {
     const double last = p.values.at(target.places - 1);
     target.least = std::min(target.least, last);
     target.largest = std::max(target.largest, last);
-    swept.push_back(std::move(target));
-  }
-  return swept;
+    return target;
+  });
 }
 
 std::uint64_t Sweep::blocks() const {

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <map>
 
+#include "tpm/core/lists.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/delimited.hpp"
 #include "tpm/store/file.hpp"
@@ -36,10 +37,7 @@ class ReasonTable {
   std::vector<std::int32_t> numbers_of(const CellBlock& block) {
     std::vector<std::int32_t> global{0};
     for (const std::string& reason : block.reasons) global.push_back(number_of(reason));
-    std::vector<std::int32_t> numbers;
-    numbers.reserve(block.cells());
-    for (const std::uint16_t local : block.reason) numbers.push_back(global[local]);
-    return numbers;
+    return mapped<std::int32_t>(block.reason, [&](std::uint16_t local) { return global[local]; });
   }
   [[nodiscard]] const std::vector<std::string>& texts() const { return texts_; }
 
@@ -64,10 +62,7 @@ std::string path_to(const std::string& dataset) {
 
 template <class List>
 std::vector<std::string> names_of(const List& list) {
-  std::vector<std::string> names;
-  names.reserve(list.size());
-  for (const auto& entry : list) names.push_back(entry.name);
-  return names;
+  return mapped<std::string>(list, [](const auto& entry) { return entry.name; });
 }
 
 /// Bytes of a result, with some to spare for names.
@@ -115,9 +110,8 @@ class ResultWriter {
   /// Writes what does not depend on other blocks; any number of threads at once.
   void store(const CellBlock& block) const {
     const std::uint64_t first = block.number * sweep_.block_cells;
-    std::vector<std::uint8_t> status;
-    status.reserve(block.cells());
-    for (const CellStatus s : block.status) status.push_back(static_cast<std::uint8_t>(s));
+    const auto status = mapped<std::uint8_t>(
+        block.status, [](CellStatus s) { return static_cast<std::uint8_t>(s); });
     out_.part("/status", first, std::span<const std::uint8_t>(status));
     out_.part("/error_estimate", first, std::span<const double>(block.error_estimate));
     if (!block.model.empty()) {
