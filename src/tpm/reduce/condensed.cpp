@@ -33,16 +33,6 @@ double rest_share(double y) {
 }
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using State6 = Eigen::Matrix<double, 6, 1>;
-using Packed = Eigen::Matrix<double, 8, 1>;
-
-/// Columns of states, w and q each filled up with a 0.
-template <class Columns>
-void pack(const Columns& columns, double (*packed)[8]) {
-  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
-    for (Eigen::Index i = 0; i < 6; ++i) packed[k][i < 3 ? i : i + 1] = columns(i, k);
-  }
-}
 
 double positive(double value, std::string_view name) {
   if (value > 0.0 && std::isfinite(value)) return value;
@@ -56,7 +46,8 @@ CondensedContact::CondensedContact(std::shared_ptr<const CondensedFit> fit,
                                    std::vector<CondensedBranch> branches, double period_s)
     : fit_(std::move(fit)),
       branches_(std::move(branches)),
-      period_s_(positive(period_s, "period")) {
+      period_s_(positive(period_s, "period")),
+      state_(fit_->tables) {
   double whole = 0.0;
   for (const CondensedBranch& branch : branches_) {
     (void)positive(branch.relaxation_time_s, "relaxation time");
@@ -72,11 +63,10 @@ CondensedContact::CondensedContact(std::shared_ptr<const CondensedFit> fit,
   }
   for (CondensedBranch& branch : branches_) branch.share /= whole;
   if (several()) {
-    of_branches_ = CondensedBranches(*fit_, branches_, period_s_);
+    of_branches_.emplace(*fit_, branches_, period_s_);
   } else {
     set_rates(branches_.front().relaxation_time_s);
   }
-  settle_condensed(fit_->tables, state_);
 }
 
 CondensedContact CondensedContact::with_relaxation_time(double relaxation_time_s) const {
@@ -95,79 +85,72 @@ void CondensedContact::set_rates(double relaxation_time_s) {
   const double x = period_s_ / relaxation_time_s;
   const CondensedModes modes = condensed_modes(*fit_);
   const auto of_rate = [&](const auto& f) {
-    State6 values;
-    for (Eigen::Index k = 0; k < 6; ++k) values[k] = f(modes.rate[k] * x);
+    CondensedVector values = modes.rate * x;
+    for (double& y : values) y = f(y);
     return Matrix6(modes.right * values.asDiagonal() * modes.left);
   };
-  const Matrix6 rate = of_rate([&](double y) { return y / x; });
-  pack(rate, rates_.rate);
-  pack(of_rate([&](double y) { return x * first_phi(y); }), rates_.first);
-  pack(of_rate([&](double y) { return x * second_phi(y); }), rates_.second);
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    for (Eigen::Index i = 0; i < 3; ++i) rates_.of_second[k][i] = rate(3 + i, 3 + k);
-  }
+  rates_.rate = modes.rates();
+  rates_.first = of_rate([&](double y) { return x * first_phi(y); });
+  rates_.second = of_rate([&](double y) { return x * second_phi(y); });
   const SymmetricModes of_w = symmetric_modes(fit_->mean_energy, fit_->mean_metric);
   const double share = rest_share(of_w.values.mean() * x);
   // Of a linear tissue that moves straight, resting for that share of the way leaves this out: with
   // r = exp(-y) the state relative to the contact ends at phi1, not at 1 + (r - 1) share, per step
   // of the contact.
-  const Matrix6 left_out =
-      of_rate([&](double y) { return 1.0 + std::expm1(-y) * share - first_phi(y); });
-  pack(left_out.leftCols<3>(), rates_.drift);
+  rates_.drift =
+      of_rate([&](double y) { return 1.0 + std::expm1(-y) * share - first_phi(y); }).leftCols<3>();
   rates_.relaxation_point = share;
 }
 
 void CondensedContact::reset() noexcept {
-  state_ = {};
-  settle_condensed(fit_->tables, state_);
-  if (several()) of_branches_.reset();
+  state_ = CondensedState(fit_->tables);
+  if (several()) of_branches_->reset();
   kept_ = 0;
 }
 
 CondensedViscousState CondensedContact::viscous_state() const noexcept {
-  return {Eigen::Vector3d::Map(&state_.viscous[0]), Eigen::Vector3d::Map(&state_.viscous[4]),
-          several() ? of_branches_.spread_J() : 0.0};
+  return {state_.viscous.head<3>(), state_.viscous.tail<3>(),
+          several() ? of_branches_->spread_J() : 0.0};
 }
 
 double CondensedContact::stored_energy_J(const Eigen::Vector3d& displacement_m,
                                          const CondensedViscousState& viscous) const noexcept {
-  return value_of(displacement_m, viscous).energy_J + viscous.spread_J;
+  return pull_of(displacement_m, viscous).energy_J + viscous.spread_J;
 }
 
 Eigen::Vector3d CondensedContact::force_N(const Eigen::Vector3d& displacement_m,
                                           const CondensedViscousState& viscous) const noexcept {
-  return fit_->frame.axes * value_of(displacement_m, viscous).force_N;
+  return fit_->frame.axes * pull_of(displacement_m, viscous).force_N;
 }
 
-CondensedValue CondensedContact::value_of(const Eigen::Vector3d& displacement_m,
-                                          const CondensedViscousState& viscous) const noexcept {
-  const Eigen::Vector3d u = fit_->frame.local(displacement_m);
-  Packed packed = Packed::Zero();
-  packed.head<3>() = viscous.w_m;
-  packed.segment<3>(4) = viscous.q_m;
-  return value_of_condensed(fit_->tables, u.data(), packed.data());
+CondensedPull CondensedContact::pull_of(const Eigen::Vector3d& displacement_m,
+                                        const CondensedViscousState& viscous) const noexcept {
+  CondensedVector state;
+  state << viscous.w_m, viscous.q_m;
+  return condensed_pull(fit_->tables, fit_->frame.local(displacement_m), state,
+                        condensed_matrices_at(fit_->tables, viscous.w_m));
 }
 
 ContactAnswer CondensedContact::step(const ToolPose& tool) noexcept {
   const Eigen::Vector3d u = fit_->frame.local(tool.displacement_m);
   if (several()) {
-    of_branches_.step(state_, u.data());
+    of_branches_->step(state_, u);
   } else {
-    step_condensed(fit_->tables, rates_, state_, u.data());
+    step_condensed(fit_->tables, rates_, state_, u);
   }
   kept_ += state_.kept ? 1 : 0;
   ContactAnswer answer;
-  answer.force_N = fit_->frame.axes * Eigen::Vector3d::Map(&state_.force[0]);
-  const Eigen::Vector3d q = several() ? of_branches_.second_m(state_)
-                                      : Eigen::Vector3d(Eigen::Vector3d::Map(&state_.viscous[4]));
+  answer.force_N = fit_->frame.axes * state_.force_N;
+  const Eigen::Vector3d q =
+      several() ? of_branches_->second_m(state_) : Eigen::Vector3d(state_.viscous.tail<3>());
   const double place_aside_m = across(u[1], u[2]);
   const double aside_m = std::max(place_aside_m, across(state_.viscous[1], state_.viscous[2]));
   const double aside = aside_m / fit_->frame.tangential_m;
   answer.error_N = (kMisfitAlong + aside * aside) * fit_->fit_error_N +
                    kSecondModeError * (fit_->coupling_along * std::abs(q[0]) +
                                        fit_->coupling_across * across(q[1], q[2])) +
-                   fit_->lag_error_N * condensed_lag(u, Eigen::Vector3d::Map(&state_.viscous[0]),
-                                                     2.0 * fit_->frame.half_depth_m);
+                   fit_->lag_error_N *
+                       condensed_lag(u, state_.viscous.head<3>(), 2.0 * fit_->frame.half_depth_m);
   answer.valid = u[0] >= fit_->least_depth_m && u[0] <= fit_->most_depth_m &&
                  place_aside_m <= fit_->most_tangential_m;
   return answer;
@@ -188,10 +171,8 @@ Eigen::Index CondensedContact::spheres() const noexcept {
 // A Ref is a view: what it shows is changed.
 // NOLINTNEXTLINE(performance-unnecessary-value-param)
 void CondensedContact::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
-  const Eigen::Vector3d u = Eigen::Vector3d::Map(&state_.u[0]);
-  fit_->field.displacements(u, Eigen::Vector3d::Map(&state_.viscous[0]),
-                            Eigen::Vector3d::Map(&state_.viscous[4]), all);
-  all.col(fit_->contact) = fit_->frame.axes * u;
+  fit_->field.displacements(state_.u, state_.viscous.head<3>(), state_.viscous.tail<3>(), all);
+  all.col(fit_->contact) = fit_->frame.axes * state_.u;
 }
 
 }  // namespace tpm::organ

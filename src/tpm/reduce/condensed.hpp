@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/constraints.hpp"
@@ -61,7 +62,7 @@ class CondensedContact final : public ContactModel {
   /// Within a step the contact moves straight, and the viscous state relaxes while it is at this
   /// share of the way (docs/reduction_method.md), 0.5 to 1.
   [[nodiscard]] double relaxation_point() const noexcept {
-    return several() ? of_branches_.relaxation_point() : rates_.relaxation_point;
+    return several() ? of_branches_->relaxation_point() : rates_.relaxation_point;
   }
   /// Number of steps since reset() in which the viscous state was kept because the computed update
   /// would have increased the energy.
@@ -70,14 +71,14 @@ class CondensedContact final : public ContactModel {
  private:
   void set_rates(double relaxation_time_s);
   [[nodiscard]] bool several() const noexcept { return branches_.size() > 1; }
-  [[nodiscard]] CondensedValue value_of(const Eigen::Vector3d& displacement_m,
-                                        const CondensedViscousState& viscous) const noexcept;
+  [[nodiscard]] CondensedPull pull_of(const Eigen::Vector3d& displacement_m,
+                                      const CondensedViscousState& viscous) const noexcept;
 
   std::shared_ptr<const CondensedFit> fit_;
   std::vector<CondensedBranch> branches_;
   double period_s_;
-  CondensedRates rates_;           ///< of one branch
-  CondensedBranches of_branches_;  ///< of several
+  CondensedRates rates_;                          ///< of one branch
+  std::optional<CondensedBranches> of_branches_;  ///< of several
   CondensedState state_;
   long long kept_ = 0;
 };

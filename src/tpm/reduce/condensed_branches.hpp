@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <array>
 #include <vector>
 
 #include "tpm/reduce/condensed_fit.hpp"
@@ -16,8 +15,13 @@ struct CondensedBranch {
 /// Modes of the linear motion of a condensed viscous state (w, q) with the contact at rest, one
 /// relaxation time: d xi_k/dt = -rate_k xi_k/tau with xi = left (w, q), (w, q) = right xi.
 struct CondensedModes {
-  Eigen::Matrix<double, 6, 1> rate;
+  CondensedVector rate;
   Eigen::Matrix<double, 6, 6> left, right;
+
+  /// A of d(w, q)/dt = -A (w, q)/tau.
+  [[nodiscard]] Eigen::Matrix<double, 6, 6> rates() const {
+    return right * rate.asDiagonal() * left;
+  }
 };
 [[nodiscard]] CondensedModes condensed_modes(const CondensedFit& fit);
 
@@ -40,14 +44,13 @@ struct CondensedModes {
 /// all branches together. No call allocates but the constructor.
 class CondensedBranches {
  public:
-  CondensedBranches() = default;
   /// @param fit must live as long as this
   CondensedBranches(const CondensedFit& fit, const std::vector<CondensedBranch>& branches,
                     double period_s);
 
   void reset() noexcept;
   /// Step of state.u -> to (m, in the axes of the contact), as step_condensed() for one branch.
-  void step(CondensedState& state, const double* to) noexcept;
+  void step(CondensedState& state, const Eigen::Vector3d& to) noexcept;
   /// Stored in the differences of the branches, J.
   [[nodiscard]] double spread_J() const noexcept { return spread_J_; }
   /// Where the contact is, of its way in a step, while the viscous state relaxes, 0.5 to 1.
@@ -56,21 +59,24 @@ class CondensedBranches {
   [[nodiscard]] Eigen::Vector3d second_m(const CondensedState& state) const noexcept;
 
  private:
-  const CondensedTables* tables_ = nullptr;
-  CondensedRates rates_;  ///< those that do not depend on the relaxation times
-  CondensedModeTables modes_;
-  std::array<double, 8> mode_rate_{};
-  double relaxation_point_ = 1.0;
-  // 8 numbers for each branch (CondensedBranchArrays).
-  std::vector<double> share_;   ///< one number each
-  std::vector<double> follow_;  ///< h phi1(h B) D^-1
-  std::vector<double> drift_;
-  std::vector<double> later_;  ///< h phi2(h B) D^-1 1
+  void set_frame(const CondensedMatricesAt& matrices) noexcept;
 
-  std::array<double, 6> frame_{};  ///< C
-  std::vector<double> spread_, pending_;
+  const CondensedTables* tables_;
+  CondensedModes modes_;
+  Eigen::Matrix3d second_metric_;  ///< N: mean, N/m
+  double relaxation_point_ = 1.0;
+  // Of each branch, of modes: a column.
+  using Columns = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+  Eigen::VectorXd share_;
+  Columns follow_;  ///< h phi1(h B) D^-1, those that branch j follows side by side
+  Columns drift_;   ///< per way of the contact
+  Columns later_;   ///< h phi2(h B) D^-1 1
+  Columns pending_;
+
+  Eigen::Matrix3d frame_ = Eigen::Matrix3d::Zero();  ///< C
+  Columns spread_;                                   ///< a_j, p_j of each branch
   double spread_J_ = 0.0;
-  std::vector<double> lacks_, moved_, next_;  ///< of the step
+  Columns lacks_, moved_, next_;  ///< of the step
 };
 
 }  // namespace tpm::organ

@@ -146,6 +146,7 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
   }
   const CondensedPotential potential(fit->frame, samples);
   fit->tables = condensed_tables(fit->frame, potential, CondensedMatrices(fit->frame, metrics));
+  fit->tables.second_rate = condensed_modes(*fit).rates().bottomRightCorner<3, 3>();
   fit->fit_error_N = potential.worst_N();
   fit->field = CondensedField(fit->frame, rest, samples, metrics);
   CondensedContact model{fit, std::move(branches), options.period_s};

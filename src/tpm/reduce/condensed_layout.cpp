@@ -1,11 +1,11 @@
 #include <algorithm>
-#include <array>
+#include <vector>
 
 #include "tpm/reduce/condensed_fit.hpp"
 
 namespace tpm::organ {
 
-static_assert(kCondensedDegrees == std::array<int, 4>{7, 5, 3, 1}, "the layout of the tables");
+static_assert(kCondensedDegrees[0] < CondensedTables::kDepths);
 static_assert(CondensedMatrices::kTerms == CondensedTables::kMatrixTerms);
 
 CondensedTables condensed_tables(const CondensedFrame& frame, const CondensedPotential& potential,
@@ -17,7 +17,6 @@ CondensedTables condensed_tables(const CondensedFrame& frame, const CondensedPot
   const auto monomials = condensed_monomials(kCondensedDegrees);
   for (std::size_t m = 0; m < monomials.size(); ++m) {
     const CondensedExponents& e = monomials[m];
-    const double c = potential.coefficients()[m];
     std::vector<int> across;  // the tangents in it, each as often as its power
     double factorials = 1.0;
     for (int t = 0; t < 4; ++t) {
@@ -26,26 +25,17 @@ CondensedTables condensed_tables(const CondensedFrame& frame, const CondensedPot
         factorials *= n;
       }
     }
-    const double derivative = c * factorials;  // by all its tangents
-    if (across.empty()) tables.constant[e[1]][e[0]] = c;
-    if (across.size() == 1) tables.linear[e[0]][e[1]][across[0]] = c;
-    if (across.size() == 2) {
-      tables.square[e[0]][e[1]][across[0]][across[1]] = derivative;
-      tables.square[e[0]][e[1]][across[1]][across[0]] = derivative;
-    }
-    if (across.size() != 3) continue;
+    const double derivative = potential.coefficients()[m] * factorials;  // by all its tangents
+    CondensedColumn& column =
+        tables.columns[static_cast<std::size_t>(e[0])][static_cast<std::size_t>(e[1])];
     do {
-      if (across[1] > across[2]) continue;
-      constexpr std::array<int, 4> kFirstPair{0, 4, 7, 9};
-      const int pair = kFirstPair[static_cast<std::size_t>(across[1])] + across[2] - across[1];
-      tables.cube[e[0]][e[1]][pair][across[0]] = derivative;
+      if (across.empty()) column.constant = derivative;
+      if (across.size() == 1) column.linear[across[0]] = derivative;
+      if (across.size() == 2) column.square(across[0], across[1]) = derivative;
+      if (across.size() == 3) column.cube(across[0], 4 * across[1] + across[2]) = derivative;
     } while (std::next_permutation(across.begin(), across.end()));
   }
-  for (Eigen::Index term = 0; term < CondensedMatrices::kTerms; ++term) {
-    for (Eigen::Index entry = 0; entry < 18; ++entry) {
-      tables.matrices[term][entry] = matrices.coefficients()(entry, term);
-    }
-  }
+  tables.matrices = matrices.coefficients();
   return tables;
 }
 

@@ -35,6 +35,9 @@ inline constexpr std::array<int, 3> kCondensedOfW{1, 4, 5};
 [[nodiscard]] std::vector<CondensedExponents> condensed_monomials(
     std::span<const int> depth_degree);
 
+/// How the potential is expanded: the degree in the depths, by that in the tangents.
+inline constexpr std::array<int, 4> kCondensedDegrees{7, 5, 3, 1};
+
 /// Powers of the six coordinates of a place, up to 7.
 class CondensedPowers {
  public:

@@ -9,9 +9,6 @@
 
 namespace tpm::organ {
 
-/// How the potential is expanded, see condensed_monomials().
-inline constexpr std::array<int, 4> kCondensedDegrees{7, 5, 3, 1};
-
 /// Psi(u, w) as a polynomial, fitted to values, gradients and second derivatives of samples.
 /// Displacements are local (CondensedFrame).
 class CondensedPotential {

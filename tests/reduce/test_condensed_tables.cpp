@@ -1,0 +1,106 @@
+// What a step of the condensed contact reads, against the sum over all monomials and finite
+// differences of the energy.
+#include <Eigen/LU>
+#include <catch2/catch.hpp>
+
+#include "tpm/core/random.hpp"
+#include "tpm/reduce/condensed_fit.hpp"
+
+using namespace tpm;
+using namespace tpm::organ;
+
+namespace {
+
+class RandomFit {
+ public:
+  RandomFit() {
+    frame.middle_depth_m = frame.half_depth_m = 4e-3;
+    frame.tangential_m = 2e-3;
+    std::vector<CondensedSample> samples(60);
+    for (CondensedSample& sample : samples) {
+      sample.u_m = place();
+      sample.w_m = place();
+      sample.energy_J = number();
+      for (double& x : sample.by_u_N) x = number();
+      for (double& x : sample.by_w_N) x = number();
+      for (double& x : sample.by_uu.reshaped()) x = number();
+      for (double& x : sample.by_wu.reshaped()) x = number();
+    }
+    potential = CondensedPotential(frame, samples);
+    for (int m = 0; m < 40; ++m) {
+      metrics.push_back({place(), spd(), spd(), spd(), {}});
+    }
+    tables = condensed_tables(frame, potential, CondensedMatrices(frame, metrics));
+    for (double& x : tables.second_rate.reshaped()) x = number();
+  }
+
+  double number() { return 2.0 * random_.uniform() - 1.0; }
+  Eigen::Vector3d place() { return {8e-3 * random_.uniform(), 2e-3 * number(), 2e-3 * number()}; }
+  CondensedFrame frame;
+  CondensedPotential potential;
+  std::vector<CondensedMetric> metrics;
+  CondensedTables tables;
+
+ private:
+  Eigen::Matrix3d spd() {
+    Eigen::Matrix3d a;
+    for (double& x : a.reshaped()) x = 0.2 * number();
+    return Eigen::Matrix3d::Identity() + a * a.transpose();
+  }
+  Random random_{3};
+};
+
+}  // namespace
+
+TEST_CASE("a condensed step reads every monomial of the potential", "[condensed]") {
+  RandomFit fit;
+  for (const double c : fit.potential.coefficients()) REQUIRE(c != 0.0);
+  for (int i = 0; i < 100; ++i) {
+    CondensedVector rested = CondensedVector::Zero();
+    rested.head<3>() = fit.place();
+    const Eigen::Vector3d u = fit.place();
+    const CondensedMatricesAt at = condensed_matrices_at(fit.tables, rested.head<3>());
+    const CondensedPull pull = condensed_pull(fit.tables, u, rested, at);
+    const CondensedPotential::Gradient sum = fit.potential.gradient(u, rested.head<3>());
+    const double scale_N = sum.by_u_N.norm() + sum.by_w_N.norm();
+    CHECK(std::abs(pull.energy_J - sum.value_J) < 1e-11 * scale_N * fit.frame.tangential_m);
+    CHECK((pull.force_N + sum.by_u_N).norm() < 1e-11 * scale_N);
+    const Eigen::Vector3d drive_N = -at.mobility.inverse() * pull.velocity.head<3>();
+    CHECK((drive_N - sum.by_w_N).norm() < 1e-11 * scale_N);
+  }
+}
+
+TEST_CASE("the force of a condensed state is minus the slope of its energy", "[condensed]") {
+  RandomFit fit;
+  constexpr double kStep_m = 1e-6;
+  for (int i = 0; i < 20; ++i) {
+    CondensedVector state;
+    state << fit.place(), 1e-3 * fit.number(), 1e-3 * fit.number(), 1e-3 * fit.number();
+    const Eigen::Vector3d u = fit.place();
+    const CondensedMatricesAt at = condensed_matrices_at(fit.tables, state.head<3>());
+    CHECK(at.coupling == at.coupling.transpose());
+    CHECK(at.second == at.second.transpose());
+    CHECK(at.mobility == at.mobility.transpose());
+    const auto energy_J = [&](const Eigen::Vector3d& there, const CondensedVector& viscous) {
+      return condensed_pull(fit.tables, there, viscous, at).energy_J;
+    };
+    const CondensedPull pull = condensed_pull(fit.tables, u, state, at);
+    Eigen::Vector3d by_u;
+    Eigen::Vector3d by_w;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const Eigen::Vector3d step = kStep_m * Eigen::Vector3d::Unit(k);
+      CondensedVector ahead = state;
+      CondensedVector behind = state;
+      ahead[k] += kStep_m;
+      behind[k] -= kStep_m;
+      by_u[k] = (energy_J(u + step, state) - energy_J(u - step, state)) / (2.0 * kStep_m);
+      by_w[k] = (energy_J(u, ahead) - energy_J(u, behind)) / (2.0 * kStep_m);
+    }
+    const double scale_N = by_u.norm() + by_w.norm();
+    CHECK((pull.force_N + by_u).norm() < 1e-5 * scale_N);
+    CHECK((pull.velocity.head<3>() + at.mobility * by_w).norm() < 1e-5 * scale_N);
+    const Eigen::Vector3d q = state.tail<3>();
+    CHECK((pull.velocity.tail<3>() - (u - state.head<3>() - fit.tables.second_rate * q)).norm() <
+          1e-15);
+  }
+}
