@@ -181,12 +181,6 @@ void require_free(const std::vector<Target>& targets) {
   }
 }
 
-void announce(const std::vector<Target>& targets) {
-  for (const Target& target : targets) {
-    will_write({target.csv, fs::path(target.csv).replace_extension(".json")});
-  }
-}
-
 void print_text(const std::vector<Target>& targets, bool written) {
   for (const Target& target : targets) {
     say("{} -> {}\n", target.source,
@@ -223,7 +217,9 @@ void write_curves(const std::vector<Target>& targets) {
 int import_files(const Session& session, const ImportArguments& arguments) {
   const bool write = !arguments.output.empty();
   const std::vector<Target> targets = plan(arguments, options_of(arguments));
-  if (write) announce(targets);
+  for (const Target& target : targets) {
+    if (write) will_write({target.csv, fs::path(target.csv).replace_extension(".json")});
+  }
   if (write && !arguments.force) require_free(targets);
   if (write) write_curves(targets);
   session.json() ? print_json(targets, write) : print_text(targets, write);

@@ -49,10 +49,6 @@ Tissue tissue_of(const NetworkChoice& choice) {
   return read_tissue(choice.scene);
 }
 
-std::string place_of(const NetworkChoice& choice) {
-  return choice.scene.empty() ? "options" : choice.scene;
-}
-
 int build(const NetworkChoice& choice, const Session& session) {
   will_write({fs::path(choice.output).replace_extension(".xdmf")});
   const Tissue tissue = tissue_of(choice);
@@ -73,7 +69,7 @@ int check(const NetworkChoice& choice, const Session& session) {
   const Tissue tissue = tissue_of(choice);
   std::string fault;
   try {
-    require_standing(tissue, place_of(choice));
+    require_standing(tissue, choice.scene.empty() ? "options" : choice.scene);
   } catch (const Error& error) {
     if (error.code() != ExitCode::bad_input) throw;
     fault = error.what();

@@ -11,12 +11,6 @@
 
 namespace tpm {
 
-/// "a, b, c": the text of each item, which `text` says, a member or a function.
-template <class Items, class Text>
-std::string listed(const Items& items, Text text, std::string_view between = ", ") {
-  return fmt::format("{}", fmt::join(items | std::views::transform(text), between));
-}
-
 /// What `value` makes of the items, a member or a function.
 template <class Made, class Items, class Value>
 std::vector<Made> mapped(Items&& items, Value value) {
@@ -24,6 +18,12 @@ std::vector<Made> mapped(Items&& items, Value value) {
   if constexpr (std::ranges::sized_range<Items>) all.reserve(std::ranges::size(items));
   for (auto&& item : items) all.emplace_back(std::invoke(value, item));
   return all;
+}
+
+/// "a, b, c": the text of each item, which `text` says, a member or a function.
+template <class Items, class Text>
+std::string listed(const Items& items, Text text, std::string_view between = ", ") {
+  return fmt::format("{}", fmt::join(mapped<std::string>(items, text), between));
 }
 
 /// What `value` says of the items, a member or a function: each once, in the order in which they

@@ -198,8 +198,6 @@ Json number_or_null(double value) {
   return std::isfinite(value) ? Json(rounded(value, 6)) : Json(nullptr);
 }
 
-}  // namespace
-
 std::string_view gradient_verdict_name(GradientVerdict verdict) noexcept {
   static constexpr auto kNames =
       std::to_array<Word<GradientVerdict>>({{GradientVerdict::agrees, "agrees"},
@@ -207,6 +205,8 @@ std::string_view gradient_verdict_name(GradientVerdict verdict) noexcept {
                                             {GradientVerdict::undecided, "undecided"}});
   return word_for(kNames, verdict);
 }
+
+}  // namespace
 
 bool GradientCheck::passed() const {
   std::size_t columns = 0;

@@ -15,8 +15,6 @@ enum class GradientVerdict {
   undecided,  ///< of most residuals the finite differences say too little: noise, kinks
 };
 
-[[nodiscard]] std::string_view gradient_verdict_name(GradientVerdict verdict) noexcept;
-
 /// The derivatives of all residuals by one parameter at one point; the numbers are those of the
 /// residual whose difference is largest for what is known of it. Differences are relative to the
 /// derivative plus a thousandth of the column's largest.

@@ -11,6 +11,14 @@ namespace {
 /// Starts that are followed to their end out of those that were looked at.
 constexpr std::size_t kFollowed = 5;
 
+/// Minimum of |A x - b| with lower <= x <= upper, from the normal equations: for a handful of
+/// columns. Columns of zeros leave x at the bound nearest to 0.
+Eigen::VectorXd bounded_least_squares(const Eigen::Ref<const Eigen::MatrixXd>& a,
+                                      const Eigen::VectorXd& b, const Eigen::VectorXd& lower,
+                                      const Eigen::VectorXd& upper) {
+  return bounded_minimum(a.transpose() * a, a.transpose() * b, lower, upper);
+}
+
 /// The start with its linear parameters solved for. Empty if it cannot be evaluated.
 std::vector<double> projected(const ResidualFunction& function,
                               std::span<const FitParameter> parameters,
@@ -121,12 +129,6 @@ Eigen::VectorXd bounded_minimum(const Eigen::MatrixXd& gram, const Eigen::Vector
     free.push_back(pulled);
   }
   return x;
-}
-
-Eigen::VectorXd bounded_least_squares(const Eigen::Ref<const Eigen::MatrixXd>& a,
-                                      const Eigen::VectorXd& b, const Eigen::VectorXd& lower,
-                                      const Eigen::VectorXd& upper) {
-  return bounded_minimum(a.transpose() * a, a.transpose() * b, lower, upper);
 }
 
 std::vector<std::vector<double>> projected_starts(const ResidualFunction& function,

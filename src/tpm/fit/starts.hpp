@@ -20,13 +20,6 @@ enum class StartKind {
                                               const Eigen::VectorXd& lower,
                                               const Eigen::VectorXd& upper);
 
-/// Minimum of |A x - b| with lower <= x <= upper, from the normal equations: for a handful of
-/// columns. Columns of zeros leave x at the bound nearest to 0.
-[[nodiscard]] Eigen::VectorXd bounded_least_squares(const Eigen::Ref<const Eigen::MatrixXd>& a,
-                                                    const Eigen::VectorXd& b,
-                                                    const Eigen::VectorXd& lower,
-                                                    const Eigen::VectorXd& upper);
-
 /// Starts with the parameters in which the residuals are linear solved for: `count` points of a
 /// Latin hypercube over the others, of which the `keep` of least deviance are returned after the
 /// nominal start. Points that cannot be evaluated are left out.

@@ -201,6 +201,15 @@ BenchmarkRecord read_record(const Json& json) {
   return record;
 }
 
+/// Reads what to_json wrote, for a run that goes on from it: of references only words and numbers
+/// are there, not their responses.
+/// Throws Error(input) with the place in the file where it is not what to_json writes.
+BenchmarkRecord read_benchmark(const std::filesystem::path& file) {
+  const Json json = read_json(file);
+  check_schema(json, "benchmark", file.string());
+  return read_record(json);
+}
+
 }  // namespace
 
 Json to_json(const BenchmarkRecord& record) {
@@ -215,12 +224,6 @@ Json to_json(const BenchmarkRecord& record) {
     return problem;
   });
   return json;
-}
-
-BenchmarkRecord read_benchmark(const std::filesystem::path& file) {
-  const Json json = read_json(file);
-  check_schema(json, "benchmark", file.string());
-  return read_record(json);
 }
 
 KeptBenchmark keep_benchmark(const std::filesystem::path& folder, const BenchmarkOptions& options,

@@ -290,6 +290,31 @@ std::string introduction(const BenchmarkOptions& options) {
                     options.repeats, seconds_words(options.least_repeat_s));
 }
 
+/// The setting of each curve that first meets an error, over all problems.
+/// @param figures of benchmark_figures
+Document benchmark_document(const BenchmarkRecord& record, const std::vector<Figure>& figures) {
+  Document document{"Speed against accuracy", "What `tpm benchmark` measured"};
+  document.paragraph(introduction(record.options));
+  for (const BenchmarkResult& result : record.results) {
+    document.heading(2, fmt::format("{} (`{}`)", result.title, result.name));
+    document.paragraph(result.text);
+    document.paragraph(reference_words(result));
+    add_pictures(document, figures, result.name);
+    if (result.targets.empty()) {
+      document.table(aims_table(result, record.options.timing));
+      Table servo = servo_table(result);
+      if (!servo.rows.empty()) document.table(std::move(servo));
+    } else {
+      add_model_tables(document, result, record.options.timing);
+    }
+    Table failures = failure_table(result);
+    if (!failures.rows.empty()) document.table(std::move(failures));
+    document.paragraph(fmt::format("Every setting: `{}.csv`.", result.name));
+  }
+  typeset(document);
+  return document;
+}
+
 }  // namespace
 
 std::vector<std::string> curves_of(const BenchmarkResult& result) {
@@ -313,29 +338,6 @@ const BenchmarkPoint* cheapest_within(const BenchmarkResult& result, const std::
     if (cheapest == nullptr || cost_of(p) < cost_of(*cheapest)) cheapest = &p;
   }
   return cheapest;
-}
-
-Document benchmark_document(const BenchmarkRecord& record, const std::vector<Figure>& figures) {
-  Document document{"Speed against accuracy", "What `tpm benchmark` measured"};
-  document.paragraph(introduction(record.options));
-  for (const BenchmarkResult& result : record.results) {
-    document.heading(2, fmt::format("{} (`{}`)", result.title, result.name));
-    document.paragraph(result.text);
-    document.paragraph(reference_words(result));
-    add_pictures(document, figures, result.name);
-    if (result.targets.empty()) {
-      document.table(aims_table(result, record.options.timing));
-      Table servo = servo_table(result);
-      if (!servo.rows.empty()) document.table(std::move(servo));
-    } else {
-      add_model_tables(document, result, record.options.timing);
-    }
-    Table failures = failure_table(result);
-    if (!failures.rows.empty()) document.table(std::move(failures));
-    document.paragraph(fmt::format("Every setting: `{}.csv`.", result.name));
-  }
-  typeset(document);
-  return document;
 }
 
 void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path& folder,

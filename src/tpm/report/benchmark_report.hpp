@@ -24,11 +24,6 @@ struct BenchmarkRecord {
 /// The same for a program (docs/benchmark_files.md lists the keys).
 [[nodiscard]] Json to_json(const BenchmarkRecord& record);
 
-/// Reads what to_json wrote, for a run that goes on from it: of references only words and numbers
-/// are there, not their responses.
-/// Throws Error(input) with the place in the file where it is not what to_json writes.
-[[nodiscard]] BenchmarkRecord read_benchmark(const std::filesystem::path& file);
-
 /// The problems that are there already, and what has to be run to have them all.
 struct KeptBenchmark {
   BenchmarkRecord record;
@@ -38,7 +33,8 @@ struct KeptBenchmark {
 /// Takes from a folder what an earlier run has left there: of one that was interrupted
 /// kBenchmarkPart, else benchmark.json; nothing if neither is there.
 /// @param named problems that are run in any case; none: those that are not there
-/// Throws Error(usage) if they were run with other options, and what read_benchmark throws.
+/// Throws Error(usage) if they were run with other options, Error(input) where the file is not what
+/// to_json writes.
 [[nodiscard]] KeptBenchmark keep_benchmark(const std::filesystem::path& folder,
                                            const BenchmarkOptions& options,
                                            std::span<const std::string> named);
@@ -52,11 +48,6 @@ void put_result(BenchmarkRecord& record, BenchmarkResult result, Json run);
 /// For each problem error against wall time and, without times too, against counts. Settings that
 /// fail stand in a band above the panel.
 [[nodiscard]] std::vector<Figure> benchmark_figures(const BenchmarkRecord& record);
-
-/// The setting of each curve that first meets an error, over all problems.
-/// @param figures of benchmark_figures
-[[nodiscard]] Document benchmark_document(const BenchmarkRecord& record,
-                                          const std::vector<Figure>& figures);
 
 /// The cheapest point of a curve whose error is at most `error`: by wall time, without times by
 /// evaluations of forces; null if none.

@@ -74,8 +74,8 @@ Panel largest_panel(const ErrorBudget& b) {
   return panel;
 }
 
-}  // namespace
-
+/// The waterfall: how the lines add up at the instant of the largest sum, and beside it each line's
+/// own largest with the thresholds of a hand.
 Figure budget_figure(const ErrorBudget& budget) {
   return {"budget",
           fmt::format("Error budget: {}", budget.title),
@@ -86,6 +86,8 @@ Figure budget_figure(const ErrorBudget& budget) {
                       budget.sentences.empty() ? "" : budget.sentences.front()),
           {waterfall_panel(budget), largest_panel(budget)}};
 }
+
+}  // namespace
 
 std::vector<std::string> write_budget_report(const std::filesystem::path& folder,
                                              const ErrorBudget& budget) {

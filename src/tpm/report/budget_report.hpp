@@ -8,10 +8,6 @@
 
 namespace tpm::report {
 
-/// The waterfall: how the lines add up at the instant of the largest sum, and beside it each line's
-/// own largest with the thresholds of a hand.
-[[nodiscard]] Figure budget_figure(const ErrorBudget& budget);
-
 /// Writes budget.json, budget.csv, figures.json and the figure into `folder`; returns the names of
 /// the files.
 [[nodiscard]] std::vector<std::string> write_budget_report(const std::filesystem::path& folder,

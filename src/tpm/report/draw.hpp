@@ -48,7 +48,7 @@ void write_report(const std::filesystem::path& folder, const Document& document,
 void draw_network(const std::string& python, const std::filesystem::path& picture_json,
                   const std::filesystem::path& stem);
 
-/// Draws deformation_pictures() into `folder` with scripts/draw_deformation.py, SVG and PNG.
+/// Draws pictures.json of a simulation into `folder` with scripts/draw_deformation.py, SVG and PNG.
 /// Returns the names of the files. Throws as draw_figures does.
 /// @param two there are two states to be drawn side by side
 [[nodiscard]] std::vector<std::string> draw_deformation(const std::string& python,

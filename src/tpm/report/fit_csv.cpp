@@ -60,6 +60,24 @@ std::vector<std::string> parameter_cells(const FitResult& fit, const ParameterRe
           verdict_text(p)};
 }
 
+/// Each sample of a recording with the law's answer and its prediction band.
+std::string samples_csv(const FitResult& fit, std::size_t recording) {
+  const RecordingFit& r = fit.recordings.at(recording);
+  const bool banded = r.lower.size() == r.time_s.size();
+  std::string text =
+      csv_line({"time_s", si_key(r.drive_quantity), si_key(r.response_quantity, "observed"),
+                si_key(r.response_quantity, "law"), si_key(r.response_quantity, "band_lower"),
+                si_key(r.response_quantity, "band_upper"), "role", "provenance"});
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    text += csv_line(
+        {significant(r.time_s[i], 9), significant(r.drive[i], 9), significant(r.observed[i], 9),
+         std::isfinite(r.predicted[i]) ? significant(r.predicted[i], 9) : "",
+         banded ? cell(r.lower[i]) : "", banded ? cell(r.upper[i]) : "",
+         r.fitted[i] ? "fitted" : "not_fitted", std::string(provenance_name(r.provenance))});
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string parameters_csv(const FitResult& fit) {
@@ -84,23 +102,6 @@ std::string readings_csv(const FitResult& fit) {
                       cell(datum.upper), significant(d.predicted, 9), cell(d.reading_sd),
                       datum.held_out ? "held_out" : "fitted",
                       std::string(provenance_name(datum.provenance))});
-  }
-  return text;
-}
-
-std::string samples_csv(const FitResult& fit, std::size_t recording) {
-  const RecordingFit& r = fit.recordings.at(recording);
-  const bool banded = r.lower.size() == r.time_s.size();
-  std::string text =
-      csv_line({"time_s", si_key(r.drive_quantity), si_key(r.response_quantity, "observed"),
-                si_key(r.response_quantity, "law"), si_key(r.response_quantity, "band_lower"),
-                si_key(r.response_quantity, "band_upper"), "role", "provenance"});
-  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-    text += csv_line(
-        {significant(r.time_s[i], 9), significant(r.drive[i], 9), significant(r.observed[i], 9),
-         std::isfinite(r.predicted[i]) ? significant(r.predicted[i], 9) : "",
-         banded ? cell(r.lower[i]) : "", banded ? cell(r.upper[i]) : "",
-         r.fitted[i] ? "fitted" : "not_fitted", std::string(provenance_name(r.provenance))});
   }
   return text;
 }

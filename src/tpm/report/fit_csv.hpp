@@ -19,8 +19,6 @@ namespace tpm::report {
 [[nodiscard]] std::string parameters_csv(const FitResult& fit);
 /// Each reading of tables, spectra, moduli and compliances with the law's answer.
 [[nodiscard]] std::string readings_csv(const FitResult& fit);
-/// Each sample of a recording with the law's answer and its prediction band.
-[[nodiscard]] std::string samples_csv(const FitResult& fit, std::size_t recording);
 /// Each law of a selection.
 [[nodiscard]] std::string laws_csv(const Selection& selection);
 /// Each parameter of each recording of a folder.

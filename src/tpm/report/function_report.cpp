@@ -9,6 +9,10 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::report {
+namespace {
+
+/// Relaxation modulus or creep compliance over time, with the fitted law, on logarithmic axes.
+/// @param choice place in the fit's data of such readings
 Figure step_response_figure(const FitResult& fit, std::size_t choice) {
   std::vector<const FittedDatum*> readings;
   for (const FittedDatum& d : fit.data) {
@@ -45,6 +49,8 @@ Figure step_response_figure(const FitResult& fit, std::size_t choice) {
           measured_name, law_name(*fit.config.law)),
       {std::move(panel)}};
 }
+
+}  // namespace
 
 std::vector<std::string> write_function_report(const std::filesystem::path& folder,
                                                const MaterialFunction& function,

@@ -8,10 +8,6 @@
 
 namespace tpm::report {
 
-/// Relaxation modulus or creep compliance over time, with the fitted law, on logarithmic axes.
-/// @param choice place in the fit's data of such readings
-[[nodiscard]] Figure step_response_figure(const FitResult& fit, std::size_t choice);
-
 /// Writes config.json, selection.json, law.json, tables as CSV (fit_csv.hpp) and figures of a
 /// material function.
 /// @returns the names of the files

@@ -82,8 +82,7 @@ Panel law_panel(const Identification& id) {
   return panel;
 }
 
-}  // namespace
-
+/// Half width of each parameter's interval over time, and which law was the least.
 Figure identification_figure(const Identification& id) {
   const std::string name = std::filesystem::path(id.name).stem().string();
   return {"identification",
@@ -93,6 +92,8 @@ Figure identification_figure(const Identification& id) {
                       significant(100.0 * id.options.level, 3), law_name(id.laws[id.result().law])),
           {width_panel(id), law_panel(id)}};
 }
+
+}  // namespace
 
 std::vector<std::string> write_identification_report(const std::filesystem::path& folder,
                                                      const Identification& identification,

@@ -8,9 +8,6 @@
 
 namespace tpm::report {
 
-/// Half width of each parameter's interval over time, and which law was the least.
-[[nodiscard]] Figure identification_figure(const Identification& identification);
-
 /// Writes identification.json, law.json, figures.json and the figure into `folder`; returns the
 /// names of the files.
 [[nodiscard]] std::vector<std::string> write_identification_report(

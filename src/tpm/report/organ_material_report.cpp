@@ -45,24 +45,7 @@ Panel material_profile_panel(const ReadingsFit& readings, const ParameterResult&
   return panel;
 }
 
-/// Nothing if no profiles were walked.
-std::vector<Figure> material_figures(const OrganMaterial& m) {
-  std::vector<Figure> figures{organ_material_figure(m)};
-  if (m.intervals != MaterialIntervals::profiles) return figures;
-  Figure figure{
-      "material_profiles", fmt::format("Profiles of {} on an organ", m.law),
-      "Each parameter of the bonds is held, and the others, contacts and offsets among them, are "
-      "fitted again to the readings."};
-  for (std::size_t i = 0; i < m.parameters.size(); ++i) {
-    const ParameterResult& p = m.readings->fit.parameters[i];
-    if (!p.profile.points.empty()) figure.panels.push_back(material_profile_panel(*m.readings, p));
-  }
-  figures.push_back(std::move(figure));
-  return figures;
-}
-
-}  // namespace
-
+/// Forces of law, organ and recording over time, and what the organ misses over depth.
 Figure organ_material_figure(const OrganMaterial& m) {
   Figure figure{
       "material", fmt::format("{} put on an organ", m.law),
@@ -81,6 +64,24 @@ Figure organ_material_figure(const OrganMaterial& m) {
   figure.panels.push_back(std::move(misses));
   return figure;
 }
+
+/// Nothing if no profiles were walked.
+std::vector<Figure> material_figures(const OrganMaterial& m) {
+  std::vector<Figure> figures{organ_material_figure(m)};
+  if (m.intervals != MaterialIntervals::profiles) return figures;
+  Figure figure{
+      "material_profiles", fmt::format("Profiles of {} on an organ", m.law),
+      "Each parameter of the bonds is held, and the others, contacts and offsets among them, are "
+      "fitted again to the readings."};
+  for (std::size_t i = 0; i < m.parameters.size(); ++i) {
+    const ParameterResult& p = m.readings->fit.parameters[i];
+    if (!p.profile.points.empty()) figure.panels.push_back(material_profile_panel(*m.readings, p));
+  }
+  figures.push_back(std::move(figure));
+  return figures;
+}
+
+}  // namespace
 
 std::vector<std::string> write_organ_material_report(const std::filesystem::path& folder,
                                                      const OrganMaterial& result) {

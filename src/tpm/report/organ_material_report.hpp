@@ -8,9 +8,6 @@
 
 namespace tpm::report {
 
-/// Forces of law, organ and recording over time, and what the organ misses over depth.
-[[nodiscard]] Figure organ_material_figure(const OrganMaterial& result);
-
 /// Writes scene.json, session.json, material.json, material.csv, figures.json and the figure into
 /// `folder`. Returns the names of the files. Throws Error(environment) if drawing is not possible;
 /// the other files are then already there.

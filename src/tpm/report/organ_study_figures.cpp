@@ -128,11 +128,6 @@ Figure static_figure(const OrganStudy& study, std::size_t condition) {
   return figure;
 }
 
-/// The rate at which the readings are taken to have been made; without data the fastest.
-double reading_rate(const StudyData* data, const std::vector<double>& rates) {
-  return data != nullptr ? data->protocol.rate_m_per_s : rates.back();
-}
-
 /// Ramp and hold in a panel per tissue.
 /// @param label of a condition's curve; empty: not shown
 template <class Label>
@@ -166,7 +161,8 @@ Figure relaxation_figure(const OrganStudy& study, const StudyCurves& set, const 
   const auto conditions = conditions_of(study, Kind::ramp_hold);
   const auto rates = values_of(study, conditions, &StudyCondition::rate_m_per_s);
   const StudyData* data = data_of(study, Kind::ramp_hold);
-  const double rate = reading_rate(data, rates);
+  // That of the readings, as is assumed; without data the fastest.
+  const double rate = data != nullptr ? data->protocol.rate_m_per_s : rates.back();
   Figure figure{id, fmt::format("Relaxation at every depth, {}", set_words(set)),
                 fmt::format("Ramps of {} mm/s, then held. The readings are the peak and the end of "
                             "each depth (Tables 1 to 4 of the paper); that they come from this "

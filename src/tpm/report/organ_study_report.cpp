@@ -314,19 +314,7 @@ void add_costs(Document& document, const OrganStudy& study) {
   }
 }
 
-}  // namespace
-
-std::vector<std::string> cost_sentences(const OrganStudy& study) {
-  std::vector<std::string> sentences;
-  for (const StudyCurves& set : study.curves) {
-    if (!set.parameters) continue;
-    for (std::size_t t = 1; t < study.config.tissues.size(); ++t) {
-      sentences.push_back(cost_sentence(study, set, t));
-    }
-  }
-  return sentences;
-}
-
+/// @param figures of organ_study_figures
 Document organ_study_document(const OrganStudy& study, const std::vector<Figure>& figures) {
   Document document;
   document.title = study.config.title;
@@ -351,6 +339,19 @@ Document organ_study_document(const OrganStudy& study, const std::vector<Figure>
   }
   typeset(document);
   return document;
+}
+
+}  // namespace
+
+std::vector<std::string> cost_sentences(const OrganStudy& study) {
+  std::vector<std::string> sentences;
+  for (const StudyCurves& set : study.curves) {
+    if (!set.parameters) continue;
+    for (std::size_t t = 1; t < study.config.tissues.size(); ++t) {
+      sentences.push_back(cost_sentence(study, set, t));
+    }
+  }
+  return sentences;
 }
 
 void write_organ_study(const OrganStudy& study, const std::filesystem::path& folder,

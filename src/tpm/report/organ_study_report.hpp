@@ -17,10 +17,6 @@ namespace tpm::report {
 /// each other tissue.
 [[nodiscard]] std::vector<std::string> cost_sentences(const OrganStudy& study);
 
-/// @param figures of organ_study_figures
-[[nodiscard]] Document organ_study_document(const OrganStudy& study,
-                                            const std::vector<Figure>& figures);
-
 /// One line per reading, SI units in the column names.
 [[nodiscard]] std::string readings_csv(const OrganStudy& study);
 /// One line per estimated parameter of every fit.

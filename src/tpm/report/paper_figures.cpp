@@ -87,8 +87,7 @@ Series printed_relaxation(const PointSet& relaxation, double ramp_s) {
   return s;
 }
 
-}  // namespace
-
+/// Fig. 6: force against depth, 0-8 mm, with the range over three pigs.
 Figure static_force_figure(const PaperFigureData& data) {
   const TpmParameters& p = data.paper;
   const std::vector<double> depth_mm = evenly(0.0, 8.0, 160);
@@ -113,6 +112,8 @@ Figure static_force_figure(const PaperFigureData& data) {
           "relaxed force. Only the four tabulated ranges are data; nothing is known between them.",
           {std::move(panel)}};
 }
+
+}  // namespace
 
 Figure relaxation_figure(const PaperFigureData& data) {
   constexpr double kRate = 4e-3;

@@ -28,9 +28,6 @@ struct PaperFigureData {
   ValueSet literature;  ///< single values, viscosities among them
 };
 
-/// Fig. 6: force against depth, 0-8 mm, with the range over three pigs.
-[[nodiscard]] Figure static_force_figure(const PaperFigureData& data);
-
 /// Fig. 7: relaxation at 4 mm after a 4 mm/s ramp, with the paper's dashpot and with the fitted
 /// one.
 [[nodiscard]] Figure relaxation_figure(const PaperFigureData& data);

@@ -40,8 +40,8 @@ Series prediction_readings(const LawPrediction& p, bool fitted, double unit, boo
   return s;
 }
 
-}  // namespace
-
+/// The mean with both bands over time, beside the recording if there is one; then prediction less
+/// measurement.
 Figure prediction_figure(const LawPrediction& p) {
   const Quantity answer = p.drive_kind == Drive::force ? p.spec.drive : p.spec.response;
   const Unit unit = shown_unit(p.response_dimension());
@@ -83,6 +83,8 @@ Figure prediction_figure(const LawPrediction& p) {
   figure.panels.push_back(std::move(residual));
   return figure;
 }
+
+}  // namespace
 
 std::vector<std::string> write_prediction_report(const std::filesystem::path& folder,
                                                  const LawPrediction& prediction,

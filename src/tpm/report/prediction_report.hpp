@@ -8,10 +8,6 @@
 
 namespace tpm::report {
 
-/// The mean with both bands over time, beside the recording if there is one; then prediction less
-/// measurement.
-[[nodiscard]] Figure prediction_figure(const LawPrediction& prediction);
-
 /// Writes prediction.csv, prediction.json, figures.json and the figure as SVG and PNG into
 /// `folder`. Returns the names of the files. Throws Error(environment) if drawing is not possible;
 /// the other files are then already there.

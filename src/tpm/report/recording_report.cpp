@@ -28,10 +28,6 @@ Units units_of(const RecordingFit& r) {
           shown_unit(stretch ? Dimension::stress : Dimension::force)};
 }
 
-std::string file_stem(const std::string& path) {
-  return std::filesystem::path(path).stem().string();
-}
-
 /// Takes every k-th sample for which `wanted` holds and that has a value (a law may not predict).
 template <class Wanted>
 Series sampled(Series series, const RecordingFit& r, const std::vector<double>& x, double x_unit,
@@ -121,11 +117,32 @@ FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {
   return config;
 }
 
+/// Each law's residual and BIC over its number of parameters, the recommended one marked.
+Figure selection_figure(const Selection& selection) {
+  Figure figure{
+      "selection", "Which law",
+      fmt::format(
+          "Every law that was fitted: residual, and BIC above the best with {} effective readings, "
+          "over the number of estimated parameters. The recommended law is {}.",
+          significant(selection.effective_count, 3),
+          law_name(selection.candidates[selection.recommended].law))};
+  Panel residual;
+  residual.x = {"estimated parameters", ""};
+  residual.y = {"rms residual over peak", "%", true};
+  Panel bic{.x = residual.x, .y = {"BIC above the best", ""}};
+  for (const bool recommended : {false, true}) {
+    add_if_any(residual, laws_at(selection, false, recommended));
+    add_if_any(bic, laws_at(selection, true, recommended));
+  }
+  figure.panels = {std::move(residual), std::move(bic)};
+  return figure;
+}
+
 }  // namespace
 
 Figure recording_figure(const FitResult& fit, std::size_t recording) {
   const RecordingFit& r = fit.recordings.at(recording);
-  const std::string name = file_stem(fit.config.data[r.choice].dataset);
+  const std::string name = std::filesystem::path(fit.config.data[r.choice].dataset).stem().string();
   const std::string law = fit.config.law ? law_name(*fit.config.law) : fit.config.model;
   Figure figure{fmt::format("fit_{}", name), fmt::format("{}: {}", name, law),
                 fmt::format("{} and the law {}, driven by the measured {}; rms residual {} % of "
@@ -144,26 +161,6 @@ Figure recording_figure(const FitResult& fit, std::size_t recording) {
                                   p.parameter.name, in_unit(p.parameter, bound));
   }
   figure.panels = {response_panel(r, true), response_panel(r, false), residual_panel(r)};
-  return figure;
-}
-
-Figure selection_figure(const Selection& selection) {
-  Figure figure{
-      "selection", "Which law",
-      fmt::format(
-          "Every law that was fitted: residual, and BIC above the best with {} effective readings, "
-          "over the number of estimated parameters. The recommended law is {}.",
-          significant(selection.effective_count, 3),
-          law_name(selection.candidates[selection.recommended].law))};
-  Panel residual;
-  residual.x = {"estimated parameters", ""};
-  residual.y = {"rms residual over peak", "%", true};
-  Panel bic{.x = residual.x, .y = {"BIC above the best", ""}};
-  for (const bool recommended : {false, true}) {
-    add_if_any(residual, laws_at(selection, false, recommended));
-    add_if_any(bic, laws_at(selection, true, recommended));
-  }
-  figure.panels = {std::move(residual), std::move(bic)};
   return figure;
 }
 

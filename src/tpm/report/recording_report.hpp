@@ -13,9 +13,6 @@ namespace tpm::report {
 /// outside the window are drawn apart.
 [[nodiscard]] Figure recording_figure(const FitResult& fit, std::size_t recording);
 
-/// Each law's residual and BIC over its number of parameters, the recommended one marked.
-[[nodiscard]] Figure selection_figure(const Selection& selection);
-
 /// Deviances in which the starts ended, sorted.
 [[nodiscard]] Figure waterfall_figure(const FitResult& fit);
 

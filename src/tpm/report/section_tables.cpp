@@ -24,16 +24,13 @@ Tone tone_of_digits(DigitVerdict verdict) {
   return Tone::bad;
 }
 
-std::string computed_text(const DigitCheck& check) {
-  return significant(check.computed, 5);
-}
-
 /// "0.304 · 0.30436 · exact by rounding"; forces from the printed lambda1, as the paper did.
 Cell printed_cell(const TableCell& cell, double unit) {
   if (!cell.printed) return {significant(cell.value / unit, 5)};
   const PrintedCell& printed = *cell.printed;
   const DigitCheck& check = printed.from_printed_lambda1.value_or(printed.from_computed_lambda1);
-  return {fmt::format("{} · {} · {}", check.printed.text, computed_text(check), check.words()),
+  return {fmt::format("{} · {} · {}", check.printed.text, significant(check.computed, 5),
+                      check.words()),
           tone_of_digits(check.verdict)};
 }
 

@@ -99,16 +99,9 @@ Panel panel_of(const std::vector<FiguredRun>& runs, bool imposed) {
   return panel;
 }
 
-}  // namespace
-
-Figure response_figure(const std::vector<FiguredRun>& runs) {
-  return {"response",
-          runs.front().scene->tissue.title,
-          fmt::format("Sphere {} of {}, computed by tpm {}", runs.front().scene->probe().sphere + 1,
-                      runs.front().scene->tissue.network.organ.size(), version()),
-          {panel_of(runs, true), panel_of(runs, false)}};
-}
-
+/// The network of the first run for scripts/draw_deformation.py: undeformed, and deformed at its
+/// last output, coloured by displacement, by force, and by the limits of validity; with two runs
+/// also both side by side.
 Json deformation_pictures(const std::vector<FiguredRun>& runs) {
   const ExperimentScene& scene = *runs.front().scene;
   Json json = network_picture(scene.tissue);
@@ -123,6 +116,17 @@ Json deformation_pictures(const std::vector<FiguredRun>& runs) {
   json["states"] = array_json(runs, state_json);
   return json;
 }
+
+/// What is imposed and the response over time, each run a curve.
+Figure response_figure(const std::vector<FiguredRun>& runs) {
+  return {"response",
+          runs.front().scene->tissue.title,
+          fmt::format("Sphere {} of {}, computed by tpm {}", runs.front().scene->probe().sphere + 1,
+                      runs.front().scene->tissue.network.organ.size(), version()),
+          {panel_of(runs, true), panel_of(runs, false)}};
+}
+
+}  // namespace
 
 std::vector<std::string> write_simulation_figures(const fs::path& folder,
                                                   const std::vector<FiguredRun>& runs) {

@@ -16,14 +16,6 @@ struct FiguredRun {
   const SimulationRun* run;
 };
 
-/// What is imposed and the response over time, each run a curve.
-[[nodiscard]] Figure response_figure(const std::vector<FiguredRun>& runs);
-
-/// The network of the first run for scripts/draw_deformation.py: undeformed, and deformed at its
-/// last output, coloured by displacement, by force, and by the limits of validity; with two runs
-/// also both side by side.
-[[nodiscard]] Json deformation_pictures(const std::vector<FiguredRun>& runs);
-
 /// Draws all of them into a folder as SVG and PNG. Returns the names of the files, figures.json and
 /// pictures.json, from which they can be drawn again, among them.
 /// @param runs one or two, of the same spheres

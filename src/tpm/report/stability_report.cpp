@@ -172,6 +172,93 @@ Json verdict_json(StepRule rule, const StabilityVerdict& v) {
   return json;
 }
 
+/// @param figures of stability_figures
+Document stability_document(const StabilityStudy& study, const std::vector<Figure>& figures) {
+  Document document;
+  document.title = "Where the step rules fail";
+  document.subtitle =
+      "Maps of the step against what the problem is made of, limits against theory, "
+      "degenerate corners, servo rates";
+  document.heading(2, "Summary");
+  std::vector<Cell> items;
+  for (const std::string& s : stability_sentences(study)) items.push_back({s});
+  document.bullets(std::move(items));
+  if (!study.limits.empty()) {
+    document.heading(2, "Limits");
+    document.paragraph(study_organ_words());
+    document.table(limits_table(study));
+  }
+  if (!study.servo.empty()) document.heading(2, "At servo rate");
+  for (const std::string& problem : each_once(study.servo, &ServoRow::problem)) {
+    document.table(servo_table(study, problem));
+  }
+  if (!study.corners.empty()) {
+    document.heading(2, "Degenerate corners");
+    document.table(corners_table(study));
+  }
+  if (!study.maps.empty()) add_maps(document, study, figures);
+  typeset(document);
+  return document;
+}
+
+/// One line per limit.
+std::string stability_limits_csv(const StabilityStudy& study) {
+  std::string text =
+      csv_line({"problem", "rule", "theory", "theory_s", "found_s", "found_over_theory"});
+  for (const StabilityLimit& l : study.limits) {
+    text += csv_line({l.problem, step_rule_name(l.rule), l.theory, significant(l.theory_s, 6),
+                      number(l.found_s), number(l.ratio())});
+  }
+  return text;
+}
+
+/// One line per run of a map. SI units in the column names.
+std::string stability_map_csv(const StabilityStudy& study, const std::string& id) {
+  std::string text;
+  for (const StabilityMap& map : study.maps) {
+    if (map.id != id) continue;
+    if (text.empty()) {
+      text = csv_line({"rule", map.unit.empty() ? map.id : map.id + " [" + map.unit + "]", "step_s",
+                       "class", "error_of_peak"});
+    }
+    for (const StabilityPoint& p : map.points) {
+      text +=
+          csv_line({step_rule_name(map.rule), significant(p.x, 6), significant(p.step_s, 6),
+                    std::string(stability_class_name(p.verdict.found)), number(p.verdict.error)});
+    }
+  }
+  return text;
+}
+
+/// One line per rule and servo rate.
+std::string stability_servo_csv(const StabilityStudy& study) {
+  std::string text = csv_line({"problem", "rate_Hz", "rule", "class", "error_of_peak"});
+  for (const ServoRow& row : study.servo) {
+    for (const ServoCell& cell : row.cells) {
+      text += csv_line({row.problem, significant(row.rate_Hz, 4), step_rule_name(cell.rule),
+                        std::string(stability_class_name(cell.verdict.found)),
+                        number(cell.verdict.error)});
+    }
+  }
+  return text;
+}
+
+/// One line per rule and corner.
+std::string stability_corners_csv(const StabilityStudy& study) {
+  std::string text =
+      csv_line({"corner", "rule", "class", "error_of_peak", "expected", "right", "reason"});
+  for (const StabilityCorner& corner : study.corners) {
+    for (const CornerCell& cell : corner.cells) {
+      text +=
+          csv_line({corner.name, step_rule_name(cell.rule),
+                    std::string(stability_class_name(cell.verdict.found)),
+                    number(cell.verdict.error), std::string(stability_class_name(cell.expected)),
+                    cell.right ? "yes" : "no", cell.verdict.reason});
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 std::vector<std::string> stability_sentences(const StabilityStudy& study) {
@@ -218,88 +305,6 @@ std::vector<std::string> stability_sentences(const StabilityStudy& study) {
     sentences.push_back(fmt::format("{} maps, {} runs.", study.maps.size(), runs));
   }
   return sentences;
-}
-
-Document stability_document(const StabilityStudy& study, const std::vector<Figure>& figures) {
-  Document document;
-  document.title = "Where the step rules fail";
-  document.subtitle =
-      "Maps of the step against what the problem is made of, limits against theory, "
-      "degenerate corners, servo rates";
-  document.heading(2, "Summary");
-  std::vector<Cell> items;
-  for (const std::string& s : stability_sentences(study)) items.push_back({s});
-  document.bullets(std::move(items));
-  if (!study.limits.empty()) {
-    document.heading(2, "Limits");
-    document.paragraph(study_organ_words());
-    document.table(limits_table(study));
-  }
-  if (!study.servo.empty()) document.heading(2, "At servo rate");
-  for (const std::string& problem : each_once(study.servo, &ServoRow::problem)) {
-    document.table(servo_table(study, problem));
-  }
-  if (!study.corners.empty()) {
-    document.heading(2, "Degenerate corners");
-    document.table(corners_table(study));
-  }
-  if (!study.maps.empty()) add_maps(document, study, figures);
-  typeset(document);
-  return document;
-}
-
-std::string stability_map_csv(const StabilityStudy& study, const std::string& id) {
-  std::string text;
-  for (const StabilityMap& map : study.maps) {
-    if (map.id != id) continue;
-    if (text.empty()) {
-      text = csv_line({"rule", map.unit.empty() ? map.id : map.id + " [" + map.unit + "]", "step_s",
-                       "class", "error_of_peak"});
-    }
-    for (const StabilityPoint& p : map.points) {
-      text +=
-          csv_line({step_rule_name(map.rule), significant(p.x, 6), significant(p.step_s, 6),
-                    std::string(stability_class_name(p.verdict.found)), number(p.verdict.error)});
-    }
-  }
-  return text;
-}
-
-std::string stability_limits_csv(const StabilityStudy& study) {
-  std::string text =
-      csv_line({"problem", "rule", "theory", "theory_s", "found_s", "found_over_theory"});
-  for (const StabilityLimit& l : study.limits) {
-    text += csv_line({l.problem, step_rule_name(l.rule), l.theory, significant(l.theory_s, 6),
-                      number(l.found_s), number(l.ratio())});
-  }
-  return text;
-}
-
-std::string stability_corners_csv(const StabilityStudy& study) {
-  std::string text =
-      csv_line({"corner", "rule", "class", "error_of_peak", "expected", "right", "reason"});
-  for (const StabilityCorner& corner : study.corners) {
-    for (const CornerCell& cell : corner.cells) {
-      text +=
-          csv_line({corner.name, step_rule_name(cell.rule),
-                    std::string(stability_class_name(cell.verdict.found)),
-                    number(cell.verdict.error), std::string(stability_class_name(cell.expected)),
-                    cell.right ? "yes" : "no", cell.verdict.reason});
-    }
-  }
-  return text;
-}
-
-std::string stability_servo_csv(const StabilityStudy& study) {
-  std::string text = csv_line({"problem", "rate_Hz", "rule", "class", "error_of_peak"});
-  for (const ServoRow& row : study.servo) {
-    for (const ServoCell& cell : row.cells) {
-      text += csv_line({row.problem, significant(row.rate_Hz, 4), step_rule_name(cell.rule),
-                        std::string(stability_class_name(cell.verdict.found)),
-                        number(cell.verdict.error)});
-    }
-  }
-  return text;
 }
 
 Json to_json(const StabilityStudy& study) {

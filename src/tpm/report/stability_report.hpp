@@ -12,19 +12,6 @@ namespace tpm::report {
 /// The maps of each rule, two to a figure, with the limit of theory drawn in.
 [[nodiscard]] std::vector<Figure> stability_figures(const StabilityStudy& study);
 
-/// @param figures of stability_figures
-[[nodiscard]] Document stability_document(const StabilityStudy& study,
-                                          const std::vector<Figure>& figures);
-
-/// One line per run of a map. SI units in the column names.
-[[nodiscard]] std::string stability_map_csv(const StabilityStudy& study, const std::string& id);
-/// One line per limit.
-[[nodiscard]] std::string stability_limits_csv(const StabilityStudy& study);
-/// One line per rule and corner.
-[[nodiscard]] std::string stability_corners_csv(const StabilityStudy& study);
-/// One line per rule and servo rate.
-[[nodiscard]] std::string stability_servo_csv(const StabilityStudy& study);
-
 /// Limits, corners and servo rates, and of each map how often each class was found.
 [[nodiscard]] Json to_json(const StabilityStudy& study);
 

@@ -32,11 +32,6 @@ std::vector<std::size_t> column_widths(const TableSection& section) {
   return widths;
 }
 
-std::string without_trailing_space(std::string line) {
-  line.erase(line.find_last_not_of(' ') + 1);
-  return line;
-}
-
 std::string text_section(const TableSection& section) {
   const auto widths = column_widths(section);
   const auto line = [&](const std::vector<std::string>& cells) {
@@ -45,7 +40,8 @@ std::string text_section(const TableSection& section) {
       if (c > 0) joined += "  ";
       joined += padded(cells[c], widths[c], right_aligned(section, c));
     }
-    return without_trailing_space(joined) + "\n";
+    joined.erase(joined.find_last_not_of(' ') + 1);
+    return joined + "\n";
   };
   std::string out = section.title + "\n" + line(section.columns);
   std::size_t total = 2 * (widths.size() - 1);

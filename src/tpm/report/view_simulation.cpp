@@ -13,10 +13,6 @@ std::string step_name(std::size_t step, const char* what) {
   return fmt::format("/steps/{:05}/{}", step, what);
 }
 
-std::vector<float> floats(const std::vector<double>& numbers) {
-  return {numbers.begin(), numbers.end()};
-}
-
 /// What all points of an array must agree on: nothing of the file is trusted.
 std::vector<double> table_of(const Hdf5Reader& file, const std::filesystem::path& path,
                              const std::string& name, std::size_t numbers) {
@@ -81,7 +77,7 @@ void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::s
   std::vector<double> shown_times;
   for (const std::size_t k : shown) shown_times.push_back(times[k]);
   constexpr std::uint64_t kAny = std::uint64_t{1} << 31U;
-  organ["rest_m"] = page.put(floats(rest));
+  organ["rest_m"] = page.put(std::vector<float>(rest.begin(), rest.end()));
   organ["layer"] = page.put(whole_numbers(file, path, "/spheres/layer", kAny));
   // Files of version 0.1 name it by another word.
   const char* const constraint =

@@ -14,10 +14,6 @@ Json quantity_json(const AuditQuantity& quantity) {
           {"unit_SI", si_symbol(quantity.unit.dimension)}};
 }
 
-Json optional_quantity(const std::optional<AuditQuantity>& quantity) {
-  return quantity ? quantity_json(*quantity) : Json();
-}
-
 Json input_json(const AuditInput& input) {
   Json json{{"name", input.name}};
   if (!input.printed.empty()) json["printed"] = input.printed;
@@ -51,7 +47,7 @@ Json finding_json(const Finding& finding) {
   json["verdict"] = verdict_name(finding.verdict);
   json["difference_percent"] = optional_number(finding.difference_percent);
   json["printed"] = finding.printed;
-  json["recomputed"] = optional_quantity(finding.recomputed);
+  json["recomputed"] = finding.recomputed ? quantity_json(*finding.recomputed) : Json();
   if (finding.bound) json["bound"] = quantity_json(*finding.bound);
   json["expression"] = finding.expression;
   json["inputs"] = array_json(finding.inputs, input_json);

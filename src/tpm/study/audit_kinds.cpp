@@ -84,8 +84,7 @@ bool satisfied(double left, const std::string& relation, double right) {
   return left >= right;
 }
 
-}  // namespace
-
+/// The audit's word for a comparison of digits.
 AuditVerdict audit_verdict(DigitVerdict verdict) noexcept {
   switch (verdict) {
     case DigitVerdict::by_rounding:
@@ -99,6 +98,8 @@ AuditVerdict audit_verdict(DigitVerdict verdict) noexcept {
   }
   return AuditVerdict::cannot_be_told;
 }
+
+}  // namespace
 
 std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim) {
   const Json& printed = claim.required("printed");

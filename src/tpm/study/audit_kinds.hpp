@@ -32,9 +32,6 @@ void check_misfit(const ClaimReader& claim, Finding& finding);
 /// Adds a comparison of digits to the details, and to the verdict unless that is worse already.
 void add_check(Finding& finding, std::string what, const DigitCheck& check, const Unit& unit);
 
-/// The audit's word for a comparison of digits.
-[[nodiscard]] AuditVerdict audit_verdict(DigitVerdict verdict) noexcept;
-
 /// Key "printed" of a range or a band: two numbers, low before high.
 [[nodiscard]] std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim);
 

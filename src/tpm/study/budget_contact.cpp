@@ -59,6 +59,32 @@ void require_contact_law(const LawFile& law) {
                   "a contact force over a depth, with branches");
 }
 
+/// The stages after `law` of one contact.
+std::vector<BudgetStage> loop_stages(const LawFile& law, const Protocol& motion,
+                                     const std::vector<double>& times_s,
+                                     const BudgetDevice& device) {
+  require_possible(device);
+  std::vector<BudgetStage> stages;
+  add_device_stages(stages, law_forces(law, motion, device.period_s, 0.0),
+                    law_forces(law, motion, device.period_s, device.encoder_step_m), times_s,
+                    device,
+                    {"loop",
+                     fmt::format("the update of {} ms", significant(1e3 * device.period_s, 3)),
+                     "integration",
+                     BudgetKind::computation,
+                     {}});
+  return stages;
+}
+
+/// How a prediction is asked for the random part.
+PredictionOptions random_part_options(const BudgetOptions& options) {
+  PredictionOptions prediction;
+  prediction.samples = options.samples;
+  prediction.seed = options.seed;
+  prediction.level = options.level;
+  return prediction;
+}
+
 }  // namespace
 
 void add_random_part(ErrorBudget& budget, const LawPrediction& p) {
@@ -73,14 +99,6 @@ void add_random_part(ErrorBudget& budget, const LawPrediction& p) {
   }
   budget.random = random;
   for (const std::string& flag : p.flags) budget.flags.push_back(flag);
-}
-
-PredictionOptions random_part_options(const BudgetOptions& options) {
-  PredictionOptions prediction;
-  prediction.samples = options.samples;
-  prediction.seed = options.seed;
-  prediction.level = options.level;
-  return prediction;
 }
 
 void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& motion,
@@ -143,22 +161,6 @@ void require_possible(const BudgetDevice& device) {
   if (device.period_s > 0.0 && device.encoder_step_m >= 0.0 && device.delay_periods >= 0) return;
   throw bad_input("budget", "a period, encoder step or delay out of range",
                   "a period above 0, the others 0 or more");
-}
-
-std::vector<BudgetStage> loop_stages(const LawFile& law, const Protocol& motion,
-                                     const std::vector<double>& times_s,
-                                     const BudgetDevice& device) {
-  require_possible(device);
-  std::vector<BudgetStage> stages;
-  add_device_stages(stages, law_forces(law, motion, device.period_s, 0.0),
-                    law_forces(law, motion, device.period_s, device.encoder_step_m), times_s,
-                    device,
-                    {"loop",
-                     fmt::format("the update of {} ms", significant(1e3 * device.period_s, 3)),
-                     "integration",
-                     BudgetKind::computation,
-                     {}});
-  return stages;
 }
 
 ErrorBudget contact_budget(const LawFile& law, const Protocol& motion, std::vector<double> times_s,

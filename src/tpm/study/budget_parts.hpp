@@ -30,15 +30,8 @@ void add_device_stages(std::vector<BudgetStage>& stages, const SteppedForces& sm
                        const SteppedForces& quantised, const std::vector<double>& times_s,
                        const BudgetDevice& device, const BudgetStage& loop);
 
-/// The stages after `law` of one contact.
-[[nodiscard]] std::vector<BudgetStage> loop_stages(const LawFile& law, const Protocol& motion,
-                                                   const std::vector<double>& times_s,
-                                                   const BudgetDevice& device);
-
 /// Half the width of a prediction's band of the mean, within the ramp and hold of a recording.
 void add_random_part(ErrorBudget& budget, const LawPrediction& prediction);
-/// How a prediction is asked for it.
-[[nodiscard]] PredictionOptions random_part_options(const BudgetOptions& options);
 /// The same along a motion from the surface; a flag if the law carries no uncertainty.
 void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& motion,
                      const BudgetOptions& options);

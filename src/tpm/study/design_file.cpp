@@ -33,10 +33,6 @@ std::vector<double> intervals_of(const Json& grid, const DocumentPlace& place) {
   });
 }
 
-std::vector<int> repeats_of(const Json& grid) {
-  return grid.value("repeats", std::vector<int>{1});
-}
-
 PlannedExperiment planned(const ProtocolBlock& block) {
   if (block.kind == ProtocolKind::creep) {
     return {ExperimentKind::creep, 0.0, 0.0, *block.load_N, *block.duration_s};
@@ -53,7 +49,7 @@ void add_grid(const Json& grid, const DocumentPlace& place, std::vector<PlannedE
             : parse_protocol_lists(grid, place, ProtocolKind::ramp_hold, Openness::complete, {},
                                    {"interval", "repeats"});
   const auto intervals = intervals_of(grid, place);
-  const auto repeats = repeats_of(grid);
+  const auto repeats = grid.value("repeats", std::vector<int>{1});
   const std::size_t count = protocols.size() * intervals.size() * repeats.size();
   if (list.size() + count > kMostCandidates) {
     throw bad_input(place.where, fmt::format("{} experiments", list.size() + count),

@@ -53,19 +53,17 @@ class HoldWatch {
   double first_ = 0.0, deepest_ = 0.0, held_ = 0.0, since_s_ = 0.0, now_s_ = 0.0;
 };
 
-/// Intervals hold only where contact and offset are off their bounds.
-bool any_at_bound(const SequentialEstimate& estimate) {
-  return std::ranges::any_of(estimate.parameters, &SequentialParameter::at_bound);
-}
-
 /// Watches the widths and says when to stop.
 class StoppingRule {
  public:
   explicit StoppingRule(const IdentifyOptions& options) : options_(options) {}
 
   bool stops_at(const IdentifiedSample& sample, const HoldWatch& hold) {
-    const bool narrow = hold.holds() && !any_at_bound(sample.estimate) &&
-                        sample.estimate.widest_relative_half_width() <= options_.target;
+    // Intervals hold only where contact and offset are off their bounds.
+    const bool narrow =
+        hold.holds() &&
+        std::ranges::none_of(sample.estimate.parameters, &SequentialParameter::at_bound) &&
+        sample.estimate.widest_relative_half_width() <= options_.target;
     const auto n = static_cast<double>(sample.estimate.samples);
     if (!was_narrow_ || law_ != sample.law) since_ = n;
     was_narrow_ = narrow;
@@ -106,8 +104,7 @@ LawUncertainty uncertainty_of(const SequentialEstimate& e, double level) {
   return u;
 }
 
-}  // namespace
-
+/// Laws that can be fitted sample by sample and that a hand tells apart.
 std::vector<LawSpec> live_laws() {
   std::vector<LawSpec> laws;
   for (const Kernel kernel : {Kernel::linear, Kernel::power}) {
@@ -118,6 +115,8 @@ std::vector<LawSpec> live_laws() {
   laws.push_back({.tension = Tension::elastic});
   return laws;
 }
+
+}  // namespace
 
 const IdentifiedSample& Identification::result() const {
   return stopped ? history[*stopped] : history.back();

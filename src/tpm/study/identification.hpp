@@ -10,7 +10,9 @@
 namespace tpm::study {
 
 struct IdentifyOptions {
-  std::vector<LawSpec> laws;  ///< empty: live_laws()
+  /// Empty: linear and power kernels with 0 to 2 branches, and a linear one with a branch and
+  /// elastic tension.
+  std::vector<LawSpec> laws;
   double level = 0.95;
   /// Stop when the interval of every material parameter of the least law is at most this part of
   /// its estimate to each side; in (0, 1).
@@ -22,10 +24,6 @@ struct IdentifyOptions {
   std::optional<double> reference;  ///< planned depth; none: the recording's
   std::uint64_t seed = 0;
 };
-
-/// Laws that can be fitted sample by sample and that a hand tells apart: linear and power kernels
-/// with 0 to 2 branches, and a linear one with a branch and elastic tension.
-[[nodiscard]] std::vector<LawSpec> live_laws();
 
 /// What was known after a sample.
 struct IdentifiedSample {

@@ -18,10 +18,6 @@ Json finite(double value) {
   return std::isfinite(value) ? Json(rounded(value, kStoredDigits)) : Json();
 }
 
-std::string si_suffix(const LawSpec& spec) {
-  return spec.response == Quantity::stress ? "_Pa" : "_N";
-}
-
 Json sample_parameters_json(const IdentifiedSample& sample, const LawSpec& law) {
   const std::vector<LawParameter> table = law_parameters(law);
   return array_json(sample.estimate.parameters, [&](const SequentialParameter& p) {
@@ -44,7 +40,8 @@ Json sample_json(const Identification& id, const IdentifiedSample& sample) {
             {"law", law_name(law)},
             {"lag_1_correlation", finite(sample.estimate.phi)},
             {"widest_relative_half_width", finite(sample.estimate.widest_relative_half_width())}};
-  json["noise_sd" + si_suffix(law)] = finite(sample.estimate.sigma);
+  json[law.response == Quantity::stress ? "noise_sd_Pa" : "noise_sd_N"] =
+      finite(sample.estimate.sigma);
   json["parameters"] = sample_parameters_json(sample, law);
   return json;
 }

@@ -22,10 +22,6 @@ constexpr auto kPlacementWords = std::to_array<Word<Placement>>(
     {{Placement::surface, "surface"}, {Placement::fitted, "fitted"}, {Placement::own, "own"}});
 constexpr int kFewestSamples = 100;
 
-bool is_nuisance(const std::vector<LawParameter>& parameters, std::size_t place) {
-  return parameters[place].nuisance;
-}
-
 const LawUncertainty& uncertainty_of(const LawFile& law) {
   if (law.uncertainty) return *law.uncertainty;
   throw bad_input(fmt::format("law {}", law_name(law.spec)), "carries no uncertainty of a fit",
@@ -240,7 +236,7 @@ UncertainCoordinates fitted_coordinates(const LawFile& law, Placement placement)
   for (std::size_t i = 0; i < u.place.size(); ++i) {
     const LawParameter& p = parameters[u.place[i]];
     const bool leave_out = placement == Placement::surface
-                               ? is_nuisance(parameters, u.place[i])
+                               ? p.nuisance
                                : placement == Placement::own && belongs_to_recording(law.spec, p);
     if (leave_out) continue;
     kept.push_back(static_cast<Eigen::Index>(i));

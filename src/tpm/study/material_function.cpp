@@ -163,6 +163,25 @@ std::vector<std::string> range_warnings(const FitResult& fit, const FunctionSize
   return warnings;
 }
 
+std::vector<LawSpec> linear_family() {
+  std::vector<LawSpec> laws;
+  constexpr int kMost = 4;
+  for (int branches = 0; branches <= kMost; ++branches) {
+    LawSpec law;
+    law.branches = branches;
+    laws.push_back(law);
+  }
+  for (const Fractional fractional :
+       {Fractional::springpot, Fractional::maxwell, Fractional::kelvin_voigt, Fractional::zener,
+        Fractional::maxwell_pair, Fractional::kelvin_voigt_pair, Fractional::zener_pair}) {
+    LawSpec law;
+    law.branches = 0;
+    law.fractional = fractional;
+    laws.push_back(law);
+  }
+  return laws;
+}
+
 }  // namespace
 
 std::string MaterialFunction::kind() const {
@@ -224,25 +243,6 @@ FitConfig function_config(LawSpec law, const MaterialFunction& function,
   data.import = function.import;
   config.data.push_back(std::move(data));
   return config;
-}
-
-std::vector<LawSpec> linear_family() {
-  std::vector<LawSpec> laws;
-  constexpr int kMost = 4;
-  for (int branches = 0; branches <= kMost; ++branches) {
-    LawSpec law;
-    law.branches = branches;
-    laws.push_back(law);
-  }
-  for (const Fractional fractional :
-       {Fractional::springpot, Fractional::maxwell, Fractional::kelvin_voigt, Fractional::zener,
-        Fractional::maxwell_pair, Fractional::kelvin_voigt_pair, Fractional::zener_pair}) {
-    LawSpec law;
-    law.branches = 0;
-    law.fractional = fractional;
-    laws.push_back(law);
-  }
-  return laws;
 }
 
 Selection select_law(const MaterialFunction& function, const SelectionOptions& options) {

@@ -31,12 +31,10 @@ struct MaterialFunction {
 [[nodiscard]] FitConfig function_config(LawSpec law, const MaterialFunction& function,
                                         const SetupOptions& options);
 
-/// Linear kernels with 0 to 4 branches, and the laws with one or two spring-pots.
-[[nodiscard]] std::vector<LawSpec> linear_family();
-
 /// Fits every law and recommends the least, as select_law does for recordings; without held-out
 /// errors. The readings count as independent.
-/// @param options laws empty: linear_family()
+/// @param options laws empty: linear kernels with 0 to 4 branches, and the laws with one or two
+///        spring-pots
 [[nodiscard]] Selection select_law(const MaterialFunction& function,
                                    const SelectionOptions& options);
 

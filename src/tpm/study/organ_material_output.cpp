@@ -84,11 +84,6 @@ double deepest_of(const MaterialCourse& c) {
   return *std::max_element(c.depth_m.begin(), c.depth_m.end());
 }
 
-/// The one that reaches deepest.
-const MaterialCourse& deepest_course(const OrganMaterial& m) {
-  return *std::ranges::max_element(m.courses, {}, deepest_of);
-}
-
 /// Depth over time of the ramp: of the way from 10 to 90 % of the depth.
 double ramp_rate(const MaterialCourse& c) {
   const double first = c.depth_m.front();
@@ -276,7 +271,7 @@ Json network_session(std::string title, const Json& scene, const Json& ramp, dou
 }
 
 void add_protocol_and_session(OrganMaterial& m) {
-  const MaterialCourse& deepest = deepest_course(m);
+  const MaterialCourse& deepest = *std::ranges::max_element(m.courses, {}, deepest_of);
   const double depth_m = deepest_of(deepest);
   const double rate_m_per_s = ramp_rate(deepest);
   const double held_s = deepest.time_s.back() - deepest.time_s.front() - depth_m / rate_m_per_s;

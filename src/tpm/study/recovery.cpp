@@ -24,10 +24,6 @@ void append_times(std::vector<double>& times, double from_s, double to_s, double
   for (int i = 1; i <= steps; ++i) times.push_back(std::min(from_s + i * interval_s, to_s));
 }
 
-double largest(const std::vector<double>& values) {
-  return *std::max_element(values.begin(), values.end());
-}
-
 double visible_value(const LawParameter& p, int branches, double order) {
   constexpr double kStiffness = 200.0;  // N/m: about a newton at 5 mm
   static const std::vector<std::vector<double>> times_s = {{}, {2.0}, {0.5, 5.0}, {0.3, 2.0, 12.0}};
@@ -212,7 +208,7 @@ RecoveryResult recover(const LawSpec& law, std::span<const double> true_values,
   Trials trials{law, {true_values.begin(), true_values.end()}, {}, 0.0};
   trials.law.reference = options.test.depth_m;
   trials.clean = simulated_recording(trials.law, true_values, options.test);
-  trials.sigma = options.noise * largest(trials.clean.response);
+  trials.sigma = options.noise * std::ranges::max(trials.clean.response);
   SelectionOptions selection = options.selection;
   selection.held_out = false;
   selection.setup.profiles = false;

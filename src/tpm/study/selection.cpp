@@ -56,6 +56,19 @@ bool may_vanish(const LawSpec& law, const std::string& parameter) {
   return parameter == "k_inf" && (law.branches > 0 || law.fractional != Fractional::none);
 }
 
+/// See Candidate::contradicted.
+bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
+  double longest_s = 0.0;
+  const auto table = law_parameters(candidate.fit.config.law.value());
+  for (const ParameterResult& p : candidate.fit.parameters) {
+    const LawParameter* law = material_parameter(table, p.parameter.name);
+    if (law == nullptr || law->dimension != Dimension::time) continue;
+    if (spans.samples_too_far_for(p.estimate)) return true;
+    longest_s = std::max(longest_s, p.estimate);
+  }
+  return !candidate.law.solid && spans.too_short_to_end(longest_s);
+}
+
 }  // namespace
 
 std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans) {
@@ -106,18 +119,6 @@ void reassess(Candidate& chosen, const ProtocolSpans& spans) {
   if (chosen.identified) return;
   chosen.reason = not_identified(chosen, spans);
   chosen.identified = chosen.reason.empty();
-}
-
-bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
-  double longest_s = 0.0;
-  const auto table = law_parameters(candidate.fit.config.law.value());
-  for (const ParameterResult& p : candidate.fit.parameters) {
-    const LawParameter* law = material_parameter(table, p.parameter.name);
-    if (law == nullptr || law->dimension != Dimension::time) continue;
-    if (spans.samples_too_far_for(p.estimate)) return true;
-    longest_s = std::max(longest_s, p.estimate);
-  }
-  return !candidate.law.solid && spans.too_short_to_end(longest_s);
 }
 
 Candidate fit_candidate(const FitConfig& config, const std::vector<DataSet>& data,

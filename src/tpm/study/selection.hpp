@@ -127,9 +127,6 @@ struct ProtocolSpans {
 /// Of the fitted parts.
 [[nodiscard]] ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings);
 
-/// See Candidate::contradicted.
-[[nodiscard]] bool contradicts(const Candidate& candidate, const ProtocolSpans& spans);
-
 /// "the least law that the data support is", or what else the recommended law is.
 [[nodiscard]] std::string least_law_words(const Selection& s, const std::string& data);
 

@@ -3,10 +3,6 @@
 namespace tpm::study {
 namespace {
 
-std::string_view mode_name(TableMode mode) {
-  return mode == TableMode::as_printed ? "as_printed" : "consistent";
-}
-
 Json check_json(const DigitCheck& check, const Unit& unit, std::string_view si_suffix) {
   Json json;
   json["computed_" + std::string(si_suffix)] = check.computed * unit.to_si;
@@ -78,7 +74,7 @@ Json counts_json(const CellCounts& counts) {
 
 Json request_json(const TableRequest& request) {
   Json json;
-  json["mode"] = mode_name(request.mode);
+  json["mode"] = request.mode == TableMode::as_printed ? "as_printed" : "consistent";
   const TpmVector values = to_vector(request.parameters);
   constexpr std::array<std::string_view, kTpmParameterCount> kKeys{
       "E1_Pa", "E2_Pa", "Eprime_Pa", "eta1_Pa_s", "", "A0_m2", "l0_m"};

@@ -35,10 +35,6 @@ std::vector<double> summed_values(const SweepReader& sweep, const std::string& o
   return sums;
 }
 
-std::string last_word(const std::string& target) {
-  return target.substr(target.rfind('/') + 1);
-}
-
 /// What the cell says of a parameter that sets several of the model's.
 std::optional<CellParameter> found_in_cell(const BestCell& cell,
                                            const std::vector<std::string>& sets,
@@ -46,7 +42,8 @@ std::optional<CellParameter> found_in_cell(const BestCell& cell,
   constexpr double kSame = 1e-9;
   std::optional<CellParameter> found;
   for (const CellParameter& p : cell.parameters) {
-    if (std::find(sets.begin(), sets.end(), last_word(p.target)) == sets.end()) continue;
+    const std::string word = p.target.substr(p.target.rfind('/') + 1);
+    if (std::ranges::find(sets, word) == sets.end()) continue;
     if (found && std::abs(found->value - p.value) > kSame * std::abs(p.value)) {
       throw bad_input(place.where,
                       fmt::format("the cell has {} = {} and {} = {}", found->name,
