@@ -335,6 +335,9 @@ RealTimeWish chosen_wish(const DeviceOptions& options) {
 void add_hil_command(CLI::App& app, Session& session) {
   CLI::App* hil = app.add_subcommand("hil", "A tissue felt through a haptic device");
   hil->require_subcommand(1);
+  hil->footer(
+      "Example:\n  tpm hil devices\n  tpm hil run configs/hil_liver.json -o liver.tpmrec\n"
+      "  tpm hil verify liver.tpmrec");
 
   CLI::App* devices = hil->add_subcommand("devices", "What devices are there, and why one is not");
   auto listed = std::make_shared<DeviceOptions>();

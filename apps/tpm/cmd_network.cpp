@@ -130,6 +130,9 @@ std::shared_ptr<NetworkChoice> add_choice(CLI::App& command) {
 void add_network_command(CLI::App& app, Session& session) {
   CLI::App* network = app.add_subcommand("network", "Organs of spheres: build, check, show");
   network->require_subcommand(1);
+  network->footer(
+      "Example:\n  tpm network build configs/liver_scene.json -o liver.h5\n"
+      "  tpm network check configs/liver_scene.json");
 
   CLI::App* build_command = network->add_subcommand("build", "Write a network to HDF5 and XDMF");
   const auto to_build = add_choice(*build_command);

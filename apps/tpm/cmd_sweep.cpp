@@ -326,6 +326,10 @@ void add_sweep_command(CLI::App& app, Session& session) {
   merging->add_option("-o,--output", choice->output, "HDF5 file, as it was given to the shards")
       ->capture_default_str();
   add_format_option(*merging, session);
+  merging->footer(
+      "Example:\n  tpm sweep configs/sweep_x_depth.json --shard 1/2 -o sweep.h5\n"
+      "  tpm sweep configs/sweep_x_depth.json --shard 2/2 -o sweep.h5\n"
+      "  tpm sweep merge configs/sweep_x_depth.json -o sweep.h5");
   set_run(*merging, session, [choice, &session] { return merge(*choice, session); });
   add_sweep_views(*command, session);
   command->callback([command, choice, &session] {

@@ -185,6 +185,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   CLI::App* showing = sweep.add_subcommand("show", "What a file of results holds");
   showing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
   add_format_option(*showing, session);
+  showing->footer("Example:\n  tpm sweep show sweep.h5");
   set_run(*showing, session, [choice, &session] { return show(*choice, session); });
   CLI::App* command = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
   command->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
@@ -192,6 +193,9 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   command->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
   command->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
   add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm sweep configs/sweep_sensitivity.json -o samples.h5\n"
+      "  tpm sweep sensitivity samples.h5");
   set_run(*command, session, [choice, &session] { return sensitivity(*choice, session); });
   CLI::App* refining = sweep.add_subcommand(
       "convergence", "Order, extrapolated value and grid convergence index along an axis");
@@ -205,6 +209,9 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   refining->add_option("--at", choice->at, "AXIS=VALUE: place on another axis");
   refining->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
   add_format_option(*refining, session);
+  refining->footer(
+      "Example:\n  tpm sweep configs/sweep_convergence_spheres.json -o spheres.h5\n"
+      "  tpm sweep convergence spheres.h5 --size 'count^(-1/3)'");
   set_run(*refining, session, [choice, &session] { return convergence(*choice, session); });
   CLI::App* choosing = sweep.add_subcommand("best", "The cells with the least value of an output");
   choosing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
@@ -215,6 +222,9 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   choosing->add_option("--fit", choice->fit, "Configuration of tpm fit to be started there");
   choosing->add_option("--start", choice->start, "File for the configuration with these starts");
   add_format_option(*choosing, session);
+  choosing->footer(
+      "Example:\n  tpm sweep configs/sweep_misfit_organ.json -o organ.h5\n"
+      "  tpm sweep best organ.h5 --output misfit --over indentation");
   set_run(*choosing, session, [choice, &session] { return best(*choice, session); });
   CLI::App* plotting = sweep.add_subcommand("plot", "Maps, families of lines, Pareto fronts");
   plotting->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
@@ -226,6 +236,9 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   plotting->add_option("--at", choice->at, "AXIS=VALUE: place on an axis that is not drawn");
   plotting->add_option("--pareto", choice->pareto,
                        "MISFIT,COST: cells that no other betters in both");
+  plotting->footer(
+      "Example:\n  tpm sweep configs/sweep_x_depth.json -o sweep.h5\n"
+      "  tpm sweep plot sweep.h5 -o figures");
   set_run(*plotting, session, [choice] { return plot(*choice); });
 }
 

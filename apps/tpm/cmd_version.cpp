@@ -8,6 +8,7 @@ namespace tpm::app {
 void add_version_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("version", "Print the version of tpm");
   add_format_option(*command, session);
+  command->footer("Example:\n  tpm version --format json");
   set_run(*command, session, [&session] {
     say("{}", session.json() ? to_text(Json{{"version", version()}})
                              : fmt::format("tpm {}\n", version()));

@@ -9,7 +9,8 @@
 - a folder of src/tpm includes only those below it in the list of docs/architecture.md;
 - paper/paper.md shows every figure of paper/figures, cites every entry of paper/paper.bib and nothing else, and names
   only files that exist;
-- the groups of `tpm --help` and of the README hold the same commands, each once.
+- the groups of `tpm --help` and of the README hold the same commands, each once;
+- the help of every command ends with an example that calls it.
 """
 
 import os
@@ -129,10 +130,20 @@ def differing_groups(root, program):
             yield f"README.md: group {group} lists {named}; tpm --help lists {commands}"
 
 
+def without_example(root, program):
+    sys.path.insert(0, str(root / "scripts"))
+    from command_help import commands
+
+    for command in commands(program):
+        call = " ".join(["tpm", *command.words])
+        if not any(f"  {call} " in line + " " for line in command.footer):
+            yield f"{call} --help: has no example that calls it"
+
+
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
     faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *upward_includes(root),
-              *faults_of_paper(root), *differing_groups(root, program)]
+              *faults_of_paper(root), *differing_groups(root, program), *without_example(root, program)]
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")
