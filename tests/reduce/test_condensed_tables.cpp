@@ -11,6 +11,7 @@ using namespace tpm::organ;
 
 namespace {
 
+/// Of data of the size of a tissue's, so that no term is lost beside others.
 class RandomFit {
  public:
   RandomFit() {
@@ -20,14 +21,14 @@ class RandomFit {
     for (CondensedSample& sample : samples) {
       sample.u_m = place();
       sample.w_m = place();
-      sample.energy_J = number();
+      sample.energy_J = 1e-3 * number();
       for (double& x : sample.by_u_N) x = number();
       for (double& x : sample.by_w_N) x = number();
-      for (double& x : sample.by_uu.reshaped()) x = number();
-      for (double& x : sample.by_wu.reshaped()) x = number();
+      for (double& x : sample.by_uu.reshaped()) x = 1e3 * number();
+      for (double& x : sample.by_wu.reshaped()) x = 1e3 * number();
     }
     potential = CondensedPotential(frame, samples);
-    for (int m = 0; m < 40; ++m) {
+    for (int m = 0; m < CondensedMatrices::kTerms; ++m) {
       metrics.push_back({place(), spd(), spd(), spd(), {}});
     }
     tables = condensed_tables(frame, potential, CondensedMatrices(frame, metrics));
@@ -45,7 +46,7 @@ class RandomFit {
   Eigen::Matrix3d spd() {
     Eigen::Matrix3d a;
     for (double& x : a.reshaped()) x = 0.2 * number();
-    return Eigen::Matrix3d::Identity() + a * a.transpose();
+    return 1e3 * (Eigen::Matrix3d::Identity() + a * a.transpose());
   }
   Random random_{3};
 };
@@ -70,6 +71,16 @@ TEST_CASE("a condensed step reads every monomial of the potential", "[condensed]
   }
 }
 
+TEST_CASE("the matrices of a condensed step go through as many samples as terms", "[condensed]") {
+  const RandomFit fit;
+  for (const CondensedMetric& sample : fit.metrics) {
+    const CondensedMatricesAt at = condensed_matrices_at(fit.tables, sample.w_m);
+    CHECK((at.mobility * sample.metric).isIdentity(1e-8));
+    CHECK(at.coupling.isApprox(sample.second_metric, 1e-8));
+    CHECK(at.second.isApprox(sample.second_energy, 1e-8));
+  }
+}
+
 TEST_CASE("the force of a condensed state is minus the slope of its energy", "[condensed]") {
   RandomFit fit;
   constexpr double kStep_m = 1e-6;
@@ -86,21 +97,27 @@ TEST_CASE("the force of a condensed state is minus the slope of its energy", "[c
     };
     const CondensedPull pull = condensed_pull(fit.tables, u, state, at);
     Eigen::Vector3d by_u;
-    Eigen::Vector3d by_w;
+    CondensedVector by_state;
     for (Eigen::Index k = 0; k < 3; ++k) {
       const Eigen::Vector3d step = kStep_m * Eigen::Vector3d::Unit(k);
+      by_u[k] = (energy_J(u + step, state) - energy_J(u - step, state)) / (2.0 * kStep_m);
+    }
+    for (Eigen::Index k = 0; k < 6; ++k) {
       CondensedVector ahead = state;
       CondensedVector behind = state;
       ahead[k] += kStep_m;
       behind[k] -= kStep_m;
-      by_u[k] = (energy_J(u + step, state) - energy_J(u - step, state)) / (2.0 * kStep_m);
-      by_w[k] = (energy_J(u, ahead) - energy_J(u, behind)) / (2.0 * kStep_m);
+      by_state[k] = (energy_J(u, ahead) - energy_J(u, behind)) / (2.0 * kStep_m);
     }
+    const Eigen::Vector3d by_w = by_state.head<3>();
+    const Eigen::Vector3d by_q = by_state.tail<3>();
     const double scale_N = by_u.norm() + by_w.norm();
     CHECK((pull.force_N + by_u).norm() < 1e-5 * scale_N);
-    CHECK((pull.velocity.head<3>() + at.mobility * by_w).norm() < 1e-5 * scale_N);
+    CHECK((pull.velocity.head<3>() + at.mobility * by_w).norm() <
+          1e-5 * scale_N * at.mobility.norm());
+    const Eigen::Vector3d z = u - state.head<3>();
     const Eigen::Vector3d q = state.tail<3>();
-    CHECK((pull.velocity.tail<3>() - (u - state.head<3>() - fit.tables.second_rate * q)).norm() <
-          1e-15);
+    CHECK((by_q - (at.second * q - at.coupling * z)).norm() < 1e-5 * scale_N);
+    CHECK((pull.velocity.tail<3>() - (z - fit.tables.second_rate * q)).norm() < 1e-15);
   }
 }
