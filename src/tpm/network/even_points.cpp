@@ -5,9 +5,9 @@
 #include <numeric>
 #include <tuple>
 
+#include "tpm/core/parallel.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/neighbours.hpp"
-#include "tpm/network/parallel.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -7,7 +7,7 @@
 #include <map>
 #include <utility>
 
-#include "tpm/network/parallel.hpp"
+#include "tpm/core/parallel.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -8,7 +8,7 @@
 #include <nanoflann.hpp>
 #include <utility>
 
-#include "tpm/network/parallel.hpp"
+#include "tpm/core/parallel.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "tpm/core/parallel.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/landing_site.hpp"
 #include "tpm/network/neighbours.hpp"
-#include "tpm/network/parallel.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <tbb/parallel_for.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/core/parallel.hpp"
 #include "tpm/store/check_sum.hpp"
 #include "tpm/store/file.hpp"
 
@@ -50,7 +50,7 @@ std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::u
 std::optional<std::uint32_t> crc_of(int file, std::uint64_t size) {
   std::vector<std::optional<std::uint32_t>> parts((size + kStretch - 1) / kStretch);
   const auto end_of = [&](std::size_t i) { return std::min(size, (i + 1) * kStretch); };
-  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
+  for_each_in_parallel(parts.size(), [&](std::size_t i) {
     parts[i] = crc_of_stretch(file, i * kStretch, end_of(i));
   });
   std::uint32_t whole = 0;

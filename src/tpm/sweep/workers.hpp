@@ -6,6 +6,8 @@
 #include <exception>
 #include <mutex>
 
+#include "tpm/core/parallel.hpp"
+
 namespace tpm::study {
 
 /// The first exception of a pipeline's filters, kept until the pipeline is through: one that left a
@@ -41,12 +43,12 @@ class FirstFault {
   return named > 0 ? named : tbb::info::default_concurrency();
 }
 
-/// Does work on so many threads and no more.
+/// Does work on so many threads and no more. Throws as with_threads.
 template <class Work>
 void on_workers(int workers, const Work& work) {
   const tbb::global_control most(tbb::global_control::max_allowed_parallelism,
                                  static_cast<std::size_t>(workers));
-  tbb::task_arena(workers).execute(work);
+  with_threads([&] { tbb::task_arena(workers).execute(work); });
 }
 
 }  // namespace tpm::study
