@@ -438,12 +438,12 @@ SESSIONS = [
          LIBRARY + VIRTUAL + " 2> first; sed -i 's/initialised 0/initialised 1/' script; " + LIBRARY + VIRTUAL,
          "test_vendor: A session that cannot be prepared"),
     Case("10", "the last row of a session that a fault stopped",
-         scripted(star(), "wait 250", "fault unplugged 1500 1"), LIBRARY + VIRTUAL, "test_record", last_row),
+         scripted(star(), "wait 250", "fault unplugged 1500 1"), LIBRARY + VIRTUAL, "test_row_log", last_row),
     Case("10", "four corrupted bytes in the middle of a recording", files(s__json=star()),
          RUN + " >/dev/null 2>&1; printf 'XXXX' | dd of=r.tpmrec bs=1 seek=200000 conv=notrunc 2>/dev/null; "
-         "$TPM hil export r.tpmrec -o e.h5", "test_record", rows_kept),
+         "$TPM hil export r.tpmrec -o e.h5", "test_row_log", rows_kept),
     Case("10", "a recording cut in the middle", files(s__json=star()),
-         RUN + " >/dev/null 2>&1; truncate -s 200000 r.tpmrec; $TPM hil export r.tpmrec -o e.h5", "test_record", rows_kept),
+         RUN + " >/dev/null 2>&1; truncate -s 200000 r.tpmrec; $TPM hil export r.tpmrec -o e.h5", "test_row_log", rows_kept),
     Case("11", "5 s of rest, relaxation time 10 s",
          files(s__json={**STAR, "model": {"kind": "element", "scene": {
              "organ": {"kind": "star", "spacing": "30 mm"},

@@ -5,6 +5,8 @@
 - every function of a flow is declared in its header, and the source named includes that header and calls it;
 - every file of a folder opens the namespace that the page states for its room, and src/tpm/core/namespaces.hpp lets
   it see the namespaces that the page states;
+- a source without a header of its name says in its first line which header declares what it defines;
+  the folders whose functions CMake collects (formulations, shapes) have none;
 - docs/library.md lists every public header, with a folder that includes it or one that another public header includes;
 - docs/figures/rooms.svg is what scripts/draw_rooms.py draws of all that.
 
@@ -57,6 +59,20 @@ def faults_of_namespaces(page):
                 yield f"{file.relative_to(root)}: opens {opened}; files of {file.parent.name} stand in {space}"
 
 
+def faults_of_sources():
+    for file in sorted((root / "src/tpm").glob("*/*.cpp")):
+        public = root / "include/tpmkit" / file.with_suffix(".hpp").name
+        if file.with_suffix(".hpp").exists() or public.exists() or file.parent.name in ("formulations", "shapes"):
+            continue
+        first = file.read_text(encoding="utf-8").split("\n", 1)[0]
+        said = re.fullmatch(r"// Declared in ((tpm|tpmkit)/\S+\.hpp)\.", first)
+        folder = "src" if said and said[2] == "tpm" else "include"
+        if said is None:
+            yield f"{file.relative_to(root)}:1: no header has its name; expected '// Declared in tpm/FOLDER/HEADER.hpp.'"
+        elif not (root / folder / said[1]).exists():
+            yield f"{file.relative_to(root)}:1: {said[1]} does not exist"
+
+
 def faults_of_flows(page):
     flows = rooms.flows_of(page)
     if len(flows) != 3:
@@ -103,7 +119,8 @@ def faults_of_headers():
 
 def main():
     page = (root / "docs/architecture.md").read_text(encoding="utf-8")
-    faults = [*faults_of_rooms(page), *faults_of_namespaces(page), *faults_of_flows(page), *faults_of_headers()]
+    faults = [*faults_of_rooms(page), *faults_of_namespaces(page), *faults_of_sources(), *faults_of_flows(page),
+              *faults_of_headers()]
     drawn = root / "docs/figures/rooms.svg"
     if not faults and (not drawn.exists() or drawn.read_text(encoding="utf-8") != rooms.drawing(root)):
         faults.append("docs/figures/rooms.svg: not what is drawn now; python3 scripts/draw_rooms.py > docs/figures/rooms.svg")

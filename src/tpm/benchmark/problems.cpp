@@ -1,3 +1,4 @@
+// Declared in tpm/benchmark/problem.hpp.
 #include <fmt/format.h>
 
 #include <algorithm>

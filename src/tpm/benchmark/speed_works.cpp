@@ -1,3 +1,4 @@
+// Declared in tpm/benchmark/speed.hpp.
 // The pieces of work that the speed record follows. A name stands for the same work for ever: to
 // change one, give it another name.
 #include <memory>

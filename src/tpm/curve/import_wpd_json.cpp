@@ -1,3 +1,4 @@
+// Declared in tpm/curve/import_digitizer.hpp.
 #include <fmt/format.h>
 
 #include <array>

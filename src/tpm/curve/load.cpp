@@ -1,3 +1,4 @@
+// Declared in tpmkit/curve_file.hpp.
 #include "tpmkit/curve_file.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Declared in tpmkit/device.hpp.
 #include "tpmkit/device.hpp"
 
 #include "tpm/core/enum_names.hpp"

@@ -1,3 +1,4 @@
+// Declared in tpm/fit/config_parts.hpp.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Declared in tpm/fit/experiment_residuals.hpp.
 // What ExperimentResiduals knows of its noise.
 #include <fmt/format.h>
 

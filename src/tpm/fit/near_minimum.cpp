@@ -1,3 +1,4 @@
+// Declared in tpm/fit/least_squares.hpp.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// Declared in tpm/haptics/verify.hpp.
 #include <algorithm>
 #include <limits>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/haptics/session.hpp.
 #include "tpm/core/namespaces.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/haptics/planned_model.hpp"

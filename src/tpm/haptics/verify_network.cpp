@@ -1,3 +1,4 @@
+// Declared in tpm/haptics/verify_parts.hpp.
 
 #include <algorithm>
 #include <cmath>

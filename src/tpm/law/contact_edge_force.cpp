@@ -1,3 +1,4 @@
+// Declared in tpm/law/contact_history.hpp.
 // The force of a contact that shrinks, from the history up to where its edge was met.
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/contact_retreat.hpp"

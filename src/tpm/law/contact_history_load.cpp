@@ -1,3 +1,4 @@
+// Declared in tpm/law/contact_history.hpp.
 // A contact history under an imposed load; contact_history.cpp has the imposed depth.
 #include <algorithm>
 #include <array>

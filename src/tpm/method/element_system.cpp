@@ -1,3 +1,4 @@
+// Declared in tpm/method/step_system.hpp.
 // One sphere on the paper's element, for the step rules.
 #include <algorithm>
 #include <cmath>

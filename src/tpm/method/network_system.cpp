@@ -1,3 +1,4 @@
+// Declared in tpm/method/step_system.hpp.
 // A network under its probe, for the step rules.
 
 #include <algorithm>

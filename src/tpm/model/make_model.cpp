@@ -1,3 +1,4 @@
+// Declared in tpmkit/model.hpp.
 // Apart from model.cpp: a program that asks for no model by its name is linked without the list of
 // formulations.
 #include "tpmkit/formulation.hpp"

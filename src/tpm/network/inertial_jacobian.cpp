@@ -1,3 +1,4 @@
+// Declared in tpm/network/inertial_equation.hpp.
 // The sparse Jacobian of the equations of motion.
 #include "tpm/network/inertial_equation.hpp"
 

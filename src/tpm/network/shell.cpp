@@ -1,3 +1,4 @@
+// Declared in tpm/network/filling.hpp.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Declared in tpm/network/stage_balance.hpp.
 // What StageBalance answers of the step that it has found: responses, states, heat and work.
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>

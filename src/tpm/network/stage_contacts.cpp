@@ -1,3 +1,4 @@
+// Declared in tpm/network/stage_balance.hpp.
 // Contacts with a tool that close or open within the step that StageBalance has found.
 #include <boost/math/tools/roots.hpp>
 #include <cstdint>

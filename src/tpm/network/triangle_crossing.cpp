@@ -1,3 +1,4 @@
+// Declared in tpm/network/triangle_mesh.hpp.
 // Where triangles of a mesh cut each other, found pair by pair over the tree of bounding boxes.
 // Predicates are in double precision: distances below 1e-12 of the triangle's size count as zero,
 // and touching counts as cutting, since a body that touches itself has no inside there.

@@ -1,3 +1,4 @@
+// Declared in tpm/plan/operations.hpp.
 // How long each operation takes on this machine.
 #include <algorithm>
 #include <chrono>

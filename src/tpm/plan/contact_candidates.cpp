@@ -1,3 +1,4 @@
+// Declared in tpm/plan/plan_model.hpp.
 // Contact models that a servo steps: the network seen from one sphere in three directions.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/plan/plan_model.hpp.
 // The nonlinear network: stepped by a servo, by collocation, with fewer moving layers, with masses.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/plan/plan_relevance.hpp.
 // What would break first if the scene changed.
 #include <fmt/format.h>
 

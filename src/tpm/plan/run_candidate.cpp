@@ -1,3 +1,4 @@
+// Declared in tpm/plan/plan_model.hpp.
 // Candidates of plans and runs of scenes, each as the other.
 #include <algorithm>
 

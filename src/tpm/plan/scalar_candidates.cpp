@@ -1,3 +1,4 @@
+// Declared in tpm/plan/plan_model.hpp.
 // Models of the contact alone: the element, linear and with two static curves.
 #include <fmt/format.h>
 

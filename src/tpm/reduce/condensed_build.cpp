@@ -1,3 +1,4 @@
+// Declared in tpm/reduce/condensed.hpp.
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>

@@ -1,3 +1,4 @@
+// Declared in tpm/reduce/condensed_fit.hpp.
 #include <algorithm>
 #include <vector>
 

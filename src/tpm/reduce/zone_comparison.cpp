@@ -1,3 +1,4 @@
+// Declared in tpm/reduce/zone_network.hpp.
 // The claim of a zone: compared with the whole network when it is built.
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Declared in tpm/reduce/zone_network.hpp.
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>

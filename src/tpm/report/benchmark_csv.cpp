@@ -1,3 +1,4 @@
+// Declared in tpm/report/benchmark_report.hpp.
 #include "tpm/report/benchmark_report.hpp"
 
 #include <array>

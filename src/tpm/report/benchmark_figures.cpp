@@ -1,3 +1,4 @@
+// Declared in tpm/report/benchmark_report.hpp.
 // Error against cost, one figure of wall time and one of counts for each problem.
 #include <fmt/format.h>
 

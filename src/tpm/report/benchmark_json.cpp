@@ -1,3 +1,4 @@
+// Declared in tpm/report/benchmark_report.hpp.
 // The record of tpm benchmark as JSON, both ways, and what an earlier run has left.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/report/document.hpp.
 #include <fmt/format.h>
 
 #include "tpm/report/document.hpp"

@@ -1,3 +1,4 @@
+// Declared in tpm/report/hil_report.hpp.
 #include <fmt/format.h>
 
 #include <map>

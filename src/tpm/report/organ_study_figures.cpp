@@ -1,3 +1,4 @@
+// Declared in tpm/report/organ_study_report.hpp.
 #include <fmt/format.h>
 
 #include <algorithm>

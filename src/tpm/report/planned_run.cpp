@@ -1,3 +1,4 @@
+// Declared in tpm/report/plan_report.hpp.
 // What a planned model answered.
 #include <fmt/format.h>
 

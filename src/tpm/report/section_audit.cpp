@@ -1,3 +1,4 @@
+// Declared in tpm/report/sections.hpp.
 // The section on the audit: each claim of the paper, recomputed.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/report/sections.hpp.
 // The sections on data, on validity and on what is assumed.
 #include <fmt/format.h>
 

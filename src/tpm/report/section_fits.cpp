@@ -1,3 +1,4 @@
+// Declared in tpm/report/sections.hpp.
 // The section on fits: estimates, intervals, minima, readings, sensitivity, held-out depths.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/report/sections.hpp.
 // The first section, and the paper's figures: sentences made from the numbers.
 #include <fmt/format.h>
 

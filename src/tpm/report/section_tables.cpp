@@ -1,3 +1,4 @@
+// Declared in tpm/report/sections.hpp.
 // The section on Tables 1-5: every printed cell with its recomputation and verdict.
 #include <fmt/format.h>
 

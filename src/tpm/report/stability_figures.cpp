@@ -1,3 +1,4 @@
+// Declared in tpm/report/stability_report.hpp.
 #include <fmt/format.h>
 
 #include "tpm/report/stability_report.hpp"

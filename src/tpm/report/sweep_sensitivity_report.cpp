@@ -1,3 +1,4 @@
+// Declared in tpm/report/sweep_report.hpp.
 // Tables and figures of sensitivity indices; sweep_report.cpp has those of the sweeps themselves.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/report/view_parts.hpp.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Declared in tpm/scene/experiment_blocks.hpp.
 #include <fmt/format.h>
 
 #include <array>

@@ -1,3 +1,4 @@
+// Declared in tpm/scene/blocks.hpp.
 // The block `material` of a scene: the paper's element or a material with branches, and regions.
 #include <fmt/format.h>
 

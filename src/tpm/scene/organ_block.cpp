@@ -1,3 +1,4 @@
+// Declared in tpm/scene/blocks.hpp.
 #include <fmt/format.h>
 
 #include <algorithm>

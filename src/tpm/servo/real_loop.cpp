@@ -1,3 +1,4 @@
+// Declared in tpmkit/servo_loop.hpp.
 #include <algorithm>
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>

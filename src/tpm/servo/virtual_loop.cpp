@@ -1,3 +1,4 @@
+// Declared in tpmkit/servo_loop.hpp.
 #include <exception>
 
 #include "tpm/servo/servo_step.hpp"

@@ -1,3 +1,4 @@
+// Declared in tpm/stability/study.hpp.
 // Degenerate cases on purpose: what every rule does, and whether that is right.
 #include <cmath>
 #include <functional>

@@ -1,3 +1,4 @@
+// Declared in tpm/stability/study.hpp.
 // Limits found by bisection, and the servo rates at the paper's own eta1.
 #include <array>
 #include <cmath>

@@ -1,3 +1,4 @@
+// Declared in tpm/stability/study.hpp.
 // Maps of each rule over a property of the problem and the step.
 #include <array>
 #include <cmath>

@@ -1,3 +1,4 @@
+// Declared in tpm/store/hdf5.hpp.
 #include <utility>
 
 #include "tpm/store/hdf5.hpp"

@@ -1,3 +1,4 @@
+// Declared in tpm/store/hdf5.hpp.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>

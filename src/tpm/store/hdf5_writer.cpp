@@ -1,3 +1,4 @@
+// Declared in tpm/store/hdf5.hpp.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// Declared in tpm/store/json.hpp.
 #include <fmt/format.h>
 
 #include <cstdint>

@@ -1,3 +1,4 @@
+// Declared in tpm/study/audit.hpp.
 #include "tpm/study/audit.hpp"
 
 namespace tpm::study {

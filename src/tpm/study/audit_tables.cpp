@@ -1,3 +1,4 @@
+// Declared in tpm/study/audit_kinds.hpp.
 // The kinds of claims that speak of many numbers at once: bands, tables and misfits.
 #include <fmt/format.h>
 

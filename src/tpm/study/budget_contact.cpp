@@ -1,3 +1,4 @@
+// Declared in tpm/study/budget_parts.hpp.
 // The stages of one contact.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/study/error_budget.hpp.
 // The stages of an organ.
 #include <fmt/format.h>
 

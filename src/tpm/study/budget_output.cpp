@@ -1,3 +1,4 @@
+// Declared in tpm/study/error_budget.hpp.
 // What a budget says: JSON, terminal, CSV.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/study/design.hpp.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Declared in tpm/study/identification.hpp.
 // What an identification says: JSON and terminal.
 #include <fmt/format.h>
 

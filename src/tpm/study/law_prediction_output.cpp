@@ -1,3 +1,4 @@
+// Declared in tpm/study/law_prediction.hpp.
 // What a prediction says: verdict, JSON, terminal, CSV.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/study/organ_material.hpp.
 // The motions that a law and an organ are compared along.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/study/organ_material_parts.hpp.
 // What a law put on an organ writes and says: scene, session, JSON, terminal, CSV.
 #include <fmt/format.h>
 

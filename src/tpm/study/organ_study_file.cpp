@@ -1,3 +1,4 @@
+// Declared in tpm/study/organ_study.hpp.
 // Reading the configuration of a study of the paper's experiments.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/study/organ_study.hpp.
 // A study of the paper's experiments as JSON.
 
 #include "tpm/core/text.hpp"

@@ -1,3 +1,4 @@
+// Declared in tpm/study/prediction_parts.hpp.
 // A prediction beside a recording.
 #include <fmt/format.h>
 

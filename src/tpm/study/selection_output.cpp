@@ -1,3 +1,4 @@
+// Declared in tpm/study/selection.hpp.
 #include <fmt/format.h>
 
 #include "tpm/core/text.hpp"

@@ -1,3 +1,4 @@
+// Declared in tpm/study/selection.hpp.
 // What a selection says about the samples outside the window, and about the protocol.
 #include <fmt/format.h>
 

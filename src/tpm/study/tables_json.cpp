@@ -1,3 +1,4 @@
+// Declared in tpm/study/tables.hpp.
 #include "tpm/study/tables.hpp"
 
 namespace tpm::study {

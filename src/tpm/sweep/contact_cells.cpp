@@ -1,3 +1,4 @@
+// Declared in tpm/sweep/cell_model.hpp.
 // Cells of a sweep over the paper's star in closed form.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// Declared in tpm/sweep/cell_model.hpp.
 // Cells of a sweep over the quasi-static network of a scene.
 #include <fmt/format.h>
 

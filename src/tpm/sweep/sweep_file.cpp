@@ -1,3 +1,4 @@
+// Declared in tpm/sweep/sweep.hpp.
 // Reading SWEEP.json.
 #include <fmt/format.h>
 
