@@ -64,6 +64,12 @@ void free(void* memory) noexcept {
   if (memory) ++tpm::testing::heap_calls;
   __interceptor_free ? __interceptor_free(memory) : __libc_free(memory);
 }
+
+// What the dynamic linker keeps is no leak. AddressSanitizer knows that of calls that come straight
+// from it, not by malloc() above; oneTBB loads libraries.
+const char* __lsan_default_suppressions() {
+  return "leak:ld-linux\n";
+}
 }
 
 // AddressSanitizer's would not come by malloc. Not inlined, or g++ sees malloc meet delete.
