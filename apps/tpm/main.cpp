@@ -121,7 +121,8 @@ void announce_output(const CLI::App& app) {
   for (const CLI::App* command : app.get_subcommands()) {
     announce_output(*command);
     const CLI::Option* output = command->get_option_no_throw("--output");
-    if (output == nullptr) continue;
+    // Of a command with a command of its own only that one runs.
+    if (output == nullptr || !command->get_subcommands().empty()) continue;
     will_write({output->count() > 0 ? output->results().front() : output->get_default_str()});
   }
 }

@@ -320,6 +320,17 @@ TEST_CASE("Control characters of names and titles are escaped on every way to th
   CHECK(std::count(option.said.begin(), option.said.end(), '\n') == 1);
 }
 
+TEST_CASE("Views of a sweep read the file that a sweep writes by default") {
+  const test::TempFolder folder;
+  REQUIRE(run_in(folder, "$TPM sweep $S/configs/sweep_x_depth.json").code == 0);
+  for (const char* view : {"show sweep.h5", "best sweep.h5 --output peak_force"}) {
+    CAPTURE(view);
+    const Ran ran = run_in(folder, std::string("$TPM sweep ") + view);
+    CHECK(ran.code == 0);
+    CHECK(ran.said == "");
+  }
+}
+
 TEST_CASE("A sweep for which the disk has no room is refused before its first cell") {
   const test::TempFolder folder;
   write_file(folder / "s.json",

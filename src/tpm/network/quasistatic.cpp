@@ -10,6 +10,7 @@
 #include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/stage_tangents.hpp"
+#include "tpm/network/step_growth.hpp"
 #include "tpm/solve/sampled_function.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
@@ -17,37 +18,13 @@
 namespace tpm::organ {
 namespace {
 
-constexpr double kStepShare = 0.1;   // of the tolerance, for one step
-constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
-constexpr double kLeastMove = 1e-9;  // of a jump
-constexpr double kFirstStep = 3.0;   // after a change of rate, in the shortest relaxation times
-constexpr double kSafety = 0.8;
+constexpr double kStepShare = 0.1;      // of the tolerance, for one step
+constexpr double kLeastStep = 1e-9;     // of a piece of the protocol
+constexpr double kLeastMove = 1e-9;     // of a jump
+constexpr double kFirstStep = 3.0;      // after a change of rate, in the shortest relaxation times
 constexpr double kMostGrowth = 30.0;    // from one step to the next
 constexpr double kLanded = 1.0 - 1e-6;  // of a step that was to end where a contact changes
 constexpr std::size_t kMostChangesTogether = 4;  // of a contact at one time
-
-/// By how much the next step may be longer. The error of smooth motion goes with a high power of
-/// the step, but behind a change of rate the motion itself calms down while steps grow: the power
-/// is taken from the two latest steps.
-class StepGrowth {
- public:
-  explicit StepGrowth(int order) : order_(order) {}
-
-  [[nodiscard]] double after(double h, const StepOutcome& outcome) {
-    double power = order_;
-    if (outcome.balanced && last_h_ > 0.0 && h != last_h_) {
-      power = std::log(outcome.error / last_error_) / std::log(h / last_h_);
-      power = std::clamp(power, 1.0, order_);
-    }
-    last_h_ = outcome.balanced ? h : 0.0;
-    last_error_ = outcome.error;
-    return kSafety * std::pow(outcome.allowed / outcome.error, 1.0 / power);
-  }
-
- private:
-  double order_;
-  double last_h_ = 0.0, last_error_ = 0.0;
-};
 
 /// One run: the state and how it is carried through the protocol.
 class Run {
