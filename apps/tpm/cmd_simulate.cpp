@@ -283,13 +283,18 @@ void add_simulate_command(CLI::App& app, Session& session) {
       ->add_option("--checkpoint-every", choice->checkpoint_every,
                    "Time between checkpoints, such as \"5 s\"")
       ->capture_default_str();
-  command->add_flag("--plan", choice->planned,
-                    "Run the least model that tpm plan finds, instead of the scene's formulation");
+  CLI::Option* planned = command->add_flag(
+      "--plan", choice->planned,
+      "Run the least model that tpm plan finds, instead of the scene's formulation");
   command->add_flag("--list-formulations", choice->list,
                     "List what a scene's key 'formulation' can name, with what each can do");
   command->add_flag("--list-materials", choice->list_materials,
                     "List the shapes that a scene's keys 'potential' and 'kernel' can name");
   add_plan_options(*command, choice->plan);
+  for (const char* of_plan :
+       {"--tolerance", "--budget", "--outputs", "--rate", "--wall", "--costs"}) {
+    command->get_option(of_plan)->needs(planned);
+  }
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5 --figures pictures\n"

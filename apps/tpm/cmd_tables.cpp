@@ -54,6 +54,7 @@ std::vector<double> lengths(const std::string& text, std::string_view option) {
   }
   const std::string_view last = split_quantity(parts.back()).unit;
   const std::string unit(last.empty() ? "mm" : last);
+  static_cast<void>(parse_unit(unit, Dimension::length, option));
   return mapped<double>(parts,
                         [&](const std::string& part) { return in_unit(part, unit, option); });
 }

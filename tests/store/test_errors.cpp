@@ -615,6 +615,7 @@ std::vector<ErrorCase> table_option_cases() {
   const std::string type = "options of tpm tables";
   return {
       {type, "depth that overflows", "tables --depths 1e300 -o {}/out", files({})},
+      {type, "depth in newtons", "tables --depths '2,8 N' -o {}/out", files({})},
       {type, "infinite depth", "tables --depths 1e400 -o {}/out", files({})},
       {type, "depth without unit", "tables --depths inf -o {}/out", files({})},
   };

@@ -91,6 +91,8 @@ inline std::vector<ErrorCase> simulation_error_cases() {
       {type, "tolerance of 0", simulate, pushed(R"("tolerance": 0)")},
       {type, "checkpoints of another unit", simulate + " --checkpoint-every '5 mm'",
        pushed(R"("title": "t")")},
+      {type, "tolerance of a plan that is not asked for",
+       "simulate {}/s.json --tolerance 1e-3 -o {}/out.h5", pushed(R"("title": "t")")},
       {type, "output cannot be written", "simulate {}/s.json -o /proc/none/out.h5",
        pushed(R"("title": "t")")},
       {type, "garbage as checkpoint", simulate,
