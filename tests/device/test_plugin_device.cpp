@@ -12,12 +12,6 @@
 #include "tpm/servo/servo_step.hpp"
 #include "tpm/store/file.hpp"
 
-// What the loader keeps of a library that stays loaded is not found by LeakSanitizer.
-// NOLINTNEXTLINE(bugprone-reserved-identifier): the sanitizer's name
-extern "C" const char* __lsan_default_suppressions() {
-  return "leak:_dl_map_object_deps\nleak:add_name_to_object\n";
-}
-
 namespace tpm::haptics {
 namespace {
 

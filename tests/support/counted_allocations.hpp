@@ -66,7 +66,7 @@ void free(void* memory) noexcept {
 }
 
 // What the dynamic linker keeps is no leak. AddressSanitizer knows that of calls that come straight
-// from it, not by malloc() above; oneTBB loads libraries.
+// from it, not by malloc() above; oneTBB and plugins load libraries.
 const char* __lsan_default_suppressions() {
   return "leak:ld-linux\n";
 }
