@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
+#include <cstring>
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/wide_vectors.hpp"
@@ -97,12 +98,12 @@ CondensedField::CondensedField(const CondensedFrame& frame, const Eigen::Matrix3
       symmetric_modes(coefficients * coefficients.transpose()).vectors.rightCols(kModes);
   const Eigen::MatrixXd modes = coefficients.transpose() * strongest;  // 3n x modes
   const auto rows_of = [](const Eigen::MatrixXd& table) {
-    std::vector<Amplitudes> all(static_cast<std::size_t>(table.rows()));
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      for (std::size_t m = 0; m < kModes; ++m) {
-        all[i][m] =
-            static_cast<float>(table(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(m)));
-      }
+    std::vector<Amplitudes> all;
+    for (Eigen::Index i = 0; i < table.rows(); ++i) {
+      std::array<float, 16> row{};
+      std::transform(table.row(i).begin(), table.row(i).end(), row.begin(),
+                     [](double x) { return static_cast<float>(x); });
+      std::memcpy(&all.emplace_back(), row.data(), sizeof row);
     }
     return all;
   };
@@ -145,22 +146,21 @@ CondensedField::Amplitudes CondensedField::amplitudes(const Eigen::Vector3d& u_m
   const Amplitudes* term = terms_.data();
   const Amplitudes* second = second_.data();
   run_wide([&]() __attribute__((always_inline)) {
+    Amplitudes all;
     for (std::size_t t = 0; t < kTangents; ++t) {
       const int beside = kBeside[t == 0 ? 0 : t < 5 ? 1 : 2];
-      Amplitudes part{};
+      Amplitudes part;
       for (std::size_t d = 0; d < static_cast<std::size_t>(beside); ++d, ++term) {
-        for (std::size_t m = 0; m < kModes; ++m) part[m] += depths[d] * (*term)[m];
+        part.add(depths[d], *term);
       }
-      for (std::size_t m = 0; m < kModes; ++m) sum[m] += tangents[t] * part[m];
+      all.add(tangents[t], part);
     }
     for (Eigen::Index k = 0; k < 3; ++k) {
-      const auto q = static_cast<float>(q_m[k]);
-      Amplitudes part{};
-      for (std::size_t d = 0; d < kOfW; ++d, ++second) {
-        for (std::size_t m = 0; m < kModes; ++m) part[m] += of_w[d] * (*second)[m];
-      }
-      for (std::size_t m = 0; m < kModes; ++m) sum[m] += q * part[m];
+      Amplitudes part;
+      for (std::size_t d = 0; d < kOfW; ++d, ++second) part.add(of_w[d], *second);
+      all.add(static_cast<float>(q_m[k]), part);
     }
+    sum = all;
   });
   return sum;
 }
@@ -168,7 +168,9 @@ CondensedField::Amplitudes CondensedField::amplitudes(const Eigen::Vector3d& u_m
 void CondensedField::displacements(const Eigen::Vector3d& u_m, const Eigen::Vector3d& w_m,
                                    const Eigen::Vector3d& q_m,
                                    Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
-  const Amplitudes amplitude = amplitudes(u_m, w_m, q_m);
+  const Amplitudes all_amplitudes = amplitudes(u_m, w_m, q_m);
+  std::array<float, 16> amplitude;
+  std::memcpy(amplitude.data(), &all_amplitudes, sizeof amplitude);
   constexpr auto kNumbers = static_cast<std::size_t>(kGroup);
   const float* mode = modes_.data();
   const bool in_a_row = all.outerStride() == 3;

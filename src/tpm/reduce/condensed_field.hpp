@@ -31,7 +31,15 @@ class CondensedField {
   static constexpr int kTangents = 15;  ///< monomials of the four tangents, to degree 2
   static constexpr int kDepths = 21;    ///< of the two depths, to degree 5
   static constexpr int kOfW = 10;       ///< of w, to degree 2, times each of q
-  using Amplitudes = std::array<float, kModes>;
+  using Eight [[gnu::vector_size(8 * sizeof(float))]] = float;
+  /// Of each mode; the last two are 0.
+  struct Amplitudes {
+    [[gnu::always_inline]] void add(float factor, const Amplitudes& other) {
+      low += factor * other.low;
+      high += factor * other.high;
+    }
+    Eight low{}, high{};
+  };
 
   [[nodiscard]] Amplitudes amplitudes(const Eigen::Vector3d& u_m, const Eigen::Vector3d& w_m,
                                       const Eigen::Vector3d& q_m) const noexcept;

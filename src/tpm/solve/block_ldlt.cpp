@@ -4,17 +4,14 @@
 #include <stdexcept>
 
 #include "tpm/core/dense_algebra.hpp"
+#include "tpm/core/parallel.hpp"
 #include "tpm/core/wide_vectors.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr std::size_t kTogether = 48;  // columns eliminated at a time: a multiple of 12
-constexpr std::size_t kSlack = 16;     // numbers that rounded-up tiles may touch behind an array
-
-std::size_t up_to_four(std::size_t size) {
-  return (size + 3) / 4 * 4;
-}
+constexpr std::size_t kSlack = 16;  // numbers that rounded-up tiles may touch behind an array
+constexpr std::size_t kWorthThreads = 2'000'000;  // multiplications of a product
 
 /// v[begin..end) -= the three columns of a node times the values of the node.
 [[gnu::always_inline]] inline void subtract_node(const double* column, std::size_t stride,
@@ -59,91 +56,31 @@ std::size_t negative_eigenvalues(const Eigen::Matrix3d& matrix) {
   return static_cast<std::size_t>((symmetric_eigenvalues(matrix).array() < 0.0).count());
 }
 
+/// Minus the inverse of the unit lower triangle with 3x3 blocks on its diagonal, by columns.
+void invert_lower(const DensePanel& block, std::size_t size, const DensePanel& to) {
+  double* const inverse = to.numbers;
+  const std::size_t columns = to.stride;
+  const double* const l = block.numbers;
+  const std::size_t stride = block.stride;
+  std::fill_n(inverse, columns * columns, 0.0);
+  run_wide([=]() __attribute__((always_inline)) {
+    for (std::size_t j = 0; j < size; ++j) {
+      double* const x = inverse + j * columns;
+      x[j] = -1.0;
+      for (std::size_t k = j / 3 * 3; k + 3 < size; k += 3) {
+        const double* const l0 = l + k * stride;
+        const double* const l1 = l0 + stride;
+        const double* const l2 = l1 + stride;
+        const double f0 = x[k], f1 = x[k + 1], f2 = x[k + 2];
+        for (std::size_t i = k + 3; i < size; ++i) {
+          x[i] -= l0[i] * f0 + l1[i] * f1 + l2[i] * f2;
+        }
+      }
+    }
+  });
+}
+
 }  // namespace
-
-BlockPattern::BlockPattern(std::size_t nodes, std::span<const std::array<std::uint32_t, 2>> edges)
-    : fronts_(nodes, edges), node_of_(nodes), column_(nodes + 1, 0) {
-  const std::span<const std::uint32_t> order = fronts_.place();
-  for (std::uint32_t node = 0; node < nodes; ++node) node_of_[order[node]] = node;
-  std::vector<std::array<std::uint32_t, 2>> blocks;  // column, row
-  blocks.reserve(edges.size());
-  for (const auto& [a, b] : edges) {
-    const auto [low, high] = std::minmax(order[a], order[b]);
-    blocks.push_back({low, high});
-  }
-  std::sort(blocks.begin(), blocks.end());
-  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
-  row_.reserve(blocks.size());
-  for (const auto& [column, row] : blocks) {
-    row_.push_back(row);
-    ++column_[column + 1];
-  }
-  for (std::size_t i = 0; i < nodes; ++i) column_[i + 1] += column_[i];
-  front_row_.resize(row_.size());
-  for (const auto& front : fronts_.fronts()) {
-    const std::span<const std::uint32_t> rows = fronts_.row(front);
-    for (std::uint32_t p = column_[front.first]; p < column_[front.first + front.own]; ++p) {
-      const std::uint32_t end = front.first + front.own;
-      front_row_[p] =
-          row_[p] < end
-              ? row_[p] - front.first
-              : front.own + static_cast<std::uint32_t>(
-                                std::lower_bound(rows.begin(), rows.end(), row_[p]) - rows.begin());
-    }
-  }
-  lay_out();
-}
-
-void BlockPattern::lay_out() {
-  std::array<std::size_t, 2> top{};
-  for (const auto& front : fronts_.fronts()) {
-    const std::size_t own = front.own;
-    const std::size_t count = front.count;
-    factor_blocks_ += own * (own - 1) / 2 + own * count;
-    for (std::size_t i = 0; i < own; ++i) {
-      const std::size_t below = own - 1 - i + count;
-      products_ += below * (below + 1) / 2;
-    }
-    Layout layout;
-    layout.panel = panel_numbers_;
-    layout.stride = up_to_four(3 * (own + count));
-    layout.update_stride = up_to_four(3 * count);
-    panel_numbers_ += layout.stride * 3 * own;
-    longest_front_ = std::max(longest_front_, layout.stride);
-    // The children's updates are the last ones on the stack of the other parity.
-    std::size_t& here = top[front.depth % 2];
-    std::size_t& below = top[(front.depth + 1) % 2];
-    layout.update = here;
-    here += layout.update_stride * 3 * count;
-    stack_numbers_[front.depth % 2] = std::max(stack_numbers_[front.depth % 2], here);
-    for (const std::uint32_t c : fronts_.child(front)) {
-      below = std::min(below, layout_[c].update);
-    }
-    layout_.push_back(layout);
-  }
-}
-
-std::size_t BlockPattern::factor_bytes() const {
-  const std::size_t numbers = panel_numbers_ + stack_numbers_[0] + stack_numbers_[1] +
-                              longest_front_ * (kTogether + 1) + 21 * nodes();
-  return numbers * sizeof(double);
-}
-
-BlockPattern::Place BlockPattern::place(std::uint32_t a, std::uint32_t b) const {
-  if (std::max(a, b) >= nodes()) throw std::out_of_range("a node that is none");
-  const std::span<const std::uint32_t> order = fronts_.place();
-  const auto [low, high] = std::minmax(order[a], order[b]);
-  const auto begin = row_.begin() + column_[low];
-  const auto end = row_.begin() + column_[low + 1];
-  const auto found = std::lower_bound(begin, end, high);
-  if (found == end || *found != high) throw std::out_of_range("nodes that are not neighbours");
-  return {static_cast<std::uint32_t>(found - row_.begin()), order[a] == low};
-}
-
-void BlockMatrix::set_zero() {
-  std::fill(diagonal.begin(), diagonal.end(), Eigen::Matrix3d::Zero());
-  std::fill(below.begin(), below.end(), Eigen::Matrix3d::Zero());
-}
 
 BlockLdlt::BlockLdlt(const BlockPattern& pattern, bool portable)
     : pattern_(pattern),
@@ -153,10 +90,15 @@ BlockLdlt::BlockLdlt(const BlockPattern& pattern, bool portable)
               ZeroedNumbers(pattern.stack_numbers_[1] + kSlack)},
       pivot_(pattern.nodes()),
       inverse_(pattern.nodes()),
-      scaled_(pattern.longest_front_ * kTogether + kSlack),
-      lower_inverse_(kTogether * kTogether),
       permuted_(3, static_cast<Eigen::Index>(pattern.nodes())),
-      local_(pattern.longest_front_) {}
+      local_(pattern.longest_front_) {
+  for (const BlockPattern::Part& part : pattern.parts_) scratch_.emplace_back(part.longest);
+  scratch_.emplace_back(pattern.longest_front_);
+}
+
+BlockLdlt::Scratch::Scratch(std::size_t longest)
+    : scaled(longest * BlockPattern::kTogether + kSlack),
+      lower_inverse(BlockPattern::kTogether * BlockPattern::kTogether) {}
 
 BlockLdlt::Work BlockLdlt::work_on(std::size_t front) {
   const EliminationFronts::Front& f = pattern_.fronts_.fronts()[front];
@@ -216,17 +158,18 @@ void BlockLdlt::add_child(const EliminationFronts::Front& child, const DensePane
   }
 }
 
-bool BlockLdlt::invert_pivot(std::uint32_t place) {
+bool BlockLdlt::invert_pivot(std::uint32_t place, Scratch& scratch) {
   const Eigen::Matrix3d& pivot = pivot_[place];
   if (!pivot.allFinite()) return false;
-  negative_ += negative_eigenvalues(pivot);
+  scratch.negative += negative_eigenvalues(pivot);
   bool invertible = false;
   pivot.computeInverseWithCheck(inverse_[place], invertible, 0.0);
   return invertible;
 }
 
 /// Eliminates a block on the diagonal within itself: L stands below the 3x3 pivots afterwards.
-bool BlockLdlt::eliminate_diagonal(const DensePanel& block, std::size_t size, std::uint32_t place) {
+bool BlockLdlt::eliminate_diagonal(const DensePanel& block, std::size_t size, std::uint32_t place,
+                                   Scratch& scratch) {
   double* const a = block.numbers;
   const std::size_t stride = block.stride;
   for (std::size_t k = 0; k < size; k += 3, ++place) {
@@ -238,17 +181,17 @@ bool BlockLdlt::eliminate_diagonal(const DensePanel& block, std::size_t size, st
             a[(k + std::min(i, j)) * stride + k + std::max(i, j)];
       }
     }
-    if (!invert_pivot(place)) return false;
+    if (!invert_pivot(place, scratch)) return false;
     // The columns of the node as they are: L D.
-    double* const rest = scaled_.data();
+    double* const rest = scratch.scaled.data();
     for (std::size_t j = 0; j < 3; ++j) {
-      std::copy_n(a + (k + j) * stride, size, rest + j * kTogether);
+      std::copy_n(a + (k + j) * stride, size, rest + j * BlockPattern::kTogether);
     }
     const double* const inverse = inverse_[place].data();
     run_wide([=]() __attribute__((always_inline)) {
       const double* const r0 = rest;
-      const double* const r1 = rest + kTogether;
-      const double* const r2 = rest + 2 * kTogether;
+      const double* const r1 = rest + BlockPattern::kTogether;
+      const double* const r2 = rest + 2 * BlockPattern::kTogether;
       for (std::size_t j = 0; j < 3; ++j) {
         double* const l = a + (k + j) * stride;
         const double* const factor = inverse + 3 * j;
@@ -271,29 +214,6 @@ bool BlockLdlt::eliminate_diagonal(const DensePanel& block, std::size_t size, st
   return true;
 }
 
-/// Minus the inverse of the unit lower triangle with 3x3 blocks on its diagonal, by columns.
-void BlockLdlt::invert_lower(const DensePanel& block, std::size_t size) {
-  double* const inverse = lower_inverse_.data();
-  const double* const l = block.numbers;
-  const std::size_t stride = block.stride;
-  std::fill(lower_inverse_.begin(), lower_inverse_.end(), 0.0);
-  run_wide([=]() __attribute__((always_inline)) {
-    for (std::size_t j = 0; j < size; ++j) {
-      double* const x = inverse + j * kTogether;
-      x[j] = -1.0;
-      for (std::size_t k = j / 3 * 3; k + 3 < size; k += 3) {
-        const double* const l0 = l + k * stride;
-        const double* const l1 = l0 + stride;
-        const double* const l2 = l1 + stride;
-        const double f0 = x[k], f1 = x[k + 1], f2 = x[k + 2];
-        for (std::size_t i = k + 3; i < size; ++i) {
-          x[i] -= l0[i] * f0 + l1[i] * f1 + l2[i] * f2;
-        }
-      }
-    }
-  });
-}
-
 /// Columns of L D times D^-1.
 void BlockLdlt::scale_columns(const DensePanel& from, std::size_t rows, std::size_t columns,
                               std::uint32_t place, const DensePanel& to) const {
@@ -314,55 +234,102 @@ void BlockLdlt::scale_columns(const DensePanel& from, std::size_t rows, std::siz
   });
 }
 
-bool BlockLdlt::eliminate(const Work& work) {
+/// Calls f(first, end) for stretches of rows that begin at multiples of DenseUpdate::kRows, on more
+/// threads than one if there are multiplications enough.
+template <class Function>
+void BlockLdlt::for_rows(std::size_t rows, std::size_t multiplications, const Function& f) const {
+  if (pattern_.parts_.empty() || multiplications < kWorthThreads) return f(std::size_t{0}, rows);
+  constexpr std::size_t kRows = DenseUpdate::kRows;
+  for_each_in_parallel((rows + kRows - 1) / kRows,
+                       [&](std::size_t i) { f(i * kRows, std::min((i + 1) * kRows, rows)); });
+}
+
+/// Each number of the product is computed as by one thread.
+void BlockLdlt::multiply(const DenseUpdate::Product& product) const {
+  for_rows(product.rows, product.rows * product.columns * product.depth,
+           [&](std::size_t first, std::size_t end) {
+             DenseUpdate::Product rows = product;
+             rows.first_row = first;
+             rows.rows = end;
+             update_.run(rows);
+           });
+}
+
+bool BlockLdlt::eliminate(const Work& work, Scratch& scratch) {
   const std::size_t size = work.own + work.reached;
   const std::size_t stride = work.panel.stride;
-  for (std::size_t k = 0; k < work.own; k += kTogether) {
-    const std::size_t columns = std::min(kTogether, work.own - k);
+  const DensePanel inverse{scratch.lower_inverse.data(), BlockPattern::kTogether};
+  for (std::size_t k = 0; k < work.own; k += BlockPattern::kTogether) {
+    const std::size_t columns = std::min(BlockPattern::kTogether, work.own - k);
     const DensePanel block{work.panel.numbers + k * stride + k, stride};
     const std::uint32_t place = work.first + static_cast<std::uint32_t>(k / 3);
-    if (!eliminate_diagonal(block, columns, place)) return false;
+    if (!eliminate_diagonal(block, columns, place, scratch)) return false;
     const std::size_t below = size - k - columns;
     if (below == 0) continue;
-    invert_lower(block, columns);
+    invert_lower(block, columns, inverse);
     // L D = A L^-T of what is on the diagonal; then L, over A.
-    const DensePanel scaled{scaled_.data(), up_to_four(below)};
+    const DensePanel scaled{scratch.scaled.data(), BlockPattern::up_to_four(below)};
     const DensePanel lower{block.numbers + columns, stride};
-    update_.run({.c = scaled,
-                 .a = lower,
-                 .b = {lower_inverse_.data(), kTogether},
-                 .rows = below,
-                 .columns = columns,
-                 .depth = columns,
-                 .b_triangular = true,
-                 .overwrite = true});
-    scale_columns(scaled, below, columns, place, lower);
+    for_rows(below, below * columns * columns, [&](std::size_t first, std::size_t end) {
+      update_.run({.c = scaled,
+                   .a = lower,
+                   .b = inverse,
+                   .first_row = first,
+                   .rows = end,
+                   .columns = columns,
+                   .depth = columns,
+                   .b_triangular = true,
+                   .overwrite = true});
+      scale_columns({scaled.numbers + first, scaled.stride}, end - first, columns, place,
+                    {lower.numbers + first, stride});
+    });
     const std::size_t own_left = work.own - k - columns;
-    update_.run({.c = {lower.numbers + columns * stride, stride},
-                 .a = lower,
-                 .b = scaled,
-                 .rows = below,
-                 .columns = own_left,
-                 .depth = columns,
-                 .lower = true});
-    update_.run({.c = work.update,
-                 .a = {lower.numbers + own_left, stride},
-                 .b = {scaled.numbers + own_left, scaled.stride},
-                 .rows = work.reached,
-                 .columns = work.reached,
-                 .depth = columns,
-                 .lower = true});
+    multiply({.c = {lower.numbers + columns * stride, stride},
+              .a = lower,
+              .b = scaled,
+              .rows = below,
+              .columns = own_left,
+              .depth = columns,
+              .lower = true});
+    multiply({.c = work.update,
+              .a = {lower.numbers + own_left, stride},
+              .b = {scaled.numbers + own_left, scaled.stride},
+              .rows = work.reached,
+              .columns = work.reached,
+              .depth = columns,
+              .lower = true});
   }
   return true;
 }
 
+void BlockLdlt::eliminate_front(const BlockMatrix& matrix, std::size_t front, Scratch& scratch) {
+  const Work work = work_on(front);
+  gather(matrix, front, work);
+  scratch.done = eliminate(work, scratch);
+}
+
 bool BlockLdlt::factorise(const BlockMatrix& matrix) {
   negative_ = 0;
-  for (std::size_t f = 0; f < pattern_.layout_.size(); ++f) {
-    const Work work = work_on(f);
-    gather(matrix, f, work);
-    if (!eliminate(work)) return false;
+  for (Scratch& scratch : scratch_) {
+    scratch.negative = 0;
+    scratch.done = true;
   }
+  const auto& parts = pattern_.parts_;
+  if (!parts.empty()) {
+    for_each_in_parallel(parts.size(), [&](std::size_t p) {
+      for (std::uint32_t f = parts[p].first; f < parts[p].end && scratch_[p].done; ++f) {
+        eliminate_front(matrix, f, scratch_[p]);
+      }
+    });
+  }
+  const auto done = [](const Scratch& scratch) { return scratch.done; };
+  if (!std::all_of(scratch_.begin(), scratch_.end(), done)) return false;
+  Scratch& last = scratch_.back();
+  for (const std::uint32_t f : pattern_.after_) {
+    eliminate_front(matrix, f, last);
+    if (!last.done) return false;
+  }
+  for (const Scratch& scratch : scratch_) negative_ += scratch.negative;
   return true;
 }
 

@@ -14,12 +14,13 @@ using Product = DenseUpdate::Product;
 
 constexpr std::size_t kRowsTogether = 4;  // of a vector
 constexpr std::size_t kColumnsTogether = 4;
-constexpr std::size_t kRowChunk = 72;  // of A: with 48 columns it fits into the first cache
+constexpr std::size_t kRowChunk =
+    DenseUpdate::kRows;  // with 48 columns it fits into the first cache
 
 /// Goes over C in tiles of up to 12 x 4 numbers and calls tile<vectors, columns>(c, a, b, depth).
 template <class Tiles>
 void for_each_tile(const Product& p) noexcept {
-  for (std::size_t chunk = 0; chunk < p.rows; chunk += kRowChunk) {
+  for (std::size_t chunk = p.first_row; chunk < p.rows; chunk += kRowChunk) {
     const std::size_t chunk_end = std::min(chunk + kRowChunk, p.rows);
     for (std::size_t j = 0; j < p.columns; j += kColumnsTogether) {
       if (p.lower && j >= chunk_end) break;

@@ -11,9 +11,12 @@ struct DensePanel {
 
 /// The product that nearly all operations of a dense factorisation go into.
 struct DenseUpdate {
+  static constexpr std::size_t kRows = 72;  ///< rows of A taken at a time, a multiple of 4
+
   /// Operands of C -= A B^T, or C = -A B^T, with A rows x depth, B columns x depth.
   struct Product {
     DensePanel c, a, b;
+    std::size_t first_row = 0;  ///< of A and C, a multiple of kRows: those before it stay
     std::size_t rows, columns, depth;
     /// What is asked of C: all of it, or of column j what is in row j and below. More may be
     /// computed, of columns rounded down to a multiple of 4.
