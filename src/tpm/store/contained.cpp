@@ -16,6 +16,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <memory>
 #include <new>
 #include <utility>
 
@@ -25,6 +26,9 @@ namespace {
 constexpr int kFile = 3, kParent = 4;  // descriptors of the child
 constexpr char kAnswer = 'a', kError = 'e', kNoMemory = 'm';
 constexpr int kLargestMessage = 1 << 16;
+/// Answers that may be due. So many short ones fit into the socket, so that neither side waits for
+/// the other to read.
+constexpr std::size_t kMostDue = 64;
 
 bool send_all(int to, const void* bytes, std::size_t size) {
   const auto* next = static_cast<const char*>(bytes);
@@ -253,13 +257,32 @@ void Contained::report_end() {
 }
 
 std::string Contained::ask(std::string_view request) {
+  const auto answer = std::make_shared<std::string>();
+  tell(request, [answer](std::string_view taken) { *answer = taken; });
+  take_answers();
+  return std::move(*answer);
+}
+
+void Contained::tell(std::string_view request, Taker taker) {
   if (!end_.empty()) report_end();
+  if (due_.size() >= kMostDue) take_answers();
+  if (!send_message(socket_, kAnswer, request)) report_end();
+  due_.push_back(std::move(taker));
+}
+
+void Contained::take_answers() {
+  while (!due_.empty()) {
+    const Taker taker = std::move(due_.front());
+    due_.pop_front();
+    const std::string answer = next_answer();
+    if (taker) taker(answer);
+  }
+}
+
+std::string Contained::next_answer() {
   char kind = 0;
   std::string reply;
-  if (!send_message(socket_, kAnswer, request) ||
-      !receive_message(socket_, kind, reply, most_bytes_)) {
-    report_end();
-  }
+  if (!receive_message(socket_, kind, reply, most_bytes_)) report_end();
   if (kind == kNoMemory) {
     if (writes_) throw std::bad_alloc();
     throw bad_input(where_, "its content asks for too much memory", "a whole file");

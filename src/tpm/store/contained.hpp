@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -46,7 +47,16 @@ class Contained {
   /// std::bad_alloc if a child that writes got no memory.
   [[nodiscard]] std::string ask(std::string_view request);
 
+  /// Takes an answer.
+  using Taker = std::function<void(std::string_view answer)>;
+  /// Sends a request and does not wait for the child: the answer is taken, or its Error thrown, by
+  /// a later call of this or of ask(). Answers are taken in the order of their requests; some 64
+  /// may be due. Throws as ask.
+  void tell(std::string_view request, Taker taker = {});
+
  private:
+  void take_answers();
+  [[nodiscard]] std::string next_answer();
   [[noreturn]] void report_end();
 
   std::string where_;
@@ -54,7 +64,8 @@ class Contained {
   std::uint64_t most_bytes_;
   int socket_ = -1;
   int child_ = -1;
-  std::string end_;  ///< how the child ended; empty: it lives
+  std::string end_;        ///< how the child ended; empty: it lives
+  std::deque<Taker> due_;  ///< of the answers that are due
 };
 
 }  // namespace tpm

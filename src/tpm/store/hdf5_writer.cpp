@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <functional>
 #include <new>
 #include <utility>
 
@@ -79,17 +80,37 @@ std::string add_whole_part(Hdf5Assembly& file, std::string_view request) {
   return reply;
 }
 
+constexpr std::size_t kKept = std::size_t{1} << 16U;  // bytes of an array that may wait
+
 template <class... Parts>
 void order(Contained& child, const Parts&... request) {
-  static_cast<void>(child.ask(packed(request...)));
+  child.tell(packed(request...));
+}
+
+std::uint64_t number_in(std::string_view answer) {
+  std::uint64_t number = 0;
+  Unpacker(answer, "").take(number);
+  return number;
 }
 
 template <class... Parts>
 std::uint64_t number_from(Contained& child, const Parts&... request) {
-  std::uint64_t number = 0;
-  const std::string reply = child.ask(packed(request...));
-  Unpacker(reply, "").take(number);
-  return number;
+  return number_in(child.ask(packed(request...)));
+}
+
+/// Has an array made and calls write(place, values) when it is known where, short arrays later.
+template <class Number, class T, class Write>
+void write_array(Contained& child, const std::string& name, Number kind,
+                 const std::vector<std::uint64_t>& extents, const std::vector<T>& values,
+                 const Write& write) {
+  const std::string request = packed(Part::array, name, kind, extents);
+  if (values.size() * sizeof(T) > kKept) {
+    write(number_in(child.ask(request)), std::as_bytes(std::span(values)));
+    return;
+  }
+  child.tell(request, [values, write](std::string_view answer) {
+    write(number_in(answer), std::as_bytes(std::span(values)));
+  });
 }
 
 }  // namespace
@@ -126,28 +147,32 @@ std::uint64_t Hdf5Writer::arrange(const std::string& name, Number kind,
 }
 
 void Hdf5Writer::numbers(const std::string& name, const std::vector<double>& values) {
-  write_at(arrange(name, Number::float64, {values.size()}), std::as_bytes(std::span(values)));
+  write_array(*child_, name, Number::float64, {values.size()}, values,
+              std::bind_front(&Hdf5Writer::write_at, this));
 }
 
 void Hdf5Writer::table(const std::string& name, const std::vector<double>& values,
                        std::size_t columns) {
-  write_at(arrange(name, Number::float64, {values.size() / columns, columns}),
-           std::as_bytes(std::span(values)));
+  write_array(*child_, name, Number::float64, {values.size() / columns, columns}, values,
+              std::bind_front(&Hdf5Writer::write_at, this));
 }
 
 void Hdf5Writer::integers(const std::string& name, const std::vector<std::int32_t>& values,
                           std::size_t columns) {
   std::vector<std::uint64_t> extents{values.size() / columns};
   if (columns > 1) extents.push_back(columns);
-  write_at(arrange(name, Number::int32, extents), std::as_bytes(std::span(values)));
+  write_array(*child_, name, Number::int32, extents, values,
+              std::bind_front(&Hdf5Writer::write_at, this));
 }
 
 void Hdf5Writer::long_integers(const std::string& name, const std::vector<std::int64_t>& values) {
-  write_at(arrange(name, Number::int64, {values.size()}), std::as_bytes(std::span(values)));
+  write_array(*child_, name, Number::int64, {values.size()}, values,
+              std::bind_front(&Hdf5Writer::write_at, this));
 }
 
 void Hdf5Writer::bytes(const std::string& name, const std::vector<std::uint8_t>& values) {
-  write_at(arrange(name, Number::uint8, {values.size()}), std::as_bytes(std::span(values)));
+  write_array(*child_, name, Number::uint8, {values.size()}, values,
+              std::bind_front(&Hdf5Writer::write_at, this));
 }
 
 void Hdf5Writer::texts(const std::string& name, const std::vector<std::string>& values) {
