@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 constexpr int kSubdivisions = 5;
 // Of the farthest reach: a bracket with one crossing, and the error of its estimate.
 constexpr double kNear = 1.0 / 256.0;
-constexpr double kClose = 1e-9;
+constexpr double kClose = 1e-11;
 constexpr int kMostEstimates = 60;
 
 struct Ellipsoid {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "tpm/core/dense_algebra.hpp"
+#include "tpm/core/parallel.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -44,11 +45,9 @@ class BondsOfSpheres {
 };
 
 /// The stiffness of a sphere and its neighbours, all others fixed, on their free coordinates.
-/// @param place scratch: -1 for every sphere, before and after
 Eigen::MatrixXd patch_stiffness(const BondsOfSpheres& bonds, const Constraints& constraints,
-                                const std::vector<std::size_t>& patch, std::vector<Index>& place) {
+                                const std::vector<std::size_t>& patch) {
   const auto n = static_cast<Index>(patch.size());
-  for (Index i = 0; i < n; ++i) place[patch[static_cast<std::size_t>(i)]] = i;
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(3 * n, 3 * n);
   for (Index i = 0; i < n; ++i) {
     const std::size_t sphere = patch[static_cast<std::size_t>(i)];
@@ -56,7 +55,8 @@ Eigen::MatrixXd patch_stiffness(const BondsOfSpheres& bonds, const Constraints& 
     for (const auto& end : bonds.of(sphere)) {
       const Eigen::Matrix3d block = bonds.stiffness(sphere, end);
       matrix.block<3, 3>(3 * i, 3 * i) += p * block * p;
-      if (const Index j = place[end.other]; j >= 0) {
+      const Index j = std::find(patch.begin(), patch.end(), end.other) - patch.begin();
+      if (j < n) {
         matrix.block<3, 3>(3 * i, 3 * j) -= p * block * constraints.projector(end.other);
       }
     }
@@ -67,7 +67,6 @@ Eigen::MatrixXd patch_stiffness(const BondsOfSpheres& bonds, const Constraints& 
     matrix.block<3, 3>(3 * i, 3 * i) +=
         scale *
         (Eigen::Matrix3d::Identity() - (1.0 - kRegularised) * constraints.projector(sphere));
-    place[sphere] = -1;
   }
   return matrix;
 }
@@ -77,26 +76,29 @@ Eigen::MatrixXd patch_stiffness(const BondsOfSpheres& bonds, const Constraints& 
 std::vector<double> local_support(const BondSystem& bonds, const Organ& organ,
                                   const Constraints& constraints) {
   const BondsOfSpheres of(bonds, organ.position);
-  std::vector<Index> place(organ.size(), -1);
   std::vector<double> support(organ.size(), 1.0);
-  for (std::size_t i = 0; i < organ.size(); ++i) {
+  for_each_in_parallel(organ.size(), [&](std::size_t i) {
     const Eigen::Vector3d normal = organ.normal.col(static_cast<Index>(i));
     const Eigen::Vector3d along = constraints.projector(i) * normal;
-    if (along.norm() < 1e-6) continue;
+    if (along.norm() < 1e-6) return;
     std::vector<std::size_t> patch{i};
-    for (const auto& end : of.of(i)) patch.push_back(end.other);
-    const Eigen::MatrixXd matrix = patch_stiffness(of, constraints, patch, place);
+    for (const auto& end : of.of(i)) {
+      if (std::find(patch.begin(), patch.end(), end.other) == patch.end()) {
+        patch.push_back(end.other);
+      }
+    }
+    const Eigen::MatrixXd matrix = patch_stiffness(of, constraints, patch);
     const double held = along.dot(matrix.topLeftCorner<3, 3>() * along);
     if (!(matrix.trace() > 0.0) || of.of(i).empty()) {
       support[i] = 0.0;
-      continue;
+      return;
     }
     Eigen::VectorXd motion = Eigen::VectorXd::Zero(matrix.rows());
     motion.head<3>() = along;
     motion = solve_symmetric(matrix, motion);
     const double compliance = along.dot(motion.head<3>()) / std::pow(along.squaredNorm(), 2);
     support[i] = held > 0.0 ? 1.0 / (compliance * held) : 0.0;
-  }
+  });
   return support;
 }
 

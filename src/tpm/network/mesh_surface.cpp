@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "tpm/core/parallel.hpp"
 #include "tpm/core/random.hpp"
 
 namespace tpm::organ {
@@ -47,8 +48,8 @@ MeshSurface::MeshSurface(TriangleMesh mesh)
   for (std::size_t t = 0; t < normals_.size(); ++t) {
     normals_[t].face = this->mesh().area_vector(static_cast<Eigen::Index>(t)).normalized();
   }
-  set_corner_normals();
-  set_edge_normals();
+  for_each_in_parallel(2,
+                       [&](int which) { which == 0 ? set_corner_normals() : set_edge_normals(); });
 }
 
 void MeshSurface::set_corner_normals() {

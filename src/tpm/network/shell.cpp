@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "tpm/core/parallel.hpp"
@@ -17,9 +18,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kRoom = 0.8;        // share of the inner radius that the layers may take
-constexpr double kClearance = 0.62;  // least distance of an inner sphere, in steps
-constexpr double kAgreement = 0.01;  // of a count and a spacing that are both given
+constexpr double kRoom = 0.8;            // share of the inner radius that the layers may take
+constexpr double kClearance = 0.62;      // least distance of an inner sphere, in steps
+constexpr double kAgreement = 0.01;      // of a count and a spacing that are both given
+constexpr double kDepthRounding = 1e-9;  // of a depth
 constexpr int kSweeps = 200;
 
 /// A request with everything decided.
@@ -108,7 +110,8 @@ class InnerLayers {
         organ_(organ),
         step_(plan.step),
         near_(kClearance * plan.step),
-        fixed_(static_cast<Eigen::Index>(plan.in_layer(0))) {}
+        fixed_(static_cast<Eigen::Index>(plan.in_layer(0))),
+        seen_(organ.size()) {}
 
   void settle() {
     std::vector<Eigen::Index> moved(static_cast<std::size_t>(organ_.position.cols() - fixed_));
@@ -122,7 +125,12 @@ class InnerLayers {
  private:
   void keep_depth(Eigen::Index i) {
     const double wanted = kClearance * step_ * organ_.layer[static_cast<std::size_t>(i)];
+    // A step changes the depth by no more than its own length.
+    Seen& seen = seen_[static_cast<std::size_t>(i)];
+    const double sure = seen.depth - (organ_.position.col(i) - seen.position).norm();
+    if (sure >= (1.0 + kDepthRounding) * wanted) return;
     const double depth = -surface_.signed_distance(organ_.position.col(i));
+    seen = {organ_.position.col(i), depth};
     if (depth >= wanted) return;
     const SurfacePoint at = surface_.nearest(organ_.position.col(i));
     organ_.position.col(i) -= (wanted - depth) * at.normal;
@@ -162,11 +170,18 @@ class InnerLayers {
     return moved;
   }
 
+  /// Where a sphere was when its depth was last found.
+  struct Seen {
+    Vector3d position = Vector3d::Zero();
+    double depth = -std::numeric_limits<double>::infinity();
+  };
+
   const Surface& surface_;
   Organ& organ_;
   double step_;
   NearPairs near_;
   Eigen::Index fixed_;
+  std::vector<Seen> seen_;
 };
 
 /// The columns below the outer layer, straight down.
