@@ -63,12 +63,12 @@ TEST_CASE("a factor in fronts solves as a dense one does", "[frontal]") {
   for (int i = 0; i < kNodes; ++i) {
     places.col(i) << random.uniform(), random.uniform(), 0.2 * random.uniform();
   }
-  std::vector<FrontalPattern::Edge> edges;
+  std::vector<FrontalFactor::Edge> edges;
   for (std::uint32_t a = 0; a < kNodes; ++a) {
     for (std::uint32_t b = a + 1; b < kNodes; ++b) {
       if ((places.col(a) - places.col(b)).norm() > 0.3) continue;
-      edges.push_back(random.uniform() < 0.5 ? FrontalPattern::Edge{a, b}
-                                             : FrontalPattern::Edge{b, a});
+      edges.push_back(random.uniform() < 0.5 ? FrontalFactor::Edge{a, b}
+                                             : FrontalFactor::Edge{b, a});
     }
   }
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(3 * kNodes, 3 * kNodes);
@@ -89,29 +89,27 @@ TEST_CASE("a factor in fronts solves as a dense one does", "[frontal]") {
   Eigen::VectorXd right(3 * kNodes);
   for (auto& value : right) value = random.uniform() - 0.5;
   const Eigen::VectorXd exact = dense.ldlt().solve(right);
-  for (const std::size_t leaf : {1U, 6U, 1000U}) {
-    const auto pattern = std::make_shared<const FrontalPattern>(places, edges, leaf);
-    for (const bool portable : {false, true}) {
-      FrontalFactor factor(pattern, portable);
-      REQUIRE(factor.factorise(diagonal, across));
-      AlignedFloats x(4 * kNodes, 0.0F);
-      for (std::size_t i = 0; i < kNodes; ++i) {
-        for (std::size_t c = 0; c < 3; ++c) {
-          x[4 * pattern->place()[i] + c] = static_cast<float>(right[static_cast<int>(3 * i + c)]);
-        }
+  const auto fronts = std::make_shared<const EliminationFronts>(kNodes, edges);
+  for (const bool portable : {false, true}) {
+    FrontalFactor factor(fronts, portable);
+    REQUIRE(factor.factorise(diagonal, edges, across));
+    AlignedFloats x(4 * kNodes, 0.0F);
+    for (std::size_t i = 0; i < kNodes; ++i) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        x[4 * fronts->place()[i] + c] = static_cast<float>(right[static_cast<int>(3 * i + c)]);
       }
-      factor.solve(x.data());
-      for (std::size_t i = 0; i < kNodes; ++i) {
-        for (std::size_t c = 0; c < 3; ++c) {
-          CHECK(static_cast<double>(x[4 * pattern->place()[i] + c]) ==
-                Approx(exact[static_cast<int>(3 * i + c)]).margin(1e-7));
-        }
+    }
+    factor.solve(x.data());
+    for (std::size_t i = 0; i < kNodes; ++i) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        CHECK(static_cast<double>(x[4 * fronts->place()[i] + c]) ==
+              Approx(exact[static_cast<int>(3 * i + c)]).margin(1e-7));
       }
     }
   }
   diagonal[5] *= -1.0;
-  FrontalFactor factor(std::make_shared<const FrontalPattern>(places, edges));
-  CHECK_FALSE(factor.factorise(diagonal, across));
+  FrontalFactor factor(fronts);
+  CHECK_FALSE(factor.factorise(diagonal, edges, across));
 }
 
 TEST_CASE("servo bonds pull and relax as the bonds of the network", "[servo][heavy]") {

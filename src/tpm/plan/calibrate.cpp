@@ -123,24 +123,25 @@ class Bench {
   }
 
   [[nodiscard]] double servo_block_s() {
-    std::vector<FrontalPattern::Edge> edges;
+    std::vector<FrontalFactor::Edge> edges;
     for (std::size_t b = 0; b < bonds_.size(); ++b) {
       edges.push_back({bonds_.end_a()[b], bonds_.end_b()[b]});
     }
-    const auto pattern = std::make_shared<const FrontalPattern>(rest(), edges);
-    FrontalFactor factor(pattern, true);
+    const auto nodes = static_cast<std::size_t>(rest().cols());
+    const auto fronts = std::make_shared<const EliminationFronts>(nodes, edges);
+    FrontalFactor factor(fronts, true);
     const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
     // Near 1, so that repeated solutions stay of one size.
-    const std::vector<Eigen::Matrix3d> diagonal(pattern->nodes(), unit);
+    const std::vector<Eigen::Matrix3d> diagonal(nodes, unit);
     const std::vector<Eigen::Matrix3d> across(edges.size(), -1e-3 * unit);
-    (void)factor.factorise(diagonal, across);
-    const AlignedFloats one(4 * (pattern->nodes() + 1), 1.0F);
+    (void)factor.factorise(diagonal, edges, across);
+    const AlignedFloats one(4 * (nodes + 1), 1.0F);
     AlignedFloats x = one;
     return time_of([&] {
              std::copy(one.begin(), one.end(), x.begin());
              factor.solve(x.data());
            }) /
-           static_cast<double>(pattern->blocks_read());
+           static_cast<double>(FrontalFactor::blocks_read(*fronts));
   }
 
   [[nodiscard]] double contact_step_s() {

@@ -58,7 +58,7 @@ ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest,
   branch_error_.assign(weights_.branches.size(), Eigen::Vector3d::Zero());
   const double forgotten = 1.0 - static_cast<double>(weights_.longest_kept());
   rounding_ = kRounding + kViscousRounding / std::max(forgotten, 1.0 / kLongestLag);
-  spheres_ = std::make_unique<ServoStiffness>(bonds, rest, tissue.constraints());
+  spheres_ = std::make_unique<ServoStiffness>(bonds, tissue.constraints());
   contact_ = spheres_->column(contact);
   choose_bonds(tissue);
   const auto relaxed = static_cast<double>(weights_.of_end);

@@ -2,8 +2,7 @@
 
 namespace tpm::organ {
 
-ServoStiffness::ServoStiffness(const BondSystem& bonds, const Positions& rest,
-                               const Constraints& constraints)
+ServoStiffness::ServoStiffness(const BondSystem& bonds, const Constraints& constraints)
     : column_(bonds.spheres(), 0) {
   std::vector<std::uint32_t> rank(bonds.spheres(), 0);
   std::vector<char> moves(bonds.spheres(), 0);
@@ -13,20 +12,15 @@ ServoStiffness::ServoStiffness(const BondSystem& bonds, const Positions& rest,
     rank[i] = static_cast<std::uint32_t>(free_.size());
     free_.push_back(i);
   }
-  Eigen::Matrix3Xd places(3, static_cast<Eigen::Index>(free_.size()));
-  for (std::size_t i = 0; i < free_.size(); ++i) {
-    places.col(static_cast<Eigen::Index>(i)) = rest.col(static_cast<Eigen::Index>(free_[i]));
-  }
-  std::vector<FrontalPattern::Edge> edges;
   for (std::size_t b = 0; b < bonds.size(); ++b) {
     const std::uint32_t from = bonds.end_a()[b];
     const std::uint32_t to = bonds.end_b()[b];
-    if (moves[from] != 0 && moves[to] != 0) edges.push_back({rank[from], rank[to]});
+    if (moves[from] != 0 && moves[to] != 0) edges_.push_back({rank[from], rank[to]});
   }
-  pattern_ = std::make_shared<const FrontalPattern>(places, edges);
+  fronts_ = std::make_shared<const EliminationFronts>(free_.size(), edges_);
   auto next = static_cast<std::uint32_t>(free_.size());
   for (std::size_t i = 0; i < bonds.spheres(); ++i) {
-    column_[i] = moves[i] != 0 ? pattern_->place()[rank[i]] : next++;
+    column_[i] = moves[i] != 0 ? fronts_->place()[rank[i]] : next++;
     if (moves[i] == 0 || constraints.is_free(i)) continue;
     partly_.push_back({column_[i], constraints.projector(i).cast<float>()});
   }
@@ -52,8 +46,8 @@ bool ServoStiffness::factorise(const BondSystem& bonds, const Constraints& const
     of_free.emplace_back(p * diagonal[i] * p +
                          diagonal[i].trace() * (Eigen::Matrix3d::Identity() - p));
   }
-  factor_ = std::make_unique<FrontalFactor>(pattern_, portable);
-  return factor_->factorise(of_free, across);
+  factor_ = std::make_unique<FrontalFactor>(fronts_, portable);
+  return factor_->factorise(of_free, edges_, across);
 }
 
 void ServoStiffness::project(float* four_per_sphere) const noexcept {

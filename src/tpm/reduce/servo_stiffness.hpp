@@ -12,9 +12,8 @@ namespace tpm::organ {
 /// position, factorised for many solutions (FrontalFactor).
 class ServoStiffness {
  public:
-  /// @param rest places by which the order is chosen
   /// @param constraints fixed spheres do not move
-  ServoStiffness(const BondSystem& bonds, const Positions& rest, const Constraints& constraints);
+  ServoStiffness(const BondSystem& bonds, const Constraints& constraints);
 
   /// To be called before solve(), with bonds and constraints as before. False if the tissue is not
   /// stiff there.
@@ -30,7 +29,7 @@ class ServoStiffness {
   /// Replaces forces by displacements, four floats per sphere that moves. Allocates nothing.
   void solve(float* four_per_sphere) noexcept;
   /// 3x3 blocks that a solution reads.
-  [[nodiscard]] std::size_t blocks_read() const { return pattern_->blocks_read(); }
+  [[nodiscard]] std::size_t blocks_read() const { return FrontalFactor::blocks_read(*fronts_); }
 
  private:
   /// A sphere that may move in some directions only.
@@ -43,7 +42,8 @@ class ServoStiffness {
   std::vector<std::size_t> free_;
   std::vector<std::uint32_t> column_;
   std::vector<Partly> partly_;
-  std::shared_ptr<const FrontalPattern> pattern_;
+  std::vector<FrontalFactor::Edge> edges_;  ///< bonds whose ends both move, by their ranks in free_
+  std::shared_ptr<const EliminationFronts> fronts_;
   std::unique_ptr<FrontalFactor> factor_;
 };
 

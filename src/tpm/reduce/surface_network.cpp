@@ -70,7 +70,7 @@ void require_unstretched(const BondSystem& bonds, const Positions& rest) {
 SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
                                const Constraints& constraints, BallTool ball,
                                const SurfaceNetworkOptions& options)
-    : options_(options), ball_(std::move(ball)), rest_(rest), stiffness_(bonds, rest, constraints) {
+    : options_(options), ball_(std::move(ball)), rest_(rest), stiffness_(bonds, constraints) {
   require_valid(options, ball_);
   require_servo_material(bonds, "the network under a ball at servo rate");
   require_unstretched(bonds, rest);

@@ -25,28 +25,33 @@ struct Entry {
 /// Dense fronts in double precision.
 class Elimination {
  public:
-  Elimination(const FrontalPattern& pattern, std::span<const Eigen::Matrix3d> diagonal,
+  using Front = EliminationFronts::Front;
+
+  Elimination(const EliminationFronts& fronts, std::span<const Eigen::Matrix3d> diagonal,
+              std::span<const EliminationFronts::Edge> edges,
               std::span<const Eigen::Matrix3d> across)
-      : pattern_(pattern), across_(across), passed_(pattern.fronts().size()) {
-    pivot_.resize(pattern.nodes());
-    for (std::size_t n = 0; n < pattern.nodes(); ++n) pivot_[pattern.place()[n]] = diagonal[n];
-    entries_.resize(pattern.nodes());
+      : fronts_(fronts),
+        across_(across),
+        pivot_(fronts.nodes()),
+        entries_(fronts.nodes()),
+        passed_(fronts.fronts().size()) {
+    const std::span<const std::uint32_t> place = fronts.place();
+    for (std::size_t n = 0; n < fronts.nodes(); ++n) pivot_[place[n]] = diagonal[n];
     std::size_t edge = 0;
-    for (const auto& [a, b] : pattern.edges()) {
-      const std::uint32_t pa = pattern.place()[a];
-      const std::uint32_t pb = pattern.place()[b];
-      entries_[std::min(pa, pb)].push_back({std::max(pa, pb), std::min(pa, pb), edge++, pa < pb});
+    for (const auto& [a, b] : edges) {
+      const auto [low, high] = std::minmax(place[a], place[b]);
+      entries_[low].push_back({high, low, edge++, place[a] == low});
     }
   }
 
   /// False if the front's pivot is not positive definite.
   [[nodiscard]] bool eliminate(std::size_t number) {
-    const FrontalPattern::Front& front = pattern_.fronts()[number];
+    const Front& front = fronts_.fronts()[number];
     const auto own = Index{3} * front.own;
-    const auto reached = static_cast<Index>(3 * front.rows.size());
+    const auto reached = Index{3} * front.count;
     dense_.setZero(own + reached, own + reached);
     add_matrix(front);
-    for (const std::size_t child : children_of(number)) add_passed(front, child);
+    for (const std::uint32_t child : fronts_.child(front)) add_passed(child);
     const Eigen::LLT<Eigen::MatrixXd> pivot(dense_.topLeftCorner(own, own));
     if (pivot.info() != Eigen::Success) return false;
     inverse = pivot.solve(Eigen::MatrixXd::Identity(own, own));
@@ -59,21 +64,14 @@ class Elimination {
   Eigen::MatrixXd inverse, down;  ///< of the front eliminated last
 
  private:
-  [[nodiscard]] static Index place_in(const FrontalPattern::Front& front, std::uint32_t place) {
+  [[nodiscard]] Index place_in(const Front& front, std::uint32_t place) const {
     if (place < front.first + front.own) return Index{3} * (place - front.first);
-    const auto at = std::lower_bound(front.rows.begin(), front.rows.end(), place);
-    return Index{3} * front.own + 3 * (at - front.rows.begin());
+    const std::span<const std::uint32_t> rows = fronts_.row(front);
+    return Index{3} * front.own +
+           3 * (std::lower_bound(rows.begin(), rows.end(), place) - rows.begin());
   }
 
-  [[nodiscard]] std::vector<std::size_t> children_of(std::size_t number) const {
-    std::vector<std::size_t> children;
-    for (std::size_t f = 0; f < number; ++f) {
-      if (pattern_.fronts()[f].parent == number) children.push_back(f);
-    }
-    return children;
-  }
-
-  void add_matrix(const FrontalPattern::Front& front) {
+  void add_matrix(const Front& front) {
     for (std::uint32_t p = front.first; p < front.first + front.own; ++p) {
       const Index column = place_in(front, p);
       dense_.block<3, 3>(column, column) += pivot_[p];
@@ -87,20 +85,19 @@ class Elimination {
     }
   }
 
-  void add_passed(const FrontalPattern::Front& front, std::size_t child) {
-    const auto& rows = pattern_.fronts()[child].rows;
+  void add_passed(std::uint32_t child) {
+    const std::span<const std::uint32_t> at = fronts_.row_in_parent(fronts_.fronts()[child]);
     const Eigen::MatrixXd& from = passed_[child];
-    for (std::size_t j = 0; j < rows.size(); ++j) {
-      const Index column = place_in(front, rows[j]);
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        dense_.block<3, 3>(place_in(front, rows[i]), column) +=
+    for (std::size_t j = 0; j < at.size(); ++j) {
+      for (std::size_t i = 0; i < at.size(); ++i) {
+        dense_.block<3, 3>(Index{3} * at[i], Index{3} * at[j]) +=
             from.block<3, 3>(static_cast<Index>(3 * i), static_cast<Index>(3 * j));
       }
     }
     passed_[child].resize(0, 0);
   }
 
-  const FrontalPattern& pattern_;
+  const EliminationFronts& fronts_;
   std::span<const Eigen::Matrix3d> across_;
   std::vector<Eigen::Matrix3d> pivot_;       ///< by place
   std::vector<std::vector<Entry>> entries_;  ///< by column
@@ -135,18 +132,16 @@ void copy_node(const float* from, float* to) {
 
 }  // namespace
 
-FrontalFactor::FrontalFactor(std::shared_ptr<const FrontalPattern> pattern, bool portable)
-    : pattern_(std::move(pattern)), kernels_(panel_kernels(portable)) {
+FrontalFactor::FrontalFactor(std::shared_ptr<const EliminationFronts> fronts, bool portable)
+    : fronts_(std::move(fronts)), kernels_(panel_kernels(portable)) {
   std::size_t numbers = 0;
   std::size_t most_own = 0;
   std::size_t most_reached = 0;
-  for (const FrontalPattern::Front& front : pattern_->fronts()) {
+  for (const EliminationFronts::Front& front : fronts_->fronts()) {
     const std::size_t own = std::size_t{3} * front.own;
-    const std::size_t reached = 3 * front.rows.size();
-    front_.push_back({front.first, front.own, static_cast<std::uint32_t>(row_.size()),
-                      static_cast<std::uint32_t>(front.rows.size()), numbers,
-                      numbers + own * padded(own)});
-    row_.insert(row_.end(), front.rows.begin(), front.rows.end());
+    const std::size_t reached = std::size_t{3} * front.count;
+    front_.push_back(
+        {front.first, front.own, front.rows, front.count, numbers, numbers + own * padded(own)});
     numbers += own * (padded(own) + padded(reached));
     most_own = std::max(most_own, padded(own));
     most_reached = std::max(most_reached, padded(reached));
@@ -155,6 +150,14 @@ FrontalFactor::FrontalFactor(std::shared_ptr<const FrontalPattern> pattern, bool
   own_.assign(most_own + 1, 0.0F);  // with the padding of copy_node
   reached_.assign(most_reached + 1, 0.0F);
   sum_.assign(std::max(most_own, most_reached) + 1, 0.0F);
+}
+
+std::size_t FrontalFactor::blocks_read(const EliminationFronts& fronts) {
+  std::size_t blocks = 0;
+  for (const EliminationFronts::Front& front : fronts.fronts()) {
+    blocks += std::size_t{front.own} * (front.own + 2 * front.count);
+  }
+  return blocks;
 }
 
 FloatPanel FrontalFactor::inverse(const Place& front) const {
@@ -168,8 +171,9 @@ FloatPanel FrontalFactor::passed(const Place& front) const {
 }
 
 bool FrontalFactor::factorise(std::span<const Eigen::Matrix3d> diagonal,
+                              std::span<const Edge> edges,
                               std::span<const Eigen::Matrix3d> across) {
-  Elimination elimination(*pattern_, diagonal, across);
+  Elimination elimination(*fronts_, diagonal, edges, across);
   for (std::size_t f = 0; f < front_.size(); ++f) {
     if (!elimination.eliminate(f)) return false;
     put(elimination.inverse, numbers_.data() + front_[f].inverse);
@@ -179,13 +183,14 @@ bool FrontalFactor::factorise(std::span<const Eigen::Matrix3d> diagonal,
 }
 
 void FrontalFactor::solve(float* x) noexcept {
+  const std::uint32_t* const all_rows = fronts_->all_rows().data();
   for (const Place& front : front_) {
     if (front.count == 0) continue;
     for (std::size_t i = 0; i < front.own; ++i) {
       copy_node(x + 4 * (front.first + i), own_.data() + 3 * i);
     }
     kernels_.times(passed(front), own_.data(), sum_.data());
-    const std::uint32_t* const row = row_.data() + front.rows;
+    const std::uint32_t* const row = all_rows + front.rows;
     for (std::size_t i = 0; i < front.count; ++i) {
       float* const to = x + std::size_t{4} * row[i];
       Four sum = four_at(sum_.data() + 3 * i);
@@ -202,7 +207,7 @@ void FrontalFactor::solve(float* x) noexcept {
     kernels_.times(inverse(front), own_.data(), sum_.data());
     if (front.count > 0) {
       const FloatPanel down = passed(front);
-      const std::uint32_t* const row = row_.data() + front.rows;
+      const std::uint32_t* const row = all_rows + front.rows;
       for (std::size_t i = 0; i < front.count; ++i) {
         copy_node(x + std::size_t{4} * row[i], reached_.data() + 3 * i);
       }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tpm/solve/aligned_floats.hpp"
-#include "tpm/solve/frontal_pattern.hpp"
+#include "tpm/solve/elimination_fronts.hpp"
 #include "tpm/solve/panel_kernels.hpp"
 
 namespace tpm {
@@ -17,13 +17,20 @@ namespace tpm {
 /// residual is known better.
 class FrontalFactor {
  public:
+  using Edge = EliminationFronts::Edge;
+
   /// @param portable without vector instructions beyond those of every processor
-  explicit FrontalFactor(std::shared_ptr<const FrontalPattern> pattern, bool portable = false);
+  explicit FrontalFactor(std::shared_ptr<const EliminationFronts> fronts, bool portable = false);
+
+  /// 3x3 blocks that a solution reads: pivots whole, once; what they reach, twice.
+  [[nodiscard]] static std::size_t blocks_read(const EliminationFronts& fronts);
 
   /// False if the matrix is not positive definite; the factor is then of no use.
   /// @param diagonal of each node, in the order of the nodes
-  /// @param across block (a, b) of each edge of the pattern; those of one pair are added
+  /// @param edges of the graph that the fronts are of
+  /// @param across block (a, b) of each edge; those of one pair are added
   [[nodiscard]] bool factorise(std::span<const Eigen::Matrix3d> diagonal,
+                               std::span<const Edge> edges,
                                std::span<const Eigen::Matrix3d> across);
 
   /// Replaces the right-hand side by the solution, to about 1e-5 of it for matrices that are not
@@ -35,16 +42,15 @@ class FrontalFactor {
  private:
   struct Place {
     std::uint32_t first, own;     ///< nodes
-    std::uint32_t rows, count;    ///< of row_
+    std::uint32_t rows, count;    ///< of all rows
     std::size_t inverse, passed;  ///< of numbers_
   };
   [[nodiscard]] FloatPanel inverse(const Place& front) const;
   [[nodiscard]] FloatPanel passed(const Place& front) const;
 
-  std::shared_ptr<const FrontalPattern> pattern_;
+  std::shared_ptr<const EliminationFronts> fronts_;
   const PanelKernels& kernels_;
   std::vector<Place> front_;
-  std::vector<std::uint32_t> row_;
   AlignedFloats numbers_;
   AlignedFloats own_, reached_, sum_;  ///< of one front, three floats per node
 };
