@@ -58,9 +58,9 @@ double largest(const Eigen::Matrix3Xd& vectors) {
 
 TEST_CASE("a factor in fronts solves as a dense one does", "[frontal]") {
   Random random(3);
-  constexpr int kNodes = 57;
+  constexpr Eigen::Index kNodes = 57;
   Eigen::Matrix3Xd places(3, kNodes);
-  for (int i = 0; i < kNodes; ++i) {
+  for (Eigen::Index i = 0; i < kNodes; ++i) {
     places.col(i) << random.uniform(), random.uniform(), 0.2 * random.uniform();
   }
   std::vector<FrontalFactor::Edge> edges;
@@ -76,15 +76,15 @@ TEST_CASE("a factor in fronts solves as a dense one does", "[frontal]") {
   const auto noise = [&] {
     return Eigen::Matrix3d::NullaryExpr([&] { return random.uniform() - 0.5; });
   };
-  for (int i = 0; i < kNodes; ++i) {
+  for (Eigen::Index i = 0; i < kNodes; ++i) {
     const Eigen::Matrix3d part = noise();
     diagonal.emplace_back(part + part.transpose() + 40.0 * Eigen::Matrix3d::Identity());
     dense.block<3, 3>(3 * i, 3 * i) = diagonal.back();
   }
   for (const auto& [a, b] : edges) {
     across.emplace_back(noise());
-    dense.block<3, 3>(3 * a, 3 * b) += across.back();
-    dense.block<3, 3>(3 * b, 3 * a) += across.back().transpose();
+    dense.block<3, 3>(Eigen::Index{3} * a, Eigen::Index{3} * b) += across.back();
+    dense.block<3, 3>(Eigen::Index{3} * b, Eigen::Index{3} * a) += across.back().transpose();
   }
   Eigen::VectorXd right(3 * kNodes);
   for (auto& value : right) value = random.uniform() - 0.5;
@@ -96,14 +96,15 @@ TEST_CASE("a factor in fronts solves as a dense one does", "[frontal]") {
     AlignedFloats x(4 * kNodes, 0.0F);
     for (std::size_t i = 0; i < kNodes; ++i) {
       for (std::size_t c = 0; c < 3; ++c) {
-        x[4 * fronts->place()[i] + c] = static_cast<float>(right[static_cast<int>(3 * i + c)]);
+        x[std::size_t{4} * fronts->place()[i] + c] =
+            static_cast<float>(right[static_cast<Eigen::Index>(3 * i + c)]);
       }
     }
     factor.solve(x.data());
     for (std::size_t i = 0; i < kNodes; ++i) {
       for (std::size_t c = 0; c < 3; ++c) {
-        CHECK(static_cast<double>(x[4 * fronts->place()[i] + c]) ==
-              Approx(exact[static_cast<int>(3 * i + c)]).margin(1e-7));
+        CHECK(static_cast<double>(x[std::size_t{4} * fronts->place()[i] + c]) ==
+              Approx(exact[static_cast<Eigen::Index>(3 * i + c)]).margin(1e-7));
       }
     }
   }

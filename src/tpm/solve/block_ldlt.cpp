@@ -121,7 +121,7 @@ void BlockLdlt::gather(const BlockMatrix& matrix, std::size_t front, const Work&
   for (std::uint32_t i = 0; i < f.own; ++i) {
     const auto put = [&](const Eigen::Matrix3d& block, std::uint32_t row) {
       double* to = work.panel.numbers + 3 * (i * work.panel.stride + row);
-      for (int column = 0; column < 3; ++column, to += work.panel.stride) {
+      for (std::ptrdiff_t column = 0; column < 3; ++column, to += work.panel.stride) {
         std::copy_n(block.data() + 3 * column, 3, to);
       }
     };

@@ -88,7 +88,7 @@ struct Avx2Tile {
     for (std::size_t k = 0; k < depth; ++k, a += p.a.stride, b += p.b.stride) {
       __m256d rows[Vectors];
 #pragma GCC unroll 4
-      for (int v = 0; v < Vectors; ++v) rows[v] = _mm256_loadu_pd(a + 4 * v);
+      for (int v = 0; v < Vectors; ++v) rows[v] = _mm256_loadu_pd(a + std::ptrdiff_t{4} * v);
 #pragma GCC unroll 4
       for (int j = 0; j < Columns; ++j) {
         const __m256d factor = _mm256_broadcast_sd(b + j);
@@ -100,8 +100,9 @@ struct Avx2Tile {
     for (int j = 0; j < Columns; ++j, c += p.c.stride) {
 #pragma GCC unroll 4
       for (int v = 0; v < Vectors; ++v) {
-        const __m256d before = p.overwrite ? _mm256_setzero_pd() : _mm256_loadu_pd(c + 4 * v);
-        _mm256_storeu_pd(c + 4 * v, _mm256_sub_pd(before, sum[j][v]));
+        const __m256d before =
+            p.overwrite ? _mm256_setzero_pd() : _mm256_loadu_pd(c + std::ptrdiff_t{4} * v);
+        _mm256_storeu_pd(c + std::ptrdiff_t{4} * v, _mm256_sub_pd(before, sum[j][v]));
       }
     }
   }
