@@ -49,6 +49,33 @@ TEST_CASE("A child answers, and an error of it is thrown here") {
         }) == "f: holds nothing; expected something");
 }
 
+TEST_CASE(
+    "Requests that nobody waits for are answered in their order, and their errors come later") {
+  const test::TempFolder folder;
+  write_file(folder / "f", "content");
+  const int file = ::open((folder / "f").c_str(), O_RDONLY | O_CLOEXEC);
+  REQUIRE(file >= 0);
+  Contained child("f", file, ContainedLimits{}, [](int /*descriptor*/) {
+    return [](std::string_view request) -> std::string {
+      if (request == "throw") throw bad_input("f", "holds nothing", "something");
+      return std::string(request) + "!";
+    };
+  });
+  ::close(file);
+  constexpr int kRequests = 1000;  // far more than may be due
+  std::vector<std::string> taken;
+  std::vector<std::string> expected;
+  for (int i = 0; i < kRequests; ++i) {
+    expected.push_back(std::to_string(i) + "!");
+    child.tell(std::to_string(i), [&](std::string_view answer) { taken.emplace_back(answer); });
+  }
+  CHECK(child.ask("last") == "last!");
+  CHECK(taken == expected);
+  CHECK(test::refusal_of([&] { child.tell("throw"); }).empty());
+  CHECK(test::refusal_of([&] { (void)child.ask("next"); }) ==
+        "f: holds nothing; expected something");
+}
+
 TEST_CASE("A child that crashes, loops, or asks for more than it may have ends in one line") {
   ContainedLimits limits;
   CHECK(end_of(limits, [](std::string_view) -> std::string {

@@ -100,10 +100,10 @@ CondensedField::CondensedField(const CondensedFrame& frame, const Eigen::Matrix3
   const auto rows_of = [](const Eigen::MatrixXd& table) {
     std::vector<Amplitudes> all;
     for (Eigen::Index i = 0; i < table.rows(); ++i) {
-      std::array<float, 16> row{};
-      std::transform(table.row(i).begin(), table.row(i).end(), row.begin(),
+      std::array<float, 16> numbers{};
+      std::transform(table.row(i).begin(), table.row(i).end(), numbers.begin(),
                      [](double x) { return static_cast<float>(x); });
-      std::memcpy(&all.emplace_back(), row.data(), sizeof row);
+      std::memcpy(&all.emplace_back(), numbers.data(), sizeof numbers);
     }
     return all;
   };
@@ -146,17 +146,17 @@ CondensedField::Amplitudes CondensedField::amplitudes(const Eigen::Vector3d& u_m
   const Amplitudes* term = terms_.data();
   const Amplitudes* second = second_.data();
   run_wide([&]() __attribute__((always_inline)) {
-    Amplitudes all;
+    Amplitudes all{};
     for (std::size_t t = 0; t < kTangents; ++t) {
       const int beside = kBeside[t == 0 ? 0 : t < 5 ? 1 : 2];
-      Amplitudes part;
+      Amplitudes part{};
       for (std::size_t d = 0; d < static_cast<std::size_t>(beside); ++d, ++term) {
         part.add(depths[d], *term);
       }
       all.add(tangents[t], part);
     }
     for (Eigen::Index k = 0; k < 3; ++k) {
-      Amplitudes part;
+      Amplitudes part{};
       for (std::size_t d = 0; d < kOfW; ++d, ++second) part.add(of_w[d], *second);
       all.add(static_cast<float>(q_m[k]), part);
     }

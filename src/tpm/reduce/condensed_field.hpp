@@ -38,7 +38,7 @@ class CondensedField {
       low += factor * other.low;
       high += factor * other.high;
     }
-    Eight low{}, high{};
+    Eight low, high;
   };
 
   [[nodiscard]] Amplitudes amplitudes(const Eigen::Vector3d& u_m, const Eigen::Vector3d& w_m,

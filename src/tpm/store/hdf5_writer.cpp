@@ -124,7 +124,7 @@ Hdf5Writer::Hdf5Writer(fs::path path) : path_(std::move(path)), place_(path_) {
         auto file = std::make_shared<Hdf5Assembly>(descriptor, where);
         return [file](std::string_view request) { return add_whole_part(*file, request); };
       });
-  order(*child_, Part::file);
+  static_cast<void>(child_->ask(packed(Part::file)));  // says at once if it cannot be begun
 }
 
 Hdf5Writer::~Hdf5Writer() = default;
