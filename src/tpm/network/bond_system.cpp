@@ -361,10 +361,11 @@ void BondSystem::add_stiffness_times(const Positions& position, const ViscousSta
                                      const Eigen::Matrix3Xd& displacement,
                                      Eigen::Matrix3Xd& force) const {
   for (std::size_t i = 0; i < size(); ++i) {
+    const Eigen::Vector3d apart = displacement.col(end_b_[i]) - displacement.col(end_a_[i]);
+    if (apart.isZero(0.0)) continue;
     const Line placed = line(i, position);
     const auto [n, slope] = pull(i, placed.elongation, viscous_state);
     const double across = n * placed.per_length;
-    const Eigen::Vector3d apart = displacement.col(end_b_[i]) - displacement.col(end_a_[i]);
     const Eigen::Vector3d f =
         across * apart + (slope - across) * placed.direction.dot(apart) * placed.direction;
     force.col(end_b_[i]) += f;

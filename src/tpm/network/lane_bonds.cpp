@@ -11,6 +11,7 @@ namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kSphere = std::size_t{3} * kLanes;
+constexpr std::size_t kBatch = 16;                      // bonds
 constexpr std::size_t kDown = std::size_t{2} * kLanes;  // from x to z of a sphere
 
 /// The place or force of a sphere, a row a lane.
@@ -168,10 +169,7 @@ void LaneBonds::followed(const LaneMatrix& position, LaneMatrix& followed) const
   }
 }
 
-void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& mean_viscous,
-                           LaneMatrix& force) const {
-  linear_ ? add_bond_forces<true>(position, mean_viscous, force)
-          : add_bond_forces<false>(position, mean_viscous, force);
+void LaneBonds::add_contact_forces(const LaneMatrix& position, LaneMatrix& force) const {
   for (const ToolContact& contact : closed_) {
     const ContactGeometry now = contact_geometry(contact, position);
     const Eigen::Matrix<double, kLanes, 3> pull =
@@ -179,6 +177,119 @@ void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& mean_vi
     columns_of(force, contact.sphere) += pull;
     columns_of(force, contact.tool) -= pull;
   }
+}
+
+struct LaneBondKernels {
+  using Data = LaneBonds::Data;
+  using Lanes = std::array<double, kLanes>;
+
+  /// What a linear bond pulls with, added to its ends.
+  [[gnu::always_inline]] static void pull_linear(const Data& bond, const Span& span,
+                                                 const double* viscous, double* f) {
+    Lanes share;
+#pragma omp simd
+    for (std::size_t s = 0; s < kLanes; ++s) {
+      const double l = span.length[s] - bond.rest_length_m;
+      const double taut = l >= bond.least ? 1.0 : 0.0;
+      share[s] = taut * (bond.k * l - bond.g * viscous[s]) * span.inverse[s];
+    }
+    pull_along(bond, span, share, f);
+  }
+
+  [[gnu::always_inline]] static void pull_along(const Data& bond, const Span& span,
+                                                const Lanes& share, double* f) {
+    Pull pull;
+#pragma omp simd
+    for (std::size_t s = 0; s < kLanes; ++s) {
+      pull[s] = share[s] * span.x[s];
+      pull[kLanes + s] = share[s] * span.y[s];
+      pull[kDown + s] = share[s] * span.z[s];
+    }
+    pull_ends(pull, f + kSphere * bond.a, f + kSphere * bond.b);
+  }
+
+  /// Linear bonds of one group, whose y follows what it does at the stages.
+  template <bool kKnown>
+  [[gnu::always_inline]] static void pull_following(const Data* bonds, std::size_t begin,
+                                                    std::size_t end,
+                                                    const LaneBonds::Following& following,
+                                                    const double* x, double* followed, double* f) {
+    const double* const weight = following.weights->of_stages.data();
+    const double* const from_start = following.weights->of_start.data();
+    const double* const from_viscous = following.weights->of_viscous.data();
+    // Batch by batch, so that what one bond waits for is hidden behind the others.
+    std::array<Span, kBatch> spans;
+    std::array<Lanes, kBatch> viscous;
+    for (std::size_t first = begin; first < end; first += kBatch) {
+      const std::size_t count = std::min(kBatch, end - first);
+      for (std::size_t n = 0; n < count; ++n) {
+        const Data& bond = bonds[first + n];
+        measure(x + kSphere * bond.a, x + kSphere * bond.b, spans[n]);
+        double* const l = followed + kLanes * (first + n);
+#pragma omp simd
+        for (std::size_t s = 0; s < kLanes; ++s) l[s] = spans[n].length[s] - bond.rest_length_m;
+      }
+      for (std::size_t n = 0; n < count; ++n) {
+        const std::size_t i = first + n;
+        const double* const l = followed + kLanes * i;
+        Lanes sum;
+#pragma omp simd
+        for (std::size_t s = 0; s < kLanes; ++s) {
+          double lane = 0.0;
+          if constexpr (kKnown) {
+            lane = following.known[kLanes * i + s];
+          } else {
+            lane = from_start[s] * following.followed[i] + from_viscous[s] * following.mean[i];
+          }
+          for (std::size_t j = 0; j < kLanes; ++j) lane += weight[kLanes * j + s] * l[j];
+          sum[s] = lane;
+        }
+        viscous[n] = sum;
+      }
+      for (std::size_t n = 0; n < count; ++n) {
+        pull_linear(bonds[first + n], spans[n], viscous[n].data(), f);
+      }
+    }
+  }
+};
+
+void LaneBonds::add_forces_of_stages(const LaneMatrix& position, std::span<const Following> groups,
+                                     LaneMatrix& followed, LaneMatrix& force) const {
+  followed.resize(kLanes, static_cast<Eigen::Index>(relaxing_.size()));
+  const double* const x = position.data();
+  double* const l = followed.data();
+  double* const f = force.data();
+  const Data* const bonds = bond_.data();
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const Following following = groups[i];
+    const auto begin = static_cast<std::size_t>(groups_[i].first);
+    const auto end = begin + static_cast<std::size_t>(groups_[i].count);
+    if (following.known != nullptr) {
+      run_wide([&]() __attribute__((always_inline)) {
+        LaneBondKernels::pull_following<true>(bonds, begin, end, following, x, l, f);
+      });
+    } else {
+      run_wide([&]() __attribute__((always_inline)) {
+        LaneBondKernels::pull_following<false>(bonds, begin, end, following, x, l, f);
+      });
+    }
+  }
+  run_wide([&]() __attribute__((always_inline)) {
+    constexpr LaneBondKernels::Lanes kNothing{};
+    Span span;
+    for (std::size_t i = relaxing_.size(); i < bond_.size(); ++i) {
+      measure(x + kSphere * bonds[i].a, x + kSphere * bonds[i].b, span);
+      LaneBondKernels::pull_linear(bonds[i], span, kNothing.data(), f);
+    }
+  });
+  add_contact_forces(position, force);
+}
+
+void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& mean_viscous,
+                           LaneMatrix& force) const {
+  linear_ ? add_bond_forces<true>(position, mean_viscous, force)
+          : add_bond_forces<false>(position, mean_viscous, force);
+  add_contact_forces(position, force);
 }
 
 template <bool kLinear>
@@ -189,22 +300,17 @@ void LaneBonds::add_bond_forces(const LaneMatrix& position, const LaneMatrix& me
   double* const f = force.data();
   const std::size_t relaxing = relaxing_.size();
   const auto sweep = [&]() __attribute__((always_inline)) {
-    constexpr std::array<double, kLanes> kNothing{};
+    constexpr LaneBondKernels::Lanes kNothing{};
     Span span;
     for (std::size_t i = 0; i < bond_.size(); ++i) {
-      const Data bond = bond_[i];
+      const Data& bond = bond_[i];
       const double* const viscous = i < relaxing ? y + kLanes * i : kNothing.data();
       measure(x + kSphere * bond.a, x + kSphere * bond.b, span);
-      std::array<double, kLanes> share;
       if constexpr (kLinear) {
-#pragma omp simd
-        for (std::size_t s = 0; s < kLanes; ++s) {
-          const double l = span.length[s] - bond.rest_length_m;
-          const double taut = l >= bond.least ? 1.0 : 0.0;
-          share[s] = taut * (bond.k * l - bond.g * viscous[s]) * span.inverse[s];
-        }
+        LaneBondKernels::pull_linear(bond, span, viscous, f);
       } else {
         const ViscousLaw& law = laws_[bond.law];
+        LaneBondKernels::Lanes share;
         for (std::size_t s = 0; s < kLanes; ++s) {
           const double l = span.length[s] - bond.rest_length_m;
           const double taut = l >= bond.least ? 1.0 : 0.0;
@@ -212,15 +318,8 @@ void LaneBonds::add_bond_forces(const LaneMatrix& position, const LaneMatrix& me
               (bond.k - bond.g) * law.equilibrium(l) + bond.g * (law.kernel.value(l) - viscous[s]);
           share[s] = taut * pull * span.inverse[s];
         }
+        LaneBondKernels::pull_along(bond, span, share, f);
       }
-      Pull pull;
-#pragma omp simd
-      for (std::size_t s = 0; s < kLanes; ++s) {
-        pull[s] = share[s] * span.x[s];
-        pull[kLanes + s] = share[s] * span.y[s];
-        pull[kDown + s] = share[s] * span.z[s];
-      }
-      pull_ends(pull, f + kSphere * bond.a, f + kSphere * bond.b);
     }
   };
   // Calls of laws are not inlined.

@@ -39,6 +39,23 @@ class LaneBonds {
   /// V(l) of the relaxing bonds.
   void followed(const LaneMatrix& position, LaneMatrix& followed) const;
 
+  /// What y of the relaxing bonds of one group follows within a step.
+  struct Following {
+    const ViscousWeights* weights;  ///< of y
+    const double* followed;         ///< V(l) at the start of the step, by relaxing bond
+    const double* mean;             ///< y there
+    /// The part of y that the start decides, by (lane, relaxing bond); null: it follows from the
+    /// two above, as with one branch.
+    const double* known;
+  };
+  /// followed(), y by `Following::weights`, and add_forces() with it, in one sweep. Only where no
+  /// bond stiffens (is_linear()).
+  /// @param groups one for each of groups()
+  void add_forces_of_stages(const LaneMatrix& position, std::span<const Following> groups,
+                            LaneMatrix& followed, LaneMatrix& force) const;
+  /// No bond stiffens: V(l) = l.
+  [[nodiscard]] bool is_linear() const { return linear_; }
+
   /// Adds what all bonds pull their spheres with, N.
   /// @param mean_viscous y of the relaxing bonds, m
   void add_forces(const LaneMatrix& position, const LaneMatrix& mean_viscous,
@@ -62,6 +79,7 @@ class LaneBonds {
                          const Changes& changes, LaneMatrix& force) const;
 
  private:
+  friend struct LaneBondKernels;
   struct Data {
     std::uint32_t a, b;
     double rest_length_m, k, g;
@@ -76,6 +94,7 @@ class LaneBonds {
   [[nodiscard]] ContactGeometry contact_geometry(const ToolContact& contact,
                                                  const LaneMatrix& position) const;
 
+  void add_contact_forces(const LaneMatrix& position, LaneMatrix& force) const;
   template <bool kLinear>
   void add_bond_forces(const LaneMatrix& position, const LaneMatrix& mean_viscous,
                        LaneMatrix& force) const;

@@ -48,7 +48,7 @@ StageBalance::Within StageBalance::within(const TissueState& state,
     states.imposed[lane] = state.imposed + c * h * rate;
   }
   // Of displacements, not of coordinates, for the sake of rounding.
-  states.position.noalias() = at.interpolation * (x_.rowwise() - start_);
+  mix_lanes(at.interpolation, x_.rowwise() - start_, states.position);
   states.position.rowwise() += start_;
   LaneMatrix known;
   find_known(at.weights, begin_, known);

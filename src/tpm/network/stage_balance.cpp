@@ -1,21 +1,23 @@
 #include "tpm/network/stage_balance.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/wide_vectors.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
 namespace {
 
 constexpr int kMostIterations = 25;
-constexpr int kTooManyIterations = 8;      // a new factorisation pays
-constexpr double kFollowingChange = 0.45;  // likewise
-constexpr double kHopeless = 10.0;         // times the tolerance: an error that no balance mends
-constexpr int kLastHopeless = 2;           // iterations after which only the balance decides
+constexpr int kTooManyIterations = 8;     // a new factorisation pays
+constexpr double kFollowingChange = 0.6;  // likewise
+constexpr double kHopeless = 10.0;        // times the tolerance: an error that no balance mends
+constexpr int kLastHopeless = 2;          // iterations after which only the balance decides
 constexpr double kFurthestExtrapolation = 1.0;  // of the step before
-constexpr Eigen::Index kAndersonDepth = 6;
+constexpr Eigen::Index kAndersonDepth = 5;
 // How far what is driven may go at one step of a load: beyond, it may have snapped to another
 // place.
 constexpr double kLongestMove = 0.25;    // of a bond
@@ -196,6 +198,17 @@ void StageBalance::apply(const StepWeights& weights, const LaneMatrix& followed,
   }
 }
 
+std::vector<LaneBonds::Following> StageBalance::following(const StepWeights& weights,
+                                                          const Start& start,
+                                                          const LaneMatrix& known) const {
+  std::vector<LaneBonds::Following> groups;
+  for (const LawWeights& law : weights) {
+    groups.push_back({&law.mean, start.followed.data(), start.mean.data(),
+                      law.branch.size() == 1 ? nullptr : known.data()});
+  }
+  return groups;
+}
+
 void StageBalance::viscous_in_lane(const StepWeights& weights, const LaneMatrix& followed,
                                    const Start& start, Eigen::Index lane,
                                    Eigen::MatrixXd& viscous) const {
@@ -232,9 +245,7 @@ void StageBalance::set_weights(double h) {
   const auto count = static_cast<Eigen::Index>(full_error_places_.size());
   for (std::size_t t = 0; t < times.size(); ++t) {
     const double z = h / times[t];
-    ErrorWeights& weights = error_weights_[t];
-    weights.of_stages.setZero(count, kLanes);
-    weights.of_start.resize(count);
+    ErrorWeights& weights = error_weights_[t] = {};
     for (Eigen::Index i = 0; i < count; ++i) {
       const auto place = static_cast<std::size_t>(i);
       Eigen::VectorXd difference = full_error_places_[place].weights(z);
@@ -301,14 +312,14 @@ void StageBalance::predict(const TissueState& state, double h, double rate) {
   for (int lane = 0; lane < kLanes; ++lane) c[lane] = node(lane);
   imposed_ = (h * rate * c).array() + state.imposed;
   if (has_last_ && last_rate_ == rate) {
-    Eigen::Matrix<double, kLanes, kLanes> shape = Eigen::Matrix<double, kLanes, kLanes>::Zero();
+    LaneSquare shape = LaneSquare::Zero();
     for (int lane = 0; lane < kLanes; ++lane) {
       const double ahead = std::min(c[lane] * h / last_h_, kFurthestExtrapolation);
       const Eigen::VectorXd at = full_.interpolation(1.0 + ahead);
       shape.row(lane).head(stages_) = at.tail(stages_).transpose();
     }
     // From where the step before began to each stage, less the way to where this one begins.
-    x_.noalias() = shape * last_path_;
+    mix_lanes(shape, last_path_, x_);
     x_.rowwise() -= last_path_.row(stages_ - 1).eval();
     // Only what is free moves: rounding would make fixed spheres drift.
     tissue_.constraints().project(x_);
@@ -326,10 +337,15 @@ void StageBalance::update_viscous() {
 }
 
 void StageBalance::residuals() {
-  update_viscous();
   force_.setZero();
   tissue_.add_load(imposed_, force_);
-  bonds_.add_forces(x_, mean_viscous_, force_);
+  if (bonds_.is_linear()) {
+    bonds_.add_forces_of_stages(x_, following(weights_, begin_, known_), followed_, force_);
+  } else {
+    update_viscous();
+    bonds_.add_forces(x_, mean_viscous_, force_);
+  }
+  plain_response_ = tissue_.response(x_, force_);
   tissue_.constraints().project(force_);
   d_ = force_;
   factor_.solve(d_);
@@ -363,31 +379,60 @@ StageBalance::Balance StageBalance::balance(double tolerance) {
   return Balance::failed;
 }
 
+StageBalance::ErrorSums StageBalance::error_sums(const LaneBonds::Group& group,
+                                                 const ErrorWeights& weights) const {
+  ErrorSums sums;
+  const double* const weight = weights.of_stages.data();
+  const double* const weight_of_start = weights.of_start.data();
+  const double* const aim = adjoint_.data() + group.first;
+  const double* const followed = followed_.data() + kLanes * group.first;
+  const double* const start = begin_.followed.data() + group.first;
+  const auto bonds = static_cast<std::size_t>(group.count);
+  run_wide([&]() __attribute__((always_inline)) {
+    constexpr auto kPlaces = static_cast<std::size_t>(kErrorPlaces);
+    std::array<double, kPlaces> size{};
+    std::array<double, kLanes> stages{};
+    double start_sum = 0.0;
+    for (std::size_t i = 0; i < bonds; ++i) {
+      const double* const at = followed + kLanes * i;
+      const double size_of_aim = std::abs(aim[i]);
+#pragma omp simd
+      for (std::size_t p = 0; p < kPlaces; ++p) {
+        double difference = weight_of_start[p] * start[i];
+        for (std::size_t s = 0; s < kLanes; ++s) difference += weight[kPlaces * s + p] * at[s];
+        size[p] += size_of_aim * std::abs(difference);
+      }
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) stages[s] += aim[i] * at[s];
+      start_sum += aim[i] * start[i];
+    }
+    std::copy(size.begin(), size.end(), sums.size.data());
+    std::copy(stages.begin(), stages.end(), sums.stages.data());
+    sums.start = start_sum;
+  });
+  return sums;
+}
+
 double StageBalance::error() const {
-  const auto places = static_cast<Eigen::Index>(full_error_places_.size());
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(places);
-  Eigen::VectorXd size = sum;
+  AtErrorPlaces error = AtErrorPlaces::Zero();
   for (const LaneBonds::Group& group : bonds_.groups()) {
-    const auto weight = adjoint_.segment(group.first, group.count);
-    const auto followed = followed_.middleCols(group.first, group.count);
-    const auto start = begin_.followed.segment(group.first, group.count);
-    const LaneVector aimed = followed * weight;
-    const double start_aimed = start * weight;
+    const std::vector<ViscousLaw::Branch>& branches = tissue_.bonds().laws()[group.law].branches;
     ErrorWeights mean;
-    mean.of_stages.setZero(places, kLanes);
-    mean.of_start.setZero(places);
-    for (const ViscousLaw::Branch& branch : tissue_.bonds().laws()[group.law].branches) {
-      // Branch by branch, whose later errors do not cancel even where they do now.
+    for (const ViscousLaw::Branch& branch : branches) {
       const ErrorWeights& weights = error_weights_[branch.time];
-      sum += branch.share * (weights.of_stages * aimed + weights.of_start * start_aimed).cwiseAbs();
       mean.of_stages += branch.share * weights.of_stages;
       mean.of_start += branch.share * weights.of_start;
     }
-    Eigen::MatrixXd change = mean.of_stages * followed;
-    change.noalias() += mean.of_start * start;
-    size += change.cwiseAbs() * weight.cwiseAbs();
+    const ErrorSums sums = error_sums(group, mean);
+    error += 0.1 * sums.size;
+    // Branch by branch, whose later errors do not cancel even where they do now.
+    for (const ViscousLaw::Branch& branch : branches) {
+      const ErrorWeights& weights = error_weights_[branch.time];
+      error += branch.share *
+               (weights.of_stages * sums.stages + weights.of_start * sums.start).cwiseAbs();
+    }
   }
-  return (sum + 0.1 * size).maxCoeff();
+  return error.maxCoeff();
 }
 
 StepOutcome StageBalance::try_step(const TissueState& state, double h, double rate,
@@ -414,7 +459,7 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
     factorised_ = false;
     return outcome;
   }
-  if (balanced == Balance::found) update_viscous();
+  if (balanced == Balance::found) bonds_.followed(x_, followed_);
   outcome.error = std::max(error(), 1e-12 * outcome.allowed);
   outcome.accepted =
       balanced == Balance::found && outcome.error <= std::max(outcome.allowed, rounding_);
@@ -458,7 +503,9 @@ void StageBalance::accept(TissueState& state, double h, double rate) {
   put_viscous(viscous, state.viscous);
   state.mean = tissue_.bonds().mean_viscous(state.viscous);
   ++work_.steps;
-  see(tissue_.response(state));
+  // Before the last correction, whose effect the adjoint knows.
+  const Eigen::Index last = stages_ - 1;
+  see(plain_response_[last] + tissue_.adjoint_sign() * force_.row(last).dot(lane_field_));
 }
 
 }  // namespace tpm::organ

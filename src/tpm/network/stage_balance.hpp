@@ -123,6 +123,10 @@ class StageBalance {
   /// The mean viscous elongations in every lane.
   void apply(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
              const LaneMatrix& known, LaneMatrix& mean) const;
+  /// The same for a sweep over linear bonds; a view of its arguments.
+  [[nodiscard]] std::vector<LaneBonds::Following> following(const StepWeights& weights,
+                                                            const Start& start,
+                                                            const LaneMatrix& known) const;
   /// Every viscous elongation in one lane, by (branch, bond).
   void viscous_in_lane(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
                        Eigen::Index lane, Eigen::MatrixXd& viscous) const;
@@ -213,15 +217,29 @@ class StageBalance {
   Eigen::RowVectorXd start_;  ///< positions where it begins, by coordinate
   Start begin_;
   LaneMatrix x_, d_, force_;
-  LaneMatrix followed_, mean_viscous_;  ///< of relaxing bonds
-  LaneMatrix known_;                    ///< find_known()
+  LaneVector plain_response_;  ///< to x_, with forces left
+  LaneMatrix followed_;        ///< of relaxing bonds
+  LaneMatrix mean_viscous_;    ///< of relaxing bonds, where they are not linear
+  LaneMatrix known_;           ///< find_known()
   StepWeights weights_;
   LaneVector imposed_;
-  /// What tells the two collocations apart, for one relaxation time.
+  /// What tells the two collocations apart, for one relaxation time: by place measured, the
+  /// stages' and two more; beyond them 0.
+  static constexpr int kErrorPlaces = 2 * kLanes;
+  using AtErrorPlaces = Eigen::Matrix<double, kErrorPlaces, 1>;
   struct ErrorWeights {
-    Eigen::Matrix<double, Eigen::Dynamic, kLanes> of_stages;  ///< by (place measured, stage)
-    Eigen::VectorXd of_start;
+    Eigen::Matrix<double, kErrorPlaces, kLanes> of_stages =
+        Eigen::Matrix<double, kErrorPlaces, kLanes>::Zero();
+    AtErrorPlaces of_start = AtErrorPlaces::Zero();
   };
+  /// Sums over the bonds of a group, with what each bond does to the response.
+  struct ErrorSums {
+    LaneVector stages = LaneVector::Zero();      ///< of what is followed at the stages
+    double start = 0.0;                          ///< at the start of the step
+    AtErrorPlaces size = AtErrorPlaces::Zero();  ///< of absolute differences
+  };
+  [[nodiscard]] ErrorSums error_sums(const LaneBonds::Group& group,
+                                     const ErrorWeights& weights) const;
   std::vector<ErrorWeights> error_weights_;  ///< of each relaxation time of the system
   double imbalance_ = 0.0;  ///< bound of the response's error from forces left, N or m
   // The step before, for the prediction of the next.

@@ -73,7 +73,8 @@ StageTangents::Stages StageTangents::stages_at(const StageBalance::Places& place
 StageTangents::Stages StageTangents::stages_of_step(double h) const {
   Stages stages = stages_at(balance_.stage_places_, balance_.lane_nodes(), h);
   stages.position = balance_.x_;
-  stages.mean = balance_.mean_viscous_;
+  balance_.apply(balance_.weights_, balance_.followed_, balance_.begin_, balance_.known_,
+                 stages.mean);
   stages.imposed = balance_.imposed_;
   return stages;
 }

@@ -61,4 +61,26 @@ void ViscousWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
 }
 // NOLINTEND(performance-unnecessary-value-param)
 
+void mix_lanes(const LaneSquare& weights, const LaneMatrix& in, LaneMatrix& out) {
+  out.resize(kLanes, in.cols());
+  const double* const weight = weights.data();
+  const double* const from = in.data();
+  double* const to = out.data();
+  const auto columns = static_cast<std::size_t>(in.cols());
+  run_wide([=]() __attribute__((always_inline)) {
+    for (std::size_t i = 0; i < columns; ++i) {
+      std::array<double, kLanes> sum;
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        double lane = 0.0;
+        for (std::size_t j = 0; j < kLanes; ++j)
+          lane += weight[kLanes * j + s] * from[kLanes * i + j];
+        sum[s] = lane;
+      }
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) to[kLanes * i + s] = sum[s];
+    }
+  });
+}
+
 }  // namespace tpm

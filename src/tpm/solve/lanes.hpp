@@ -29,6 +29,10 @@ struct ViscousWeights {
              Eigen::Ref<LaneMatrix> out) const;
 };
 
+/// What every lane makes of all of them: out = weights in, not what Eigen makes of so small a
+/// matrix beside so wide a one. `in` is no part of `out`.
+void mix_lanes(const LaneSquare& weights, const LaneMatrix& in, LaneMatrix& out);
+
 /// All numbers of all states as one vector.
 [[nodiscard]] inline Eigen::Map<Eigen::VectorXd> flat(LaneMatrix& lanes) {
   return {lanes.data(), lanes.size()};
