@@ -76,8 +76,8 @@ struct ServoBondKernels {
     const ServoWeights& w = step.weights;
     const std::size_t latest = step.latest;
     for (std::size_t i = 0; i < ServoBonds::kWide; ++i) {
-      const float* const ua = u + std::size_t{4} * group.a[i];
-      const float* const ub = u + std::size_t{4} * group.b[i];
+      const float* const ua = u + group.a[i];
+      const float* const ub = u + group.b[i];
       const float ux = ub[0] - ua[0];
       const float uy = ub[1] - ua[1];
       const float uz = ub[2] - ua[2];
@@ -107,8 +107,8 @@ struct ServoBondKernels {
         group.offset[1 - latest][i] = offset;
         next = taut * (elastic - group.g[i] * (offset + w.of_end * l));
       }
-      float* const fa = force + std::size_t{8} * group.a[i];
-      float* const fb = force + std::size_t{8} * group.b[i];
+      float* const fa = force + std::size_t{2} * group.a[i];
+      float* const fb = force + std::size_t{2} * group.b[i];
       const float direction[3] = {x, y, z};
       for (std::size_t c = 0; c < 3; ++c) {
         if constexpr (kSweep != Sweep::next) {
@@ -152,19 +152,24 @@ struct ServoBondKernels {
              _mm256_shuffle_ps(b, d, 0x44), _mm256_shuffle_ps(b, d, 0xEE)}};
   }
 
-  template <Sweep kSweep, bool kCubic, bool kBranches>
-  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void group_avx2(Group& group,
-                                                                                const Step& step,
-                                                                                const float* u,
-                                                                                float* force) {
-    const ServoWeights& w = step.weights;
-    const std::size_t latest = step.latest;
+  /// Groups of bonds are worked on several at a time, each thing for all before the next: what one
+  /// waits for is hidden behind the others.
+  static constexpr std::size_t kTogether = 16;
+
+  /// What is known of a group between its steps.
+  struct Spans {
+    __m256 x, y, z;         ///< from end to end
+    __m256 square, change;  ///< of its length, and against that at rest
+    __m256 now, next;       ///< pulls per length
+  };
+
+  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void measure_avx2(
+      const Group& group, const float* u, Spans& spans) {
     Four apart;
     for (std::size_t i = 0; i < 4; ++i) {
-      const __m128 low = _mm_sub_ps(_mm_load_ps(u + std::size_t{4} * group.b[i]),
-                                    _mm_load_ps(u + std::size_t{4} * group.a[i]));
-      const __m128 high = _mm_sub_ps(_mm_load_ps(u + std::size_t{4} * group.b[i + 4]),
-                                     _mm_load_ps(u + std::size_t{4} * group.a[i + 4]));
+      const __m128 low = _mm_sub_ps(_mm_load_ps(u + group.b[i]), _mm_load_ps(u + group.a[i]));
+      const __m128 high =
+          _mm_sub_ps(_mm_load_ps(u + group.b[i + 4]), _mm_load_ps(u + group.a[i + 4]));
       apart.of[i] = _mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1);
     }
     __m256 ux, uy, uz;
@@ -172,17 +177,26 @@ struct ServoBondKernels {
     const __m256 x0 = _mm256_load_ps(group.x.data());
     const __m256 y0 = _mm256_load_ps(group.y.data());
     const __m256 z0 = _mm256_load_ps(group.z.data());
-    const __m256 x = _mm256_add_ps(x0, ux);
-    const __m256 y = _mm256_add_ps(y0, uy);
-    const __m256 z = _mm256_add_ps(z0, uz);
-    const __m256 square = _mm256_fmadd_ps(z, z, _mm256_fmadd_ps(y, y, _mm256_mul_ps(x, x)));
-    const __m256 length = _mm256_sqrt_ps(square);
-    const __m256 change = _mm256_fmadd_ps(
-        uz, _mm256_add_ps(z0, z),
-        _mm256_fmadd_ps(uy, _mm256_add_ps(y0, y), _mm256_mul_ps(ux, _mm256_add_ps(x0, x))));
+    spans.x = _mm256_add_ps(x0, ux);
+    spans.y = _mm256_add_ps(y0, uy);
+    spans.z = _mm256_add_ps(z0, uz);
+    spans.square = _mm256_fmadd_ps(
+        spans.z, spans.z, _mm256_fmadd_ps(spans.y, spans.y, _mm256_mul_ps(spans.x, spans.x)));
+    spans.change = _mm256_fmadd_ps(uz, _mm256_add_ps(z0, spans.z),
+                                   _mm256_fmadd_ps(uy, _mm256_add_ps(y0, spans.y),
+                                                   _mm256_mul_ps(ux, _mm256_add_ps(x0, spans.x))));
+  }
+
+  /// @param branch offsets of the group's branches, where there are several
+  template <Sweep kSweep, bool kCubic, bool kBranches>
+  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void relax_avx2(
+      Group& group, const Step& step, ServoBonds::BranchLane* branch_lane, Spans& spans) {
+    const ServoWeights& w = step.weights;
+    const std::size_t latest = step.latest;
+    const __m256 length = _mm256_sqrt_ps(spans.square);
     const __m256 sum = _mm256_add_ps(length, _mm256_load_ps(group.rest.data()));
     const __m256 inverse = _mm256_div_ps(_mm256_set1_ps(1.0F), _mm256_mul_ps(length, sum));
-    const __m256 l = _mm256_mul_ps(_mm256_mul_ps(change, inverse), length);
+    const __m256 l = _mm256_mul_ps(_mm256_mul_ps(spans.change, inverse), length);
     const __m256 carries = _mm256_cmp_ps(l, _mm256_load_ps(group.least.data()), _CMP_GE_OQ);
     const __m256 taut = _mm256_and_ps(_mm256_mul_ps(inverse, sum), carries);
     const __m256 k = _mm256_load_ps(group.k.data());
@@ -194,14 +208,13 @@ struct ServoBondKernels {
       elastic = _mm256_mul_ps(_mm256_fmadd_ps(cubic, l, k), l);
     }
     const __m256 viscous = _mm256_fmadd_ps(of_end, l, _mm256_load_ps(group.offset[latest].data()));
-    const __m256 now = _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, viscous, elastic));
-    __m256 next = now;
+    spans.now = _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, viscous, elastic));
     if constexpr (kSweep != Sweep::next) {
       __m256 offset = _mm256_setzero_ps();
       if constexpr (kBranches) {
         for (std::size_t j = 0; j < w.branches.size(); ++j) {
           const ServoBranch& branch = w.branches[j];
-          ServoBonds::BranchLane& lane = step.branch[j];
+          ServoBonds::BranchLane& lane = branch_lane[j];
           const __m256 m = _mm256_fmadd_ps(_mm256_set1_ps(branch.of_end), l,
                                            _mm256_load_ps(lane.offset[latest].data()));
           const __m256 left = _mm256_fmadd_ps(_mm256_set1_ps(branch.keep), m,
@@ -214,8 +227,16 @@ struct ServoBondKernels {
                                  _mm256_mul_ps(_mm256_set1_ps(w.of_start), l));
       }
       _mm256_store_ps(group.offset[1 - latest].data(), offset);
-      next = _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, _mm256_fmadd_ps(of_end, l, offset), elastic));
+      spans.next =
+          _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, _mm256_fmadd_ps(of_end, l, offset), elastic));
     }
+  }
+
+  template <Sweep kSweep>
+  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void pull_avx2(const Group& group,
+                                                                               const Spans& spans,
+                                                                               float* force) {
+    const auto [x, y, z, square, change, now, next] = spans;
     const Four first =
         from_lanes(_mm256_mul_ps(now, x), _mm256_mul_ps(now, y), _mm256_mul_ps(now, z));
     if constexpr (kSweep == Sweep::both) {
@@ -239,8 +260,8 @@ struct ServoBondKernels {
   [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void pull(const Group& group,
                                                                           std::size_t i, __m256 f,
                                                                           float* force) {
-    float* const fa = force + std::size_t{8} * group.a[i];
-    float* const fb = force + std::size_t{8} * group.b[i];
+    float* const fa = force + std::size_t{2} * group.a[i];
+    float* const fb = force + std::size_t{2} * group.b[i];
     _mm256_store_ps(fa, _mm256_add_ps(_mm256_load_ps(fa), f));
     _mm256_store_ps(fb, _mm256_sub_ps(_mm256_load_ps(fb), f));
   }
@@ -249,8 +270,8 @@ struct ServoBondKernels {
                                                                                std::size_t i,
                                                                                __m128 f,
                                                                                float* force) {
-    float* const fa = force + std::size_t{8} * group.a[i];
-    float* const fb = force + std::size_t{8} * group.b[i];
+    float* const fa = force + std::size_t{2} * group.a[i];
+    float* const fb = force + std::size_t{2} * group.b[i];
     _mm_store_ps(fa, _mm_add_ps(_mm_load_ps(fa), f));
     _mm_store_ps(fb, _mm_sub_ps(_mm_load_ps(fb), f));
   }
@@ -258,9 +279,18 @@ struct ServoBondKernels {
   template <Sweep kSweep, bool kCubic, bool kBranches>
   [[gnu::target("avx2,fma")]] static void sweep_avx2(ServoBonds& bonds, Step step, const float* u,
                                                      float* force) {
-    for (Group& group : bonds.group_) {
-      group_avx2<kSweep, kCubic, kBranches>(group, step, u, force);
-      if constexpr (kBranches) step.branch += bonds.branches_;
+    std::array<Spans, kTogether> spans;
+    for (std::size_t first = 0; first < bonds.group_.size(); first += kTogether) {
+      const std::span<Group> groups(bonds.group_.data() + first,
+                                    std::min(kTogether, bonds.group_.size() - first));
+      for (std::size_t i = 0; i < groups.size(); ++i) measure_avx2(groups[i], u, spans[i]);
+      for (std::size_t i = 0; i < groups.size(); ++i) {
+        relax_avx2<kSweep, kCubic, kBranches>(groups[i], step, step.branch, spans[i]);
+        if constexpr (kBranches) step.branch += bonds.branches_;
+      }
+      for (std::size_t i = 0; i < groups.size(); ++i) {
+        pull_avx2<kSweep>(groups[i], spans[i], force);
+      }
     }
   }
 
@@ -342,7 +372,7 @@ ServoBonds::ServoBonds(const BondSystem& bonds, const Positions& rest,
     const std::size_t i = n % kWide;
     group.offset[0][i] = group.offset[1][i] = 0.0F;
     if (n >= order.size()) {
-      group.a[i] = group.b[i] = filler;
+      group.a[i] = group.b[i] = 4 * filler;
       group.x[i] = group.rest[i] = 1.0F;
       group.y[i] = group.z[i] = group.k[i] = group.g[i] = group.cubic[i] = 0.0F;
       group.least[i] = kNever;
@@ -352,8 +382,8 @@ ServoBonds::ServoBonds(const BondSystem& bonds, const Positions& rest,
     const auto row = static_cast<Eigen::Index>(choice.bond);
     const Eigen::Vector3f apart =
         (rest.col(bonds.end_b()[choice.bond]) - rest.col(bonds.end_a()[choice.bond])).cast<float>();
-    group.a[i] = choice.a;
-    group.b[i] = choice.b;
+    group.a[i] = 4 * choice.a;
+    group.b[i] = 4 * choice.b;
     group.x[i] = apart.x();
     group.y[i] = apart.y();
     group.z[i] = apart.z();

@@ -92,7 +92,7 @@ class ServoBonds {
     Lane least;    ///< elongation below which the bond is slack, m
     /// y at the end of the next period less its part that follows, m: that in use, and the next.
     std::array<Lane, 2> offset;
-    std::array<std::uint32_t, kWide> a, b;
+    std::array<std::uint32_t, kWide> a, b;  ///< where displacements of the ends begin
   };
   friend struct ServoBondKernels;
 

@@ -28,7 +28,9 @@ constexpr double kViscousRounding = 6e-9;
 constexpr double kLongestLag = 1e3;  // steps
 constexpr std::size_t kNow = 0, kNext = 4;
 
-using Eight [[gnu::vector_size(8 * sizeof(float))]] = float;
+/// Vectors of four spheres.
+constexpr std::size_t kSixteen = 16;
+using Sixteen [[gnu::vector_size(kSixteen * sizeof(float))]] = float;
 
 void require(const ServoNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
   require_number(is_positive(options.period_s), "period_s", options.period_s, "a time above 0");
@@ -91,7 +93,7 @@ void ServoNetwork::choose_bonds(const PushedContact& tissue) {
   at_contact_ = ServoBonds(bonds, tissue.rest(), near, filler, options_.portable);
   elsewhere_ = ServoBonds(bonds, tissue.rest(), far, filler, options_.portable);
   displacement_.assign(4 * (columns + 1), 0.0F);
-  force_.assign(8 * (columns + 1), 0.0F);
+  force_.assign(8 * (columns + 4), 0.0F);  // weighed() reads four at once
   change_.assign(4 * (spheres_->free().size() + 1), 0.0F);
 }
 
@@ -111,7 +113,7 @@ ServoNetwork::Field ServoNetwork::field_of(const std::array<Eigen::Matrix3Xd, 3>
                                            double depth_m) const {
   Field field{depth_m, {}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    field.along[axis].assign(8 * ((spheres_->free().size() + 1) / 2), 0.0F);
+    field.along[axis].assign(kSixteen * ((spheres_->free().size() + 3) / 4), 0.0F);
     for (const std::size_t i : spheres_->free()) {
       const Eigen::Vector3f at = displacement[axis].col(static_cast<Eigen::Index>(i)).cast<float>();
       std::copy_n(at.data(), 3, field.along[axis].data() + std::size_t{4} * spheres_->column(i));
@@ -156,8 +158,11 @@ void ServoNetwork::reset() noexcept {
 }
 
 void ServoNetwork::balance(std::size_t first) noexcept {
-  for (std::size_t i = 0; i < spheres_->free().size(); ++i) {
-    std::copy_n(force_.data() + 8 * i + first, 4, change_.data() + 4 * i);
+  const std::size_t count = spheres_->free().size();
+  const float* const force = force_.data() + first;
+  float* const right = change_.data();
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t c = 0; c < 4; ++c) right[4 * i + c] = force[8 * i + c];
   }
   spheres_->solve(change_.data());
   for (std::size_t i = 0; i < 4 * spheres_->free().size(); ++i) displacement_[i] += change_[i];
@@ -169,25 +174,29 @@ void ServoNetwork::balance(std::size_t first) noexcept {
 std::array<Eigen::Vector3d, 3> ServoNetwork::weighed(
     const std::array<const Field*, 3>& fields) const noexcept {
   constexpr std::size_t kSums = 9;
-  std::array<Eight, kSums> sum{};
+  std::array<Sixteen, kSums> sum{};
   run_wide([&] {
     const float* force = force_.data();
-    for (std::size_t at = 0; at < 4 * spheres_->free().size(); at += 8, force += 16) {
-      Eight two;  // spheres
-      std::memcpy(&two, force, 4 * sizeof(float));
-      std::memcpy(reinterpret_cast<float*>(&two) + 4, force + 8, 4 * sizeof(float));
+    for (std::size_t at = 0; at < 4 * spheres_->free().size(); at += kSixteen) {
+      Sixteen four;  // spheres
+      for (std::size_t i = 0; i < 4; ++i, force += 8) {
+        std::memcpy(reinterpret_cast<float*>(&four) + 4 * i, force, 4 * sizeof(float));
+      }
       for (std::size_t s = 0; s < kSums; ++s) {
-        Eight along;
-        std::memcpy(&along, fields[s / 3]->along[s % 3].data() + at, sizeof(Eight));
-        sum[s] += along * two;
+        Sixteen along;
+        std::memcpy(&along, fields[s / 3]->along[s % 3].data() + at, sizeof(Sixteen));
+        sum[s] += along * four;
       }
     }
   });
   std::array<Eigen::Vector3d, 3> weighed;
   for (std::size_t s = 0; s < kSums; ++s) {
-    const Eight& part = sum[s];
-    weighed[s / 3][static_cast<Eigen::Index>(s % 3)] =
-        static_cast<double>(((part[0] + part[4]) + (part[1] + part[5])) + (part[2] + part[6]));
+    const Sixteen& part = sum[s];
+    float total = 0.0F;
+    for (std::size_t c = 0; c < 3; ++c) {
+      total += (part[c] + part[c + 8]) + (part[c + 4] + part[c + 12]);
+    }
+    weighed[s / 3][static_cast<Eigen::Index>(s % 3)] = static_cast<double>(total);
   }
   return weighed;
 }

@@ -7,12 +7,6 @@
 namespace tpm {
 namespace {
 
-constexpr std::size_t kWide = 8;
-
-std::size_t padded(std::size_t size) {
-  return (size + kWide - 1) / kWide * kWide;
-}
-
 using Index = Eigen::Index;
 
 /// The blocks of the matrix that each front brings in: an entry per edge.
@@ -105,13 +99,6 @@ class Elimination {
   Eigen::MatrixXd dense_;
 };
 
-void put(const Eigen::MatrixXd& matrix, float* to) {
-  const std::size_t stride = padded(static_cast<std::size_t>(matrix.rows()));
-  for (Index j = 0; j < matrix.cols(); ++j, to += stride) {
-    for (Index i = 0; i < matrix.rows(); ++i) to[i] = static_cast<float>(matrix(i, j));
-  }
-}
-
 constexpr std::size_t kNode = 3 * sizeof(float);
 
 /// Four floats at once are moved much faster than three.
@@ -134,19 +121,19 @@ void copy_node(const float* from, float* to) {
 
 FrontalFactor::FrontalFactor(std::shared_ptr<const EliminationFronts> fronts, bool portable)
     : fronts_(std::move(fronts)), kernels_(panel_kernels(portable)) {
-  std::size_t numbers = 0;
+  std::size_t words = 0;
   std::size_t most_own = 0;
   std::size_t most_reached = 0;
   for (const EliminationFronts::Front& front : fronts_->fronts()) {
     const std::size_t own = std::size_t{3} * front.own;
     const std::size_t reached = std::size_t{3} * front.count;
-    front_.push_back(
-        {front.first, front.own, front.rows, front.count, numbers, numbers + own * padded(own)});
-    numbers += own * (padded(own) + padded(reached));
-    most_own = std::max(most_own, padded(own));
-    most_reached = std::max(most_reached, padded(reached));
+    const std::size_t inverse = own * PackedPanel::words_of(own);
+    front_.push_back({front.first, front.own, front.rows, front.count, words, words + inverse});
+    words += inverse + own * PackedPanel::words_of(reached);
+    most_own = std::max(most_own, PackedPanel::filled(own));
+    most_reached = std::max(most_reached, PackedPanel::filled(reached));
   }
-  numbers_.assign(numbers, 0.0F);
+  words_.assign(words, 0);
   own_.assign(most_own + 1, 0.0F);  // with the padding of copy_node
   reached_.assign(most_reached + 1, 0.0F);
   sum_.assign(std::max(most_own, most_reached) + 1, 0.0F);
@@ -160,13 +147,13 @@ std::size_t FrontalFactor::blocks_read(const EliminationFronts& fronts) {
   return blocks;
 }
 
-FloatPanel FrontalFactor::inverse(const Place& front) const {
+PackedPanel FrontalFactor::inverse(const Place& front) const {
   const std::size_t own = std::size_t{3} * front.own;
-  return {numbers_.data() + front.inverse, padded(own), own};
+  return {words_.data() + front.inverse, PackedPanel::filled(own), own};
 }
 
-FloatPanel FrontalFactor::passed(const Place& front) const {
-  return {numbers_.data() + front.passed, padded(std::size_t{3} * front.count),
+PackedPanel FrontalFactor::passed(const Place& front) const {
+  return {words_.data() + front.passed, PackedPanel::filled(std::size_t{3} * front.count),
           std::size_t{3} * front.own};
 }
 
@@ -176,8 +163,9 @@ bool FrontalFactor::factorise(std::span<const Eigen::Matrix3d> diagonal,
   Elimination elimination(*fronts_, diagonal, edges, across);
   for (std::size_t f = 0; f < front_.size(); ++f) {
     if (!elimination.eliminate(f)) return false;
-    put(elimination.inverse, numbers_.data() + front_[f].inverse);
-    put(elimination.down, numbers_.data() + front_[f].passed);
+    const std::span<std::uint32_t> words(words_);
+    pack_panel(elimination.inverse, words.subspan(front_[f].inverse));
+    pack_panel(elimination.down, words.subspan(front_[f].passed));
   }
   return true;
 }
@@ -189,7 +177,7 @@ void FrontalFactor::solve(float* x) noexcept {
     for (std::size_t i = 0; i < front.own; ++i) {
       copy_node(x + 4 * (front.first + i), own_.data() + 3 * i);
     }
-    kernels_.times(passed(front), own_.data(), sum_.data());
+    kernels_.packed_times(passed(front), own_.data(), sum_.data());
     const std::uint32_t* const row = all_rows + front.rows;
     for (std::size_t i = 0; i < front.count; ++i) {
       float* const to = x + std::size_t{4} * row[i];
@@ -204,16 +192,16 @@ void FrontalFactor::solve(float* x) noexcept {
     for (std::size_t i = 0; i < front.own; ++i) {
       copy_node(x + 4 * (front.first + i), own_.data() + 3 * i);
     }
-    kernels_.times(inverse(front), own_.data(), sum_.data());
+    kernels_.packed_times(inverse(front), own_.data(), sum_.data());
     if (front.count > 0) {
-      const FloatPanel down = passed(front);
+      const PackedPanel down = passed(front);
       const std::uint32_t* const row = all_rows + front.rows;
       for (std::size_t i = 0; i < front.count; ++i) {
         copy_node(x + std::size_t{4} * row[i], reached_.data() + 3 * i);
       }
       std::fill(reached_.begin() + std::ptrdiff_t{3} * front.count,
-                reached_.begin() + static_cast<std::ptrdiff_t>(down.stride), 0.0F);
-      kernels_.subtract_transposed(down, reached_.data(), sum_.data());
+                reached_.begin() + static_cast<std::ptrdiff_t>(down.rows), 0.0F);
+      kernels_.subtract_packed_transposed(down, reached_.data(), sum_.data());
     }
     for (std::size_t i = 0; i < front.own; ++i) {
       std::memcpy(x + 4 * (front.first + i), sum_.data() + 3 * i, kNode);

@@ -12,9 +12,9 @@
 namespace tpm {
 
 /// A positive definite matrix of 3x3 blocks, factorised in double precision (multifrontal; Duff and
-/// Reid, ACM TOMS 1983) and kept in single precision for many solutions at little cost: of every
-/// front the inverse of its pivot and what it passes on, as dense blocks. To correct iterates whose
-/// residual is known better.
+/// Reid, ACM TOMS 1983) and kept in 8 binary digits a number for many solutions at little cost,
+/// which is bound by reading them: of every front the inverse of its pivot and what it passes on,
+/// as dense blocks. To correct iterates whose residual is known better.
 class FrontalFactor {
  public:
   using Edge = EliminationFronts::Edge;
@@ -33,8 +33,8 @@ class FrontalFactor {
                                std::span<const Edge> edges,
                                std::span<const Eigen::Matrix3d> across);
 
-  /// Replaces the right-hand side by the solution, to about 1e-5 of it for matrices that are not
-  /// near singular. Allocates nothing.
+  /// Replaces the right-hand side by the solution, to about a hundredth of it for matrices that are
+  /// not near singular. Allocates nothing.
   /// @param x four floats per node, the fourth of no meaning, in the order of elimination; aligned
   ///          to 16 bytes
   void solve(float* x) noexcept;
@@ -43,15 +43,15 @@ class FrontalFactor {
   struct Place {
     std::uint32_t first, own;     ///< nodes
     std::uint32_t rows, count;    ///< of all rows
-    std::size_t inverse, passed;  ///< of numbers_
+    std::size_t inverse, passed;  ///< of words_
   };
-  [[nodiscard]] FloatPanel inverse(const Place& front) const;
-  [[nodiscard]] FloatPanel passed(const Place& front) const;
+  [[nodiscard]] PackedPanel inverse(const Place& front) const;
+  [[nodiscard]] PackedPanel passed(const Place& front) const;
 
   std::shared_ptr<const EliminationFronts> fronts_;
   const PanelKernels& kernels_;
   std::vector<Place> front_;
-  AlignedFloats numbers_;
+  std::vector<std::uint32_t, LineAllocator<std::uint32_t>> words_;
   AlignedFloats own_, reached_, sum_;  ///< of one front, three floats per node
 };
 
