@@ -98,7 +98,8 @@ void ZoneNetwork::compare(PushedContact& tissue, const Constraints& constraints,
     branches.push_back({branch.share, branch.relaxation_time_s});
   }
   const ServoWeights of_period = weights_;
-  const Dense stiff = stiff_, inverse = inverse_;
+  const Dense stiff = stiff_;
+  const Packed inverse = inverse_;
   const std::array<AlignedFloats, 3> field = field_;
   const ComparedMotions asked{.depth_m = options_.deepest_m,
                               .durations = kZoneDurations,

@@ -110,6 +110,14 @@ void ZoneNetwork::Dense::put(const Eigen::MatrixXd& matrix) {
   }
 }
 
+void ZoneNetwork::Packed::put(const Eigen::MatrixXd& matrix) {
+  const auto of_matrix = static_cast<std::size_t>(matrix.rows());
+  rows = PackedPanel::filled(of_matrix);
+  columns = static_cast<std::size_t>(matrix.cols());
+  words.assign(PackedPanel::words_of(of_matrix) * columns, 0);
+  pack_panel(matrix, words);
+}
+
 void ZoneNetwork::reset() noexcept {
   at_contact_.forget();
   elsewhere_.forget();
@@ -171,7 +179,7 @@ ContactAnswer ZoneNetwork::step(const ToolPose& tool) noexcept {
   }
   at_contact_.add_next(displacement_.data(), weights_, force_.data());
   gather(kZoneNext);
-  kernels_.times(inverse_.panel(), right_.data(), change_.data());
+  kernels_.packed_times(inverse_.panel(), right_.data(), change_.data());
   for (std::size_t i = 0; i < zone_.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) displacement_[4 * i + c] += change_[3 * i + c];
   }
@@ -215,7 +223,7 @@ ContactAnswer ZoneNetwork::step(const ToolPose& tool) noexcept {
 BalanceWork ZoneNetwork::work() const noexcept {
   const auto size = [](const Dense& panel) { return panel.stride * panel.columns; };
   return {ServoBonds::kWide * (2 * at_contact_.groups() + elsewhere_.groups()), 0,
-          size(inverse_) + size(stiff_) + size(relaxing_)};
+          inverse_.rows * inverse_.columns + size(stiff_) + size(relaxing_)};
 }
 
 // A Ref is a view: what it shows is changed.

@@ -72,6 +72,13 @@ class ZoneNetwork final : public ContactModel {
     void put(const Eigen::MatrixXd& matrix);
     [[nodiscard]] FloatPanel panel() const { return {numbers.data(), stride, columns}; }
   };
+  /// A dense matrix that only corrects, in half the bytes.
+  struct Packed {
+    std::vector<std::uint32_t, LineAllocator<std::uint32_t>> words;
+    std::size_t rows = 0, columns = 0;
+    void put(const Eigen::MatrixXd& matrix);
+    [[nodiscard]] PackedPanel panel() const { return {words.data(), rows, columns}; }
+  };
   /// What a zone is made from, whatever its period.
   struct Parts {
     std::vector<ServoBonds::Choice> near, far;
@@ -105,7 +112,7 @@ class ZoneNetwork final : public ContactModel {
   Eigen::Matrix3d instantaneous_, equilibrium_;
 
   ServoBonds at_contact_, elsewhere_;
-  Dense inverse_;   ///< of the frozen stiffness, by coordinates of zone and own displacements
+  Packed inverse_;  ///< of the frozen stiffness, by coordinates of zone and own displacements
   Dense stiff_;     ///< of the surroundings in a step, by coordinates of edge and own ones
   Dense relaxing_;  ///< what relaxes of it
   Dense outer_;     ///< displacements outside by those coordinates

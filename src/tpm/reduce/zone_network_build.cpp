@@ -145,7 +145,7 @@ ZoneNetwork::Parts ZoneNetwork::build(PushedContact& tissue) {
 
   parts.frozen = tissue.at(options_.frozen_depth_m * into_, relaxed);
   set_weights(tissue, parts, weights_);
-  for (AlignedFloats* const all : {&right_, &change_}) all->assign(inverse_.stride, 0.0F);
+  for (AlignedFloats* const all : {&right_, &change_}) all->assign(inverse_.rows, 0.0F);
   for (AlignedFloats* const all :
        {&moved_, &offset_, &next_offset_, &pull_, &offset_pull_, &next_pull_}) {
     all->assign(std::max<std::size_t>(stiff_.stride, 8), 0.0F);
@@ -193,7 +193,7 @@ void ZoneNetwork::set_weights(const PushedContact& tissue, const Parts& parts,
   inverse_.put(inverse);
   const Eigen::MatrixXd field = inverse * coupling;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    field_[axis].assign(inverse_.stride, 0.0F);
+    field_[axis].assign(inverse_.rows, 0.0F);
     for (Eigen::Index i = 0; i < n; ++i) {
       field_[axis][static_cast<std::size_t>(i)] =
           static_cast<float>(field(i, static_cast<Eigen::Index>(axis)));
