@@ -365,6 +365,9 @@ StageBalance::Balance StageBalance::balance(double tolerance) {
     last_iterations_ = i;
     if (!std::isfinite(imbalance_)) return Balance::failed;
     if (imbalance_ <= tolerance) {
+      // Of the last correction the adjoint knows what it does to the response.
+      end_response_ = plain_response_[stages_ - 1] +
+                      tissue_.adjoint_sign() * force_.row(stages_ - 1).dot(lane_field_);
       x_ += d_;  // the correction is known: it costs nothing
       return Balance::found;
     }
@@ -396,13 +399,11 @@ StageBalance::ErrorSums StageBalance::error_sums(const LaneBonds::Group& group,
     for (std::size_t i = 0; i < bonds; ++i) {
       const double* const at = followed + kLanes * i;
       const double size_of_aim = std::abs(aim[i]);
-#pragma omp simd
       for (std::size_t p = 0; p < kPlaces; ++p) {
         double difference = weight_of_start[p] * start[i];
         for (std::size_t s = 0; s < kLanes; ++s) difference += weight[kPlaces * s + p] * at[s];
         size[p] += size_of_aim * std::abs(difference);
       }
-#pragma omp simd
       for (std::size_t s = 0; s < kLanes; ++s) stages[s] += aim[i] * at[s];
       start_sum += aim[i] * start[i];
     }
@@ -503,9 +504,7 @@ void StageBalance::accept(TissueState& state, double h, double rate) {
   put_viscous(viscous, state.viscous);
   state.mean = tissue_.bonds().mean_viscous(state.viscous);
   ++work_.steps;
-  // Before the last correction, whose effect the adjoint knows.
-  const Eigen::Index last = stages_ - 1;
-  see(plain_response_[last] + tissue_.adjoint_sign() * force_.row(last).dot(lane_field_));
+  see(end_response_);
 }
 
 }  // namespace tpm::organ

@@ -218,6 +218,7 @@ class StageBalance {
   Start begin_;
   LaneMatrix x_, d_, force_;
   LaneVector plain_response_;  ///< to x_, with forces left
+  double end_response_ = 0.0;  ///< at the end of a balanced step
   LaneMatrix followed_;        ///< of relaxing bonds
   LaneMatrix mean_viscous_;    ///< of relaxing bonds, where they are not linear
   LaneMatrix known_;           ///< find_known()

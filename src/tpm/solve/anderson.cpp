@@ -50,7 +50,6 @@ void Anderson::store(const double* x, const double* d) {
     for (std::size_t begin = 0; begin < stride; begin += kPart) {
       const std::size_t end = std::min(begin + kPart, stride);
       const std::size_t filled = std::min(end, size);
-#pragma omp simd
       for (std::size_t i = begin; i < filled; ++i) {
         const double change = d[i] - last_d[i];
         dd[i] = static_cast<float>(change);
@@ -63,7 +62,6 @@ void Anderson::store(const double* x, const double* d) {
         Sums products = new_sums[k];
         Sums aims = d_sums[k];
         for (std::size_t i = begin; i < end; i += kWide) {
-#pragma omp simd
           for (std::size_t s = 0; s < kWide; ++s) {
             const auto difference = static_cast<double>(column[i + s]);
             products[s] += difference * static_cast<double>(dd[i + s]);
@@ -109,12 +107,10 @@ void Anderson::step(Eigen::Ref<Eigen::VectorXd> x, const Eigen::Ref<const Eigen:
   run_wide([=]() __attribute__((always_inline)) {
     for (std::size_t begin = 0; begin < size; begin += kPart) {
       const std::size_t end = std::min(begin + kPart, size);
-#pragma omp simd
       for (std::size_t i = begin; i < end; ++i) to[i] += plain[i];
       for (std::size_t k = 0; k < columns; ++k) {
         const float* const column = all + k * stride;
         const double part = share[k];
-#pragma omp simd
         for (std::size_t i = begin; i < end; ++i) to[i] -= part * static_cast<double>(column[i]);
       }
     }

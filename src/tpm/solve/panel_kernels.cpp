@@ -46,10 +46,8 @@ void packed_times_portable(const PackedPanel& panel, const float* x, float* out)
     for (std::size_t i = 0; i < panel.rows; i += 2 * kPanelWide, word += kPanelWide) {
       float* const first = out + i;
       float* const second = first + kPanelWide;
-#pragma omp simd
       for (std::size_t s = 0; s < kPanelWide; ++s) first[s] += first_of(word[s]) * by;
       if (i + kPanelWide == panel.rows) continue;
-#pragma omp simd
       for (std::size_t s = 0; s < kPanelWide; ++s) second[s] += second_of(word[s]) * by;
     }
   }
@@ -63,10 +61,8 @@ void subtract_packed_transposed_portable(const PackedPanel& panel, const float* 
     for (std::size_t i = 0; i < panel.rows; i += 2 * kPanelWide, word += kPanelWide) {
       const float* const first = x + i;
       const float* const second = first + kPanelWide;
-#pragma omp simd
       for (std::size_t s = 0; s < kPanelWide; ++s) sum[s] += first_of(word[s]) * first[s];
       if (i + kPanelWide == panel.rows) continue;
-#pragma omp simd
       for (std::size_t s = 0; s < kPanelWide; ++s) sum[s] += second_of(word[s]) * second[s];
     }
     for (const float part : sum) out[j] -= part;
