@@ -75,29 +75,29 @@ constexpr PanelKernels kPortable{times_portable, subtract_transposed_portable,
 #ifdef TPM_HAS_AVX2
 
 /// `Count` vectors of the product, from row `begin` on.
-template <int Count>
+template <std::size_t Count>
 [[gnu::target("avx2,fma"), gnu::always_inline]] inline void rows_times(const FloatPanel& panel,
                                                                        std::size_t begin,
                                                                        const float* x, float* out) {
   __m256 even[Count], odd[Count];
-  for (int c = 0; c < Count; ++c) even[c] = odd[c] = _mm256_setzero_ps();
+  for (std::size_t c = 0; c < Count; ++c) even[c] = odd[c] = _mm256_setzero_ps();
   const float* column = panel.numbers + begin;
   std::size_t j = 0;
   for (; j + 2 <= panel.columns; j += 2, column += 2 * panel.stride) {
     const __m256 x0 = _mm256_broadcast_ss(x + j);
     const __m256 x1 = _mm256_broadcast_ss(x + j + 1);
-    for (int c = 0; c < Count; ++c) {
+    for (std::size_t c = 0; c < Count; ++c) {
       even[c] = _mm256_fmadd_ps(_mm256_load_ps(column + 8 * c), x0, even[c]);
       odd[c] = _mm256_fmadd_ps(_mm256_load_ps(column + panel.stride + 8 * c), x1, odd[c]);
     }
   }
   if (j < panel.columns) {
     const __m256 x0 = _mm256_broadcast_ss(x + j);
-    for (int c = 0; c < Count; ++c) {
+    for (std::size_t c = 0; c < Count; ++c) {
       even[c] = _mm256_fmadd_ps(_mm256_load_ps(column + 8 * c), x0, even[c]);
     }
   }
-  for (int c = 0; c < Count; ++c) {
+  for (std::size_t c = 0; c < Count; ++c) {
     _mm256_store_ps(out + begin + 8 * c, _mm256_add_ps(even[c], odd[c]));
   }
 }
@@ -166,20 +166,20 @@ struct PackedWords {
 
 /// `Count` times eight words of each column of the product; the last of them without second
 /// numbers if `kSingle`.
-template <int Count, bool kSingle>
+template <std::size_t Count, bool kSingle>
 [[gnu::target("avx2,fma"), gnu::always_inline]] inline void words_times(const std::uint32_t* column,
                                                                         std::size_t stride,
                                                                         std::size_t columns,
                                                                         const float* x,
                                                                         float* out) {
   __m256 first[2][Count], second[2][Count];
-  for (int k = 0; k < 2; ++k) {
-    for (int c = 0; c < Count; ++c) first[k][c] = second[k][c] = _mm256_setzero_ps();
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (std::size_t c = 0; c < Count; ++c) first[k][c] = second[k][c] = _mm256_setzero_ps();
   }
-  const auto add = [&](int k, const std::uint32_t* from, float by)
+  const auto add = [&](std::size_t k, const std::uint32_t* from, float by)
       __attribute__((target("avx2,fma"), always_inline)) {
     const __m256 xj = _mm256_set1_ps(by);
-    for (int c = 0; c < Count; ++c) {
+    for (std::size_t c = 0; c < Count; ++c) {
       const PackedWords w(from + 8 * c);
       first[k][c] = _mm256_fmadd_ps(w.first(), xj, first[k][c]);
       if (!kSingle || c + 1 < Count) second[k][c] = _mm256_fmadd_ps(w.second(), xj, second[k][c]);
@@ -191,7 +191,7 @@ template <int Count, bool kSingle>
     add(1, column + stride, x[j + 1]);
   }
   if (j < columns) add(0, column, x[j]);
-  for (int c = 0; c < Count; ++c) {
+  for (std::size_t c = 0; c < Count; ++c) {
     _mm256_store_ps(out + 16 * c, _mm256_add_ps(first[0][c], first[1][c]));
     if (kSingle && c + 1 == Count) continue;
     _mm256_store_ps(out + 16 * c + 8, _mm256_add_ps(second[0][c], second[1][c]));
@@ -222,36 +222,36 @@ template <int Count, bool kSingle>
 }
 
 /// Sums of `Columns` columns times x, subtracted from out.
-template <int Columns>
+template <std::size_t Columns>
 [[gnu::target("avx2,fma"), gnu::always_inline]] inline void subtract_columns(
     const std::uint32_t* column, std::size_t stride, std::size_t rows, const float* x, float* out) {
   __m256 first[Columns], second[Columns];
-  for (int c = 0; c < Columns; ++c) first[c] = second[c] = _mm256_setzero_ps();
+  for (std::size_t c = 0; c < Columns; ++c) first[c] = second[c] = _mm256_setzero_ps();
   std::size_t i = 0;
   for (; i + 16 <= rows; i += 16, column += 8) {
     const __m256 x0 = _mm256_load_ps(x + i);
     const __m256 x1 = _mm256_load_ps(x + i + 8);
-    for (int c = 0; c < Columns; ++c) {
-      const PackedWords w(column + static_cast<std::size_t>(c) * stride);
+    for (std::size_t c = 0; c < Columns; ++c) {
+      const PackedWords w(column + c * stride);
       first[c] = _mm256_fmadd_ps(w.first(), x0, first[c]);
       second[c] = _mm256_fmadd_ps(w.second(), x1, second[c]);
     }
   }
   if (i < rows) {
     const __m256 x0 = _mm256_load_ps(x + i);
-    for (int c = 0; c < Columns; ++c) {
-      const PackedWords w(column + static_cast<std::size_t>(c) * stride);
+    for (std::size_t c = 0; c < Columns; ++c) {
+      const PackedWords w(column + c * stride);
       first[c] = _mm256_fmadd_ps(w.first(), x0, first[c]);
     }
   }
-  for (int c = 0; c < Columns; ++c) first[c] = _mm256_add_ps(first[c], second[c]);
+  for (std::size_t c = 0; c < Columns; ++c) first[c] = _mm256_add_ps(first[c], second[c]);
   if constexpr (Columns == 4) {
     const __m256 sums =
         _mm256_hadd_ps(_mm256_hadd_ps(first[0], first[1]), _mm256_hadd_ps(first[2], first[3]));
     const __m128 sum = _mm_add_ps(_mm256_castps256_ps128(sums), _mm256_extractf128_ps(sums, 1));
     _mm_storeu_ps(out, _mm_sub_ps(_mm_loadu_ps(out), sum));
   } else {
-    for (int c = 0; c < Columns; ++c) {
+    for (std::size_t c = 0; c < Columns; ++c) {
       __m128 sum = _mm_add_ps(_mm256_castps256_ps128(first[c]), _mm256_extractf128_ps(first[c], 1));
       sum = _mm_hadd_ps(sum, sum);
       sum = _mm_hadd_ps(sum, sum);
