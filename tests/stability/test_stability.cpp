@@ -3,10 +3,26 @@
 #include <cmath>
 
 #include "tpm/stability/study.hpp"
+#include "tpm/stability/verdict.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;
 using namespace tpm::study;
+
+TEST_CASE(
+    "a run that stays on one side of the reference has a wrong steady state, whatever rounding "
+    "does") {
+  const Eigen::VectorXd reference = Eigen::VectorXd::LinSpaced(8, 0.0, 1.0);
+  MethodRun run;
+  for (const double rounding : {-1e-13, 0.0, 1e-13}) {
+    CAPTURE(rounding);
+    run.response = reference.array() - 0.2;
+    run.response[0] = reference[0] + rounding;
+    CHECK(classify_run(run, reference, 1.0, false).found == StabilityClass::wrong_steady_state);
+  }
+  run.response[0] = reference[0] + 0.01;
+  CHECK(classify_run(run, reference, 1.0, false).found == StabilityClass::oscillates);
+}
 
 TEST_CASE("what is above the limit of a step rule fails, and what is below does not", "[heavy]") {
   std::size_t cells = 0;
@@ -26,5 +42,5 @@ TEST_CASE("what is above the limit of a step rule fails, and what is below does 
       }
     }
   }
-  CHECK(cells == 9 * 21 * 21);
+  CHECK(cells == std::size_t{9} * 21 * 21);
 }

@@ -6,7 +6,8 @@
 namespace tpm::study {
 namespace {
 
-constexpr double kGrows = 1.1;  // of the largest difference, from the first half to the second
+constexpr double kGrows = 1.1;       // of the largest difference, from the first half to the second
+constexpr double kBothSides = 1e-6;  // share of it by which a run goes to its other side too
 
 StabilityClass class_of(MethodEnd end) {
   switch (end) {
@@ -48,7 +49,7 @@ StabilityVerdict classify_run(const MethodRun& run, const Eigen::VectorXd& refer
   if (after > kGrows * before) {
     verdict.found = moves ? StabilityClass::energy_grew : StabilityClass::diverged;
     verdict.reason = "the difference from the reference still grows";
-  } else if (swing > std::abs(middle)) {
+  } else if (swing > (1.0 + kBothSides) * std::abs(middle)) {
     verdict.found = StabilityClass::oscillates;
   } else {
     verdict.found = StabilityClass::wrong_steady_state;
