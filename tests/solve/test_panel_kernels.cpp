@@ -10,7 +10,7 @@ using namespace tpm;
 TEST_CASE("packed panels are the matrix to 1/256 of each number, on every processor") {
   std::mt19937 random(0);
   std::normal_distribution<double> number;
-  std::vector<std::uint32_t, LineAllocator<std::uint32_t>> words;
+  AlignedWords words;
   for (const Eigen::Index rows : {1, 8, 9, 16, 17, 24, 25, 33, 47, 64, 65}) {
     for (const Eigen::Index columns : {1, 2, 3, 4, 5, 9}) {
       CAPTURE(rows, columns);

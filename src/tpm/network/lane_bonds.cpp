@@ -11,7 +11,6 @@ namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kSphere = std::size_t{3} * kLanes;
-constexpr std::size_t kBatch = 16;                      // bonds
 constexpr std::size_t kDown = std::size_t{2} * kLanes;  // from x to z of a sphere
 
 /// The place or force of a sphere, a row a lane.
@@ -217,38 +216,26 @@ struct LaneBondKernels {
     const double* const weight = following.weights->of_stages.data();
     const double* const from_start = following.weights->of_start.data();
     const double* const from_viscous = following.weights->of_viscous.data();
-    // Batch by batch, so that what one bond waits for is hidden behind the others.
-    std::array<Span, kBatch> spans;
-    std::array<Lanes, kBatch> viscous;
-    for (std::size_t first = begin; first < end; first += kBatch) {
-      const std::size_t count = std::min(kBatch, end - first);
-      for (std::size_t n = 0; n < count; ++n) {
-        const Data& bond = bonds[first + n];
-        measure(x + kSphere * bond.a, x + kSphere * bond.b, spans[n]);
-        double* const l = followed + kLanes * (first + n);
+    Span span;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Data& bond = bonds[i];
+      measure(x + kSphere * bond.a, x + kSphere * bond.b, span);
+      double* const l = followed + kLanes * i;
+      Lanes viscous;
 #pragma omp simd
-        for (std::size_t s = 0; s < kLanes; ++s) l[s] = spans[n].length[s] - bond.rest_length_m;
-      }
-      for (std::size_t n = 0; n < count; ++n) {
-        const std::size_t i = first + n;
-        const double* const l = followed + kLanes * i;
-        Lanes sum;
+      for (std::size_t s = 0; s < kLanes; ++s) l[s] = span.length[s] - bond.rest_length_m;
 #pragma omp simd
-        for (std::size_t s = 0; s < kLanes; ++s) {
-          double lane = 0.0;
-          if constexpr (kKnown) {
-            lane = following.known[kLanes * i + s];
-          } else {
-            lane = from_start[s] * following.followed[i] + from_viscous[s] * following.mean[i];
-          }
-          for (std::size_t j = 0; j < kLanes; ++j) lane += weight[kLanes * j + s] * l[j];
-          sum[s] = lane;
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        double lane = 0.0;
+        if constexpr (kKnown) {
+          lane = following.known[kLanes * i + s];
+        } else {
+          lane = from_start[s] * following.followed[i] + from_viscous[s] * following.mean[i];
         }
-        viscous[n] = sum;
+        for (std::size_t j = 0; j < kLanes; ++j) lane += weight[kLanes * j + s] * l[j];
+        viscous[s] = lane;
       }
-      for (std::size_t n = 0; n < count; ++n) {
-        pull_linear(bonds[first + n], spans[n], viscous[n].data(), f);
-      }
+      pull_linear(bond, span, viscous.data(), f);
     }
   }
 };

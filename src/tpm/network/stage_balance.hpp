@@ -123,10 +123,6 @@ class StageBalance {
   /// The mean viscous elongations in every lane.
   void apply(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
              const LaneMatrix& known, LaneMatrix& mean) const;
-  /// The same for a sweep over linear bonds; a view of its arguments.
-  [[nodiscard]] std::vector<LaneBonds::Following> following(const StepWeights& weights,
-                                                            const Start& start,
-                                                            const LaneMatrix& known) const;
   /// Every viscous elongation in one lane, by (branch, bond).
   void viscous_in_lane(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
                        Eigen::Index lane, Eigen::MatrixXd& viscous) const;
@@ -171,6 +167,10 @@ class StageBalance {
 
   [[nodiscard]] double node(int lane) const;
   void set_weights(double h);
+  void set_error_weights(double h);
+  void choose_error_places();
+  /// For sweeps over linear bonds: a view of weights, start and known part of the step.
+  void set_following();
   /// The share of the viscous elongation of each law that follows in a step, the mean over stages.
   [[nodiscard]] RelaxationFactor relaxation_factor_of_step() const;
   /// The largest difference of two such shares.
@@ -223,6 +223,7 @@ class StageBalance {
   LaneMatrix mean_viscous_;    ///< of relaxing bonds, where they are not linear
   LaneMatrix known_;           ///< find_known()
   StepWeights weights_;
+  std::vector<LaneBonds::Following> following_;
   LaneVector imposed_;
   /// What tells the two collocations apart, for one relaxation time: by place measured, the
   /// stages' and two more; beyond them 0.

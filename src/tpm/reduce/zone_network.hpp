@@ -74,7 +74,7 @@ class ZoneNetwork final : public ContactModel {
   };
   /// A dense matrix that only corrects, in half the bytes.
   struct Packed {
-    std::vector<std::uint32_t, LineAllocator<std::uint32_t>> words;
+    AlignedWords words;
     std::size_t rows = 0, columns = 0;
     void put(const Eigen::MatrixXd& matrix);
     [[nodiscard]] PackedPanel panel() const { return {words.data(), rows, columns}; }

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <new>
 #include <vector>
 
@@ -27,5 +28,6 @@ struct LineAllocator {
 };
 
 using AlignedFloats = std::vector<float, LineAllocator<float>>;
+using AlignedWords = std::vector<std::uint32_t, LineAllocator<std::uint32_t>>;
 
 }  // namespace tpm

@@ -12,9 +12,9 @@
 namespace tpm {
 
 /// A positive definite matrix of 3x3 blocks, factorised in double precision (multifrontal; Duff and
-/// Reid, ACM TOMS 1983) and kept in 8 binary digits a number for many solutions at little cost,
-/// which is bound by reading them: of every front the inverse of its pivot and what it passes on,
-/// as dense blocks. To correct iterates whose residual is known better.
+/// Reid, ACM TOMS 1983) and kept for many solutions at little cost, to correct iterates whose
+/// residual is known better: of every front the inverse of its pivot and what it passes on, as
+/// dense blocks in 8 binary digits a number, since a solution is bound by reading them.
 class FrontalFactor {
  public:
   using Edge = EliminationFronts::Edge;
@@ -51,7 +51,7 @@ class FrontalFactor {
   std::shared_ptr<const EliminationFronts> fronts_;
   const PanelKernels& kernels_;
   std::vector<Place> front_;
-  std::vector<std::uint32_t, LineAllocator<std::uint32_t>> words_;
+  AlignedWords words_;
   AlignedFloats own_, reached_, sum_;  ///< of one front, three floats per node
 };
 

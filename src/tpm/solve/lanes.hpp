@@ -29,8 +29,8 @@ struct ViscousWeights {
              Eigen::Ref<LaneMatrix> out) const;
 };
 
-/// What every lane makes of all of them: out = weights in, not what Eigen makes of so small a
-/// matrix beside so wide a one. `in` is no part of `out`.
+/// out = weights in, lane by lane of all lanes, without the packing that Eigen's product does,
+/// which does not pay for so small a matrix. `in` is no part of `out`.
 void mix_lanes(const LaneSquare& weights, const LaneMatrix& in, LaneMatrix& out);
 
 /// All numbers of all states as one vector.

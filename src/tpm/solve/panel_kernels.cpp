@@ -21,15 +21,6 @@ void times_portable(const FloatPanel& panel, const float* x, float* out) noexcep
   }
 }
 
-void subtract_transposed_portable(const FloatPanel& panel, const float* x, float* out) noexcept {
-  const float* column = panel.numbers;
-  for (std::size_t j = 0; j < panel.columns; ++j, column += panel.stride) {
-    float sum[kPanelWide] = {};
-    for (std::size_t i = 0; i < panel.stride; ++i) sum[i % kPanelWide] += column[i] * x[i];
-    for (const float part : sum) out[j] -= part;
-  }
-}
-
 /// The first of two numbers in a word: the digits of the second are the last ones of its own.
 float first_of(std::uint32_t word) {
   return std::bit_cast<float>(word);
@@ -69,8 +60,8 @@ void subtract_packed_transposed_portable(const PackedPanel& panel, const float* 
   }
 }
 
-constexpr PanelKernels kPortable{times_portable, subtract_transposed_portable,
-                                 packed_times_portable, subtract_packed_transposed_portable};
+constexpr PanelKernels kPortable{times_portable, packed_times_portable,
+                                 subtract_packed_transposed_portable};
 
 #ifdef TPM_HAS_AVX2
 
@@ -118,36 +109,6 @@ template <std::size_t Count>
       break;
     default:
       break;
-  }
-}
-
-[[gnu::target("avx2,fma")]] void subtract_transposed_avx2(const FloatPanel& panel, const float* x,
-                                                          float* out) noexcept {
-  const float* column = panel.numbers;
-  const std::size_t stride = panel.stride;
-  std::size_t j = 0;
-  for (; j + 4 <= panel.columns; j += 4, column += 4 * stride) {
-    __m256 s0 = _mm256_setzero_ps(), s1 = s0, s2 = s0, s3 = s0;
-    for (std::size_t i = 0; i < stride; i += kPanelWide) {
-      const __m256 v = _mm256_load_ps(x + i);
-      s0 = _mm256_fmadd_ps(_mm256_load_ps(column + i), v, s0);
-      s1 = _mm256_fmadd_ps(_mm256_load_ps(column + stride + i), v, s1);
-      s2 = _mm256_fmadd_ps(_mm256_load_ps(column + 2 * stride + i), v, s2);
-      s3 = _mm256_fmadd_ps(_mm256_load_ps(column + 3 * stride + i), v, s3);
-    }
-    const __m256 sums = _mm256_hadd_ps(_mm256_hadd_ps(s0, s1), _mm256_hadd_ps(s2, s3));
-    const __m128 sum = _mm_add_ps(_mm256_castps256_ps128(sums), _mm256_extractf128_ps(sums, 1));
-    _mm_storeu_ps(out + j, _mm_sub_ps(_mm_loadu_ps(out + j), sum));
-  }
-  for (; j < panel.columns; ++j, column += stride) {
-    __m256 s0 = _mm256_setzero_ps();
-    for (std::size_t i = 0; i < stride; i += kPanelWide) {
-      s0 = _mm256_fmadd_ps(_mm256_load_ps(column + i), _mm256_load_ps(x + i), s0);
-    }
-    __m128 sum = _mm_add_ps(_mm256_castps256_ps128(s0), _mm256_extractf128_ps(s0, 1));
-    sum = _mm_hadd_ps(sum, sum);
-    sum = _mm_hadd_ps(sum, sum);
-    out[j] -= _mm_cvtss_f32(sum);
   }
 }
 
@@ -284,8 +245,7 @@ template <std::size_t Columns>
   }
 }
 
-constexpr PanelKernels kAvx2{times_avx2, subtract_transposed_avx2, packed_times_avx2,
-                             subtract_packed_transposed_avx2};
+constexpr PanelKernels kAvx2{times_avx2, packed_times_avx2, subtract_packed_transposed_avx2};
 
 #endif
 

@@ -40,10 +40,9 @@ void pack_panel(const Eigen::MatrixXd& matrix, std::span<std::uint32_t> words);
 struct PanelKernels {
   /// out = panel x; `out` has `stride` numbers and is aligned to 32 bytes.
   void (*times)(const FloatPanel& panel, const float* x, float* out) noexcept;
-  /// out -= panel^T x; `x` has `stride` numbers and is aligned to 32 bytes.
-  void (*subtract_transposed)(const FloatPanel& panel, const float* x, float* out) noexcept;
-  /// The same of packed panels, with `rows` in place of `stride`.
+  /// The same of a packed panel; `out` has `rows` numbers.
   void (*packed_times)(const PackedPanel& panel, const float* x, float* out) noexcept;
+  /// out -= panel^T x; `x` has `rows` numbers and is aligned to 32 bytes.
   void (*subtract_packed_transposed)(const PackedPanel& panel, const float* x, float* out) noexcept;
 };
 
