@@ -3,6 +3,13 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
+namespace {
+
+ViscousState all_relaxed(const TissueState& rest) {
+  return {Eigen::VectorXd::Zero(rest.followed.size()), 1.0};
+}
+
+}  // namespace
 
 DrivenTissue::DrivenTissue(const BondSystem& bonds, Positions rest, Constraints constraints,
                            const Probes& probes, Drive drive, EquilibriumOptions options)
@@ -142,7 +149,7 @@ DrivenTissue::UnitField DrivenTissue::unit_field(const TissueState& state,
   if (!depth_driven()) {
     field.displacement = unit;
     equilibrium_.displace(field.displacement);
-    field.stiffness = along(field.displacement);
+    field.stiffness = field.whole = along(field.displacement);
     field.adjoint = field.displacement;
     return field;
   }
@@ -152,12 +159,13 @@ DrivenTissue::UnitField DrivenTissue::unit_field(const TissueState& state,
   equilibrium_.displace(field.displacement);
   field.stiffness = -pushed.cwiseProduct(field.displacement).sum();
   field.displacement += unit;
+  field.whole = pushed.cwiseProduct(field.displacement).sum();
   field.adjoint = field.displacement;
   if (!pushed.isZero(0.0)) return field;
   const Eigen::Matrix3Xd push = unit_on_touched();
   field.adjoint = push;
   equilibrium_.displace(field.adjoint);
-  field.stiffness = 1.0 / push.cwiseProduct(field.adjoint).sum();
+  field.stiffness = field.whole = 1.0 / push.cwiseProduct(field.adjoint).sum();
   field.adjoint *= field.stiffness;
   return field;
 }
@@ -169,14 +177,20 @@ double DrivenTissue::held_stiffness(const Positions& position,
   return along(pushed);
 }
 
-double DrivenTissue::linear_response(const TissueState& rest, double peak) {
-  const ViscousState relaxed{Eigen::VectorXd::Zero(rest.followed.size()), 1.0};
-  if (!equilibrium_.factorise(rest.position, relaxed)) return 0.0;
-  const UnitField field = unit_field(rest, relaxed);
-  if (!depth_driven()) return field.stiffness * peak;
+double DrivenTissue::relaxed_response(const TissueState& rest,
+                                      const Eigen::Matrix3Xd& displacement) const {
   Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  bonds_.add_stiffness_times(rest.position, relaxed, field.displacement, force);
-  return along(force) * peak;
+  bonds_.add_stiffness_times(rest.position, all_relaxed(rest), displacement, force);
+  const double work = displacement.cwiseProduct(force).sum();
+  if (depth_driven()) return work;
+  const double moved = along(displacement);
+  return moved * moved / work;
+}
+
+double DrivenTissue::linear_response(const TissueState& rest, double peak) {
+  const ViscousState relaxed = all_relaxed(rest);
+  if (!equilibrium_.factorise(rest.position, relaxed)) return 0.0;
+  return peak * relaxed_response(rest, unit_field(rest, relaxed).displacement);
 }
 
 double DrivenTissue::push_on_tissue(const Eigen::Matrix3Xd& on_driven) const {

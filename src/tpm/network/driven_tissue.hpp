@@ -71,6 +71,7 @@ class DrivenTissue {
     /// is nothing, that of a unit depth imposed on the spheres that it touched first.
     Eigen::Matrix3Xd adjoint;
     double stiffness = 0.0;  ///< work of `adjoint`: N/m under an imposed depth, m/N under a load
+    double whole = 0.0;      ///< the same with the work of what is driven
   };
   /// From the last factorisation, which was at this state and viscous state.
   [[nodiscard]] UnitField unit_field(const TissueState& state,
@@ -80,6 +81,11 @@ class DrivenTissue {
   /// Force on what is driven per displacement along the probe while all else stands still, N/m.
   [[nodiscard]] double held_stiffness(const Positions& position,
                                       const ViscousState& viscous_state) const;
+
+  /// Response per unit of what is imposed with the equilibrium stiffness at rest, given what the
+  /// displacements are about: their errors count squared.
+  [[nodiscard]] double relaxed_response(const TissueState& rest,
+                                        const Eigen::Matrix3Xd& displacement) const;
 
   /// Size of the response to a peak of what is imposed, with the equilibrium stiffness at rest.
   [[nodiscard]] double linear_response(const TissueState& rest, double peak);

@@ -18,10 +18,12 @@
 namespace tpm::organ {
 namespace {
 
-constexpr double kStepShare = 0.1;      // of the tolerance, for one step
-constexpr double kLeastStep = 1e-9;     // of a piece of the protocol
-constexpr double kLeastMove = 1e-9;     // of a jump
-constexpr double kFirstStep = 3.0;      // after a change of rate, in the shortest relaxation times
+constexpr double kStepShare = 0.1;   // of the tolerance, for one step
+constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
+constexpr double kLeastMove = 1e-9;  // of a jump
+// A step of p stages after a change of rate errs by about (h / (kFirstStep tau))^(p + 1), with the
+// shortest relaxation time.
+constexpr double kFirstStep = 28.0;
 constexpr double kMostGrowth = 30.0;    // from one step to the next
 constexpr double kLanded = 1.0 - 1e-6;  // of a step that was to end where a contact changes
 constexpr std::size_t kMostChangesTogether = 4;  // of a contact at one time
@@ -89,9 +91,24 @@ class Run {
   /// Puts the tissue at rest and sets what tolerances refer to.
   void set_scales(double time_s) {
     state_ = tissue_.at_rest(time_s);
-    const double unit = tissue_.linear_response(state_, 1.0);
-    stages_.set_unit_response(unit);
-    stages_.set_scale(unit * protocol_.peak());
+    stages_.begin(state_, first_step_s(first_change_s()), protocol_.peak());
+  }
+
+  /// How long the first piece takes in which the imposed value changes gradually, s.
+  [[nodiscard]] double first_change_s() const {
+    const auto knots = protocol_.knots();
+    for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+      const double length_s = knots[k + 1].time_s - knots[k].time_s;
+      if (length_s > 0.0 && knots[k + 1].value != knots[k].value) return length_s;
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  /// The first step that is tried in a piece of the protocol, s.
+  [[nodiscard]] double first_step_s(double length_s) const {
+    const double of_time = kFirstStep * std::pow(options_.tolerance, 1.0 / (options_.stages + 1));
+    const double fit = of_time * tissue_.bonds().shortest_relaxation_time_s();
+    return std::min(length_s, options_.step_s.value_or(fit));
   }
 
   void start() {
@@ -178,8 +195,7 @@ class Run {
     const double length = to.time_s - from.time_s;
     const double rate = (to.value - from.value) / length;
     StepGrowth growth(options_.stages + 1);
-    double h = std::min(length, options_.step_s.value_or(
-                                    kFirstStep * tissue_.bonds().shortest_relaxation_time_s()));
+    double h = first_step_s(length);
     if (rate == 0.0 && from.value == 0.0 && is_relaxed()) return stand_still(to.time_s);
     while (state_.time_s < to.time_s) {
       const double left = to.time_s - state_.time_s;

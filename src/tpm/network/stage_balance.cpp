@@ -10,12 +10,13 @@ namespace tpm::organ {
 namespace {
 
 constexpr int kMostIterations = 25;
-constexpr int kTooManyIterations = 8;     // a new factorisation pays
-constexpr double kFollowingChange = 0.6;  // likewise
-constexpr double kHopeless = 10.0;        // times the tolerance: an error that no balance mends
-constexpr int kLastHopeless = 2;          // iterations after which only the balance decides
-constexpr double kFurthestExtrapolation = 1.0;  // of the step before
-constexpr Eigen::Index kAndersonDepth = 5;
+constexpr int kTooManyIterations = 8;  // a new factorisation pays
+// Times the tolerance: a bound of what one more correction mends.
+constexpr double kLeftToCorrect = 3.0;
+constexpr double kMixingShare = 0.8;  // of what relaxes on average: what relaxes less is overdone
+constexpr double kHopeless = 10.0;    // times the tolerance: an error that no balance mends
+constexpr int kLastHopeless = 2;      // iterations after which only the balance decides
+constexpr Eigen::Index kAndersonDepth = 7;
 // How far what is driven may go at one step of a load: beyond, it may have snapped to another
 // place.
 constexpr double kLongestMove = 0.25;    // of a bond
@@ -40,8 +41,8 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
       choosing_(choosing),
       coordinates_(3 * static_cast<Eigen::Index>(tissue.constraints().size())),
       bonds_(tissue.bonds()),
-      full_(with_start(radau_nodes(stages))),
       inner_(radau_nodes(stages)),
+      full_(with_start(inner_.nodes())),
       factor_(tissue.equilibrium()),
       anderson_(coordinates_ * kLanes, kAndersonDepth),
       x_(kLanes, coordinates_),
@@ -56,6 +57,17 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
 
 double StageBalance::node(int lane) const {
   return inner_.nodes()[static_cast<std::size_t>(std::min(lane, stages_ - 1))];
+}
+
+void StageBalance::begin(const TissueState& rest, double h, double peak) {
+  set_weights(h);
+  const double unit =
+      refactorise(rest, relaxation_factor_of_step())
+          ? tissue_.relaxed_response(
+                rest, Eigen::Map<const Eigen::Matrix3Xd>(lane_field_.data(), 3, coordinates_ / 3))
+          : tissue_.linear_response(rest, 1.0);
+  unit_response_ = std::abs(unit);
+  scale_ = std::abs(unit * peak);
 }
 
 TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, double tolerance) {
@@ -76,7 +88,7 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   work_.factorisations += search.factorisations;
   work_.back_solves += search.iterations;
   factorised_ = false;
-  has_last_ = false;
+  last_rate_.reset();
   if (!search.stable) return TissueMove::unstable;
   if (!search.converged) return TissueMove::unbalanced;
   const double change_m = std::abs(tissue_.depth_of(position - state.position));
@@ -258,7 +270,6 @@ bool StageBalance::refactorise(const TissueState& state,
   if (!factorised_) return false;
   factor_.take();
   const DrivenTissue::UnitField field = tissue_.unit_field(state, viscous_state);
-  path_stiffness_ = field.stiffness;
   lane_field_ = by_coordinate(field.displacement);
   ++work_.back_solves;
   Eigen::VectorXd change;
@@ -268,8 +279,53 @@ bool StageBalance::refactorise(const TissueState& state,
   rounding_ =
       kRoundings * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
   if (tissue_.depth_driven()) rounding_ *= tissue_.held_stiffness(state.position, viscous_state);
+  set_relaxing_shares(state, change, field);
   last_iterations_ = 0;
   return true;
+}
+
+void StageBalance::set_relaxing_shares(const TissueState& state, const Eigen::VectorXd& change,
+                                       const DrivenTissue::UnitField& field) {
+  Eigen::VectorXd slope;
+  tissue_.bonds().kernel_slopes(state.position, slope);
+  relaxing_share_.assign(tissue_.bonds().laws().size(), 0.0);
+  double whole = field.whole;
+  double relaxing = 0.0;
+  for (const std::size_t bond : bonds_.relaxing_bonds()) {
+    const auto i = static_cast<Eigen::Index>(bond);
+    const std::size_t law = tissue_.bonds().law_of(bond);
+    const double energy = tissue_.bonds().relaxing()[i] * slope[i] * change[i] * change[i];
+    relaxing_share_[law] += energy;
+    relaxing += energy;
+    whole += relaxation_factor_(law) * energy;
+  }
+  // Compressed bonds can take more than they give; what relaxes is no more than all.
+  for (double& share : relaxing_share_) share *= kMixingShare / std::max(whole, relaxing);
+  // Of the response to what is left, and to what follows it.
+  bounding_stiffness_ = field.stiffness + relaxing;
+}
+
+LaneSquare StageBalance::mixing(const StepWeights& weights) const {
+  LaneSquare coupled = LaneSquare::Identity();
+  double factorised = 1.0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const std::size_t law = bonds_.groups()[i].law;
+    coupled -= relaxing_share_[law] * weights[i].mean.of_stages;
+    factorised -= relaxing_share_[law] * relaxation_factor_(law);
+  }
+  LaneSquare mixing = factorised * coupled.inverse();
+  for (Eigen::Index lane = stages_; lane < kLanes; ++lane)
+    mixing.row(lane) = mixing.row(stages_ - 1);
+  return mixing;
+}
+
+double StageBalance::correction(const LaneMatrix& force, const LaneSquare& mixing, LaneMatrix& d) {
+  solved_ = force;
+  factor_.solve(solved_);
+  tissue_.constraints().project(solved_);
+  mix_lanes(mixing, solved_, d);
+  const double energy = solved_.cwiseProduct(force).rowwise().sum().maxCoeff();
+  return std::isfinite(energy) ? std::sqrt(std::max(energy, 0.0) * bounding_stiffness_) : energy;
 }
 
 void StageBalance::require_factor(const TissueState& state,
@@ -281,26 +337,17 @@ void StageBalance::require_factor(const TissueState& state,
 }
 
 void StageBalance::predict(const TissueState& state, double h, double rate) {
-  LaneVector c;
-  for (int lane = 0; lane < kLanes; ++lane) c[lane] = node(lane);
-  imposed_ = (h * rate * c).array() + state.imposed;
-  if (has_last_ && last_rate_ == rate) {
-    LaneSquare shape = LaneSquare::Zero();
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const double ahead = std::min(c[lane] * h / last_h_, kFurthestExtrapolation);
-      const Eigen::VectorXd at = full_.interpolation(1.0 + ahead);
-      shape.row(lane).head(stages_) = at.tail(stages_).transpose();
-    }
-    // From where the step before began to each stage, less the way to where this one begins.
-    mix_lanes(shape, last_path_, x_);
-    x_.rowwise() -= last_path_.row(stages_ - 1).eval();
-    // Only what is free moves: rounding would make fixed spheres drift.
-    tissue_.constraints().project(x_);
-    x_.rowwise() += start_;
-  } else {
-    x_.noalias() = h * rate * c * lane_field_;
-    x_.rowwise() += start_;
+  LaneVector since, as_before;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    since[lane] = h * node(lane);
+    as_before[lane] = last_rate_ == rate ? std::min(since[lane], last_h_) : 0.0;
   }
+  imposed_ = (rate * since).array() + state.imposed;
+  x_.noalias() = rate * (since - as_before) * lane_field_;
+  if (as_before[0] > 0.0) x_.noalias() += as_before * last_velocity_;
+  // Only what is free moves: rounding would make fixed spheres drift.
+  tissue_.constraints().project(x_);
+  x_.rowwise() += start_;
   tissue_.impose(x_, imposed_);
 }
 
@@ -320,14 +367,9 @@ void StageBalance::residuals() {
   }
   plain_response_ = tissue_.response(x_, force_);
   tissue_.constraints().project(force_);
-  d_ = force_;
-  factor_.solve(d_);
-  tissue_.constraints().project(d_);
+  imbalance_ = correction(force_, mixing_, d_);
   work_.back_solves += stages_;
   ++work_.iterations;
-  const double energy = d_.cwiseProduct(force_).rowwise().sum().maxCoeff();
-  imbalance_ = std::sqrt(std::max(energy, 0.0) * path_stiffness_);
-  if (!std::isfinite(energy)) imbalance_ = energy;
 }
 
 StageBalance::Balance StageBalance::balance(double tolerance) {
@@ -360,8 +402,7 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   set_weights(h);
   StepOutcome outcome;
   const RelaxationFactor relaxation_factor = relaxation_factor_of_step();
-  const bool stale = !factorised_ || last_iterations_ > kTooManyIterations ||
-                     difference(relaxation_factor, relaxation_factor_) > kFollowingChange;
+  const bool stale = !factorised_ || last_iterations_ > kTooManyIterations;
   if (stale && !refactorise(state, relaxation_factor)) {
     outcome.unstable = true;
     return outcome;
@@ -372,9 +413,10 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   begin_ = start_of(state);
   find_known(weights_, begin_, known_);
   set_following();
+  mixing_ = mixing(weights_);
   predict(state, h, rate);
   outcome.allowed = tolerance * scale_;
-  const Balance balanced = balance(std::max(outcome.allowed, rounding_));
+  const Balance balanced = balance(std::max(kLeftToCorrect * outcome.allowed, rounding_));
   outcome.balanced = balanced != Balance::failed;
   if (!outcome.balanced) {
     factorised_ = false;
@@ -410,8 +452,8 @@ LaneMatrix StageBalance::aging(const Places& places, std::span<const double> fra
 }
 
 void StageBalance::accept(TissueState& state, double h, double rate) {
-  last_path_ = x_.rowwise() - start_;
-  has_last_ = true;
+  const int middle = (stages_ - 1) / 2;
+  last_velocity_ = (x_.row(stages_ - 1) - x_.row(middle)) / (h * (1.0 - node(middle)));
   last_h_ = h;
   last_rate_ = rate;
   state.time_s += h;

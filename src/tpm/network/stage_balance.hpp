@@ -60,12 +60,12 @@ class StageBalance {
   /// @param choosing steps are chosen by their error: one with too large an error is given up early
   StageBalance(DrivenTissue& tissue, int stages, bool choosing);
 
-  /// Size of the response that tolerances are parts of: at least `least`, N or m.
-  void set_scale(double least) { scale_ = std::abs(least); }
+  /// Sets what tolerances are parts of: at least the response to a peak of what is imposed, with
+  /// the equilibrium stiffness at rest. The factorisation for that serves the first step too.
+  /// @param h of that step, s
+  void begin(const TissueState& rest, double h, double peak);
   void see(double response) { scale_ = std::max(scale_, std::abs(response)); }
   [[nodiscard]] double scale() const { return scale_; }
-  /// Response per unit of what is imposed: turns tolerances of forces into such of lengths.
-  void set_unit_response(double response) { unit_response_ = std::abs(response); }
   [[nodiscard]] const QuasiStaticWork& work() const { return work_; }
 
   /// An equilibrium at another imposed value, with y constant or relaxed; the state moves if it is
@@ -177,6 +177,15 @@ class StageBalance {
   [[nodiscard]] double difference(const RelaxationFactor& a, const RelaxationFactor& b) const;
   [[nodiscard]] bool refactorise(const TissueState& state,
                                  const RelaxationFactor& relaxation_factor);
+  /// @param change of the elongation of each bond with the adjoint displacement
+  void set_relaxing_shares(const TissueState& state, const Eigen::VectorXd& change,
+                           const DrivenTissue::UnitField& field);
+  /// How corrections of the stages depend on each other, since each follows the others: where all
+  /// bonds relax alike, the inverse of that.
+  [[nodiscard]] LaneSquare mixing(const StepWeights& weights) const;
+  /// What to move the stages by where forces are left on their free spheres.
+  /// @return bound of what the forces do to the response, N or m
+  double correction(const LaneMatrix& force, const LaneSquare& mixing, LaneMatrix& d);
   void predict(const TissueState& state, double h, double rate);
   [[nodiscard]] Balance balance(double tolerance);
   /// The forces left on the free spheres of every stage, and from them the next correction.
@@ -192,31 +201,34 @@ class StageBalance {
   bool choosing_;
   Eigen::Index coordinates_;
   LaneBonds bonds_;
-  ExponentialCollocation full_;   ///< through the start and the stages
   ExponentialCollocation inner_;  ///< through the stages alone
+  ExponentialCollocation full_;   ///< through the start and the stages
   Places stage_places_;           ///< of full_, where the lanes stand
   std::array<double, kLanes> lane_nodes_{};
   Places full_error_places_, inner_error_places_;  ///< where the error is measured
   LaneStiffness factor_;
   Anderson anderson_;
   QuasiStaticWork work_;
-  double scale_ = 0.0;
-  double unit_response_ = 0.0;
+  double scale_ = 0.0;          ///< size of the response, N or m
+  double unit_response_ = 0.0;  ///< per unit of what is imposed: turns forces into lengths
 
   // The factorisation in use.
   bool factorised_ = false;
   RelaxationFactor relaxation_factor_;
   int last_iterations_ = 0;
-  Eigen::RowVectorXd lane_field_;  ///< displacement per unit imposed, by coordinate
-  Eigen::VectorXd adjoint_;        ///< change of the response per change of each bond's y
-  double path_stiffness_ = 0.0;    ///< bounds a response by the energy of an imbalance
-  double rounding_ = 0.0;          ///< what rounding of positions does to the response, N or m
+  Eigen::RowVectorXd lane_field_;    ///< displacement per unit imposed, by coordinate
+  Eigen::VectorXd adjoint_;          ///< change of the response per change of each bond's y
+  double bounding_stiffness_ = 0.0;  ///< bounds a response by the energy of an imbalance
+  /// The part of the instantaneous stiffness that relaxes, by law, as mixing() counts it.
+  std::vector<double> relaxing_share_;
+  double rounding_ = 0.0;  ///< what rounding of positions does to the response, N or m
 
   // The step being balanced, stages in lanes.
   std::vector<char> closed_;  ///< contacts
   Eigen::RowVectorXd start_;  ///< positions where it begins, by coordinate
   Start begin_;
-  LaneMatrix x_, d_, force_;
+  LaneMatrix x_, d_, force_, solved_;
+  LaneSquare mixing_;
   LaneVector plain_response_;  ///< to x_, with forces left
   double end_response_ = 0.0;  ///< at the end of a balanced step
   LaneMatrix followed_;        ///< of relaxing bonds
@@ -245,9 +257,9 @@ class StageBalance {
   std::vector<ErrorWeights> error_weights_;  ///< of each relaxation time of the system
   double imbalance_ = 0.0;  ///< bound of the response's error from forces left, N or m
   // The step before, for the prediction of the next.
-  bool has_last_ = false;
-  double last_h_ = 0.0, last_rate_ = 0.0;
-  LaneMatrix last_path_;  ///< displacements of its stages from its start
+  double last_h_ = 0.0;
+  std::optional<double> last_rate_;   ///< none: the state has been moved since
+  Eigen::RowVectorXd last_velocity_;  ///< over its second half, m/s, by coordinate
 };
 
 }  // namespace tpm::organ

@@ -64,7 +64,7 @@ void StageBalance::change_contact(TissueState& state, std::size_t contact) {
   state.closed[contact] = state.closed[contact] != 0 ? 0 : 1;
   ++work_.contact_changes;
   factorised_ = false;
-  has_last_ = false;
+  last_rate_.reset();
 }
 
 }  // namespace tpm::organ

@@ -142,17 +142,15 @@ void StageTangents::solve(Tangent& tangent, const Stages& stages) {
   tangent.position = tangent.start.replicate(kLanes, 1);
   tissue_.impose_change(tangent.position, tangent.imposed * stages.imposed);
   anderson_.restart();
+  const LaneSquare mixing = balance_.mixing(stages.weights);
   const double allowed = std::max(tolerance_ * balance_.scale_, balance_.rounding_);
   for (int i = 0; i < kMostTangentIterations; ++i) {
     update_viscous(tangent, stages);
     force_changes(tangent, stages, tangent.position, tangent.mean);
     constraints.project(force_);
-    d_ = force_;
-    balance_.factor_.solve(d_);
-    constraints.project(d_);
-    const double energy = d_.cwiseProduct(force_).rowwise().sum().maxCoeff();
-    if (!std::isfinite(energy)) break;
-    if (std::sqrt(std::max(energy, 0.0) * balance_.path_stiffness_) <= allowed) {
+    const double imbalance = balance_.correction(force_, mixing, d_);
+    if (!std::isfinite(imbalance)) break;
+    if (imbalance <= allowed) {
       tangent.position += d_;
       update_viscous(tangent, stages);
       return;

@@ -20,17 +20,20 @@ std::vector<double> radau_nodes(int count) {
     return boost::math::legendre_p(count, x) - boost::math::legendre_p(count - 1, x);
   };
   std::vector<double> nodes;
-  constexpr int kCells = 400;
+  const int cells = 4 * count * count;  // near the ends, nodes are about 4 / count^2 apart
   double left = -1.0;
-  for (int i = 1; i < kCells; ++i) {
-    const double right = -1.0 + 2.0 * i / kCells;
-    if (f(left) * f(right) < 0.0) {
+  double at_left = f(left);
+  for (int i = 1; i < cells; ++i) {
+    const double right = -1.0 + 2.0 * i / cells;
+    const double at_right = f(right);
+    if (at_left * at_right < 0.0) {
       std::uintmax_t steps = 100;
       const auto [a, b] = boost::math::tools::toms748_solve(
-          f, left, right, boost::math::tools::eps_tolerance<double>(52), steps);
+          f, left, right, at_left, at_right, boost::math::tools::eps_tolerance<double>(52), steps);
       nodes.push_back(0.5 + 0.25 * (a + b));
     }
     left = right;
+    at_left = at_right;
   }
   nodes.push_back(1.0);
   return nodes;
