@@ -78,7 +78,7 @@ void tell_cost(const RunNetwork& network, const ExperimentScene& scene) {
   constexpr std::size_t kLarge = 2000;  // spheres; smaller ones take seconds
   constexpr double kWorthSaying_s = 1.0;
   constexpr double kOfProduct = 54.0;      // operations in a product of 3x3 blocks
-  constexpr double kFactorisations = 2.0;  // at rest and in the first step
+  constexpr double kFactorisations = 1.0;  // at rest, for the first step too
   if (network.driven.spheres() < kLarge) return;
   const SolverChoice solver = choose_solver(network.driven.bonds, network.driven.constraints,
                                             {.solver = scene.formulation.solver});
@@ -91,7 +91,7 @@ void tell_cost(const RunNetwork& network, const ExperimentScene& scene) {
   if (seconds < kWorthSaying_s) return;
   tell_user(
       "tpm: {} spheres: a factorisation takes about {} s (costs of operations: {}), and a run of "
-      "{} s at least {} of them: {} min or more\n",
+      "{} s at least {}: {} min or more\n",
       network.driven.spheres(), significant(seconds, 2), costs.source,
       significant(scene.protocol.end_s() - scene.protocol.start_s(), 3), kFactorisations,
       significant(kFactorisations * seconds / 60.0, 2));

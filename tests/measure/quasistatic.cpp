@@ -1,9 +1,10 @@
 // Prints the measured numbers of reports/network/2026-11-21.md:
-// build/release/tests/measure_quasistatic [two]
-// With "two" only the ends of the ramp and of the hold are asked for.
+// build/release/tests/measure_quasistatic [all | two [E1]]
+// With "two" only the ends of the ramp and of the hold are asked for; E1 in Pa, 12000 if none.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <ctime>
 #include <string_view>
 #include <vector>
@@ -63,7 +64,7 @@ OrganScene liver_scene(bool inner_fixed) {
   return scene;
 }
 
-void measure(const OrganScene& scene, bool two) {
+void measure(const OrganScene& scene, bool two, const TpmParameters& of_tissue) {
   fmt::print("{} spheres, {} bonds, {} free coordinates\n", scene.network.organ.size(),
              scene.network.bonds.size(), scene.constraints.count());
   fmt::print("{:>10} {:>9} {:>9} {:>6} {:>6} {:>6} {:>6} {:>7} {:>9} {:>9} {:>9}\n", "tau, s",
@@ -71,7 +72,7 @@ void measure(const OrganScene& scene, bool two) {
              "end, N");
   const Protocol protocol = ramp_and_hold(8e-3, 4e-3, 29.0);
   for (const double tau : {2e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0}) {
-    const TpmParameters material = TpmParameters{}.with_relaxation_time(tau);
+    const TpmParameters material = of_tissue.with_relaxation_time(tau);
     const std::vector<double> times = two ? std::vector<double>{2.0, 31.0} : output_times(tau);
     const BondSystem bonds(scene.network, material);
     const Positions& rest = scene.network.organ.position;
@@ -95,7 +96,9 @@ void measure(const OrganScene& scene, bool two) {
 
 int main(int argc, char** argv) {
   const bool two = argc > 1 && std::string_view(argv[1]) == "two";
-  measure(liver_scene(false), two);
-  measure(liver_scene(true), two);
+  TpmParameters material;
+  if (argc > 2) material.E1_Pa = std::strtod(argv[2], nullptr);
+  measure(liver_scene(false), two, material);
+  measure(liver_scene(true), two, material);
   return 0;
 }
