@@ -27,8 +27,10 @@ std::vector<double> output_times(double relaxation_time_s) {
   std::vector<double> times;
   for (int i = 0; i <= 310; ++i) times.push_back(0.1 * i);
   for (const double change_s : {0.0, 2.0}) {
-    for (double after = 1e-2; after < 20.0; after *= 1.5) {
+    double after = 1e-2;
+    while (after < 20.0) {
       times.push_back(std::min(change_s + after * relaxation_time_s, 31.0));
+      after *= 1.5;
     }
   }
   return times;
