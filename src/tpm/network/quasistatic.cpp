@@ -223,7 +223,7 @@ class Run {
       if (options_.energies) energy = stages_.energy_of_step(state_, h, rate);
       report_within(h, rate, energy);
       if (energy) energy_ = with(energy->whole());
-      result_.error_estimate += outcome.error;
+      result_.error_estimate += outcome.error + outcome.left;
       stages_.accept(state_, h, rate);
       if (tangents_) tangents_->accept();
       if (last) state_.time_s = to.time_s;

@@ -81,8 +81,9 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   Eigen::Matrix3Xd load;
   tissue_.load(imposed, load);
   // A force error of this size is within the tolerance whatever it acts on; below the least one
-  // the rounding of positions decides.
-  const double force_scale = tissue_.depth_driven() ? scale_ : std::abs(imposed);
+  // the rounding of positions decides. Also where a load is taken off.
+  const double force_scale =
+      tissue_.depth_driven() ? scale_ : std::max(std::abs(imposed), scale_ / unit_response_);
   const EquilibriumSearch search = tissue_.equilibrium().find(
       position, viscous_state, load, std::max(tolerance, kLeastBalance) * force_scale);
   work_.factorisations += search.factorisations;
@@ -375,6 +376,7 @@ void StageBalance::residuals() {
 StageBalance::Balance StageBalance::balance(double tolerance) {
   anderson_.restart();
   double first = 0.0;
+  double before = 0.0;
   for (int i = 0; i < kMostIterations; ++i) {
     residuals();
     last_iterations_ = i;
@@ -383,6 +385,7 @@ StageBalance::Balance StageBalance::balance(double tolerance) {
       // Of the last correction the adjoint knows what it does to the response.
       end_response_ = plain_response_[stages_ - 1] +
                       tissue_.adjoint_sign() * force_.row(stages_ - 1).dot(lane_field_);
+      left_ = imbalance_ * (i > 0 ? std::min(1.0, imbalance_ / before) : 1.0);
       x_ += d_;  // the correction is known: it costs nothing
       return Balance::found;
     }
@@ -392,6 +395,7 @@ StageBalance::Balance StageBalance::balance(double tolerance) {
     }
     if (i == 0) first = imbalance_;
     if (i > 3 && imbalance_ > 10.0 * first) return Balance::failed;
+    before = imbalance_;
     anderson_.step(flat(x_), flat(d_));
   }
   return Balance::failed;
@@ -424,6 +428,7 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   }
   if (balanced == Balance::found) bonds_.followed(x_, followed_);
   outcome.error = std::max(error(), 1e-12 * outcome.allowed);
+  outcome.left = left_;
   outcome.accepted =
       balanced == Balance::found && outcome.error <= std::max(outcome.allowed, rounding_);
   return outcome;

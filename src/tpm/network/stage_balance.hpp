@@ -19,6 +19,7 @@ struct StepOutcome {
   bool balanced = false;  ///< the stages were balanced; the error decided
   bool unstable = false;
   double error = 0.0;    ///< estimate, in the unit of the response
+  double left = 0.0;     ///< what the last correction leaves, if it shrinks as the one before
   double allowed = 0.0;  ///< in the same unit
 };
 
@@ -255,7 +256,9 @@ class StageBalance {
   [[nodiscard]] ErrorSums error_sums(const LaneBonds::Group& group,
                                      const ErrorWeights& weights) const;
   std::vector<ErrorWeights> error_weights_;  ///< of each relaxation time of the system
-  double imbalance_ = 0.0;  ///< bound of the response's error from forces left, N or m
+  double differing_share_ = 0.0;  ///< of differences of either sign, of what does not cancel
+  double imbalance_ = 0.0;        ///< bound of the response's error from forces left, N or m
+  double left_ = 0.0;             ///< of it once a step is balanced
   // The step before, for the prediction of the next.
   double last_h_ = 0.0;
   std::optional<double> last_rate_;   ///< none: the state has been moved since

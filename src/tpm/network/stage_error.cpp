@@ -8,8 +8,22 @@
 #include "tpm/network/stage_balance.hpp"
 
 namespace tpm::organ {
+namespace {
+
+// Differences of smooth motions cancel over the bonds; kinks, where ropes slacken, do not.
+constexpr double kOfSmooth = 0.1, kOfKinks = 1.0;
+
+bool has_ropes(const BondSystem& bonds) {
+  for (std::size_t i = 0; i < bonds.first_contact(); ++i) {
+    if (bonds.is_rope(i)) return true;
+  }
+  return false;
+}
+
+}  // namespace
 
 void StageBalance::choose_error_places() {
+  differing_share_ = has_ropes(tissue_.bonds()) ? kOfKinks : kOfSmooth;
   // The error is measured where outputs are taken from: at the stages, of which the last is more
   // accurate than the others, and before the first of them, where a step that is long against the
   // relaxation time hides how the tissue settles after a change of rate.
@@ -82,7 +96,7 @@ double StageBalance::error() const {
       mean.of_start += branch.share * weights.of_start;
     }
     const ErrorSums sums = error_sums(group, mean);
-    error += 0.1 * sums.size;
+    error += differing_share_ * sums.size;
     // Branch by branch, whose later errors do not cancel even where they do now.
     for (const ViscousLaw::Branch& branch : branches) {
       const ErrorWeights& weights = error_weights_[branch.time];
