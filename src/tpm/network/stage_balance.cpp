@@ -295,13 +295,15 @@ void StageBalance::set_relaxing_shares(const TissueState& state, const Eigen::Ve
   for (const std::size_t bond : bonds_.relaxing_bonds()) {
     const auto i = static_cast<Eigen::Index>(bond);
     const std::size_t law = tissue_.bonds().law_of(bond);
-    const double energy = tissue_.bonds().relaxing()[i] * slope[i] * change[i] * change[i];
+    const double stiffness = std::max(tissue_.bonds().relaxing()[i] * slope[i], 0.0);
+    const double energy = stiffness * change[i] * change[i];
     relaxing_share_[law] += energy;
     relaxing += energy;
     whole += relaxation_factor_(law) * energy;
   }
   // Compressed bonds can take more than they give; what relaxes is no more than all.
-  for (double& share : relaxing_share_) share *= kMixingShare / std::max(whole, relaxing);
+  const double most = std::max(whole, relaxing);
+  for (double& share : relaxing_share_) share = most > 0.0 ? kMixingShare * share / most : 0.0;
   // Of the response to what is left, and to what follows it.
   bounding_stiffness_ = field.stiffness + relaxing;
 }
