@@ -54,3 +54,9 @@ set(TPM_ARRANGING_FLAGS $<$<CONFIG:Release>:-O1>)
 if(TPM_QUICK_TO_BUILD)
   set(TPM_ARRANGING_FLAGS -O0)
 endif()
+
+# A program or module that is installed: CMake would end its paths of libraries with an empty one until then, and the
+# folder in which it is called would be searched for each of them.
+function(tpm_load_from_fixed_places target)
+  set_target_properties(${target} PROPERTIES BUILD_WITH_INSTALL_RPATH ON INSTALL_RPATH_USE_LINK_PATH ON)
+endfunction()

@@ -18,7 +18,7 @@
 #include "tpm/simulate/simulation_file.hpp"
 #include "tpm/simulate/vtkhdf.hpp"
 #include "tpm/store/file_roles.hpp"
-#include "tpm/store/hdf5.hpp"
+#include "tpm/store/replacement.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -98,7 +98,7 @@ void tell_cost(const RunNetwork& network, const ExperimentScene& scene) {
 }
 
 Simulated simulated(ExperimentScene scene, fs::path file, double checkpoint_every_s) {
-  (void)Hdf5Writer(file);  // before a long run, not after it: can the result be written?
+  (void)Replacement(file);  // before a long run, not after it: can the result be written?
   RunNetwork network = network_to_run(scene);
   tell_cost(network, scene);
   fs::path checkpoint = file.string() + ".checkpoint";
@@ -187,7 +187,7 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
             formulations_that([](const Formulation& f) { return f.as<StateRunner>() != nullptr; }));
   }
   will_write({choice.output});
-  (void)Hdf5Writer(choice.output);  // can the result be written?
+  (void)Replacement(choice.output);  // can the result be written?
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_scene(scene, times, scene.formulation.entry().can().field);
   write_scene_run(scene, times, answer, choice.output);
@@ -232,7 +232,7 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
     throw Error(ExitCode::usage, "--plan", "with figures, --vtkhdf or --beside-mass-spring",
                 "none of them: a planned model need not know the whole network");
   }
-  (void)Hdf5Writer(choice.output);  // can the result be written?
+  (void)Replacement(choice.output);  // can the result be written?
   const ExperimentScene scene = read_experiment(choice.scene);
   PlanRequest request = plan_request(choice.plan);
   request.relevance = request.changes = false;

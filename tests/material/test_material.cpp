@@ -335,6 +335,10 @@ TEST_CASE("a run with several branches goes on from its state as if it had not s
   const std::vector<double> times{1.0, 2.0, 4.0};
   const QuasiStaticRun whole =
       network.run(ramp(), times, [&](const QuasiStaticState& s) { states.push_back(s); });
+  for (const QuasiStaticState& state : states) {
+    CHECK_THAT(state.energy->stored_J,
+               WithinRel(bonds.stored_energy_J(state.position, state.viscous), 1e-12));
+  }
   const std::vector<double> rest{2.0, 4.0};
   const QuasiStaticRun second = network.run(ramp(), rest, {}, &states[0]);
   CHECK_THAT(second.response[1], WithinRel(whole.response[2], 1e-7));

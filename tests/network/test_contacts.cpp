@@ -307,6 +307,8 @@ TEST_CASE("several tools at once balance, and energy is accounted for") {
         tools[0].force.dot(slab.down()) + 0.5 * tools[1].force.dot(slab.down());
     CHECK_THAT(state.response, WithinAbs(conjugate, 1e-7));
     for (const ToolState& tool : tools) CHECK(tool.force.dot(slab.down()) >= -1e-9);
+    CHECK_THAT(state.energy->stored_J,
+               WithinAbs(driven.bonds.stored_energy_J(state.position, state.viscous), 1e-12));
     if (state.time_s == 3.0) {
       for (const ToolState& tool : tools) on_tissue += tool.force;
       Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, driven.rest.cols());

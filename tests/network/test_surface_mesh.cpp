@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 
 #include "organ_meshes.hpp"
 #include "refusal.hpp"
@@ -12,6 +13,7 @@
 #include "tpm/network/filling.hpp"
 #include "tpm/network/mesh_file.hpp"
 #include "tpm/network/mesh_surface.hpp"
+#include "tpm/network/triangle_tree.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;
@@ -116,6 +118,32 @@ TEST_CASE("a meshed sphere has the sphere's area, volume, distance and normals")
     CHECK_THAT(ball.signed_distance(p), WithinAbs(exact.signed_distance(p), 1e-3));
     if (p.norm() > 0.5) {
       CHECK((ball.nearest(p).normal - exact.nearest(p).normal).norm() < 0.03);
+    }
+  }
+}
+
+TEST_CASE("the nearest point is that of the nearest triangle, wherever a search begins") {
+  for (const TriangleMesh& mesh : {unit_cube(), round_cube(3), round_cube(4), round_cube(40)}) {
+    const MeshSurface surface(closed_mesh(mesh, "mesh").mesh);
+    Random random(11);
+    Surface::Place place = Surface::kNoPlace;
+    Vector3d walker(1.0, 0.0, 0.0);
+    const int questions = mesh.triangles.cols() < 1000 ? 20 : 3;
+    for (int i = 0; i < questions; ++i) {
+      for (double& x : walker) x += 0.1 * random.normal();
+      double least = std::numeric_limits<double>::infinity();
+      for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+        TriangleMesh alone;
+        alone.vertices.resize(3, 3);
+        for (Eigen::Index which = 0; which < 3; ++which) {
+          alone.vertices.col(which) = mesh.corner(t, which);
+        }
+        alone.triangles = Eigen::Vector3i(0, 1, 2);
+        least = std::min(least, TriangleTree(alone).nearest(walker).squared_distance);
+      }
+      const Vector3d found = surface.nearest_position(walker, 10.0, place);
+      CHECK_THAT((found - walker).norm(), WithinAbs(std::sqrt(least), 1e-12));
+      CHECK((found - surface.nearest(walker).position).norm() < 1e-12);
     }
   }
 }

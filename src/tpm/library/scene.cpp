@@ -2,8 +2,8 @@
 
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpm/simulate/simulation_file.hpp"
-#include "tpm/store/hdf5.hpp"
 #include "tpm/store/json.hpp"
+#include "tpm/store/replacement.hpp"
 
 namespace tpm::organ {
 
@@ -77,7 +77,7 @@ Trajectory Scene::run(const std::vector<double>& times_s, bool with_field) const
 }
 
 std::vector<std::filesystem::path> Scene::simulate(const std::filesystem::path& result) const {
-  (void)Hdf5Writer(result);  // before a long run, not after it: can the result be written?
+  (void)Replacement(result);  // before a long run, not after it: can the result be written?
   const SimulationRun run = tpm::organ::simulate(*scene_, *network_);
   return {result, write_simulation(*scene_, *network_, run, result)};
 }

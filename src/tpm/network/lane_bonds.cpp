@@ -317,6 +317,34 @@ void LaneBonds::add_bond_forces(const LaneMatrix& position, const LaneMatrix& me
   }
 }
 
+LaneVector LaneBonds::stored_J(const LaneMatrix& position, const LaneMatrix& mean_viscous) const {
+  const double* const x = position.data();
+  const double* const y = mean_viscous.data();
+  LaneBondKernels::Lanes twice{};
+  run_wide([&]() __attribute__((always_inline)) {
+    constexpr LaneBondKernels::Lanes kNothing{};
+    Span span;
+    for (std::size_t i = 0; i < bond_.size(); ++i) {
+      const Data& bond = bond_[i];
+      const double* const viscous = i < relaxing_.size() ? y + kLanes * i : kNothing.data();
+      measure(x + kSphere * bond.a, x + kSphere * bond.b, span);
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        const double l = span.length[s] - bond.rest_length_m;
+        const double taut = l >= bond.least ? 1.0 : 0.0;
+        const double spring = l - viscous[s];
+        twice[s] += taut * ((bond.k - bond.g) * l * l + bond.g * spring * spring);
+      }
+    }
+  });
+  LaneVector stored = 0.5 * LaneVector::Map(twice.data());
+  for (const ToolContact& contact : closed_) {
+    stored += contact_geometry(contact, position).overlap_force.cwiseAbs2() /
+              (2.0 * contact.stiffness_N_per_m);
+  }
+  return stored;
+}
+
 void LaneBonds::followed_changes(const LaneMatrix& position, const LaneMatrix& displacement,
                                  std::span<const LawChange> laws, LaneMatrix& change) const {
   change.resize(kLanes, static_cast<Eigen::Index>(relaxing_.size()));

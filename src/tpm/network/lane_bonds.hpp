@@ -61,6 +61,11 @@ class LaneBonds {
   void add_forces(const LaneMatrix& position, const LaneMatrix& mean_viscous,
                   LaneMatrix& force) const;
 
+  /// Energy stored in the bonds and closed contacts if every branch had its bond's mean viscous
+  /// elongation, J. Only where no bond stiffens (is_linear()).
+  [[nodiscard]] LaneVector stored_J(const LaneMatrix& position,
+                                    const LaneMatrix& mean_viscous) const;
+
   /// Changes of V(l) of the relaxing bonds with small displacements of the spheres and changes of
   /// the laws.
   void followed_changes(const LaneMatrix& position, const LaneMatrix& displacement,

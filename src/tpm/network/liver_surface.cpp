@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "tpm/core/parallel.hpp"
+#include "tpm/network/edge_table.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -86,16 +86,15 @@ class LiverFunction {
 /// Every triangle of a unit sphere cut into four at the middles of its edges.
 std::vector<Eigen::Vector3i> quartered(const std::vector<Eigen::Vector3i>& faces,
                                        std::vector<Vector3d>& vertices) {
-  std::map<std::pair<int, int>, int> halfway;
+  EdgeTable<int> halfway(vertices.size());
   const auto middle = [&](int a, int b) {
-    const auto [found, fresh] =
-        halfway.try_emplace(std::minmax({a, b}), static_cast<int>(vertices.size()));
+    const auto [number, fresh] = halfway.at(a, b, static_cast<int>(vertices.size()));
     if (fresh) {
       vertices.push_back(
           (vertices[static_cast<std::size_t>(a)] + vertices[static_cast<std::size_t>(b)])
               .normalized());
     }
-    return found->second;
+    return number;
   };
   std::vector<Eigen::Vector3i> finer;
   finer.reserve(4 * faces.size());

@@ -3,11 +3,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <numeric>
+#include <span>
 #include <utility>
 
 #include "tpm/core/parallel.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/network/edge_table.hpp"
 
 namespace tpm::organ {
 
@@ -24,78 +26,94 @@ double angle_at(const TriangleMesh& mesh, Eigen::Index triangle, Eigen::Index wh
   return std::atan2(u.cross(v).norm(), u.dot(v));
 }
 
-/// For every vertex the triangles that meet there.
-std::vector<std::vector<Eigen::Index>> fans(const TriangleMesh& mesh) {
-  std::vector<std::vector<Eigen::Index>> fan(static_cast<std::size_t>(mesh.vertices.cols()));
-  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
-    for (const int vertex : mesh.triangles.col(t))
-      fan[static_cast<std::size_t>(vertex)].push_back(t);
-  }
-  return fan;
-}
+/// A corner of a triangle.
+struct Corner {
+  Eigen::Index triangle = 0, which = 0;
+};
 
-Eigen::Index corner_number(const TriangleMesh& mesh, Eigen::Index triangle, int vertex) {
-  Eigen::Index which = 0;
-  while (mesh.triangles(which, triangle) != vertex) ++which;
-  return which;
-}
+/// The corners that meet at each vertex, in the order of the triangles.
+class Fans {
+ public:
+  explicit Fans(const TriangleMesh& mesh)
+      : end_(static_cast<std::size_t>(mesh.vertices.cols()) + 1, 0),
+        corners_(static_cast<std::size_t>(mesh.triangles.size())) {
+    for (const int vertex : mesh.triangles.reshaped()) ++end_[static_cast<std::size_t>(vertex) + 1];
+    std::partial_sum(end_.begin(), end_.end(), end_.begin());
+    std::vector<std::size_t> next(end_.begin(), end_.end() - 1);
+    for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+      for (Eigen::Index which = 0; which < 3; ++which) {
+        corners_[next[static_cast<std::size_t>(mesh.triangles(which, t))]++] = {t, which};
+      }
+    }
+  }
+  [[nodiscard]] std::span<const Corner> of(Eigen::Index vertex) const {
+    const auto v = static_cast<std::size_t>(vertex);
+    return std::span(corners_).subspan(end_[v], end_[v + 1] - end_[v]);
+  }
+
+ private:
+  std::vector<std::size_t> end_;  ///< of the corners of the vertex before
+  std::vector<Corner> corners_;
+};
 
 }  // namespace
 
 MeshSurface::MeshSurface(TriangleMesh mesh)
     : tree_(std::move(mesh)), area_(mesh_area(tree_.mesh())), volume_(mesh_volume(tree_.mesh())) {
   normals_.resize(static_cast<std::size_t>(this->mesh().triangles.cols()));
-  for (std::size_t t = 0; t < normals_.size(); ++t) {
-    normals_[t].face = this->mesh().area_vector(static_cast<Eigen::Index>(t)).normalized();
-  }
-  for_each_in_parallel(2,
-                       [&](int which) { which == 0 ? set_corner_normals() : set_edge_normals(); });
+  Eigen::Matrix3Xd angles(3, this->mesh().triangles.cols());
+  for_each_in_parallel(angles.cols(), [&](Eigen::Index t) {
+    normals_[static_cast<std::size_t>(t)].face = this->mesh().area_vector(t).normalized();
+    for (Eigen::Index which = 0; which < 3; ++which) {
+      angles(which, t) = angle_at(this->mesh(), t, which);
+    }
+  });
+  for_each_in_parallel(
+      2, [&](int which) { which == 0 ? set_corner_normals(angles) : set_edge_normals(); });
 }
 
-void MeshSurface::set_corner_normals() {
-  const auto fan = fans(mesh());
+void MeshSurface::set_corner_normals(const Eigen::Matrix3Xd& angles) {
+  const Fans fans(mesh());
   vertex_normals_.setZero(3, mesh().vertices.cols());
-  for (std::size_t v = 0; v < fan.size(); ++v) {
-    const auto vertex = static_cast<int>(v);
-    std::vector<double> angle;
-    for (const Eigen::Index t : fan[v]) {
-      angle.push_back(angle_at(mesh(), t, corner_number(mesh(), t, vertex)));
-      vertex_normals_.col(vertex) += angle.back() * normals_[static_cast<std::size_t>(t)].face;
+  for (Eigen::Index v = 0; v < vertex_normals_.cols(); ++v) {
+    const std::span<const Corner> fan = fans.of(v);
+    for (const auto& [t, which] : fan) {
+      vertex_normals_.col(v) += angles(which, t) * normals_[static_cast<std::size_t>(t)].face;
     }
-    vertex_normals_.col(vertex).normalize();
-    for (const Eigen::Index t : fan[v]) {
+    vertex_normals_.col(v).normalize();
+    for (const auto& [t, which] : fan) {
       Normals& own = normals_[static_cast<std::size_t>(t)];
       Vector3d sum = Vector3d::Zero();
-      for (std::size_t k = 0; k < fan[v].size(); ++k) {
-        const Vector3d& other = normals_[static_cast<std::size_t>(fan[v][k])].face;
-        if (own.face.dot(other) >= kSmooth) sum += angle[k] * other;
+      for (const Corner& at : fan) {
+        const Vector3d& other = normals_[static_cast<std::size_t>(at.triangle)].face;
+        if (own.face.dot(other) >= kSmooth) sum += angles(at.which, at.triangle) * other;
       }
-      own.smooth.col(corner_number(mesh(), t, vertex)) = sum.normalized();
+      own.smooth.col(which) = sum.normalized();
     }
   }
 }
 
 void MeshSurface::set_edge_normals() {
   using Side = std::pair<std::size_t, Eigen::Index>;  // triangle and edge
-  std::map<std::pair<int, int>, Side> open;
+  EdgeTable<Side> open(static_cast<std::size_t>(mesh().vertices.cols()));
   on_crease_.assign(static_cast<std::size_t>(mesh().vertices.cols()), false);
   for (std::size_t t = 0; t < normals_.size(); ++t) {
     const auto corner = mesh().triangles.col(static_cast<Eigen::Index>(t));
     for (Eigen::Index i = 0; i < 3; ++i) {
-      const std::pair<int, int> key = std::minmax({corner[i], corner[(i + 1) % 3]});
-      const auto [found, fresh] = open.try_emplace(key, t, i);
+      const int from = corner[i];
+      const int to = corner[(i + 1) % 3];
+      const auto [side, fresh] = open.at(from, to, {t, i});
       if (fresh) continue;
-      const auto [other, edge] = found->second;
+      const auto [other, edge] = side;
       const Vector3d mean = (normals_[t].face + normals_[other].face).normalized();
       const bool crease = normals_[t].face.dot(normals_[other].face) < kSmooth;
       normals_[t].edge.col(i) = mean;
       normals_[other].edge.col(edge) = mean;
       normals_[t].crease[i] = normals_[other].crease[edge] = crease;
       if (crease) {
-        on_crease_[static_cast<std::size_t>(key.first)] = true;
-        on_crease_[static_cast<std::size_t>(key.second)] = true;
+        on_crease_[static_cast<std::size_t>(from)] = true;
+        on_crease_[static_cast<std::size_t>(to)] = true;
       }
-      open.erase(found);
     }
   }
 }
@@ -130,8 +148,10 @@ SurfacePoint MeshSurface::nearest(const Vector3d& point) const {
   return {at.position, normal(at)};
 }
 
-Vector3d MeshSurface::nearest_position(const Vector3d& point, double within) const {
-  return tree_.nearest(point, within).position;
+Vector3d MeshSurface::nearest_position(const Vector3d& point, double within, Place& place) const {
+  const TrianglePoint at = tree_.nearest(point, within, place);
+  place = at.triangle;
+  return at.position;
 }
 
 double MeshSurface::signed_distance(const Vector3d& point) const {

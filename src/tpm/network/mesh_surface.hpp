@@ -15,8 +15,8 @@ class MeshSurface final : public Surface {
   explicit MeshSurface(TriangleMesh mesh);
 
   [[nodiscard]] SurfacePoint nearest(const Eigen::Vector3d& point) const override;
-  [[nodiscard]] Eigen::Vector3d nearest_position(const Eigen::Vector3d& point,
-                                                 double within) const override;
+  [[nodiscard]] Eigen::Vector3d nearest_position(const Eigen::Vector3d& point, double within,
+                                                 Place& place) const override;
   [[nodiscard]] double signed_distance(const Eigen::Vector3d& point) const override;
   [[nodiscard]] Positions spread(std::size_t count, std::uint64_t seed) const override;
   [[nodiscard]] Eigen::AlignedBox3d bounds() const override { return tree_.bounds(); }
@@ -32,7 +32,8 @@ class MeshSurface final : public Surface {
     Eigen::Matrix3d edge;                    ///< column i: the edge from corner i to corner i + 1
     bool crease[3] = {false, false, false};  ///< of each edge
   };
-  void set_corner_normals();
+  /// @param angles one column a triangle, at its corners, rad
+  void set_corner_normals(const Eigen::Matrix3Xd& angles);
   void set_edge_normals();
   [[nodiscard]] Eigen::Vector3d pseudonormal(const TrianglePoint& at) const;
   [[nodiscard]] Eigen::Vector3d normal(const TrianglePoint& at) const;

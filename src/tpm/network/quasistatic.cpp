@@ -142,7 +142,10 @@ class Run {
   /// The account of the energy where the tissue is in a state.
   template <class State>
   [[nodiscard]] QuasiStaticEnergy energy_of(const State& state, QuasiStaticEnergy spent) const {
-    spent.stored_J = tissue_.bonds().stored_energy_J(state.position, state.viscous);
+    return with_stored(spent, tissue_.bonds().stored_energy_J(state.position, state.viscous));
+  }
+  [[nodiscard]] static QuasiStaticEnergy with_stored(QuasiStaticEnergy spent, double stored_J) {
+    spent.stored_J = stored_J;
     return spent;
   }
 
@@ -325,7 +328,8 @@ class Run {
   /// Responses within the step just found, with the states there.
   void show_within(std::span<const double> fractions, double h, double rate,
                    const std::optional<StepEnergy>& energy) {
-    std::vector<QuasiStaticState> states = stages_.states_within(state_, fractions, h, rate);
+    std::vector<QuasiStaticState> states =
+        stages_.states_within(state_, fractions, h, rate, options_.energies);
     for (std::size_t i = 0; i < fractions.size(); ++i) {
       const double response = states[i].response;
       show(states[i], energy ? with(energy->until(fractions[i], response)) : energy_);
@@ -375,7 +379,10 @@ class Run {
   void show(QuasiStaticState& state, const QuasiStaticEnergy& spent) {
     state.time_s = times_s_[order_[next_]];
     put(state.response);
-    if (options_.energies) state.energy = energy_of(state, spent);
+    if (options_.energies) {
+      state.energy =
+          state.energy ? with_stored(spent, state.energy->stored_J) : energy_of(state, spent);
+    }
     observer_(state);
   }
 

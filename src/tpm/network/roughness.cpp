@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpmkit/error.hpp"
@@ -10,27 +11,8 @@
 namespace tpm::organ {
 namespace {
 
-double unevenness(const Organ& organ, const Eigen::Matrix3Xd& displacement, Eigen::Index sphere,
-                  const std::vector<std::uint32_t>& neighbours) {
-  if (neighbours.empty()) return 0.0;
-  const Eigen::Vector3d normal = organ.normal.col(sphere);
-  const Eigen::Vector3d first = normal.unitOrthogonal();
-  const Eigen::Vector3d second = normal.cross(first);
-  const auto n = static_cast<Eigen::Index>(neighbours.size());
-  Eigen::MatrixX3d place(n, 3);
-  Eigen::VectorXd value(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const std::uint32_t j = neighbours[static_cast<std::size_t>(k)];
-    // In spacings, so that the smallest solution treats value and gradient alike.
-    const Eigen::Vector3d apart =
-        (organ.position.col(j) - organ.position.col(sphere)) / organ.spacing;
-    place.row(k) << 1.0, apart.dot(first), apart.dot(second);
-    value[k] = normal.dot(displacement.col(j) - displacement.col(sphere));
-  }
-  return -shortest_least_squares(place, value)(0, 0);
-}
-
-}  // namespace
+/// For every sphere those that lateral bonds join to it.
+using LateralNeighbours = std::vector<std::vector<std::uint32_t>>;
 
 LateralNeighbours lateral_neighbours(const Network& network) {
   LateralNeighbours neighbours(network.organ.size());
@@ -42,32 +24,68 @@ LateralNeighbours lateral_neighbours(const Network& network) {
   return neighbours;
 }
 
-Eigen::VectorXd normal_unevenness_m(const Network& network, const Eigen::Matrix3Xd& displacement) {
+/// What each neighbour's value adds to the least-squares fit's value at a sphere.
+Eigen::VectorXd shares_of_fit(const Organ& organ, Eigen::Index sphere,
+                              const std::vector<std::uint32_t>& neighbours) {
+  const Eigen::Vector3d normal = organ.normal.col(sphere);
+  const Eigen::Vector3d first = normal.unitOrthogonal();
+  const Eigen::Vector3d second = normal.cross(first);
+  Eigen::Matrix3Xd place(3, static_cast<Eigen::Index>(neighbours.size()));
+  for (Eigen::Index k = 0; k < place.cols(); ++k) {
+    const std::uint32_t j = neighbours[static_cast<std::size_t>(k)];
+    // In spacings, so that the smallest solution treats value and gradient alike.
+    const Eigen::Vector3d apart =
+        (organ.position.col(j) - organ.position.col(sphere)) / organ.spacing;
+    place.col(k) << 1.0, apart.dot(first), apart.dot(second);
+  }
+  return shortest_least_squares(place, Eigen::Vector3d::UnitX());
+}
+
+}  // namespace
+
+Unevenness::Unevenness(const Network& network, std::span<const std::size_t> spheres) {
   const LateralNeighbours neighbours = lateral_neighbours(network);
-  Eigen::VectorXd r(displacement.cols());
+  stencils_.reserve(spheres.size());
+  for (const std::size_t i : spheres) {
+    const auto sphere = static_cast<Eigen::Index>(i);
+    Stencil& stencil = stencils_.emplace_back();
+    stencil.sphere = sphere;
+    stencil.normal = network.organ.normal.col(sphere);
+    stencil.neighbours = neighbours.at(i);
+    if (stencil.neighbours.empty()) continue;
+    stencil.share = shares_of_fit(network.organ, sphere, stencil.neighbours);
+  }
+}
+
+Eigen::VectorXd Unevenness::of(const Eigen::Matrix3Xd& displacement) const {
+  Eigen::VectorXd r = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(stencils_.size()));
   for (Eigen::Index i = 0; i < r.size(); ++i) {
-    r[i] = unevenness(network.organ, displacement, i, neighbours[static_cast<std::size_t>(i)]);
+    const Stencil& at = stencils_[static_cast<std::size_t>(i)];
+    for (Eigen::Index k = 0; k < at.share.size(); ++k) {
+      const std::uint32_t j = at.neighbours[static_cast<std::size_t>(k)];
+      r[i] -= at.share[k] * at.normal.dot(displacement.col(j) - displacement.col(at.sphere));
+    }
   }
   return r;
 }
 
-double roughness(const Network& network, const LateralNeighbours& neighbours,
-                 const Eigen::Matrix3Xd& displacement, std::span<const std::size_t> spheres) {
-  if (spheres.empty()) throw bad_input("roughness", "of no spheres", "at least one");
+Eigen::VectorXd normal_unevenness_m(const Network& network, const Eigen::Matrix3Xd& displacement) {
+  std::vector<std::size_t> all(network.organ.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return Unevenness(network, all).of(displacement);
+}
+
+double roughness(const Unevenness& spheres, const Eigen::Matrix3Xd& displacement) {
+  const Eigen::VectorXd r = spheres.of(displacement);
+  if (r.size() == 0) throw bad_input("roughness", "of no spheres", "at least one");
   const double peak = displacement.colwise().norm().maxCoeff();
   if (!(peak > 0.0)) throw bad_input("roughness", "nothing has moved", "a deformation");
-  double sum = 0.0;
-  for (const std::size_t i : spheres) {
-    const double value =
-        unevenness(network.organ, displacement, static_cast<Eigen::Index>(i), neighbours[i]);
-    sum += value * value;
-  }
-  return std::sqrt(sum / static_cast<double>(spheres.size())) / peak;
+  return std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) / peak;
 }
 
 double roughness(const Network& network, const Eigen::Matrix3Xd& displacement,
                  std::span<const std::size_t> spheres) {
-  return roughness(network, lateral_neighbours(network), displacement, spheres);
+  return roughness(Unevenness(network, spheres), displacement);
 }
 
 std::vector<std::size_t> spheres_around(const Network& network, std::size_t sphere, int steps) {

@@ -5,10 +5,6 @@
 
 namespace tpm::organ {
 
-/// For every sphere those that lateral bonds join to it.
-using LateralNeighbours = std::vector<std::vector<std::uint32_t>>;
-[[nodiscard]] LateralNeighbours lateral_neighbours(const Network& network);
-
 /// Distance, m, by which each sphere stands out of the smooth continuation of its neighbours'
 /// displacements:
 ///
@@ -28,15 +24,30 @@ using LateralNeighbours = std::vector<std::vector<std::uint32_t>>;
 [[nodiscard]] Eigen::VectorXd normal_unevenness_m(const Network& network,
                                                   const Eigen::Matrix3Xd& displacement);
 
+/// The unevenness of some spheres, linear in displacements: its shares are found once.
+class Unevenness {
+ public:
+  Unevenness(const Network& network, std::span<const std::size_t> spheres);
+  /// One number a sphere, m, in the order of the spheres.
+  [[nodiscard]] Eigen::VectorXd of(const Eigen::Matrix3Xd& displacement) const;
+
+ private:
+  struct Stencil {
+    Eigen::Index sphere = 0;
+    Eigen::Vector3d normal;
+    std::vector<std::uint32_t> neighbours;
+    Eigen::VectorXd share;  ///< of each neighbour
+  };
+  std::vector<Stencil> stencils_;
+};
+
 /// Root mean square of the unevenness over some spheres, over the largest displacement of any
 /// sphere; dimensionless. 0 for a smooth (linear) displacement.
 /// Throws Error(bad_input) for an empty list of spheres, or if nothing has moved.
 [[nodiscard]] double roughness(const Network& network, const Eigen::Matrix3Xd& displacement,
                                std::span<const std::size_t> spheres);
 /// The same for many displacements of one network.
-[[nodiscard]] double roughness(const Network& network, const LateralNeighbours& neighbours,
-                               const Eigen::Matrix3Xd& displacement,
-                               std::span<const std::size_t> spheres);
+[[nodiscard]] double roughness(const Unevenness& spheres, const Eigen::Matrix3Xd& displacement);
 
 /// The spheres of a layer that lateral bonds reach from one sphere in at most so many steps, that
 /// one included; rising.

@@ -74,12 +74,16 @@ LaneVector StageBalance::responses_within(const TissueState& state,
 
 std::vector<QuasiStaticState> StageBalance::states_within(const TissueState& state,
                                                           std::span<const double> fractions,
-                                                          double h, double rate) {
-  const Within all = within(state, fractions, h, rate);
+                                                          double h, double rate, bool energies) {
+  Within all = within(state, fractions, h, rate);
   const LaneVector response = responses(all);
   d_ = force_;  // what responses() left of them
   factor_.solve(d_);
   tissue_.constraints().project(d_);
+  all.position += d_;
+  LaneVector stored_J;
+  const bool in_lanes = energies && bonds_.is_linear();
+  if (in_lanes) stored_J = bonds_.stored_J(all.position, all.mean_viscous);
   work_.back_solves += static_cast<int>(fractions.size());
   std::vector<QuasiStaticState> states;
   Eigen::MatrixXd viscous;
@@ -89,13 +93,37 @@ std::vector<QuasiStaticState> StageBalance::states_within(const TissueState& sta
     at.time_s = state.time_s + fractions[lane] * h;
     at.imposed = all.imposed[row];
     at.response = response[row];
-    const Eigen::RowVectorXd place = all.position.row(row) + d_.row(row);
+    const Eigen::RowVectorXd place = all.position.row(row);
     at.position = Eigen::Map<const Positions>(place.data(), 3, coordinates_ / 3);
     viscous_in_lane(all.weights, followed_, begin_, row, viscous);
     at.viscous = state.viscous;
     put_viscous(viscous, at.viscous);
+    if (!energies) continue;
+    at.energy.emplace().stored_J = in_lanes
+                                       ? stored_J[row] + spread_J(viscous)
+                                       : tissue_.bonds().stored_energy_J(at.position, at.viscous);
   }
   return states;
+}
+
+double StageBalance::spread_J(const Eigen::MatrixXd& viscous) const {
+  double spread = 0.0;
+  for (const LaneBonds::Group& group : bonds_.groups()) {
+    const std::vector<ViscousLaw::Branch>& branches = tissue_.bonds().laws()[group.law].branches;
+    if (branches.size() < 2) continue;
+    Eigen::VectorXd share(static_cast<Eigen::Index>(branches.size()));
+    for (std::size_t b = 0; b < branches.size(); ++b) {
+      share[static_cast<Eigen::Index>(b)] = branches[b].share;
+    }
+    for (Eigen::Index i = group.first; i < group.first + group.count; ++i) {
+      const auto elongation = viscous.col(i).head(share.size());
+      const double mean = share.dot(elongation);
+      const std::size_t bond = bonds_.relaxing_bonds()[static_cast<std::size_t>(i)];
+      spread += tissue_.bonds().relaxing()[static_cast<Eigen::Index>(bond)] *
+                share.dot((elongation.array() - mean).square().matrix());
+    }
+  }
+  return 0.5 * spread;
 }
 
 LaneVector StageBalance::heat_W(const Within& states) const {

@@ -91,9 +91,10 @@ class StageBalance {
   /// The tissue at fractions of the step just balanced; its forces are balanced once more there,
   /// for all fractions at once.
   /// @param fractions in [0, 1], at most kLanes of them
+  /// @param energies also what is stored there, in `energy`
   [[nodiscard]] std::vector<QuasiStaticState> states_within(const TissueState& state,
                                                             std::span<const double> fractions,
-                                                            double h, double rate);
+                                                            double h, double rate, bool energies);
   /// Work done and heat made within the step just balanced.
   [[nodiscard]] StepEnergy energy_of_step(const TissueState& state, double h, double rate);
   /// Moves the state to the end of the step just balanced.
@@ -127,6 +128,9 @@ class StageBalance {
   /// Every viscous elongation in one lane, by (branch, bond).
   void viscous_in_lane(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
                        Eigen::Index lane, Eigen::MatrixXd& viscous) const;
+  /// What is stored because branches differ from their bond's mean, J.
+  /// @param viscous of one lane
+  [[nodiscard]] double spread_J(const Eigen::MatrixXd& viscous) const;
   /// Puts viscous elongations of the relaxing bonds among those of all.
   void put_viscous(const Eigen::MatrixXd& viscous, Eigen::MatrixXd& of_bonds) const;
 

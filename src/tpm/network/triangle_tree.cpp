@@ -6,13 +6,21 @@
 #include <numeric>
 #include <utility>
 
+#include "tpm/core/parallel.hpp"
+
 namespace tpm::organ {
 
 namespace {
 
 constexpr int kLeaf = 4;
+constexpr int kAlone = 4096;  // triangles that one thread splits
 
 using Eigen::Vector3d;
+
+/// Without a branch, which AlignedBox's has: where a point lies is not foreseen.
+double squared_distance(const Eigen::AlignedBox3d& box, const Vector3d& point) {
+  return (box.min() - point).cwiseMax(point - box.max()).cwiseMax(0.0).squaredNorm();
+}
 
 /// Nearest point on the edge from corner `from` to corner `to`, as weights of the three corners.
 Vector3d edge_weights(const Vector3d& start, const Vector3d& end, const Vector3d& point,
@@ -51,27 +59,39 @@ Vector3d nearest_weights(const Vector3d& a, const Vector3d& b, const Vector3d& c
   return best;
 }
 
+/// Nodes of the tree over so many triangles.
+int nodes_of(int count) {
+  if (count <= kLeaf) return 1;
+  // Halving leaves parts that differ by one at most: here those beyond a leaf are split once more.
+  int parts = 1;
+  while ((count - 1) / (2 * kLeaf) >= parts) parts *= 2;
+  return 2 * parts - 1 + 2 * std::min(parts, count - kLeaf * parts);
+}
+
 }  // namespace
 
 TriangleTree::TriangleTree(TriangleMesh mesh) : mesh_(std::move(mesh)) {
   const auto count = static_cast<int>(mesh_.triangles.cols());
   order_.resize(static_cast<std::size_t>(count));
   std::iota(order_.begin(), order_.end(), 0);
-  nodes_.reserve(order_.size());
-  nodes_.emplace_back();
-  std::vector<Eigen::AlignedBox3d> boxes;
-  boxes.reserve(order_.size());
-  for (const int t : order_) boxes.push_back(box_of(t));
-  split(0, 0, count, boxes);
-  pack();
+  nodes_.resize(static_cast<std::size_t>(nodes_of(count)));
+  std::vector<Eigen::AlignedBox3d> boxes(order_.size());
+  packed_.resize(order_.size());
+  for_each_in_parallel(order_.size(),
+                       [&](std::size_t t) { boxes[t] = box_of(static_cast<int>(t)); });
+  split(0, 1, 0, count, boxes);
 }
 
-void TriangleTree::pack() {
-  packed_.reserve(order_.size());
-  for (const int t : order_) {
-    packed_.push_back({mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2),
-                       mesh_.area_vector(t).normalized()});
+void TriangleTree::pack(int first, int count) {
+  for (int at = first; at < first + count; ++at) {
+    const int t = order_[static_cast<std::size_t>(at)];
+    packed_[static_cast<std::size_t>(at)] = packed(t);
   }
+}
+
+TriangleTree::Packed TriangleTree::packed(int triangle) const {
+  return {mesh_.corner(triangle, 0), mesh_.corner(triangle, 1), mesh_.corner(triangle, 2),
+          mesh_.area_vector(triangle).normalized()};
 }
 
 Eigen::AlignedBox3d TriangleTree::box_of(int triangle) const {
@@ -80,7 +100,7 @@ Eigen::AlignedBox3d TriangleTree::box_of(int triangle) const {
   return box;
 }
 
-void TriangleTree::split(int node, int first, int count,
+void TriangleTree::split(int node, int below, int first, int count,
                          const std::vector<Eigen::AlignedBox3d>& boxes) {
   const auto own_box = [&](int t) -> const Eigen::AlignedBox3d& {
     return boxes[static_cast<std::size_t>(t)];
@@ -97,7 +117,7 @@ void TriangleTree::split(int node, int first, int count,
   filled.box = box;
   filled.first = first;
   filled.count = count;
-  if (count <= kLeaf) return;
+  if (count <= kLeaf) return pack(first, count);
   Eigen::Index axis = 0;
   centres.sizes().maxCoeff(&axis);
   const int half = count / 2;
@@ -106,19 +126,36 @@ void TriangleTree::split(int node, int first, int count,
     const double right = own_box(b).center()[axis];
     return left != right ? left < right : a < b;
   });
-  const auto child = static_cast<int>(nodes_.size());
-  filled.first = child;
+  filled.first = below;
   filled.count = 0;
-  nodes_.resize(nodes_.size() + 2);  // `filled` is not valid from here on
-  split(child, first, half, boxes);
-  split(child + 1, first + half, count - half, boxes);
+  const auto split_half = [&](int which) {
+    which == 0 ? split(below, below + 2, first, half, boxes)
+               : split(below + 1, below + 1 + nodes_of(half), first + half, count - half, boxes);
+  };
+  if (count > kAlone) return for_each_in_parallel(2, split_half);
+  split_half(0);
+  split_half(1);
 }
 
-TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const {
+TrianglePoint TriangleTree::nearest(const Vector3d& point, double within, int last) const {
   TrianglePoint best;
   best.squared_distance = within * within;
+  const auto consider = [&](int triangle, const Packed& corners) {
+    const auto& [a, b, c, normal] = corners;
+    const double height = normal.dot(point - a);
+    if (height * height >= best.squared_distance) return;  // its plane is too far already
+    const Vector3d weights = nearest_weights(a, b, c, point);
+    const Vector3d position = weights[0] * a + weights[1] * b + weights[2] * c;
+    const double squared = (position - point).squaredNorm();
+    if (squared < best.squared_distance) best = {triangle, weights, position, squared};
+  };
+  if (last >= 0) consider(last, packed(last));
+  struct Open {
+    double bound;
+    int node;
+  };
   // Halving leaves at most 31 levels below an int of triangles, each with one node set aside.
-  std::array<std::pair<double, int>, 64> open;
+  std::array<Open, 64> open;
   std::size_t depth = 0;
   open[depth++] = {0.0, 0};
   while (depth > 0) {
@@ -126,26 +163,20 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const 
     if (bound >= best.squared_distance) continue;
     const Node& node = nodes_[static_cast<std::size_t>(index)];
     if (node.count == 0) {
-      const auto bound_of = [&](int child) {
-        return nodes_[static_cast<std::size_t>(child)].box.squaredExteriorDistance(point);
+      const auto child = [&](int number) {
+        const Eigen::AlignedBox3d& box = nodes_[static_cast<std::size_t>(number)].box;
+        return Open{squared_distance(box, point), number};
       };
-      std::pair<double, int> near{bound_of(node.first), node.first};
-      std::pair<double, int> far{bound_of(node.first + 1), node.first + 1};
-      if (far.first < near.first) std::swap(near, far);
-      open[depth++] = far;
-      open[depth++] = near;
+      Open near = child(node.first);
+      Open far = child(node.first + 1);
+      if (far.bound < near.bound) std::swap(near, far);
+      if (far.bound < best.squared_distance) open[depth++] = far;
+      if (near.bound < best.squared_distance) open[depth++] = near;
       continue;
     }
     for (int at = node.first; at < node.first + node.count; ++at) {
-      const auto& [a, b, c, normal] = packed_[static_cast<std::size_t>(at)];
-      const double height = normal.dot(point - a);
-      if (height * height >= best.squared_distance) continue;  // its plane is too far already
-      const Vector3d weights = nearest_weights(a, b, c, point);
-      const Vector3d position = weights[0] * a + weights[1] * b + weights[2] * c;
-      const double squared = (position - point).squaredNorm();
-      if (squared < best.squared_distance) {
-        best = {order_[static_cast<std::size_t>(at)], weights, position, squared};
-      }
+      const auto i = static_cast<std::size_t>(at);
+      consider(order_[i], packed_[i]);
     }
   }
   return best.triangle >= 0 ? best : nearest(point);

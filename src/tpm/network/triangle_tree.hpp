@@ -27,8 +27,9 @@ class TriangleTree {
   [[nodiscard]] const Eigen::AlignedBox3d& bounds() const { return nodes_.front().box; }
   /// @param within the caller's promise that the mesh comes nearer than this, m; it saves most of
   ///   the search and changes nothing. A promise that is not kept costs a second search.
-  [[nodiscard]] TrianglePoint nearest(const Eigen::Vector3d& point,
-                                      double within = kAnywhere) const;
+  /// @param last a triangle that may be the nearest, which saves the rest of it; -1: none is known
+  [[nodiscard]] TrianglePoint nearest(const Eigen::Vector3d& point, double within = kAnywhere,
+                                      int last = -1) const;
   /// The triangles whose bounding boxes meet a box, in rising order.
   [[nodiscard]] std::vector<int> meeting(const Eigen::AlignedBox3d& box) const;
   [[nodiscard]] Eigen::AlignedBox3d box_of(int triangle) const;
@@ -44,8 +45,11 @@ class TriangleTree {
     Eigen::Vector3d a, b, c;
     Eigen::Vector3d normal;  ///< unit
   };
-  void split(int node, int first, int count, const std::vector<Eigen::AlignedBox3d>& boxes);
-  void pack();
+  /// @param below where the nodes below this one begin
+  void split(int node, int below, int first, int count,
+             const std::vector<Eigen::AlignedBox3d>& boxes);
+  void pack(int first, int count);
+  [[nodiscard]] Packed packed(int triangle) const;
 
   TriangleMesh mesh_;
   std::vector<int> order_;

@@ -26,9 +26,12 @@ class SmoothnessProbe {
   [[nodiscard]] std::optional<Smoothness> at(const Positions& position) const;
 
  private:
+  SmoothnessProbe(const Network& network, const std::vector<std::size_t>& near,
+                  const std::vector<std::size_t>& rim);
+
   const Network& network_;
-  LateralNeighbours neighbours_;
-  std::vector<std::size_t> near_, rim_;
+  std::size_t near_spheres_, rim_spheres_;
+  Unevenness near_, rim_;
 };
 
 /// Of one deformation: SmoothnessProbe(scene).at(position).
