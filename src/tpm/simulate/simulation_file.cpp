@@ -11,6 +11,7 @@
 #include "tpm/simulate/smoothness.hpp"
 #include "tpm/simulate/step_fields.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/hdf5.hpp"
 #include "tpmkit/version.hpp"
 
 namespace tpm::organ {
