@@ -235,7 +235,7 @@ std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
   if (scene.outputs.viscous) {
     for (Eigen::Index j = 0; j < branches; ++j) {
       const std::string name = viscous_name(j, branches);
-      text += source.scalar(name, group + "/" + name, Centre::cell, m, Number::real);
+      text += source.scalar(name, fmt::format("{}/{}", group, name), Centre::cell, m, Number::real);
     }
   }
   text += "    </Grid>\n";
