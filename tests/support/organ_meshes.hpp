@@ -131,8 +131,8 @@ class Sphere final : public Surface {
         point.norm() > 0.0 ? point.normalized() : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
     return {radius_ * normal, normal};
   }
-  [[nodiscard]] Eigen::Vector3d nearest_position(const Eigen::Vector3d& point, double /*within*/,
-                                                 Place& /*place*/) const override {
+  [[nodiscard]] Eigen::Vector3d nearest_position(const Eigen::Vector3d& point,
+                                                 double /*within*/) const override {
     return nearest(point).position;
   }
   [[nodiscard]] double signed_distance(const Eigen::Vector3d& point) const override {

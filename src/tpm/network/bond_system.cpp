@@ -409,25 +409,23 @@ double BondSystem::stored_energy_J(const Positions& position,
   Eigen::VectorXd elongation;
   elongations(position, elongation);
   double energy = 0.0;
-  for (std::size_t i = first_contact(); i < size(); ++i) {
+  for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const double l = elongation[row];
-    if (carries(i, l, {})) energy += 0.5 * stiffness_[row] * l * l;
-  }
-  for (std::size_t i = 0; i < first_contact(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const double l = elongation[row];
-    if (rope_[i] && l < 0.0) continue;
+    if (!carries(i, l, {})) continue;
     const double g = relaxing_[row];
+    if (i >= first_contact()) {
+      energy += 0.5 * stiffness_[row] * l * l;
+      continue;
+    }
     const ViscousLaw& law = laws_[law_[i]];
-    double stored = (stiffness_[row] - g) * (linear_ ? 0.5 * l * l : law.equilibrium_integral(l));
+    energy += (stiffness_[row] - g) * (linear_ ? 0.5 * l * l : law.equilibrium_integral(l));
+    if (!(g > 0.0)) continue;
     Eigen::Index j = 0;
     for (const ViscousLaw::Branch& branch : law.branches) {
-      if (!(g > 0.0)) break;
       const double m = viscous(row, j++);
-      stored += g * branch.share * (linear_ ? 0.5 * (l - m) * (l - m) : law.kernel.gap(l, m));
+      energy += g * branch.share * (linear_ ? 0.5 * (l - m) * (l - m) : law.kernel.gap(l, m));
     }
-    energy += stored;
   }
   return energy;
 }

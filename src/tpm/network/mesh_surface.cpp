@@ -148,10 +148,8 @@ SurfacePoint MeshSurface::nearest(const Vector3d& point) const {
   return {at.position, normal(at)};
 }
 
-Vector3d MeshSurface::nearest_position(const Vector3d& point, double within, Place& place) const {
-  const TrianglePoint at = tree_.nearest(point, within, place);
-  place = at.triangle;
-  return at.position;
+Vector3d MeshSurface::nearest_position(const Vector3d& point, double within) const {
+  return tree_.nearest(point, within).position;
 }
 
 double MeshSurface::signed_distance(const Vector3d& point) const {

@@ -15,8 +15,8 @@ class MeshSurface final : public Surface {
   explicit MeshSurface(TriangleMesh mesh);
 
   [[nodiscard]] SurfacePoint nearest(const Eigen::Vector3d& point) const override;
-  [[nodiscard]] Eigen::Vector3d nearest_position(const Eigen::Vector3d& point, double within,
-                                                 Place& place) const override;
+  [[nodiscard]] Eigen::Vector3d nearest_position(const Eigen::Vector3d& point,
+                                                 double within) const override;
   [[nodiscard]] double signed_distance(const Eigen::Vector3d& point) const override;
   [[nodiscard]] Positions spread(std::size_t count, std::uint64_t seed) const override;
   [[nodiscard]] Eigen::AlignedBox3d bounds() const override { return tree_.bounds(); }

@@ -27,14 +27,10 @@ class Surface {
 
   /// The point of the surface nearest to a point.
   [[nodiscard]] virtual SurfacePoint nearest(const Eigen::Vector3d& point) const = 0;
-  /// Where a search ended, for the next one nearby.
-  using Place = int;
-  static constexpr Place kNoPlace = -1;
   /// The same place, found faster if the surface comes nearer than `within`, m, as the caller
-  /// knows, and near where the last search for this point ended.
-  /// @param place kNoPlace at first; where this search ends
+  /// knows.
   [[nodiscard]] virtual Eigen::Vector3d nearest_position(const Eigen::Vector3d& point,
-                                                         double within, Place& place) const = 0;
+                                                         double within) const = 0;
   /// Distance to the surface, negative inside.
   [[nodiscard]] virtual double signed_distance(const Eigen::Vector3d& point) const = 0;
   /// `count` points spread over the surface in proportion to area, the same for the same seed.

@@ -85,13 +85,9 @@ TriangleTree::TriangleTree(TriangleMesh mesh) : mesh_(std::move(mesh)) {
 void TriangleTree::pack(int first, int count) {
   for (int at = first; at < first + count; ++at) {
     const int t = order_[static_cast<std::size_t>(at)];
-    packed_[static_cast<std::size_t>(at)] = packed(t);
+    packed_[static_cast<std::size_t>(at)] = {mesh_.corner(t, 0), mesh_.corner(t, 1),
+                                             mesh_.corner(t, 2), mesh_.area_vector(t).normalized()};
   }
-}
-
-TriangleTree::Packed TriangleTree::packed(int triangle) const {
-  return {mesh_.corner(triangle, 0), mesh_.corner(triangle, 1), mesh_.corner(triangle, 2),
-          mesh_.area_vector(triangle).normalized()};
 }
 
 Eigen::AlignedBox3d TriangleTree::box_of(int triangle) const {
@@ -137,19 +133,9 @@ void TriangleTree::split(int node, int below, int first, int count,
   split_half(1);
 }
 
-TrianglePoint TriangleTree::nearest(const Vector3d& point, double within, int last) const {
+TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const {
   TrianglePoint best;
   best.squared_distance = within * within;
-  const auto consider = [&](int triangle, const Packed& corners) {
-    const auto& [a, b, c, normal] = corners;
-    const double height = normal.dot(point - a);
-    if (height * height >= best.squared_distance) return;  // its plane is too far already
-    const Vector3d weights = nearest_weights(a, b, c, point);
-    const Vector3d position = weights[0] * a + weights[1] * b + weights[2] * c;
-    const double squared = (position - point).squaredNorm();
-    if (squared < best.squared_distance) best = {triangle, weights, position, squared};
-  };
-  if (last >= 0) consider(last, packed(last));
   struct Open {
     double bound;
     int node;
@@ -175,8 +161,15 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point, double within, int la
       continue;
     }
     for (int at = node.first; at < node.first + node.count; ++at) {
-      const auto i = static_cast<std::size_t>(at);
-      consider(order_[i], packed_[i]);
+      const auto& [a, b, c, normal] = packed_[static_cast<std::size_t>(at)];
+      const double height = normal.dot(point - a);
+      if (height * height >= best.squared_distance) continue;  // its plane is too far already
+      const Vector3d weights = nearest_weights(a, b, c, point);
+      const Vector3d position = weights[0] * a + weights[1] * b + weights[2] * c;
+      const double squared = (position - point).squaredNorm();
+      if (squared < best.squared_distance) {
+        best = {order_[static_cast<std::size_t>(at)], weights, position, squared};
+      }
     }
   }
   return best.triangle >= 0 ? best : nearest(point);

@@ -27,9 +27,8 @@ class TriangleTree {
   [[nodiscard]] const Eigen::AlignedBox3d& bounds() const { return nodes_.front().box; }
   /// @param within the caller's promise that the mesh comes nearer than this, m; it saves most of
   ///   the search and changes nothing. A promise that is not kept costs a second search.
-  /// @param last a triangle that may be the nearest, which saves the rest of it; -1: none is known
-  [[nodiscard]] TrianglePoint nearest(const Eigen::Vector3d& point, double within = kAnywhere,
-                                      int last = -1) const;
+  [[nodiscard]] TrianglePoint nearest(const Eigen::Vector3d& point,
+                                      double within = kAnywhere) const;
   /// The triangles whose bounding boxes meet a box, in rising order.
   [[nodiscard]] std::vector<int> meeting(const Eigen::AlignedBox3d& box) const;
   [[nodiscard]] Eigen::AlignedBox3d box_of(int triangle) const;
@@ -49,7 +48,6 @@ class TriangleTree {
   void split(int node, int below, int first, int count,
              const std::vector<Eigen::AlignedBox3d>& boxes);
   void pack(int first, int count);
-  [[nodiscard]] Packed packed(int triangle) const;
 
   TriangleMesh mesh_;
   std::vector<int> order_;
