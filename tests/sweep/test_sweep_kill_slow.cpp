@@ -53,9 +53,37 @@ int exit_code(int status) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
+std::uintmax_t size_or_none(const std::string& file) {
+  std::error_code none;
+  const auto size = fs::file_size(file, none);
+  return none ? 0 : size;
+}
+
+/// Sends the signal once the log has grown by so many bytes, or, where it grows no more because the
+/// result is written, 20 ms later: moments of the work, whatever pace the machine has. Returns how
+/// the program ended, also where it was faster.
+int signalled(pid_t child, int signal, const std::string& log, double growth) {
+  using Clock = std::chrono::steady_clock;
+  const auto begin = size_or_none(log);
+  auto size = begin;
+  for (auto grown = Clock::now();;) {
+    int status = 0;
+    if (waitpid(child, &status, WNOHANG) == child) return status;
+    if (const auto now = size_or_none(log); now != size) {
+      size = now;
+      grown = Clock::now();
+    }
+    const bool idle = size > begin && Clock::now() - grown > std::chrono::milliseconds(20);
+    if (idle || static_cast<double>(size) >= static_cast<double>(begin) + growth) break;
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+  (void)kill(child, signal);
+  return ended(child);
+}
+
 /// One line of a program, nothing else.
 std::string one_line(const std::string& file) {
-  const std::string text = read_file(file);
+  std::string text = read_file(file);
   CHECK(text.find('\n') == text.size() - 1);
   return text;
 }
@@ -64,13 +92,10 @@ struct Undisturbed {
   test::TempFolder folder;
   std::string sweep = folder / "sweep.json", output = folder / "whole.h5";
   std::string words = folder / "words", bytes;
-  double seconds = 0.0;
 
   Undisturbed() {
     write_file(sweep, kSweep);
-    const auto begin = std::chrono::steady_clock::now();
     REQUIRE(exit_code(ended(start(sweep, output, words))) == 0);
-    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     bytes = read_file(output);
   }
 };
@@ -88,10 +113,11 @@ TEST_CASE("kill -9 and other signals at random moments: resumed to the same byte
   for (int i = 0; i < kills; ++i) {
     const int signal = signals[random.below(signals.size())];
     const pid_t child = start(whole.sweep, output, whole.folder / "said");
-    std::this_thread::sleep_for(
-        std::chrono::duration<double>(0.3 * whole.seconds * random.uniform()));
-    (void)kill(child, signal);
-    const int status = ended(child);
+    // The log is about as large as the result. Below 0: while the program starts.
+    const double growth =
+        static_cast<double>(whole.bytes.size()) * (0.35 * random.uniform() - 0.05);
+    std::this_thread::sleep_for(std::chrono::duration<double>(0.02 * random.uniform()));
+    const int status = signalled(child, signal, output + ".blocks", growth);
     killed += WIFSIGNALED(status) || exit_code(status) == 128 + signal ? 1 : 0;
     kept += fs::exists(output + ".blocks") ? 1 : 0;
     if (exit_code(status) == 0) fs::remove(output);  // it was done: once more from the start
