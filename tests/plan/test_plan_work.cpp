@@ -1,5 +1,6 @@
 // How much a plan may take: runs are counted, also those that fail, and end where they may not go
 // on.
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "simulated_scene.hpp"
@@ -64,6 +65,38 @@ TEST_CASE("a run ends where it may not go on, and what it took is counted") {
     CHECK(spent_s(again) < whole_s);
   }
   CHECK_NOTHROW(scene.quasi_static(to(1e-6), times, false, 1.001 * whole_s));
+}
+
+TEST_CASE("what a claim takes is said before it is made, with what models are compared with") {
+  const PlanScene scene(pushed_liver());
+  const PlanSurrogate surrogate(scene, {}, false);
+  const double first_s = nominal_costs().seconds_of(surrogate.work_of_first());
+  const PlanModels models = plan_models(scene);
+  const auto named = [&](const std::string& name) {
+    return std::find_if(models.begin(), models.end(),
+                        [&](const auto& model) { return model->name() == name; });
+  };
+  const auto full = named("collocation_0.001"), layered = named("collocation_0.001_layers_1");
+  REQUIRE(full < layered);  // what needs no more runs comes first
+  REQUIRE(layered != models.end());
+  const auto asked_s = [&](const PlanModel& model) {
+    return nominal_costs().seconds_of(model.work_to_claim(surrogate));
+  };
+  for (const auto& model : models) {
+    CAPTURE(model->name());
+    CHECK(asked_s(*model) >= 0.0);
+  }
+  CHECK_THAT(spent_s(scene), WithinRel(first_s, 1e-12));  // asking runs nothing
+  CHECK_THAT(asked_s(**named("linear_1")), WithinRel(first_s, 1e-12));
+  CHECK_THAT(asked_s(**layered), WithinRel(2.0 * first_s, 1e-12));
+  (void)surrogate.collocation(1e-5);  // as a reference does
+  CHECK(asked_s(**full) == 0.0);
+  (void)(*full)->claim(surrogate, {});
+  CHECK_FALSE(surrogate.has_collocation(PlanSurrogate::kTolerance));
+  (void)surrogate.coarse();
+  CHECK(asked_s(**named("linear_1")) == 0.0);
+  CHECK_THAT(asked_s(**layered),
+             WithinRel(nominal_costs().seconds_of(surrogate.coarse().work), 1e-12));
 }
 
 TEST_CASE("what a plan has no time for is said, and done where it is thorough", "[heavy]") {

@@ -62,11 +62,14 @@ class CollocationCandidate final : public LayeredCandidate {
   }
   [[nodiscard]] bool last_resort() const override { return tolerance_ < kUsualFinest; }
   [[nodiscard]] OperationCount work_to_claim(const PlanSurrogate& surrogate) const override {
-    const OperationCount& run = surrogate.coarse().work;
-    if (layers() > 0) return run;
+    const OperationCount& run = surrogate.coarse_or_first().work;
     OperationCount work;
-    if (!surrogate.has_collocation(tolerance_)) work += run;
-    if (!surrogate.inertial() && !surrogate.has_collocation_as_fine_as(finer())) work += run;
+    if (layers() > 0 || !surrogate.has_collocation(tolerance_)) work += run;
+    if (layers() > 0 || surrogate.inertial()) {
+      work += surrogate.work_to_compare();
+    } else if (!surrogate.has_collocation_as_fine_as(finer())) {
+      work += run;
+    }
     return work;
   }
 
@@ -123,7 +126,9 @@ class NetworkStepCandidate final : public LayeredCandidate {
     return LayeredCandidate::why_not(surrogate, budget);
   }
   [[nodiscard]] OperationCount work_to_claim(const PlanSurrogate& surrogate) const override {
-    return newton_iteration_work(surrogate.scene().driven()).times(3.0 * kTried);
+    OperationCount work = newton_iteration_work(surrogate.scene().driven()).times(3.0 * kTried);
+    if (layers() > 0) work += surrogate.work_to_compare();
+    return work;
   }
 
   [[nodiscard]] ModelClaim claim(const PlanSurrogate& surrogate,
@@ -224,13 +229,14 @@ PlanModels network_step_candidates(const PlanScene& scene) {
 
 PlanModels collocation_candidates(const PlanScene& scene) {
   PlanModels models;
-  for (int layers = 1; layers < scene.moving_layers(); ++layers) {
-    models.push_back(std::make_unique<CollocationCandidate>(1e-3, layers));
-  }
-  // That at 1e-3 first: its run is one of those that all claims are made from.
-  for (const double tolerance : {1e-3, 1e-2, 1e-4, 1e-5, 1e-6, 1e-7}) {
-    models.push_back(std::make_unique<CollocationCandidate>(tolerance, 0));
-  }
+  const auto add = [&](double tolerance, int layers) {
+    models.push_back(std::make_unique<CollocationCandidate>(tolerance, layers));
+  };
+  // That at 1e-3 first: its run is made anyway, and others are tried only while there is time once
+  // one meets the tolerance.
+  add(1e-3, 0);
+  for (int layers = 1; layers < scene.moving_layers(); ++layers) add(1e-3, layers);
+  for (const double tolerance : {1e-2, 1e-4, 1e-5, 1e-6, 1e-7}) add(tolerance, 0);
   return models;
 }
 

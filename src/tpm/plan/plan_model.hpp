@@ -55,9 +55,10 @@ class PlanModel {
   [[nodiscard]] virtual OperationCount work_to_build(const PlanScene& /*scene*/) const {
     return {};
   }
-  /// About what the runs for its claim take that were not made yet.
-  [[nodiscard]] virtual OperationCount work_to_claim(const PlanSurrogate& /*surrogate*/) const {
-    return {};
+  /// About what the runs for its claim take that were not made yet: by default that which models
+  /// are compared with.
+  [[nodiscard]] virtual OperationCount work_to_claim(const PlanSurrogate& surrogate) const {
+    return surrogate.work_to_compare();
   }
 
   /// Why the model has no answer to a scene at all; none if it has.

@@ -39,7 +39,8 @@ PlanRelevance switched_off(const PlanSurrogate& surrogate, const PlanAllowance& 
   PlanRelevance result;
   result.part = std::move(part);
   result.note = std::move(note);
-  const OperationCount& work = surrogate.coarse().work;
+  OperationCount work = surrogate.coarse_or_first().work;
+  work += surrogate.work_to_compare();
   if (!allowance.permits(work)) {
     result.note = fmt::format("not tried: a run takes some {} s more (--thorough)",
                               significant(nominal_costs().seconds_of(work), 1));
@@ -109,7 +110,7 @@ PlanRelevance relevance_of_inertia(const PlanSurrogate& surrogate, const PlanAll
       return result;
     }
     if (estimate.of_jumps > 0.0) {
-      const double peak = surrogate.coarse().response.cwiseAbs().maxCoeff();
+      const double peak = surrogate.coarse_or_first().response.cwiseAbs().maxCoeff();
       result.note += fmt::format("; a load step would ring by {} % of the peak",
                                  significant(100.0 * estimate.of_jumps / peak, 3));
       return result;

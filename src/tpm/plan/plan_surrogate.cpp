@@ -100,6 +100,14 @@ const Trajectory& PlanSurrogate::coarse() const {
   return collocation(kTolerance);
 }
 
+const Trajectory& PlanSurrogate::coarse_or_first() const {
+  return has_collocation(kTolerance) ? coarse() : rough();
+}
+
+OperationCount PlanSurrogate::work_to_compare() const {
+  return has_collocation(kTolerance) ? OperationCount{} : rough().work;
+}
+
 double PlanSurrogate::coarse_error() const {
   return trajectory_error(rough(), coarse(), measure_);
 }
@@ -119,7 +127,7 @@ const InertiaEstimate& PlanSurrogate::inertia() const {
 }
 
 double PlanSurrogate::inertia_share() const {
-  return inertia().of_rates / coarse().response.cwiseAbs().maxCoeff();
+  return inertia().of_rates / coarse_or_first().response.cwiseAbs().maxCoeff();
 }
 
 const ContactCurves& PlanSurrogate::curves() const {
@@ -145,7 +153,7 @@ const ContactCurves& PlanSurrogate::curves() const {
 }
 
 OperationCount PlanSurrogate::work_of_claims() const {
-  OperationCount work = coarse().work;
+  OperationCount work = coarse_or_first().work;
   if (inertial_) {
     work += with_masses(kTolerance).work;
     work += with_masses(kRoughTolerance).work;

@@ -41,6 +41,10 @@ class PlanSurrogate {
   /// That at the surrogate's own tolerance, with which models are compared before they are
   /// verified.
   [[nodiscard]] const Trajectory& coarse() const;
+  /// The coarse run where it was made, else the first, at ten times its tolerance.
+  [[nodiscard]] const Trajectory& coarse_or_first() const;
+  /// About what the coarse run takes if it was not made yet: what a first comparison costs.
+  [[nodiscard]] OperationCount work_to_compare() const;
   /// Where a run at ten times its tolerance leaves the model's limits.
   [[nodiscard]] const Validity& validity() const { return rough().validity; }
   /// What that run, the first and coarsest, takes.
@@ -52,13 +56,13 @@ class PlanSurrogate {
 
   [[nodiscard]] const ContactSpectrum& spectrum() const { return spectrum_at_rest(scene_); }
   [[nodiscard]] const InertiaEstimate& inertia() const;
-  /// InertiaEstimate::of_rates in parts of the coarse run's peak.
+  /// InertiaEstimate::of_rates in parts of the peak of coarse_or_first().
   [[nodiscard]] double inertia_share() const;
   /// Curves over the depths of the coarse run.
   [[nodiscard]] const ContactCurves& curves() const;
   [[nodiscard]] bool has_curves() const { return curves_.has_value(); }
 
-  /// What the runs take that any claim is made from.
+  /// What the runs take that any claim is made from; about, where the coarse one was not made.
   [[nodiscard]] OperationCount work_of_claims() const;
 
   /// A bound of the error of a model without masses that answers `model` at times(): `kSafety`

@@ -154,8 +154,10 @@ class CurvesCandidate final : public ScalarCandidate {
     return ScalarCandidate::why_not(surrogate, budget);
   }
   [[nodiscard]] OperationCount work_to_claim(const PlanSurrogate& surrogate) const override {
-    if (surrogate.has_curves()) return {};
-    return surrogate.coarse().work.times(2.0);  // one curve instantaneous, one at equilibrium
+    OperationCount work = surrogate.work_to_compare();
+    // One curve instantaneous, one at equilibrium.
+    if (!surrogate.has_curves()) work += surrogate.coarse_or_first().work.times(2.0);
+    return work;
   }
 
  protected:
