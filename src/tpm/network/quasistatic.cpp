@@ -90,6 +90,7 @@ class Run {
   /// Puts the tissue at rest and sets what tolerances refer to.
   void set_scales(double time_s) {
     state_ = tissue_.at_rest(time_s);
+    response_.reset();
     stages_.begin(state_, first_step_s(first_change_s()), protocol_.peak());
   }
 
@@ -135,6 +136,11 @@ class Run {
 
   void jump(double value) { move_to(value, false); }
 
+  [[nodiscard]] double response_now() {
+    if (!response_) response_ = tissue_.response(state_);
+    return *response_;
+  }
+
   [[nodiscard]] double stored_J() const {
     return tissue_.bonds().stored_energy_J(state_.position, state_.viscous);
   }
@@ -160,10 +166,10 @@ class Run {
   /// Waits for ever; what the springs lose then and the probe adds turns into heat.
   void settle() {
     const double before_J = stored_J();
-    const double response = tissue_.response(state_);
+    const double response = response_now();
     follow(state_.imposed, true);
     const double work_J =
-        tissue_.depth_driven() ? 0.0 : state_.imposed * (tissue_.response(state_) - response);
+        tissue_.depth_driven() ? 0.0 : state_.imposed * (response_now() - response);
     energy_.work_J += work_J;
     energy_.dissipated_J += work_J + before_J - stored_J();
   }
@@ -188,7 +194,8 @@ class Run {
                                 ? "the tissue buckles: its stiffness is no longer positive"
                                 : "no equilibrium is found: it may snap through");
     }
-    stages_.see(tissue_.response(state_));
+    response_.reset();
+    stages_.see(response_now());
     if (tangents_) tangents_->follow_move(state_, relaxed);
   }
 
@@ -226,7 +233,7 @@ class Run {
       report_within(h, rate, energy);
       if (energy) energy_ = with(energy->whole());
       result_.error_estimate += outcome.error + outcome.left;
-      stages_.accept(state_, h, rate);
+      response_ = stages_.accept(state_, h, rate);
       if (tangents_) tangents_->accept();
       if (last) state_.time_s = to.time_s;
       state_.imposed = last ? to.value : state_.imposed;
@@ -261,6 +268,7 @@ class Run {
 
   void change_contact(std::size_t contact) {
     stages_.change_contact(state_, contact);
+    response_.reset();
     changes_together_ = state_.time_s == changed_at_s_ ? changes_together_ + 1 : 1;
     changed_at_s_ = state_.time_s;
     if (changes_together_ <= kMostChangesTogether * state_.closed.size()) return;
@@ -271,7 +279,7 @@ class Run {
 
   void stand_still(double until_s) {
     while (next_ < order_.size() && times_s_[order_[next_]] < until_s) {
-      put(tissue_.response(state_), state_, energy_);
+      put(response_now(), state_, energy_);
     }
     state_.time_s = until_s;
   }
@@ -303,6 +311,10 @@ class Run {
   /// Puts derivatives at fractions of the step just found, and responses unless an observer is
   /// shown states, which bring them.
   void answer(std::span<const double> fractions, double h, double rate) {
+    while (!tangents_ && !fractions.empty() && fractions.front() == 0.0) {
+      put(response_now());
+      fractions = fractions.subspan(1);
+    }
     const Eigen::Index derivatives = tangents_ ? tangents_->count() : 0;
     Eigen::RowVectorXd allowed = Eigen::RowVectorXd::Constant(
         1 + derivatives, options_.derivative_tolerance.value_or(options_.tolerance));
@@ -322,7 +334,10 @@ class Run {
       derivative_row(next_ + static_cast<std::size_t>(i)) = answers.row(i).tail(derivatives);
     }
     if (observer_) return;
-    for (const double response : answers.col(0)) put(response);
+    for (Eigen::Index i = 0; i < answers.rows(); ++i) {
+      const bool begins = fractions[static_cast<std::size_t>(i)] == 0.0;
+      put(begins ? response_now() : answers(i, 0));
+    }
   }
 
   /// Responses within the step just found, with the states there.
@@ -331,6 +346,7 @@ class Run {
     std::vector<QuasiStaticState> states =
         stages_.states_within(state_, fractions, h, rate, options_.energies);
     for (std::size_t i = 0; i < fractions.size(); ++i) {
+      if (fractions[i] == 0.0) states[i].response = response_now();
       const double response = states[i].response;
       show(states[i], energy ? with(energy->until(fractions[i], response)) : energy_);
     }
@@ -348,7 +364,7 @@ class Run {
         continue;
       }
       if (tangents_) derivative_row(next_) = tangents_->response(state_);
-      put(tissue_.response(state_), state_, energy_);
+      put(response_now(), state_, energy_);
     }
   }
 
@@ -404,6 +420,7 @@ class Run {
   double changed_at_s_ = -std::numeric_limits<double>::infinity();
   std::size_t changes_together_ = 0;
   TissueState state_;
+  std::optional<double> response_;  ///< there, once known
   QuasiStaticEnergy energy_;
   QuasiStaticRun result_;
 };

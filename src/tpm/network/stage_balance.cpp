@@ -11,8 +11,9 @@ namespace {
 
 constexpr int kMostIterations = 25;
 constexpr int kTooManyIterations = 8;  // a new factorisation pays
-// Times the tolerance: a bound of what one more correction mends.
-constexpr double kLeftToCorrect = 3.0;
+// Times the tolerance: what the last correction may mend, by the bound of what is left to it, and
+// if what it leaves shrinks as much as before.
+constexpr double kLeftToCorrect = 3.0, kLeftIfShrinking = 30.0;
 constexpr double kMixingShare = 0.8;  // of what relaxes on average: what relaxes less is overdone
 constexpr double kHopeless = 10.0;    // times the tolerance: an error that no balance mends
 constexpr int kLastHopeless = 2;      // iterations after which only the balance decides
@@ -375,7 +376,7 @@ void StageBalance::residuals() {
   ++work_.iterations;
 }
 
-StageBalance::Balance StageBalance::balance(double tolerance) {
+StageBalance::Balance StageBalance::balance(double allowed) {
   anderson_.restart();
   double first = 0.0;
   double before = 0.0;
@@ -383,16 +384,17 @@ StageBalance::Balance StageBalance::balance(double tolerance) {
     residuals();
     last_iterations_ = i;
     if (!std::isfinite(imbalance_)) return Balance::failed;
-    if (imbalance_ <= tolerance) {
+    left_ = imbalance_ * (i > 0 ? std::min(1.0, imbalance_ / before) : 1.0);
+    if (imbalance_ <= std::max(kLeftToCorrect * allowed, rounding_) ||
+        (imbalance_ <= kLeftIfShrinking * allowed && left_ <= allowed)) {
       // Of the last correction the adjoint knows what it does to the response.
       end_response_ = plain_response_[stages_ - 1] +
                       tissue_.adjoint_sign() * force_.row(stages_ - 1).dot(lane_field_);
-      left_ = imbalance_ * (i > 0 ? std::min(1.0, imbalance_ / before) : 1.0);
       x_ += d_;  // the correction is known: it costs nothing
       return Balance::found;
     }
     if (choosing_ && i > 0 && i <= kLastHopeless &&
-        error() > kHopeless * (tolerance + imbalance_)) {
+        error() > kHopeless * (kLeftToCorrect * allowed + imbalance_)) {
       return Balance::hopeless;
     }
     if (i == 0) first = imbalance_;
@@ -422,7 +424,7 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   mixing_ = mixing(weights_);
   predict(state, h, rate);
   outcome.allowed = tolerance * scale_;
-  const Balance balanced = balance(std::max(kLeftToCorrect * outcome.allowed, rounding_));
+  const Balance balanced = balance(outcome.allowed);
   outcome.balanced = balanced != Balance::failed;
   if (!outcome.balanced) {
     factorised_ = false;
@@ -458,7 +460,7 @@ LaneMatrix StageBalance::aging(const Places& places, std::span<const double> fra
   return -z * change;
 }
 
-void StageBalance::accept(TissueState& state, double h, double rate) {
+double StageBalance::accept(TissueState& state, double h, double rate) {
   const int middle = (stages_ - 1) / 2;
   last_velocity_ = (x_.row(stages_ - 1) - x_.row(middle)) / (h * (1.0 - node(middle)));
   last_h_ = h;
@@ -474,6 +476,7 @@ void StageBalance::accept(TissueState& state, double h, double rate) {
   state.mean = tissue_.bonds().mean_viscous(state.viscous);
   ++work_.steps;
   see(end_response_);
+  return end_response_;
 }
 
 }  // namespace tpm::organ

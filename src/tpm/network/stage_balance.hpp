@@ -97,8 +97,8 @@ class StageBalance {
                                                             double h, double rate, bool energies);
   /// Work done and heat made within the step just balanced.
   [[nodiscard]] StepEnergy energy_of_step(const TissueState& state, double h, double rate);
-  /// Moves the state to the end of the step just balanced.
-  void accept(TissueState& state, double h, double rate);
+  /// Moves the state to the end of the step just balanced, and returns the response there.
+  double accept(TissueState& state, double h, double rate);
 
  private:
   friend class StageTangents;
@@ -192,7 +192,8 @@ class StageBalance {
   /// @return bound of what the forces do to the response, N or m
   double correction(const LaneMatrix& force, const LaneSquare& mixing, LaneMatrix& d);
   void predict(const TissueState& state, double h, double rate);
-  [[nodiscard]] Balance balance(double tolerance);
+  /// @param allowed error of the response that forces may leave
+  [[nodiscard]] Balance balance(double allowed);
   /// The forces left on the free spheres of every stage, and from them the next correction.
   void residuals();
   void update_viscous();
