@@ -11,9 +11,9 @@ namespace {
 
 constexpr int kMostIterations = 25;
 constexpr int kTooManyIterations = 8;  // a new factorisation pays
-// Times the tolerance: what the last correction may mend, by the bound of what is left to it, and
-// if what it leaves shrinks as much as before.
-constexpr double kLeftToCorrect = 3.0, kLeftIfShrinking = 30.0;
+// Times what a step may err, a tenth of the run's tolerance: a bound of what the last correction
+// mends; and where it leaves no more than that if it shrinks as much as before, which it need not.
+constexpr double kLeftToCorrect = 3.0, kLeftIfShrinking = 8.0;
 constexpr double kMixingShare = 0.8;  // of what relaxes on average: what relaxes less is overdone
 constexpr double kHopeless = 10.0;    // times the tolerance: an error that no balance mends
 constexpr int kLastHopeless = 2;      // iterations after which only the balance decides
