@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 constexpr int kSubdivisions = 5;
 // Of the farthest reach: a bracket with one crossing, and the error of its estimate.
 constexpr double kNear = 1.0 / 256.0;
-constexpr double kClose = 1e-11;
+constexpr double kClose = 2e-12;
 constexpr int kMostEstimates = 60;
 
 struct Ellipsoid {
@@ -83,16 +83,24 @@ class LiverFunction {
   Vector3d hollow_centre_;
 };
 
-/// Every triangle of a unit sphere cut into four at the middles of its edges.
-std::vector<Eigen::Vector3i> quartered(const std::vector<Eigen::Vector3i>& faces,
-                                       std::vector<Vector3d>& vertices) {
+/// A unit sphere in triangles.
+struct Sphere {
+  std::vector<Vector3d> vertices;
+  std::vector<std::array<std::size_t, 2>> ends;  ///< of the edge whose middle a vertex was, if any
+  std::vector<std::size_t> rounds;               ///< how many vertices there were after each
+  std::vector<Eigen::Vector3i> faces;
+};
+
+/// Every triangle cut into four at the middles of its edges.
+std::vector<Eigen::Vector3i> quartered(const std::vector<Eigen::Vector3i>& faces, Sphere& sphere) {
+  std::vector<Vector3d>& vertices = sphere.vertices;
   EdgeTable<int> halfway(vertices.size());
-  const auto middle = [&](int a, int b) {
-    const auto [number, fresh] = halfway.at(a, b, static_cast<int>(vertices.size()));
+  const auto middle = [&](int from, int to) {
+    const auto [number, fresh] = halfway.at(from, to, static_cast<int>(vertices.size()));
     if (fresh) {
-      vertices.push_back(
-          (vertices[static_cast<std::size_t>(a)] + vertices[static_cast<std::size_t>(b)])
-              .normalized());
+      const auto a = static_cast<std::size_t>(from), b = static_cast<std::size_t>(to);
+      vertices.push_back((vertices[a] + vertices[b]).normalized());
+      sphere.ends.push_back({a, b});
     }
     return number;
   };
@@ -108,48 +116,40 @@ std::vector<Eigen::Vector3i> quartered(const std::vector<Eigen::Vector3i>& faces
   return finer;
 }
 
-/// Unit sphere: an icosahedron whose triangles are cut into four, again and again.
-TriangleMesh icosphere(int subdivisions) {
+/// An icosahedron whose triangles are cut into four, again and again.
+Sphere icosphere(int subdivisions) {
   const double golden = (1.0 + std::sqrt(5.0)) / 2.0;
-  TriangleMesh mesh;
-  mesh.vertices.resize(3, 12);
+  Sphere sphere;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     for (Eigen::Index k = 0; k < 4; ++k) {
       Vector3d corner = Vector3d::Zero();
       corner[axis] = k < 2 ? 1.0 : -1.0;
       corner[(axis + 1) % 3] = k % 2 == 0 ? golden : -golden;
-      mesh.vertices.col(4 * axis + k) = corner.normalized();
+      sphere.vertices.push_back(corner.normalized());
     }
   }
   // The 20 triples of corners that are all one edge length apart, turned outwards.
   const double edge = 1.1 * 2.0 / std::sqrt(golden * golden + 1.0);
-  std::vector<Eigen::Vector3i> faces;
-  const auto near = [&](int a, int b) {
-    return (mesh.vertices.col(a) - mesh.vertices.col(b)).norm() < edge;
+  const auto corner = [&](int v) -> const Vector3d& {
+    return sphere.vertices[static_cast<std::size_t>(v)];
   };
+  const auto near = [&](int a, int b) { return (corner(a) - corner(b)).norm() < edge; };
   for (int a = 0; a < 12; ++a) {
     for (int b = a + 1; b < 12; ++b) {
       for (int c = b + 1; c < 12; ++c) {
         if (!near(a, b) || !near(b, c) || !near(c, a)) continue;
-        const Vector3d va = mesh.vertices.col(a);
-        const Vector3d vb = mesh.vertices.col(b);
-        const bool outwards = va.cross(vb).dot(mesh.vertices.col(c)) > 0.0;
-        faces.emplace_back(a, outwards ? b : c, outwards ? c : b);
+        const bool outwards = corner(a).cross(corner(b)).dot(corner(c)) > 0.0;
+        sphere.faces.emplace_back(a, outwards ? b : c, outwards ? c : b);
       }
     }
   }
-  std::vector<Vector3d> vertices;
-  for (Eigen::Index v = 0; v < 12; ++v) vertices.emplace_back(mesh.vertices.col(v));
-  for (int round = 0; round < subdivisions; ++round) faces = quartered(faces, vertices);
-  mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
-  for (std::size_t v = 0; v < vertices.size(); ++v) {
-    mesh.vertices.col(static_cast<Eigen::Index>(v)) = vertices[v];
+  sphere.ends.resize(sphere.vertices.size());
+  sphere.rounds.push_back(sphere.vertices.size());
+  for (int round = 0; round < subdivisions; ++round) {
+    sphere.faces = quartered(sphere.faces, sphere);
+    sphere.rounds.push_back(sphere.vertices.size());
   }
-  mesh.triangles.resize(3, static_cast<Eigen::Index>(faces.size()));
-  for (std::size_t f = 0; f < faces.size(); ++f) {
-    mesh.triangles.col(static_cast<Eigen::Index>(f)) = faces[f];
-  }
-  return mesh;
+  return sphere;
 }
 
 /// Two places on a ray from the middle, one inside the shape and one outside, m from the middle.
@@ -186,9 +186,14 @@ double estimated_reach(const Value& value, Bracket at, double precision) {
 }
 
 /// Where a ray from the middle leaves the shape, by bisection. Where a narrow bracket is known the
-/// shape is asked within it alone, which changes no answer and saves half of them.
-double reach_along(const LiverFunction& liver, const Vector3d& direction, double farthest) {
+/// shape is asked within it alone, which changes no answer and saves most of them.
+/// @param about a guess, m from the middle; any will do
+double reach_along(const LiverFunction& liver, const Vector3d& direction, double farthest,
+                   double about) {
   const auto value = [&](double reach) { return liver(liver.middle() + reach * direction); };
+  const auto is_within = [&](const Bracket& at) {
+    return value(at.inside) < 0.0 && value(at.outside) >= 0.0;
+  };
   Bracket at{0.0, farthest};
   const auto halve = [&](const Bracket& known) {
     const double between = at.middle();
@@ -196,11 +201,14 @@ double reach_along(const LiverFunction& liver, const Vector3d& direction, double
         between <= known.inside || (between < known.outside && value(between) < 0.0);
     (is_inside ? at.inside : at.outside) = between;
   };
-  while (at.width() > kNear * farthest) halve(at);
-  const double about = estimated_reach(value, at, 0.1 * kClose * farthest);
-  Bracket known{about - kClose * farthest, about + kClose * farthest};
-  if (value(known.inside) >= 0.0) known.inside = at.inside;
-  if (value(known.outside) < 0.0) known.outside = at.outside;
+  Bracket known{about - kNear * farthest, about + kNear * farthest};
+  if (!is_within(known)) {
+    while (at.width() > kNear * farthest) halve(at);
+    known = at;
+  }
+  const double closer = estimated_reach(value, known, 0.1 * kClose * farthest);
+  const Bracket narrow{closer - kClose * farthest, closer + kClose * farthest};
+  if (is_within(narrow)) known = narrow;
   while (at.width() > 1e-12 * farthest) halve(known);
   return at.inside;
 }
@@ -243,12 +251,27 @@ LiverShape scaled(LiverShape shape, double factor) {
 TriangleMesh liver_mesh(const LiverShape& shape) {
   require_valid(shape, "liver");
   const LiverFunction liver(shape);
-  TriangleMesh mesh = icosphere(kSubdivisions);
+  const Sphere sphere = icosphere(kSubdivisions);
   const double farthest = shape.width + shape.height + shape.depth;
-  for_each_in_parallel(mesh.vertices.cols(), [&](Eigen::Index v) {
-    const Vector3d direction = mesh.vertices.col(v);
-    mesh.vertices.col(v) = liver.middle() + reach_along(liver, direction, farthest) * direction;
-  });
+  std::vector<double> reach(sphere.vertices.size());
+  TriangleMesh mesh;
+  mesh.vertices.resize(3, static_cast<Eigen::Index>(reach.size()));
+  std::size_t begin = 0;
+  for (const std::size_t end : sphere.rounds) {
+    for_each_in_parallel(end - begin, [&](std::size_t i) {
+      const std::size_t v = begin + i;
+      const auto [a, b] = sphere.ends[v];
+      const double about = begin == 0 ? 0.0 : 0.5 * (reach[a] + reach[b]);
+      const Vector3d& direction = sphere.vertices[v];
+      reach[v] = reach_along(liver, direction, farthest, about);
+      mesh.vertices.col(static_cast<Eigen::Index>(v)) = liver.middle() + reach[v] * direction;
+    });
+    begin = end;
+  }
+  mesh.triangles.resize(3, static_cast<Eigen::Index>(sphere.faces.size()));
+  for (std::size_t f = 0; f < sphere.faces.size(); ++f) {
+    mesh.triangles.col(static_cast<Eigen::Index>(f)) = sphere.faces[f];
+  }
   return mesh;
 }
 

@@ -4,12 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <span>
 #include <utility>
 
-#include "tpm/core/parallel.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/network/edge_table.hpp"
 
 namespace tpm::organ {
 
@@ -19,128 +16,91 @@ using Eigen::Vector3d;
 
 const double kSmooth = std::sqrt(3.0) / 2.0;  // cosine of 30 degrees
 
-/// Angle of a triangle at a corner, rad.
-double angle_at(const TriangleMesh& mesh, Eigen::Index triangle, Eigen::Index which) {
-  const Vector3d u = mesh.corner(triangle, (which + 1) % 3) - mesh.corner(triangle, which);
-  const Vector3d v = mesh.corner(triangle, (which + 2) % 3) - mesh.corner(triangle, which);
-  return std::atan2(u.cross(v).norm(), u.dot(v));
-}
-
-/// A corner of a triangle.
-struct Corner {
-  Eigen::Index triangle = 0, which = 0;
-};
-
-/// The corners that meet at each vertex, in the order of the triangles.
-class Fans {
- public:
-  explicit Fans(const TriangleMesh& mesh)
-      : end_(static_cast<std::size_t>(mesh.vertices.cols()) + 1, 0),
-        corners_(static_cast<std::size_t>(mesh.triangles.size())) {
-    for (const int vertex : mesh.triangles.reshaped()) ++end_[static_cast<std::size_t>(vertex) + 1];
-    std::partial_sum(end_.begin(), end_.end(), end_.begin());
-    std::vector<std::size_t> next(end_.begin(), end_.end() - 1);
-    for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
-      for (Eigen::Index which = 0; which < 3; ++which) {
-        corners_[next[static_cast<std::size_t>(mesh.triangles(which, t))]++] = {t, which};
-      }
-    }
-  }
-  [[nodiscard]] std::span<const Corner> of(Eigen::Index vertex) const {
-    const auto v = static_cast<std::size_t>(vertex);
-    return std::span(corners_).subspan(end_[v], end_[v + 1] - end_[v]);
-  }
-
- private:
-  std::vector<std::size_t> end_;  ///< of the corners of the vertex before
-  std::vector<Corner> corners_;
-};
-
 }  // namespace
 
 MeshSurface::MeshSurface(TriangleMesh mesh)
     : tree_(std::move(mesh)), area_(mesh_area(tree_.mesh())), volume_(mesh_volume(tree_.mesh())) {
-  normals_.resize(static_cast<std::size_t>(this->mesh().triangles.cols()));
-  Eigen::Matrix3Xd angles(3, this->mesh().triangles.cols());
-  for_each_in_parallel(angles.cols(), [&](Eigen::Index t) {
-    normals_[static_cast<std::size_t>(t)].face = this->mesh().area_vector(t).normalized();
-    for (Eigen::Index which = 0; which < 3; ++which) {
-      angles(which, t) = angle_at(this->mesh(), t, which);
+  const Eigen::Matrix3Xi& triangles = this->mesh().triangles;
+  fan_end_.assign(static_cast<std::size_t>(this->mesh().vertices.cols()) + 1, 0);
+  fans_.resize(static_cast<std::size_t>(triangles.size()));
+  for (const int v : triangles.reshaped()) ++fan_end_[static_cast<std::size_t>(v) + 1];
+  std::partial_sum(fan_end_.begin(), fan_end_.end(), fan_end_.begin());
+  std::vector<std::size_t> next(fan_end_.begin(), fan_end_.end() - 1);
+  for (int t = 0; t < static_cast<int>(triangles.cols()); ++t) {
+    for (int which = 0; which < 3; ++which) {
+      fans_[next[static_cast<std::size_t>(triangles(which, t))]++] = {t, which};
     }
+  }
+}
+
+std::span<const MeshSurface::Corner> MeshSurface::fan(int vertex) const {
+  const auto v = static_cast<std::size_t>(vertex);
+  return std::span(fans_).subspan(fan_end_[v], fan_end_[v + 1] - fan_end_[v]);
+}
+
+Vector3d MeshSurface::face(int triangle) const {
+  return mesh().area_vector(triangle).normalized();
+}
+
+double MeshSurface::angle(const Corner& at) const {
+  const Vector3d here = mesh().corner(at.triangle, at.which);
+  const Vector3d u = mesh().corner(at.triangle, (at.which + 1) % 3) - here;
+  const Vector3d v = mesh().corner(at.triangle, (at.which + 2) % 3) - here;
+  return std::atan2(u.cross(v).norm(), u.dot(v));
+}
+
+int MeshSurface::beyond(const Corner& edge) const {
+  const int end = vertex_of({edge.triangle, (edge.which + 1) % 3});
+  const std::span<const Corner> corners = fan(vertex_of(edge));
+  // There the edge runs the other way, as in every closed mesh.
+  const auto other = std::find_if(corners.begin(), corners.end(), [&](const Corner& at) {
+    return vertex_of({at.triangle, (at.which + 2) % 3}) == end;
   });
-  for_each_in_parallel(
-      2, [&](int which) { which == 0 ? set_corner_normals(angles) : set_edge_normals(); });
+  return other->triangle;
 }
 
-void MeshSurface::set_corner_normals(const Eigen::Matrix3Xd& angles) {
-  const Fans fans(mesh());
-  vertex_normals_.setZero(3, mesh().vertices.cols());
-  for (Eigen::Index v = 0; v < vertex_normals_.cols(); ++v) {
-    const std::span<const Corner> fan = fans.of(v);
-    for (const auto& [t, which] : fan) {
-      vertex_normals_.col(v) += angles(which, t) * normals_[static_cast<std::size_t>(t)].face;
-    }
-    vertex_normals_.col(v).normalize();
-    for (const auto& [t, which] : fan) {
-      Normals& own = normals_[static_cast<std::size_t>(t)];
-      Vector3d sum = Vector3d::Zero();
-      for (const Corner& at : fan) {
-        const Vector3d& other = normals_[static_cast<std::size_t>(at.triangle)].face;
-        if (own.face.dot(other) >= kSmooth) sum += angles(at.which, at.triangle) * other;
-      }
-      own.smooth.col(which) = sum.normalized();
-    }
-  }
+bool MeshSurface::is_crease(const Corner& edge) const {
+  return face(edge.triangle).dot(face(beyond(edge))) < kSmooth;
 }
 
-void MeshSurface::set_edge_normals() {
-  using Side = std::pair<std::size_t, Eigen::Index>;  // triangle and edge
-  EdgeTable<Side> open(static_cast<std::size_t>(mesh().vertices.cols()));
-  on_crease_.assign(static_cast<std::size_t>(mesh().vertices.cols()), false);
-  for (std::size_t t = 0; t < normals_.size(); ++t) {
-    const auto corner = mesh().triangles.col(static_cast<Eigen::Index>(t));
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      const int from = corner[i];
-      const int to = corner[(i + 1) % 3];
-      const auto [side, fresh] = open.at(from, to, {t, i});
-      if (fresh) continue;
-      const auto [other, edge] = side;
-      const Vector3d mean = (normals_[t].face + normals_[other].face).normalized();
-      const bool crease = normals_[t].face.dot(normals_[other].face) < kSmooth;
-      normals_[t].edge.col(i) = mean;
-      normals_[other].edge.col(edge) = mean;
-      normals_[t].crease[i] = normals_[other].crease[edge] = crease;
-      if (crease) {
-        on_crease_[static_cast<std::size_t>(from)] = true;
-        on_crease_[static_cast<std::size_t>(to)] = true;
-      }
-    }
+bool MeshSurface::on_crease(int vertex) const {
+  return std::ranges::any_of(fan(vertex), [&](const Corner& edge) { return is_crease(edge); });
+}
+
+Vector3d MeshSurface::mean_normal(const Corner& at, bool smooth) const {
+  const Vector3d own = face(at.triangle);
+  Vector3d sum = Vector3d::Zero();
+  for (const Corner& corner : fan(vertex_of(at))) {
+    const Vector3d other = face(corner.triangle);
+    if (!smooth || own.dot(other) >= kSmooth) sum += angle(corner) * other;
   }
+  return sum.normalized();
 }
 
 /// What tells inside from outside at the nearest point (Baerentzen and Aanaes 2005).
 Vector3d MeshSurface::pseudonormal(const TrianglePoint& at) const {
-  const Normals& own = normals_[static_cast<std::size_t>(at.triangle)];
-  for (Eigen::Index i = 0; i < 3; ++i) {
+  for (int i = 0; i < 3; ++i) {
     const bool before_zero = at.weights[(i + 1) % 3] <= 0.0;
     const bool after_zero = at.weights[(i + 2) % 3] <= 0.0;
-    if (before_zero && after_zero) return vertex_normals_.col(mesh().triangles(i, at.triangle));
+    if (before_zero && after_zero) return mean_normal({at.triangle, i}, false);
   }
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    if (at.weights[(i + 2) % 3] <= 0.0) return own.edge.col(i);
+  for (int i = 0; i < 3; ++i) {
+    if (at.weights[(i + 2) % 3] > 0.0) continue;
+    return (face(at.triangle) + face(beyond({at.triangle, i}))).normalized();
   }
-  return own.face;
+  return face(at.triangle);
 }
 
 Vector3d MeshSurface::normal(const TrianglePoint& at) const {
-  const Normals& own = normals_[static_cast<std::size_t>(at.triangle)];
-  for (Eigen::Index i = 0; i < 3; ++i) {
+  for (int i = 0; i < 3; ++i) {
+    const Corner corner{at.triangle, i};
     const bool at_corner = at.weights[(i + 1) % 3] <= 0.0 && at.weights[(i + 2) % 3] <= 0.0;
-    const auto vertex = static_cast<std::size_t>(mesh().triangles(i, at.triangle));
-    if (at_corner && on_crease_[vertex]) return pseudonormal(at);
-    if (at.weights[(i + 2) % 3] <= 0.0 && own.crease[i]) return pseudonormal(at);
+    if (at_corner && on_crease(vertex_of(corner))) return pseudonormal(at);
+    if (at.weights[(i + 2) % 3] <= 0.0 && is_crease(corner)) return pseudonormal(at);
   }
-  return (own.smooth * at.weights).normalized();
+  Eigen::Matrix3d smooth;
+  for (int i = 0; i < 3; ++i) smooth.col(i) = mean_normal({at.triangle, i}, true);
+  return (smooth * at.weights).normalized();
 }
 
 SurfacePoint MeshSurface::nearest(const Vector3d& point) const {

@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <vector>
 
 #include "tpm/network/surface.hpp"
@@ -25,23 +26,34 @@ class MeshSurface final : public Surface {
   [[nodiscard]] const TriangleMesh& mesh() const { return tree_.mesh(); }
 
  private:
-  /// Of one triangle: the normals that its interior, its edges and its corners have.
-  struct Normals {
-    Eigen::Vector3d face;
-    Eigen::Matrix3d smooth;                  ///< one column a corner, to be interpolated
-    Eigen::Matrix3d edge;                    ///< column i: the edge from corner i to corner i + 1
-    bool crease[3] = {false, false, false};  ///< of each edge
+  /// A corner of a triangle.
+  struct Corner {
+    int triangle = 0, which = 0;
   };
-  /// @param angles one column a triangle, at its corners, rad
-  void set_corner_normals(const Eigen::Matrix3Xd& angles);
-  void set_edge_normals();
+  // Normals are found where they are asked for: most triangles of a mesh are nobody's nearest.
+  /// The corners that meet at a vertex, in the order of the triangles.
+  [[nodiscard]] std::span<const Corner> fan(int vertex) const;
+  [[nodiscard]] int vertex_of(const Corner& at) const {
+    return mesh().triangles(at.which, at.triangle);
+  }
+  /// Of a triangle, unit.
+  [[nodiscard]] Eigen::Vector3d face(int triangle) const;
+  /// Angle of a triangle at a corner, rad.
+  [[nodiscard]] double angle(const Corner& at) const;
+  /// The triangle beyond the edge from a corner to the next one.
+  [[nodiscard]] int beyond(const Corner& edge) const;
+  /// Whether that triangle meets its own at 30 degrees or more.
+  [[nodiscard]] bool is_crease(const Corner& edge) const;
+  [[nodiscard]] bool on_crease(int vertex) const;
+  /// The mean of the faces at a corner, weighed by angle.
+  /// @param smooth without those at 30 degrees or more to the corner's own
+  [[nodiscard]] Eigen::Vector3d mean_normal(const Corner& at, bool smooth) const;
   [[nodiscard]] Eigen::Vector3d pseudonormal(const TrianglePoint& at) const;
   [[nodiscard]] Eigen::Vector3d normal(const TrianglePoint& at) const;
 
   TriangleTree tree_;
-  std::vector<Normals> normals_;
-  Eigen::Matrix3Xd vertex_normals_;
-  std::vector<bool> on_crease_;  ///< of each vertex
+  std::vector<std::size_t> fan_end_;  ///< of the vertex before
+  std::vector<Corner> fans_;
   double area_ = 0.0;
   double volume_ = 0.0;
 };
