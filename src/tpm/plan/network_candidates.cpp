@@ -99,7 +99,7 @@ class CollocationCandidate final : public LayeredCandidate {
  private:
   // At fewer times errors between them have been seen to be 3.5 times those at them.
   static constexpr double kSafety = 5.0;
-  static constexpr double kFloor = 1e-3;   // of the tolerance: what forces left unbalanced may hide
+  static constexpr double kFloor = 2e-2;   // of the tolerance: what forces left unbalanced hide
   static constexpr double kFinest = 1e-9;  // ten times that of the reference
   static constexpr double kUsual = 1e-6;
   static constexpr double kUsualFinest = 0.9e-5;
