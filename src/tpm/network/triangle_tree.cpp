@@ -12,15 +12,10 @@ namespace tpm::organ {
 
 namespace {
 
-constexpr int kLeaf = 4;
+constexpr int kLeaf = 5;
 constexpr int kAlone = 4096;  // triangles that one thread splits
 
 using Eigen::Vector3d;
-
-/// Without a branch, which AlignedBox's has: where a point lies is not foreseen.
-double squared_distance(const Eigen::AlignedBox3d& box, const Vector3d& point) {
-  return (box.min() - point).cwiseMax(point - box.max()).cwiseMax(0.0).squaredNorm();
-}
 
 /// Nearest point on the edge from corner `from` to corner `to`, as weights of the three corners.
 Vector3d edge_weights(const Vector3d& start, const Vector3d& end, const Vector3d& point,
@@ -59,8 +54,8 @@ Vector3d nearest_weights(const Vector3d& a, const Vector3d& b, const Vector3d& c
   return best;
 }
 
-/// Nodes of the tree over so many triangles.
-int nodes_of(int count) {
+/// Nodes of the tree of halves over so many triangles.
+int halves_of(int count) {
   if (count <= kLeaf) return 1;
   // Halving leaves parts that differ by one at most: here those beyond a leaf are split once more.
   int parts = 1;
@@ -74,12 +69,58 @@ TriangleTree::TriangleTree(TriangleMesh mesh) : mesh_(std::move(mesh)) {
   const auto count = static_cast<int>(mesh_.triangles.cols());
   order_.resize(static_cast<std::size_t>(count));
   std::iota(order_.begin(), order_.end(), 0);
-  nodes_.resize(static_cast<std::size_t>(nodes_of(count)));
+  std::vector<Half> halves(static_cast<std::size_t>(halves_of(count)));
   std::vector<Eigen::AlignedBox3d> boxes(order_.size());
   packed_.resize(order_.size());
   for_each_in_parallel(order_.size(),
                        [&](std::size_t t) { boxes[t] = box_of(static_cast<int>(t)); });
-  split(0, 1, 0, count, boxes);
+  split(halves, 0, 1, 0, count, boxes);
+  bounds_ = halves.front().box;
+  nodes_.reserve(halves.size() / kChildren + 1);
+  join(halves, 0);
+}
+
+int TriangleTree::join(const std::vector<Half>& halves, int half) {
+  const auto at = [&](int number) -> const Half& {
+    return halves[static_cast<std::size_t>(number)];
+  };
+  std::array<int, kChildren> children{half};
+  std::size_t count = 1;
+  for (int round = 2; round <= kChildren; round *= 2) {
+    for (std::size_t i = 0, whole = count; i < whole; ++i) {
+      const Half& child = at(children[i]);
+      if (child.count > 0) continue;
+      children[i] = child.first;
+      children[count++] = child.first + 1;
+    }
+  }
+  const std::size_t own = nodes_.size();
+  nodes_.emplace_back();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    nodes_[own].low[axis].setConstant(kAnywhere);
+    nodes_[own].high[axis].setConstant(-kAnywhere);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Half& child = at(children[i]);
+    const auto lane = static_cast<Eigen::Index>(i);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      nodes_[own].low[axis][lane] = child.box.min()[static_cast<Eigen::Index>(axis)];
+      nodes_[own].high[axis][lane] = child.box.max()[static_cast<Eigen::Index>(axis)];
+    }
+    const int first = child.count > 0 ? child.first : join(halves, children[i]);
+    nodes_[own].first[i] = first;
+    nodes_[own].count[i] = child.count;
+  }
+  return static_cast<int>(own);
+}
+
+TriangleTree::OfChildren TriangleTree::squared_distances(const Node& node, const Vector3d& point) {
+  OfChildren squared = OfChildren::Zero();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double at = point[static_cast<Eigen::Index>(axis)];
+    squared += (node.low[axis] - at).max(at - node.high[axis]).max(0.0).square();
+  }
+  return squared;
 }
 
 void TriangleTree::pack(int first, int count) {
@@ -96,7 +137,7 @@ Eigen::AlignedBox3d TriangleTree::box_of(int triangle) const {
   return box;
 }
 
-void TriangleTree::split(int node, int below, int first, int count,
+void TriangleTree::split(std::vector<Half>& halves, int node, int below, int first, int count,
                          const std::vector<Eigen::AlignedBox3d>& boxes) {
   const auto own_box = [&](int t) -> const Eigen::AlignedBox3d& {
     return boxes[static_cast<std::size_t>(t)];
@@ -109,7 +150,7 @@ void TriangleTree::split(int node, int below, int first, int count,
     box.extend(own);
     centres.extend(own.center());
   }
-  Node& filled = nodes_[static_cast<std::size_t>(node)];
+  Half& filled = halves[static_cast<std::size_t>(node)];
   filled.box = box;
   filled.first = first;
   filled.count = count;
@@ -125,8 +166,9 @@ void TriangleTree::split(int node, int below, int first, int count,
   filled.first = below;
   filled.count = 0;
   const auto split_half = [&](int which) {
-    which == 0 ? split(below, below + 2, first, half, boxes)
-               : split(below + 1, below + 1 + nodes_of(half), first + half, count - half, boxes);
+    which == 0
+        ? split(halves, below, below + 2, first, half, boxes)
+        : split(halves, below + 1, below + 1 + halves_of(half), first + half, count - half, boxes);
   };
   if (count > kAlone) return for_each_in_parallel(2, split_half);
   split_half(0);
@@ -138,29 +180,32 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const 
   best.squared_distance = within * within;
   struct Open {
     double bound;
-    int node;
+    int first, count;
   };
-  // Halving leaves at most 31 levels below an int of triangles, each with one node set aside.
-  std::array<Open, 64> open;
+  // Halving leaves at most 31 levels below an int of triangles, three of them to a node, each with
+  // all children but one set aside.
+  std::array<Open, 96> open;
   std::size_t depth = 0;
-  open[depth++] = {0.0, 0};
+  open[depth++] = {0.0, 0, 0};
   while (depth > 0) {
-    const auto [bound, index] = open[--depth];
+    const auto [bound, first, count] = open[--depth];
     if (bound >= best.squared_distance) continue;
-    const Node& node = nodes_[static_cast<std::size_t>(index)];
-    if (node.count == 0) {
-      const auto child = [&](int number) {
-        const Eigen::AlignedBox3d& box = nodes_[static_cast<std::size_t>(number)].box;
-        return Open{squared_distance(box, point), number};
-      };
-      Open near = child(node.first);
-      Open far = child(node.first + 1);
-      if (far.bound < near.bound) std::swap(near, far);
-      if (far.bound < best.squared_distance) open[depth++] = far;
-      if (near.bound < best.squared_distance) open[depth++] = near;
+    if (count == 0) {
+      const Node& node = nodes_[static_cast<std::size_t>(first)];
+      const OfChildren squared = squared_distances(node, point);
+      const std::size_t begin = depth;
+      for (std::size_t i = 0; i < kChildren; ++i) {
+        const double here = squared[static_cast<Eigen::Index>(i)];
+        if (here >= best.squared_distance) continue;
+        // The nearest last, to be taken first.
+        std::size_t place = depth++;
+        for (; place > begin && open[place - 1].bound < here; --place)
+          open[place] = open[place - 1];
+        open[place] = {here, node.first[i], node.count[i]};
+      }
       continue;
     }
-    for (int at = node.first; at < node.first + node.count; ++at) {
+    for (int at = first; at < first + count; ++at) {
       const auto& [a, b, c, normal] = packed_[static_cast<std::size_t>(at)];
       const double height = normal.dot(point - a);
       if (height * height >= best.squared_distance) continue;  // its plane is too far already
@@ -181,15 +226,20 @@ std::vector<int> TriangleTree::meeting(const Eigen::AlignedBox3d& box) const {
   while (!open.empty()) {
     const Node& node = nodes_[static_cast<std::size_t>(open.back())];
     open.pop_back();
-    if (!node.box.intersects(box)) continue;
-    if (node.count == 0) {
-      open.push_back(node.first);
-      open.push_back(node.first + 1);
-      continue;
-    }
-    for (int at = node.first; at < node.first + node.count; ++at) {
-      const int triangle = order_[static_cast<std::size_t>(at)];
-      if (box_of(triangle).intersects(box)) found.push_back(triangle);
+    for (std::size_t i = 0; i < kChildren; ++i) {
+      const auto lane = static_cast<Eigen::Index>(i);
+      bool meets = true;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto along = static_cast<Eigen::Index>(axis);
+        meets = meets && node.low[axis][lane] <= box.max()[along] &&
+                box.min()[along] <= node.high[axis][lane];
+      }
+      if (!meets) continue;
+      if (node.count[i] == 0) open.push_back(node.first[i]);
+      for (int at = node.first[i]; at < node.first[i] + node.count[i]; ++at) {
+        const int triangle = order_[static_cast<std::size_t>(at)];
+        if (box_of(triangle).intersects(box)) found.push_back(triangle);
+      }
     }
   }
   std::sort(found.begin(), found.end());
