@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 #include <limits>
+#include <random>
 
 #include "refusal.hpp"
 #include "simulated_scene.hpp"
@@ -275,6 +276,39 @@ TEST_CASE("a lateral bond of the star turns as the paper's angle says") {
   const ValidityBreach breach = turned("17.3 mm").of(ValidityLimit::turning);
   REQUIRE(breach.first_time_s);
   CHECK(breach.spheres == std::vector<std::size_t>{0, 1, 2});
+}
+
+TEST_CASE("the bonds that have turned are found whatever moves them") {
+  const ExperimentScene scene = small_scene(kPush);
+  const Network& network = scene.tissue.network;
+  const Positions& rest = network.organ.position;
+  std::mt19937 random(0);
+  std::uniform_real_distribution<double> part(-1.0, 1.0);
+  ValidityWatch watch(scene);
+  double most_rad = 0.0;
+  // Spheres that move on their own from 0.1 mm to 30 mm, and an organ that is carried along whole,
+  // which turns nothing.
+  for (const double size_m : {1e-4, 1e-3, 4e-3, 8e-3, 3e-2}) {
+    for (const double carried_m : {0.0, 0.5}) {
+      Positions moved = rest;
+      for (double& coordinate : moved.reshaped()) coordinate += carried_m + size_m * part(random);
+      std::vector<bool> turned(network.organ.size(), false);
+      for (const Bond& bond : network.bonds) {
+        if (bond.kind != BondKind::lateral) continue;
+        const Eigen::Vector3d before = (rest.col(bond.b) - rest.col(bond.a)).normalized();
+        const Eigen::Vector3d now = (moved.col(bond.b) - moved.col(bond.a)).normalized();
+        // The half of the angle, from the chord and its complement.
+        const double angle = 2.0 * std::atan2((now - before).norm(), (now + before).norm());
+        most_rad = std::max(most_rad, angle);
+        if (angle > kValidTurning_rad) turned[bond.a] = turned[bond.b] = true;
+      }
+      const std::vector<std::int32_t> flags = watch.flags(moved);
+      watch.see(size_m, moved);
+      CAPTURE(size_m, carried_m);
+      CHECK_THAT(watch.seen().most_turned_rad, WithinAbs(most_rad, 1e-9));
+      for (std::size_t i = 0; i < flags.size(); ++i) CHECK(((flags[i] & 4) != 0) == turned[i]);
+    }
+  }
 }
 
 TEST_CASE("static states are those that a load held for ever reaches", "[heavy]") {

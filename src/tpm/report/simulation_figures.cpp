@@ -67,9 +67,7 @@ Json state_json(const FiguredRun& figured) {
             {"bond_force_mN", list_json(force, 1e-3)}};
   json["largest_bond_force_mN"] =
       list_json(largest_bond_forces_N(figured.network->network, force), 1e-3);
-  json["validity"] = ValidityWatch(figured.scene->tissue.network, figured.scene->probe(),
-                                   depth_limits_apply(figured.scene->tissue))
-                         .flags(state.position);
+  json["validity"] = ValidityWatch(*figured.scene).flags(position);
   const bool depth = figured.scene->protocol.drive() == Drive::displacement;
   const double depth_m = depth ? state.imposed : state.response;
   const double force_N = depth ? state.response : state.imposed;

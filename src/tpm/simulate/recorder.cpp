@@ -33,7 +33,7 @@ Recorder::Recorder(const ExperimentScene& scene, const RunNetwork& network,
       controls_(controls),
       parts_(parts),
       identity_(checkpoint_identity(scene)),
-      watch_(scene.tissue.network, scene.probe(), depth_limits_apply(scene.tissue)),
+      watch_(scene),
       times_(times_to_watch(scene)),
       saved_(Clock::now()) {}
 
@@ -77,7 +77,7 @@ void Recorder::see(const QuasiStaticState& state, const Eigen::VectorXd& contact
     record_.outputs.push_back(state);
     record_.contact_pushes_N.push_back(contact_push_N);
   }
-  watch_.see(state.time_s, state.position);
+  watch_.see(state.time_s, network_.spheres(state.position));
   record_.validity = watch_.seen();
   seen_ = state;
   if (controls_.progress) controls_.progress(record_.curve.size(), times_.size());

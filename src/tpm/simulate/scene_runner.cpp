@@ -63,7 +63,7 @@ Trajectory run_quasi_static(const ExperimentScene& scene, const RunNetwork& netw
   const QuasiStatic equations(driven.bonds, driven.rest, driven.constraints, driven.probes,
                               options);
   Trajectory result;
-  ValidityWatch watch(network.network, scene.probe(), depth_limits_apply(scene.tissue));
+  ValidityWatch watch(scene);
   const Eigen::Index spheres = network.network.organ.position.cols();
   const auto see = [&](const QuasiStaticState& state) {
     watch.see(state.time_s, network.spheres(state.position));

@@ -190,12 +190,12 @@ void write_field(const StepField& field, const std::string& group, Hdf5Writer& f
                      : file.table(name, field.values, field.columns);
 }
 
-void write_step(const ExperimentScene& scene, const RunNetwork& network,
+void write_step(const ExperimentScene& scene, const RunNetwork& network, const ValidityWatch& watch,
                 const QuasiStaticState& state, const Eigen::VectorXd& contact_push_N,
                 const std::string& group, Hdf5Writer& file) {
   file.table(group + "/position_m", list_of(network.spheres(state.position)), 3);
   write_tool_states(network.driven, state, contact_push_N, group, file);
-  const StepFields fields = fields_of(scene, network, state);
+  const StepFields fields = fields_of(scene, network, watch, state);
   for (const StepField& field : fields.of_spheres) write_field(field, group, file);
   file.integers(group + "/validity", fields.validity, 1);
   for (const StepField& field : fields.of_bonds) write_field(field, group, file);
@@ -276,11 +276,12 @@ fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& networ
   if (scene.formulation.masses) write_motion(run, file);
   write_validity(run.record.validity, file);
   write_roughness(scene, run.record, file);
+  const ValidityWatch watch(scene);
   std::vector<double> times;
   for (std::size_t k = 0; k < run.record.outputs.size(); ++k) {
     times.push_back(run.record.outputs[k].time_s);
-    write_step(scene, network, run.record.outputs[k], run.record.contact_pushes_N[k], step_group(k),
-               file);
+    write_step(scene, network, watch, run.record.outputs[k], run.record.contact_pushes_N[k],
+               step_group(k), file);
   }
   file.numbers("/steps/time_s", times);
   file.attribute("/steps", "validity",

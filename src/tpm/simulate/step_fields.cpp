@@ -15,14 +15,12 @@ std::string viscous_name(Eigen::Index branch, Eigen::Index branches) {
 }
 
 StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
-                     const QuasiStaticState& state) {
+                     const ValidityWatch& watch, const QuasiStaticState& state) {
   StepFields fields;
   const Eigen::Matrix3Xd moved = displacements_m(network, state);
   fields.of_spheres = {{"displacement_m", 3, list_of(moved)},
                        {"displacement_magnitude_m", 1, list_of(moved.colwise().norm())}};
-  fields.validity =
-      ValidityWatch(scene.tissue.network, scene.probe(), depth_limits_apply(scene.tissue))
-          .flags(state.position);
+  fields.validity = watch.flags(network.spheres(state.position));
   const Eigen::VectorXd bond_force = bond_forces_N(network.driven.bonds, state);
   if (scene.outputs.force) {
     const std::vector<char> open(network.driven.bonds.contact_count(), 0);

@@ -28,8 +28,9 @@ struct StepFields {
 [[nodiscard]] std::string viscous_name(Eigen::Index branch, Eigen::Index branches);
 
 /// Those that the scene asks for.
+/// @param watch of the scene
 [[nodiscard]] StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
-                                   const QuasiStaticState& state);
+                                   const ValidityWatch& watch, const QuasiStaticState& state);
 
 /// What the bonds of a network pull with in a state, N: positive when a bond is in tension.
 [[nodiscard]] Eigen::VectorXd bond_forces_N(const BondSystem& bonds, const QuasiStaticState& state);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/scene/experiment_scene.hpp"
+
 namespace tpm::organ {
 namespace {
 
@@ -14,11 +16,16 @@ void insert(std::vector<std::size_t>& rising, std::size_t sphere) {
   if (at == rising.end() || *at != sphere) rising.insert(at, sphere);
 }
 
-/// What no bond that has turned beyond an angle stays below; 0 where the tangent says nothing.
-double cautious_tangent(double angle_rad) {
-  constexpr double kAlmost = 1.0 - 1e-9;
-  return angle_rad > 1.0 ? 0.0 : kAlmost * std::tan(angle_rad);
-}
+/// What no bond that has turned beyond an angle stays below; 0 where they say nothing.
+struct CautiousAngle {
+  explicit CautiousAngle(double angle_rad) {
+    constexpr double kAlmost = 1.0 - 1e-9;
+    if (angle_rad > 1.0) return;
+    sine = kAlmost * std::sin(angle_rad);
+    tangent = kAlmost * std::tan(angle_rad);
+  }
+  double sine = 0.0, tangent = 0.0;
+};
 
 }  // namespace
 
@@ -60,11 +67,14 @@ bool depth_limits_apply(const Tissue& tissue) {
   return width_m * kAlike > kPaperWidth_m && width_m < kAlike * kPaperWidth_m;
 }
 
-ValidityWatch::ValidityWatch(const Network& network, const Probe& probe, bool depth_limits)
-    : network_(network), probe_(probe), depth_limits_(depth_limits) {}
-
-double ValidityWatch::indentation_m(Eigen::Index sphere, const Positions& position) const {
-  return (position.col(sphere) - network_.organ.position.col(sphere)).dot(probe_.direction);
+ValidityWatch::ValidityWatch(const ExperimentScene& scene)
+    : rest_(scene.tissue.network.organ.position),
+      direction_(scene.probe().direction),
+      depth_limits_(depth_limits_apply(scene.tissue)) {
+  for (const Bond& bond : scene.tissue.network.bonds) {
+    if (bond.kind != BondKind::lateral) continue;
+    lateral_.push_back({bond.a, bond.b, (rest_.col(bond.b) - rest_.col(bond.a)).norm()});
+  }
 }
 
 std::vector<std::int32_t> ValidityWatch::flags(const Positions& position) const {
@@ -74,39 +84,46 @@ std::vector<std::int32_t> ValidityWatch::flags(const Positions& position) const 
 
 std::vector<std::int32_t> ValidityWatch::flags(const Positions& position,
                                                double& most_turned_rad) const {
-  std::vector<std::int32_t> flags(network_.organ.size(), 0);
-  for (std::size_t i = 0; depth_limits_ && i < flags.size(); ++i) {
-    const double indentation = indentation_m(static_cast<Eigen::Index>(i), position);
-    if (indentation > kValidIndentation_m + kRounding_m) flags[i] |= 1;
-    if (indentation > kDamageIndentation_m + kRounding_m) flags[i] |= 2;
+  const Eigen::Matrix3Xd moved = position - rest_;
+  std::vector<std::int32_t> flags(static_cast<std::size_t>(rest_.cols()), 0);
+  if (depth_limits_) {
+    const Eigen::RowVectorXd indentation = direction_.transpose() * moved;
+    for (std::size_t i = 0; i < flags.size(); ++i) {
+      const double here = indentation[static_cast<Eigen::Index>(i)];
+      if (here > kValidIndentation_m + kRounding_m) flags[i] |= 1;
+      if (here > kDamageIndentation_m + kRounding_m) flags[i] |= 2;
+    }
   }
-  const Positions& rest = network_.organ.position;
-  double tangent = cautious_tangent(std::min(most_turned_rad, kValidTurning_rad));
-  for (const Bond& bond : network_.bonds) {
-    if (bond.kind != BondKind::lateral) continue;
-    const Eigen::Vector3d before = rest.col(bond.b) - rest.col(bond.a);
-    const Eigen::Vector3d now = position.col(bond.b) - position.col(bond.a);
+  const Eigen::RowVectorXd distance = moved.colwise().norm();
+  CautiousAngle below(std::min(most_turned_rad, kValidTurning_rad));
+  for (const auto& [first, second, length_m] : lateral_) {
+    const auto a = static_cast<Eigen::Index>(first), b = static_cast<Eigen::Index>(second);
+    // Both without the cost of an angle: its ends have moved too little, or it has turned too
+    // little.
+    if (distance[a] + distance[b] < below.sine * length_m) continue;
+    const Eigen::Vector3d before = rest_.col(b) - rest_.col(a);
+    const Eigen::Vector3d now = position.col(b) - position.col(a);
     const double along = before.dot(now);
-    const double across = tangent * along;
+    const double across = below.tangent * along;
     const double turning = before.cross(now).squaredNorm();
-    if (along > 0.0 && turning < across * across) continue;  // without the cost of an angle
+    if (along > 0.0 && turning < across * across) continue;
     const double turned_rad = std::atan2(std::sqrt(turning), along);
     if (turned_rad > kValidTurning_rad) {
-      flags[bond.a] |= 4;
-      flags[bond.b] |= 4;
+      flags[first] |= 4;
+      flags[second] |= 4;
     }
     if (!(turned_rad > most_turned_rad)) continue;
     most_turned_rad = turned_rad;
-    tangent = cautious_tangent(std::min(most_turned_rad, kValidTurning_rad));
+    below = CautiousAngle(std::min(most_turned_rad, kValidTurning_rad));
   }
   return flags;
 }
 
 void ValidityWatch::see(double time_s, const Positions& position) {
   const std::vector<std::int32_t> now = flags(position, seen_.most_turned_rad);
+  seen_.deepest_m =
+      std::max(seen_.deepest_m, (direction_.transpose() * (position - rest_)).maxCoeff());
   for (std::size_t i = 0; i < now.size(); ++i) {
-    seen_.deepest_m =
-        std::max(seen_.deepest_m, indentation_m(static_cast<Eigen::Index>(i), position));
     for (std::size_t k = 0; k < kValidityLimits; ++k) {
       if ((now[i] & (1 << k)) == 0) continue;
       ValidityBreach& breach = seen_.breach[k];

@@ -18,9 +18,8 @@ namespace tpm::organ {
 /// displacement along the probe's direction.
 class ValidityWatch {
  public:
-  /// @param network must live as long as this
-  /// @param depth_limits the limits of depth apply (depth_limits_apply)
-  ValidityWatch(const Network& network, const Probe& probe, bool depth_limits);
+  /// @param scene its network must live as long as this
+  explicit ValidityWatch(const ExperimentScene& scene);
 
   /// For each sphere the sum of 1 (indentation), 2 (damage) and 4 (an end of a turned bond).
   [[nodiscard]] std::vector<std::int32_t> flags(const Positions& position) const;
@@ -35,11 +34,16 @@ class ValidityWatch {
   /// @param most_turned_rad an angle; afterwards the largest of it and of all lateral bonds
   [[nodiscard]] std::vector<std::int32_t> flags(const Positions& position,
                                                 double& most_turned_rad) const;
-  [[nodiscard]] double indentation_m(Eigen::Index sphere, const Positions& position) const;
+  /// A bond that turns.
+  struct Lateral {
+    std::size_t a, b;
+    double length_m;  ///< at rest
+  };
 
-  const Network& network_;
-  Probe probe_;
-  bool depth_limits_;
+  const Positions& rest_;
+  Eigen::Vector3d direction_;  ///< of the probe
+  bool depth_limits_;          ///< the limits of depth apply (depth_limits_apply)
+  std::vector<Lateral> lateral_;
   Validity seen_;
 };
 

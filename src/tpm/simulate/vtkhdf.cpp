@@ -84,10 +84,11 @@ void write_field_series(const ExperimentScene& scene, const RunNetwork& network,
   std::vector<double> points;
   std::vector<std::int32_t> validity;
   StepFields all;
+  const ValidityWatch watch(scene);
   for (const QuasiStaticState& state : outputs) {
     const Positions spheres = network.spheres(state.position);
     points.insert(points.end(), spheres.data(), spheres.data() + spheres.size());
-    const StepFields fields = fields_of(scene, network, state);
+    const StepFields fields = fields_of(scene, network, watch, state);
     append(all.of_spheres, fields.of_spheres);
     append(all.of_bonds, fields.of_bonds);
     validity.insert(validity.end(), fields.validity.begin(), fields.validity.end());
