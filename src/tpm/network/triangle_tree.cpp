@@ -196,7 +196,7 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const 
       const std::size_t begin = depth;
       for (std::size_t i = 0; i < kChildren; ++i) {
         const double here = squared[static_cast<Eigen::Index>(i)];
-        if (here >= best.squared_distance) continue;
+        if (!(here < best.squared_distance)) continue;  // also where there is no child
         // The nearest last, to be taken first.
         std::size_t place = depth++;
         for (; place > begin && open[place - 1].bound < here; --place)
