@@ -124,8 +124,8 @@ TEST_CASE("a run in parts is the run of the whole, within its tolerance", "[heav
 TEST_CASE("a scene names its solver; runs without mass answer with either", "[heavy]") {
   for (const std::string kind : {"quasi_static", "static"}) {
     const auto run = [&](const std::string& solver) {
-      return run_of(small_scene(R"("formulation": {"kind": ")" + kind + R"(", "solver": ")" +
-                                solver + R"("}, )" + kPush));
+      return run_of(small_scene(fmt::format(
+          R"("formulation": {{"kind": "{}", "solver": "{}"}}, {})", kind, solver, kPush)));
     };
     const SimulationRun direct = run("direct");
     const SimulationRun iterative = run("iterative");
