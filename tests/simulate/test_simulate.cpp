@@ -286,8 +286,7 @@ TEST_CASE("the bonds that have turned are found whatever moves them") {
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   ValidityWatch watch(scene);
   double most_rad = 0.0;
-  // Spheres that move on their own from 0.1 mm to 30 mm, and an organ that is carried along whole,
-  // which turns nothing.
+  // By 0.1 to 30 mm each on its own; then also carried along with all others, which turns nothing.
   for (const double size_m : {1e-4, 1e-3, 4e-3, 8e-3, 3e-2}) {
     for (const double carried_m : {0.0, 0.5}) {
       Positions moved = rest;

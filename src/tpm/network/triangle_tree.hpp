@@ -35,7 +35,7 @@ class TriangleTree {
   [[nodiscard]] Eigen::AlignedBox3d box_of(int triangle) const;
 
  private:
-  /// Of the tree of halves that the other one is made from.
+  /// A node of the tree of halves, of which three levels become one of eight children.
   struct Half {
     Eigen::AlignedBox3d box;
     int first = 0;  ///< first of order_ in a leaf, else the left child; the right one follows it

@@ -16,7 +16,7 @@ void insert(std::vector<std::size_t>& rising, std::size_t sphere) {
   if (at == rising.end() || *at != sphere) rising.insert(at, sphere);
 }
 
-/// What no bond that has turned beyond an angle stays below; 0 where they say nothing.
+/// Lower bounds for a bond that has turned beyond an angle; 0 where there is none.
 struct CautiousAngle {
   explicit CautiousAngle(double angle_rad) {
     constexpr double kAlmost = 1.0 - 1e-9;
@@ -24,7 +24,8 @@ struct CautiousAngle {
     sine = kAlmost * std::sin(angle_rad);
     tangent = kAlmost * std::tan(angle_rad);
   }
-  double sine = 0.0, tangent = 0.0;
+  double sine = 0.0;     ///< of what its ends have moved apart, over its length at rest
+  double tangent = 0.0;  ///< of the tangent of its angle
 };
 
 }  // namespace
@@ -78,28 +79,26 @@ ValidityWatch::ValidityWatch(const ExperimentScene& scene)
 }
 
 std::vector<std::int32_t> ValidityWatch::flags(const Positions& position) const {
-  double most_turned_rad = kValidTurning_rad;
-  return flags(position, most_turned_rad);
+  double deepest_m = 0.0, most_turned_rad = kValidTurning_rad;
+  return flags(position, deepest_m, most_turned_rad);
 }
 
-std::vector<std::int32_t> ValidityWatch::flags(const Positions& position,
+std::vector<std::int32_t> ValidityWatch::flags(const Positions& position, double& deepest_m,
                                                double& most_turned_rad) const {
   const Eigen::Matrix3Xd moved = position - rest_;
   std::vector<std::int32_t> flags(static_cast<std::size_t>(rest_.cols()), 0);
-  if (depth_limits_) {
-    const Eigen::RowVectorXd indentation = direction_.transpose() * moved;
-    for (std::size_t i = 0; i < flags.size(); ++i) {
-      const double here = indentation[static_cast<Eigen::Index>(i)];
-      if (here > kValidIndentation_m + kRounding_m) flags[i] |= 1;
-      if (here > kDamageIndentation_m + kRounding_m) flags[i] |= 2;
-    }
+  const Eigen::RowVectorXd indentation = direction_.transpose() * moved;
+  deepest_m = std::max(deepest_m, indentation.maxCoeff());
+  for (std::size_t i = 0; depth_limits_ && i < flags.size(); ++i) {
+    const double here = indentation[static_cast<Eigen::Index>(i)];
+    if (here > kValidIndentation_m + kRounding_m) flags[i] |= 1;
+    if (here > kDamageIndentation_m + kRounding_m) flags[i] |= 2;
   }
   const Eigen::RowVectorXd distance = moved.colwise().norm();
   CautiousAngle below(std::min(most_turned_rad, kValidTurning_rad));
   for (const auto& [first, second, length_m] : lateral_) {
     const auto a = static_cast<Eigen::Index>(first), b = static_cast<Eigen::Index>(second);
-    // Both without the cost of an angle: its ends have moved too little, or it has turned too
-    // little.
+    // Without the cost of an angle, where its ends have moved or it has turned too little.
     if (distance[a] + distance[b] < below.sine * length_m) continue;
     const Eigen::Vector3d before = rest_.col(b) - rest_.col(a);
     const Eigen::Vector3d now = position.col(b) - position.col(a);
@@ -120,9 +119,7 @@ std::vector<std::int32_t> ValidityWatch::flags(const Positions& position,
 }
 
 void ValidityWatch::see(double time_s, const Positions& position) {
-  const std::vector<std::int32_t> now = flags(position, seen_.most_turned_rad);
-  seen_.deepest_m =
-      std::max(seen_.deepest_m, (direction_.transpose() * (position - rest_)).maxCoeff());
+  const std::vector<std::int32_t> now = flags(position, seen_.deepest_m, seen_.most_turned_rad);
   for (std::size_t i = 0; i < now.size(); ++i) {
     for (std::size_t k = 0; k < kValidityLimits; ++k) {
       if ((now[i] & (1 << k)) == 0) continue;

@@ -31,8 +31,9 @@ class ValidityWatch {
 
  private:
   /// The same.
-  /// @param most_turned_rad an angle; afterwards the largest of it and of all lateral bonds
-  [[nodiscard]] std::vector<std::int32_t> flags(const Positions& position,
+  /// @param deepest_m, most_turned_rad an indentation and an angle; afterwards the largest of them
+  ///   and of all spheres and lateral bonds
+  [[nodiscard]] std::vector<std::int32_t> flags(const Positions& position, double& deepest_m,
                                                 double& most_turned_rad) const;
   /// A bond that turns.
   struct Lateral {
