@@ -21,11 +21,11 @@ endfunction()
 # are listed in TPM_FOLDER_OBJECTS.
 function(tpm_folders suffix flags)
   # Loops over lanes become vectors: they are marked, and nobody reads errno after a square root there.
-  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/network/lane_bonds.cpp
-    ${PROJECT_SOURCE_DIR}/src/tpm/solve/lanes.cpp
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/organ/balance/lane_bonds.cpp
+    ${PROJECT_SOURCE_DIR}/src/tpm/organ/linear/lanes.cpp
     PROPERTIES COMPILE_OPTIONS "-fno-math-errno;-fopenmp-simd" SKIP_PRECOMPILE_HEADERS ON
                SKIP_UNITY_BUILD_INCLUSION ON)
-  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/haptics/page_server.cpp
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/haptics/session/page_server.cpp
     PROPERTIES COMPILE_OPTIONS "${TPM_HTTPLIB_CFLAGS_OTHER}" SKIP_PRECOMPILE_HEADERS ON
                SKIP_UNITY_BUILD_INCLUSION ON)
   set(objects)

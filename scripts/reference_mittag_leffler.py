@@ -10,7 +10,7 @@ The last holds G(t), J(t), G' and G'' of the three laws with two spring-pots (do
 tau1 = 1: G and J from E_{a,b}(-z) by the series, but the Zener form's J, which has no closed form, from its Laplace
 transform by mpmath's Talbot contour in 60 digits.
 
-Needs mpmath. Shares no formula with src/tpm/solve/mittag_leffler.cpp beyond the definition: up to
+Needs mpmath. Shares no formula with src/tpm/law/relaxation/mittag_leffler.cpp beyond the definition: up to
 t = z^(1/alpha) = 95 the power series in enough digits to survive its cancellation (terms reach
 exp(t)), above it the asymptotic series, whose smallest term is about exp(-t). Where both reach the
 digits (95 <= t <= 130) they are compared, and a disagreement stops the script. alpha = 1 is in

@@ -11,10 +11,10 @@
 #include <cstring>
 
 #include "peers.hpp"
-#include "tpm/benchmark/organ_problems.hpp"
-#include "tpm/report/benchmark_report.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/run_record.hpp"
+#include "tpm/accuracy/organ_problems.hpp"
+#include "tpm/accuracy/show/benchmark_report.hpp"
+#include "tpm/show/draw.hpp"
+#include "tpm/show/run_record.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;

@@ -2,7 +2,7 @@
 // Other engines on the network with masses and elastic bonds: settings for tpm's own benchmark.
 #include <vector>
 
-#include "tpm/benchmark/posed.hpp"
+#include "tpm/accuracy/posed.hpp"
 
 namespace tpm::peers {
 

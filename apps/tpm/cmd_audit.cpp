@@ -3,10 +3,10 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/report/json_table_csv.hpp"
-#include "tpm/report/study_report.hpp"
-#include "tpm/store/json.hpp"
-#include "tpm/study/audit.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/fit/claims/audit.hpp"
+#include "tpm/paper/show/study_report.hpp"
+#include "tpm/show/json_table_csv.hpp"
 
 namespace tpm::app {
 namespace {

@@ -5,17 +5,17 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/benchmark/runner.hpp"
-#include "tpm/core/progress.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/report/benchmark_report.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/run_record.hpp"
-#include "tpm/report/speed_record.hpp"
-#include "tpm/report/trajectory_report.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/file_roles.hpp"
-#include "tpm/store/writable.hpp"
+#include "tpm/accuracy/runner.hpp"
+#include "tpm/accuracy/show/benchmark_report.hpp"
+#include "tpm/accuracy/show/speed_record.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
+#include "tpm/files/writable.hpp"
+#include "tpm/plan/show/trajectory_report.hpp"
+#include "tpm/show/draw.hpp"
+#include "tpm/show/run_record.hpp"
+#include "tpm/work/progress.hpp"
 
 namespace tpm::app {
 namespace {

@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/fit/experiment_residuals.hpp"
 #include "tpm/fit/gradient_check.hpp"
+#include "tpm/fit/likelihood/experiment_residuals.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

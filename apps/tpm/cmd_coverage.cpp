@@ -5,7 +5,7 @@
 
 #include "command.hpp"
 #include "tpm/fit/coverage.hpp"
-#include "tpm/report/fit_csv.hpp"
+#include "tpm/fit/show/fit_csv.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

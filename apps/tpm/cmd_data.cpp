@@ -6,9 +6,9 @@
 
 #include "command.hpp"
 #include "data_text.hpp"
-#include "tpm/curve/description.hpp"
-#include "tpm/curve/pack.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/files/import/description.hpp"
+#include "tpm/files/import/pack.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 

@@ -8,10 +8,10 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/curve/import.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/file_roles.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
+#include "tpm/files/import/import.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 

@@ -3,11 +3,11 @@
 #include <optional>
 
 #include "command.hpp"
-#include "tpm/report/design_figures.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/json_table_csv.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/study/design.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/fit/design/design.hpp"
+#include "tpm/fit/show/design_figures.hpp"
+#include "tpm/show/draw.hpp"
+#include "tpm/show/json_table_csv.hpp"
 
 namespace tpm::app {
 namespace {

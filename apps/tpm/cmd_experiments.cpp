@@ -4,10 +4,10 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/organ_study_report.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/writable.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/writable.hpp"
+#include "tpm/paper/show/organ_study_report.hpp"
+#include "tpm/show/draw.hpp"
 
 namespace tpm::app {
 namespace {

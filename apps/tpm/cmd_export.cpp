@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "command.hpp"
-#include "tpm/core/namespaces.hpp"
-#include "tpm/law/law_export.hpp"
-#include "tpm/scene/organ_export.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/files/blocks/law_export.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/organ/scene/organ_export.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 

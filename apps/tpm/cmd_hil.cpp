@@ -17,10 +17,10 @@
 #include "hil_page.hpp"
 #include "interrupt_watch.hpp"
 #include "out_of_memory.hpp"
-#include "tpm/core/progress.hpp"
-#include "tpm/device/force_dimension.hpp"
-#include "tpm/device/plugin_device.hpp"
-#include "tpm/report/hil_report.hpp"
+#include "tpm/haptics/device/force_dimension.hpp"
+#include "tpm/haptics/device/plugin_device.hpp"
+#include "tpm/haptics/show/hil_report.hpp"
+#include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

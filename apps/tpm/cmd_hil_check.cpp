@@ -7,8 +7,8 @@
 #include "hil_options.hpp"
 #include "interrupt_watch.hpp"
 #include "out_of_memory.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/report/hil_report.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/haptics/show/hil_report.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 

@@ -4,8 +4,8 @@
 
 #include "command.hpp"
 #include "hil_options.hpp"
-#include "tpm/haptics/recording_export.hpp"
-#include "tpm/store/file.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/session/recording_export.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

@@ -4,9 +4,9 @@
 #include <optional>
 
 #include "command.hpp"
-#include "tpm/core/progress.hpp"
-#include "tpm/report/hazard_report.hpp"
-#include "tpm/report/json_table_csv.hpp"
+#include "tpm/haptics/show/hazard_report.hpp"
+#include "tpm/show/json_table_csv.hpp"
+#include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

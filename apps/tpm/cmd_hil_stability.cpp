@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/report/border_report.hpp"
-#include "tpm/report/draw.hpp"
+#include "tpm/haptics/show/border_report.hpp"
+#include "tpm/show/draw.hpp"
 
 namespace tpm::app {
 

@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/hil_report.hpp"
+#include "tpm/haptics/show/hil_report.hpp"
+#include "tpm/show/draw.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 

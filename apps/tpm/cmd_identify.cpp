@@ -5,10 +5,10 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/report/identification_report.hpp"
-#include "tpm/report/json_table_csv.hpp"
-#include "tpm/study/identification.hpp"
-#include "tpm/study/identified_loop.hpp"
+#include "tpm/fit/online/identification.hpp"
+#include "tpm/fit/online/identified_loop.hpp"
+#include "tpm/fit/show/identification_report.hpp"
+#include "tpm/show/json_table_csv.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::app {

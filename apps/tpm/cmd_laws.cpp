@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/law_file.hpp"
 
 namespace tpm::app {

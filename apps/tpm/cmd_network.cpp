@@ -5,13 +5,13 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/network/local_support.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/network_report.hpp"
-#include "tpm/scene/network_file.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/file_roles.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
+#include "tpm/organ/bonds/local_support.hpp"
+#include "tpm/organ/scene/network_file.hpp"
+#include "tpm/plan/show/network_report.hpp"
+#include "tpm/show/draw.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

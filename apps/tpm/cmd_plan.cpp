@@ -8,14 +8,14 @@
 
 #include "command.hpp"
 #include "plan_options.hpp"
-#include "tpm/core/progress.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/report/json_table_csv.hpp"
-#include "tpm/report/plan_report.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/file_roles.hpp"
-#include "tpm/store/json.hpp"
-#include "tpm/study/error_budget.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/fit/predict/error_budget.hpp"
+#include "tpm/plan/show/plan_report.hpp"
+#include "tpm/show/json_table_csv.hpp"
+#include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

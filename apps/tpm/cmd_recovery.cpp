@@ -5,8 +5,8 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/report/fit_csv.hpp"
-#include "tpm/study/recovery.hpp"
+#include "tpm/fit/design/recovery.hpp"
+#include "tpm/fit/show/fit_csv.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

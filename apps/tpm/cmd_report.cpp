@@ -2,8 +2,8 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/paper_report.hpp"
+#include "tpm/paper/show/paper_report.hpp"
+#include "tpm/show/draw.hpp"
 
 namespace tpm::app {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/report/fit_csv.hpp"
-#include "tpm/study/selection.hpp"
+#include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/show/fit_csv.hpp"
 
 namespace tpm::app {
 namespace {

@@ -5,11 +5,11 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/evenly.hpp"
-#include "tpm/core/namespaces.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/law/law_json.hpp"
-#include "tpm/report/table_document.hpp"
+#include "tpm/base/evenly.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/show/table_document.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_file.hpp"

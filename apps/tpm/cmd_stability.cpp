@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "command.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/stability_report.hpp"
-#include "tpm/store/writable.hpp"
+#include "tpm/accuracy/show/stability_report.hpp"
+#include "tpm/files/writable.hpp"
+#include "tpm/show/draw.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

@@ -8,14 +8,14 @@
 
 #include "command.hpp"
 #include "interrupt_watch.hpp"
-#include "tpm/core/namespaces.hpp"
-#include "tpm/core/progress.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/report/run_record.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/file_roles.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
+#include "tpm/show/run_record.hpp"
 #include "tpm/sweep/sweep_ranks.hpp"
 #include "tpm/sweep/sweep_result.hpp"
+#include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

@@ -7,15 +7,15 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/lists.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/sweep_convergence_report.hpp"
-#include "tpm/report/sweep_report.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/file_roles.hpp"
-#include "tpm/store/renamed_names.hpp"
+#include "tpm/base/lists.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
+#include "tpm/files/renamed_names.hpp"
+#include "tpm/show/draw.hpp"
 #include "tpm/sweep/best_cells.hpp"
+#include "tpm/sweep/show/sweep_convergence_report.hpp"
+#include "tpm/sweep/show/sweep_report.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 

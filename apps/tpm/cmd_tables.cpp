@@ -5,12 +5,12 @@
 #include <optional>
 
 #include "command.hpp"
-#include "tpm/core/lists.hpp"
-#include "tpm/core/quantity_text.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/report/study_report.hpp"
-#include "tpm/store/json.hpp"
-#include "tpm/study/tables.hpp"
+#include "tpm/base/lists.hpp"
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/paper/show/study_report.hpp"
+#include "tpm/paper/tables.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

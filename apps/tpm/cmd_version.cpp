@@ -1,6 +1,6 @@
 
 #include "command.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/version.hpp"
 
 namespace tpm::app {

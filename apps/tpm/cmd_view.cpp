@@ -5,11 +5,11 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/namespaces.hpp"
-#include "tpm/core/progress.hpp"
-#include "tpm/report/view_file.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/file_roles.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
+#include "tpm/haptics/show/view_file.hpp"
+#include "tpm/work/progress.hpp"
 
 namespace tpm::app {
 namespace {

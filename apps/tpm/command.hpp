@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

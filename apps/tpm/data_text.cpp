@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "tpm/core/quantity_text.hpp"
-#include "tpm/core/text.hpp"
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::app {

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/curve_file.hpp"
 
 namespace tpm::app {

@@ -1,7 +1,7 @@
 #pragma once
 #include "command.hpp"
-#include "tpm/core/namespaces.hpp"
-#include "tpm/haptics/session_run.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/haptics/session/session_run.hpp"
 
 namespace tpm::app {
 

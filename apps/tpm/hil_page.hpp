@@ -2,10 +2,10 @@
 #include <memory>
 #include <string>
 
-#include "tpm/core/namespaces.hpp"
-#include "tpm/haptics/live_view.hpp"
-#include "tpm/haptics/page_server.hpp"
-#include "tpm/haptics/session_run.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/haptics/session/live_view.hpp"
+#include "tpm/haptics/session/page_server.hpp"
+#include "tpm/haptics/session/session_run.hpp"
 
 namespace tpm::app {
 

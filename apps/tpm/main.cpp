@@ -18,10 +18,10 @@
 
 #include "command.hpp"
 #include "out_of_memory.hpp"
-#include "tpm/core/quantity_text.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/file_roles.hpp"
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 

@@ -2,7 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "tpm/core/namespaces.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/plan/plan.hpp"
 
 namespace tpm::app {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "tpm/core/namespaces.hpp"
-#include "tpm/scene/protocol_file.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/organ/scene/protocol_file.hpp"
 
 namespace tpm::app {
 

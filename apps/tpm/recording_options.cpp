@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "command.hpp"
-#include "tpm/curve/recording_file.hpp"
-#include "tpm/study/selection.hpp"
+#include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/select/selection.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

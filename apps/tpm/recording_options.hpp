@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "tpm/curve/import.hpp"
-#include "tpm/study/recording_setup.hpp"
+#include "tpm/files/import/import.hpp"
+#include "tpm/fit/select/recording_setup.hpp"
 
 namespace tpm::app {
 

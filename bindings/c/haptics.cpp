@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "tpm/haptics/loop_contact.hpp"
+#include "tpm/haptics/session/loop_contact.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 

@@ -16,7 +16,7 @@
 #include <string>
 #include <thread>
 
-#include "tpm/core/interrupted.hpp"
+#include "tpm/work/interrupted.hpp"
 
 namespace tpm::python {
 

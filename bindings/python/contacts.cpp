@@ -1,10 +1,10 @@
 // Contacts stepped from Python, and recordings of haptic sessions.
 #include "binding.hpp"
-#include "tpm/core/namespaces.hpp"
-#include "tpm/haptics/loop_contact.hpp"
-#include "tpm/haptics/recording.hpp"
-#include "tpm/haptics/session_run.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/haptics/session/loop_contact.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/session/session_run.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::python {

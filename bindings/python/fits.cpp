@@ -2,18 +2,18 @@
 #include <filesystem>
 
 #include "binding.hpp"
-#include "tpm/curve/recording_file.hpp"
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/files/import/recording_file.hpp"
+#include "tpm/files/json.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/prediction.hpp"
+#include "tpm/fit/select/material_function.hpp"
+#include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/show/fit_report.hpp"
+#include "tpm/fit/show/function_report.hpp"
+#include "tpm/fit/show/recording_report.hpp"
 #include "tpm/fit/verdict.hpp"
-#include "tpm/law/law_json.hpp"
-#include "tpm/report/fit_report.hpp"
-#include "tpm/report/function_report.hpp"
-#include "tpm/report/recording_report.hpp"
-#include "tpm/store/json.hpp"
-#include "tpm/study/material_function.hpp"
-#include "tpm/study/selection.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::python {

@@ -1,8 +1,8 @@
 // Protocols, laws, and the paper's element.
 #include "binding.hpp"
-#include "tpm/core/warning.hpp"
-#include "tpm/law/law_json.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/base/warning.hpp"
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_file.hpp"

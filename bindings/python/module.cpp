@@ -1,9 +1,9 @@
 // tpmkit._core: the library for Python. The package around it (tpmkit/*.py) makes DataFrames,
 // Datasets and figures of what it answers.
 #include "binding.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/core/warning.hpp"
-#include "tpm/store/file.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/base/warning.hpp"
+#include "tpm/files/file.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 #include "tpmkit/version.hpp"

@@ -11,9 +11,9 @@
 
 #include "expected_values.hpp"
 #include "fitted_parameter.hpp"
-#include "tpm/core/random.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/files/file.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 

@@ -5,9 +5,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "tpm/core/random.hpp"
-#include "tpm/report/recording_report.hpp"
-#include "tpm/study/selection.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/show/recording_report.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

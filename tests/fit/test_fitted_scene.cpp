@@ -5,14 +5,14 @@
 #include <cmath>
 
 #include "temp_folder.hpp"
-#include "tpm/core/random.hpp"
-#include "tpm/protocol/straight_pieces.hpp"
-#include "tpm/scene/experiment_scene.hpp"
-#include "tpm/scene/organ_model.hpp"
-#include "tpm/simulate/scene_runner.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/json.hpp"
-#include "tpm/study/fitted_scene.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/data/straight_pieces.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/fit/predict/fitted_scene.hpp"
+#include "tpm/organ/run/scene_runner.hpp"
+#include "tpm/organ/scene/experiment_scene.hpp"
+#include "tpm/organ/scene/organ_model.hpp"
 
 namespace tpm::fit {
 using namespace study;

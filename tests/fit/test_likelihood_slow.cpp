@@ -9,12 +9,12 @@
 
 #include "fitted_parameter.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/random.hpp"
-#include "tpm/fit/experiment_refit.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/files/file.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/gradient_check.hpp"
+#include "tpm/fit/likelihood/experiment_refit.hpp"
 #include "tpm/fit/petab.hpp"
-#include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 

@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "tpm/fit/fit.hpp"
-#include "tpm/scene/organ_model.hpp"
+#include "tpm/organ/scene/organ_model.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "expected_values.hpp"
-#include "tpm/fit/config.hpp"
-#include "tpm/scene/organ_model.hpp"
+#include "tpm/fit/likelihood/config.hpp"
+#include "tpm/organ/scene/organ_model.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

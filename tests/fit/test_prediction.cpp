@@ -5,11 +5,11 @@
 
 #include "coverage_studies.hpp"
 #include "refusal.hpp"
+#include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/prediction.hpp"
-#include "tpm/law/law_json.hpp"
-#include "tpm/scene/protocol_file.hpp"
-#include "tpm/study/law_prediction.hpp"
+#include "tpm/organ/scene/protocol_file.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
 

@@ -13,15 +13,15 @@
 
 #include "expected_values.hpp"
 #include "statistics_problems.hpp"
-#include "tpm/fit/correlation.hpp"
-#include "tpm/fit/estimated_sigma.hpp"
-#include "tpm/fit/experiment_residuals.hpp"
 #include "tpm/fit/gradient_check.hpp"
-#include "tpm/fit/noise.hpp"
+#include "tpm/fit/likelihood/correlation.hpp"
+#include "tpm/fit/likelihood/estimated_sigma.hpp"
+#include "tpm/fit/likelihood/experiment_residuals.hpp"
+#include "tpm/fit/likelihood/noise.hpp"
 #include "tpm/fit/prediction.hpp"
+#include "tpm/fit/select/random_effects.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpm/fit/waterfall.hpp"
-#include "tpm/study/random_effects.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;

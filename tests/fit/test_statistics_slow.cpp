@@ -5,8 +5,8 @@
 #include <catch2/catch.hpp>
 
 #include "statistics_problems.hpp"
-#include "tpm/fit/correlation.hpp"
 #include "tpm/fit/coverage.hpp"
+#include "tpm/fit/likelihood/correlation.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;

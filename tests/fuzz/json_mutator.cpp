@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
 
 namespace tpm::fuzz {
 namespace {

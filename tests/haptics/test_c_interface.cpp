@@ -11,9 +11,9 @@
 #include "counted_allocations.hpp"
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
-#include "tpm/haptics/recording.hpp"
-#include "tpm/haptics/session_run.hpp"
-#include "tpm/store/file.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/session/session_run.hpp"
 #include "tpmkit/haptics.h"
 #include "tpmkit/model.hpp"
 

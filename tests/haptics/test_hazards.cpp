@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "expected_values.hpp"
-#include "tpm/haptics/border_study.hpp"
-#include "tpm/haptics/hazard_study.hpp"
-#include "tpm/haptics/rendering_check.hpp"
-#include "tpm/report/border_report.hpp"
-#include "tpm/report/hazard_report.hpp"
+#include "tpm/haptics/border/border_study.hpp"
+#include "tpm/haptics/hazards/hazard_study.hpp"
+#include "tpm/haptics/session/rendering_check.hpp"
+#include "tpm/haptics/show/border_report.hpp"
+#include "tpm/haptics/show/hazard_report.hpp"
 
 namespace tpm::haptics {
 using namespace report;

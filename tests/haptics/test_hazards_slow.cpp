@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 
-#include "tpm/report/hazard_report.hpp"
+#include "tpm/haptics/show/hazard_report.hpp"
 
 namespace tpm::haptics {
 using namespace report;

@@ -12,10 +12,10 @@
 #include "expected_values.hpp"
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/random.hpp"
-#include "tpm/haptics/recording.hpp"
-#include "tpm/haptics/verify.hpp"
-#include "tpm/store/file.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/verify/verify.hpp"
 
 namespace tpm::haptics {
 

@@ -8,9 +8,9 @@
 #include "hil_scenes.hpp"
 #include "raw_client.hpp"
 #include "temp_folder.hpp"
-#include "tpm/haptics/page_server.hpp"
-#include "tpm/haptics/recording.hpp"
-#include "tpm/haptics/session_run.hpp"
+#include "tpm/haptics/session/page_server.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/session/session_run.hpp"
 
 // After Eigen: it brings <resolv.h> along, whose macros have the names of Eigen's parameters.
 #include <httplib.h>

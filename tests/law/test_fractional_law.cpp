@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/random.hpp"
-#include "tpm/solve/mittag_leffler.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/law/relaxation/mittag_leffler.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "expected_values.hpp"
-#include "tpm/core/random.hpp"
-#include "tpm/fit/experiment_residuals.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/fit/likelihood/experiment_residuals.hpp"
 #include "tpm/law/tension_creep.hpp"
 #include "tpmkit/law_model.hpp"
 

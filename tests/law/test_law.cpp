@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/random.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/law/element/closed_form.hpp"
 #include "tpm/law/imposed_depth.hpp"
 #include "tpm/law/kelvin_chain.hpp"
-#include "tpm/model/closed_form.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 

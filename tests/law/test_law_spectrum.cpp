@@ -6,8 +6,8 @@
 
 #include "expected_values.hpp"
 #include "temp_folder.hpp"
-#include "tpm/law/law_export.hpp"
-#include "tpm/law/law_json.hpp"
+#include "tpm/files/blocks/law_export.hpp"
+#include "tpm/files/blocks/law_json.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"

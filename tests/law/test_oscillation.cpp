@@ -6,11 +6,11 @@
 #include <numbers>
 
 #include "fitted_parameter.hpp"
-#include "tpm/core/random.hpp"
+#include "tpm/base/random.hpp"
 #include "tpm/fit/coverage.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/gradient_check.hpp"
-#include "tpm/report/fit_report.hpp"
+#include "tpm/fit/show/fit_report.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_model.hpp"
 

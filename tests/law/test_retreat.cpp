@@ -6,10 +6,10 @@
 
 #include "expected_values.hpp"
 #include "refusal.hpp"
-#include "tpm/core/random.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/show/recording_report.hpp"
 #include "tpm/law/contact_retreat.hpp"
-#include "tpm/report/recording_report.hpp"
-#include "tpm/study/selection.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

@@ -6,8 +6,8 @@
 
 #include "expected_values.hpp"
 #include "tpm/law/relaxation.hpp"
+#include "tpm/law/relaxation/exponential_sum.hpp"
 #include "tpm/law/tension_creep.hpp"
-#include "tpm/solve/exponential_sum.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

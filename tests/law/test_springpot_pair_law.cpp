@@ -10,12 +10,12 @@
 #include <sstream>
 
 #include "expected_values.hpp"
-#include "tpm/law/law_export.hpp"
-#include "tpm/law/law_json.hpp"
+#include "tpm/files/blocks/law_export.hpp"
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/files/file.hpp"
 #include "tpm/law/prony_table.hpp"
 #include "tpm/law/relaxation.hpp"
-#include "tpm/solve/mittag_leffler.hpp"
-#include "tpm/store/file.hpp"
+#include "tpm/law/relaxation/mittag_leffler.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "program.hpp"
-#include "tpm/benchmark/contact_reference.hpp"
-#include "tpm/haptics/network_beside.hpp"
-#include "tpm/scene/scene.hpp"
+#include "tpm/accuracy/contact_reference.hpp"
+#include "tpm/haptics/session/network_beside.hpp"
+#include "tpm/organ/scene/scene.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;

@@ -9,8 +9,8 @@
 
 #include "condensed_passivity.hpp"
 #include "contact_path.hpp"
-#include "tpm/network/quasistatic.hpp"
-#include "tpm/scene/scene.hpp"
+#include "tpm/organ/balance/quasistatic.hpp"
+#include "tpm/organ/scene/scene.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

@@ -18,12 +18,12 @@
 #include <string>
 #include <vector>
 
-#include "tpm/core/random.hpp"
-#include "tpm/network/constraints.hpp"
-#include "tpm/network/filling.hpp"
-#include "tpm/network/liver.hpp"
-#include "tpm/network/liver_surface.hpp"
-#include "tpm/solve/lane_factor.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/body/liver.hpp"
+#include "tpm/organ/body/liver_surface.hpp"
+#include "tpm/organ/bonds/constraints.hpp"
+#include "tpm/organ/linear/lane_factor.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 #if __has_include("tpm/network/indentation.hpp")
@@ -31,8 +31,8 @@
 #else
 #include "indentation.hpp"
 #endif
-#if __has_include("tpm/network/stiffness_blocks.hpp")
-#include "tpm/network/stiffness_blocks.hpp"
+#if __has_include("tpm/organ/bonds/stiffness_blocks.hpp")
+#include "tpm/organ/bonds/stiffness_blocks.hpp"
 #else
 namespace tpm {
 namespace organ {}

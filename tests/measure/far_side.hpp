@@ -1,5 +1,5 @@
 #pragma once
-#include "tpm/network/constraints.hpp"
+#include "tpm/organ/bonds/constraints.hpp"
 
 namespace tpm_measure {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "fractional_reference.hpp"
-#include "tpm/core/random.hpp"
+#include "tpm/base/random.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

@@ -18,12 +18,12 @@
 #include <string>
 
 #include "indentation.hpp"
-#include "tpm/network/equilibrium.hpp"
-#include "tpm/network/filling.hpp"
-#include "tpm/network/large_equilibrium.hpp"
-#include "tpm/network/liver.hpp"
-#include "tpm/report/figure.hpp"
-#include "tpm/store/file.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/organ/balance/equilibrium.hpp"
+#include "tpm/organ/balance/large_equilibrium.hpp"
+#include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/body/liver.hpp"
+#include "tpm/show/figure.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 

@@ -12,10 +12,10 @@
 
 #include "endless_motion.hpp"
 #include "program.hpp"
-#include "tpm/haptics/session.hpp"
-#include "tpm/reduce/condensed.hpp"
-#include "tpm/scene/scene.hpp"
-#include "tpm/store/row_log.hpp"
+#include "tpm/contact/condensed/condensed.hpp"
+#include "tpm/files/row_log.hpp"
+#include "tpm/haptics/session/session.hpp"
+#include "tpm/organ/scene/scene.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;

@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "tpm/device/virtual_omega7.hpp"
-#include "tpm/haptics/session.hpp"
-#include "tpm/servo/real_time.hpp"
-#include "tpm/servo/servo_step.hpp"
-#include "tpm/store/row_log.hpp"
+#include "tpm/files/row_log.hpp"
+#include "tpm/haptics/device/virtual_omega7.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpm/haptics/loop/servo_step.hpp"
+#include "tpm/haptics/session/session.hpp"
 
 using namespace tpm;
 using namespace tpm::haptics;

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "far_side.hpp"
-#include "tpm/network/inertial.hpp"
-#include "tpm/network/liver.hpp"
+#include "tpm/organ/balance/inertial.hpp"
+#include "tpm/organ/body/liver.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

@@ -9,10 +9,10 @@
 #include <string>
 
 #include "far_side.hpp"
-#include "tpm/network/inertial.hpp"
-#include "tpm/network/liver.hpp"
-#include "tpm/network/mass_spring.hpp"
-#include "tpm/network/roughness.hpp"
+#include "tpm/organ/balance/inertial.hpp"
+#include "tpm/organ/balance/mass_spring.hpp"
+#include "tpm/organ/body/liver.hpp"
+#include "tpm/organ/bonds/roughness.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "organ_scene.hpp"
-#include "tpm/network/liver.hpp"
-#include "tpm/reduce/condensed.hpp"
-#include "tpm/reduce/servo_network.hpp"
-#include "tpm/reduce/zone_network.hpp"
-#include "tpm/solve/fractional_branches.hpp"
+#include "tpm/contact/condensed/condensed.hpp"
+#include "tpm/contact/servo_network.hpp"
+#include "tpm/contact/zone_network.hpp"
+#include "tpm/law/relaxation/fractional_branches.hpp"
+#include "tpm/organ/body/liver.hpp"
 #include "written_out_network.hpp"
 
 using namespace tpm;

@@ -7,7 +7,7 @@
 #include <ctime>
 
 #include "organ_scene.hpp"
-#include "tpm/network/liver.hpp"
+#include "tpm/organ/body/liver.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

@@ -3,8 +3,8 @@
 
 #include <chrono>
 
-#include "tpm/network/filling.hpp"
-#include "tpm/network/liver.hpp"
+#include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/body/liver.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

@@ -18,9 +18,9 @@
 
 #include "program.hpp"
 #include "raw_client.hpp"
-#include "tpm/haptics/page_server.hpp"
-#include "tpm/haptics/session_run.hpp"
-#include "tpm/servo/real_time.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpm/haptics/session/page_server.hpp"
+#include "tpm/haptics/session/session_run.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;

@@ -7,11 +7,11 @@
 #include <numeric>
 #include <vector>
 
+#include "tpm/contact/condensed/condensed.hpp"
+#include "tpm/contact/servo_network.hpp"
+#include "tpm/contact/zone_network.hpp"
+#include "tpm/organ/scene/scene.hpp"
 #include "tpm/plan/operations.hpp"
-#include "tpm/reduce/condensed.hpp"
-#include "tpm/reduce/servo_network.hpp"
-#include "tpm/reduce/zone_network.hpp"
-#include "tpm/scene/scene.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "python_reference.hpp"
-#include "tpm/network/quasistatic.hpp"
-#include "tpm/scene/network_file.hpp"
+#include "tpm/organ/balance/quasistatic.hpp"
+#include "tpm/organ/scene/network_file.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "organ_scene.hpp"
-#include "tpm/network/liver.hpp"
+#include "tpm/organ/body/liver.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

@@ -4,8 +4,8 @@
 
 #include "patch_test.hpp"
 #include "punch_on_block.hpp"
-#include "tpm/network/filling.hpp"
-#include "tpm/network/liver.hpp"
+#include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/body/liver.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

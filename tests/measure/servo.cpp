@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "tpm/benchmark/contact_reference.hpp"
-#include "tpm/reduce/servo_network.hpp"
-#include "tpm/reduce/zone_network.hpp"
-#include "tpm/scene/scene.hpp"
+#include "tpm/accuracy/contact_reference.hpp"
+#include "tpm/contact/servo_network.hpp"
+#include "tpm/contact/zone_network.hpp"
+#include "tpm/organ/scene/scene.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;

@@ -10,8 +10,8 @@
 #include <cmath>
 
 #include "program.hpp"
-#include "tpm/haptics/session_run.hpp"
-#include "tpm/haptics/surface_scene.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpm/haptics/session/surface_scene.hpp"
 
 using namespace tpm;
 using namespace tpm::haptics;

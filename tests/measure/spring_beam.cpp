@@ -13,11 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "tpm/network/bond_system.hpp"
-#include "tpm/network/constraints.hpp"
-#include "tpm/solve/block_ldlt.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/organ/bonds/bond_system.hpp"
+#include "tpm/organ/bonds/constraints.hpp"
+#include "tpm/organ/linear/block_ldlt.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

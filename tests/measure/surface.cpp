@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "program.hpp"
-#include "tpm/core/random.hpp"
-#include "tpm/haptics/surface_scene.hpp"
-#include "tpm/reduce/surface_network.hpp"
-#include "tpm/servo/real_time.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/contact/surface_network.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpm/haptics/session/surface_scene.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

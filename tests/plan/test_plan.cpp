@@ -7,11 +7,11 @@
 #include "refusal.hpp"
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
-#include "tpm/network/contact_stiffness.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/organ/bonds/contact_stiffness.hpp"
 #include "tpm/plan/plan.hpp"
-#include "tpm/report/plan_report.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/hdf5.hpp"
+#include "tpm/plan/show/plan_report.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

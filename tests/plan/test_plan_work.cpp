@@ -5,7 +5,7 @@
 
 #include "simulated_scene.hpp"
 #include "tpm/plan/plan_relevance.hpp"
-#include "tpm/report/plan_report.hpp"
+#include "tpm/plan/show/plan_report.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;

@@ -3,10 +3,10 @@
 #include <cmath>
 
 #include "refusal.hpp"
-#include "tpm/core/random.hpp"
+#include "tpm/base/random.hpp"
 #include "tpm/plan/plan_scene.hpp"
+#include "tpm/plan/show/plan_report.hpp"
 #include "tpm/plan/spheres_plan.hpp"
-#include "tpm/report/plan_report.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

@@ -3,7 +3,7 @@
 
 - every folder of src/tpm stands in one room, and a room includes only rooms above it in the table;
 - every function of a flow is declared in its header, and the source named includes that header and calls it;
-- every file of a folder opens the namespace that the page states for its room, and src/tpm/core/namespaces.hpp lets
+- every file of a folder opens the namespace that the page states for its room, and src/tpm/base/namespaces.hpp lets
   it see the namespaces that the page states;
 - a source without a header of its name says in its first line which header declares what it defines;
   the folders whose functions CMake collects (formulations, shapes) have none;
@@ -43,13 +43,13 @@ def faults_of_namespaces(page):
     space_of = {room: row[0].strip("`") for row in rows for room in row[1].split(", ")}
     for room in sorted(set(room_of.values()) - set(space_of)):
         yield f"docs/architecture.md: the room {room} has no namespace"
-    directives = (root / "src/tpm/core/namespaces.hpp").read_text(encoding="utf-8")
+    directives = (root / "src/tpm/base/namespaces.hpp").read_text(encoding="utf-8")
     for space, _, sees, *_ in rows:
         space = space.strip("`")
         opened = re.search(rf"^namespace {space} \{{(.*?)\}}", directives, re.M | re.S)
         given = re.findall(r"using namespace (\w+);", opened.group(1)) if opened else []
         if [f"`tpm::{name}`" for name in given] != ([s for s in sees.split(", ") if s]):
-            yield f"src/tpm/core/namespaces.hpp: {space} sees {given}; docs/architecture.md says {sees or 'none'}"
+            yield f"src/tpm/base/namespaces.hpp: {space} sees {given}; docs/architecture.md says {sees or 'none'}"
     for file in sorted((root / "src/tpm").glob("*/*.[ch]pp")):
         space = "tpm::report" if file.parent.name == "report" else space_of.get(room_of.get(file.parent.name, ""))
         if space is None or file.parent.name == "library" or file.name == "namespaces.hpp":

@@ -28,7 +28,7 @@
 #include <thread>
 #include <vector>
 
-#include "tpm/device/virtual_plant.hpp"
+#include "tpm/haptics/device/virtual_plant.hpp"
 
 namespace {
 

@@ -2,7 +2,7 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/network/network.hpp"
+#include "tpm/organ/bonds/network.hpp"
 
 namespace tpm::test {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/core/random.hpp"
-#include "tpm/reduce/condensed.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/contact/condensed/condensed.hpp"
 
 namespace tpm::testing {
 using namespace organ;

@@ -3,8 +3,8 @@
 // models.
 #include <stdexcept>
 
-#include "tpm/network/equilibrium.hpp"
-#include "tpm/solve/relaxation_filter.hpp"
+#include "tpm/law/relaxation/relaxation_filter.hpp"
+#include "tpm/organ/balance/equilibrium.hpp"
 
 namespace tpm::testing {
 using namespace organ;

@@ -6,12 +6,12 @@
 #include <optional>
 #include <vector>
 
-#include "tpm/core/random.hpp"
+#include "tpm/base/random.hpp"
 #include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/recovery.hpp"
 #include "tpm/fit/fitted_law.hpp"
-#include "tpm/study/identification.hpp"
-#include "tpm/study/law_prediction.hpp"
-#include "tpm/study/recovery.hpp"
+#include "tpm/fit/online/identification.hpp"
+#include "tpm/fit/predict/law_prediction.hpp"
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::test {

@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <string>
 
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
 
 namespace tpm::test {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/servo/servo_step.hpp"
+#include "tpm/haptics/loop/servo_step.hpp"
 #include "tpmkit/device.hpp"
 #include "tpmkit/servo_loop.hpp"
 

@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "loaded_oscillator.hpp"
-#include "tpm/core/enum_names.hpp"
-#include "tpm/haptics/loop_maker.hpp"
-#include "tpm/method/method.hpp"
-#include "tpm/model/closed_form.hpp"
-#include "tpm/network/lowest_mode.hpp"
+#include "tpm/base/enum_names.hpp"
+#include "tpm/haptics/session/loop_maker.hpp"
+#include "tpm/law/element/closed_form.hpp"
+#include "tpm/organ/bonds/lowest_mode.hpp"
+#include "tpm/organ/run/scene_runner.hpp"
+#include "tpm/organ/steps/method.hpp"
 #include "tpm/plan/plan_model.hpp"
-#include "tpm/simulate/scene_runner.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::test {

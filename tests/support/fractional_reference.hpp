@@ -3,8 +3,8 @@
 #include <cmath>
 #include <vector>
 
-#include "tpm/solve/exponential_sum.hpp"
-#include "tpm/solve/mittag_leffler.hpp"
+#include "tpm/law/relaxation/exponential_sum.hpp"
+#include "tpm/law/relaxation/mittag_leffler.hpp"
 
 namespace tpm {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "tpm/haptics/session.hpp"
+#include "tpm/haptics/session/session.hpp"
 
 namespace tpm::test {
 using namespace haptics;

@@ -6,9 +6,9 @@
 #include <functional>
 #include <span>
 
-#include "tpm/core/text.hpp"
-#include "tpm/network/equilibrium.hpp"
-#include "tpm/network/large_equilibrium.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/organ/balance/equilibrium.hpp"
+#include "tpm/organ/balance/large_equilibrium.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

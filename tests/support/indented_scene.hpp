@@ -3,10 +3,10 @@
 #include <catch2/catch.hpp>
 
 #include "indentation.hpp"
-#include "tpm/network/equilibrium.hpp"
-#include "tpm/network/filling.hpp"
-#include "tpm/network/large_equilibrium.hpp"
-#include "tpm/network/liver_surface.hpp"
+#include "tpm/organ/balance/equilibrium.hpp"
+#include "tpm/organ/balance/large_equilibrium.hpp"
+#include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/body/liver_surface.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::organ {

@@ -1,7 +1,7 @@
 #pragma once
 // What the tests of materials on organs share.
-#include "tpm/store/json.hpp"
-#include "tpm/study/organ_material.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/fit/predict/organ_material.hpp"
 #include "tpmkit/protocol.hpp"
 
 namespace tpm::testing {

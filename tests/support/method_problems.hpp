@@ -8,11 +8,11 @@
 #include "loaded_oscillator.hpp"
 #include "organ_scene.hpp"
 #include "star_network.hpp"
-#include "tpm/method/method.hpp"
-#include "tpm/model/closed_form.hpp"
-#include "tpm/network/inertial.hpp"
-#include "tpm/network/liver.hpp"
-#include "tpm/network/lowest_mode.hpp"
+#include "tpm/law/element/closed_form.hpp"
+#include "tpm/organ/balance/inertial.hpp"
+#include "tpm/organ/body/liver.hpp"
+#include "tpm/organ/bonds/lowest_mode.hpp"
+#include "tpm/organ/steps/method.hpp"
 
 namespace tpm_test {
 

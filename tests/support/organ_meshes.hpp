@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "tpm/core/random.hpp"
-#include "tpm/network/surface.hpp"
-#include "tpm/network/triangle_mesh.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/organ/body/surface.hpp"
+#include "tpm/organ/body/triangle_mesh.hpp"
 
 namespace tpm::test {
 using namespace organ;

@@ -2,9 +2,9 @@
 // An organ with its far side fixed, pushed at its contact sphere: for tests and measurements.
 #include <utility>
 
-#include "tpm/network/constraints.hpp"
-#include "tpm/network/network.hpp"
-#include "tpm/network/quasistatic.hpp"
+#include "tpm/organ/balance/quasistatic.hpp"
+#include "tpm/organ/bonds/constraints.hpp"
+#include "tpm/organ/bonds/network.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::testing {

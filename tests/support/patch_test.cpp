@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-#include "tpm/network/equilibrium.hpp"
+#include "tpm/organ/balance/equilibrium.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -2,7 +2,7 @@
 #include <span>
 #include <vector>
 
-#include "tpm/network/bond_system.hpp"
+#include "tpm/organ/bonds/bond_system.hpp"
 
 namespace tpm::organ {
 

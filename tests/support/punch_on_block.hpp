@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "indentation.hpp"
-#include "tpm/network/large_equilibrium.hpp"
-#include "tpm/network/simple_organs.hpp"
+#include "tpm/organ/balance/large_equilibrium.hpp"
+#include "tpm/organ/body/simple_organs.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::organ {

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
 
 namespace tpm_test {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "tpm/core/random.hpp"
-#include "tpm/haptics/law_handover.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/contact/law_handover.hpp"
 
 namespace tpm::test {
 using namespace haptics;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "tpm/core/random.hpp"
+#include "tpm/base/random.hpp"
 #include "tpm/plan/plan.hpp"
 
 namespace tpm::test {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/sample/sensitivity.hpp"
+#include "tpm/base/sensitivity.hpp"
 
 namespace tpm {
 

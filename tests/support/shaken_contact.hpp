@@ -1,7 +1,7 @@
 #pragma once
 #include <algorithm>
 
-#include "tpm/haptics/element_contact.hpp"
+#include "tpm/contact/element_contact.hpp"
 #include "tpmkit/device.hpp"
 #include "tpmkit/tpm_element.hpp"
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/random.hpp"
-#include "tpm/simulate/scene_runner.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/organ/run/scene_runner.hpp"
 #include "tpmkit/bond_material.hpp"
 #include "tpmkit/error.hpp"
 

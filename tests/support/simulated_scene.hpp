@@ -2,7 +2,7 @@
 // Scenes that are quick to simulate.
 #include <string>
 
-#include "tpm/simulate/simulation.hpp"
+#include "tpm/organ/run/simulation.hpp"
 
 namespace tpm::test {
 using namespace organ;

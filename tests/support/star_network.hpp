@@ -1,7 +1,7 @@
 #pragma once
 // The four-sphere star of docs/notation.md as a network.
-#include "tpm/network/network.hpp"
-#include "tpm/network/quasistatic.hpp"
+#include "tpm/organ/balance/quasistatic.hpp"
+#include "tpm/organ/bonds/network.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm_test {

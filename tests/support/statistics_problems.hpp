@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/core/random.hpp"
-#include "tpm/fit/bootstrap.hpp"
-#include "tpm/fit/error_law.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/fit/likelihood/bootstrap.hpp"
+#include "tpm/fit/likelihood/error_law.hpp"
 #include "tpm/fit/uncertainty.hpp"
 
 namespace tpm::test {

@@ -11,10 +11,10 @@
 #include <stdexcept>
 #include <vector>
 
-#include "tpm/network/constraints.hpp"
-#include "tpm/network/network.hpp"
-#include "tpm/network/quasistatic.hpp"
-#include "tpm/solve/sundials.hpp"
+#include "tpm/organ/balance/quasistatic.hpp"
+#include "tpm/organ/bonds/constraints.hpp"
+#include "tpm/organ/bonds/network.hpp"
+#include "tpm/organ/linear/sundials.hpp"
 #include "tpmkit/bond_material.hpp"
 
 namespace tpm_test {

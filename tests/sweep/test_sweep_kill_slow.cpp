@@ -14,8 +14,8 @@
 #include <thread>
 
 #include "temp_folder.hpp"
-#include "tpm/core/random.hpp"
-#include "tpm/store/file.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/files/file.hpp"
 
 using namespace tpm;
 namespace fs = std::filesystem;

@@ -4,9 +4,9 @@
 #include <set>
 
 #include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/organ/run/static_path.hpp"
 #include "tpm/plan/shared_plan.hpp"
-#include "tpm/simulate/static_path.hpp"
-#include "tpm/store/file.hpp"
 #include "tpm/sweep/run_sweep.hpp"
 #include "tpm/sweep/sweep_reader.hpp"
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/text.hpp"
+#include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/law.hpp"
 
 namespace tpm::fit {

@@ -6,12 +6,12 @@
 #include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 
-#include "tpm/core/give_up.hpp"
-#include "tpm/core/progress.hpp"
-#include "tpm/core/random.hpp"
-#include "tpm/core/text.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/fit/starts.hpp"
+#include "tpm/fit/likelihood/starts.hpp"
+#include "tpm/work/give_up.hpp"
+#include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

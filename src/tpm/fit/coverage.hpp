@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "tpm/fit/config.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/fit/likelihood/config.hpp"
 
 namespace tpm::fit {
 

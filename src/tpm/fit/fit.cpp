@@ -3,11 +3,11 @@
 #include <algorithm>
 
 #include "tpm/fit/conditional.hpp"
-#include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit_flags.hpp"
 #include "tpm/fit/fitted_data.hpp"
 #include "tpm/fit/hypothesis_test.hpp"
-#include "tpm/fit/starts.hpp"
+#include "tpm/fit/likelihood/experiment_refit.hpp"
+#include "tpm/fit/likelihood/starts.hpp"
 #include "tpm/fit/unpredicted.hpp"
 
 namespace tpm::fit {

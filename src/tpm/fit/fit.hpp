@@ -4,16 +4,16 @@
 #include <string>
 #include <vector>
 
-#include "tpm/fit/bootstrap.hpp"
-#include "tpm/fit/config.hpp"
-#include "tpm/fit/correlation.hpp"
-#include "tpm/fit/experiment_residuals.hpp"
-#include "tpm/fit/least_squares.hpp"
+#include "tpm/files/json.hpp"
 #include "tpm/fit/likelihood.hpp"
-#include "tpm/fit/starts.hpp"
+#include "tpm/fit/likelihood/bootstrap.hpp"
+#include "tpm/fit/likelihood/config.hpp"
+#include "tpm/fit/likelihood/correlation.hpp"
+#include "tpm/fit/likelihood/experiment_residuals.hpp"
+#include "tpm/fit/likelihood/least_squares.hpp"
+#include "tpm/fit/likelihood/starts.hpp"
 #include "tpm/fit/uncertainty.hpp"
 #include "tpm/fit/waterfall.hpp"
-#include "tpm/store/json.hpp"
 #include "tpmkit/fit.hpp"
 
 namespace tpm::fit {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/text.hpp"
-#include "tpm/protocol/straight_pieces.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/data/straight_pieces.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::fit {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/progress.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/verdict.hpp"
+#include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

@@ -8,8 +8,8 @@
 #include <limits>
 #include <optional>
 
-#include "tpm/core/enum_names.hpp"
-#include "tpm/core/text.hpp"
+#include "tpm/base/enum_names.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "tpm/fit/least_squares.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/fit/likelihood/least_squares.hpp"
 
 namespace tpm::fit {
 

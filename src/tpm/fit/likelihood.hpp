@@ -2,7 +2,7 @@
 #include <optional>
 #include <span>
 
-#include "tpm/fit/experiment_residuals.hpp"
+#include "tpm/fit/likelihood/experiment_residuals.hpp"
 
 namespace tpm::fit {
 

@@ -1,12 +1,12 @@
-// Declared in tpm/fit/least_squares.hpp.
+// Declared in tpm/fit/likelihood/least_squares.hpp.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "tpm/fit/least_squares.hpp"
-#include "tpm/fit/starts.hpp"
-#include "tpm/fit/surrogate_minimum.hpp"
+#include "tpm/fit/likelihood/least_squares.hpp"
+#include "tpm/fit/likelihood/starts.hpp"
+#include "tpm/fit/likelihood/surrogate_minimum.hpp"
 
 namespace tpm::fit {
 namespace {

@@ -7,9 +7,9 @@
 #include <map>
 #include <string_view>
 
-#include "tpm/core/text.hpp"
-#include "tpm/store/delimited.hpp"
-#include "tpm/store/renamed_names.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/delimited.hpp"
+#include "tpm/files/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

@@ -11,7 +11,7 @@
 #include <limits>
 #include <utility>
 
-#include "tpm/core/dense_algebra.hpp"
+#include "tpm/base/dense_algebra.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

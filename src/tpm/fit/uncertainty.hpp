@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/fit/least_squares.hpp"
+#include "tpm/fit/likelihood/least_squares.hpp"
 
 namespace tpm::fit {
 

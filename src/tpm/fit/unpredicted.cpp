@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/law.hpp"
 
 namespace tpm::fit {

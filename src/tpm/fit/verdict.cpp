@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/enum_names.hpp"
-#include "tpm/core/quantity_text.hpp"
-#include "tpm/core/text.hpp"
+#include "tpm/base/enum_names.hpp"
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
 
 namespace tpm::fit {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "tpm/core/text.hpp"
+#include "tpm/base/text.hpp"
 
 namespace tpm::fit {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/core/text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "tpm/law/kernel.hpp"
+#include "tpm/law/relaxation/exponential_quadrature.hpp"
 #include "tpm/law/relaxation_sum.hpp"
-#include "tpm/solve/exponential_quadrature.hpp"
 #include "tpmkit/model.hpp"
 
 namespace tpm {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/solve/exponential_sum.hpp"
+#include "tpm/law/relaxation/exponential_sum.hpp"
 
 namespace tpm {
 namespace {

@@ -2,8 +2,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "tpm/law/relaxation/exponential_collocation.hpp"
 #include "tpm/law/relaxation_sum.hpp"
-#include "tpm/solve/exponential_collocation.hpp"
 
 namespace tpm {
 

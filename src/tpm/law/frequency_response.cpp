@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "tpm/core/text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/law/kernel.hpp"
 #include "tpm/law/operational_stiffness.hpp"
 #include "tpmkit/error.hpp"

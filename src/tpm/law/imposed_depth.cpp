@@ -6,7 +6,7 @@
 
 #include "tpm/law/depth_pieces.hpp"
 #include "tpm/law/kernel_tables.hpp"
-#include "tpm/solve/exponential_quadrature.hpp"
+#include "tpm/law/relaxation/exponential_quadrature.hpp"
 
 namespace tpm {
 namespace {

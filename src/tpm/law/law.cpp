@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/enum_names.hpp"
-#include "tpm/core/text.hpp"
+#include "tpm/base/enum_names.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

@@ -6,14 +6,14 @@
 #include <cmath>
 #include <optional>
 
-#include "tpm/core/text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/contact_retreat.hpp"
 #include "tpm/law/imposed_depth.hpp"
 #include "tpm/law/imposed_load.hpp"
 #include "tpm/law/kelvin_chain.hpp"
 #include "tpm/law/kept_step.hpp"
-#include "tpm/solve/exponential_sum.hpp"
+#include "tpm/law/relaxation/exponential_sum.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "tpm/core/evenly.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/solve/mittag_leffler.hpp"
-#include "tpm/solve/nonnegative.hpp"
+#include "tpm/base/evenly.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/law/relaxation/mittag_leffler.hpp"
+#include "tpm/law/relaxation/nonnegative.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

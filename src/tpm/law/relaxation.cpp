@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "tpm/core/text.hpp"
-#include "tpm/solve/laplace_contour.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/law/relaxation/laplace_contour.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "tpm/solve/exponential_sum.hpp"
+#include "tpm/law/relaxation/exponential_sum.hpp"
 #include "tpmkit/law.hpp"
 
 namespace tpm {

@@ -6,18 +6,18 @@
 #include <functional>
 #include <vector>
 
-#include "tpm/core/text.hpp"
-#include "tpm/network/equilibrium.hpp"
-#include "tpm/network/lane_bonds.hpp"
-#include "tpm/network/liver.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/contact/condensed/condensed.hpp"
+#include "tpm/contact/pushed_contact.hpp"
+#include "tpm/contact/servo_bonds.hpp"
+#include "tpm/contact/step_error.hpp"
+#include "tpm/organ/balance/equilibrium.hpp"
+#include "tpm/organ/balance/lane_bonds.hpp"
+#include "tpm/organ/body/liver.hpp"
+#include "tpm/organ/linear/frontal_factor.hpp"
+#include "tpm/organ/linear/lane_factor.hpp"
 #include "tpm/plan/operations.hpp"
 #include "tpm/plan/scalar_model.hpp"
-#include "tpm/reduce/condensed.hpp"
-#include "tpm/reduce/pushed_contact.hpp"
-#include "tpm/reduce/servo_bonds.hpp"
-#include "tpm/reduce/step_error.hpp"
-#include "tpm/solve/frontal_factor.hpp"
-#include "tpm/solve/lane_factor.hpp"
 #include "tpmkit/bond_element.hpp"
 
 namespace tpm::organ {

@@ -8,10 +8,10 @@
 #include <functional>
 #include <vector>
 
+#include "tpm/contact/condensed/condensed.hpp"
+#include "tpm/contact/servo_network.hpp"
+#include "tpm/contact/zone_network.hpp"
 #include "tpm/plan/plan_model.hpp"
-#include "tpm/reduce/condensed.hpp"
-#include "tpm/reduce/servo_network.hpp"
-#include "tpm/reduce/zone_network.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -5,10 +5,10 @@
 #include <limits>
 #include <numbers>
 
-#include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/evenly.hpp"
-#include "tpm/network/driven_tissue.hpp"
-#include "tpm/network/material_refusal.hpp"
+#include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/evenly.hpp"
+#include "tpm/organ/balance/driven_tissue.hpp"
+#include "tpm/organ/bonds/material_refusal.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -5,9 +5,9 @@
 #include <limits>
 #include <numbers>
 
-#include "tpm/core/dense_algebra.hpp"
-#include "tpm/network/driven_tissue.hpp"
-#include "tpm/network/lowest_mode.hpp"
+#include "tpm/base/dense_algebra.hpp"
+#include "tpm/organ/balance/driven_tissue.hpp"
+#include "tpm/organ/bonds/lowest_mode.hpp"
 #include "tpm/plan/rest_answers.hpp"
 #include "tpmkit/error.hpp"
 

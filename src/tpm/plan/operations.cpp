@@ -3,10 +3,10 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "tpm/core/text.hpp"
-#include "tpm/store/document_place.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/document_place.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/quantity_text.hpp"
-#include "tpm/core/require.hpp"
-#include "tpm/core/text.hpp"
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/require.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/plan/perception.hpp"
 #include "tpm/plan/plan_allowance.hpp"
 #include "tpm/plan/plan_reference.hpp"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/text.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/organ/run/validity.hpp"
 #include "tpm/plan/plan_relevance.hpp"
-#include "tpm/simulate/validity.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

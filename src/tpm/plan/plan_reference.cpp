@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "tpm/core/text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -5,8 +5,8 @@
 #include <mutex>
 #include <vector>
 
+#include "tpm/organ/run/scene_runner.hpp"
 #include "tpm/plan/operations.hpp"
-#include "tpm/simulate/scene_runner.hpp"
 
 namespace tpm::organ {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 

@@ -10,8 +10,8 @@
 #include <limits>
 #include <numbers>
 
-#include "tpm/core/require.hpp"
-#include "tpm/core/text.hpp"
+#include "tpm/base/require.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpmkit/error.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/scene/refilled_scene.hpp"
+#include "tpm/organ/scene/refilled_scene.hpp"
 
 namespace tpm::organ {
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/text.hpp"
-#include "tpm/store/document_place.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/document_place.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {

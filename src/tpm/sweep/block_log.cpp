@@ -12,9 +12,9 @@
 #include <cstring>
 #include <utility>
 
-#include "tpm/store/check_sum.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/file_roles.hpp"
+#include "tpm/files/check_sum.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {

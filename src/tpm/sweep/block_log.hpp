@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/store/descriptor.hpp"
+#include "tpm/files/descriptor.hpp"
 #include "tpm/sweep/cell_block.hpp"
 
 namespace tpm::study {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "tpm/study/expression.hpp"
+#include "tpm/fit/claims/expression.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {

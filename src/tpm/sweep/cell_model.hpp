@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::study {

@@ -8,11 +8,11 @@
 #include <limits>
 #include <optional>
 
-#include "tpm/core/enum_names.hpp"
-#include "tpm/core/lists.hpp"
-#include "tpm/model/closed_form.hpp"
-#include "tpm/protocol/protocol_block.hpp"
-#include "tpm/solve/creep_exact.hpp"
+#include "tpm/base/enum_names.hpp"
+#include "tpm/base/lists.hpp"
+#include "tpm/files/blocks/protocol_block.hpp"
+#include "tpm/law/element/closed_form.hpp"
+#include "tpm/law/relaxation/creep_exact.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
 #include "tpmkit/error.hpp"
 

@@ -8,13 +8,13 @@
 #include <mutex>
 #include <optional>
 
-#include "tpm/core/namespaces.hpp"
-#include "tpm/core/quantity_text.hpp"
-#include "tpm/core/text.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/organ/scene/blocks.hpp"
+#include "tpm/organ/scene/experiment_blocks.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/plan/shared_plan.hpp"
-#include "tpm/scene/blocks.hpp"
-#include "tpm/scene/experiment_blocks.hpp"
 #include "tpm/sweep/scene_field.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
 #include "tpmkit/error.hpp"

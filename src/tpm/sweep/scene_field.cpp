@@ -1,11 +1,11 @@
 #include "tpm/sweep/scene_field.hpp"
-#include "tpm/core/quantity_text.hpp"
+#include "tpm/base/quantity_text.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "tpm/core/text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {

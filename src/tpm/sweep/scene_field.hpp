@@ -2,8 +2,8 @@
 #include <string>
 #include <string_view>
 
-#include "tpm/protocol/protocol_block.hpp"
-#include "tpm/store/json.hpp"
+#include "tpm/files/blocks/protocol_block.hpp"
+#include "tpm/files/json.hpp"
 #include "tpmkit/bond_material.hpp"
 
 namespace tpm::study {

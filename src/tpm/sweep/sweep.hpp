@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/store/json.hpp"
+#include "tpm/files/json.hpp"
 #include "tpm/sweep/cell_model.hpp"
 #include "tpm/sweep/parameter_values.hpp"
 

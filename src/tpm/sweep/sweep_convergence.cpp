@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "tpm/study/expression.hpp"
+#include "tpm/fit/claims/expression.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/sample/grid_convergence.hpp"
+#include "tpm/base/grid_convergence.hpp"
 #include "tpm/sweep/sweep_reader.hpp"
 
 namespace tpm::study {

@@ -6,13 +6,13 @@
 #include <array>
 #include <set>
 
-#include "tpm/core/enum_names.hpp"
-#include "tpm/core/lists.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/sample/sensitivity.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/renamed_names.hpp"
-#include "tpm/study/expression.hpp"
+#include "tpm/base/enum_names.hpp"
+#include "tpm/base/lists.hpp"
+#include "tpm/base/sensitivity.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/renamed_names.hpp"
+#include "tpm/fit/claims/expression.hpp"
 #include "tpm/sweep/sweep.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
 #include "tpmkit/error.hpp"

@@ -8,7 +8,7 @@
 #include <functional>
 #include <utility>
 
-#include "tpm/core/enum_names.hpp"
+#include "tpm/base/enum_names.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {

@@ -3,7 +3,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/store/document_place.hpp"
+#include "tpm/files/document_place.hpp"
 #include "tpm/sweep/cell_model.hpp"
 #include "tpm/sweep/parameter_values.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "tpm/core/lists.hpp"
+#include "tpm/base/lists.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::study {

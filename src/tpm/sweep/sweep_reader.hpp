@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/store/hdf5.hpp"
+#include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
 namespace tpm::study {

@@ -9,11 +9,11 @@
 #include <iterator>
 #include <map>
 
-#include "tpm/core/lists.hpp"
-#include "tpm/core/text.hpp"
-#include "tpm/store/delimited.hpp"
-#include "tpm/store/file.hpp"
-#include "tpm/store/hdf5.hpp"
+#include "tpm/base/lists.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/delimited.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/sweep/workers.hpp"
 #include "tpmkit/error.hpp"
 

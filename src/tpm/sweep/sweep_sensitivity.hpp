@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "tpm/sample/sensitivity.hpp"
+#include "tpm/base/sensitivity.hpp"
 #include "tpm/sweep/sweep_reader.hpp"
 
 namespace tpm::study {

@@ -6,7 +6,7 @@
 #include <exception>
 #include <mutex>
 
-#include "tpm/core/parallel.hpp"
+#include "tpm/work/parallel.hpp"
 
 namespace tpm::study {
 

@@ -1,5 +1,5 @@
 // A formulation that does not keep its word: the suite has to find it.
-#include "tpm/simulate/scene_runner.hpp"
+#include "tpm/organ/run/scene_runner.hpp"
 
 namespace tpm::organ {
 namespace {

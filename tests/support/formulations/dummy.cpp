@@ -1,6 +1,6 @@
 // The worked example of docs/adding.md, "A formulation": one file, and nothing else.
-#include "tpm/network/mass_spring.hpp"
-#include "tpm/simulate/scene_runner.hpp"
+#include "tpm/organ/balance/mass_spring.hpp"
+#include "tpm/organ/run/scene_runner.hpp"
 
 namespace tpm::organ {
 namespace {

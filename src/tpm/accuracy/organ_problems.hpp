@@ -1,0 +1,24 @@
+#pragma once
+#include "tpm/accuracy/posed.hpp"
+
+namespace tpm::study {
+
+// On the liver of 424 spheres of configs/liver_scene.json.
+
+/// Ramp and hold at the fitted eta1.
+[[nodiscard]] BenchmarkProblem organ_hold_problem();
+/// In at 100 mm/s, held, and out, at the paper's eta1.
+[[nodiscard]] BenchmarkProblem organ_poke_problem();
+/// 300 s under a constant load at the fitted eta1.
+[[nodiscard]] BenchmarkProblem organ_creep_problem();
+/// In at 100 mm/s with masses.
+[[nodiscard]] BenchmarkProblem organ_poke_mass_problem();
+
+/// The same network with masses and bonds that do not relax: what other engines can be asked as
+/// well. Sampled between the kinks of the protocol.
+[[nodiscard]] std::shared_ptr<const PosedNetwork> posed_elastic_poke();
+/// Every method on a poke of a network with masses; to be given name, title and text.
+[[nodiscard]] BenchmarkProblem poke_with_mass_problem(
+    const std::shared_ptr<const PosedNetwork>& posed);
+
+}  // namespace tpm::study

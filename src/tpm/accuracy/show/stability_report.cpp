@@ -1,0 +1,367 @@
+#include "tpm/accuracy/show/stability_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "tpm/base/lists.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/show/draw.hpp"
+#include "tpm/show/table_document.hpp"
+
+namespace tpm::report {
+namespace {
+
+std::string number(double value) {
+  return std::isfinite(value) ? significant(value, 4) : "";
+}
+
+std::string percent(double share) {
+  return fmt::format("{} %", significant(100.0 * share, 2));
+}
+
+/// "holds, 0.012 %", "diverged".
+std::string verdict_words(const StabilityVerdict& v) {
+  std::string name(stability_class_name(v.found));
+  // What is left of rounding is no error to speak of.
+  constexpr double kRounding = 1e-12;
+  if (!std::isfinite(v.error)) return name;
+  return name + ", " + (v.error < kRounding ? "exact" : percent(v.error));
+}
+
+Table limits_table(const StabilityStudy& study) {
+  Table table{"Limits found by bisection to 1 % and those of theory.",
+              {{"problem"},
+               {"rule"},
+               {"theory"},
+               {"theory, s", true},
+               {"found, s", true},
+               {"found/theory", true}}};
+  for (const StabilityLimit& l : study.limits) {
+    const bool good = std::abs(l.ratio() - 1.0) <= 0.02;
+    table.rows.push_back({{l.problem},
+                          {step_rule_name(l.rule)},
+                          {l.theory},
+                          {number(l.theory_s)},
+                          {std::isfinite(l.found_s) ? number(l.found_s) : "not found"},
+                          {number(l.ratio()), good ? Tone::good : Tone::bad}});
+  }
+  return table;
+}
+
+Table servo_table(const StabilityStudy& study, const std::string& problem) {
+  Table table{
+      fmt::format(
+          "{}, the paper's eta1 = 5 Pa s (tau = 0.208 ms), 4 mm at 90 mm/s and "
+          "held, as a servo samples it at its ticks: largest force error there, of the peak.",
+          problem),
+      {{"rate, Hz", true}}};
+  for (const ServoRow& row : study.servo) {
+    if (row.problem != problem) continue;
+    if (table.columns.size() == 1) {
+      for (const ServoCell& cell : row.cells)
+        table.columns.push_back({step_rule_name(cell.rule), true});
+    }
+    std::vector<Cell> cells{{significant(row.rate_Hz, 4)}};
+    for (const ServoCell& cell : row.cells) {
+      const bool holds = cell.verdict.found == StabilityClass::holds;
+      cells.push_back({verdict_words(cell.verdict), holds ? Tone::good : Tone::bad});
+    }
+    table.rows.push_back(std::move(cells));
+  }
+  return table;
+}
+
+Table corners_table(const StabilityStudy& study) {
+  Table table{"Degenerate corners, step 1 ms. An answer that is not the expected one is marked.",
+              {{"corner"}, {"what is done"}, {"what is right"}}};
+  for (const StepRuleEntry& entry : kStepRules) table.columns.push_back({std::string(entry.text)});
+  for (const StabilityCorner& corner : study.corners) {
+    std::vector<Cell> row{{corner.name}, {corner.setup}, {corner.expected}};
+    for (const CornerCell& cell : corner.cells) {
+      std::string words = verdict_words(cell.verdict);
+      if (!cell.right) {
+        words += fmt::format(" (not as expected: {})", stability_class_name(cell.expected));
+      }
+      row.push_back({std::move(words), cell.right ? Tone::good : Tone::bad});
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+std::set<std::string> map_ids(const StabilityStudy& study) {
+  std::set<std::string> ids;
+  for (const StabilityMap& map : study.maps) ids.insert(map.id);
+  return ids;
+}
+
+/// Of a map: runs above the limit of theory that hold, and runs below it that do not.
+struct Disagreement {
+  std::size_t runs = 0, hold_above = 0, fail_below = 0;
+};
+
+Disagreement disagreement(const StabilityMap& map) {
+  constexpr double kMargin = 1.05;
+  Disagreement d;
+  for (std::size_t i = 0; i < map.limit_x.size(); ++i) {
+    for (const StabilityPoint& p : map.points) {
+      if (p.x != map.limit_x[i]) continue;
+      ++d.runs;
+      const bool grows = p.verdict.found == StabilityClass::diverged ||
+                         p.verdict.found == StabilityClass::energy_grew;
+      if (p.step_s > kMargin * map.limit_step_s[i] && !grows) ++d.hold_above;
+      if (p.step_s * kMargin < map.limit_step_s[i] && grows) ++d.fail_below;
+    }
+  }
+  return d;
+}
+
+Table maps_table(const StabilityStudy& study) {
+  Table table{
+      "Runs of the maps by class, and against the limit of linear theory: above it without "
+      "growth, below it with growth (5 % around it left out).",
+      {{"map"}, {"rule"}}};
+  for (const StabilityClassEntry& entry : kStabilityClasses) {
+    if (entry.meaning == StabilityClass::not_applicable) continue;
+    table.columns.push_back({std::string(entry.text), true});
+  }
+  table.columns.push_back({"above, no growth", true});
+  table.columns.push_back({"below, growth", true});
+  for (const StabilityMap& map : study.maps) {
+    std::vector<Cell> row{{map.quantity}, {step_rule_name(map.rule)}};
+    for (const StabilityClassEntry& entry : kStabilityClasses) {
+      if (entry.meaning == StabilityClass::not_applicable) continue;
+      const auto count = std::ranges::count_if(
+          map.points, [&](const auto& p) { return p.verdict.found == entry.meaning; });
+      row.push_back({std::to_string(count)});
+    }
+    const Disagreement d = disagreement(map);
+    row.push_back({d.runs == 0 ? "-" : std::to_string(d.hold_above)});
+    row.push_back({d.runs == 0 ? "-" : std::to_string(d.fail_below)});
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+void add_maps(Document& document, const StabilityStudy& study, const std::vector<Figure>& figures) {
+  document.heading(2, "Maps");
+  document.paragraph(fmt::format(
+      "A run holds if it is within {} of the reference at its end, in parts of the peak; the "
+      "reference is "
+      "a "
+      "closed form, or the modes of the linear motion. It diverged if a value is not finite or "
+      "beyond 1000 times its scale, or if its distance from the reference still grows; with masses "
+      "that "
+      "is called growing energy.",
+      percent(kHoldsWithin)));
+  document.table(maps_table(study));
+  for (const Figure& figure : figures) {
+    document.picture({figure.id, figure.title, figure.caption});
+  }
+}
+
+Json verdict_json(StepRule rule, const StabilityVerdict& v) {
+  Json json{{"rule", step_rule_name(rule)}, {"class", stability_class_name(v.found)}};
+  if (std::isfinite(v.error)) json["error_of_peak"] = v.error;
+  if (!v.reason.empty()) json["reason"] = v.reason;
+  return json;
+}
+
+/// @param figures of stability_figures
+Document stability_document(const StabilityStudy& study, const std::vector<Figure>& figures) {
+  Document document;
+  document.title = "Where the step rules fail";
+  document.subtitle =
+      "Maps of the step against what the problem is made of, limits against theory, "
+      "degenerate corners, servo rates";
+  document.heading(2, "Summary");
+  std::vector<Cell> items;
+  for (const std::string& s : stability_sentences(study)) items.push_back({s});
+  document.bullets(std::move(items));
+  if (!study.limits.empty()) {
+    document.heading(2, "Limits");
+    document.paragraph(study_organ_words());
+    document.table(limits_table(study));
+  }
+  if (!study.servo.empty()) document.heading(2, "At servo rate");
+  for (const std::string& problem : each_once(study.servo, &ServoRow::problem)) {
+    document.table(servo_table(study, problem));
+  }
+  if (!study.corners.empty()) {
+    document.heading(2, "Degenerate corners");
+    document.table(corners_table(study));
+  }
+  if (!study.maps.empty()) add_maps(document, study, figures);
+  typeset(document);
+  return document;
+}
+
+/// One line per limit.
+std::string stability_limits_csv(const StabilityStudy& study) {
+  std::string text =
+      csv_line({"problem", "rule", "theory", "theory_s", "found_s", "found_over_theory"});
+  for (const StabilityLimit& l : study.limits) {
+    text += csv_line({l.problem, step_rule_name(l.rule), l.theory, significant(l.theory_s, 6),
+                      number(l.found_s), number(l.ratio())});
+  }
+  return text;
+}
+
+/// One line per run of a map. SI units in the column names.
+std::string stability_map_csv(const StabilityStudy& study, const std::string& id) {
+  std::string text;
+  for (const StabilityMap& map : study.maps) {
+    if (map.id != id) continue;
+    if (text.empty()) {
+      text = csv_line({"rule", map.unit.empty() ? map.id : map.id + " [" + map.unit + "]", "step_s",
+                       "class", "error_of_peak"});
+    }
+    for (const StabilityPoint& p : map.points) {
+      text +=
+          csv_line({step_rule_name(map.rule), significant(p.x, 6), significant(p.step_s, 6),
+                    std::string(stability_class_name(p.verdict.found)), number(p.verdict.error)});
+    }
+  }
+  return text;
+}
+
+/// One line per rule and servo rate.
+std::string stability_servo_csv(const StabilityStudy& study) {
+  std::string text = csv_line({"problem", "rate_Hz", "rule", "class", "error_of_peak"});
+  for (const ServoRow& row : study.servo) {
+    for (const ServoCell& cell : row.cells) {
+      text += csv_line({row.problem, significant(row.rate_Hz, 4), step_rule_name(cell.rule),
+                        std::string(stability_class_name(cell.verdict.found)),
+                        number(cell.verdict.error)});
+    }
+  }
+  return text;
+}
+
+/// One line per rule and corner.
+std::string stability_corners_csv(const StabilityStudy& study) {
+  std::string text =
+      csv_line({"corner", "rule", "class", "error_of_peak", "expected", "right", "reason"});
+  for (const StabilityCorner& corner : study.corners) {
+    for (const CornerCell& cell : corner.cells) {
+      text +=
+          csv_line({corner.name, step_rule_name(cell.rule),
+                    std::string(stability_class_name(cell.verdict.found)),
+                    number(cell.verdict.error), std::string(stability_class_name(cell.expected)),
+                    cell.right ? "yes" : "no", cell.verdict.reason});
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> stability_sentences(const StabilityStudy& study) {
+  std::vector<std::string> sentences;
+  double furthest = 0.0;
+  bool all = true;
+  for (const StabilityLimit& l : study.limits) {
+    all = all && std::isfinite(l.found_s);
+    if (std::isfinite(l.found_s)) furthest = std::max(furthest, std::abs(l.ratio() - 1.0));
+  }
+  if (!study.limits.empty()) {
+    sentences.push_back(fmt::format("{} limits bisected{}: at most {} from theory.",
+                                    study.limits.size(), all ? "" : ", not all found",
+                                    percent(furthest)));
+  }
+  for (const StabilityLimit& l : study.limits) {
+    if (l.problem.find("paper") == std::string::npos) continue;
+    sentences.push_back(fmt::format("At the paper's eta1 {} holds above {} Hz (theory {} Hz).",
+                                    step_rule_name(l.rule), significant(1.0 / l.found_s, 4),
+                                    significant(1.0 / l.theory_s, 4)));
+  }
+  for (const ServoRow& row : study.servo) {
+    if (row.rate_Hz != 1000.0) continue;
+    const auto words = [](const ServoCell& cell) {
+      return fmt::format("{} {}", step_rule_name(cell.rule), verdict_words(cell.verdict));
+    };
+    sentences.push_back(
+        fmt::format("{} at 1 kHz, paper's eta1: {}.", row.problem, listed(row.cells, words, "; ")));
+  }
+  std::size_t wrong = 0, cells = 0;
+  for (const StabilityCorner& corner : study.corners) {
+    for (const CornerCell& cell : corner.cells) {
+      ++cells;
+      wrong += cell.right ? 0 : 1;
+    }
+  }
+  if (!study.corners.empty()) {
+    sentences.push_back(fmt::format("{} corners, {} runs: {} came out otherwise than expected.",
+                                    study.corners.size(), cells, wrong));
+  }
+  if (sentences.empty()) {  // maps alone
+    std::size_t runs = 0;
+    for (const StabilityMap& map : study.maps) runs += map.points.size();
+    sentences.push_back(fmt::format("{} maps, {} runs.", study.maps.size(), runs));
+  }
+  return sentences;
+}
+
+Json to_json(const StabilityStudy& study) {
+  Json json;
+  json["summary"] = stability_sentences(study);
+  json["networks"] = study_organ_words();
+  for (const StabilityLimit& l : study.limits) {
+    Json limit{{"problem", l.problem},
+               {"rule", step_rule_name(l.rule)},
+               {"theory", l.theory},
+               {"theory_s", l.theory_s}};
+    if (std::isfinite(l.found_s)) limit["found_s"] = l.found_s;
+    json["limits"].push_back(std::move(limit));
+  }
+  for (const ServoRow& row : study.servo) {
+    Json rate{{"problem", row.problem}, {"rate_Hz", row.rate_Hz}};
+    for (const ServoCell& cell : row.cells) {
+      rate["rules"].push_back(verdict_json(cell.rule, cell.verdict));
+    }
+    json["servo"].push_back(std::move(rate));
+  }
+  for (const StabilityCorner& corner : study.corners) {
+    Json entry{{"corner", corner.name}, {"setup", corner.setup}, {"expected", corner.expected}};
+    for (const CornerCell& cell : corner.cells) {
+      Json of_rule = verdict_json(cell.rule, cell.verdict);
+      of_rule["expected"] = stability_class_name(cell.expected);
+      of_rule["right"] = cell.right;
+      entry["rules"].push_back(std::move(of_rule));
+    }
+    json["corners"].push_back(std::move(entry));
+  }
+  for (const StabilityMap& map : study.maps) {
+    std::map<std::string, int> counts;
+    for (const StabilityPoint& p : map.points) {
+      ++counts[std::string(stability_class_name(p.verdict.found))];
+    }
+    json["maps"].push_back(Json{{"map", map.id},
+                                {"quantity", map.quantity},
+                                {"unit", map.unit},
+                                {"problem", map.problem},
+                                {"rule", step_rule_name(map.rule)},
+                                {"runs", counts}});
+  }
+  return json;
+}
+
+void write_stability(const StabilityStudy& study, const std::filesystem::path& folder,
+                     const std::string& python, double seconds) {
+  const std::vector<Figure> figures = stability_figures(study);
+  write_report(folder, stability_document(study, figures), figures, python, {{"runs", seconds}});
+  write_file(folder / "stability.json", to_text(to_json(study)));
+  if (!study.limits.empty()) write_file(folder / "limits.csv", stability_limits_csv(study));
+  if (!study.corners.empty()) write_file(folder / "corners.csv", stability_corners_csv(study));
+  if (!study.servo.empty()) write_file(folder / "servo.csv", stability_servo_csv(study));
+  for (const std::string& id : map_ids(study)) {
+    write_file(folder / fmt::format("map_{}.csv", id), stability_map_csv(study, id));
+  }
+}
+
+}  // namespace tpm::report

@@ -1,0 +1,61 @@
+#include "tpm/base/text.hpp"
+
+#include <fmt/format.h>
+
+#include <utf8.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+
+namespace tpm {
+
+std::string shortest(double value) {
+  return fmt::format("{}", value);
+}
+
+std::string significant(double value, int digits) {
+  return fmt::format("{:.{}g}", value, digits);
+}
+
+double rounded(double value, int digits) {
+  if (!std::isfinite(value)) return value;
+  const std::string text = fmt::format("{:.{}e}", value, digits - 1);
+  double result = value;
+  std::from_chars(text.data(), text.data() + text.size(), result);
+  return result;
+}
+
+std::string fixed(double value, int decimals) {
+  return fmt::format("{:.{}f}", value, decimals);
+}
+
+std::string for_terminal(std::string_view text, LineEnds line_ends) {
+  const auto plain = [&](char c) {
+    const auto u = static_cast<unsigned char>(c);
+    constexpr unsigned char kSpace = 0x20, kDelete = 0x7f;
+    return (u >= kSpace && u < kDelete) || c == '\t' || (c == '\n' && line_ends == LineEnds::kept);
+  };
+  if (std::all_of(text.begin(), text.end(), plain)) return std::string(text);
+  std::string valid;
+  utf8::replace_invalid(text.begin(), text.end(), std::back_inserter(valid), U'?');
+  std::string safe;
+  for (auto at = valid.cbegin(); at != valid.cend();) {
+    const auto begin = at;
+    const std::uint32_t c = utf8::next(at, valid.cend());
+    const bool line_end = c == '\n' && line_ends == LineEnds::kept;
+    const bool control = (c < 0x20 && c != '\t' && !line_end) || (c >= 0x7f && c < 0xa0);
+    const bool turns_direction = c == 0x061c || (c >= 0x200e && c <= 0x200f) ||
+                                 (c >= 0x2028 && c <= 0x202e) || (c >= 0x2066 && c <= 0x2069);
+    if (control || turns_direction) {
+      fmt::format_to(std::back_inserter(safe), "\\u{:04x}", c);
+    } else {
+      safe.append(begin, at);
+    }
+  }
+  return safe;
+}
+
+}  // namespace tpm

@@ -1,0 +1,87 @@
+#pragma once
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "tpm/organ/balance/equilibrium.hpp"
+
+namespace tpm::organ {
+
+/// How a tissue answers small displacements of its contact sphere.
+struct ContactFields {
+  /// Of every sphere per displacement of the contact along x, y and z.
+  std::array<Eigen::Matrix3Xd, 3> displacement;
+  Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();  ///< at the contact, N/m
+};
+
+/// The spheres that a tool moves together, without turning: one, or a patch of a rigid face that is
+/// glued to them. The forces on them add up to that on the tool.
+class PushedSpheres {
+ public:
+  // NOLINTNEXTLINE(google-explicit-constructor): one is the usual case
+  PushedSpheres(std::size_t sphere) : all_{sphere} {}
+  /// @param all each once, at least one
+  explicit PushedSpheres(std::vector<std::size_t> all) : all_(std::move(all)) {}
+
+  [[nodiscard]] auto begin() const { return all_.begin(); }
+  [[nodiscard]] auto end() const { return all_.end(); }
+  [[nodiscard]] bool has(std::size_t sphere) const {
+    return std::find(all_.begin(), all_.end(), sphere) != all_.end();
+  }
+  /// The sum of their columns.
+  [[nodiscard]] Eigen::Vector3d sum(const Eigen::Matrix3Xd& force) const;
+
+ private:
+  std::vector<std::size_t> all_;
+};
+
+/// A tissue pushed at one of its spheres, or at several together, to given places: what reduced
+/// models are built from.
+class PushedContact {
+ public:
+  /// @param constraints of the tissue without the probe
+  /// @param contact spheres that are free
+  /// Throws Error(bad_input) for tools among the bonds, a contact that is not free, or bonds that
+  /// do not have their rest length.
+  PushedContact(const BondSystem& bonds, Positions rest, Constraints constraints,
+                PushedSpheres contact);
+  PushedContact(const PushedContact&) = delete;
+  PushedContact& operator=(const PushedContact&) = delete;
+
+  [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
+  [[nodiscard]] const Positions& rest() const { return rest_; }
+  /// With the contact fixed.
+  [[nodiscard]] const Constraints& constraints() const { return constraints_; }
+  [[nodiscard]] const PushedSpheres& contact() const { return contact_; }
+
+  /// The equilibrium with the contact displaced, found along a straight line from rest or from the
+  /// nearest of those found before with the same `relaxed`.
+  /// @param relaxed how far the viscous elongations have caught up: 0 instantaneous, 1 equilibrium
+  /// Throws Error(numerical) where the tissue buckles or none is found.
+  [[nodiscard]] Positions at(const Eigen::Vector3d& displacement_m, double relaxed);
+  /// The viscous elongations at such an equilibrium, told so that changes are felt with a given
+  /// stiffness: 0 the instantaneous one, 1 that of equilibrium.
+  [[nodiscard]] ViscousState viscous_state(const Positions& position, double relaxed,
+                                           double relaxation_factor) const;
+  /// About such an equilibrium. Throws Error(numerical) if the tissue is not stiff there.
+  [[nodiscard]] ContactFields fields(const Positions& position, const ViscousState& viscous_state);
+  /// Replaces forces by the displacements of what is free under them, with the stiffness of the
+  /// last fields().
+  void displace(Eigen::Matrix3Xd& forces) const { equilibrium_.displace(forces); }
+
+ private:
+  struct Found {
+    double relaxed;
+    Eigen::Vector3d displacement_m;
+    Positions position;
+  };
+  const BondSystem& bonds_;
+  Positions rest_;
+  Constraints constraints_;
+  PushedSpheres contact_;
+  Equilibrium equilibrium_;
+  std::vector<Found> found_;
+};
+
+}  // namespace tpm::organ

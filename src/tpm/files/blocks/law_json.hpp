@@ -1,0 +1,26 @@
+#pragma once
+#include <span>
+#include <string_view>
+
+#include "tpm/files/json.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/law_uncertainty.hpp"
+
+namespace tpm {
+
+/// Throws Error(bad_input) for anything that schemas/law.schema.json or the law does not allow: an
+/// unknown law or key, a missing parameter without a preset, a value out of range.
+[[nodiscard]] LawFile law_from_json(const Json& json, std::string_view where);
+/// An infinite spacing, which is its preset, is left out: JSON has no infinity.
+[[nodiscard]] Json to_json(const LawFile& law);
+
+/// The block "fit" of a law file. Keys of `parameters` and `covariance` are law_key() names.
+[[nodiscard]] Json to_json(const LawUncertainty& uncertainty, const LawSpec& spec);
+
+/// Throws Error(bad_input) for names that the law has not, a matrix of another size, one that is
+/// not symmetric or not positive semidefinite.
+[[nodiscard]] LawUncertainty uncertainty_from_json(const Json& block, const LawSpec& spec,
+                                                   std::span<const double> values,
+                                                   std::string_view where);
+
+}  // namespace tpm

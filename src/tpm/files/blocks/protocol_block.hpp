@@ -1,0 +1,84 @@
+#pragma once
+// Protocols in files: one table of kinds and keys, one parser, one place where they are made.
+#include <array>
+#include <initializer_list>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "tpm/base/enum_names.hpp"
+#include "tpm/files/document_place.hpp"
+#include "tpmkit/protocol.hpp"
+#include "tpmkit/units.hpp"
+
+namespace tpm {
+
+/// The protocols that files name.
+enum class ProtocolKind {
+  ramp_hold,  ///< from rest to `depth` at `rate`, then held for `hold`
+  step_hold,  ///< at once to `depth`, then held for `hold`
+  creep,      ///< `load` at once, kept for `duration`
+  knots,      ///< linear between corners
+};
+
+inline constexpr auto kProtocolKindWords =
+    std::to_array<Word<ProtocolKind>>({{ProtocolKind::ramp_hold, "ramp_hold"},
+                                       {ProtocolKind::step_hold, "step_hold"},
+                                       {ProtocolKind::creep, "creep"},
+                                       {ProtocolKind::knots, "knots"}});
+
+/// What a block says of a protocol. Numbers may be open as long as something else will set them: an
+/// axis of a sweep, the data of a fit.
+struct ProtocolBlock {
+  ProtocolKind kind = ProtocolKind::ramp_hold;
+  std::optional<double> depth_m, rate_m_per_s, hold_s, load_N, duration_s;
+  Drive drive = Drive::displacement;  ///< of knots
+  std::vector<Knot> knots;
+
+  /// The number under a key of the block's kind, such as "depth"; null for another key.
+  [[nodiscard]] std::optional<double>* find(std::string_view key);
+  /// The number under a key of the block's kind. Throws Error(bad_input) at the key if it is open
+  /// or out of range, std::logic_error for another key.
+  [[nodiscard]] double number(std::string_view key, const DocumentPlace& place) const;
+  /// Throws Error(bad_input) for a number that is open or out of range, at its key.
+  [[nodiscard]] Protocol protocol(const DocumentPlace& place) const;
+};
+
+/// A key of a block with what it means.
+struct ProtocolKey {
+  std::string_view text;
+  Dimension dimension;
+  std::optional<double> ProtocolBlock::*value;
+  bool may_be_zero;
+};
+/// The keys of a kind, in their order; none of `knots`.
+[[nodiscard]] std::vector<ProtocolKey> protocol_keys(ProtocolKind kind);
+
+enum class Openness {
+  complete,  ///< every key has to be there
+  open,      ///< what is missing stays open
+};
+
+/// A block with the key `kind`, or of a kind that its place in the file says.
+/// Throws Error(bad_input) for unknown kinds, keys of others, and what is not a number of its unit.
+[[nodiscard]] ProtocolBlock parse_protocol_block(const Json& block, const DocumentPlace& place,
+                                                 Openness openness,
+                                                 std::optional<ProtocolKind> kind = std::nullopt);
+
+/// The name that a file uses for a key, such as "rates" for a list of the key "rate".
+struct ProtocolKeyName {
+  std::string_view key, in_file;
+};
+
+/// All combinations of the numbers in a block that has a list of quantities, or one quantity, under
+/// each key: several indentations of a session, the candidates of a design. The first key of the
+/// kind varies most slowly; every number is in range.
+/// @param renamed the keys that have another name in this block
+/// @param others keys of the block that say nothing of the protocol
+/// Throws Error(bad_input) as parse_protocol_block() does, for numbers out of range, and for more
+/// than 100,000 combinations.
+[[nodiscard]] std::vector<ProtocolBlock> parse_protocol_lists(
+    const Json& block, const DocumentPlace& place, ProtocolKind kind, Openness openness,
+    std::initializer_list<ProtocolKeyName> renamed, const std::vector<std::string_view>& others);
+
+}  // namespace tpm

@@ -1,0 +1,93 @@
+#include "tpm/files/checksum.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "tpm/files/check_sum.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/work/parallel.hpp"
+
+namespace tpm {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "check sums hold little-endian numbers");
+
+constexpr std::string_view kChecksumMagic = "TPMSEAL1";
+
+struct CheckSum {
+  char magic[8];
+  std::uint64_t size;  ///< of what the check sum covers
+  std::uint32_t crc;
+  std::uint32_t nothing;
+};
+
+constexpr std::uint64_t kStretch = std::uint64_t{1} << 22U;
+
+/// Of a stretch of a file.
+std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::uint64_t to) {
+  constexpr std::uint64_t kPiece = std::uint64_t{1} << 17U;
+  std::vector<char> bytes(static_cast<std::size_t>(std::min(to - from, kPiece)));
+  std::uint32_t crc = 0;
+  while (from < to) {
+    const std::uint64_t part = std::min(to - from, kPiece);
+    if (pread_all(file, bytes.data(), part, from) != part) return std::nullopt;
+    crc = check_sum(bytes.data(), static_cast<std::size_t>(part), crc);
+    from += part;
+  }
+  return crc;
+}
+
+/// Of the first bytes of a file, by all threads; nothing if they cannot be read.
+std::optional<std::uint32_t> crc_of(int file, std::uint64_t size) {
+  std::vector<std::optional<std::uint32_t>> parts((size + kStretch - 1) / kStretch);
+  const auto end_of = [&](std::size_t i) { return std::min(size, (i + 1) * kStretch); };
+  for_each_in_parallel(parts.size(), [&](std::size_t i) {
+    parts[i] = crc_of_stretch(file, i * kStretch, end_of(i));
+  });
+  std::uint32_t whole = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (!parts[i]) return std::nullopt;
+    whole = joined_check_sum(whole, *parts[i], end_of(i) - i * kStretch);
+  }
+  return whole;
+}
+
+}  // namespace
+
+bool write_checksum(int descriptor, std::uint64_t size) {
+  CheckSum sum{{}, size, 0, 0};
+  std::copy(kChecksumMagic.begin(), kChecksumMagic.end(), sum.magic);
+  const auto crc = crc_of(descriptor, size);
+  if (!crc) {
+    if (errno == 0) errno = EIO;
+    return false;
+  }
+  sum.crc = *crc;
+  return pwrite_all(descriptor, &sum, sizeof sum, size) == sizeof sum && ::fsync(descriptor) == 0;
+}
+
+ChecksumState checksum_of(int descriptor) {
+  struct stat found {};
+  if (::fstat(descriptor, &found) != 0) return ChecksumState::none;
+  const auto size = static_cast<std::uint64_t>(found.st_size);
+  CheckSum sum{};
+  if (size < sizeof sum ||
+      pread_all(descriptor, &sum, sizeof sum, size - sizeof sum) != sizeof sum ||
+      !std::equal(kChecksumMagic.begin(), kChecksumMagic.end(), sum.magic)) {
+    return ChecksumState::none;
+  }
+  const bool whole =
+      sum.size + sizeof sum == size && sum.nothing == 0 && crc_of(descriptor, sum.size) == sum.crc;
+  return whole ? ChecksumState::whole : ChecksumState::broken;
+}
+
+}  // namespace tpm

@@ -1,0 +1,34 @@
+#pragma once
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/files/json.hpp"
+#include "tpmkit/units.hpp"
+
+namespace tpm {
+
+/// A place in a document, for messages: "FILE: key /a/b".
+struct DocumentPlace {
+  std::string where;
+  [[nodiscard]] DocumentPlace key(std::string_view name) const;
+};
+
+/// A text of a number and a unit, SI; or a number, which is SI already: schemas let files say texts
+/// alone, programs put numbers there. Throws Error(bad_input).
+[[nodiscard]] double quantity_of(const Json& value, Dimension dimension, std::string_view where);
+
+/// The same of what stands under a key. Throws Error(bad_input) with the key.
+[[nodiscard]] double quantity_at(const Json& object, std::string_view key, Dimension dimension,
+                                 const DocumentPlace& place);
+/// The same; throws too unless it is above 0.
+[[nodiscard]] double positive_at(const Json& object, std::string_view key, Dimension dimension,
+                                 const DocumentPlace& place);
+
+/// Throws unless a block has the keys that its kind needs, and no others but `kind` and those
+/// allowed.
+void require_keys_of(const Json& block, std::string_view kind,
+                     const std::vector<std::string_view>& needed,
+                     const std::vector<std::string_view>& allowed, const DocumentPlace& place);
+
+}  // namespace tpm

@@ -1,0 +1,301 @@
+#include "tpm/files/import/assemble.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/base/text.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm {
+namespace {
+
+std::string header_of(const ImportedColumn& column) {
+  std::string header(quantity_short_name(column.quantity));
+  if (column.bound != Bound::value) header.append("_").append(bound_name(column.bound));
+  if (!column.unit.symbol.empty()) header.append("_").append(column.unit.symbol);
+  return header;
+}
+
+/// Numbers stay as they were read; where zero was moved, the noise of the subtraction is cut off.
+std::string number_text(const ImportedColumn& column, std::size_t row) {
+  return column.shifted ? significant(column.values[row], 12) : shortest(column.values[row]);
+}
+
+std::string with_unit(double value, const Unit& unit) {
+  return fmt::format("{}{}{}", significant(value, 6), unit.symbol.empty() ? "" : " ", unit.symbol);
+}
+
+const ImportedColumn* find(const ImportedSeries& series, Quantity quantity,
+                           Bound bound = Bound::value) {
+  const auto found = std::find_if(series.columns.begin(), series.columns.end(),
+                                  [quantity, bound](const auto& column) {
+                                    return column.quantity == quantity && column.bound == bound;
+                                  });
+  return found == series.columns.end() ? nullptr : &*found;
+}
+
+/// The last column with values: the importers put what was observed after what was imposed.
+const ImportedColumn& observed(const ImportedSeries& series) {
+  return *std::find_if(series.columns.rbegin(), series.columns.rend(),
+                       [](const auto& column) { return column.bound == Bound::value; });
+}
+
+std::string place(const ImportedSeries& series, const std::string& file, std::size_t row) {
+  if (row < series.lines.size()) return fmt::format("{}:{}", file, series.lines[row]);
+  return series.name.empty() ? file : fmt::format("{}: dataset '{}'", file, printable(series.name));
+}
+
+void require_increasing(const ImportedSeries& series, const std::string& file) {
+  const ImportedColumn* time = find(series, Quantity::time);
+  if (time == nullptr) return;
+  for (std::size_t i = 1; i < time->values.size(); ++i) {
+    if (time->values[i] > time->values[i - 1]) continue;
+    throw bad_input(
+        place(series, file, i),
+        fmt::format("time {} {} does not follow {} {}", shortest(time->values[i]),
+                    time->unit.symbol, shortest(time->values[i - 1]), time->unit.symbol),
+        "strictly increasing times");
+  }
+}
+
+void require_not_negative(const ImportedSeries& series, const std::string& file, Quantity quantity,
+                          Bound bound) {
+  const ImportedColumn* column = find(series, quantity, bound);
+  if (column == nullptr) return;
+  const auto found = std::find_if(column->values.begin(), column->values.end(),
+                                  [](double value) { return value < 0.0; });
+  if (found == column->values.end()) return;
+  throw bad_input(place(series, file, static_cast<std::size_t>(found - column->values.begin())),
+                  fmt::format("{}{} {} is negative", quantity_name(quantity),
+                              bound == Bound::sd ? " standard deviation" : "", shortest(*found)),
+                  "at least 0");
+}
+
+void add_time_findings(const ImportedColumn& time, std::vector<ImportFinding>& findings) {
+  findings.push_back(
+      {"time range", fmt::format("{} to {}", with_unit(time.values.front(), time.unit),
+                                 with_unit(time.values.back(), time.unit))});
+  if (time.values.size() < 2) return;
+  double shortest_step = time.values[1] - time.values[0];
+  double longest_step = shortest_step;
+  for (std::size_t i = 2; i < time.values.size(); ++i) {
+    const double step = time.values[i] - time.values[i - 1];
+    shortest_step = std::min(shortest_step, step);
+    longest_step = std::max(longest_step, step);
+  }
+  constexpr double kEven = 1e-6;  // exports repeat rounding noise of this relative size
+  const bool even = longest_step - shortest_step <= kEven * longest_step;
+  findings.push_back(
+      {"sampling", even ? fmt::format("every {}", with_unit(shortest_step, time.unit))
+                        : fmt::format("every {} to {}", with_unit(shortest_step, time.unit),
+                                      with_unit(longest_step, time.unit))});
+}
+
+/// Storage or loss, whatever their dimension.
+const ImportedColumn* find_part(const ImportedSeries& series, Quantity SpectrumQuantities::*part) {
+  for (const Dimension dimension : {Dimension::stress, Dimension::stiffness}) {
+    const auto* column = find(series, spectrum_quantities(dimension).*part);
+    if (column != nullptr) return column;
+  }
+  return nullptr;
+}
+
+void require_spectrum(const ImportedSeries& series, const std::string& file) {
+  const ImportedColumn& frequency = *find(series, Quantity::frequency);
+  const ImportedColumn* storage = find_part(series, &SpectrumQuantities::storage);
+  const ImportedColumn* loss = find_part(series, &SpectrumQuantities::loss);
+  if (storage == nullptr || loss == nullptr) {
+    throw bad_input(file, "a frequency without both storage and loss",
+                    "one table with the columns of all three");
+  }
+  if (storage->unit.dimension != loss->unit.dimension) {
+    throw bad_input(file, "a modulus beside a stiffness", "storage and loss of one kind");
+  }
+  if (const auto fault = find_spectrum_fault(frequency.values, storage->values, loss->values)) {
+    throw bad_input(place(series, file, fault->row), fault->what, fault->expected);
+  }
+}
+
+void add_spectrum_measures(ImportedSeries& series) {
+  const ImportedColumn& frequency = *find(series, Quantity::frequency);
+  const auto [low, high] = std::minmax_element(frequency.values.begin(), frequency.values.end());
+  series.findings.push_back({"rows", std::to_string(frequency.values.size())});
+  series.findings.push_back(
+      {"frequency range",
+       fmt::format("{} to {}", with_unit(*low, frequency.unit), with_unit(*high, frequency.unit))});
+}
+
+void add_measures(ImportedSeries& series) {
+  const ImportedColumn& response = observed(series);
+  const ImportedColumn* time = find(series, Quantity::time);
+  series.findings.push_back({"rows", std::to_string(response.values.size())});
+  if (time != nullptr) add_time_findings(*time, series.findings);
+  const auto peak = std::max_element(response.values.begin(), response.values.end());
+  const auto row = static_cast<std::size_t>(peak - response.values.begin());
+  std::string found = with_unit(*peak, response.unit);
+  if (time != nullptr) found += " at " + with_unit(time->values[row], time->unit);
+  series.findings.push_back({"peak", found});
+}
+
+/// A digitised curve with a known imposed quantity is a set of points that a model can answer.
+bool becomes_points(const ImportedSeries& series, const ImportOptions& options) {
+  if (options.format == "machine" || !series.lines.empty()) return false;
+  const Quantity response = observed(series).quantity;
+  const bool force = response == Quantity::contact_force;
+  const bool depth = response == Quantity::indentation_depth;
+  if (find(series, Quantity::time) == nullptr) {
+    return (force && find(series, Quantity::indentation_depth) != nullptr) ||
+           (depth && find(series, Quantity::load) != nullptr);
+  }
+  return (force && options.depth_m) || (depth && options.load_N);
+}
+
+void add_imposed(ImportedSeries& series, const std::string& file, const ImportOptions& options) {
+  const bool timed = find(series, Quantity::time) != nullptr;
+  if (timed && options.time_origin == TimeOrigin::none) {
+    throw bad_input(file, "what the times count from is not known",
+                    "--time-origin end_of_ramp or load_applied");
+  }
+  if (!timed) return;
+  const std::size_t rows = observed(series).values.size();
+  const bool force = observed(series).quantity == Quantity::contact_force;
+  ImportedColumn imposed;
+  imposed.quantity = force ? Quantity::indentation_depth : Quantity::load;
+  imposed.unit = force ? parse_unit("mm", file) : parse_unit("N", file);
+  const double si = force ? *options.depth_m : *options.load_N;
+  imposed.values.assign(rows, si / imposed.unit.to_si);
+  imposed.shifted = true;  // converted: not the digits of the file
+  series.findings.push_back({"imposed", fmt::format("{} {}", quantity_name(imposed.quantity),
+                                                    with_unit(imposed.values[0], imposed.unit))});
+  series.columns.insert(series.columns.begin(), std::move(imposed));
+}
+
+std::string csv_text(const ImportedSeries& series, std::string_view provenance) {
+  std::string csv;
+  for (const ImportedColumn& column : series.columns) {
+    if (!csv.empty()) csv += ',';
+    csv += header_of(column);
+  }
+  csv += provenance.empty() ? "\n" : ",provenance\n";
+  for (std::size_t row = 0; row < series.columns.front().values.size(); ++row) {
+    for (std::size_t c = 0; c < series.columns.size(); ++c) {
+      if (c > 0) csv += ',';
+      csv += number_text(series.columns[c], row);
+    }
+    csv += provenance.empty() ? "\n" : fmt::format(",{}\n", provenance);
+  }
+  return csv;
+}
+
+/// What every kind of curve has to fulfil, and what it measures.
+void check_and_measure(ImportedSeries& series, const std::string& file) {
+  if (holds_spectrum(series)) {
+    require_spectrum(series, file);
+    add_spectrum_measures(series);
+    return;
+  }
+  require_increasing(series, file);
+  require_not_negative(series, file, observed(series).quantity, Bound::sd);
+  add_measures(series);
+}
+
+std::vector<double> in_si(ImportedColumn& column) {
+  for (double& value : column.values) value *= column.unit.to_si;
+  return std::move(column.values);
+}
+
+}  // namespace
+
+bool holds_spectrum(const ImportedSeries& series) {
+  return find(series, Quantity::frequency) != nullptr;
+}
+
+Spectrum assemble_spectrum(ImportedSeries series, const std::string& file,
+                           const ImportOptions& options, Provenance usual) {
+  check_and_measure(series, file);
+  if (!holds_spectrum(series))
+    throw bad_input(file, "holds no spectrum", "frequency, storage and loss");
+  Spectrum spectrum;
+  spectrum.header = options.header;
+  spectrum.provenance = options.provenance.value_or(usual);
+  for (ImportedColumn& column : series.columns) {
+    const Dimension dimension = column.unit.dimension;
+    if (column.quantity == Quantity::frequency) {
+      spectrum.frequency_Hz = in_si(column);
+    } else if (column.quantity == spectrum_quantities(dimension).storage) {
+      spectrum.dimension = dimension;
+      spectrum.storage = in_si(column);
+    } else if (column.quantity == spectrum_quantities(dimension).loss) {
+      spectrum.loss = in_si(column);
+    }
+  }
+  return spectrum;
+}
+
+RecordingFile assemble_recording(ImportedSeries series, const std::string& file,
+                                 const ImportOptions& options, Provenance usual) {
+  check_and_measure(series, file);
+  if (holds_spectrum(series)) {
+    throw bad_input(file, "holds a spectrum (storage and loss over frequency)", "a recording");
+  }
+  RecordingFile result;
+  Recording& recording = result.recording;
+  recording.header = options.header;
+  recording.provenance = options.provenance.value_or(usual);
+  recording.response_quantity = observed(series).quantity;
+  for (ImportedColumn& column : series.columns) {
+    if (column.bound == Bound::sd) {
+      recording.response_sd = in_si(column);
+    } else if (column.quantity == Quantity::time) {
+      recording.time_s = in_si(column);
+    } else if (column.quantity == recording.response_quantity) {
+      recording.response = in_si(column);
+    } else {
+      recording.drive_quantity = column.quantity;
+      recording.drive = in_si(column);
+    }
+  }
+  series.findings.push_back({"provenance", std::string(provenance_name(recording.provenance))});
+  result.findings = std::move(series.findings);
+  return result;
+}
+
+ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
+                             const ImportOptions& options, Provenance usual) {
+  check_and_measure(series, file);
+  const Provenance provenance = options.provenance.value_or(usual);
+
+  ImportedCurve curve;
+  curve.name = series.name;
+  curve.description.header = options.header;
+  std::string& note = curve.description.header.note;
+  if (!series.note.empty()) note += (note.empty() ? "" : "; ") + series.note;
+  if (!holds_spectrum(series)) curve.description.observable = observed(series).quantity;
+  if (becomes_points(series, options)) {
+    curve.description.kind = "points";
+    const bool timed = find(series, Quantity::time) != nullptr;
+    curve.description.time_origin = timed ? options.time_origin : TimeOrigin::none;
+    for (const Quantity imposed : {Quantity::time, Quantity::indentation_depth, Quantity::load}) {
+      require_not_negative(series, file, imposed, Bound::value);
+    }
+    add_imposed(series, file, options);
+    curve.csv = csv_text(series, provenance_name(provenance));
+  } else {
+    curve.description.kind = holds_spectrum(series) ? "spectrum" : "recording";
+    curve.description.provenance = provenance;
+    curve.description.segments = std::move(series.segments);
+    curve.csv = csv_text(series, {});
+  }
+  for (const ImportedColumn& column : series.columns) {
+    curve.description.columns.emplace(
+        header_of(column),
+        ColumnDescription{column.quantity, column.unit, column.bound, std::nullopt, {}});
+  }
+  series.findings.push_back({"kind", curve.description.kind});
+  series.findings.push_back({"provenance", std::string(provenance_name(provenance))});
+  curve.findings = std::move(series.findings);
+  return curve;
+}
+
+}  // namespace tpm

@@ -1,0 +1,183 @@
+#include "tpm/files/import/recording_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "tpm/files/delimited.hpp"
+#include "tpm/files/import/assemble.hpp"
+#include "tpm/files/json.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm {
+namespace fs = std::filesystem;
+namespace {
+
+fs::path with_ending(fs::path path, const char* ending) {
+  return path.replace_extension(ending);
+}
+
+/// A description and its rows stand side by side; an id has neither ending nor file.
+bool is_described(const fs::path& path) {
+  if (path.extension() == ".csv") return fs::exists(with_ending(path, ".json"));
+  if (path.extension() == ".json") return fs::exists(with_ending(path, ".csv"));
+  return !fs::exists(path) && !path.has_extension();
+}
+
+bool says_something_about_columns(const ImportOptions& options) {
+  return options.format != "auto" || options.header_rows || !options.time_column.empty() ||
+         !options.drive_column.empty() || !options.response_column.empty() ||
+         !options.sd_column.empty() || !options.frequency_column.empty() ||
+         !options.storage_column.empty() || !options.loss_column.empty() ||
+         options.drive_quantity || options.response_quantity || !options.units.empty() ||
+         options.negate_drive || options.negate_response || options.contact_force_N ||
+         options.spring_constant_N_per_m || !options.segments.empty() || options.rest_length_m ||
+         options.area_m2 || options.x || options.y || !options.dataset.empty() || options.depth_m ||
+         options.load_N;
+}
+
+/// The kind that a description names; an id is one of the shipped curves.
+std::string curve_kind_of(const fs::path& path) {
+  if (!path.has_extension()) return std::string(curve_kind(load_curve(path.string())));
+  return read_json(with_ending(path, ".json")).value("kind", "");
+}
+
+RecordingFile read_described(const fs::path& path, const ImportOptions& options) {
+  if (says_something_about_columns(options)) {
+    throw bad_input(path.string(), "has a description beside it, which says what its columns are",
+                    "no import options, or a file without a description");
+  }
+  RecordingFile result{load_recording(path.string()), {}};
+  const Recording& recording = result.recording;
+  const auto found = [&result](const char* what, std::string value) {
+    result.findings.push_back({what, std::move(value)});
+  };
+  found("format", "described");
+  if (!recording.drive.empty())
+    found("drive", std::string(quantity_name(recording.drive_quantity)));
+  found("response", std::string(quantity_name(recording.response_quantity)));
+  found("rows", std::to_string(recording.response.size()));
+  found("provenance", std::string(provenance_name(recording.provenance)));
+  return result;
+}
+
+/// Which of several datasets is meant has to be said.
+void require_one(const ImportedFile& imported, const std::string& file) {
+  if (imported.series.size() == 1) return;
+  std::string names;
+  for (const ImportedSeries& series : imported.series) {
+    names += fmt::format("{}'{}'", names.empty() ? "" : ", ", printable(series.name));
+  }
+  throw bad_input(file, fmt::format("holds {} curves", imported.series.size()),
+                  fmt::format("--dataset with one of {}", printable(names, 200)));
+}
+
+/// The importer would make readings of separate experiments out of such a curve.
+void require_no_imposed_value(const ImportOptions& options, const std::string& file) {
+  if (!options.depth_m && !options.load_N) return;
+  throw bad_input(file, "with an imposed depth or load its rows are readings, not a recording",
+                  "tpm data import, which writes points, or no --depth and --load");
+}
+
+}  // namespace
+
+namespace {
+
+std::string described_label(const fs::path& path, std::string_view key) {
+  const fs::path description = with_ending(path, ".json");
+  const Json json = read_json(description);
+  const auto value = json.find(std::string(key));
+  if (value != json.end() && value->is_string()) return value->get<std::string>();
+  if (value != json.end() && value->is_number()) return value->dump();
+  throw bad_input(description.string(), fmt::format("no text or number '{}'", printable(key)),
+                  "a key that every description has");
+}
+
+}  // namespace
+
+std::string columns_words(const std::vector<ImportFinding>& findings) {
+  std::string words;
+  for (const ImportFinding& finding : findings) {
+    const bool column =
+        finding.value.starts_with("column ") || finding.value.starts_with("channel ");
+    if (!column && finding.what != "converted") continue;
+    words +=
+        fmt::format("{}{}: {}", words.empty() ? "read as " : "; ", finding.what, finding.value);
+  }
+  return words;
+}
+
+std::string recording_label(const fs::path& path, std::string_view key,
+                            const ImportOptions& options) {
+  if (is_described(path)) return described_label(path, key);
+  const DelimitedTable table = read_delimited(path, options.text);
+  std::optional<std::size_t> column;
+  std::string label;
+  for (const DelimitedRow& row : table.rows) {
+    if (!column) {
+      const auto title = std::find(row.fields.begin(), row.fields.end(), key);
+      if (title != row.fields.end()) column = static_cast<std::size_t>(title - row.fields.begin());
+      continue;
+    }
+    // Units may stand between the titles and the samples.
+    const auto numbers = std::count_if(row.fields.begin(), row.fields.end(), [&](auto field) {
+      return is_number(field, table.decimal_comma);
+    });
+    if (numbers < 2 || *column >= row.fields.size()) continue;
+    const std::string_view field = row.fields[*column];
+    if (label.empty()) label = std::string(field);
+    if (field == label && !field.empty()) continue;
+    throw bad_input(fmt::format("{}, line {}", path.string(), row.line),
+                    fmt::format("'{}' in the column '{}' that began with '{}'", printable(field),
+                                printable(key), printable(label)),
+                    "one value in all samples");
+  }
+  if (!label.empty()) return label;
+  throw bad_input(path.string(), fmt::format("no column is called '{}'", printable(key)),
+                  "a column that every recording has, or a name pattern with one group, ()");
+}
+
+MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& options) {
+  const std::string file = path.string();
+  if (is_described(path)) {
+    if (curve_kind_of(path) == "spectrum") return SpectrumFile{load_spectrum(file), {}};
+    return read_described(path, options);
+  }
+  require_no_imposed_value(options, file);
+  ImportedFile imported = import_series(path, options);
+  require_one(imported, file);
+  ImportedSeries& series = imported.series.front();
+  const std::string name = printable(series.name, 200);
+  const auto name_it = [&](CurveHeader& header) {
+    header.id = path.stem().string();
+    if (header.title.empty()) header.title = name.empty() ? header.id : name;
+    header.sha256 = imported.sha256;
+  };
+  if (holds_spectrum(series)) {
+    std::vector<ImportFinding> findings = series.findings;
+    Spectrum spectrum = assemble_spectrum(std::move(series), file, options, imported.usual);
+    name_it(spectrum.header);
+    return SpectrumFile{std::move(spectrum), std::move(findings)};
+  }
+  RecordingFile result = assemble_recording(std::move(series), file, options, imported.usual);
+  name_it(result.recording.header);
+  return result;
+}
+
+RecordingFile read_recording_file(const fs::path& path, const ImportOptions& options) {
+  MeasuredFile measured = read_measured_file(path, options);
+  if (auto* file = std::get_if<RecordingFile>(&measured)) return std::move(*file);
+  throw bad_input(path.string(), "holds a spectrum (storage and loss over frequency)",
+                  "a recording");
+}
+
+Spectrum read_spectrum_file(const fs::path& path, const ImportOptions& options) {
+  MeasuredFile measured = read_measured_file(path, options);
+  if (auto* file = std::get_if<SpectrumFile>(&measured)) return std::move(file->spectrum);
+  throw bad_input(path.string(), "holds a recording", "a spectrum: frequency, storage and loss");
+}
+
+}  // namespace tpm

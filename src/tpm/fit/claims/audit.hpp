@@ -1,0 +1,116 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/base/enum_names.hpp"
+#include "tpm/fit/claims/claims.hpp"
+
+namespace tpm::study {
+
+/// Whether what the paper prints stands up to recomputing it.
+enum class AuditVerdict {
+  holds,
+  holds_by_truncation,  ///< digits cut off instead of rounded
+  last_digit_off,       ///< a neighbour of the printed last digit
+  differs,              ///< another number; Finding::difference_percent says by how much
+  contradicted,         ///< a statement that the paper's own equations or numbers refute
+  cannot_be_told,       ///< the paper gives no number to hold it to
+};
+
+inline constexpr auto kAuditVerdicts = std::to_array<Word<AuditVerdict>>({
+    {AuditVerdict::holds, "holds"},
+    {AuditVerdict::holds_by_truncation, "holds by truncation"},
+    {AuditVerdict::last_digit_off, "last digit off"},
+    {AuditVerdict::differs, "differs"},
+    {AuditVerdict::contradicted, "contradicted"},
+    {AuditVerdict::cannot_be_told, "cannot be told"},
+});
+[[nodiscard]] std::string_view verdict_name(AuditVerdict verdict) noexcept;
+
+/// A number in the unit in which people read it.
+struct AuditQuantity {
+  double value = 0.0;
+  Unit unit;
+};
+
+/// An input of a recomputation.
+struct AuditInput {
+  std::string name;
+  std::string printed;  ///< as printed, with unit; empty if computed or bound by the claim
+  AuditQuantity value;
+  std::string where;
+  std::string provenance;  ///< one of the words of Provenance; empty if the file says none
+};
+
+/// A changed input that would give the printed number.
+struct AuditCause {
+  std::string text;           ///< in words: "load = 0.2 N instead of 0.196 N"
+  double recomputed = 0.0;    ///< what it gives, in the printed unit
+  bool only_printed = false;  ///< uses nothing but other printed values of the symbol
+  int digits = 0;             ///< significant digits of the changed value
+  double relative_change = 0.0;
+};
+
+/// One of several numbers inside a finding: a table cell, a datum, a sample point.
+struct AuditDetail {
+  std::string what;
+  std::string printed;
+  AuditQuantity recomputed;
+  std::string verdict;
+  std::optional<double> difference_percent;
+};
+
+/// How many cells of printed tables follow (kind "table").
+struct AuditCells {
+  int cells = 0;
+  int by_rounding = 0;
+  int by_truncation = 0;
+};
+
+/// What came out of one claim.
+struct Finding {
+  std::string id;
+  std::string topic;
+  std::string kind;
+  std::string where;
+  std::string claim;                        ///< the paper's words, quoted or paraphrased
+  std::string printed;                      ///< what is printed, with unit
+  std::optional<AuditQuantity> recomputed;  ///< in the printed unit
+  std::optional<AuditQuantity> bound;       ///< right-hand side of an inequality
+  std::string expression;                   ///< what was evaluated
+  std::vector<AuditInput> inputs;
+  AuditVerdict verdict = AuditVerdict::cannot_be_told;
+  std::optional<double> difference_percent;
+  std::vector<AuditCause> causes;  ///< most plausible first: printed values, then few digits
+  std::vector<AuditDetail> details;
+  std::optional<AuditCells> cells;
+  std::string consequence;
+
+  /// The verdict in words: "differs by 2.3 %".
+  [[nodiscard]] std::string verdict_words() const;
+  /// The recomputed number, range or count of cells with its unit, four digits.
+  [[nodiscard]] std::string recomputed_words() const;
+  /// True for holds and holds_by_truncation.
+  [[nodiscard]] bool stands() const noexcept;
+};
+
+struct AuditReport {
+  std::string title;
+  std::string file;
+  std::vector<Finding> findings;
+
+  [[nodiscard]] int count(AuditVerdict verdict) const noexcept;
+};
+
+/// Recomputes every claim of a claims file (docs/json_tables_audit.md describes the kinds). Every
+/// verdict follows from a printed string and a recomputed number.
+/// @param claims the document; checked against schemas/claims.schema.json
+/// @param file its name, for messages
+/// Throws Error(bad_input) naming file and claim, Error(numerical) if a formula gives no number.
+[[nodiscard]] AuditReport run_audit(const Json& claims, std::string_view file);
+
+/// docs/json_tables_audit.md lists the keys.
+[[nodiscard]] Json to_json(const AuditReport& report);
+
+}  // namespace tpm::study

@@ -1,0 +1,83 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/files/json.hpp"
+#include "tpm/fit/claims/expression.hpp"
+#include "tpmkit/units.hpp"
+
+namespace tpm::study {
+
+/// A value that the paper prints for a symbol in another place.
+struct PrintedAlternative {
+  std::string value;  ///< as printed
+  double si = 0.0;
+  std::string where;
+};
+
+/// A named number of the paper.
+struct PrintedSymbol {
+  std::string name;
+  std::string value;  ///< as printed, e.g. "12" or "pi/6"
+  Unit unit;
+  double si = 0.0;
+  std::string where;
+  std::string provenance;                ///< empty if not said
+  std::vector<PrintedAlternative> also;  ///< printed elsewhere for the same thing
+};
+
+/// A column of a printed table; its name is bound to the row's value while a row is evaluated.
+struct PrintedColumn {
+  std::string name;
+  Unit unit;
+};
+
+/// A table with its numbers as printed, row by row.
+struct PrintedTable {
+  std::string id;
+  std::string where;
+  std::string kind;  ///< "relaxation", "static_band" (which `tpm tables` knows) or "other"
+  std::vector<std::pair<std::string, std::string>> constants;  ///< names bound for every row
+  std::vector<PrintedColumn> columns;
+  std::vector<std::vector<std::string>> rows;
+
+  /// Index of a column; throws Error(bad_input) starting with `at` if there is none.
+  [[nodiscard]] std::size_t column(std::string_view name, std::string_view at) const;
+  [[nodiscard]] bool has_column(std::string_view name) const noexcept;
+  /// The SI value of a cell.
+  [[nodiscard]] double si(std::size_t row, std::size_t column, std::string_view at) const;
+};
+
+/// A claims file, read: what a paper prints, in which units, and the formulas that connect it.
+struct ClaimSet {
+  std::string file;  ///< for messages
+  std::string title;
+  Evaluator evaluator;
+  std::vector<PrintedSymbol> symbols;
+  std::vector<PrintedTable> tables;
+  Json claims;  ///< array; each has a unique id and a kind
+
+  [[nodiscard]] const PrintedSymbol* symbol(std::string_view name) const noexcept;
+  /// Throws Error(bad_input) starting with `at` if there is no such table.
+  [[nodiscard]] const PrintedTable& table(std::string_view id, std::string_view at) const;
+};
+
+/// The paper's own claims: data/paper_claims.json of share_dir().
+[[nodiscard]] std::filesystem::path paper_claims_path();
+
+/// Only the tables of a claims file, which is all that `tpm tables` needs.
+/// @param document already checked against schemas/claims.schema.json
+[[nodiscard]] std::vector<PrintedTable> read_printed_tables(const Json& document,
+                                                            std::string_view file);
+
+/// Checks the document against the schema and reads it. Throws Error(bad_input) naming the file
+/// and the symbol, table or claim.
+[[nodiscard]] ClaimSet read_claims(const Json& document, std::string_view file);
+
+/// A quantity ("0.196 N") as its SI value; nothing if the text is not a number followed by a unit,
+/// and so is a formula.
+[[nodiscard]] std::optional<double> quantity_si(std::string_view text);
+
+}  // namespace tpm::study

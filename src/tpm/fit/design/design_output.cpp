@@ -1,0 +1,180 @@
+// Declared in tpm/fit/design/design.hpp.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/text.hpp"
+#include "tpm/fit/design/design.hpp"
+#include "tpm/fit/design/design_words.hpp"
+#include "tpm/fit/fit.hpp"
+
+namespace tpm::study {
+namespace {
+
+constexpr int kDesignDigits = 6;
+
+/// null for what is not finite: an unknown parameter has an infinite error.
+Json finite_json(double value) {
+  return std::isfinite(value) ? Json(rounded(value, kDesignDigits)) : Json(nullptr);
+}
+
+Json finite_json(const std::optional<double>& value) {
+  return value ? finite_json(*value) : Json(nullptr);
+}
+
+Json to_json(const PlannedExperiment& e) {
+  Json j;
+  if (e.kind == PlannedExperiment::Kind::creep) {
+    j = {{"kind", "creep"}, {"load_N", finite_json(e.load_N)}};
+  } else {
+    j = {{"kind", "ramp_hold"},
+         {"depth_m", finite_json(e.depth_m)},
+         {"rate_m_per_s", finite_json(e.rate_m_per_s)}};
+  }
+  j["hold_s"] = finite_json(e.hold_s);
+  j["interval_s"] = finite_json(e.interval_s);
+  j["repeats"] = e.repeats;
+  j["total_time_s"] = finite_json(e.total_s());
+  return j;
+}
+
+Json to_json(const Expectation& expected, const DesignProblem& problem) {
+  Json list = Json::array();
+  for (std::size_t i = 0; i < expected.parameters.size(); ++i) {
+    const ExpectedParameter& p = expected.parameters[i];
+    list.push_back({{"name", p.name},
+                    {"unit", si_symbol(problem.parameter(i).unit.dimension)},
+                    {"value", finite_json(p.value)},
+                    {"relative_standard_error", finite_json(p.relative_error)},
+                    {"lower", finite_json(p.lower)},
+                    {"upper", finite_json(p.upper)},
+                    {"identified", p.identified},
+                    {"rival", p.rival},
+                    {"rival_correlation", finite_json(p.rival_correlation)}});
+  }
+  return {{"score", finite_json(expected.score)},
+          {"effective_samples", finite_json(expected.effective_samples)},
+          {"parameters", std::move(list)}};
+}
+
+Json to_json(const DesignCheck& check) {
+  Json list = array_json(check.parameters, [](const CheckedParameter& p) {
+    return Json{{"name", p.name},
+                {"predicted_theta_sd", finite_json(p.predicted)},
+                {"observed_theta_sd", finite_json(p.observed)},
+                {"ratio", finite_json(p.ratio)},
+                {"ratio_error", finite_json(p.ratio_error)},
+                {"bias_in_predicted_sd", finite_json(p.bias)},
+                {"bias_error", finite_json(p.bias_error)},
+                {"covered", p.covered},
+                {"agrees", p.agrees}};
+  });
+  return {
+      {"seed", check.seed},         {"data_sets", check.sets},       {"failed", check.failed},
+      {"at_bound", check.at_bound}, {"parameters", std::move(list)}, {"warnings", check.warnings}};
+}
+
+std::string percent(double relative) {
+  if (!std::isfinite(relative)) return "unknown";
+  return fmt::format("{} %", significant(100.0 * relative, 3));
+}
+
+std::string candidate_rows(const DesignResult& result, std::size_t top) {
+  std::string text = fmt::format("{:>4}  {:<56}{:>10}", "", "candidate", "score");
+  for (const ExpectedParameter& p : result.ranked.front().expected.parameters) {
+    text += fmt::format("{:>12}", p.name);
+  }
+  text += "\n";
+  for (std::size_t i = 0; i < std::min(top, result.ranked.size()); ++i) {
+    const DesignCandidate& c = result.ranked[i];
+    text += fmt::format("{:>3}.  {:<56}{:>10}", i + 1, experiment_words(c.experiment),
+                        percent(c.expected.score));
+    for (const ExpectedParameter& p : c.expected.parameters) {
+      text += fmt::format("{:>12}", percent(p.relative_error) + (p.identified ? " " : "?"));
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string pair_words(const DesignResult& result) {
+  const bool same = result.pair.first == result.pair.second;
+  std::string text = fmt::format("best pair: {}; then {}\n", experiment_words(result.pair.first),
+                                 same ? "the same again" : experiment_words(result.pair.second));
+  for (std::size_t i = 0; i < result.pair.expected.parameters.size(); ++i) {
+    const ExpectedParameter& p = result.pair.expected.parameters[i];
+    text += fmt::format("  {}: {}, {}\n", p.name, interval_words(result.problem.parameter(i), p),
+                        p.identified ? "identified" : "not identified");
+  }
+  return text;
+}
+
+std::string cheapest_words(const DesignResult& result) {
+  if (!result.cheapest) return "no single candidate identifies every parameter\n";
+  const DesignCandidate& c = result.ranked[*result.cheapest];
+  return fmt::format("least time that identifies every parameter: {} ({} s in all; place {})\n",
+                     experiment_words(c.experiment), significant(c.experiment.total_s(), 4),
+                     *result.cheapest + 1);
+}
+
+std::string check_words(const DesignCheck& check, double level) {
+  std::string text = fmt::format(
+      "\n{} simulated data sets of the best candidate, seed {}, {} could not be fitted\n",
+      check.sets, check.seed, check.failed);
+  for (const CheckedParameter& p : check.parameters) {
+    text += fmt::format(
+        "{:<12} spread / prediction {} +- {}, bias {} +- {} standard errors, {} of {} within the "
+        "{:.4g} % interval\n",
+        p.name, fixed(p.ratio, 3), fixed(p.ratio_error, 3), fixed(p.bias, 2),
+        fixed(p.bias_error, 2), p.covered, check.sets, 100.0 * level);
+  }
+  for (const std::string& warning : check.warnings) text += fmt::format("warning: {}\n", warning);
+  return text;
+}
+
+}  // namespace
+
+Json to_json(const DesignResult& result, const DesignCheck* check, std::size_t top) {
+  const DesignProblem& problem = result.problem;
+  Json j{{"title", problem.config.title},
+         {"criterion", criterion_words(problem)},
+         {"confidence_level", problem.config.level},
+         {"identified_factor", problem.factor},
+         {"candidates_evaluated", result.ranked.size()},
+         {"left_out", result.left_out}};
+  Json list = Json::array();
+  for (std::size_t i = 0; i < std::min(top, result.ranked.size()); ++i) {
+    const DesignCandidate& c = result.ranked[i];
+    list.push_back({{"experiment", to_json(c.experiment)},
+                    {"samples", finite_json(c.one.samples)},
+                    {"peak_depth_m", finite_json(c.one.peak_depth_m)},
+                    {"expected", to_json(c.expected, problem)}});
+  }
+  j["ranked"] = std::move(list);
+  j["pair"] = {{"first", to_json(result.pair.first)},
+               {"second", to_json(result.pair.second)},
+               {"expected", to_json(result.pair.expected, problem)}};
+  j["least_time"] = nullptr;
+  if (result.cheapest) j["least_time"] = to_json(result.ranked[*result.cheapest].experiment);
+  j["words"] = result.words;
+  j["check"] = nullptr;
+  if (check != nullptr) j["check"] = to_json(*check);
+  return j;
+}
+
+std::string to_terminal_text(const DesignResult& result, const DesignCheck* check,
+                             std::size_t top) {
+  const DesignProblem& problem = result.problem;
+  std::string text = fmt::format("{}\n{} candidates; best by the {}\n", problem.config.title,
+                                 result.ranked.size(), criterion_words(problem));
+  for (const std::string& line : result.left_out) text += fmt::format("left out: {}\n", line);
+  text += "\nexpected relative standard errors; ? marks what would not be identified\n";
+  text += candidate_rows(result, top) + "\n";
+  for (const std::string& line : result.words) text += line + "\n";
+  text += "\n" + cheapest_words(result) + pair_words(result);
+  if (check != nullptr) text += check_words(*check, problem.config.level);
+  return text;
+}
+
+}  // namespace tpm::study

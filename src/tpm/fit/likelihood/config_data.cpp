@@ -1,0 +1,177 @@
+// Declared in tpm/fit/likelihood/config_parts.hpp.
+#include <fmt/format.h>
+
+#include <array>
+
+#include "tpm/base/enum_names.hpp"
+#include "tpm/files/blocks/protocol_block.hpp"
+#include "tpm/fit/likelihood/config_parts.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::fit {
+namespace {
+
+using Kind = ProtocolChoice::Kind;
+/// The common protocols, and what only data can say. A fit's file gives a common protocol without
+/// the numbers that its readings hold.
+constexpr auto kProtocolKinds = std::to_array<Word<Kind>>(
+    {{Kind::ramp_hold, entry_of(kProtocolKindWords, ProtocolKind::ramp_hold).text},
+     {Kind::step_hold, entry_of(kProtocolKindWords, ProtocolKind::step_hold).text},
+     {Kind::static_, "static"},
+     {Kind::creep, entry_of(kProtocolKindWords, ProtocolKind::creep).text},
+     {Kind::measured, "measured"},
+     {Kind::oscillation, "oscillation"}});
+
+/// What only oscillations have.
+void parse_oscillation(const Json& j, const std::optional<LawSpec>& law, ProtocolChoice& protocol,
+                       const DocumentPlace& place) {
+  const DocumentPlace depth = place.key("operating_depth");
+  if (protocol.kind != Kind::oscillation) {
+    if (!j.contains("operating_depth")) return;
+    throw bad_input(
+        depth.where,
+        fmt::format("protocol '{}' has no operating depth", protocol_kind_name(protocol.kind)),
+        "an operating depth only with oscillation");
+  }
+  if (!law) {
+    throw bad_input(place.key("kind").where, "'oscillation' with the paper's element",
+                    "a law of the family under /law");
+  }
+  if (!j.contains("operating_depth")) return;
+  protocol.operating_depth =
+      quantity_at(j, "operating_depth", quantity_dimension(law->drive), place);
+  if (*protocol.operating_depth >= 0.0) return;
+  throw bad_input(depth.where, "below 0", "a depth of the tissue such as \"2 mm\"");
+}
+
+ProtocolChoice parse_protocol(const Json& j, const std::optional<LawSpec>& law,
+                              const DocumentPlace& place) {
+  ProtocolChoice protocol;
+  const auto name = j.at("kind").get<std::string>();
+  protocol.kind = parse_word(kProtocolKinds, "protocol", name, place.key("kind").where);
+  if (protocol.kind == Kind::ramp_hold) {
+    Json imposed = j;
+    for (const char* key : {"rate_provenance", "operating_depth"}) imposed.erase(key);
+    protocol.rate_m_per_s =
+        parse_protocol_block(imposed, place, Openness::open).number("rate", place);
+    if (j.contains("rate_provenance")) {
+      protocol.rate_provenance = parse_provenance(j.at("rate_provenance").get<std::string>(),
+                                                  place.key("rate_provenance").where);
+    }
+  } else if (j.contains("rate")) {
+    throw bad_input(place.key("rate").where, fmt::format("protocol '{}' has no rate", name),
+                    "a rate only with ramp_hold");
+  }
+  parse_oscillation(j, law, protocol, place);
+  return protocol;
+}
+
+Selector parse_selector(const Json& j, const DocumentPlace& place) {
+  Selector s;
+  if (j.contains("depth")) s.depth_m = quantity_at(j, "depth", Dimension::length, place);
+  if (j.contains("load")) s.load_N = quantity_at(j, "load", Dimension::force, place);
+  if (j.contains("label")) s.label = j.at("label").get<std::string>();
+  return s;
+}
+
+/// A0/l0 of a spectrum of moduli under a contact.
+void parse_stiffness_per_modulus(const Json& j, const FitConfig& config, DataChoice& data,
+                                 const DocumentPlace& place) {
+  if (!j.contains("stiffness_per_modulus")) return;
+  const DocumentPlace here = place.key("stiffness_per_modulus");
+  const bool strip = config.law && is_answered_by_stress(config.law->drive);
+  if (data.protocol.kind != Kind::oscillation || strip) {
+    throw bad_input(
+        here.where,
+        strip ? "beside a law of stress"
+              : fmt::format("beside protocol '{}'", protocol_kind_name(data.protocol.kind)),
+        "it only with oscillation and a law of contact force over indentation depth");
+  }
+  data.stiffness_per_modulus_m = quantity_at(j, "stiffness_per_modulus", Dimension::length, place);
+  if (*data.stiffness_per_modulus_m > 0.0) return;
+  throw bad_input(here.where, "not above 0", "A0/l0 such as \"12.56 mm\"");
+}
+
+/// The columns and units of a recording that has no description.
+ImportOptions parse_import(const Json& j, const DocumentPlace& place) {
+  ImportOptions import;
+  import.time_column = j.value("time", "");
+  import.drive_column = j.value("drive", "");
+  import.response_column = j.value("response", "");
+  import.sd_column = j.value("sd", "");
+  import.frequency_column = j.value("frequency", "");
+  import.storage_column = j.value("storage", "");
+  import.loss_column = j.value("loss", "");
+  if (j.contains("drive_quantity")) {
+    import.drive_quantity = parse_quantity_name(j.at("drive_quantity").get<std::string>(),
+                                                place.key("drive_quantity").where);
+  }
+  if (j.contains("response_quantity")) {
+    import.response_quantity = parse_quantity_name(j.at("response_quantity").get<std::string>(),
+                                                   place.key("response_quantity").where);
+  }
+  import.negate_drive = j.value("negate_drive", false);
+  import.negate_response = j.value("negate_response", false);
+  if (j.contains("rest_length")) {
+    import.rest_length_m = quantity_at(j, "rest_length", Dimension::length, place);
+  }
+  if (j.contains("spring_constant")) {
+    import.spring_constant_N_per_m = quantity_at(j, "spring_constant", Dimension::stiffness, place);
+  }
+  import.segments = j.value("segments", std::vector<std::string>());
+  if (j.contains("area")) import.area_m2 = quantity_at(j, "area", Dimension::area, place);
+  if (j.contains("units")) {
+    for (const auto& [column, unit] : j.at("units").items()) {
+      import.units[column] = unit.get<std::string>();
+      static_cast<void>(parse_unit(import.units[column], place.key("units").key(column).where));
+    }
+  }
+  return import;
+}
+
+}  // namespace
+
+DataChoice parse_data(const Json& j, const FitConfig& config, const DocumentPlace& place) {
+  DataChoice data;
+  data.dataset = j.at("dataset").get<std::string>();
+  data.protocol = parse_protocol(j.at("protocol"), config.law, place.key("protocol"));
+  parse_stiffness_per_modulus(j, config, data, place);
+  parse_noise(j.at("noise"), data, reading_dimension(config, data), place.key("noise"));
+  if (j.contains("import")) data.import = parse_import(j.at("import"), place.key("import"));
+  if (j.contains("from")) data.from_s = quantity_at(j, "from", Dimension::time, place);
+  if (j.contains("to")) data.to_s = quantity_at(j, "to", Dimension::time, place);
+  const bool recording = data.protocol.kind == Kind::measured;
+  const bool importable = recording || data.protocol.kind == Kind::oscillation;
+  if (!importable && j.contains("import")) {
+    throw bad_input(place.where, "'import' for separate readings",
+                    "it only with the protocol 'measured' or 'oscillation'");
+  }
+  if (!recording && (j.contains("from") || j.contains("to"))) {
+    throw bad_input(place.where, "'from' or 'to' without a recording",
+                    "them only with the protocol 'measured'");
+  }
+  if (!(data.from_s < data.to_s)) {
+    throw bad_input(place.key("to").where, "not after 'from'", "a later time");
+  }
+  for (const auto& [key, list] :
+       {std::pair{"exclude", &data.exclude}, {"hold_out", &data.hold_out}}) {
+    if (!j.contains(key)) continue;
+    for (const auto& selector : j.at(key)) {
+      list->push_back(parse_selector(selector, place.key(key)));
+    }
+  }
+  return data;
+}
+
+std::string_view protocol_kind_name(Kind kind) noexcept {
+  return entry_of(kProtocolKinds, kind).text;
+}
+
+bool Selector::matches(const Datum& datum) const {
+  const auto close = [](double a, double b) { return std::abs(a - b) <= 1e-9 * std::abs(b); };
+  if (depth_m && !(datum.depth_m && close(*datum.depth_m, *depth_m))) return false;
+  if (load_N && !(datum.load_N && close(*datum.load_N, *load_N))) return false;
+  return !label || datum.label == *label;
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,247 @@
+// Declared in tpm/fit/likelihood/config_parts.hpp.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/lists.hpp"
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/fit/likelihood/config_parts.hpp"
+#include "tpm/organ/scene/organ_model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
+#include "tpmkit/tpm_element.hpp"
+
+namespace tpm::fit {
+namespace {
+
+std::size_t parse_target(std::string_view name, const Model& model, const DocumentPlace& place) {
+  const auto all = model.parameters();
+  const auto found = std::ranges::find(all, name, &ParameterDescription::name);
+  if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
+  throw bad_input(place.where, fmt::format("no model parameter is called '{}'", printable(name)),
+                  fmt::format("one of {}", listed(all, &ParameterDescription::name)));
+}
+
+/// The places of the data sets named under "for".
+std::vector<std::size_t> parse_scope(const Json& j, const FitConfig& config,
+                                     const DocumentPlace& place) {
+  std::vector<std::size_t> scope;
+  if (!j.contains("for")) return scope;
+  for (const auto& name : j.at("for")) {
+    const auto dataset = name.get<std::string>();
+    bool found = false;
+    for (std::size_t i = 0; i < config.data.size(); ++i) {
+      if (config.data[i].dataset != dataset) continue;
+      scope.push_back(i);
+      found = true;
+    }
+    if (found) continue;
+    throw bad_input(place.key("for").where,
+                    fmt::format("'{}' is no data set of this fit", printable(dataset)),
+                    "a name that stands under /data");
+  }
+  return scope;
+}
+
+/// Name, start, bounds and scale of an estimated parameter.
+FitParameter parse_search(const std::string& name, const Json& j, Dimension dimension,
+                          const DocumentPlace& place) {
+  const auto start = j.at("start").get<std::string>();
+  FitParameter fit;
+  fit.name = name;
+  fit.start = quantity_at(j, "start", dimension, place);
+  fit.unit = parse_unit(split_quantity(start).unit, dimension, place.key("start").where);
+  fit.lower = quantity_at(j, "lower", dimension, place);
+  fit.upper = quantity_at(j, "upper", dimension, place);
+  const DocumentPlace scale_place = place.key("scale");
+  fit.scale = parse_scale(j.value("scale", "log"), scale_place.where);
+  require_valid(fit, place.where);
+  return fit;
+}
+
+EstimatedParameter parse_parameter(const std::string& name, const Json& j, const Model& model,
+                                   const FitConfig& config, const DocumentPlace& place) {
+  EstimatedParameter parameter;
+  const std::vector<std::size_t> scope = parse_scope(j, config, place);
+  if (j.contains("sets")) {
+    for (const auto& target : j.at("sets")) {
+      parameter.sets.push_back(
+          {parse_target(target.get<std::string>(), model, place.key("sets")), scope});
+    }
+  } else {
+    parameter.sets.push_back({parse_target(name, model, place), scope});
+  }
+  const Dimension dimension = model.parameters()[parameter.sets.front().parameter].dimension;
+  for (const Target& target : parameter.sets) {
+    if (model.parameters()[target.parameter].dimension == dimension) continue;
+    throw bad_input(place.key("sets").where, "the parameters set have different dimensions",
+                    "parameters of one dimension");
+  }
+  parameter.fit = parse_search(name, j, dimension, place);
+  const FitParameter& fit = parameter.fit;
+  for (const Target& target : parameter.sets) {
+    const auto [low, high] = model.range(target.parameter);
+    if (fit.lower >= low && fit.upper <= high) continue;
+    throw bad_input(
+        place.key(fit.lower < low ? "lower" : "upper").where,
+        fmt::format("outside the range of {}", model.parameters()[target.parameter].name),
+        fmt::format("bounds from {} to {} (SI)", shortest(low), shortest(high)));
+  }
+  return parameter;
+}
+
+const EstimatedParameter& find_parameter(const FitConfig& config, const std::string& name,
+                                         const DocumentPlace& place) {
+  for (const EstimatedParameter& p : config.parameters) {
+    if (p.fit.name == name) return p;
+  }
+  throw bad_input(place.where, fmt::format("'{}' is not an estimated parameter", printable(name)),
+                  "a name from /parameters");
+}
+
+/// The noise parameters that the data sets name, with their dimensions, each once. Throws
+/// Error(bad_input) for a name that stands for two dimensions.
+std::vector<std::pair<std::string, Dimension>> noise_parameters(const FitConfig& config,
+                                                                const DocumentPlace& place) {
+  std::vector<std::pair<std::string, Dimension>> list;
+  const auto add = [&](const std::string& name, Dimension dimension) {
+    const auto same = [&](const auto& entry) { return entry.first == name; };
+    const auto found = std::find_if(list.begin(), list.end(), same);
+    if (name.empty()) return;
+    if (found == list.end()) {
+      list.emplace_back(name, dimension);
+    } else if (found->second != dimension) {
+      throw bad_input(place.key("data").where,
+                      fmt::format("noise parameter '{}' is {} and {}", printable(name),
+                                  dimension_name(found->second), dimension_name(dimension)),
+                      "one noise parameter for each dimension");
+    }
+  };
+  for (const DataChoice& data : config.data) {
+    add(data.sigma_a, reading_dimension(config, data));
+    add(data.sigma_b, Dimension::dimensionless);
+  }
+  return list;
+}
+
+/// A noise parameter: as it stands under /parameters, or for the data to decide.
+EstimatedParameter parse_noise_parameter(const std::string& name, Dimension dimension,
+                                         const Json& parameters, const DocumentPlace& place) {
+  EstimatedParameter parameter;
+  if (!parameters.contains(name)) {
+    parameter.fit.name = name;
+    parameter.fit.unit = shown_unit(dimension);
+    parameter.from_data = true;
+    return parameter;
+  }
+  const Json& j = parameters.at(name);
+  if (j.contains("sets") || j.contains("for")) {
+    throw bad_input(place.key(name).where, "'sets' or 'for' of a parameter of the noise",
+                    "data sets that name it under /noise");
+  }
+  parameter.fit = parse_search(name, j, dimension, place.key(name));
+  if (parameter.fit.lower > 0.0) return parameter;
+  throw bad_input(place.key(name).key("lower").where, "not above 0", "a positive lower bound");
+}
+
+}  // namespace
+
+void parse_parameters(const Json& document, const Model& model, FitConfig& config,
+                      const DocumentPlace& place) {
+  const auto of_noise = noise_parameters(config, place);
+  const Json& parameters = document.at("parameters");
+  for (const auto& [name, j] : parameters.items()) {
+    const bool is_noise = std::any_of(of_noise.begin(), of_noise.end(),
+                                      [&n = name](const auto& entry) { return entry.first == n; });
+    if (is_noise) continue;
+    config.parameters.push_back(
+        parse_parameter(name, j, model, config, place.key("parameters").key(name)));
+  }
+  for (const auto& [name, dimension] : of_noise) {
+    config.parameters.push_back(
+        parse_noise_parameter(name, dimension, parameters, place.key("parameters")));
+  }
+}
+
+std::vector<double> parse_fixed(const Json& document, const Model& model, const FitConfig& config,
+                                const DocumentPlace& place) {
+  std::vector<double> values;
+  if (config.law) {
+    for (const LawParameter& p : law_parameters(*config.law)) {
+      values.push_back(p.preset.value_or(std::numeric_limits<double>::quiet_NaN()));
+    }
+  } else if (config.organ) {
+    values = OrganModel(config.organ).own_values();
+  } else {
+    const TpmVector paper = to_vector({});
+    values.assign(paper.begin(), paper.end());
+  }
+  if (!document.contains("fixed")) return values;
+  for (const auto& [name, value] : document.at("fixed").items()) {
+    const std::size_t target = parse_target(name, model, place.key("fixed"));
+    values[target] = parse_quantity(value.get<std::string>(), model.parameters()[target].dimension,
+                                    place.key("fixed").key(name).where);
+  }
+  return values;
+}
+
+void require_each_set_once(const FitConfig& config, const Model& model, const Json& document,
+                           const DocumentPlace& place) {
+  for (std::size_t choice = 0; choice < config.data.size(); ++choice) {
+    std::vector<std::string> setter(model.parameters().size());
+    const auto claim = [&](std::size_t target, const std::string& by) {
+      std::string& owner = setter[target];
+      if (!owner.empty()) {
+        throw bad_input(place.where,
+                        fmt::format("model parameter '{}' is set by '{}' and by '{}'",
+                                    model.parameters()[target].name, owner, by),
+                        "each model parameter set once");
+      }
+      owner = by;
+    };
+    for (const EstimatedParameter& p : config.parameters) {
+      for (const Target& target : p.sets) {
+        if (target.applies_to(choice)) claim(target.parameter, p.fit.name);
+      }
+    }
+    if (document.contains("fixed")) {
+      for (const auto& [name, value] : document.at("fixed").items()) {
+        claim(parse_target(name, model, place.key("fixed")), "fixed");
+      }
+    }
+    for (std::size_t i = 0; i < setter.size(); ++i) {
+      if (!setter[i].empty() || !std::isnan(config.fixed[i])) continue;
+      throw bad_input(place.where,
+                      fmt::format("model parameter '{}' has no value for '{}'",
+                                  model.parameters()[i].name, config.data[choice].dataset),
+                      "it under /parameters or /fixed");
+    }
+  }
+}
+
+void parse_hypotheses(const Json& list, FitConfig& config, const DocumentPlace& place) {
+  std::size_t index = 0;
+  for (const auto& j : list) {
+    const DocumentPlace here = place.key(std::to_string(index++)).key("values");
+    Hypothesis hypothesis;
+    hypothesis.name = j.at("name").get<std::string>();
+    for (const auto& [name, value] : j.at("values").items()) {
+      const FitParameter& p = find_parameter(config, name, here.key(name)).fit;
+      const double si =
+          parse_quantity(value.get<std::string>(), p.unit.dimension, here.key(name).where);
+      if (!(si >= p.lower && si <= p.upper)) {
+        throw bad_input(
+            here.key(name).where,
+            fmt::format("{} is outside the parameter's bounds", value.get<std::string>()),
+            "a value within them");
+      }
+      hypothesis.values.emplace_back(name, si);
+    }
+    config.hypotheses.push_back(std::move(hypothesis));
+  }
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,148 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/likelihood/estimated_sigma.hpp"
+#include "tpm/fit/likelihood/experiment.hpp"
+#include "tpm/fit/likelihood/least_squares.hpp"
+
+namespace tpm::fit {
+
+/// The residuals of a configuration: experiments asked of the model, compared with data.
+class ExperimentResiduals final : public ResidualFunction {
+ public:
+  /// Loads the data sets and sets the experiments up. Throws Error(bad_input).
+  explicit ExperimentResiduals(const FitConfig& config);
+
+  /// The same with data given in memory, one for each of config.data.
+  ExperimentResiduals(const FitConfig& config, const std::vector<DataSet>& data);
+
+  [[nodiscard]] Eigen::Index residual_count() const override { return residual_count_; }
+  [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
+                              RowMatrix* jacobian) const override;
+  [[nodiscard]] bool information_root(std::span<const double> natural,
+                                      RowMatrix& root) const override;
+  [[nodiscard]] double offset() const override { return offset_; }
+  [[nodiscard]] bool linear_in(std::size_t parameter) const override { return linear_[parameter]; }
+  [[nodiscard]] const ExperimentResiduals* surrogate() const override { return surrogate_.get(); }
+  [[nodiscard]] const ExchangeOrder& exchange_order() const override { return order_; }
+
+  [[nodiscard]] const std::vector<FitDatum>& data() const { return data_; }
+  [[nodiscard]] const std::vector<Experiment>& experiments() const { return experiments_; }
+  /// Values (not bands) that are fitted.
+  [[nodiscard]] int value_count() const;
+  [[nodiscard]] int band_count() const;
+
+  /// The model's answer to every datum, held-out ones too, in the order of data().
+  /// @param sensitivity d answer / d estimated parameter, or null
+  /// Throws Error(numerical) if a response cannot be computed.
+  [[nodiscard]] Eigen::VectorXd predict(std::span<const double> natural,
+                                        RowMatrix* sensitivity) const;
+
+  /// Replaces the value of a fitted datum and its standard deviation (simulation studies).
+  void set_value(std::size_t datum, double value);
+
+  /// How often each datum counts, in the order of data(); 0 leaves it out.
+  void set_counts(std::vector<int> counts);
+
+  /// The same experiments, with data that can be replaced apart from these.
+  [[nodiscard]] std::unique_ptr<ExperimentResiduals> copy() const;
+  /// A copy with at most about `most` samples of each recording, evenly taken from the history and
+  /// from the response: for the search of starts only.
+  [[nodiscard]] std::unique_ptr<ExperimentResiduals> thinned(std::size_t most) const;
+
+  /// Scale of the noise law of a value, given the model's answer to it.
+  [[nodiscard]] double noise_scale(std::size_t datum, double answer,
+                                   std::span<const double> natural) const;
+  /// The same for a new reading at the model's answer, which no datum is known of.
+  [[nodiscard]] double new_noise_scale(std::size_t datum, double answer,
+                                       std::span<const double> natural) const;
+  /// (T(answer) - T(value)) / scale; of a band the distance to it. Infinite where the answer has no
+  /// likelihood.
+  [[nodiscard]] double standardised(std::size_t datum, double answer,
+                                    std::span<const double> natural) const;
+
+  /// With the start and bounds of noise parameters that follow from the data.
+  [[nodiscard]] const FitConfig& config() const { return config_; }
+  [[nodiscard]] const Model& model() const { return *model_; }
+
+ private:
+  /// sigma = a + b |model| of a data set, and where a and b stand among the parameters.
+  struct MovingSigma {
+    EstimatedSigma sigma;
+    std::optional<std::size_t> a, b;
+
+    [[nodiscard]] double value_a(std::span<const double> natural) const;
+    [[nodiscard]] double value_b(std::span<const double> natural) const;
+  };
+
+  ExperimentResiduals() = default;
+  /// Factor of a datum's residuals.
+  [[nodiscard]] double weight(std::size_t datum) const;
+  /// The model's answer to an experiment, one value per reading.
+  [[nodiscard]] Response respond_to(const Experiment& experiment,
+                                    std::span<const double> parameters, Want want) const;
+  /// Largest value that is fitted of a data set, SI. Throws Error(bad_input) if all are 0.
+  [[nodiscard]] double data_size(std::size_t choice) const;
+  void resolve_noise_parameters();
+  void resolve_noise_parameter(EstimatedParameter& parameter);
+  [[nodiscard]] bool is_normal_of_stated_size() const;
+  [[nodiscard]] bool expected_information_root(std::span<const double> natural,
+                                               RowMatrix& root) const;
+  /// A residual's derivative, times a factor, by the estimated parameters.
+  static void write_row(const NoiseTerm& term, const MovingSigma& moving, double factor,
+                        const Eigen::Ref<const Eigen::RowVectorXd>& sensitivity,
+                        Eigen::Ref<Eigen::RowVectorXd> row);
+  void count_residuals();
+  [[nodiscard]] std::optional<std::size_t> parameter_place(const std::string& name) const;
+  [[nodiscard]] Eigen::VectorXd answers(const std::vector<Experiment>& experiments,
+                                        std::span<const double> natural,
+                                        RowMatrix* sensitivity) const;
+  /// Fills fitted_.
+  void leave_out_held_out();
+  void set_up_surrogate();
+  /// A costly model is asked for derivatives by the estimated parameters only.
+  [[nodiscard]] bool asks_along() const { return surrogate_ != nullptr; }
+  /// Changes of the model parameters with each of the estimated ones.
+  [[nodiscard]] Eigen::MatrixXd changes_for(std::size_t choice) const;
+  /// Columns of a response's sensitivity and the estimated parameters that they belong to.
+  [[nodiscard]] std::vector<std::pair<Eigen::Index, Eigen::Index>> columns_for(
+      std::size_t choice) const;
+  [[nodiscard]] const Noise& noise(std::size_t choice) const { return config_.data[choice].noise; }
+  /// Two residuals stand for each value: sigma moves with the parameters.
+  [[nodiscard]] bool has_normalisation(std::size_t choice) const;
+
+  /// Residuals that are differences times constants: normal noise of stated size, values only.
+  struct PlainResiduals {
+    Eigen::VectorXd observed, factor;
+    std::vector<Eigen::Index> row;  ///< of each datum; -1 of what is held out
+  };
+  void find_linear();
+  void set_up_plain();
+  void set_plain_value(std::size_t datum);
+  [[nodiscard]] bool is_plain() const;
+  void evaluate_plain(std::span<const double> natural, Eigen::VectorXd& residual,
+                      RowMatrix* jacobian) const;
+  /// Experiments without what is held out.
+  [[nodiscard]] const std::vector<Experiment>& fitted() const {
+    return fitted_.empty() ? experiments_ : fitted_;
+  }
+
+  FitConfig config_;
+  std::shared_ptr<const Model> model_;
+  std::vector<FitDatum> data_;
+  std::vector<Experiment> experiments_;
+  std::vector<Experiment> fitted_;  ///< without what is held out; empty if nothing is
+  std::vector<std::optional<MovingSigma>> moving_sigma_;  ///< of each data set
+  std::vector<int> counts_;                               ///< empty: every datum counts once
+  std::vector<bool> linear_;  ///< of each estimated parameter: linear_in
+  ExchangeOrder order_;
+  std::optional<PlainResiduals> plain_;
+  std::unique_ptr<ExperimentResiduals> surrogate_;  ///< the same, asking the model's surrogate
+  Eigen::Index residual_count_ = 0;
+  double offset_ = 0.0;
+};
+
+}  // namespace tpm::fit

@@ -1,0 +1,159 @@
+#include "tpm/fit/likelihood/noise.hpp"
+
+#include <ceres/loss_function.h>
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "tpm/base/enum_names.hpp"
+#include "tpm/base/text.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr auto kNoiseKinds = std::to_array<Word<NoiseKind>>({
+    {NoiseKind::relative_to_datum, "relative_to_datum"},
+    {NoiseKind::absolute, "absolute"},
+    {NoiseKind::combined, "combined"},
+    {NoiseKind::per_row, "per_row"},
+    {NoiseKind::log, "log"},
+    {NoiseKind::relative_to_model, "relative_to_model"},
+});
+
+constexpr auto kLosses = std::to_array<Word<Loss>>(
+    {{Loss::none, "none"}, {Loss::huber, "huber"}, {Loss::cauchy, "cauchy"}});
+
+}  // namespace
+
+std::string_view noise_kind_name(NoiseKind kind) noexcept {
+  return entry_of(kNoiseKinds, kind).text;
+}
+
+NoiseKind parse_noise_kind(std::string_view text, std::string_view where) {
+  return parse_word(kNoiseKinds, "noise kind", text, where);
+}
+
+bool uses_relative(NoiseKind kind) {
+  return kind == NoiseKind::relative_to_datum || kind == NoiseKind::combined ||
+         kind == NoiseKind::log || kind == NoiseKind::relative_to_model;
+}
+
+bool uses_absolute(NoiseKind kind) {
+  return kind == NoiseKind::absolute || kind == NoiseKind::combined;
+}
+
+std::string_view loss_name(Loss loss) noexcept {
+  return entry_of(kLosses, loss).text;
+}
+
+Loss parse_loss(std::string_view text, std::string_view where) {
+  return parse_word(kLosses, "loss", text, where);
+}
+
+ErrorLaw error_law(const Noise& noise) {
+  return {noise.shape, noise.kind == NoiseKind::log ? ErrorScale::ln : ErrorScale::linear,
+          noise.degrees_of_freedom};
+}
+
+double sigma_of(const Noise& noise, double datum, std::optional<double> row_sd,
+                std::string_view where) {
+  double sigma = 0.0;
+  switch (noise.kind) {
+    case NoiseKind::relative_to_datum:
+      sigma = noise.relative * std::abs(datum);
+      break;
+    case NoiseKind::absolute:
+      sigma = noise.absolute;
+      break;
+    case NoiseKind::combined:
+      sigma = noise.absolute + noise.relative * std::abs(datum);
+      break;
+    case NoiseKind::per_row:
+      if (!row_sd) {
+        throw bad_input(where, "noise 'per_row', but the datum has no standard deviation",
+                        "a column of standard deviations or another noise kind");
+      }
+      sigma = *row_sd;
+      break;
+    case NoiseKind::log:
+    case NoiseKind::relative_to_model:
+      if (!(datum > 0.0)) {
+        throw bad_input(where,
+                        fmt::format("a datum of {} (SI) under noise '{}'", shortest(datum),
+                                    noise_kind_name(noise.kind)),
+                        "data above 0");
+      }
+      sigma = noise.relative;
+      break;
+  }
+  if (!(sigma > 0.0 && std::isfinite(sigma))) {
+    throw bad_input(where,
+                    fmt::format("the datum {} (SI) has a standard deviation of {} under noise '{}'",
+                                shortest(datum), shortest(sigma), noise_kind_name(noise.kind)),
+                    "a positive standard deviation");
+  }
+  return sigma;
+}
+
+std::optional<DatumResidual> value_residual(const Noise& noise, double sigma, double datum,
+                                            double f) {
+  DatumResidual residual;
+  switch (noise.kind) {
+    case NoiseKind::log:
+      if (!(f > 0.0)) return std::nullopt;
+      residual.r = std::log(f / datum) / sigma;
+      residual.d_r = 1.0 / (f * sigma);
+      return residual;
+    case NoiseKind::relative_to_model: {
+      if (!(f > 0.0)) return std::nullopt;
+      residual.r = (1.0 - datum / f) / sigma;
+      residual.d_r = datum / (f * f * sigma);
+      const double argument = 2.0 * std::log(f / datum) + kNormalisationOffset;
+      if (!(argument > 0.0)) return std::nullopt;
+      residual.normalisation = std::sqrt(argument);
+      residual.d_normalisation = 1.0 / (f * residual.normalisation);
+      return residual;
+    }
+    case NoiseKind::relative_to_datum:
+    case NoiseKind::absolute:
+    case NoiseKind::combined:
+    case NoiseKind::per_row:
+      break;
+  }
+  residual.r = (f - datum) / sigma;
+  residual.d_r = 1.0 / sigma;
+  return residual;
+}
+
+DatumResidual band_residual(double sigma, double lower, double upper, double f) {
+  DatumResidual residual;
+  if (f < lower) {
+    residual.r = (f - lower) / sigma;
+    residual.d_r = 1.0 / sigma;
+  } else if (f > upper) {
+    residual.r = (f - upper) / sigma;
+    residual.d_r = 1.0 / sigma;
+  }
+  return residual;
+}
+
+void apply_shape(const ErrorLaw& law, DatumResidual& residual) {
+  const ShapedResidual shaped = shaped_residual(law, residual.r);
+  residual.r = shaped.r;
+  residual.d_r *= shaped.slope;
+}
+
+void apply_loss(const RobustLoss& loss, DatumResidual& residual) {
+  if (loss.kind == Loss::none || residual.r == 0.0) return;
+  std::array<double, 3> rho{};
+  const double square = residual.r * residual.r;
+  if (loss.kind == Loss::huber) ceres::HuberLoss(loss.width).Evaluate(square, rho.data());
+  if (loss.kind == Loss::cauchy) ceres::CauchyLoss(loss.width).Evaluate(square, rho.data());
+  const double root = std::copysign(std::sqrt(rho[0]), residual.r);
+  residual.d_r *= rho[1] * residual.r / root;
+  residual.r = root;
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,115 @@
+// Declared in tpm/fit/online/identification.hpp.
+// What an identification says: JSON and terminal.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/text.hpp"
+#include "tpm/fit/online/identification.hpp"
+#include "tpmkit/law_file.hpp"
+
+namespace tpm::study {
+namespace {
+
+constexpr int kStoredDigits = 6;
+constexpr std::size_t kMostStored = 400;  // samples in the JSON
+
+Json finite(double value) {
+  return std::isfinite(value) ? Json(rounded(value, kStoredDigits)) : Json();
+}
+
+Json sample_parameters_json(const IdentifiedSample& sample, const LawSpec& law) {
+  const std::vector<LawParameter> table = law_parameters(law);
+  return array_json(sample.estimate.parameters, [&](const SequentialParameter& p) {
+    Json entry{{"name", law_key(table[p.place])},
+               {"estimate", finite(p.estimate)},
+               {"lower", finite(p.at_bound ? NAN : p.lower)},
+               {"upper", finite(p.at_bound ? NAN : p.upper)},
+               {"relative_half_width", finite(p.relative_half_width())},
+               {"degrees_of_freedom", finite(p.degrees_of_freedom)}};
+    if (p.nuisance) entry["nuisance"] = true;
+    if (p.at_bound) entry["at_bound"] = true;
+    return entry;
+  });
+}
+
+Json sample_json(const Identification& id, const IdentifiedSample& sample) {
+  const LawSpec& law = id.laws[sample.law];
+  Json json{{"time_s", sample.time_s},
+            {"samples", sample.estimate.samples},
+            {"law", law_name(law)},
+            {"lag_1_correlation", finite(sample.estimate.phi)},
+            {"widest_relative_half_width", finite(sample.estimate.widest_relative_half_width())}};
+  json[law.response == Quantity::stress ? "noise_sd_Pa" : "noise_sd_N"] =
+      finite(sample.estimate.sigma);
+  json["parameters"] = sample_parameters_json(sample, law);
+  return json;
+}
+
+std::string parameter_line(const SequentialParameter& p) {
+  const auto shown = [&](double value) {
+    return std::isfinite(value) ? significant(value / p.parameter.unit.to_si, 4) : "open";
+  };
+  if (p.at_bound) {
+    return fmt::format("  {:<14} {:>12} {} (at a bound)\n", p.parameter.name, shown(p.estimate),
+                       p.parameter.unit.symbol);
+  }
+  return fmt::format("  {:<14} {:>12} {:>28} {:<6} +-{} %{}\n", p.parameter.name, shown(p.estimate),
+                     fmt::format("{} .. {}", shown(p.lower), shown(p.upper)),
+                     p.parameter.unit.symbol, significant(100.0 * p.relative_half_width(), 3),
+                     p.nuisance ? " (of the recording)" : "");
+}
+
+std::string sample_text(const Identification& id, const IdentifiedSample& sample) {
+  const Unit response = shown_unit(quantity_dimension(id.laws[sample.law].response));
+  std::string text = fmt::format(
+      "{} s after {} samples: {}, noise {} {}, neighbours correlated by {}\n",
+      significant(sample.time_s, 4), sample.estimate.samples, law_name(id.laws[sample.law]),
+      significant(sample.estimate.sigma / response.to_si, 3), response.symbol,
+      significant(sample.estimate.phi, 3));
+  for (const SequentialParameter& p : sample.estimate.parameters) text += parameter_line(p);
+  return text;
+}
+
+}  // namespace
+
+Json to_json(const Identification& id) {
+  Json json{{"recording", id.name},
+            {"level", id.options.level},
+            {"target_relative_half_width", id.options.target},
+            {"patience", id.options.patience},
+            {"ramp_and_hold_s", {id.begin_s, id.end_s}},
+            {"samples", id.samples},
+            {"stopped", id.stopped ? sample_json(id, id.history[*id.stopped]) : Json()},
+            {"last", sample_json(id, id.history.back())}};
+  Json history = Json::array();
+  const std::size_t stride = 1 + id.history.size() / kMostStored;
+  for (std::size_t i = 0; i < id.history.size(); i += stride) {
+    history.push_back(sample_json(id, id.history[i]));
+  }
+  json["history"] = std::move(history);
+  json["flags"] = id.flags;
+  return json;
+}
+
+std::string to_terminal_text(const Identification& id) {
+  constexpr std::size_t kRows = 10;
+  std::string text = fmt::format("{:>9} {:>8} {:>18} {:>12} {:>12}\n", "time s", "samples",
+                                 "least law", "widest +- %", "correlation");
+  const std::size_t n = id.history.size();
+  for (std::size_t row = 0; row < std::min(n, kRows); ++row) {
+    const IdentifiedSample& s = id.history[n <= kRows ? row : row * (n - 1) / (kRows - 1)];
+    const double width = 100.0 * s.estimate.widest_relative_half_width();
+    text += fmt::format("{:>9} {:>8} {:>18} {:>12} {:>12}\n", significant(s.time_s, 4),
+                        s.estimate.samples, law_name(id.laws[s.law]),
+                        std::isfinite(width) ? significant(width, 3) : "open",
+                        significant(s.estimate.phi, 3));
+  }
+  if (id.stopped) text += "\nstopped at " + sample_text(id, id.history[*id.stopped]);
+  text += "\nat the end, " + sample_text(id, id.history.back());
+  for (const std::string& flag : id.flags) text += fmt::format("! {}\n", flag);
+  return text;
+}
+
+}  // namespace tpm::study

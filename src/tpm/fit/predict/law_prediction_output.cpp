@@ -1,0 +1,213 @@
+// Declared in tpm/fit/predict/law_prediction.hpp.
+// What a prediction says: verdict, JSON, terminal, CSV.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/text.hpp"
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/files/delimited.hpp"
+#include "tpm/fit/predict/law_prediction.hpp"
+#include "tpm/fit/select/selection.hpp"
+
+namespace tpm::study {
+namespace {
+
+constexpr int kStored = 6;  // significant digits
+
+std::string unit_suffix(Dimension dimension) {
+  const std::string unit(si_symbol(dimension));
+  return unit.empty() ? "" : "_" + unit;
+}
+
+Json numbers(const std::vector<double>& values) {
+  return array_json(values,
+                    [](double v) { return std::isfinite(v) ? Json(rounded(v, kStored)) : Json(); });
+}
+
+std::string drive_key(const LawPrediction& p) {
+  if (p.drive_kind == Drive::force) return "load_N";
+  return p.spec.drive == Quantity::relative_length ? "relative_length" : "depth_m";
+}
+
+Json comparison_json(const PredictionComparison& c, double peak, const std::string& suffix) {
+  Json json{{"samples", c.samples}};
+  if (c.samples == 0) return json;
+  json["rms" + suffix] = rounded(c.rms, kStored);
+  json["largest" + suffix] = rounded(c.largest, kStored);
+  json["rms_over_peak"] = rounded(c.rms / peak, kStored);
+  json["largest_over_peak"] = rounded(c.largest / peak, kStored);
+  if (c.share_in_reading_band) {
+    json["share_in_reading_band"] = rounded(*c.share_in_reading_band, kStored);
+  }
+  return json;
+}
+
+std::string comparison_words(const char* what, const PredictionComparison& c, double peak) {
+  if (c.samples == 0) return {};
+  std::string text =
+      fmt::format("{}, {} samples: rms {} % of the peak, largest {} %", what, c.samples,
+                  significant(100.0 * c.rms / peak, 3), significant(100.0 * c.largest / peak, 3));
+  if (c.share_in_reading_band) {
+    text += fmt::format("; {} % in the band for new readings",
+                        significant(100.0 * *c.share_in_reading_band, 3));
+  }
+  return text + "\n";
+}
+
+std::string placement_words(const LawPrediction& p) {
+  const Unit drive = shown_unit(quantity_dimension(p.spec.drive));
+  const Unit response = shown_unit(quantity_dimension(p.spec.response));
+  const char* whose = p.placement == Placement::surface ? "none: depths count from the surface"
+                      : p.placement == Placement::fitted
+                          ? "of the fit"
+                          : "found for this recording, material fixed";
+  return fmt::format("contact {} {}, offset {} {} ({})\n", significant(p.contact / drive.to_si, 4),
+                     drive.symbol, significant(p.offset / response.to_si, 4), response.symbol,
+                     whose);
+}
+
+}  // namespace
+
+Json to_json(const LawPrediction& p) {
+  const Dimension dimension = p.response_dimension();
+  const std::string suffix = unit_suffix(dimension);
+  Json json{{"law", law_name(p.spec)},
+            {"level", p.level},
+            {"quantile_of_the_standard_error", rounded(p.quantile, kStored)},
+            {"bands_from", p.samples > 0 ? "samples" : "derivatives"},
+            {"placement", placement_name(p.placement)}};
+  if (p.organ_spheres > 0) json["organ_spheres"] = p.organ_spheres;
+  if (p.samples > 0) json["samples"] = p.samples;
+  json["contact" + unit_suffix(quantity_dimension(p.spec.drive))] = rounded(p.contact, kStored);
+  json["offset" + unit_suffix(quantity_dimension(p.spec.response))] = rounded(p.offset, kStored);
+  json["time_s"] = numbers(p.time_s);
+  json[drive_key(p)] = numbers(p.imposed);
+  json["mean" + suffix] = numbers(p.response);
+  json["standard_error" + suffix] = numbers(p.standard_error);
+  json["mean_band" + suffix] = {{"lower", numbers(p.mean_lower)}, {"upper", numbers(p.mean_upper)}};
+  if (!p.reading_lower.empty()) {
+    json["reading_band" + suffix] = {{"lower", numbers(p.reading_lower)},
+                                     {"upper", numbers(p.reading_upper)}};
+  }
+  if (p.recording) {
+    const PredictedRecording& r = *p.recording;
+    json["recording"] = {{"name", r.name},
+                         {"peak" + suffix, rounded(r.peak, kStored)},
+                         {"observed" + suffix, numbers(r.observed)},
+                         {"fitted", comparison_json(r.fitted, r.peak, suffix)},
+                         {"not_fitted", comparison_json(r.held_out, r.peak, suffix)},
+                         {"after_the_hold", comparison_json(r.outside, r.peak, suffix)}};
+  }
+  json["flags"] = p.flags;
+  return json;
+}
+
+std::string to_csv(const LawPrediction& p) {
+  const std::string suffix = unit_suffix(p.response_dimension());
+  std::string text = fmt::format("time_s,{},mean{},standard_error{},mean_lower{},mean_upper{}",
+                                 drive_key(p), suffix, suffix, suffix, suffix);
+  if (!p.reading_lower.empty()) {
+    text += fmt::format(",reading_lower{},reading_upper{}", suffix, suffix);
+  }
+  if (p.recording) text += fmt::format(",observed{},was_fitted", suffix);
+  text += "\n";
+  const auto cell = [](double value) {
+    return std::isfinite(value) ? significant(value, 9) : std::string();
+  };
+  for (std::size_t i = 0; i < p.time_s.size(); ++i) {
+    text +=
+        fmt::format("{},{},{},{},{},{}", cell(p.time_s[i]), cell(p.imposed[i]), cell(p.response[i]),
+                    cell(p.standard_error[i]), cell(p.mean_lower[i]), cell(p.mean_upper[i]));
+    if (!p.reading_lower.empty()) {
+      text += fmt::format(",{},{}", cell(p.reading_lower[i]), cell(p.reading_upper[i]));
+    }
+    if (p.recording) {
+      text +=
+          fmt::format(",{},{}", cell(p.recording->observed[i]), p.recording->was_fitted[i] ? 1 : 0);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string to_terminal_text(const LawPrediction& p) {
+  constexpr std::size_t kRows = 12;
+  const Unit unit = shown_unit(p.response_dimension());
+  std::string text = fmt::format(
+      "{}: {}\n{}{} % bands, {}\n\n", p.subject(), law_words(p.spec), placement_words(p),
+      significant(100.0 * p.level, 4),
+      p.samples > 0 ? fmt::format("from {} laws drawn from the fit's covariance", p.samples)
+                    : fmt::format("{} standard errors", significant(p.quantile, 4)));
+  text += fmt::format("{:>10} {:>12} {:>25}{}\n", "time s", fmt::format("mean {}", unit.symbol),
+                      "band of the mean",
+                      p.reading_lower.empty() ? "" : fmt::format(" {:>25}", "band for a reading"));
+  const auto pair = [&](double lower, double upper) {
+    return fmt::format(" {:>25}", fmt::format("{} .. {}", significant(lower / unit.to_si, 4),
+                                              significant(upper / unit.to_si, 4)));
+  };
+  const std::size_t n = p.time_s.size();
+  for (std::size_t row = 0; row < std::min(n, kRows); ++row) {
+    const std::size_t i = n <= kRows ? row : row * (n - 1) / (kRows - 1);
+    text += fmt::format("{:>10} {:>12}", significant(p.time_s[i], 4),
+                        significant(p.response[i] / unit.to_si, 4));
+    text += pair(p.mean_lower[i], p.mean_upper[i]);
+    if (!p.reading_lower.empty()) text += pair(p.reading_lower[i], p.reading_upper[i]);
+    text += "\n";
+  }
+  if (p.recording) {
+    const PredictedRecording& r = *p.recording;
+    text += "\n" + comparison_words("fitted", r.fitted, r.peak) +
+            comparison_words("not fitted", r.held_out, r.peak) +
+            comparison_words("after the hold", r.outside, r.peak);
+  }
+  for (const std::string& flag : p.flags) text += fmt::format("! {}\n", flag);
+  return text;
+}
+
+PredictionVerdict compare_prediction(const LawPrediction& prediction,
+                                     const PreparedRecording& recording, std::uint64_t seed) {
+  SelectionOptions options;
+  options.held_out = false;
+  options.setup.profiles = false;
+  options.setup.seed = seed;
+  const Selection selection = select_law(std::span(&recording, 1), options);
+  PredictionVerdict verdict;
+  verdict.factor = options.prediction_factor;
+  const PredictedRecording& own = prediction.recording.value();
+  const int n = own.fitted.samples + own.held_out.samples;
+  verdict.rms = std::sqrt((own.fitted.samples * own.fitted.rms * own.fitted.rms +
+                           own.held_out.samples * own.held_out.rms * own.held_out.rms) /
+                          std::max(n, 1));
+  verdict.least_residual = std::numeric_limits<double>::infinity();
+  for (const Candidate& c : selection.candidates) {
+    if (c.failed || !(c.fit.recordings.front().rms_residual < verdict.least_residual)) continue;
+    verdict.least_residual = c.fit.recordings.front().rms_residual;
+    verdict.least_law = law_name(c.law);
+  }
+  return verdict;
+}
+
+Json to_json(const PredictionVerdict& verdict, Dimension response) {
+  const std::string suffix = unit_suffix(response);
+  Json json{{"predicts", verdict.predicts()}};
+  json["rms" + suffix] = rounded(verdict.rms, kStored);
+  json["least_residual" + suffix] = rounded(verdict.least_residual, kStored);
+  json["least_law"] = verdict.least_law;
+  json["factor"] = verdict.factor;
+  return json;
+}
+
+std::string verdict_words(const PredictionVerdict& verdict, double peak) {
+  return fmt::format(
+      "{}: rms {} % of the peak; the least residual of a law fitted to this recording is {} % "
+      "({}), and {} times that is allowed\n",
+      verdict.predicts() ? "predicts" : "does not predict",
+      significant(100.0 * verdict.rms / peak, 3),
+      significant(100.0 * verdict.least_residual / peak, 3), verdict.least_law,
+      significant(verdict.factor, 2));
+}
+
+}  // namespace tpm::study

@@ -1,0 +1,69 @@
+// Declared in tpm/fit/predict/organ_material.hpp.
+// The motions that a law and an organ are compared along.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/data/straight_pieces.hpp"
+#include "tpm/fit/predict/organ_material.hpp"
+#include "tpm/fit/predict/organ_readings.hpp"
+#include "tpm/fit/predict/prediction_parts.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::study {
+namespace {
+
+constexpr std::size_t kMostTimes = 200;  // of a motion, that the forces are compared at
+
+/// The law's own contact and offset if it was fitted to this recording alone; else those that suit
+/// the recording best.
+RecordingPlacement placement_of(const LawFile& law, const PreparedRecording& recording) {
+  const std::string& sha256 = recording.recording.header.sha256;
+  const bool own = law.uncertainty && law.uncertainty->data.size() == 1 && !sha256.empty() &&
+                   law.uncertainty->data.front().sha256 == sha256;
+  const std::vector<double> values = own ? law.values : place_recording(law, recording).values;
+  return {values[values.size() - 2], values.back()};
+}
+
+}  // namespace
+
+MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& recording) {
+  const Recording& r = recording.recording;
+  require_quantities_of(law, recording);
+  const RecordingPlacement placement = placement_of(law, recording);
+  std::vector<double> time_s, drive_m, force_N;
+  for (std::size_t i = 0; i < r.time_s.size() && r.time_s[i] <= recording.to_s; ++i) {
+    if (r.time_s[i] < recording.from_s) continue;
+    time_s.push_back(r.time_s[i]);
+    drive_m.push_back(r.drive[i]);
+    force_N.push_back(r.response[i] - placement.offset_N);
+  }
+  if (!(*std::max_element(drive_m.begin(), drive_m.end()) > placement.contact_m)) {
+    throw bad_input(fmt::format("recording '{}'", recording.name), "does not press the tissue",
+                    "a depth beyond the law's contact");
+  }
+  Protocol whole = measured_history(Drive::displacement, time_s, drive_m);
+  whole.set_equilibrium_at_start(true);
+  const Protocol drive = followed_by_organ(whole, placement.contact_m);
+  MaterialMotion motion{recording.name, beyond_contact(drive, placement.contact_m), {}};
+  const std::size_t stride = 1 + time_s.size() / kMostTimes;
+  for (std::size_t i = 0; i < time_s.size(); i += stride) {
+    motion.time_s.push_back(time_s[i]);
+    motion.measured_N.push_back(force_N[i]);
+  }
+  motion.drive = drive;
+  motion.placement = placement;
+  return motion;
+}
+
+MaterialMotion motion_of_protocol(const Protocol& protocol, std::vector<double> times_s) {
+  if (protocol.drive() != Drive::displacement || !(protocol.peak() > 0.0)) {
+    throw bad_input("protocol", "does not press the tissue to a depth", "imposed depths above 0");
+  }
+  std::vector<double> times;
+  const std::size_t stride = 1 + times_s.size() / kMostTimes;
+  for (std::size_t i = 0; i < times_s.size(); i += stride) times.push_back(times_s[i]);
+  return {{}, protocol, std::move(times)};
+}
+
+}  // namespace tpm::study

@@ -1,0 +1,167 @@
+// Declared in tpm/fit/predict/prediction_parts.hpp.
+// A prediction beside a recording.
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/fit/fit.hpp"
+#include "tpm/fit/predict/prediction_parts.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
+
+namespace tpm::study {
+namespace {
+
+/// Adds the directions in which contact and offset of the recording move: with the material (they
+/// are found for it by least squares), and with the recording's own noise.
+void add_own_directions(UncertainCoordinates& u, const OwnPlacement& own, const Model& model,
+                        const LawFile& law, const PreparedRecording& recording,
+                        const Protocol& protocol) {
+  if (own.place.empty()) return;
+  const Recording& r = recording.recording;
+  std::vector<double> times;
+  std::vector<double> sd;
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    if (r.time_s[i] < recording.from_s || r.time_s[i] > recording.to_s) continue;
+    times.push_back(r.time_s[i]);
+    if (!r.response_sd.empty()) sd.push_back(r.response_sd[i]);
+  }
+  const Response response =
+      model.respond(protocol, times, own.values, Want::values_and_sensitivity);
+  const Eigen::MatrixXd material = coordinate_slopes(response, u, own.values);
+  std::vector<Eigen::Index> columns(own.place.begin(), own.place.end());
+  Eigen::MatrixXd nuisance = response.sensitivity(Eigen::all, columns);
+  Eigen::VectorXd sigma = Eigen::VectorXd::Ones(response.value.size());
+  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const auto own_sd = k < sd.size() ? std::optional<double>(sd[k]) : std::nullopt;
+    const auto known = reading_sigma(law.uncertainty->noise, response.value[i], own_sd);
+    if (known && *known > 0.0) sigma[i] = *known;
+  }
+  nuisance = sigma.cwiseInverse().asDiagonal() * nuisance;
+  const Eigen::MatrixXd weighted = sigma.cwiseInverse().asDiagonal() * material;
+  const Eigen::LDLT<Eigen::MatrixXd> normal(nuisance.transpose() * nuisance);
+  const Eigen::MatrixXd follows = -normal.solve(nuisance.transpose() * weighted);
+  const auto found = static_cast<Eigen::Index>(own.place.size());
+  const Eigen::MatrixXd noise = law.uncertainty->readings_per_independent *
+                                normal.solve(Eigen::MatrixXd::Identity(found, found));
+  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(u.root.rows() + found, u.root.cols() + found);
+  root.topLeftCorner(u.root.rows(), u.root.cols()) = u.root;
+  root.bottomLeftCorner(found, u.root.cols()) = follows * u.root;
+  root.bottomRightCorner(found, found) = covariance_root(noise);
+  u.root = std::move(root);
+  for (const std::size_t place : own.place) {
+    u.place.push_back(place);
+    u.coordinate.push_back(Coordinate::linear);
+  }
+}
+
+bool has_read(const LawFile& law, const PreparedRecording& recording) {
+  const std::string& sha256 = recording.recording.header.sha256;
+  const auto& data = law.uncertainty->data;
+  return !sha256.empty() && std::ranges::find(data, sha256, &FittedFile::sha256) != data.end();
+}
+
+void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& recording) {
+  const Recording& r = recording.recording;
+  PredictedRecording own;
+  own.name = recording.name;
+  own.observed = r.response;
+  struct Sum {
+    double squares = 0.0;
+    int inside = 0;
+  };
+  Sum sums[3];
+  PredictionComparison* parts[3] = {&own.fitted, &own.held_out, &own.outside};
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    const bool window = r.time_s[i] >= recording.from_s && r.time_s[i] <= recording.to_s;
+    bool fitted = false;
+    for (const FittedFile& file : law.uncertainty->data) {
+      fitted = fitted ||
+               (!file.sha256.empty() && file.sha256 == r.header.sha256 && file.holds(r.time_s[i]));
+    }
+    own.in_window.push_back(window);
+    own.was_fitted.push_back(fitted);
+    if (window) own.peak = std::max(own.peak, std::abs(r.response[i]));
+    if (!std::isfinite(p.response[i])) continue;
+    const std::size_t part = fitted ? 0 : window ? 1 : 2;
+    const double off = p.response[i] - r.response[i];
+    ++parts[part]->samples;
+    parts[part]->largest = std::max(parts[part]->largest, std::abs(off));
+    sums[part].squares += off * off;
+    if (p.reading_lower.empty()) continue;
+    sums[part].inside += r.response[i] >= p.reading_lower[i] && r.response[i] <= p.reading_upper[i];
+  }
+  for (std::size_t part = 0; part < 3; ++part) {
+    const int n = parts[part]->samples;
+    if (n == 0) continue;
+    parts[part]->rms = std::sqrt(sums[part].squares / n);
+    if (!p.reading_lower.empty()) parts[part]->share_in_reading_band = 1.0 * sums[part].inside / n;
+  }
+  p.recording = std::move(own);
+}
+
+}  // namespace
+
+OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording) {
+  SetupOptions setup;
+  setup.reference = law.spec.reference;
+  setup.profiles = false;
+  const FitResult fit = fit_placement(law.spec, law.values, recording, setup);
+  OwnPlacement result{model_parameters(fit.config, fit.best.natural, 0), {}};
+  for (const std::size_t free : fit.covariance.free) {
+    result.place.push_back(fit.config.parameters[free].sets.front().parameter);
+  }
+  return result;
+}
+
+LawPrediction predict_recording(const LawFile& law, const PreparedRecording& recording,
+                                const PredictionOptions& options) {
+  const Recording& r = recording.recording;
+  Protocol protocol = measured_history(Drive::displacement, r.time_s, r.drive);
+  protocol.set_equilibrium_at_start(true);
+  return predict_recording_by(
+      LawModel(law.spec), law, recording, protocol, [&] { return place_recording(law, recording); },
+      options);
+}
+
+void require_quantities_of(const LawFile& law, const PreparedRecording& recording) {
+  const Recording& r = recording.recording;
+  if (r.drive_quantity != law.spec.drive || r.response_quantity != law.spec.response) {
+    throw bad_input(fmt::format("recording '{}'", recording.name),
+                    fmt::format("{} over {}", quantity_name(r.response_quantity),
+                                quantity_name(r.drive_quantity)),
+                    fmt::format("{} over {}, as the law answers", quantity_name(law.spec.response),
+                                quantity_name(law.spec.drive)));
+  }
+}
+
+LawPrediction predict_recording_by(const Model& model, const LawFile& law,
+                                   const PreparedRecording& recording, const Protocol& motion,
+                                   const std::function<OwnPlacement()>& place,
+                                   const PredictionOptions& options) {
+  LawPrediction p = begin_prediction(law, options);
+  const Recording& r = recording.recording;
+  require_quantities_of(law, recording);
+  p.placement =
+      options.placement.value_or(has_read(law, recording) ? Placement::fitted : Placement::own);
+  UncertainCoordinates u = fitted_coordinates(law, p.placement);
+  std::vector<double> values = law.values;
+  if (p.placement == Placement::own) {
+    const OwnPlacement own = place();
+    values = own.values;
+    add_own_directions(u, own, model, law, recording, motion);
+  } else if (p.placement == Placement::surface) {
+    values = at_surface(law).values;
+  }
+  p.contact = values[values.size() - 2];
+  p.offset = values.back();
+  p.time_s = r.time_s;
+  fill_prediction(p, model, law, motion, u, values, r.response_sd, options);
+  compare(p, law, recording);
+  return p;
+}
+
+}  // namespace tpm::study

@@ -1,0 +1,66 @@
+#include "tpmkit/fit.hpp"
+
+#include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/petab.hpp"
+#include "tpm/fit/select/selection.hpp"
+
+namespace tpm::fit {
+using namespace study;
+namespace {
+
+FitSummary summary_of(const FitResult& fit) {
+  FitSummary summary;
+  if (!no_law_because(fit.config)) summary.law = fitted_law(fit);
+  summary.chi_square = fit.chi_square;
+  summary.degrees_of_freedom = fit.degrees_of_freedom;
+  summary.starts_run = fit.starts_run;
+  summary.starts_failed = fit.starts_failed;
+  summary.starts_agreeing = fit.starts_agreeing;
+  for (const ParameterResult& p : fit.parameters) {
+    summary.parameters.push_back({.name = p.parameter.name,
+                                  .unit = std::string(si_symbol(p.parameter.unit.dimension)),
+                                  .estimate = p.estimate,
+                                  .standard_error = p.standard_error,
+                                  .lower = p.lower,
+                                  .upper = p.upper,
+                                  .verdict = p.verdict,
+                                  .nuisance = p.nuisance,
+                                  .words = p.words});
+  }
+  summary.flags = fit.flags;
+  summary.text = to_terminal_text(fit);
+  summary.json = to_text(to_json(fit));
+  return summary;
+}
+
+}  // namespace
+
+FitSummary fit_configuration(const std::filesystem::path& file, const FitRequest& request) {
+  FitProblem problem = read_fit_problem(file);
+  if (request.starts) problem.config.starts = *request.starts;
+  if (request.seed) problem.config.seed = *request.seed;
+  problem.config.interrupted = request.interrupted;
+  return summary_of(run_fit(problem));
+}
+
+FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
+                          const FitRequest& request) {
+  std::vector<PreparedRecording> recordings;
+  for (const std::filesystem::path& file : files) {
+    recordings.push_back(prepare_recording(file.string(), read_recording_file(file, {}).recording));
+  }
+  SelectionOptions options;
+  if (!request.law.empty()) options.laws = {parse_law_name(request.law, "law")};
+  options.only_listed = !request.law.empty();
+  if (request.starts) options.setup.starts = *request.starts;
+  if (request.seed) options.setup.seed = *request.seed;
+  options.setup.interrupted = request.interrupted;
+  const Selection selection = select_law(recordings, options);
+  FitSummary summary = summary_of(selection.candidates[selection.recommended].fit);
+  summary.text = to_terminal_text(selection) + "\n" + summary.text;
+  summary.json = to_text(to_json(selection));
+  return summary;
+}
+
+}  // namespace tpm::fit

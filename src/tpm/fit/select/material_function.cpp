@@ -1,0 +1,294 @@
+#include "tpm/fit/select/material_function.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "tpm/base/text.hpp"
+#include "tpm/files/import/recording_file.hpp"
+#include "tpm/work/progress.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
+
+namespace tpm::study {
+namespace {
+
+/// What the readings tell about the sizes of a law's parameters.
+struct FunctionSizes {
+  double stiffness = 0.0;  ///< largest, Pa or N/m
+  double shortest_s = std::numeric_limits<double>::infinity();
+  double longest_s = 0.0;
+  bool all_positive = true;
+  double largest = 0.0;  ///< reading
+
+  void see(double reading) {
+    all_positive = all_positive && reading > 0.0;
+    largest = std::max(largest, std::abs(reading));
+  }
+  void see_time(double time_s) {
+    if (!(time_s > 0.0)) return;
+    shortest_s = std::min(shortest_s, time_s);
+    longest_s = std::max(longest_s, time_s);
+  }
+};
+
+FunctionSizes sizes_of_spectrum(const Spectrum& spectrum) {
+  FunctionSizes sizes;
+  for (std::size_t i = 0; i < spectrum.frequency_Hz.size(); ++i) {
+    sizes.see(spectrum.storage[i]);
+    sizes.see(spectrum.loss[i]);
+    sizes.stiffness = std::max(sizes.stiffness, std::hypot(spectrum.storage[i], spectrum.loss[i]));
+    sizes.see_time(0.5 / (std::numbers::pi * spectrum.frequency_Hz[i]));
+  }
+  return sizes;
+}
+
+FunctionSizes sizes_of_step(const Recording& recording) {
+  FunctionSizes sizes;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < recording.response.size(); ++i) {
+    sizes.see(recording.response[i]);
+    if (recording.response[i] > 0.0) least = std::min(least, recording.response[i]);
+    sizes.see_time(recording.time_s[i]);
+  }
+  const bool compliance = recording.response_quantity == Quantity::creep_compliance;
+  sizes.stiffness = compliance ? 1.0 / least : sizes.largest;
+  return sizes;
+}
+
+FunctionSizes sizes_of_function(const MaterialFunction& function) {
+  const auto* spectrum = std::get_if<Spectrum>(&function.data);
+  const FunctionSizes sizes = spectrum != nullptr
+                                  ? sizes_of_spectrum(*spectrum)
+                                  : sizes_of_step(std::get<Recording>(function.data));
+  if (sizes.stiffness > 0.0 && std::isfinite(sizes.stiffness) && sizes.longest_s > 0.0)
+    return sizes;
+  throw bad_input(fmt::format("{} '{}'", function.kind(), function.name),
+                  "no reading above 0, or no time above 0", "readings of a material");
+}
+
+/// @param branch number of the parameter's branch, from 0
+FitParameter function_bounds(const LawParameter& p, const FunctionSizes& sizes, int branch,
+                             int branches) {
+  constexpr double kBeyond = 10.0;  // of the times that were measured
+  FitParameter fit;
+  fit.name = p.name;
+  fit.unit = shown_unit(p.dimension);
+  if (p.dimension == Dimension::time) {
+    fit.scale = Scale::log;
+    fit.lower = sizes.shortest_s / kBeyond;
+    fit.upper = sizes.longest_s * kBeyond;
+    const double share = (branch + 1.0) / (std::max(branches, 1) + 1.0);
+    fit.start = sizes.shortest_s * std::pow(sizes.longest_s / sizes.shortest_s, share);
+  } else if (p.dimension == Dimension::dimensionless) {
+    fit.scale = Scale::linear;
+    fit.lower = p.lower;
+    fit.upper = p.upper;
+    fit.start = 0.3 * (p.upper + p.lower);
+  } else {
+    fit.scale = p.linear ? Scale::linear : Scale::log;
+    fit.lower = p.linear ? 0.0 : 1e-6 * sizes.stiffness;
+    fit.upper = 1e3 * sizes.stiffness;
+    fit.start = sizes.stiffness / (branches + 1);
+  }
+  return readable(std::move(fit));
+}
+
+Noise noise_of_function(const MaterialFunction& function, const FunctionSizes& sizes) {
+  constexpr double kShare = 0.01;  // its size is estimated
+  Noise noise;
+  noise.scale_known = false;
+  const auto known = [](const std::vector<double>& sd) {
+    return !sd.empty() && std::all_of(sd.begin(), sd.end(), [](double s) { return s > 0.0; });
+  };
+  const auto* spectrum = std::get_if<Spectrum>(&function.data);
+  const bool per_row = spectrum != nullptr ? known(spectrum->storage_sd) && known(spectrum->loss_sd)
+                                           : known(std::get<Recording>(function.data).response_sd);
+  if (per_row) {
+    noise.kind = NoiseKind::per_row;
+  } else if (sizes.all_positive) {
+    noise.kind = NoiseKind::relative_to_datum;
+    noise.relative = kShare;
+  } else {
+    noise.kind = NoiseKind::absolute;
+    noise.absolute = kShare * sizes.largest;
+  }
+  return noise;
+}
+
+double largest_residual_share(const FitResult& fit) {
+  double sum = 0.0, largest = 0.0;
+  for (const FittedDatum& d : fit.data) {
+    sum += std::pow(d.predicted - *d.datum.value, 2);
+    largest = std::max(largest, std::abs(*d.datum.value));
+  }
+  return std::sqrt(sum / static_cast<double>(fit.data.size())) / largest;
+}
+
+constexpr ProtocolSpans kEndlessHold{.hold_s = std::numeric_limits<double>::infinity()};
+
+std::vector<DataSet> data_set_of(const MaterialFunction& function) {
+  return {std::visit([](const auto& d) { return DataSet(d); }, function.data)};
+}
+
+Candidate fit_function(const LawSpec& law, const MaterialFunction& function, SetupOptions setup) {
+  setup.profiles = false;
+  // The stiffness of a spring-pot has no value at the step itself: a reading there is a reason
+  // against the law, not an error of the file.
+  const bool refusal_counts = law.fractional != Fractional::none;
+  Candidate candidate =
+      fit_candidate(function_config(law, function, setup), data_set_of(function), refusal_counts);
+  if (candidate.failed) return candidate;
+  candidate.rms_over_peak = largest_residual_share(candidate.fit);
+  candidate.reason = not_identified(candidate, kEndlessHold);
+  candidate.identified = candidate.reason.empty();
+  return candidate;
+}
+
+/// Relaxation times that lie outside what was measured, in words.
+std::vector<std::string> range_warnings(const FitResult& fit, const FunctionSizes& sizes) {
+  std::vector<std::string> warnings;
+  for (const ParameterResult& p : fit.parameters) {
+    if (p.parameter.unit.dimension != Dimension::time) continue;
+    const bool early = p.estimate < sizes.shortest_s;
+    if (!early && p.estimate <= sizes.longest_s) continue;
+    warnings.push_back(fmt::format("{} = {} lies outside the measured range ({} s to {} s)",
+                                   p.parameter.name, in_unit(p.parameter, p.estimate),
+                                   significant(sizes.shortest_s, 3),
+                                   significant(sizes.longest_s, 3)));
+  }
+  return warnings;
+}
+
+std::vector<LawSpec> linear_family() {
+  std::vector<LawSpec> laws;
+  constexpr int kMost = 4;
+  for (int branches = 0; branches <= kMost; ++branches) {
+    LawSpec law;
+    law.branches = branches;
+    laws.push_back(law);
+  }
+  for (const Fractional fractional :
+       {Fractional::springpot, Fractional::maxwell, Fractional::kelvin_voigt, Fractional::zener,
+        Fractional::maxwell_pair, Fractional::kelvin_voigt_pair, Fractional::zener_pair}) {
+    LawSpec law;
+    law.branches = 0;
+    law.fractional = fractional;
+    laws.push_back(law);
+  }
+  return laws;
+}
+
+}  // namespace
+
+std::string MaterialFunction::kind() const {
+  if (std::holds_alternative<Spectrum>(data)) return "spectrum";
+  return std::get<Recording>(data).response_quantity == Quantity::creep_compliance
+             ? "creep compliance"
+             : "relaxation modulus";
+}
+
+std::optional<MaterialFunction> find_material_function(const std::string& path,
+                                                       const ImportOptions& import) {
+  MeasuredFile measured = read_measured_file(path, import);
+  if (auto* spectrum = std::get_if<SpectrumFile>(&measured)) {
+    return MaterialFunction{path, std::move(spectrum->spectrum), import,
+                            columns_words(spectrum->findings)};
+  }
+  auto& file = std::get<RecordingFile>(measured);
+  if (!is_step_response(file.recording.response_quantity)) return std::nullopt;
+  return MaterialFunction{path, std::move(file.recording), import, columns_words(file.findings)};
+}
+
+FitConfig function_config(LawSpec law, const MaterialFunction& function,
+                          const SetupOptions& options) {
+  const FunctionSizes sizes = sizes_of_function(function);
+  const auto* spectrum = std::get_if<Spectrum>(&function.data);
+  if (law.kernel != Kernel::linear || law.tension != Tension::none) {
+    throw bad_input(fmt::format("{} '{}'", function.kind(), function.name),
+                    fmt::format("the law {}", law_name(law)),
+                    "a law with a linear kernel and no tension: small strains tell no more");
+  }
+  if (spectrum == nullptr || spectrum->dimension == Dimension::stress) {
+    law.drive = Quantity::strain;
+    law.response = Quantity::stress;
+    law.reference = 1.0;
+  }
+  const LawModel model(law);
+  FitConfig config;
+  config.law = law;
+  config.title = fmt::format("{}: {}", function.name, law_name(law));
+  config.starts = options.starts;
+  config.seed = options.seed;
+  config.level = options.level;
+  config.profiles = options.profiles;
+  config.interrupted = options.interrupted;
+  int times = 0;
+  for (std::size_t i = 0; i < model.law_parameters().size(); ++i) {
+    const LawParameter& p = model.law_parameters()[i];
+    config.fixed.push_back(p.preset.value_or(0.0));
+    if (p.nuisance || p.preset) continue;
+    config.parameters.push_back(
+        {function_bounds(p, sizes, times, law.branches), {{i, {}}}, false, {}});
+    if (p.dimension == Dimension::time) ++times;
+  }
+  DataChoice data;
+  data.dataset = function.name;
+  data.protocol.kind =
+      spectrum != nullptr ? ProtocolChoice::Kind::oscillation : ProtocolChoice::Kind::measured;
+  data.noise = noise_of_function(function, sizes);
+  data.import = function.import;
+  config.data.push_back(std::move(data));
+  return config;
+}
+
+Selection select_law(const MaterialFunction& function, const SelectionOptions& options) {
+  const std::vector<LawSpec> laws = options.laws.empty() ? linear_family() : options.laws;
+  Selection s;
+  s.margin = options.margin;
+  Progress progress("fitting laws", laws.size());
+  for (const LawSpec& law : laws) {
+    s.candidates.push_back(fit_function(law, function, options.setup));
+    progress.advance();
+    const Candidate& made = s.candidates.back();
+    const bool branched = law.branches > 0 && law.solid && law.form == BranchForm::parallel;
+    if (options.only_listed || made.failed || !branched || !plateau_is_not_told(made.fit)) continue;
+    LawSpec fluid = law;
+    fluid.solid = false;
+    s.candidates.push_back(fit_function(fluid, function, options.setup));
+  }
+  const auto fitted = std::find_if(s.candidates.begin(), s.candidates.end(),
+                                   [](const Candidate& c) { return !c.failed; });
+  if (fitted == s.candidates.end()) {
+    throw Error(ExitCode::numerical, "fit",
+                fmt::format("none of {} laws could be fitted: {}", laws.size(),
+                            s.candidates.front().reason));
+  }
+  s.samples = fitted->fit.value_count;
+  s.effective_count = s.samples;
+  rank_candidates(s);
+  Candidate& chosen = s.candidates[s.recommended];
+  if (options.setup.profiles) {
+    chosen.fit =
+        run_fit(function_config(chosen.law, function, options.setup), data_set_of(function));
+    reassess(chosen, kEndlessHold);
+  }
+  s.warnings = range_warnings(chosen.fit, sizes_of_function(function));
+  s.words.push_back(fmt::format(
+      "{} of {} readings; {} {} ({}): {} parameters, rms residual {} % of the largest "
+      "reading",
+      function.kind(), s.samples, least_law_words(s, "they"), law_name(chosen.law),
+      law_words(chosen.law), chosen.parameters - 1, significant(100.0 * chosen.rms_over_peak, 3)));
+  const Candidate& best = s.candidates[s.best_bic];
+  if (s.recommended != s.best_bic) {
+    s.words.push_back(fmt::format("{} has the lowest BIC, by {}{}{}", law_name(best.law),
+                                  significant(chosen.delta_bic, 3), best.identified ? "" : "; ",
+                                  best.reason));
+  }
+  return s;
+}
+
+}  // namespace tpm::study

@@ -1,0 +1,41 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "tpm/fit/select/selection.hpp"
+
+namespace tpm::study {
+
+/// What a rheometer measures of a linear material, whatever the specimen: storage and loss over
+/// frequency, a relaxation modulus G(t) or a creep compliance J(t).
+struct MaterialFunction {
+  std::string name;  ///< a path where the configuration is to be rerun
+  std::variant<Spectrum, Recording> data;
+  ImportOptions import;  ///< with which it was read, for the configuration
+  std::string
+      read_as;  ///< how its columns and units were understood; empty for a file with a description
+
+  /// "spectrum", "relaxation modulus" or "creep compliance".
+  [[nodiscard]] std::string kind() const;
+};
+
+/// The material function that a file holds (read_measured_file); none if it
+/// holds a recording with a drive. Throws as these do.
+[[nodiscard]] std::optional<MaterialFunction> find_material_function(const std::string& path,
+                                                                     const ImportOptions& import);
+
+/// The configuration that fits one law with a linear kernel: of stress over strain for moduli and
+/// compliances, of force over depth for dynamic stiffnesses. Noise in parts of each reading (or the
+/// file's standard deviations), its size estimated; bounds from the readings.
+[[nodiscard]] FitConfig function_config(LawSpec law, const MaterialFunction& function,
+                                        const SetupOptions& options);
+
+/// Fits every law and recommends the least, as select_law does for recordings; without held-out
+/// errors. The readings count as independent.
+/// @param options laws empty: linear kernels with 0 to 4 branches, and the laws with one or two
+///        spring-pots
+[[nodiscard]] Selection select_law(const MaterialFunction& function,
+                                   const SelectionOptions& options);
+
+}  // namespace tpm::study

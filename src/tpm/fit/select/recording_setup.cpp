@@ -1,0 +1,435 @@
+#include "tpm/fit/select/recording_setup.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/lists.hpp"
+#include "tpm/base/median.hpp"
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
+
+namespace tpm::study {
+namespace {
+
+bool is_after_the_test(PhaseKind kind) {
+  return kind == PhaseKind::unloading || kind == PhaseKind::detached || kind == PhaseKind::recovery;
+}
+
+/// Samples before contact that are kept, so that the zero of the response is seen.
+constexpr std::size_t kBaseline = 10;
+
+/// What the recordings tell about the sizes of a law's parameters.
+struct Sizes {
+  double drive = 0.0;     ///< largest drive above contact
+  double response = 0.0;  ///< largest response above its floor
+  double shortest_s = 0.0;
+  double longest_s = 0.0;
+};
+
+double start_drive(const PreparedRecording& r) {
+  return r.phases.contact_found && !r.phases.preloaded ? r.phases.contact_drive
+                                                       : r.recording.drive.front();
+}
+
+Sizes sizes_of(std::span<const PreparedRecording> recordings) {
+  Sizes sizes;
+  sizes.shortest_s = std::numeric_limits<double>::infinity();
+  for (const PreparedRecording& r : recordings) {
+    sizes.drive = std::max(sizes.drive, r.phases.peak_drive - start_drive(r));
+    sizes.response = std::max(sizes.response, r.phases.peak_response - r.phases.floor_response);
+    sizes.shortest_s = std::min(sizes.shortest_s, median_step(r.recording.time_s));
+    sizes.longest_s = std::max(sizes.longest_s, r.to_s - r.from_s);
+  }
+  if (sizes.drive > 0.0 && sizes.response > 0.0) return sizes;
+  const PreparedRecording& first = recordings.front();
+  const auto falls = [](const std::vector<double>& values, double rise) {
+    return values.front() - *std::min_element(values.begin(), values.end()) > std::max(rise, 0.0);
+  };
+  const std::string where = fmt::format("recording '{}'", first.name);
+  const bool down = falls(first.recording.drive, sizes.drive);
+  if (down || falls(first.recording.response, sizes.response)) {
+    throw bad_input(where, fmt::format("the {} falls", down ? "drive" : "response"),
+                    "values that rise with the load: --negate-drive, --negate-response or both, if "
+                    "the machine counts them the other way");
+  }
+  throw bad_input(where,
+                  sizes.drive > 0.0 ? "the response never rises above where it starts"
+                                    : "the drive never rises above where contact begins",
+                  "a ramp that is answered by a rising response");
+}
+
+/// Automatic bounds, and how far they may be moved out.
+struct AutomaticBounds {
+  FitParameter fit;
+  WidestBounds widest;
+};
+
+AutomaticBounds law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int branches) {
+  constexpr double kFurther = 1e3;  // on a log scale
+  const auto linear = [&p](double lower, double start, double upper) {
+    return FitParameter{p.name, shown_unit(p.dimension), Scale::linear, start, lower, upper};
+  };
+  FitParameter fit = linear(p.lower, p.lower, p.upper);
+  WidestBounds widest{p.lower, p.upper};
+  const double stiffness = sizes.response / sizes.drive;
+  if (p.dimension == Dimension::time) {
+    fit.scale = Scale::log;
+    fit.lower = 0.5 * sizes.shortest_s;
+    fit.upper = 10.0 * sizes.longest_s;
+    fit.start = std::clamp(0.1 * sizes.longest_s, fit.lower, fit.upper);
+    // What relaxes between two samples is not seen, however far the bound is moved.
+    widest = {fit.lower, kFurther * fit.upper};
+  } else if (p.name == "exponent") {
+    fit = linear(1.0, 1.5, 6.0);
+  } else if (p.name == "alpha") {
+    fit.start = 0.3;
+  } else if (p.name == "beta") {
+    fit.start = 0.1;
+  } else if (p.name == "tension_share") {
+    fit = linear(0.0, 0.5, 1.0);
+  } else {
+    fit.scale = p.linear ? Scale::linear : Scale::log;
+    fit.lower = p.linear ? 0.0 : 1e-4 * stiffness;
+    fit.upper = 1e3 * stiffness;
+    fit.start = stiffness / (branches + 1);
+    widest = {fit.lower / (p.linear ? 1.0 : kFurther), kFurther * fit.upper};
+  }
+  fit = readable(std::move(fit));
+  return {fit, {std::min(widest.lower, fit.lower), std::max(widest.upper, fit.upper)}};
+}
+
+bool is_stretch(const LawSpec& law) {
+  return law.drive == Quantity::relative_length;
+}
+
+bool bends(const LawSpec& law) {
+  return law.kernel != Kernel::linear || law.tension != Tension::none;
+}
+
+/// Whether contact and offset can be told apart: by a bend of the kernel, or by a response that
+/// begins to rise within the recording. Where it begins was found in noisy readings; to fix contact
+/// there would take an estimate for known.
+bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
+  if (law.drive == Quantity::strain) return false;  // it counts from the unloaded specimen
+  if (bends(law)) return true;
+  const double contact_s = r.recording.time_s[r.phases.contact_index];
+  return !r.phases.preloaded && r.phases.contact_found && contact_s >= r.from_s;
+}
+
+/// Contact may lie this many times the depth of the recording before its start at most.
+constexpr double kFurthestContact = 2.0;
+
+AutomaticBounds contact_bounds(const LawSpec& law, std::span<const PreparedRecording> recordings,
+                               std::string name) {
+  FitParameter fit;
+  fit.name = std::move(name);
+  fit.scale = Scale::linear;
+  const bool stretch = is_stretch(law);
+  fit.unit = shown_unit(quantity_dimension(law.drive));
+  const PreparedRecording& r = recordings.front();
+  const double begin = start_drive(r);
+  const double range = r.phases.peak_drive - begin;
+  const bool preloaded = r.phases.preloaded || !r.phases.contact_found;
+  fit.start = begin;
+  fit.lower = bends(law) || !stretch ? begin - (stretch ? 0.5 : 0.25) * range : begin;
+  fit.upper = begin + (stretch ? 0.6 : 0.1) * range;
+  if (preloaded && !stretch) fit.start = begin - 0.05 * range;
+  WidestBounds widest{begin - kFurthestContact * range, begin + 0.9 * range};
+  // Under a straight kernel that was in contact from the start, depth and offset say the same.
+  if (!bends(law)) {
+    fit.lower = std::max(fit.lower, r.recording.drive.front());
+    widest.lower = fit.lower;
+  }
+  if (stretch) widest.lower = std::min(fit.lower, std::max(widest.lower, 0.1 * begin));
+  fit.start = std::max(fit.start, fit.lower);
+  fit = readable(std::move(fit));
+  return {fit, {std::min(widest.lower, fit.lower), std::max(widest.upper, fit.upper)}};
+}
+
+AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
+  constexpr double kFurther = 10.0;
+  const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
+  const Unit unit = shown_unit(quantity_dimension(law.response));
+  return {readable({std::move(name), unit, Scale::linear, 0.0, -peak, peak}),
+          {-kFurther * peak, kFurther * peak}};
+}
+
+Noise noise_of(const PreparedRecording& r) {
+  Noise noise;
+  noise.scale_known = false;
+  const std::vector<double>& sd = r.recording.response_sd;
+  if (!sd.empty() && std::all_of(sd.begin(), sd.end(), [](double s) { return s > 0.0; })) {
+    noise.kind = NoiseKind::per_row;
+    return noise;
+  }
+  noise.kind = NoiseKind::absolute;
+  noise.absolute =
+      0.01 * std::max(std::abs(r.phases.peak_response), std::numeric_limits<double>::min());
+  return noise;
+}
+
+void require_alike(std::span<const PreparedRecording> recordings) {
+  if (recordings.empty()) throw bad_input("fit", "no recording", "at least one");
+  const Recording& first = recordings.front().recording;
+  for (const PreparedRecording& r : recordings) {
+    if (r.recording.drive_quantity == first.drive_quantity &&
+        r.recording.response_quantity == first.response_quantity) {
+      continue;
+    }
+    throw bad_input(fmt::format("recording '{}'", r.name),
+                    fmt::format("{} over {}", quantity_name(r.recording.response_quantity),
+                                quantity_name(r.recording.drive_quantity)),
+                    fmt::format("{} over {}, as in '{}'", quantity_name(first.response_quantity),
+                                quantity_name(first.drive_quantity), recordings.front().name));
+  }
+}
+
+void add_automatic(FitConfig& config, AutomaticBounds bounds, std::vector<Target> sets) {
+  config.parameters.push_back({std::move(bounds.fit), std::move(sets), false, bounds.widest});
+}
+
+/// Adds the nuisance parameters of all recordings to a configuration.
+void add_nuisance(FitConfig& config, const LawModel& model,
+                  std::span<const PreparedRecording> recordings, Nuisance nuisance) {
+  if (nuisance == Nuisance::none) return;
+  const LawSpec& law = model.spec();
+  const bool several = recordings.size() > 1;
+  const auto named = [&](const char* what, const PreparedRecording& r) {
+    return several ? fmt::format("{} {}", what, r.name) : std::string(what);
+  };
+  const auto scope = [&](std::size_t i) {
+    return several ? std::vector<std::size_t>{i} : std::vector<std::size_t>{};
+  };
+  // The slack length belongs to the specimen; contact depth to each approach.
+  const bool shared_contact = is_stretch(law);
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const PreparedRecording& r = recordings[i];
+    add_automatic(config, offset_bounds(law, r, named("offset", r)),
+                  {{model.index("offset"), scope(i)}});
+    if (nuisance == Nuisance::offset || (shared_contact && i > 0)) continue;
+    if (nuisance == Nuisance::automatic && !shared_contact && !contact_is_seen(law, r)) continue;
+    add_automatic(
+        config,
+        contact_bounds(law, recordings.subspan(i, 1),
+                       shared_contact ? std::string("slack_length") : named("contact", r)),
+        {{model.index("contact"), shared_contact ? std::vector<std::size_t>{} : scope(i)}});
+  }
+}
+
+}  // namespace
+
+double median_step(std::span<const double> time_s) {
+  std::vector<double> steps;
+  steps.reserve(time_s.size());
+  for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
+  return median(std::move(steps));
+}
+
+FitParameter readable(FitParameter fit) {
+  constexpr int kDigits = 4;
+  fit.lower = rounded(fit.lower, kDigits);
+  fit.upper = rounded(fit.upper, kDigits);
+  fit.start = std::clamp(rounded(fit.start, kDigits), fit.lower, fit.upper);
+  return fit;
+}
+
+PreparedRecording prepare_recording(std::string name, Recording recording,
+                                    const PhaseOptions& options) {
+  PreparedRecording r{std::move(name), std::move(recording), {}, 0.0, 0.0, {}};
+  r.phases = find_phases(r.recording, options);
+  const std::vector<double>& time = r.recording.time_s;
+  const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;
+  r.from_s = time[contact > kBaseline ? contact - kBaseline : 0];
+  r.to_s = time.back();
+  bool pressed = false;
+  for (const Phase& phase : r.phases.phases) {
+    pressed = pressed || phase.kind == PhaseKind::loading || phase.kind == PhaseKind::hold;
+    if (!pressed || !is_after_the_test(phase.kind)) continue;
+    r.to_s = time[phase.first];
+    break;
+  }
+  if (r.to_s > r.from_s) return r;
+  throw bad_input(fmt::format("recording '{}'", r.name), "no ramp and hold before the unloading",
+                  "a recording that loads before it unloads");
+}
+
+double reference_drive(std::span<const PreparedRecording> recordings) {
+  return rounded(sizes_of(recordings).drive, 2);
+}
+
+double common_reference(std::span<const PreparedRecording> recordings) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    least = std::min(least, reference_drive(recordings.subspan(i, 1)));
+  }
+  return least;
+}
+
+FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recordings,
+                           const SetupOptions& options) {
+  require_alike(recordings);
+  law.drive = recordings.front().recording.drive_quantity;
+  law.response = recordings.front().recording.response_quantity;
+  const Sizes sizes = sizes_of(recordings);
+  law.reference = options.reference.value_or(reference_drive(recordings));
+  const LawModel model(law);
+  FitConfig config;
+  config.law = law;
+  config.title = recordings.size() == 1 ? recordings.front().name
+                                        : fmt::format("{} recordings", recordings.size());
+  config.title += fmt::format(": {}", law_name(law));
+  config.starts = options.starts;
+  config.seed = options.seed;
+  config.level = options.level;
+  config.profiles = options.profiles;
+  config.interrupted = options.interrupted;
+  for (const LawParameter& p : model.law_parameters()) {
+    config.fixed.push_back(p.preset.value_or(0.0));
+  }
+  for (std::size_t i = 0; i < model.law_parameters().size(); ++i) {
+    const LawParameter& p = model.law_parameters()[i];
+    if (p.nuisance || p.preset) continue;
+    if (p.name == "exponent" && options.exponent) {
+      config.fixed[i] = *options.exponent;
+      continue;
+    }
+    add_automatic(config, law_parameter_bounds(p, sizes, law.branches), {{i, {}}});
+  }
+  for (const PreparedRecording& r : recordings) {
+    DataChoice data;
+    data.dataset = r.name;
+    data.protocol.kind = ProtocolChoice::Kind::measured;
+    data.noise = noise_of(r);
+    data.from_s = r.from_s;
+    data.to_s = r.to_s;
+    data.import = r.import;
+    config.data.push_back(std::move(data));
+  }
+  config.fixed[model.index("contact")] = start_drive(recordings.front());
+  add_nuisance(config, model, recordings, options.nuisance);
+  return config;
+}
+
+std::vector<DataSet> data_sets(std::span<const PreparedRecording> recordings) {
+  return mapped<DataSet>(recordings, &PreparedRecording::recording);
+}
+
+namespace {
+
+Json import_json(const ImportOptions& import) {
+  Json j = Json::object();
+  const auto put = [&](const char* key, const std::string& value) {
+    if (!value.empty()) j[key] = value;
+  };
+  put("time", import.time_column);
+  put("drive", import.drive_column);
+  put("response", import.response_column);
+  put("sd", import.sd_column);
+  put("frequency", import.frequency_column);
+  put("storage", import.storage_column);
+  put("loss", import.loss_column);
+  if (import.drive_quantity) j["drive_quantity"] = quantity_name(*import.drive_quantity);
+  if (import.response_quantity) j["response_quantity"] = quantity_name(*import.response_quantity);
+  if (!import.units.empty()) j["units"] = import.units;
+  if (import.negate_drive) j["negate_drive"] = true;
+  if (import.negate_response) j["negate_response"] = true;
+  if (import.rest_length_m) {
+    j["rest_length"] = fmt::format("{} mm", shortest(1e3 * *import.rest_length_m));
+  }
+  if (import.spring_constant_N_per_m) {
+    j["spring_constant"] = fmt::format("{} N/m", shortest(*import.spring_constant_N_per_m));
+  }
+  if (!import.segments.empty()) j["segments"] = import.segments;
+  if (import.area_m2) j["area"] = fmt::format("{} mm^2", shortest(1e6 * *import.area_m2));
+  return j;
+}
+
+}  // namespace
+
+Json config_json(const FitConfig& config) {
+  const std::unique_ptr<Model> model = make_model(config);
+  const auto text = [](double value, const Unit& unit) {
+    return with_unit(shortest(value / unit.to_si), unit);
+  };
+  Json j{{"title", config.title}};
+  if (config.law) {
+    const Dimension drive = quantity_dimension(config.law->drive);
+    j["law"] = {{"name", law_name(*config.law)},
+                {"drive", quantity_name(config.law->drive)},
+                {"reference", text(config.law->reference, shown_unit(drive))}};
+  } else {
+    j["model"] = config.model;
+  }
+  Json parameters = Json::object();
+  std::vector<bool> estimated(model->parameters().size(), false);
+  for (const EstimatedParameter& p : config.parameters) {
+    Json entry{{"start", text(p.fit.start, p.fit.unit)},
+               {"lower", text(p.fit.lower, p.fit.unit)},
+               {"upper", text(p.fit.upper, p.fit.unit)},
+               {"scale", scale_name(p.fit.scale)}};
+    Json sets = Json::array();
+    for (const Target& target : p.sets) {
+      sets.push_back(model->parameters()[target.parameter].name);
+      estimated[target.parameter] = true;
+    }
+    entry["sets"] = std::move(sets);
+    if (!p.sets.front().data.empty()) {
+      entry["for"] =
+          array_json(p.sets.front().data, [&](std::size_t i) { return config.data[i].dataset; });
+    }
+    parameters[p.fit.name] = std::move(entry);
+  }
+  j["parameters"] = std::move(parameters);
+  Json fixed = Json::object();
+  for (std::size_t i = 0; i < estimated.size(); ++i) {
+    if (estimated[i] || !std::isfinite(config.fixed[i])) continue;
+    const ParameterDescription& p = model->parameters()[i];
+    fixed[std::string(p.name)] = text(config.fixed[i], shown_unit(p.dimension));
+  }
+  if (!fixed.empty()) j["fixed"] = std::move(fixed);
+  Json data = array_json(config.data, [&](const DataChoice& d) {
+    Json entry{{"dataset", d.dataset}};
+    entry["protocol"] = {{"kind", protocol_kind_name(d.protocol.kind)}};
+    entry["noise"] = {{"kind", noise_kind_name(d.noise.kind)}};
+    if (d.noise.kind == NoiseKind::absolute) {
+      const Dimension response = quantity_dimension(config.law->response);
+      entry["noise"]["absolute"] = text(d.noise.absolute, shown_unit(response));
+    }
+    if (d.noise.kind == NoiseKind::relative_to_datum) entry["noise"]["relative"] = d.noise.relative;
+    entry["noise"]["scale"] = d.noise.scale_known ? "known" : "estimated";
+    if (const Json import = import_json(d.import); !import.empty()) entry["import"] = import;
+    if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, shown_unit(Dimension::time));
+    if (std::isfinite(d.to_s)) entry["to"] = text(d.to_s, shown_unit(Dimension::time));
+    return entry;
+  });
+  j["data"] = std::move(data);
+  j["starts"] = {{"count", config.starts}, {"seed", config.seed}};
+  j["profile"] = {{"level", config.level}, {"enabled", config.profiles}};
+  return j;
+}
+
+bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter) {
+  if (!parameter.nuisance) return false;
+  return parameter.name == "offset" || spec.drive != Quantity::relative_length;
+}
+
+FitResult fit_placement(const LawSpec& law, std::span<const double> values,
+                        const PreparedRecording& recording, const SetupOptions& setup) {
+  FitConfig config = recording_config(law, std::span(&recording, 1), setup);
+  const std::vector<LawParameter> parameters = law_parameters(law);
+  std::erase_if(config.parameters, [&](const EstimatedParameter& p) {
+    const bool own =
+        p.sets.size() == 1 && belongs_to_recording(law, parameters[p.sets.front().parameter]);
+    return !own;
+  });
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (!belongs_to_recording(law, parameters[i])) config.fixed[i] = values[i];
+  }
+  return run_fit(config, data_sets(std::span(&recording, 1)));
+}
+
+}  // namespace tpm::study

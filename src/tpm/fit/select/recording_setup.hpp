@@ -1,0 +1,89 @@
+#pragma once
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tpm/data/phases.hpp"
+#include "tpm/fit/fit.hpp"
+#include "tpm/fit/likelihood/config.hpp"
+#include "tpm/fit/likelihood/experiment_residuals.hpp"
+
+namespace tpm::study {
+
+/// A recording ready to be fitted: what happened in it and which part is used.
+struct PreparedRecording {
+  std::string name;  ///< unique within a fit; a path where the configuration is to be rerun
+  Recording recording;
+  RecordingPhases phases;
+  double from_s = 0.0;        ///< window that is fitted: from the start
+  double to_s = 0.0;          ///< to the end of the first hold (before the drive first falls back)
+  ImportOptions import;       ///< with which it was read, for the configuration
+  std::string specimen = {};  ///< whose repeat it is, in a folder; empty: a specimen of its own
+  std::string read_as = {};   ///< how its columns and units were understood, in one sentence
+};
+
+/// Finds the phases and chooses the window. Throws Error(bad_input) if there is nothing to fit.
+[[nodiscard]] PreparedRecording prepare_recording(std::string name, Recording recording,
+                                                  const PhaseOptions& options = {});
+
+/// What belongs to a recording and not to the material.
+enum class Nuisance {
+  automatic,  ///< offset always; contact where the data can tell the two apart
+  none,
+  offset,
+  offset_and_contact,
+};
+
+/// Settings of an automatic configuration.
+struct SetupOptions {
+  Nuisance nuisance = Nuisance::automatic;
+  std::size_t starts = 40;
+  std::uint64_t seed = 0;
+  double level = 0.95;
+  bool profiles = true;
+  /// Depth (or change of relative length) that the coefficients refer to; reference_drive() if
+  /// nobody says.
+  std::optional<double> reference;
+  /// Exponent that power kernels keep, where the probe's shape gives it: 2 of a cone.
+  std::optional<double> exponent;
+  std::function<bool()> interrupted;  ///< see FitConfig
+};
+
+/// Time between two samples, at the median.
+[[nodiscard]] double median_step(std::span<const double> time_s);
+
+/// Bounds and start with no more digits than people read.
+[[nodiscard]] FitParameter readable(FitParameter fit);
+
+/// A reference depth for the kernels: the largest drive above contact among the recordings, to two
+/// digits.
+[[nodiscard]] double reference_drive(std::span<const PreparedRecording> recordings);
+
+/// A reference depth that every recording reaches: the least of their own.
+[[nodiscard]] double common_reference(std::span<const PreparedRecording> recordings);
+
+/// The configuration that fits one law to the recordings together: bounds and starts from the
+/// recordings, an offset (and contact) of its own for each, normal noise of unknown size (or the
+/// recordings' own standard deviations up to one factor). All recordings must have the same drive
+/// and response; otherwise Error(bad_input).
+[[nodiscard]] FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recordings,
+                                         const SetupOptions& options);
+
+/// The recordings as the fit takes them.
+[[nodiscard]] std::vector<DataSet> data_sets(std::span<const PreparedRecording> recordings);
+
+/// The configuration file that tpm fit reads, with the same meaning.
+[[nodiscard]] Json config_json(const FitConfig& config);
+
+/// The slack length of a strip belongs to the specimen: it stays, as in select_law.
+[[nodiscard]] bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter);
+
+/// Fits what belongs to a recording, with the parameters of the material as given.
+/// @param values of the whole law
+[[nodiscard]] FitResult fit_placement(const LawSpec& law, std::span<const double> values,
+                                      const PreparedRecording& recording,
+                                      const SetupOptions& setup);
+
+}  // namespace tpm::study

@@ -1,0 +1,472 @@
+#include "tpm/fit/select/selection.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/lists.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/work/give_up.hpp"
+#include "tpm/work/progress.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::study {
+namespace {
+
+/// Residuals of a fit, one run for each recording, in the order of time.
+std::vector<std::vector<double>> standardised_runs(const FitResult& fit) {
+  return mapped<std::vector<double>>(fit.recordings, [](const RecordingFit& r) {
+    std::vector<double> run;
+    run.reserve(r.observed.size());
+    for (std::size_t i = 0; i < r.observed.size(); ++i) {
+      if (r.fitted[i]) run.push_back(r.standardised[i]);
+    }
+    return run;
+  });
+}
+
+Correlation correlation_of(const FitResult& fit) {
+  const auto runs = standardised_runs(fit);
+  const std::vector<std::span<const double>> views(runs.begin(), runs.end());
+  return residual_correlation(views);
+}
+
+/// Fewer samples than these say nothing about a prediction.
+constexpr int kFewestPredicted = 5;
+
+double rms_over_peak(const FitResult& fit) {
+  double worst = 0.0;
+  for (const RecordingFit& r : fit.recordings) worst = std::max(worst, r.rms_residual / r.peak);
+  return worst;
+}
+
+const LawParameter* material_parameter(const std::vector<LawParameter>& table,
+                                       const std::string& name) {
+  for (const LawParameter& p : table) {
+    if (p.name == name && !p.nuisance) return &p;
+  }
+  return nullptr;
+}
+
+/// A material may relax to nothing: without a plateau the law stays what it is (a branch without
+/// its stiffness has a time that means nothing).
+bool may_vanish(const LawSpec& law, const std::string& parameter) {
+  return parameter == "k_inf" && (law.branches > 0 || law.fractional != Fractional::none);
+}
+
+/// See Candidate::contradicted.
+bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
+  double longest_s = 0.0;
+  const auto table = law_parameters(candidate.fit.config.law.value());
+  for (const ParameterResult& p : candidate.fit.parameters) {
+    const LawParameter* law = material_parameter(table, p.parameter.name);
+    if (law == nullptr || law->dimension != Dimension::time) continue;
+    if (spans.samples_too_far_for(p.estimate)) return true;
+    longest_s = std::max(longest_s, p.estimate);
+  }
+  return !candidate.law.solid && spans.too_short_to_end(longest_s);
+}
+
+}  // namespace
+
+std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans) {
+  constexpr int kLeastStandardErrors = 2;
+  double longest_s = 0.0;
+  const auto table = law_parameters(candidate.fit.config.law.value());
+  for (const ParameterResult& p : candidate.fit.parameters) {
+    const LawParameter* law = material_parameter(table, p.parameter.name);
+    if (law == nullptr) continue;
+    if (p.at_lower_bound && may_vanish(candidate.law, law->name)) continue;
+    if (p.at_lower_bound || p.at_upper_bound) {
+      return fmt::format("{} ends at its {} bound", p.parameter.name,
+                         p.at_lower_bound ? "lower" : "upper");
+    }
+    for (const Condition& c : p.conditional_on) {
+      if (!c.at_estimate) continue;
+      return fmt::format("{} ends at its {} bound, and {} depends on it", c.parameter,
+                         c.upper ? "upper" : "lower", p.parameter.name);
+    }
+    // An interval says more than the standard error, and stands in the table of the parameters.
+    const bool has_interval = p.verdict == Verdict::identified || p.verdict == Verdict::lower_only;
+    if (!p.standard_error && !has_interval) {
+      return fmt::format("{} has no standard error", p.parameter.name);
+    }
+    const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0 &&
+                           !may_vanish(candidate.law, law->name);
+    if (from_zero && !has_interval && p.estimate < kLeastStandardErrors * *p.standard_error) {
+      return fmt::format("{} is less than {} standard errors above 0", p.parameter.name,
+                         kLeastStandardErrors);
+    }
+    if (law->dimension != Dimension::time) continue;
+    if (p.standard_error && *p.standard_error > p.estimate) {
+      return fmt::format("{} is known only to its order of magnitude", p.parameter.name);
+    }
+    if (spans.samples_too_far_for(p.estimate)) {
+      return fmt::format("{} is sampled by fewer than {} points", p.parameter.name, kLeastSamples);
+    }
+    longest_s = std::max(longest_s, p.estimate);
+  }
+  if (!candidate.law.solid && spans.too_short_to_end(longest_s)) {
+    return fmt::format("a hold of {} s does not tell that nothing remains in the end",
+                       significant(spans.hold_s, 3));
+  }
+  return {};
+}
+
+void reassess(Candidate& chosen, const ProtocolSpans& spans) {
+  if (chosen.identified) return;
+  chosen.reason = not_identified(chosen, spans);
+  chosen.identified = chosen.reason.empty();
+}
+
+Candidate fit_candidate(const FitConfig& config, const std::vector<DataSet>& data,
+                        bool refusal_counts) {
+  Candidate candidate;
+  candidate.law = config.law.value();
+  candidate.parameters = static_cast<int>(config.parameters.size()) + 1;  // and the noise's size
+  try {
+    candidate.fit = run_fit(config, data);
+  } catch (const Error& error) {
+    const bool of_law = refusal_counts && error.code() == ExitCode::bad_input;
+    if (error.code() != ExitCode::numerical && !of_law) throw;
+    candidate.failed = true;
+    candidate.identified = false;
+    candidate.reason = error.what();
+  }
+  return candidate;
+}
+
+namespace {
+
+Candidate fit_to_recordings(const LawSpec& law, std::span<const PreparedRecording> recordings,
+                            const std::vector<DataSet>& data, SetupOptions setup) {
+  setup.profiles = false;
+  Candidate candidate = fit_candidate(recording_config(law, recordings, setup), data);
+  if (candidate.failed) return candidate;
+  candidate.rms_over_peak = rms_over_peak(candidate.fit);
+  const ProtocolSpans spans = protocol_spans(recordings);
+  candidate.reason = not_identified(candidate, spans);
+  candidate.identified = candidate.reason.empty();
+  candidate.contradicted = contradicts(candidate, spans);
+  return candidate;
+}
+
+/// The smallest deviance that counts: residuals at rounding level are all the same to us.
+double floored_deviance(const Candidate& c, int samples) {
+  constexpr double kRoundingSigma = 1e-10;  // of the noise unit, a hundredth of the peak
+  return std::max(c.fit.best.deviance, kRoundingSigma * kRoundingSigma * samples);
+}
+
+void score(Candidate& c, int samples, double effective) {
+  const double k = c.parameters;
+  const double log_likelihood = effective * std::log(floored_deviance(c, samples) / samples);
+  const double spare = std::max(effective - k - 1.0, 1e-3);
+  c.aicc = log_likelihood + 2.0 * k + 2.0 * k * (k + 1.0) / spare;
+  c.bic = log_likelihood + k * std::log(effective);
+}
+
+}  // namespace
+
+std::string least_law_words(const Selection& s, const std::string& data) {
+  const Candidate& chosen = s.candidates[s.recommended];
+  if (s.candidates.size() == 1) return "the law that was asked for is";
+  if (chosen.identified) return fmt::format("the least law that {} support is", data);
+  return fmt::format("{} identify none of the {} laws; near the best BIC the least{} is", data,
+                     s.candidates.size(),
+                     chosen.contradicted ? "" : " that the protocol does not contradict");
+}
+
+bool plateau_is_not_told(const FitResult& fit) {
+  for (const ParameterResult& p : fit.parameters) {
+    if (p.parameter.name != "k_inf") continue;
+    return p.at_lower_bound || (p.standard_error && p.estimate < 2.0 * *p.standard_error);
+  }
+  return false;
+}
+
+namespace {
+
+/// Where the lasting stiffness is not told from 0, the law without it is a lesser one.
+void add_laws_without_plateau(Selection& s, std::span<const PreparedRecording> recordings,
+                              const std::vector<DataSet>& data, const SelectionOptions& options) {
+  if (options.only_listed) return;
+  const std::size_t fitted = s.candidates.size();
+  for (std::size_t i = 0; i < fitted; ++i) {
+    const Candidate& c = s.candidates[i];
+    LawSpec fluid = c.law;
+    fluid.solid = false;
+    const bool possible = !c.failed && c.law.branches > 0 && c.law.form == BranchForm::parallel &&
+                          c.law.fractional == Fractional::none && plateau_is_not_told(c.fit);
+    if (possible) s.candidates.push_back(fit_to_recordings(fluid, recordings, data, options.setup));
+  }
+}
+
+/// Fits the material to some recordings and predicts another, whose nuisance parameters alone are
+/// fitted to it.
+HeldOut predict_one(const Candidate& candidate, std::span<const PreparedRecording> recordings,
+                    std::size_t left_out, SetupOptions setup) {
+  std::vector<PreparedRecording> others;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    if (i != left_out) others.push_back(recordings[i]);
+  }
+  setup.profiles = false;
+  const FitResult fit = run_fit(recording_config(candidate.law, others, setup), data_sets(others));
+  HeldOut held;
+  held.what = recordings[left_out].name;
+  const FitResult prediction =
+      fit_placement(candidate.law, model_parameters(fit.config, fit.best.natural, 0),
+                    recordings[left_out], setup);
+  const RecordingFit& r = prediction.recordings.front();
+  held.rms = r.rms_residual;
+  held.rms_over_peak = r.rms_residual / r.peak;
+  held.rms_standardised = std::sqrt(prediction.chi_square / prediction.value_count);
+  held.rms_if_fitted = candidate.fit.recordings[left_out].rms_residual;
+  return held;
+}
+
+/// The second half of the hold, predicted from everything before.
+/// Nothing if it has too few samples to tell a prediction from another.
+std::optional<HeldOut> predict_second_half(const Candidate& candidate,
+                                           const PreparedRecording& recording, SetupOptions setup) {
+  PreparedRecording early = recording;
+  double hold_begin = recording.from_s;
+  for (const Phase& phase : recording.phases.phases) {
+    const double begin = recording.recording.time_s[phase.first];
+    if (phase.kind == PhaseKind::hold && begin < recording.to_s) hold_begin = begin;
+  }
+  early.to_s = 0.5 * (hold_begin + recording.to_s);
+  setup.profiles = false;
+  const std::span<const PreparedRecording> one(&early, 1);
+  const FitResult fit = run_fit(recording_config(candidate.law, one, setup), data_sets(one));
+  const RecordingFit& r = fit.recordings.front();
+  HeldOut held;
+  held.what = fmt::format("{}: the second half of the hold", recording.name);
+  double sum = 0.0;
+  double sum_fitted = 0.0;
+  int count = 0;
+  const RecordingFit& whole = candidate.fit.recordings.front();
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    if (r.time_s[i] <= early.to_s || r.time_s[i] > recording.to_s) continue;
+    sum += std::pow(r.predicted[i] - r.observed[i], 2);
+    sum_fitted += std::pow(whole.predicted[i] - whole.observed[i], 2);
+    ++count;
+  }
+  if (count < kFewestPredicted) return std::nullopt;
+  held.rms = std::sqrt(sum / count);
+  held.rms_over_peak = held.rms / whole.peak;
+  held.rms_if_fitted = std::sqrt(sum_fitted / count);
+  return held;
+}
+
+void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
+              const SelectionOptions& options) {
+  if (c.failed) return;
+  // Coefficients go from one recording to another only at one reference depth.
+  SetupOptions setup = options.setup;
+  setup.reference = c.law.reference;
+  const std::string failure = gave_up([&] {
+    if (recordings.size() == 1) {
+      const auto held = predict_second_half(c, recordings.front(), setup);
+      if (held) c.held_out.push_back(*held);
+    } else {
+      for (std::size_t i = 0; i < recordings.size(); ++i) {
+        c.held_out.push_back(predict_one(c, recordings, i, setup));
+      }
+    }
+  });
+  if (failure.empty()) return;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  c.held_out.push_back({"failed: " + failure, kInfinity, kInfinity, kInfinity, 0.0, false});
+}
+
+/// A law predicts what it has not seen if it comes as near as the nearest law does that has.
+void compare_predictions(Selection& s, double factor) {
+  const std::size_t predictions = s.candidates.front().held_out.size();
+  for (std::size_t i = 0; i < predictions; ++i) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Candidate& c : s.candidates) {
+      if (!c.failed && i < c.held_out.size()) least = std::min(least, c.held_out[i].rms_if_fitted);
+    }
+    for (Candidate& c : s.candidates) {
+      if (i < c.held_out.size()) c.held_out[i].predicts = c.held_out[i].rms <= factor * least;
+    }
+  }
+}
+
+/// Which laws predict recording i from the others, and which do not.
+void describe_prediction(Selection& s, std::size_t i) {
+  std::vector<std::string> able;
+  std::vector<std::string> unable;
+  for (const Candidate& c : s.candidates) {
+    if (c.failed || i >= c.held_out.size()) continue;
+    const HeldOut& h = c.held_out[i];
+    (h.predicts ? able : unable)
+        .push_back(
+            fmt::format("{} ({} %)", law_name(c.law), significant(100.0 * h.rms_over_peak, 3)));
+  }
+  const auto listed = [](const std::vector<std::string>& laws) {
+    return laws.empty() ? std::string("none") : fmt::format("{}", fmt::join(laws, ", "));
+  };
+  s.words.push_back(
+      fmt::format("{} is predicted from the others, to {} times the least residual of any law "
+                  "fitted to it (rms "
+                  "over peak): by {}; not by {}",
+                  s.candidates.front().held_out[i].what, significant(s.prediction_factor, 2),
+                  listed(able), listed(unable)));
+}
+
+void describe(Selection& s) {
+  const Candidate& chosen = s.candidates[s.recommended];
+  const Candidate& best = s.candidates[s.best_bic];
+  s.words.push_back(fmt::format("{} {} ({}): {} parameters, rms residual {} % of the peak",
+                                least_law_words(s, "the data"), law_name(chosen.law),
+                                law_words(chosen.law), chosen.parameters - 1,
+                                significant(100.0 * chosen.rms_over_peak, 3)));
+  if (s.recommended != s.best_bic) {
+    s.words.push_back(fmt::format(
+        "{} has the lowest BIC, by {}, {}", law_name(best.law), significant(chosen.delta_bic, 3),
+        best.identified ? fmt::format("less than the margin of {}", significant(s.margin, 3))
+                        : "but is not identified: " + best.reason));
+  }
+  for (std::size_t i = 0; i < best.held_out.size() && best.held_out.size() > 1; ++i) {
+    describe_prediction(s, i);
+  }
+  if (s.correlation.significant) {
+    s.words.push_back(fmt::format(
+        "residuals repeat each other: {} samples count as {} readings (lag-1 correlation {})",
+        s.samples, significant(s.effective_count, 3), significant(s.correlation.lag1, 2)));
+  }
+}
+
+}  // namespace
+
+std::vector<LawSpec> classical_family() {
+  std::vector<LawSpec> laws;
+  for (const Kernel kernel : {Kernel::linear, Kernel::hertz, Kernel::power}) {
+    for (int branches = 0; branches <= 3; ++branches) {
+      laws.push_back({.kernel = kernel, .branches = branches});
+    }
+  }
+  for (int branches = 0; branches <= 3; ++branches) {
+    laws.push_back({.branches = branches, .tension = Tension::elastic});
+    if (branches > 0) laws.push_back({.branches = branches, .tension = Tension::relaxing});
+  }
+  return laws;
+}
+
+std::vector<LawSpec> fractional_family() {
+  std::vector<LawSpec> laws;
+  for (const Kernel kernel : {Kernel::linear, Kernel::hertz, Kernel::power}) {
+    for (const Fractional fractional : {Fractional::springpot, Fractional::maxwell,
+                                        Fractional::kelvin_voigt, Fractional::zener}) {
+      laws.push_back({.kernel = kernel, .branches = 0, .fractional = fractional});
+    }
+  }
+  return laws;
+}
+
+std::size_t least_within(const std::vector<Candidate>& candidates, double margin) {
+  std::optional<std::size_t> chosen;
+  // If no law is identified, one whose times the protocol could show goes before one that only
+  // fits.
+  enum class Eligible { identified, not_contradicted, all };
+  for (const Eligible which : {Eligible::identified, Eligible::not_contradicted, Eligible::all}) {
+    const auto eligible = [&](const Candidate& c) {
+      return !c.failed && (c.identified || which == Eligible::all ||
+                           (which == Eligible::not_contradicted && !c.contradicted));
+    };
+    double best = std::numeric_limits<double>::infinity();
+    for (const Candidate& c : candidates) {
+      if (eligible(c)) best = std::min(best, c.delta_bic);
+    }
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      const Candidate& c = candidates[i];
+      if (!eligible(c) || c.delta_bic - best > margin) continue;
+      if (!chosen || c.parameters < candidates[*chosen].parameters) chosen = i;
+    }
+    if (chosen) return *chosen;
+  }
+  throw Error(ExitCode::numerical, "select", "no law could be fitted");
+}
+
+void rank_candidates(Selection& s) {
+  double best_aicc = std::numeric_limits<double>::infinity();
+  double best_bic = best_aicc;
+  for (Candidate& c : s.candidates) {
+    if (c.failed) continue;
+    score(c, s.samples, s.effective_count);
+    best_aicc = std::min(best_aicc, c.aicc);
+    best_bic = std::min(best_bic, c.bic);
+  }
+  for (Candidate& c : s.candidates) {
+    c.delta_aicc = c.aicc - best_aicc;
+    c.delta_bic = c.bic - best_bic;
+  }
+  std::ranges::stable_sort(s.candidates, [](const Candidate& a, const Candidate& b) {
+    if (a.failed != b.failed) return b.failed;
+    return a.bic < b.bic;
+  });
+  s.recommended = least_within(s.candidates, s.margin);
+}
+
+Selection select_law(std::span<const PreparedRecording> recordings,
+                     const SelectionOptions& options) {
+  std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
+  if (!options.only_listed && !recordings.empty() &&
+      is_answered_by_stress(recordings.front().recording.drive_quantity)) {
+    // Hertz is the contact of a ball, tension that of lateral neighbours.
+    const bool strain = recordings.front().recording.drive_quantity == Quantity::strain;
+    std::erase_if(laws, [strain](const LawSpec& law) {
+      return law.kernel == Kernel::hertz || (strain && law.tension != Tension::none);
+    });
+  }
+  const std::vector<DataSet> data = data_sets(recordings);
+  Selection s;
+  s.margin = options.margin;
+  s.prediction_factor = options.prediction_factor;
+  Progress progress("fitting laws", laws.size());
+  for (const LawSpec& law : laws) {
+    s.candidates.push_back(fit_to_recordings(law, recordings, data, options.setup));
+    progress.advance();
+  }
+  add_laws_without_plateau(s, recordings, data, options);
+  // The residuals of the closest law are the nearest to noise alone.
+  const Candidate* closest = nullptr;
+  for (const Candidate& c : s.candidates) {
+    if (c.failed) continue;
+    if (closest == nullptr || c.fit.best.deviance < closest->fit.best.deviance) closest = &c;
+  }
+  if (closest == nullptr) {
+    throw Error(ExitCode::numerical, "select",
+                fmt::format("none of {} laws could be fitted", laws.size()));
+  }
+  s.samples = closest->fit.value_count;
+  s.correlation = correlation_of(closest->fit);
+  s.effective_count = s.correlation.effective_count;
+  rank_candidates(s);
+  if (options.held_out) {
+    Progress predicting("predicting what was held out", s.candidates.size());
+    for (Candidate& c : s.candidates) {
+      hold_out(c, recordings, options);
+      predicting.advance();
+    }
+    compare_predictions(s, options.prediction_factor);
+    if (s.candidates.front().held_out.empty()) {
+      s.warnings.push_back(
+          fmt::format("nothing was held out: the second half of the hold has fewer than {} samples",
+                      kFewestPredicted));
+    }
+  }
+  Candidate& chosen = s.candidates[s.recommended];
+  if (options.setup.profiles) {
+    chosen.fit = run_fit(recording_config(chosen.law, recordings, options.setup), data);
+    reassess(chosen, protocol_spans(recordings));
+  }
+  std::ranges::move(protocol_warnings(chosen.fit, recordings), std::back_inserter(s.warnings));
+  describe(s);
+  return s;
+}
+
+}  // namespace tpm::study

@@ -1,0 +1,86 @@
+// Declared in tpm/fit/select/selection.hpp.
+#include <fmt/format.h>
+
+#include "tpm/base/text.hpp"
+#include "tpm/fit/select/selection.hpp"
+
+namespace tpm::study {
+namespace {
+
+double kept_digits(double value) {
+  return rounded(value, 6);
+}
+
+Json held_out_json(const Candidate& c) {
+  return array_json(c.held_out, [](const HeldOut& h) {
+    return Json{{"what", h.what},
+                {"rms_SI", kept_digits(h.rms)},
+                {"rms_over_peak", kept_digits(h.rms_over_peak)},
+                {"rms_over_sd", kept_digits(h.rms_standardised)},
+                {"rms_if_fitted_SI", kept_digits(h.rms_if_fitted)},
+                {"predicts", h.predicts}};
+  });
+}
+
+Json candidate_json(const Candidate& c) {
+  Json j{{"law", law_name(c.law)}, {"words", law_words(c.law)}, {"failed", c.failed}};
+  if (c.failed) {
+    j["reason"] = c.reason;
+    return j;
+  }
+  j["parameters_estimated"] = c.parameters - 1;
+  j["rms_over_peak"] = kept_digits(c.rms_over_peak);
+  j["delta_bic"] = kept_digits(c.delta_bic);
+  j["delta_aicc"] = kept_digits(c.delta_aicc);
+  j["identified"] = c.identified;
+  j["reason"] = c.reason;
+  j["held_out"] = held_out_json(c);
+  return j;
+}
+
+std::string held_out_text(const Candidate& c) {
+  std::string text;
+  for (const HeldOut& h : c.held_out) {
+    text += fmt::format("{:>9}{}", significant(100.0 * h.rms_over_peak, 3) + " %",
+                        h.predicts ? "  " : " !");
+  }
+  return text;
+}
+
+}  // namespace
+
+Json to_json(const Selection& s) {
+  Json j{{"recommended", law_name(s.candidates[s.recommended].law)},
+         {"lowest_bic", law_name(s.candidates[s.best_bic].law)},
+         {"margin_bic", s.margin},
+         {"samples", s.samples},
+         {"effective_readings", kept_digits(s.effective_count)}};
+  Json laws = array_json(s.candidates, candidate_json);
+  j["laws"] = std::move(laws);
+  j["words"] = s.words;
+  j["warnings"] = s.warnings;
+  j["fit"] = to_json(s.candidates[s.recommended].fit);
+  return j;
+}
+
+std::string to_terminal_text(const Selection& s) {
+  std::string text = fmt::format("{:<26} {:>6} {:>9} {:>9} {:>9}  {}\n", "law", "param.",
+                                 "rms/peak", "dBIC", "dAICc", "held-out rms/peak; note");
+  for (std::size_t i = 0; i < s.candidates.size(); ++i) {
+    const Candidate& c = s.candidates[i];
+    const char* mark = i == s.recommended ? "*" : " ";
+    if (c.failed) {
+      text += fmt::format("{}{:<25} failed: {}\n", mark, law_name(c.law), c.reason);
+      continue;
+    }
+    text += fmt::format("{}{:<25} {:>6} {:>9} {:>9} {:>9}{}  {}\n", mark, law_name(c.law),
+                        c.parameters - 1, significant(100.0 * c.rms_over_peak, 3) + " %",
+                        fixed(c.delta_bic, 1), fixed(c.delta_aicc, 1), held_out_text(c), c.reason);
+  }
+  text += "\n";
+  for (const std::string& line : s.words) text += fmt::format("{}\n", line);
+  for (const std::string& line : s.warnings) text += fmt::format("! {}\n", line);
+  return text;
+}
+
+}  // namespace tpm::study

@@ -1,0 +1,143 @@
+// Declared in tpm/fit/select/selection.hpp.
+// What a selection says about the samples outside the window, and about the protocol.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/text.hpp"
+#include "tpm/fit/select/selection.hpp"
+
+namespace tpm::study {
+namespace {
+
+/// The samples after the fitted part, and those of them that the law predicts.
+struct Outside {
+  double last_fitted_s = 0.0;
+  std::size_t count = 0, predicted = 0;
+  double sum_of_squares = 0.0;
+  double last_drive = 0.0;  ///< of the predicted ones
+  double unknown_s = 0.0;   ///< from here on the law has no answer, if predicted < count
+};
+
+Outside outside_of(const RecordingFit& r) {
+  Outside o;
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    if (r.fitted[i]) o.last_fitted_s = r.time_s[i];
+  }
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    if (r.time_s[i] <= o.last_fitted_s) continue;
+    ++o.count;
+    if (!std::isfinite(r.predicted[i])) {
+      if (o.unknown_s == 0.0) o.unknown_s = r.time_s[i];
+      continue;
+    }
+    ++o.predicted;
+    o.sum_of_squares += std::pow(r.predicted[i] - r.observed[i], 2);
+    o.last_drive = r.drive[i];
+  }
+  return o;
+}
+
+/// Depths of soft tissue are millimetres: metres come from a unit that is not the file's.
+std::vector<std::string> unit_warnings(std::span<const PreparedRecording> recordings) {
+  constexpr double kDeepest_m = 0.5;
+  std::vector<std::string> warnings;
+  for (const PreparedRecording& r : recordings) {
+    if (r.recording.drive_quantity != Quantity::indentation_depth) continue;
+    const auto [low, high] = std::ranges::minmax_element(r.recording.drive);
+    if (*high - *low <= kDeepest_m) continue;
+    warnings.push_back(
+        fmt::format("{}: the depth changes by {} m: is its unit right? (--unit \"COLUMN=mm\")",
+                    r.name, significant(*high - *low, 3)));
+  }
+  return warnings;
+}
+
+}  // namespace
+
+std::vector<std::string> outside_words(const FitResult& fit) {
+  constexpr double kDescribes = 3.0;  // times the residual inside the window
+  constexpr std::size_t kFewestOutside = 5;
+  std::vector<std::string> words;
+  for (const RecordingFit& r : fit.recordings) {
+    const Outside o = outside_of(r);
+    const std::string& name = fit.config.data[r.choice].dataset;
+    if (o.predicted > 0 && o.predicted < kFewestOutside) {
+      words.push_back(fmt::format(
+          "{}: {} sample{} after the fitted part (from {} s): too few to say "
+          "how the law describes what follows",
+          name, o.predicted, o.predicted == 1 ? "" : "s", significant(o.last_fitted_s, 4)));
+    } else if (o.predicted > 0) {
+      const double rms = std::sqrt(o.sum_of_squares / static_cast<double>(o.predicted));
+      const bool describes = rms <= kDescribes * r.rms_residual;
+      words.push_back(fmt::format(
+          "{}: after the fitted part (from {} s, {} samples, to a drive of {}) the prediction is "
+          "off by {} % of the peak (rms){}",
+          name, significant(o.last_fitted_s, 4), o.predicted, significant(o.last_drive, 3),
+          significant(100.0 * rms / r.peak, 3),
+          describes ? "" : ": the law does not describe the unloading and what follows"));
+    }
+    if (o.predicted < o.count) {
+      words.push_back(fmt::format(
+          "{}: from {} s on {} samples are not predicted: there the contact of a Hertz kernel "
+          "shrinks or grows again in a way that the law does not cover (docs/laws.md)",
+          name, significant(o.unknown_s, 4), o.count - o.predicted));
+    }
+  }
+  return words;
+}
+
+ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  ProtocolSpans spans{kInfinity, 0.0, kInfinity};
+  for (const PreparedRecording& r : recordings) {
+    const std::vector<double>& time = r.recording.time_s;
+    for (const Phase& phase : r.phases.phases) {
+      const double length = time[phase.last] - time[phase.first];
+      if (time[phase.first] >= r.to_s) break;
+      if (phase.kind == PhaseKind::loading) spans.ramp_s = std::min(spans.ramp_s, length);
+      if (phase.kind == PhaseKind::hold) spans.hold_s = std::max(spans.hold_s, length);
+      if (phase.last > phase.first) {
+        spans.step_s =
+            std::min(spans.step_s, length / static_cast<double>(phase.last - phase.first));
+      }
+    }
+  }
+  return spans;
+}
+
+std::vector<std::string> protocol_warnings(const FitResult& fit,
+                                           std::span<const PreparedRecording> recordings) {
+  std::vector<std::string> warnings = unit_warnings(recordings);
+  const auto [ramp_s, hold_s, step_s] = protocol_spans(recordings);
+  if (hold_s == 0.0) {
+    warnings.emplace_back("there is no hold: relaxation is seen only through the ramp");
+  }
+  for (const ParameterResult& p : fit.parameters) {
+    const bool time = p.parameter.unit.dimension == Dimension::time;
+    if (!time) continue;
+    if (p.estimate < ramp_s) {
+      warnings.push_back(fmt::format(
+          "{} = {} is shorter than the shortest ramp ({} s): what relaxed during the ramp is known "
+          "only through the ramp's shape; a faster ramp would show it",
+          p.parameter.name, in_unit(p.parameter, p.estimate), significant(ramp_s, 3)));
+    }
+    if (hold_s > 0.0 && p.estimate > hold_s / 3.0) {
+      warnings.push_back(fmt::format(
+          "{} = {} is long for the longest hold ({} s): no plateau is seen; hold for at least {} s",
+          p.parameter.name, in_unit(p.parameter, p.estimate), significant(hold_s, 3),
+          significant(3.0 * p.estimate, 2)));
+    }
+    if (p.estimate < kLeastSamples * step_s) {
+      warnings.push_back(fmt::format(
+          "{} = {} is sampled by fewer than {} points ({} s apart): sampling cannot support it",
+          p.parameter.name, in_unit(p.parameter, p.estimate), kLeastSamples,
+          significant(step_s, 3)));
+    }
+  }
+  return warnings;
+}
+
+}  // namespace tpm::study

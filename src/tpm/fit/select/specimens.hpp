@@ -1,0 +1,63 @@
+#pragma once
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/select/random_effects.hpp"
+#include "tpm/fit/select/selection.hpp"
+
+namespace tpm::study {
+
+/// One recording's own fit of the common law.
+struct SpecimenRow {
+  std::string name;
+  std::string specimen = {};     ///< whose repeat it is; empty: a specimen of its own
+  std::optional<FitResult> fit;  ///< empty if it could not be fitted
+  std::string reason;            ///< then why
+  /// Which of the fit's parameters stands for each of the common law's: a fit may number its
+  /// branches in any order, here they are sorted by their relaxation times.
+  std::vector<std::size_t> place;
+
+  /// The result for the common law's parameter i of a recording that was fitted.
+  [[nodiscard]] const ParameterResult& parameter(std::size_t i) const {
+    return fit.value().parameters[place[i]];
+  }
+};
+
+/// One material parameter over the specimens.
+struct PooledParameter {
+  FitParameter parameter;
+  RandomEffects effects;  ///< in theta
+  int left_out = 0;       ///< recordings that do not determine it: it is at a bound, depends on a
+                          ///< nuisance parameter at one, or the fit is of no full rank
+};
+
+struct SpecimenStudy {
+  LawSpec law;      ///< with the reference depth of all coefficients
+  std::string why;  ///< how the law was chosen
+  std::vector<SpecimenRow> rows;
+  std::vector<PooledParameter> pooled;
+  double level = 0.95;  ///< of all intervals
+};
+
+/// Fits one law to each recording by itself and pools the material parameters with random effects:
+/// a typical specimen, its interval, and the spread between specimens. All coefficients refer to
+/// one depth: options.setup.reference, or common_reference(). Recordings of one specimen
+/// (PreparedRecording::specimen) are its repeats.
+/// @param law empty: of the laws whose parameters are identified in most of the recordings, the one
+///        with the fewest parameters whose sum of BIC over the recordings is within the margin (for
+///        each recording) of the least sum; if there is no such law, of all laws
+[[nodiscard]] SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
+                                            const std::optional<LawSpec>& law,
+                                            SelectionOptions options);
+
+/// Pools what fits of one law found. Throws Error(bad_input) naming a recording whose coefficients
+/// refer to another depth than the first one's.
+[[nodiscard]] std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows,
+                                                          double level);
+
+[[nodiscard]] Json to_json(const SpecimenStudy& study);
+[[nodiscard]] std::string to_terminal_text(const SpecimenStudy& study);
+
+}  // namespace tpm::study

@@ -1,0 +1,41 @@
+#pragma once
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/design/recovery.hpp"
+#include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/select/specimens.hpp"
+#include "tpm/fit/select/young_moduli.hpp"
+
+namespace tpm::report {
+
+/// The tables of a fit as CSV: the same numbers as in its JSON, SI, one row for each thing, every
+/// row with the unit, the reference depth and the level that its numbers depend on.
+
+/// Each parameter: estimate, standard error, interval, bounds, verdict, conditions.
+[[nodiscard]] std::string parameters_csv(const FitResult& fit);
+/// Each reading of tables, spectra, moduli and compliances with the law's answer.
+[[nodiscard]] std::string readings_csv(const FitResult& fit);
+/// Each law of a selection.
+[[nodiscard]] std::string laws_csv(const Selection& selection);
+/// Each parameter of each recording of a folder.
+[[nodiscard]] std::string specimens_csv(const SpecimenStudy& study);
+/// Each pooled parameter.
+[[nodiscard]] std::string pooled_csv(const SpecimenStudy& study);
+
+/// How often intervals contain the true value: each parameter of a configuration.
+[[nodiscard]] std::string coverage_csv(const CoverageResult& result);
+/// How often a law was returned from its own data: each law and margin.
+[[nodiscard]] std::string recovery_csv(std::span<const RecoveryResult> results);
+
+/// Each Young's modulus.
+[[nodiscard]] std::string moduli_csv(const YoungModuli& moduli);
+
+/// Writes parameters.csv, readings.csv (if there are readings) and samples.csv, samples_2.csv, ...
+/// of a fit into a folder. Returns the names.
+std::vector<std::string> write_fit_csv(const std::filesystem::path& folder, const FitResult& fit);
+
+}  // namespace tpm::report

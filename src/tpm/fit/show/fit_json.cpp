@@ -1,0 +1,306 @@
+// Declared in tpm/fit/fit.hpp.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/text.hpp"
+#include "tpm/fit/fit.hpp"
+#include "tpm/fit/likelihood/experiment_refit.hpp"
+#include "tpm/fit/verdict.hpp"
+
+namespace tpm::fit {
+namespace {
+
+/// Result numbers carry this many significant digits.
+constexpr int kDigits = 6;
+
+Json number(double value) {
+  return rounded(value, kDigits);
+}
+
+Json optional_number(const std::optional<double>& value) {
+  return value ? number(*value) : Json(nullptr);
+}
+
+/// "eta1_Pa_s": a key that says the unit of its SI value.
+std::string si_key(std::string_view name, Dimension dimension) {
+  std::string unit(si_symbol(dimension));
+  std::string clean;
+  for (const char c : unit) {
+    if (c == '/') {
+      clean += "_per_";
+    } else if (c == ' ') {
+      clean += '_';
+    } else if (c != '^') {
+      clean += c;
+    }
+  }
+  return clean.empty() ? std::string(name) : fmt::format("{}_{}", name, clean);
+}
+
+Json parameter_values(const FitResult& result, const std::vector<double>& natural) {
+  Json values = Json::object();
+  for (std::size_t i = 0; i < natural.size(); ++i) {
+    const FitParameter& p = result.parameters[i].parameter;
+    values[si_key(p.name, p.unit.dimension)] = number(natural[i]);
+  }
+  return values;
+}
+
+Json pair_json(double lower, double upper) {
+  return {number(lower), number(upper)};
+}
+
+Json bootstrap_json(const BootstrapParameter& b) {
+  Json j{{"standard_error_SI", number(b.standard_error)}, {"bias_SI", number(b.bias)}};
+  j["percentile_interval_SI"] = pair_json(b.percentile.lower, b.percentile.upper);
+  j["bca_interval_SI"] = b.bca ? pair_json(b.bca->lower, b.bca->upper) : Json(nullptr);
+  return j;
+}
+
+Json bootstrap_json(const BootstrapResult& b) {
+  return {{"replicates", b.options.replicates},
+          {"resample", resampling_name(b.options.resampling)},
+          {"block_length", b.block_length},
+          {"seed", b.options.seed},
+          {"failed", b.failed},
+          {"words", b.words}};
+}
+
+Json correlation_json(const Correlation& c) {
+  return {{"lag_1", number(c.lag1)},
+          {"samples", c.count},
+          {"effective_samples", number(c.effective_count)},
+          {"significant", c.significant},
+          {"words", c.words}};
+}
+
+Json conditions_json(const ParameterResult& p) {
+  return array_json(p.conditional_on, [](const Condition& c) {
+    return Json{{"parameter", c.parameter},
+                {"bound", c.upper ? "upper" : "lower"},
+                {"bound_SI", number(c.value)},
+                {"at_estimate", c.at_estimate}};
+  });
+}
+
+Json parameter_json(const ParameterResult& p) {
+  const Dimension dimension = p.parameter.unit.dimension;
+  Json j{{"name", p.parameter.name}, {"SI_unit", si_symbol(dimension)}};
+  j["scale"] = scale_name(p.parameter.scale);
+  j["bounds_SI"] = {number(p.parameter.lower), number(p.parameter.upper)};
+  j["estimate_SI"] = number(p.estimate);
+  j["standard_error_SI"] = optional_number(p.standard_error);
+  j["interval_SI"] = {optional_number(p.lower), optional_number(p.upper)};
+  j["interval_connected"] = p.profile.connected;
+  j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
+  j["verdict"] = verdict_text(p);
+  if (p.nuisance) j["nuisance"] = true;
+  if (p.first_bounds) {
+    j["bounds_widened_from_SI"] = pair_json(p.first_bounds->lower, p.first_bounds->upper);
+  }
+  if (!p.conditional_on.empty()) j["conditional_on"] = conditions_json(p);
+  j["words"] = p.words;
+  j["profile_SI_and_deviance"] = array_json(p.profile.points, [](const ProfilePoint& point) {
+    return Json{number(point.natural), number(point.deviance)};
+  });
+  Json failed = Json::array();
+  if (has_failed(p.profile.below)) failed.push_back("lower");
+  if (has_failed(p.profile.above)) failed.push_back("upper");
+  if (!failed.empty()) j["profile_failed"] = std::move(failed);
+  Json exchanged = Json::array();
+  if (p.profile.below == ProfileEnd::exchange) exchanged.push_back("lower");
+  if (p.profile.above == ProfileEnd::exchange) exchanged.push_back("upper");
+  if (!exchanged.empty()) j["changes_places"] = std::move(exchanged);
+  j["profile_failures"] = p.profile.failures;
+  if (p.profile.cut_short) j["interval_cut_short"] = true;
+  return j;
+}
+
+Json minima_json(const FitResult& result) {
+  return array_json(result.minima, [&](const DistinctMinimum& m) {
+    Json j{{"deviance", number(m.minimum.deviance)}, {"starts", m.starts}};
+    j["converged"] = m.minimum.converged;
+    j["parameters"] = parameter_values(result, m.minimum.natural);
+    j["lowest"] = parameter_values(result, m.low);
+    j["highest"] = parameter_values(result, m.high);
+    return j;
+  });
+}
+
+Json linearised_json(const FitResult& result) {
+  const Covariance& c = result.covariance;
+  Json j{{"full_rank", c.full_rank}};
+  j["parameters"] =
+      array_json(c.free, [&](std::size_t i) { return result.parameters[i].parameter.name; });
+  // Rounded to 6 decimals, not digits: a correlation of 1e-17 is 0.
+  const auto decimals = [](double r) { return std::round(r * 1e6) / 1e6 + 0.0; };
+  j["correlation"] = array_json(c.correlation.rowwise(),
+                                [&](const auto& row) { return array_json(row, decimals); });
+  j["singular_values_of_scaled_jacobian"] = array_json(c.singular_values, number);
+  j["weakest_direction"] = result.weakest_words;
+  return j;
+}
+
+Json data_json(const FitResult& result) {
+  return array_json(result.data, [&](const FittedDatum& d) {
+    const auto key = [&](std::string_view what) {
+      return si_key(what, quantity_dimension(d.datum.quantity));
+    };
+    Json j{{"dataset", result.config.data[d.datum.choice].dataset}, {"label", d.datum.label}};
+    j["quantity"] = quantity_name(d.datum.quantity);
+    if (d.datum.frequency_Hz) j["frequency_Hz"] = number(*d.datum.frequency_Hz);
+    j["provenance"] = provenance_name(d.datum.provenance);
+    j["role"] = d.datum.held_out ? "held_out" : "fitted";
+    if (d.datum.value) j[key("observed")] = number(*d.datum.value);
+    if (d.datum.lower) j[key("band")] = {number(*d.datum.lower), number(*d.datum.upper)};
+    j[key("predicted")] = number(d.predicted);
+    if (d.predicted_sd) j[key("predicted_sd")] = number(*d.predicted_sd);
+    if (d.confidence) {
+      j[key("confidence_band")] = pair_json(d.confidence->lower, d.confidence->upper);
+    }
+    if (d.prediction) {
+      j[key("prediction_band")] = pair_json(d.prediction->lower, d.prediction->upper);
+    }
+    j["standardised_residual"] = number(d.standardised);
+    return j;
+  });
+}
+
+/// Numbers about each recording; its samples are in the data.
+Json recordings_json(const FitResult& result) {
+  return array_json(result.recordings, [&](const RecordingFit& r) {
+    const auto fitted = std::count(r.fitted.begin(), r.fitted.end(), true);
+    Json j{{"dataset", result.config.data[r.choice].dataset}};
+    j["quantity"] = quantity_name(r.response_quantity);
+    j["provenance"] = provenance_name(r.provenance);
+    j["samples"] = r.time_s.size();
+    j["samples_fitted"] = fitted;
+    j[tpm::si_key(r.response_quantity, "peak")] = number(r.peak);
+    j[tpm::si_key(r.response_quantity, "rms_residual")] = number(r.rms_residual);
+    if (r.rms_outside) {
+      j[tpm::si_key(r.response_quantity, "rms_residual_outside")] = number(*r.rms_outside);
+    }
+    if (r.not_predicted > 0) j["samples_not_predicted"] = r.not_predicted;
+    j["share_inside_prediction_band"] = optional_number(r.share_inside);
+    if (r.correlation) j["correlation"] = correlation_json(*r.correlation);
+    return j;
+  });
+}
+
+Json hypotheses_json(const FitResult& result) {
+  return array_json(result.hypotheses, [&](const HypothesisResult& h) {
+    Json j{{"name", h.hypothesis.name}, {"deviance", number(h.minimum.deviance)}};
+    j["rise"] = number(h.rise);
+    j["p_value"] = number(h.p_value);
+    j["excluded"] = h.excluded;
+    j["parameters"] = parameter_values(result, h.minimum.natural);
+    j["words"] = h.words;
+    return j;
+  });
+}
+
+Json assumptions_json(const FitConfig& config) {
+  return array_json(config.data, [&](const DataChoice& d) {
+    Json j{{"dataset", d.dataset}, {"protocol", protocol_kind_name(d.protocol.kind)}};
+    if (d.protocol.kind == ProtocolChoice::Kind::ramp_hold) {
+      j["rate_m_per_s"] = number(d.protocol.rate_m_per_s);
+      if (d.protocol.rate_provenance) {
+        j["rate_provenance"] = provenance_name(*d.protocol.rate_provenance);
+      }
+    }
+    if (d.protocol.operating_depth) {
+      const Dimension depth = quantity_dimension(config.law.value().drive);
+      j[si_key("operating_depth", depth)] = number(*d.protocol.operating_depth);
+    }
+    if (d.stiffness_per_modulus_m) {
+      j["stiffness_per_modulus_m"] = number(*d.stiffness_per_modulus_m);
+    }
+    j["noise"] = noise_kind_name(d.noise.kind);
+    if (d.noise.shape != ErrorShape::normal) {
+      j["noise_distribution"] = error_shape_name(d.noise.shape);
+    }
+    if (d.noise.shape == ErrorShape::student_t) {
+      j["noise_degrees_of_freedom"] = number(d.noise.degrees_of_freedom);
+    }
+    if (!d.sigma_b.empty()) {
+      j["noise_relative_parameter"] = d.sigma_b;
+    } else if (uses_relative(d.noise.kind)) {
+      j["noise_relative"] = number(d.noise.relative);
+    }
+    if (!d.sigma_a.empty()) {
+      j["noise_absolute_parameter"] = d.sigma_a;
+    } else if (d.noise.absolute > 0.0) {
+      j["noise_absolute_SI"] = number(d.noise.absolute);
+    }
+    j["noise_scale"] = d.noise.scale_known ? "known" : "estimated";
+    return j;
+  });
+}
+
+}  // namespace
+
+namespace {
+
+/// -2 ln L and the criteria; null where there is no likelihood.
+void add_likelihood(Json& j, const std::optional<Likelihood>& likelihood) {
+  const auto value = [&](double Likelihood::*member) {
+    return likelihood ? number((*likelihood).*member) : Json(nullptr);
+  };
+  j["minus_two_log_likelihood"] = value(&Likelihood::minus_two_log);
+  j["AIC"] = value(&Likelihood::aic);
+  j["AICc"] = likelihood ? optional_number(likelihood->aicc) : Json(nullptr);
+  j["BIC"] = value(&Likelihood::bic);
+  if (likelihood) j["parameters_counted"] = likelihood->parameters;
+}
+
+}  // namespace
+
+Json to_json(const FitResult& result) {
+  Json j{{"title", result.config.title},
+         {"model", result.config.law ? law_name(*result.config.law) : result.config.model}};
+  if (result.config.law) {
+    const LawSpec& law = *result.config.law;
+    j[tpm::si_key(law.drive, "reference")] = number(law.reference);
+    j["coefficients_depend_on_reference"] = depends_on_reference(law);
+  }
+  j["choices"] = assumptions_json(result.config);
+  j["values_fitted"] = result.value_count;
+  j["bands_fitted"] = result.band_count;
+  j["chi_square"] = number(result.chi_square);
+  j["deviance"] = number(result.best.deviance);
+  j["degrees_of_freedom"] = result.degrees_of_freedom;
+  j["chi_square_p_value"] = optional_number(result.chi_square_p);
+  j["variance_factor"] = number(result.variance_factor);
+  add_likelihood(j, result.likelihood);
+  if (result.correlation) {
+    j["residual_correlation"] = correlation_json(*result.correlation);
+    j["residual_correlation"]["inflation"] = number(result.inflation);
+  }
+  j["confidence_level"] = result.config.level;
+  Json parameters = Json::array();
+  for (std::size_t i = 0; i < result.parameters.size(); ++i) {
+    parameters.push_back(parameter_json(result.parameters[i]));
+    if (result.bootstrap) {
+      parameters.back()["bootstrap"] = bootstrap_json(result.bootstrap->parameters[i]);
+    }
+  }
+  j["parameters"] = std::move(parameters);
+  j["linearised"] = linearised_json(result);
+  j["starts"] = {{"run", result.starts_run},
+                 {"failed", result.starts_failed},
+                 {"agreeing_to_5_digits", result.starts_agreeing},
+                 {"seed", result.config.seed},
+                 {"words", result.waterfall.words}};
+  j["starts"]["end_deviances"] = array_json(result.waterfall.deviances, number);
+  if (result.bootstrap) j["bootstrap"] = bootstrap_json(*result.bootstrap);
+  j["minima"] = minima_json(result);
+  j["hypotheses"] = hypotheses_json(result);
+  j["data"] = data_json(result);
+  j["recordings"] = recordings_json(result);
+  j["flags"] = result.flags;
+  return j;
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,225 @@
+// Declared in tpm/show/view_parts.hpp.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/show/view_parts.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_file.hpp"
+
+namespace tpm::report {
+namespace {
+
+constexpr int kShownDigits = 6;
+
+/// A JSON array of numbers as an array of the page; null and what else is no number is left empty.
+std::string put_numbers(ViewPage& page, const Json& list) {
+  std::vector<double> numbers;
+  for (const Json& v : list) numbers.push_back(v.is_number() ? v.get<double>() : std::nan(""));
+  return page.put(numbers);
+}
+
+Json series_of(ViewPage& page, const Json& series) {
+  Json json{{"kind", series.at("kind")},
+            {"label", series.value("label", "")},
+            {"provenance", series.value("provenance", "")},
+            {"text", series.value("text", "")}};
+  for (const char* key : {"x", "y", "lower", "upper"}) {
+    if (series.contains(key)) json[key] = put_numbers(page, series.at(key));
+  }
+  return json;
+}
+
+Json axis_of(const Json& axis) {
+  return {{"quantity", axis.at("quantity")},
+          {"unit", axis.at("unit")},
+          {"logarithmic", axis.value("logarithmic", false)}};
+}
+
+/// The panels of figures.json as plots. Maps of colours are figures of their own and left out.
+void add_figures(ViewPage& page, const Json& figures, const std::string& where) {
+  try {
+    for (const Json& figure : figures.at("figures")) {
+      for (const Json& panel : figure.at("panels")) {
+        Json plot{{"title", figure.at("title")},
+                  {"caption", figure.value("caption", "")},
+                  {"x", axis_of(panel.at("x"))},
+                  {"y", axis_of(panel.at("y"))},
+                  {"series", Json::array()}};
+        for (const Json& series : panel.at("series")) {
+          if (series.at("kind") == "heat") {
+            page.fact("left out", fmt::format("a map of colours of '{}'",
+                                              figure.at("title").get<std::string>()));
+            continue;
+          }
+          plot["series"].push_back(series_of(page, series));
+        }
+        if (!plot["series"].empty()) page.description["plots"].push_back(std::move(plot));
+      }
+    }
+  } catch (const Json::exception& e) {
+    throw bad_input(where, fmt::format("is no figures.json of tpm ({})", e.what()),
+                    "what tpm fit has written");
+  }
+}
+
+/// Linearised standard errors from the covariance of a law file, in the parameters' own units.
+std::vector<std::string> standard_errors(const Json& fit, const Json& parameters) {
+  std::vector<std::string> errors;
+  const Json& names = fit.at("parameters");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const double sd = std::sqrt(fit.at("covariance").at(i).at(i).get<double>());
+    const double value = parameters.at(names.at(i).get<std::string>()).get<double>();
+    const std::string coordinate = fit.at("coordinates").at(i).get<std::string>();
+    if (coordinate == "linear") {
+      errors.push_back(significant(sd, 3));
+    } else if (coordinate == "log") {
+      errors.push_back(significant(std::abs(value) * sd, 3));
+    } else {
+      errors.push_back(fmt::format("{} of its {}", significant(sd, 3), coordinate));
+    }
+  }
+  return errors;
+}
+
+void add_law(ViewPage& page, const Json& law, const std::filesystem::path& file) {
+  (void)read_law(file);  // refuses what is no law
+  page.description["title"] = law.value("note", law.at("law").get<std::string>());
+  page.fact("law", law.at("law").get<std::string>());
+  page.fact("provenance of the parameters", law.value("provenance", ""));
+  Json rows = Json::array();
+  std::vector<std::string> errors;
+  Json fitted = Json::array();
+  if (law.contains("fit")) {
+    errors = standard_errors(law.at("fit"), law.at("parameters"));
+    fitted = law.at("fit").at("parameters");
+    for (const Json& data : law.at("fit").at("data")) {
+      page.fact("fitted to",
+                fmt::format("{}: {} readings, SHA-256 {}", data.at("file").get<std::string>(),
+                            data.at("readings").get<std::size_t>(),
+                            data.at("sha256").get<std::string>()));
+    }
+  }
+  for (const auto& [name, value] : law.at("parameters").items()) {
+    std::string error = "fixed";
+    for (std::size_t i = 0; i < fitted.size(); ++i) {
+      if (fitted[i] == name) error = errors[i];
+    }
+    rows.push_back({name, significant(value.get<double>(), kShownDigits), error});
+  }
+  page.description["table"] = {{"title", "Parameters"},
+                               {"head", {"parameter, SI", "value", "standard error (linearised)"}},
+                               {"rows", std::move(rows)}};
+}
+
+std::string interval_text(const Json& interval) {
+  const auto end = [](const Json& v) {
+    return v.is_number() ? significant(v.get<double>(), 4) : std::string("open");
+  };
+  return interval.is_array() && interval.size() == 2
+             ? fmt::format("{} .. {}", end(interval[0]), end(interval[1]))
+             : std::string("-");
+}
+
+/// How the deviance rises along each parameter: what an interval is read from.
+void add_profile(ViewPage& page, const Json& parameter) {
+  Json x = Json::array(), y = Json::array();
+  for (const Json& pair : parameter.value("profile_SI_and_deviance", Json::array())) {
+    x.push_back(pair.at(0));
+    y.push_back(pair.at(1));
+  }
+  if (x.size() < 2) return;
+  const std::string name = parameter.at("name").get<std::string>();
+  page.description["plots"].push_back(
+      {{"title", "profile of " + name},
+       {"x", {{"quantity", name}, {"unit", parameter.at("SI_unit")}}},
+       {"y", {{"quantity", "deviance"}, {"unit", ""}}},
+       {"series",
+        {{{"kind", "line"},
+          {"label", "deviance, all other parameters fitted"},
+          {"x", put_numbers(page, x)},
+          {"y", put_numbers(page, y)}}}}});
+}
+
+void add_answer(ViewPage& page, const Json& fit) {
+  page.description["title"] = fit.at("title");
+  page.fact("model", fit.at("model").get<std::string>());
+  Json rows = Json::array();
+  for (const Json& p : fit.at("parameters")) {
+    rows.push_back({p.at("name"), significant(p.at("estimate_SI").get<double>(), kShownDigits),
+                    interval_text(p.value("interval_SI", Json())), p.at("SI_unit"),
+                    p.value("verdict", "")});
+    add_profile(page, p);
+  }
+  const double level = fit.value("confidence_level", 0.0);
+  page.description["table"] = {
+      {"title", "Parameters"},
+      {"head",
+       {"parameter", "estimate", significant(100.0 * level, 3) + " % interval", "unit", "verdict"}},
+      {"rows", std::move(rows)}};
+  for (const Json& data : fit.value("data", Json::array())) {
+    page.fact("reading",
+              fmt::format("{}, {}: {}, {}", data.value("dataset", ""), data.value("label", ""),
+                          data.value("provenance", ""), data.value("role", "")));
+  }
+  for (const Json& flag : fit.value("flags", Json::array())) {
+    page.fact("note", flag.get<std::string>());
+  }
+}
+
+bool is_law(const Json& json) {
+  return json.contains("law") && json.contains("parameters") && json.contains("response");
+}
+
+bool is_answer(const Json& json) {
+  return json.contains("parameters") && json.contains("model") && json.contains("chi_square");
+}
+
+/// A law, with the figures beside it if there are any.
+void add_law_and_figures(ViewPage& page, const Json& law, const std::filesystem::path& file) {
+  add_law(page, law, file);
+  const std::filesystem::path figures = file.parent_path() / "figures.json";
+  if (!std::filesystem::exists(figures)) {
+    page.fact("curves", "none: there is no figures.json beside the law");
+    return;
+  }
+  page.fact("curves", "from figures.json beside it, SHA-256 " + sha256_hex(read_file(figures)));
+  add_figures(page, read_json(figures), figures.string());
+}
+
+/// Fills the page from whatever of a fit the file is; false if it is nothing of it.
+bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file) {
+  try {
+    const Json& fit = json.contains("fit") ? json.at("fit") : json;
+    if (json.contains("figures")) {
+      add_figures(page, json, file.string());
+    } else if (is_law(json)) {
+      add_law_and_figures(page, json, file);
+    } else if (is_answer(fit)) {
+      add_answer(page, fit);
+    } else {
+      return false;
+    }
+  } catch (const Json::exception& e) {
+    throw bad_input(file.string(), fmt::format("is not as tpm fit writes it ({})", e.what()),
+                    "a file of tpm fit");
+  }
+  return true;
+}
+
+}  // namespace
+
+ViewPage view_fit(const std::filesystem::path& file, std::string_view bytes) {
+  const Json json = parse_json(bytes, file.string());
+  ViewPage page = begun_page("fit", file, bytes);
+  page.description["badge"] = "FIT";
+  if (!add_fit(page, json, file)) {
+    throw bad_input(file.string(), "is JSON that tpm view does not show",
+                    "law.json, figures.json or the JSON answer of tpm fit");
+  }
+  return page;
+}
+
+}  // namespace tpm::report

@@ -1,0 +1,86 @@
+#include "tpm/haptics/device/virtual_omega7.hpp"
+
+#include <algorithm>
+
+namespace tpm::haptics {
+namespace {
+
+PlantSettings limited(PlantSettings settings, const DeviceLimits& limits) {
+  settings.motor_limit_N = std::min(settings.motor_limit_N, limits.force_N);
+  settings.encoder_step_m = std::max(settings.encoder_step_m, limits.encoder_step_m);
+  return settings;
+}
+
+}  // namespace
+
+VirtualOmega7::VirtualOmega7(const PlantSettings& settings, OperatorScript script,
+                             const DeviceLimits& limits)
+    : settings_(limited(settings, limits)), script_(std::move(script)), plant_(settings_, script_) {
+  identity_.kind = limits.kind;
+  identity_.name = limits.name;
+}
+
+const DeviceIdentity& VirtualOmega7::open() {
+  identity_.link = DeviceLink::none;
+  identity_.assumptions = assumptions_of(settings_);
+  return identity_;
+}
+
+void VirtualOmega7::prepare(const DevicePreparation& preparation) {
+  settings_.watchdog_s = std::max(preparation.watchdog_s, settings_.least_watchdog_s);
+  plant_ = VirtualPlant(settings_, script_);
+  saturations_ = 0;
+  owed_s_ = 0.0;
+  forces_on_ = true;
+}
+
+DeviceAnswer VirtualOmega7::read(Eigen::Vector3d& position_m) noexcept {
+  position_m = plant_.measured_m();
+  return DeviceAnswer::ok;
+}
+
+DeviceAnswer VirtualOmega7::write(const Eigen::Vector3d& force_N) noexcept {
+  if (!plant_.command(force_N)) return DeviceAnswer::ok;
+  ++saturations_;
+  return DeviceAnswer::saturated;
+}
+
+DeviceStatus VirtualOmega7::status() noexcept {
+  DeviceStatus status;
+  status.saturations = saturations_;
+  if (plant_.too_fast()) {
+    status.forces_off = ForcesOff::velocity;
+  } else if (plant_.watchdog_tripped()) {
+    status.forces_off = ForcesOff::watchdog;
+  } else if (!forces_on_) {
+    status.forces_off = ForcesOff::software;
+  }
+  return status;
+}
+
+HandState VirtualOmega7::hand() noexcept {
+  HandState hand;
+  hand.buttons = plant_.waiting() ? 1U : 0U;
+  return hand;
+}
+
+void VirtualOmega7::advance(double seconds) noexcept {
+  owed_s_ += seconds;
+  plant_.forces(forces_on_);
+  // Half a period of tolerance: sums of periods are not exact.
+  while (owed_s_ > 0.5 * settings_.period_s) {
+    plant_.advance();
+    owed_s_ -= settings_.period_s;
+  }
+}
+
+void VirtualOmega7::stop() noexcept {
+  (void)plant_.command(Eigen::Vector3d::Zero());
+  forces_on_ = false;
+}
+
+void VirtualOmega7::cut_forces() noexcept {
+  forces_on_ = false;
+}
+
+}  // namespace tpm::haptics

@@ -1,0 +1,41 @@
+#pragma once
+#include <atomic>
+
+#include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/device/virtual_plant.hpp"
+#include "tpmkit/device.hpp"
+
+namespace tpm::haptics {
+
+/// A simulated Omega.7 held by a simulated arm, or another device of the list whose row says
+/// `plant`. Its time passes in advance() only.
+class VirtualOmega7 final : public HapticDevice {
+ public:
+  /// @param limits the motors are no stronger, the encoders no finer
+  VirtualOmega7(const PlantSettings& settings, OperatorScript script,
+                const DeviceLimits& limits = limits_of("virtual"));
+
+  const DeviceIdentity& open() override;
+  void prepare(const DevicePreparation& preparation) override;
+  DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override;
+  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
+  DeviceStatus status() noexcept override;
+  /// The simulated operator presses a button while the session waits.
+  HandState hand() noexcept override;
+  void await() noexcept override { plant_.await(); }
+  void begin() noexcept override { plant_.begin(); }
+  void advance(double seconds) noexcept override;
+  void stop() noexcept override;
+  void cut_forces() noexcept override;
+
+ private:
+  PlantSettings settings_;
+  OperatorScript script_;
+  VirtualPlant plant_;
+  DeviceIdentity identity_;
+  double owed_s_ = 0.0;  ///< time that has passed and is no whole period yet
+  std::uint64_t saturations_ = 0;
+  std::atomic<bool> forces_on_{false};
+};
+
+}  // namespace tpm::haptics

@@ -1,0 +1,45 @@
+// Declared in tpmkit/servo_loop.hpp.
+#include <exception>
+
+#include "tpm/haptics/loop/servo_step.hpp"
+#include "tpmkit/servo_loop.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+constexpr std::uint64_t kAskEvery = 1024;
+
+}  // namespace
+
+ServoOutcome run_in_virtual_time(HapticDevice& device, ContactModel& model,
+                                 const ServoSettings& settings, const RecordSink& sink,
+                                 const std::function<bool()>& interrupted) {
+  ServoOutcome outcome;
+  ServoStep step(device, model, settings);
+  ServoRecord row;
+  try {
+    StopCause cause = StopCause::none;
+    for (std::uint64_t i = 0; cause == StopCause::none; ++i) {
+      if (i % kAskEvery == 0 && interrupted && interrupted()) {
+        step.stop(StopCause::signal);
+        break;
+      }
+      cause = step.cycle(0, row);
+      sink(row);
+      device.advance(settings.period_s);
+    }
+  } catch (const std::exception& error) {
+    step.stop(StopCause::exception);
+    outcome.detail = error.what();
+  } catch (...) {
+    step.stop(StopCause::exception);
+    outcome.detail = "something that is no error was thrown by whoever records";
+  }
+  outcome.cause = step.cause();
+  outcome.cycles = step.cycles();
+  outcome.counts = step.counts();
+  outcome.device = step.device_status();
+  return outcome;
+}
+
+}  // namespace tpm::haptics

@@ -1,0 +1,177 @@
+#include "tpm/haptics/session/loop_contact.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/text.hpp"
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/loop/triple_buffer.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpm/haptics/session/surface_scene.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::haptics {
+
+/// The two ends of a step that the caller's loop holds: where the tool is, and the force on it.
+class CallersDevice final : public HapticDevice {
+ public:
+  const DeviceIdentity& open() override { return identity_; }
+  void prepare(const DevicePreparation& /*preparation*/) override {}
+  DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
+    position_m = position_m_;
+    return DeviceAnswer::ok;
+  }
+  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override {
+    force_N_ = force_N;
+    return DeviceAnswer::ok;
+  }
+  DeviceStatus status() noexcept override { return {}; }
+  void stop() noexcept override { force_N_.setZero(); }
+  void cut_forces() noexcept override { force_N_.setZero(); }
+
+  void move_to(const Eigen::Vector3d& position_m) noexcept { position_m_ = position_m; }
+  [[nodiscard]] const Eigen::Vector3d& force_N() const noexcept { return force_N_; }
+
+ private:
+  DeviceIdentity identity_;
+  Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d force_N_ = Eigen::Vector3d::Zero();
+};
+
+namespace {
+
+/// A session around a law: as deep as the law was fitted to.
+Json session_around(const Json& law, const LoopContactOptions& options, const std::string& where) {
+  const LawFile file = law_from_json(law, where);
+  if (!(options.longest_s > 0.0) || !std::isfinite(options.longest_s)) {
+    throw Error(ExitCode::usage, "longest_s", shortest(options.longest_s), "seconds above 0");
+  }
+  const double deepest_m = file.fitted_to.value_or(file.spec.reference);
+  constexpr double kRate_m_per_s = 4e-3;
+  return {{"title", where},
+          {"model", {{"kind", "law"}, {"law", law}}},
+          {"indentations",
+           {{"depths", {fmt::format("{} m", deepest_m)}},
+            {"rates", {fmt::format("{} m/s", kRate_m_per_s)}},
+            {"hold", fmt::format("{} s", options.longest_s)}}}};
+}
+
+HilSession session_of(const std::filesystem::path& file, const LoopContactOptions& options) {
+  Json json = read_json(file);
+  if (!json.is_object() || (!json.contains("model") && !json.contains("law"))) {
+    throw bad_input(file.string(), "is neither a session nor a law",
+                    "a key 'model' (schemas/hil.schema.json) or 'law' (schemas/law.schema.json)");
+  }
+  if (!json.contains("model")) json = session_around(json, options, file.string());
+  if (options.rate_Hz != 0.0) json["rate"] = fmt::format("{} Hz", options.rate_Hz);
+  HilSession session = parse_session(json, file.string(), file.parent_path());
+  follow_surface(session);
+  return session;
+}
+
+/// The session without its end, and without its start if nobody waits for one.
+HilSession endless(HilSession session, const LoopContactOptions& options) {
+  // The state of spring-pots is kept for the length of the session only.
+  const bool forgets = session.law && session.law->spec.fractional != Fractional::none;
+  session.servo.phase_ends = {forgets ? session.servo.phase_ends.back()
+                                      : std::numeric_limits<std::uint64_t>::max()};
+  if (!options.start_gate) session.servo.gate.reset();
+  return session;
+}
+
+}  // namespace
+
+struct LoopContact::Stepped {
+  Stepped(ContactModel& model, const ServoSettings& settings)
+      : step(device, model, settings), surface_m(settings.surface_m) {}
+  CallersDevice device;
+  ServoStep step;
+  Eigen::Vector3d surface_m;
+  bool begun = false;
+  TripleBuffer<LoopContactState> newest;
+  StopCause cause = StopCause::none;
+};
+
+LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOptions& options)
+    : session_(session_of(file, options)), loop_(make_loop_model(session_, true)) {
+  require_within(session_, limits_of(options.device));
+  rendering_ = check_rendering(session_, *loop_.model, loop_, options.device);
+  if (!rendering_.acceptable() && !options.accept_unstable) {
+    throw Error(ExitCode::answer_is_no, file.string(), rendering_.verdict(),
+                "a softer tissue or a higher rate");
+  }
+  settings_ = loop_settings(endless(session_, options), loop_, rendering_, true);
+  displacement_m_ = Eigen::Matrix3Xd::Zero(3, spheres());
+  reset();
+}
+
+LoopContact::~LoopContact() = default;
+
+void LoopContact::reset() {
+  loop_.model->reset();
+  stepped_ = std::make_unique<Stepped>(*loop_.model, settings_);
+  if (loop_.shape.field) loop_.shape.field->reset();
+  displacement_m_.setZero();
+  drawn_ = 0;
+  drawn_at_m_.setZero();
+}
+
+StopCause LoopContact::step(const Eigen::Vector3d& position_m, Eigen::Vector3d& force_N,
+                            int missed) noexcept {
+  Stepped& s = *stepped_;
+  force_N.setZero();
+  if (s.cause != StopCause::none) return s.cause;
+  s.device.move_to(position_m);
+  LoopContactState state;
+  s.cause = s.step.cycle(std::max(0, missed), state.row);
+  if (s.cause == StopCause::none) force_N = s.device.force_N();
+  if (!s.begun && state.row.phase >= 0) {
+    s.begun = true;
+    if (settings_.surface_before_hand_m) {
+      s.surface_m = position_m + *settings_.surface_before_hand_m * settings_.push;
+    }
+  }
+  state.surface_m = s.surface_m;
+  state.time_s = static_cast<double>(s.step.cycles()) * settings_.period_s;
+  s.newest.write(state);
+  return s.cause;
+}
+
+LoopContactState LoopContact::state() noexcept {
+  (void)stepped_->newest.refresh();
+  return stepped_->newest.latest();
+}
+
+void LoopContact::positions(Eigen::Ref<Eigen::Matrix3Xd> all) noexcept {
+  constexpr std::uint64_t kMostPending = 25;  // a second
+  const LoopContactState newest = state();
+  const TissueShape& shape = loop_.shape;
+  const Eigen::Map<const Eigen::Vector3d> at_m(newest.row.position_m);
+  const bool waits = newest.row.phase < 0 || newest.time_s == 0.0;
+  Eigen::Vector3d moved = drawn_at_m_;
+  if (!waits && at_m.allFinite() && std::isfinite(newest.row.surface_depth_m)) {
+    moved = shape.to_model ? Eigen::Vector3d(*shape.to_model * (at_m - newest.surface_m))
+                           : Eigen::Vector3d(shape.push * newest.row.surface_depth_m);
+  }
+  const auto lived = static_cast<std::uint64_t>(newest.time_s / kDrawnEvery_s);
+  const std::uint64_t due = lived > drawn_ ? std::min(lived - drawn_, kMostPending) : 0;
+  if (shape.field && due > 0) {
+    for (std::uint64_t i = 1; i <= due; ++i) {
+      const double part = static_cast<double>(i) / static_cast<double>(due);
+      (void)shape.field->step(drawn_at_m_ + part * (moved - drawn_at_m_));
+    }
+    shape.field->displacements(displacement_m_);
+    drawn_at_m_ = moved;
+  }
+  drawn_ = std::max(drawn_, lived);
+  if (!shape.to_model && displacement_m_.cols() > 0) {
+    displacement_m_.col(static_cast<Eigen::Index>(shape.contact)) = moved;
+  }
+  all = shape.rest_m + displacement_m_;
+}
+
+}  // namespace tpm::haptics

@@ -1,0 +1,181 @@
+#include "tpm/haptics/session/recording.hpp"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/files/renamed_names.hpp"
+#include "tpm/files/row_log.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+constexpr const char* kFormat = "tpm hil recording 2";
+constexpr const char* kFirstFormat = "tpm hil recording 1";
+
+Json times_json(const TimeHistogram& times) {
+  return {{"p50_s", times.quantile_s(0.5)},
+          {"p99_s", times.quantile_s(0.99)},
+          {"p999_s", times.quantile_s(0.999)},
+          {"max_s", times.max_s()}};
+}
+
+void set_surface(HilSession& session, const Json& by_phase, const std::string& where) {
+  if (by_phase.size() != session.phases.size()) {
+    throw bad_input(where, "has surfaces for another number of phases", "one list for each");
+  }
+  for (std::size_t i = 0; i < by_phase.size(); ++i) {
+    session.phases[i].surface_m = by_phase[i].get<std::vector<double>>();
+  }
+}
+
+}  // namespace
+
+Json to_json(const ServoCounts& counts) {
+  return {{"time_guards", counts.time_guards},
+          {"saturations", counts.saturations},
+          {"force_limited", counts.force_limited},
+          {"slipped", counts.slipped},
+          {"ramping_in", counts.ramping_in},
+          {"damped", counts.damped},
+          {"beyond_model", counts.beyond_model},
+          {"late", counts.late},
+          {"missed", counts.missed},
+          {"most_consecutive_missed", counts.most_consecutive_missed},
+          {"most_late_of_1000", counts.most_late}};
+}
+
+Json to_json(const DeviceIdentity& device) {
+  return {{"kind", device.kind},
+          {"name", device.name},
+          {"serial", device.serial},
+          {"firmware", device.firmware},
+          {"library_version", device.library_version},
+          {"communication_mode", word_of(device.link)},
+          {"left_handed", device.left_handed},
+          {"hardware", device.hardware},
+          {"assumptions", device.assumptions}};
+}
+
+Json recording_header(const HilSession& session, const DeviceIdentity& device,
+                      const LoopModel& model, bool real_time, const SessionNotes& notes,
+                      const Json& rendering) {
+  Json said = parse_json(session.text, "session");
+  if (session.law) {
+    said["model"]["law"] = to_json(*session.law);
+  } else {
+    said["model"]["scene"] = session.scene;
+  }
+  Json surface = Json::array();
+  for (const SessionPhase& phase : session.phases) surface.push_back(phase.surface_m);
+  return {{"format", kFormat},
+          {"version", version()},
+          {"simulated_device", !device.hardware},
+          {"device", to_json(device)},
+          {"time", real_time ? "real" : "virtual"},
+          {"model",
+           {{"name", model.name},
+            {"error_bound", model.error_bound},
+            {"instantaneous_stiffness_N_per_m", model.stiffness_N_per_m},
+            {"plan", model.plan}}},
+          {"notes",
+           {{"date", notes.date},
+            {"operator_code", notes.operator_code},
+            {"subject_code", notes.subject_code}}},
+          {"rendering", rendering},
+          {"surface_by_phase_m", std::move(surface)},
+          {"session", std::move(said)}};
+}
+
+Json recording_closing(const ServoOutcome& outcome) {
+  Json json{{"cause", word_of(outcome.cause)},
+            {"detail", outcome.detail},
+            {"cycles", outcome.cycles},
+            {"counts", to_json(outcome.counts)},
+            {"dropped_records", outcome.dropped_records},
+            {"device_error", outcome.device.error},
+            {"device_error_text", std::string(outcome.device.error_text)},
+            {"forces_off", word_of(outcome.device.forces_off)}};
+  if (!outcome.real_time) return json;
+  json["host"] = host_line();
+  json["scheduling"] = outcome.scheduling;
+  json["woke_late"] = times_json(outcome.woke_late);
+  json["busy"] = times_json(outcome.busy);
+  json["stop_took_s"] = outcome.stop_took_s;
+  return json;
+}
+
+bool HilRecording::simulated() const {
+  return header.value("simulated_device", true);
+}
+
+double HilRecording::time_s(const ServoRecord& row) const {
+  return static_cast<double>(row.cycle) * session.servo.period_s;
+}
+
+double HilRecording::commanded_N(const ServoRecord& row) const {
+  return -session.servo.push.dot(
+      Eigen::Vector3d(row.commanded_N[0], row.commanded_N[1], row.commanded_N[2]));
+}
+
+HilRecording read_recording(const std::filesystem::path& file) {
+  const RowLog log = read_row_log(file);
+  HilRecording recording;
+  recording.name = file.filename().string();
+  recording.header = parse_json(log.header, file.string());
+  const std::string format = recording.header.value("format", "");
+  const std::size_t row_bytes = format == kFirstFormat ? kFirstRowBytes : sizeof(ServoRecord);
+  if ((format != kFormat && format != kFirstFormat) || log.row_bytes != row_bytes) {
+    throw bad_input(file.string(), "is a recording of another version of tpm", kFormat);
+  }
+  const Json session =
+      with_current_names(recording.header.at("session"), "hil", file.string(), FormerNames::silent);
+  recording.session = parse_session(session, file.string(), {});
+  if (recording.header.contains("surface_by_phase_m")) {  // before, slides went straight
+    set_surface(recording.session, recording.header.at("surface_by_phase_m"), file.string());
+  }
+  recording.rows.resize(log.rows);
+  for (std::size_t i = 0; i < log.rows; ++i) {
+    std::memcpy(&recording.rows[i], log.bytes.data() + i * row_bytes, row_bytes);
+  }
+  if (recording.session.servo.surface_before_hand_m && log.rows > 0) {
+    const Eigen::Map<const Eigen::Vector3d> hand_m(recording.rows.front().position_m);
+    recording.session.servo.surface_m =
+        hand_m + *recording.session.servo.surface_before_hand_m * recording.session.servo.push;
+  }
+  recording.closed = log.closed;
+  recording.damaged = log.damaged;
+  if (log.closed) recording.closing = parse_json(log.closing, file.string());
+  return recording;
+}
+
+std::string damage_line(const HilRecording& recording) {
+  if (recording.damaged > 0) {
+    return fmt::format(
+        "the recording is damaged: {} of {} rows are not as they were written, and "
+        "left out{}",
+        recording.damaged, recording.rows.size() + recording.damaged,
+        recording.closed ? "" : "; it has no closing record");
+  }
+  return recording.closed ? "" : "the recording is cut off: no closing record";
+}
+
+std::string device_line(const HilRecording& recording) {
+  const Json& device = recording.header.at("device");
+  const std::string name = device.at("name").get<std::string>();
+  const std::string mode = device.at("communication_mode").get<std::string>();
+  if (!recording.simulated()) {
+    return fmt::format("{}, serial {}, firmware {}, library {}, communication {}", name,
+                       device.at("serial").get<std::string>(),
+                       device.at("firmware").get<std::string>(),
+                       device.at("library_version").get<std::string>(), mode);
+  }
+  return fmt::format("SIMULATED DEVICE, no hardware: {} ({}, communication {})", name,
+                     device.at("kind").get<std::string>(), mode);
+}
+
+}  // namespace tpm::haptics

@@ -1,0 +1,55 @@
+#pragma once
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "tpm/haptics/session/session.hpp"
+#include "tpmkit/servo_loop.hpp"
+
+namespace tpm::haptics {
+
+/// What a person adds to a recording. Codes, not names: the recording may be passed on. Nothing is
+/// required.
+struct SessionNotes {
+  std::string date, operator_code, subject_code;
+};
+
+/// What stands before the rows of a recording: format, session with its scene, device, model, what
+/// was known of its rendering before (RenderingCheck).
+[[nodiscard]] Json recording_header(const HilSession& session, const DeviceIdentity& device,
+                                    const LoopModel& model, bool real_time,
+                                    const SessionNotes& notes = {}, const Json& rendering = {});
+
+/// What stands behind them: how the session ended.
+[[nodiscard]] Json recording_closing(const ServoOutcome& outcome);
+
+[[nodiscard]] Json to_json(const DeviceIdentity& device);
+[[nodiscard]] Json to_json(const ServoCounts& counts);
+
+/// A recorded session.
+struct HilRecording {
+  std::string name;  ///< of the file, without folders
+  Json header;
+  HilSession session;
+  std::vector<ServoRecord> rows;
+  bool closed = false;      ///< the session came to an end, of whatever cause
+  Json closing;             ///< null unless closed
+  std::size_t damaged = 0;  ///< rows that were written and are not whole; left out
+
+  /// The device was simulated, replayed, or may be: no motor is known to have moved.
+  [[nodiscard]] bool simulated() const;
+  [[nodiscard]] double time_s(const ServoRecord& row) const;
+  /// Force sent to the device against the push, N.
+  [[nodiscard]] double commanded_N(const ServoRecord& row) const;
+};
+
+/// Reads a recording, also of a session that was cut off. Throws Error(bad_input).
+[[nodiscard]] HilRecording read_recording(const std::filesystem::path& file);
+
+/// What of a recording is missing, one line for a person; empty if nothing is.
+[[nodiscard]] std::string damage_line(const HilRecording& recording);
+
+/// "SIMULATED DEVICE" in words that suit the recording, or what the hardware is.
+[[nodiscard]] std::string device_line(const HilRecording& recording);
+
+}  // namespace tpm::haptics

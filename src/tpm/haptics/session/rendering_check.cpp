@@ -1,0 +1,181 @@
+#include "tpm/haptics/session/rendering_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/text.hpp"
+#include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/session/rendering_border.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+constexpr double kAtLoads_m = 0.010;
+
+/// Stiffness along the push within one period at a depth, 0 outside the validity of the model.
+double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth_m) {
+  constexpr int kSteps = 200;
+  constexpr double kFurther_m = 5e-5;
+  model.reset();
+  ContactAnswer there;
+  for (int i = 1; i <= kSteps; ++i) there = model.step(push * (depth_m * i / kSteps));
+  const ContactAnswer stays = model.step(push * depth_m);
+  const ContactAnswer further = model.step(push * (depth_m + kFurther_m));
+  if (!stays.valid || !further.valid) return 0.0;
+  // What relaxes in a period is left out: it did so in the period before as well.
+  const double equilibrium_N = push.dot(stays.force_N - there.force_N);
+  return (push.dot(stays.force_N - further.force_N) + equilibrium_N) / kFurther_m;
+}
+
+void find_stiffness(RenderingCheck& check, const HilSession& session, ContactModel& model,
+                    const Eigen::Vector3d& push) {
+  constexpr int kDepths = 4;
+  const double at_rest = push.dot(model.instantaneous_stiffness() * push);
+  const double relaxed = push.dot(model.equilibrium_stiffness() * push);
+  check.stiffness_N_per_m = at_rest;
+  check.equilibrium_share = at_rest > 0.0 ? std::clamp(relaxed / at_rest, 0.0, 1.0) : 1.0;
+  const double deepest = deepest_asked_m(session, kAtLoads_m);
+  for (int i = 1; i <= kDepths; ++i) {
+    const double depth = deepest * i / kDepths;
+    const double tangent = tangent_at(model, push, depth);
+    if (!(tangent > check.stiffness_N_per_m)) continue;
+    check.stiffness_N_per_m = tangent;
+    check.depth_m = depth;
+  }
+  model.reset();
+}
+
+RenderedContact contact_of(const RenderingCheck& check, double relaxation_time_s) {
+  RenderedContact contact;
+  contact.period_s = 1.0 / check.rate_Hz;
+  contact.delay_periods = check.delay_periods;
+  contact.relaxation_time_s = relaxation_time_s;
+  contact.stiffness_N_per_m = check.stiffness_N_per_m;
+  contact.equilibrium_share = check.equilibrium_share;
+  return contact;
+}
+
+/// Rests that are too short for what comes after them.
+void warn_of_rests(RenderingCheck& check, const HilSession& session) {
+  constexpr double kLeft = 0.01;
+  const double needed_s = -std::log(kLeft) * check.recovery_s;
+  double begin_s = 0.0, shortest_s = 0.0;
+  for (const SessionPhase& phase : session.phases) {
+    const double length_s = phase.end_s - begin_s;
+    begin_s = phase.end_s;
+    const bool last = &phase == &session.phases.back();
+    if (phase.kind != SessionPhaseKind::rest || last) continue;
+    if (shortest_s == 0.0 || length_s < shortest_s) shortest_s = length_s;
+  }
+  if (shortest_s == 0.0 || shortest_s >= needed_s) return;
+  check.warnings.push_back(fmt::format(
+      "a rest of {} s is too short: the surface recovers with a time constant of {} s, so that {} "
+      "% of what is left of an indentation is still there at the next one, whose force is smaller "
+      "by that; {} s leave 1 %",
+      significant(shortest_s, 3), significant(check.recovery_s, 3),
+      significant(100.0 * std::exp(-shortest_s / check.recovery_s), 2), significant(needed_s, 3)));
+}
+
+}  // namespace
+
+std::string RenderingCheck::verdict() const {
+  const std::string what =
+      fmt::format("stiffness {} N/m at {} Hz, {} periods of delay, friction {} N s/m",
+                  significant(stiffness_N_per_m, 3), significant(rate_Hz, 4), delay_periods,
+                  significant(friction_N_s_per_m, 2));
+  if (!stable()) {
+    return fmt::format(
+        "unstable: {}; stable with the operator's arm up to {} N/m, of which {} are allowed", what,
+        significant(stable_N_per_m, 3), kRoom);
+  }
+  if (!within_device()) {
+    return fmt::format("too stiff for the device: {}; at most {} N/m", what,
+                       significant(largest_N_per_m, 3));
+  }
+  if (!follows_encoder()) {
+    return fmt::format(
+        "the rise of the force is limited too much: {}; a step of the encoder ({} mm) makes {} N, "
+        "limits/slew_N_per_s allows {} N within a period and has to be {} at least",
+        what, significant(1e3 * encoder_step_m, 2),
+        significant(stiffness_N_per_m * encoder_step_m, 3), significant(rise_N, 3),
+        significant(stiffness_N_per_m * encoder_step_m * rate_Hz, 3));
+  }
+  if (!passive()) {
+    return fmt::format(
+        "stable with the operator's arm (up to {} N/m), not passive: {}; passive with every "
+        "operator up to {} N/m",
+        significant(stable_N_per_m, 3), what, significant(passive_N_per_m, 3));
+  }
+  return fmt::format("passive: {}; the border is {} N/m, that of stability {} N/m", what,
+                     significant(passive_N_per_m, 3), significant(stable_N_per_m, 3));
+}
+
+RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
+                               const LoopModel& loop, std::string_view kind) {
+  return check_rendering(session, model, loop, limits_of(kind));
+}
+
+RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
+                               const LoopModel& loop, const DeviceLimits& limits) {
+  // The simulated Omega.7 is what the session says; a plugin speaks for itself, simulated or not.
+  const bool own = limits.hardware() || limits.simulated;
+  RenderingCheck check;
+  check.rate_Hz = 1.0 / session.servo.period_s;
+  check.delay_periods = own ? limits.delay_periods : session.plant.delay_periods;
+  check.friction_N_s_per_m = own ? limits.friction_N_s_per_m : session.plant.damping_N_s_per_m;
+  check.largest_N_per_m = limits.stiffness_N_per_m;
+  check.encoder_step_m = own ? limits.encoder_step_m
+                         : limits.plant
+                             ? std::max(session.plant.encoder_step_m, limits.encoder_step_m)
+                             : session.plant.encoder_step_m;
+  check.rise_N = session.servo.slew_limit_N_per_s * session.servo.period_s;
+  find_stiffness(check, session, model, loop.push);
+
+  const double period_s = session.servo.period_s;
+  const double late_s = (0.5 + check.delay_periods) * period_s;
+  check.passive_friction_N_s_per_m = check.stiffness_N_per_m * late_s;
+  check.passive_N_per_m = check.friction_N_s_per_m / late_s;
+
+  check.recovery_s = loop.relaxation_times_s.empty()
+                         ? 0.0
+                         : loop.relaxation_times_s.back() / std::max(check.equilibrium_share, 1e-3);
+  PlantSettings plant = session.plant;
+  plant.damping_N_s_per_m = check.friction_N_s_per_m;
+  // A spring that never relaxes may be worse than one that does.
+  constexpr double kNever_s = 1e6;
+  check.stable_N_per_m = 1e300;
+  std::vector<double> times_s = loop.relaxation_times_s;
+  times_s.push_back(kNever_s);
+  for (const double relaxation_s : times_s) {
+    const RenderedContact contact = contact_of(check, relaxation_s);
+    check.spectral_radius = std::max(check.spectral_radius, loop_spectral_radius(contact, plant));
+    check.stable_N_per_m = std::min(check.stable_N_per_m,
+                                    largest_stable_stiffness(contact, plant, BorderBy::prediction));
+  }
+  warn_of_rests(check, session);
+  return check;
+}
+
+Json to_json(const RenderingCheck& check) {
+  constexpr int kDigits = 6;
+  return {{"verdict", check.verdict()},
+          {"stable", check.stable()},
+          {"passive", check.passive()},
+          {"within_device", check.within_device()},
+          {"follows_encoder", check.follows_encoder()},
+          {"rate_Hz", rounded(check.rate_Hz, kDigits)},
+          {"delay_periods", check.delay_periods},
+          {"friction_N_s_per_m", rounded(check.friction_N_s_per_m, kDigits)},
+          {"stiffness_N_per_m", rounded(check.stiffness_N_per_m, kDigits)},
+          {"at_depth_m", rounded(check.depth_m, kDigits)},
+          {"passive_friction_N_s_per_m", rounded(check.passive_friction_N_s_per_m, kDigits)},
+          {"passive_border_N_per_m", rounded(check.passive_N_per_m, kDigits)},
+          {"stable_border_N_per_m", rounded(check.stable_N_per_m, kDigits)},
+          {"spectral_radius", rounded(check.spectral_radius, kDigits)},
+          {"device_border_N_per_m", rounded(check.largest_N_per_m, kDigits)},
+          {"warnings", check.warnings}};
+}
+
+}  // namespace tpm::haptics

@@ -1,0 +1,58 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "tpm/haptics/session/session.hpp"
+
+namespace tpm::haptics {
+
+/// Can this tissue be rendered on this device? Found before a session begins.
+struct RenderingCheck {
+  double rate_Hz = 0.0;
+  int delay_periods = 0;                    ///< of the device, known or assumed
+  double friction_N_s_per_m = 0.0;          ///< of the device, known or assumed
+  double stiffness_N_per_m = 0.0;           ///< largest instantaneous one up to the session's depth
+  double equilibrium_share = 1.0;           ///< of it, of the equilibrium
+  double depth_m = 0.0;                     ///< where that stiffness was found
+  double passive_friction_N_s_per_m = 0.0;  ///< K (T/2 + delay), for every passive operator
+  double passive_N_per_m = 0.0;  ///< largest stiffness that is passive with this friction
+  double stable_N_per_m = 0.0;   ///< largest that is stable with the arm of the operator
+  double spectral_radius = 0.0;  ///< of device, arm and contact over a period; stable below 1
+  double largest_N_per_m = 0.0;  ///< that the device's maker recommends
+  double recovery_s = 0.0;       ///< time constant in which a free surface recovers
+  double encoder_step_m = 0.0;   ///< of the device, known or assumed
+  double rise_N = 0.0;           ///< by which the session lets a force rise within a period
+  std::vector<std::string> warnings;
+
+  [[nodiscard]] bool passive() const { return stiffness_N_per_m <= passive_N_per_m; }
+  /// With room: the border is that of small motions, and impacts and limits take away from it.
+  [[nodiscard]] bool stable() const {
+    return spectral_radius < 1.0 && stiffness_N_per_m <= kRoom * stable_N_per_m;
+  }
+  [[nodiscard]] bool within_device() const { return stiffness_N_per_m <= largest_N_per_m; }
+  /// A step of the encoder is felt as it is. Where it makes a larger force than may come within a
+  /// period, the model's tool slips back at every step towards the tissue and does not come forward
+  /// again at those away from it: the force that is felt is too small, and never at rest.
+  [[nodiscard]] bool follows_encoder() const {
+    return stiffness_N_per_m * encoder_step_m <= rise_N * (1.0 + 1e-12);
+  }
+  [[nodiscard]] bool acceptable() const { return stable() && within_device() && follows_encoder(); }
+  static constexpr double kRoom = 0.8;
+  /// One line: passive, stable, or why not.
+  [[nodiscard]] std::string verdict() const;
+};
+
+/// The stiffness is that of the model's own steps: pushed to four depths up to the session's
+/// deepest, then a little further within one period. Stability is that of the linear, two-sided
+/// loop with the arm of the session's simulated operator; the slip element only ever takes energy
+/// and is left out. The model is at rest afterwards.
+/// @param limits of the device
+[[nodiscard]] RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
+                                             const LoopModel& loop, const DeviceLimits& limits);
+/// @param kind of device, see limits_of()
+[[nodiscard]] RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
+                                             const LoopModel& loop, std::string_view kind);
+
+[[nodiscard]] Json to_json(const RenderingCheck& check);
+
+}  // namespace tpm::haptics

@@ -1,0 +1,19 @@
+#pragma once
+#include "tpm/files/document_place.hpp"
+#include "tpm/haptics/session/session.hpp"
+
+namespace tpm::haptics {
+
+/// Puts the motion itself in place of the name of a recording in the block `motion`: depths from
+/// the law's contact point on, evenly spaced in time, linear between the samples of the recording;
+/// and for how long the first depth has to be held until the law is in equilibrium under it.
+/// @param folder that the name is relative to
+void embed_motion(Json& session, const LawFile& law, double period_s,
+                  const std::filesystem::path& folder, const DocumentPlace& place);
+
+/// The phases that the blocks `indentations`, `slides`, `creep` and `motion` lead to. Throws
+/// Error(bad_input).
+[[nodiscard]] std::vector<SessionPhase> parse_phases(const Json& session,
+                                                     const DocumentPlace& place);
+
+}  // namespace tpm::haptics

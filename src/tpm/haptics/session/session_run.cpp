@@ -1,0 +1,178 @@
+#include "tpm/haptics/session/session_run.hpp"
+
+#include <limits>
+
+#include "tpm/files/row_log.hpp"
+#include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/device/force_dimension.hpp"
+#include "tpm/haptics/device/plugin_device.hpp"
+#include "tpm/haptics/device/replay_device.hpp"
+#include "tpm/haptics/device/virtual_omega7.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+constexpr std::int64_t kPassOnEvery_ns = 50'000'000;
+
+Eigen::Matrix3Xd motion_of(const HilRecording& recording) {
+  Eigen::Matrix3Xd motion(3, static_cast<Eigen::Index>(recording.rows.size()));
+  for (Eigen::Index i = 0; i < motion.cols(); ++i) {
+    motion.col(i) =
+        Eigen::Map<const Eigen::Vector3d>(recording.rows[static_cast<std::size_t>(i)].position_m);
+  }
+  return motion;
+}
+
+/// Where a session with the motion of a recording asks the tool to be, every period.
+Eigen::Matrix3Xd asked_motion(const HilSession& session) {
+  OperatorScript script = session.operator_script();
+  Eigen::Matrix3Xd motion(3, static_cast<Eigen::Index>(session.servo.phase_ends.back()));
+  for (Eigen::Index i = 0; i < motion.cols(); ++i) {
+    const double depth_m = script.at(static_cast<double>(i) * session.servo.period_s).value;
+    motion.col(i) = session.servo.surface_m + depth_m * session.servo.push;
+  }
+  return motion;
+}
+
+ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
+                      const std::shared_ptr<ContactModel>& stepped, const ServoSettings& servo,
+                      const SessionRunOptions& options, RowLogWriter& log) {
+  const RecordSink sink = [&](const ServoRecord& row) {
+    const bool waits = row.phase < 0 && row.stop == StopCause::none;
+    if (!waits) log.append(&row);
+    if (options.watcher) options.watcher(row);
+  };
+  if (!options.real_time) {
+    return run_in_virtual_time(*device, *stepped, servo, sink, options.interrupted);
+  }
+  RealTimeOptions real;
+  real.wish = options.wish;
+  real.cycle_timeout_s = session.cycle_timeout_s;
+  real.interrupted = options.interrupted;
+  std::int64_t passed_on_ns = now_ns();
+  real.idle = [&log, &passed_on_ns] {
+    if (now_ns() - passed_on_ns < kPassOnEvery_ns) return;
+    log.flush();
+    passed_on_ns = now_ns();
+  };
+  return run_in_real_time(device, stepped, servo, sink, real);
+}
+
+void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& choice,
+                        const DeviceLimits& limits, const SessionRunOptions& options) {
+  if (options.accept_unstable && !limits.plant) {
+    throw Error(ExitCode::usage, "--accept-unstable", "is not for the device '" + choice.kind + "'",
+                "--device virtual");
+  }
+  if (rendering.acceptable() || options.accept_unstable || choice.kind == "replay") return;
+  throw Error(ExitCode::answer_is_no, "stability", rendering.verdict(),
+              "a softer tissue, a higher rate, a shorter delay or a faster rise; "
+              "--accept-unstable with --device virtual");
+}
+
+std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
+  if (choice.plugin.empty()) {
+    throw Error(ExitCode::usage, "--device plugin", "no plugin is named",
+                "--plugin FILE, a shared library after tpmkit/haptic_device.h");
+  }
+  return std::make_shared<PluginDevice>(choice.plugin, choice.which);
+}
+
+/// A session from its model to the end of its recording.
+/// @param make gives the device, once the rendering is known to be acceptable
+template <class MakeDevice>
+SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const DeviceLimits& limits,
+                  const SessionRunOptions& options, const MakeDevice& make) {
+  require_within(session, limits);
+  SessionRun run;
+  run.model = make_loop_model(session, options.real_time, options.planning);
+  const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
+  run.rendering = check_rendering(session, *stepped, run.model, limits);
+  require_acceptable(run.rendering, choice, limits, options);
+  const std::shared_ptr<HapticDevice> device = make();
+  DevicePreparation preparation = session.preparation;
+  preparation.period_s = session.servo.period_s;
+  preparation.may_move = choice.may_move;
+  preparation.take_as_ready = choice.take_as_ready;
+  preparation.interrupted = options.interrupted;
+  try {
+    run.device = device->open();
+    if (options.opened) options.opened(run.device, run.model);
+    RowLogWriter log(options.recording,
+                     to_text(recording_header(session, run.device, run.model, options.real_time,
+                                              options.notes, to_json(run.rendering))),
+                     sizeof(ServoRecord), RowLogWriter::Name::later);
+    device->prepare(preparation);
+    log.appear();
+    const ServoSettings servo =
+        loop_settings(session, run.model, run.rendering, choice.kind != "replay");
+    run.outcome = run_loop(session, device, stepped, servo, options, log);
+    log.close(to_text(recording_closing(run.outcome)));
+  } catch (...) {
+    device->stop();
+    throw;
+  }
+  return run;
+}
+
+}  // namespace
+
+DeviceLimits limits_of(const DeviceChoice& choice) {
+  return choice.kind == "plugin" ? plugin_of(choice)->limits() : limits_of(choice.kind);
+}
+
+std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilSession& session) {
+  if (choice.kind == "plugin") return plugin_of(choice);
+  const DeviceLimits& limits = limits_of(choice.kind);
+  if (limits.plant) {
+    return std::make_shared<VirtualOmega7>(session.plant, session.operator_script(), limits);
+  }
+  if (limits.hardware()) {
+    return std::make_shared<ForceDimension>(choice.library, choice.kind, choice.which);
+  }
+  if (choice.replay.empty() && session.phases.back().kind == SessionPhaseKind::motion) {
+    return std::make_shared<ReplayDevice>(asked_motion(session), session.phases.back().name);
+  }
+  if (choice.replay.empty()) {
+    throw Error(ExitCode::usage, "--device replay", "has nothing to replay",
+                "--recording FILE beside it");
+  }
+  const HilRecording recording = read_recording(choice.replay);
+  return std::make_shared<ReplayDevice>(motion_of(recording), recording.name);
+}
+
+ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
+                            const RenderingCheck& rendering, bool guided) {
+  ServoSettings servo{session.servo};
+  servo.friction_N_s_per_m = rendering.friction_N_s_per_m;
+  servo.delay_periods = guided ? rendering.delay_periods : 0;
+  if (!guided) {
+    servo.gate.reset();
+    servo.energy_allowance_J = std::numeric_limits<double>::infinity();
+    servo.watch_oscillation = false;
+    servo.most_speed_m_per_s = std::numeric_limits<double>::infinity();
+  }
+  servo.model_push = model.push;
+  servo.to_model = model.to_model;
+  return servo;
+}
+
+SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
+                       const SessionRunOptions& options) {
+  return run_on(session, choice, limits_of(choice), options,
+                [&] { return make_device(choice, session); });
+}
+
+SessionRun run_session_on(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
+                          const DeviceLimits& limits, const DevicePermissions& permissions,
+                          const SessionRunOptions& options) {
+  DeviceChoice choice;
+  choice.kind = "the caller's own";
+  choice.may_move = permissions.may_move;
+  choice.take_as_ready = permissions.take_as_ready;
+  return run_on(session, choice, limits, options, [&] { return device; });
+}
+
+}  // namespace tpm::haptics

@@ -1,0 +1,80 @@
+#pragma once
+#include <functional>
+#include <memory>
+
+#include "tpm/haptics/device/force_dimension.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/session/rendering_check.hpp"
+
+namespace tpm::haptics {
+
+/// Which device, and what it may do.
+struct DeviceChoice {
+  std::string kind = "virtual";   ///< as limits_of() takes it, or "plugin"
+  std::filesystem::path library;  ///< of the vendor; empty: looked for
+  std::filesystem::path replay;   ///< recording to be replayed
+  std::filesystem::path plugin;   ///< of the kind "plugin": its shared library
+  DeviceSelection which;
+  bool may_move = false;
+  bool take_as_ready = false;
+};
+
+/// What may be asked of it; a plugin is loaded and asked. Throws as make_device().
+[[nodiscard]] DeviceLimits limits_of(const DeviceChoice& choice);
+
+/// Throws Error(usage) for an unknown kind, Error(environment) if it cannot be had.
+[[nodiscard]] std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice,
+                                                        const HilSession& session);
+
+struct SessionRunOptions {
+  bool real_time = false;
+  RealTimeWish wish = RealTimeWish::ignore;
+  std::filesystem::path recording;
+  bool accept_unstable = false;  ///< of a simulated device only
+  SessionNotes notes;
+  std::function<bool()> interrupted;
+  /// Sees every record, on the thread that writes them.
+  std::function<void(const ServoRecord&)> watcher;
+  /// Called when the device is open and its forces are still off.
+  std::function<void(const DeviceIdentity&, const LoopModel&)> opened;
+  PlanningTold planning;  ///< see make_loop_model()
+};
+
+struct SessionRun {
+  DeviceIdentity device;
+  LoopModel model;  ///< its `model` is with the run
+  RenderingCheck rendering;
+  ServoOutcome outcome;
+};
+
+/// What the loop of a session is set to: what the session states, with what is known of its model
+/// and device.
+/// @param guided a hand holds the device; else a recorded motion begins where it began, and nobody
+///        feels it
+[[nodiscard]] ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
+                                          const RenderingCheck& rendering, bool guided);
+
+/// What a device may do beside rendering forces.
+struct DevicePermissions {
+  bool may_move = false;       ///< to initialise itself
+  bool take_as_ready = false;  ///< it is initialised, where nobody can tell
+};
+
+/// run_session() on a device that the caller has made; a hand holds it.
+[[nodiscard]] SessionRun run_session_on(const HilSession& session,
+                                        const std::shared_ptr<HapticDevice>& device,
+                                        const DeviceLimits& limits,
+                                        const DevicePermissions& permissions,
+                                        const SessionRunOptions& options);
+
+/// Runs a session and records it. A rendering that would be unstable is refused, forces and phases
+/// begin when the tool is in place (StartGate; rows until then are shown and not recorded).
+/// In real time the rows written by now are passed to the system
+/// every 50 ms.
+/// Throws Error(answer_is_no) for a rendering that is refused, Error(usage) for one that is
+/// accepted on a device that is not simulated, Error(environment) before the loop begins; what
+/// happens later is in the outcome.
+[[nodiscard]] SessionRun run_session(const HilSession& session, const DeviceChoice& device,
+                                     const SessionRunOptions& options);
+
+}  // namespace tpm::haptics

@@ -1,0 +1,329 @@
+#include "tpm/haptics/show/border_report.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tpm/base/enum_names.hpp"
+#include "tpm/base/text.hpp"
+
+namespace tpm::report {
+namespace {
+
+constexpr int kBorderDigits = 6;
+const Axis kRate{"rate", "Hz", true};
+
+constexpr auto kRuleWords =
+    std::to_array<Word<ElementRule>>({{ElementRule::exact, "TPM, exact update"},
+                                      {ElementRule::forward_euler, "TPM, forward Euler"},
+                                      {ElementRule::mass_spring, "MSM"}});
+
+Json number_or_null(double value) {
+  return std::isfinite(value) ? Json(rounded(value, kBorderDigits)) : Json(nullptr);
+}
+
+Json points_json(const std::vector<BorderPoint>& points, const char* measured,
+                 const char* predicted) {
+  return array_json(points, [&](const BorderPoint& p) {
+    return Json{{"rate_Hz", rounded(p.rate_Hz, kBorderDigits)},
+                {"delay_s", rounded(p.delay_periods / p.rate_Hz, kBorderDigits)},
+                {"damping_N_s_per_m", rounded(p.damping_N_s_per_m, kBorderDigits)},
+                {measured, number_or_null(p.measured)},
+                {predicted, number_or_null(p.predicted)}};
+  });
+}
+
+double worst_difference(const std::vector<BorderPoint>& points) {
+  double worst = 0.0;
+  for (const BorderPoint& p : points) {
+    if (p.predicted > 0.0) worst = std::max(worst, std::abs(p.measured / p.predicted - 1.0));
+  }
+  return worst;
+}
+
+std::string value(double v) {
+  return std::isfinite(v) ? significant(v, 4) : "diverges";
+}
+
+Series measured_beside(const Series& predicted) {
+  return {.kind = Series::Kind::points,
+          .label = predicted.label + ", on the simulated device",
+          .provenance = "simulated"};
+}
+
+/// One curve and its measured points, over the rate, for one delay.
+void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int delay,
+                    double damping) {
+  Series predicted = line(delay == 0 ? "no delay" : fmt::format("delay {} periods", delay), {}, {});
+  Series measured = measured_beside(predicted);
+  for (const BorderPoint& p : points) {
+    if (p.delay_periods != delay || p.damping_N_s_per_m != damping) continue;
+    predicted.add(p.rate_Hz, p.predicted);
+    measured.add(p.rate_Hz, p.measured);
+  }
+  panel.series.push_back(std::move(predicted));
+  panel.series.push_back(std::move(measured));
+}
+
+Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
+  Series s = line("Colgate-Schenkel 2b/T, all taut", {}, {});
+  for (const BorderPoint& p : points) {
+    if (p.delay_periods != 0 || p.damping_N_s_per_m != damping) continue;
+    s.add(p.rate_Hz, 2.0 * damping * p.rate_Hz);
+  }
+  return s;
+}
+
+Figure border_figure(const BorderStudy& study) {
+  const double damping = study.plant.damping_N_s_per_m;
+  const Axis stiffness{"largest instantaneous stiffness", "N/m", true};
+  Panel passive{fmt::format("passive, device with {} N s/m", significant(damping, 3)), kRate,
+                stiffness};
+  Panel stable{"stable with the arm of one operator", kRate, stiffness};
+  for (const int delay : {0, 1, 2, 5}) {
+    add_rate_curve(passive, study.passive, delay, damping);
+    add_rate_curve(stable, study.stable, delay, damping);
+  }
+  passive.series.push_back(colgate_line(study.passive, damping));
+  return {
+      "borders",
+      "Passivity and stability of the contact (simulated device)",
+      "Lines: passivity by the condition of Colgate and Schenkel with the discrete transfer "
+      "function of the exactly updated Zener contact, stability by the spectral radius of the "
+      "loop. Points: measured on the simulated device by bisection. Passivity is safe with every "
+      "passive operator and found at the worst frequency; stability belongs to one operator, and "
+      "asks for less.",
+      {std::move(passive), std::move(stable)}};
+}
+
+Figure rule_figure(const BorderStudy& study) {
+  Panel panel{"friction that the device needs at 1 kHz",
+              {"relaxation time over period", "", true},
+              {"friction over T/2", "N/m", true}};
+  constexpr double kHalfPeriod_s = 0.5e-3, kPeriod_s = 1e-3;
+  for (const auto& [rule, words] : kRuleWords) {
+    Series predicted = line(std::string(words), {}, {});
+    Series measured = measured_beside(predicted);
+    for (const RulePoint& p : study.rules) {
+      if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
+      predicted.add(p.relaxation_time_s / kPeriod_s, p.predicted_N_s_per_m / kHalfPeriod_s);
+      measured.add(p.relaxation_time_s / kPeriod_s, p.measured_N_s_per_m / kHalfPeriod_s);
+    }
+    panel.series.push_back(std::move(predicted));
+    panel.series.push_back(std::move(measured));
+  }
+  return {
+      "rules",
+      "Three ways to advance the contact (simulated device)",
+      fmt::format(
+          "A contact of {0} N/m instantaneously and {1} N/m at equilibrium. The exact update needs "
+          "between {1} T/2 "
+          "and "
+          "{0} T/2 at every relaxation time; forward Euler diverges below T/2, to the left of "
+          "where "
+          "its "
+          "curve ends, at the paper's parameters (0.208 ms) too; the mass-spring model has nothing "
+          "that "
+          "relaxes.",
+          significant(study.stiffness_N_per_m, 3), significant(0.5 * study.stiffness_N_per_m, 3)),
+      {std::move(panel)}};
+}
+
+}  // namespace
+
+namespace {
+
+Json impacts_json(const BorderStudy& study) {
+  return array_json(study.impacts, [&](const ImpactPoint& p) {
+    Json json{{"delay_periods", p.delay_periods},
+              {"speed_m_per_s", p.speed_m_per_s},
+              {"share_of_linear_border", p.share},
+              {"stiffness_N_per_m", rounded(p.stiffness_N_per_m, kBorderDigits)}};
+    Json by_limit = Json::object();
+    for (const RiseLimit limit : kRiseLimits) {
+      const auto which = static_cast<std::size_t>(limit);
+      by_limit[std::string(word_of(limit))] = {
+          {"comes_to_rest", p.rests[which]},
+          {"delivered_to_hand_J", number_or_null(p.delivered_J[which])}};
+    }
+    json["by_limit_of_rise"] = std::move(by_limit);
+    return json;
+  });
+}
+
+Json corners_json(const BorderStudy& study) {
+  return array_json(study.corners, [](const DeviceCorner& c) {
+    Json json{{"device", c.device},
+              {"stiffness_N_per_m", c.stiffness_N_per_m},
+              {"damping_N_s_per_m", c.damping_N_s_per_m},
+              {"friction_needed_N_s_per_m", c.needed_N_s_per_m},
+              {"friction_needed_with_a_period_of_delay_N_s_per_m", c.needed_delayed_N_s_per_m},
+              {"assumed_friction_N_s_per_m", nullptr},
+              {"passive", nullptr}};
+    if (c.assumed_friction_N_s_per_m) {
+      json["assumed_friction_N_s_per_m"] = {c.assumed_friction_N_s_per_m->first,
+                                            c.assumed_friction_N_s_per_m->second};
+      json["passive"] = c.assumed_friction_N_s_per_m->first > c.needed_N_s_per_m;
+    }
+    return json;
+  });
+}
+
+/// A letter for each limit of the rise: the tool comes to rest, or it does not.
+std::string impact_text(const BorderStudy& study) {
+  std::string text =
+      "\na hand runs into the contact and stays 4 mm deep, at 1 kHz: r comes to rest (0.1 mm "
+      "within 5 s), O goes on to "
+      "oscillate;\nfirst letter without a limit of the rise, second with the slip of a session "
+      "(400 "
+      "N/s, 8 N), third with ramp-in besides;\nstiffness over that of the border of the linear, "
+      "two-sided loop\n";
+  int delay = -1;
+  double share = -1.0;
+  for (const ImpactPoint& p : study.impacts) {
+    if (p.delay_periods != delay) {
+      delay = p.delay_periods;
+      share = -1.0;
+      text += fmt::format("delay {} periods, border {} N/m\n{:>9}", delay,
+                          significant(p.stiffness_N_per_m / p.share, 4), "m/s");
+      double last = 0.0;
+      for (const ImpactPoint& other : study.impacts) {
+        if (other.speed_m_per_s <= last) break;
+        last = other.speed_m_per_s;
+        text += fmt::format("{:>6}", significant(last, 3));
+      }
+      text += "\n";
+    }
+    if (p.share != share) {
+      share = p.share;
+      text += fmt::format("{:>9}", significant(share, 3));
+    }
+    std::string cell;
+    for (const bool rests : p.rests) cell += rests ? 'r' : 'O';
+    text += fmt::format("{:>6}", cell);
+    if (&p == &study.impacts.back() || (&p)[1].share != share || (&p)[1].delay_periods != delay) {
+      text += "\n";
+    }
+  }
+  return text;
+}
+
+std::string corner_text(const BorderStudy& study) {
+  std::string text = fmt::format(
+      "\nfriction that a device needs to be passive at 1 kHz with all of its maker's stiffness and "
+      "damping (software limits of CHAI3D), N s/m\n{:<10}{:>8}{:>8}{:>10}{:>16}  verdict\n",
+      "device", "N/m", "N s/m", "needed", "needed, 1 late");
+  for (const DeviceCorner& c : study.corners) {
+    std::string verdict = "none: its friction is not known";
+    if (c.assumed_friction_N_s_per_m) {
+      const auto& [least, most] = *c.assumed_friction_N_s_per_m;
+      verdict = fmt::format("{} (friction assumed to be {} to {})",
+                            least > c.needed_N_s_per_m ? "passive" : "not passive",
+                            significant(least, 3), significant(most, 3));
+    }
+    text += fmt::format("{:<10}{:>8}{:>8}{:>10}{:>16}  {}\n", c.device,
+                        significant(c.stiffness_N_per_m, 4), significant(c.damping_N_s_per_m, 4),
+                        significant(c.needed_N_s_per_m, 4),
+                        significant(c.needed_delayed_N_s_per_m, 4), verdict);
+  }
+  return text;
+}
+
+/// Where impacts come to rest with the slip of a session, a panel for each delay.
+Figure impact_figure(const BorderStudy& study) {
+  Figure figure{
+      "impacts", "Impacts with the slip of a session (simulated device)",
+      "A hand runs into the one-sided contact and stays 4 mm deep; stiffness over that at which "
+      "the linear, two-sided loop becomes unstable. The rise of the force is limited to 400 N/s "
+      "by a slip of the model's tool, its size to 8 N."};
+  for (const ImpactPoint& p : study.impacts) {
+    const std::string title = fmt::format("delay {} periods", p.delay_periods);
+    if (figure.panels.empty() || figure.panels.back().title != title) {
+      Panel panel{title,
+                  {"speed of the hand", "m/s", true},
+                  {"stiffness over the linear border", "", true}};
+      for (const char* label : {"comes to rest", "oscillates"}) {
+        Series series{.kind = Series::Kind::points, .label = label, .provenance = "simulated"};
+        panel.series.push_back(std::move(series));
+      }
+      figure.panels.push_back(std::move(panel));
+    }
+    Series& series = figure.panels.back().series[p.rests[1] ? 0 : 1];
+    series.add(p.speed_m_per_s, p.share);
+  }
+  for (Panel& panel : figure.panels) {
+    std::erase_if(panel.series, [](const Series& series) { return series.x.empty(); });
+  }
+  return figure;
+}
+
+}  // namespace
+
+Json border_json(const BorderStudy& study) {
+  const Json rules = array_json(study.rules, [](const RulePoint& p) {
+    return Json{{"rule", word_for(kRuleWords, p.rule)},
+                {"relaxation_time_s", rounded(p.relaxation_time_s, kBorderDigits)},
+                {"measured_N_s_per_m", number_or_null(p.measured_N_s_per_m)},
+                {"predicted_N_s_per_m", number_or_null(p.predicted_N_s_per_m)}};
+  });
+  return {{"simulated_device", true},
+          {"assumptions", assumptions_of(study.plant)},
+          {"relaxation_time_s", rounded(study.relaxation_time_s, kBorderDigits)},
+          {"stiffness_N_per_m", rounded(study.stiffness_N_per_m, kBorderDigits)},
+          {"passive", points_json(study.passive, "measured_N_per_m", "predicted_N_per_m")},
+          {"stable", points_json(study.stable, "measured_N_per_m", "predicted_N_per_m")},
+          {"rules", rules},
+          {"shortest_forward_euler", points_json(study.shortest, "measured_s", "predicted_s")},
+          {"shortest_exact", points_json(study.shortest_exact, "measured_s", "predicted_s")},
+          {"impacts", impacts_json(study)},
+          {"device_corners", corners_json(study)},
+          {"worst_passive", rounded(worst_difference(study.passive), kBorderDigits)},
+          {"worst_stable", rounded(worst_difference(study.stable), kBorderDigits)}};
+}
+
+std::string border_text(const BorderStudy& study) {
+  std::string text = fmt::format(
+      "SIMULATED DEVICE\nlargest instantaneous stiffness, N/m, half of it at equilibrium, "
+      "relaxation time {} "
+      "ms\n"
+      "{:>7} {:>6} {:>9} {:>22} {:>22}\n",
+      significant(1e3 * study.relaxation_time_s, 3), "Hz", "delay", "b N s/m",
+      "passive: measured/theory", "stable: measured/theory");
+  for (const BorderPoint& p : study.passive) {
+    std::string stable;
+    for (const BorderPoint& s : study.stable) {
+      if (s.rate_Hz == p.rate_Hz && s.delay_periods == p.delay_periods &&
+          s.damping_N_s_per_m == p.damping_N_s_per_m) {
+        stable = value(s.measured) + " / " + value(s.predicted);
+      }
+    }
+    text += fmt::format("{:>7} {:>6} {:>9} {:>22} {:>22}\n", significant(p.rate_Hz, 4),
+                        p.delay_periods, significant(p.damping_N_s_per_m, 3),
+                        value(p.measured) + " / " + value(p.predicted), stable);
+  }
+  text += fmt::format(
+      "worst difference: passivity {} %, stability {} %\nfriction needed at 1 kHz for {} N/m at "
+      "once, N s/m (measured/theory)\n",
+      significant(100.0 * worst_difference(study.passive), 3),
+      significant(100.0 * worst_difference(study.stable), 3),
+      significant(study.stiffness_N_per_m, 3));
+  for (const RulePoint& p : study.rules) {
+    text += fmt::format("{:>7} ms  {:<20} {} / {}\n", significant(1e3 * p.relaxation_time_s, 3),
+                        word_for(kRuleWords, p.rule), value(p.measured_N_s_per_m),
+                        value(p.predicted_N_s_per_m));
+  }
+  for (std::size_t i = 0; i < study.shortest.size(); ++i) {
+    const BorderPoint& euler = study.shortest[i];
+    text += fmt::format(
+        "{:>7} Hz: shortest passive relaxation time: forward Euler {} / {} ms, exact update {}\n",
+        significant(euler.rate_Hz, 4), value(1e3 * euler.measured), value(1e3 * euler.predicted),
+        study.shortest_exact[i].measured == 0.0 ? "any" : value(study.shortest_exact[i].measured));
+  }
+  return text + impact_text(study) + corner_text(study);
+}
+
+std::vector<Figure> border_figures(const BorderStudy& study) {
+  return {border_figure(study), rule_figure(study), impact_figure(study)};
+}
+
+}  // namespace tpm::report

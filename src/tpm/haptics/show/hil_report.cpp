@@ -1,0 +1,404 @@
+#include "tpm/haptics/show/hil_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/base/printed_number.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/show/draw.hpp"
+#include "tpm/show/run_record.hpp"
+
+namespace tpm::report {
+namespace {
+
+constexpr double kMostError = 0.005;  // of the session's peak force
+
+std::string mN(double force_N) {
+  return significant(1e3 * force_N, 3);
+}
+
+std::string percent(double part, double whole) {
+  return whole > 0.0 ? significant(100.0 * part / whole, 3) + " %" : "-";
+}
+
+/// Every `stride`-th value, so that a curve has at most some thousand points.
+std::vector<double> thinned(const std::vector<double>& values, double scale = 1.0) {
+  constexpr std::size_t kPoints = 4000;
+  const std::size_t stride = std::max<std::size_t>(1, values.size() / kPoints);
+  std::vector<double> result;
+  for (std::size_t i = 0; i < values.size(); i += stride) result.push_back(scale * values[i]);
+  return result;
+}
+
+/// Where the phases ask the tool to be, mm: a curve for each stretch of time; none while they ask
+/// for a push.
+std::vector<Series> asked_depths(const HilRecording& recording, const std::vector<double>& time_s) {
+  OperatorScript script = recording.session.operator_script();
+  std::vector<Series> stretches;
+  bool before = false;
+  for (const double time : time_s) {
+    const OperatorAim aim = script.at(time);
+    const bool place = aim.aim == OperatorPiece::Aim::place;
+    if (place && !before) {
+      stretches.push_back(line("asked for", {}, {}));
+    }
+    before = place;
+    if (!place) continue;
+    stretches.back().add(time, 1e3 * aim.value);
+  }
+  return stretches;
+}
+
+/// Some of the values, so that they can be told from the curve that they lie on.
+Series some_points(std::string label, const std::vector<double>& x, const std::vector<double>& y,
+                   std::string provenance) {
+  constexpr std::size_t kPoints = 120;
+  Series series{
+      .kind = Series::Kind::points, .label = std::move(label), .provenance = std::move(provenance)};
+  const std::size_t stride = std::max<std::size_t>(1, x.size() / kPoints);
+  for (std::size_t i = 0; i < x.size(); i += stride) {
+    series.add(x[i], y[i]);
+  }
+  return series;
+}
+
+/// The recording whose motion was repeated, if there is one.
+void add_measured(std::vector<Series>& series, const HilRecording& recording) {
+  const HilSession& session = recording.session;
+  if (session.measured_N.size() < 2) return;
+  const double start_s =
+      session.phases.size() < 2 ? 0.0 : session.phases[session.phases.size() - 2].end_s;
+  const double spacing_s =
+      (session.duration_s() - start_s) / static_cast<double>(session.measured_N.size() - 1);
+  std::vector<double> time_s;
+  for (std::size_t i = 0; i < session.measured_N.size(); ++i) {
+    time_s.push_back(start_s + spacing_s * static_cast<double>(i));
+  }
+  series.push_back(some_points(session.phases.back().name, time_s, session.measured_N,
+                               std::string(provenance_name(Provenance::measured))));
+}
+
+Figure session_figure(const HilRecording& recording, const Verification& v) {
+  const std::vector<double> time = thinned(v.time_s);
+  const Axis seconds{"time", "s"};
+  Figure figure{
+      "session", recording.simulated() ? "The session, on a simulated device" : "The session",
+      "Depth of the tool below the surface at rest and where the phases ask it to be, force sent "
+      "to "
+      "the device on the curve of the reference under the recorded motion, and their difference."};
+  std::vector<Series> forces{line("reference", time, thinned(v.reference_N)),
+                             some_points("commanded", v.time_s, v.commanded_N, "model")};
+  add_measured(forces, recording);
+  std::vector<Series> depths = asked_depths(recording, time);
+  depths.push_back(line("tool", time, thinned(v.depth_m, 1e3)));
+  figure.panels = {{"motion", seconds, {"depth", "mm"}, std::move(depths)},
+                   {"force", seconds, {"contact force", "N"}, std::move(forces)},
+                   {"commanded less reference",
+                    seconds,
+                    {"force error", "mN"},
+                    {line("error", time, thinned(v.error_N, 1e3))}}};
+  return figure;
+}
+
+Figure energy_figure(const HilRecording& recording) {
+  std::vector<double> time, observed, leak;
+  for (const ServoRecord& row : recording.rows) {
+    time.push_back(recording.time_s(row));
+    observed.push_back(1e3 * row.observed_J);
+    leak.push_back(1e3 * row.leak_J);
+  }
+  return {"energy",
+          "Energy",
+          "Work of the hand on what is rendered, which must not fall below zero but for "
+          "what the held force leaks, and the leak as predicted, K dx^2/2 a period.",
+          {{"energy",
+            {"time", "s"},
+            {"energy", "mJ"},
+            {line("observed", thinned(time), thinned(observed)),
+             line("predicted leak", thinned(time), thinned(leak))}}}};
+}
+
+/// Largest and smallest difference from the readings, in words.
+std::string experiment_line(const Verification& v) {
+  if (v.experiment.empty()) return "no experiment is repeated: nothing is compared with readings";
+  double least = 1e300, most = -1e300;
+  for (const BesideExperiment& e : v.experiment) {
+    const double part = 100.0 * (e.commanded_N / e.measured_N - 1.0);
+    least = std::min(least, part);
+    most = std::max(most, part);
+  }
+  return fmt::format(
+      "beside the pig-liver readings of the same indentations: {} to {}, which "
+      "compares the material, not the rendering",
+      percent_text(least, 0), percent_text(most, 0));
+}
+
+/// To be read in a minute: how it ended and whether it could be rendered safely, whether what was
+/// commanded is the model, and how that lies beside the experiment.
+void add_glance(Document& d, const HilRecording& r, const Verification& v,
+                const RecordingSummary& s) {
+  d.heading(2, "Safe, faithful, like the experiment?");
+  std::vector<Cell> lines{{fmt::format("the session ended: {}", s.cause),
+                           s.cause == "finished" ? Tone::good : Tone::bad}};
+  const Json rendering = r.header.value("rendering", Json());
+  if (rendering.is_object()) {
+    lines.push_back({rendering.at("verdict").get<std::string>(),
+                     rendering.at("passive").get<bool>()  ? Tone::good
+                     : rendering.at("stable").get<bool>() ? Tone::plain
+                                                          : Tone::bad});
+    for (const Json& warning : rendering.at("warnings")) {
+      lines.push_back({warning.get<std::string>(), Tone::bad});
+    }
+  }
+  lines.push_back({fmt::format("the force commanded is within {} of the reference, in parts of the "
+                               "session's peak of {} N",
+                               percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)),
+                   v.all.max_N <= kMostError * v.all.peak_N ? Tone::good : Tone::bad});
+  if (r.session.measured_N.empty()) lines.push_back({experiment_line(v)});
+  for (const CrossCheck& o : v.others) {
+    if (o.name.starts_with("MEASURED")) {
+      lines.push_back({fmt::format("{}: {} mN rms, {} mN at most", o.name, mN(o.commanded.rms_N),
+                                   mN(o.commanded.max_N))});
+    }
+  }
+  if (r.simulated()) {
+    lines.push_back(
+        {"SIMULATED DEVICE: no motor moved and no hand felt these forces. What is "
+         "verified is the path from motion to command, not the hardware.",
+         Tone::bad});
+  }
+  d.bullets(std::move(lines));
+  d.picture({"session", "The session", ""});
+}
+
+void add_identity(Document& d, const HilRecording& r) {
+  const Json& device = r.header.at("device");
+  Table table{"", {{"what"}, {"value"}}};
+  const auto row = [&](const char* what, std::string value) {
+    table.rows.push_back({{what}, {value.empty() ? "not known" : std::move(value)}});
+  };
+  row("device", device.at("name").get<std::string>());
+  row("kind", device.at("kind").get<std::string>());
+  row("communication mode", device.at("communication_mode").get<std::string>());
+  row("serial", device.at("serial").get<std::string>());
+  row("firmware", device.at("firmware").get<std::string>());
+  row("library", device.at("library_version").get<std::string>());
+  row("model in the loop", r.header.at("model").at("name").get<std::string>());
+  row("its error", r.header.at("model").at("error_bound").get<std::string>());
+  row("rate", significant(1.0 / r.session.servo.period_s, 4) + " Hz");
+  row("time", r.header.at("time").get<std::string>());
+  row("tpm", r.header.at("version").get<std::string>());
+  const Json notes = r.header.value("notes", Json::object());
+  row("date", notes.value("date", ""));
+  row("operator", notes.value("operator_code", ""));
+  row("subject", notes.value("subject_code", ""));
+  d.heading(2, "Device and model");
+  d.table(std::move(table));
+  std::vector<Cell> assumed;
+  for (const Json& line : device.at("assumptions")) assumed.push_back({line.get<std::string>()});
+  if (!assumed.empty()) d.bullets(std::move(assumed));
+}
+
+/// What a planned model was picked from.
+void add_plan(Document& d, const Json& plan) {
+  if (plan.is_null()) return;
+  const auto number = [](const Json& value, double scale, const char* unit) {
+    return value.is_null() ? std::string("-") : significant(scale * value.get<double>(), 3) + unit;
+  };
+  Table table{fmt::format("Picked by tpm plan: {}, the cheapest within {} % of the peak at {} Hz",
+                          plan.at("choice").get<std::string>(),
+                          significant(100.0 * plan.at("tolerance").get<double>(), 3),
+                          significant(plan.at("rate_Hz").get<double>(), 4)),
+              {{"candidate"}, {"a period, us"}, {"claimed error"}, {"verified"}, {"why not"}}};
+  for (const Json& c : plan.at("candidates")) {
+    if (c.at("claimed_error").is_null()) continue;
+    table.rows.push_back({{c.at("name").get<std::string>()},
+                          {number(c.at("period_s"), 1e6, "")},
+                          {number(c.at("claimed_error"), 100.0, " %")},
+                          {number(c.at("verified_error"), 100.0, " %")},
+                          {c.at("reason").get<std::string>()}});
+  }
+  d.table(std::move(table));
+}
+
+void add_fidelity(Document& d, const Verification& v) {
+  d.heading(2, "Fidelity");
+  d.paragraph(fmt::format(
+      "Reference: {}, under the motion of the surface as recorded ({} knots within {} um, "
+      "{}; its own error estimate is {} mN). Over {} instants the commanded force is "
+      "off by {} mN rms and {} mN at most, {} of the session's peak of {} N.",
+      v.reference, v.knots, significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1e3, "mN"),
+      mN(v.reference_error_N), v.all.instants, mN(v.all.rms_N), mN(v.all.max_N),
+      percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)));
+  std::vector<Cell> others;
+  for (const CrossCheck& o : v.others) {
+    others.push_back(
+        {fmt::format("{}, {} to {} s: {} mN rms, {} mN at most; {} mN from the reference at most",
+                     o.name, significant(o.start_s, 4), significant(o.end_s, 4),
+                     mN(o.commanded.rms_N), mN(o.commanded.max_N), mN(o.apart_N))});
+  }
+  for (const std::string& note : v.notes) others.push_back({note, Tone::bad});
+  if (!others.empty()) d.bullets(std::move(others));
+  Table table{"Force error by phase; depth: how well the operator followed, rms",
+              {{"phase"},
+               {"start s", true},
+               {"rms mN", true},
+               {"max mN", true},
+               {"max of peak", true},
+               {"depth um", true}}};
+  for (const PhaseFidelity& p : v.phases) {
+    const bool good = p.force.max_N <= kMostError * v.all.peak_N;
+    table.rows.push_back({{p.phase.name},
+                          {significant(p.start_s, 5)},
+                          {mN(p.force.rms_N)},
+                          {mN(p.force.max_N)},
+                          {percent(p.force.max_N, v.all.peak_N), good ? Tone::good : Tone::bad},
+                          {significant(1e6 * p.depth_rms_m, 3)}});
+  }
+  d.table(std::move(table));
+}
+
+void add_experiment(Document& d, const Verification& v) {
+  if (v.experiment.empty()) return;
+  d.heading(2, "Beside the experiment");
+  d.paragraph(
+      "Readings of pig liver (Samur et al. 2007, as printed) at the same depths, without "
+      "error bars and with a rate that is not stated; the difference says how well the "
+      "material of the session is chosen, not how well it is rendered.");
+  Table table{"",
+              {{"depth mm", true},
+               {"rate mm/s", true},
+               {"reading"},
+               {"measured N", true},
+               {"commanded N", true},
+               {"difference", true}}};
+  for (const BesideExperiment& e : v.experiment) {
+    table.rows.push_back({{significant(1e3 * e.depth_m, 3)},
+                          {significant(1e3 * e.rate_m_per_s, 3)},
+                          {e.label},
+                          {significant(e.measured_N, 3)},
+                          {significant(e.commanded_N, 3)},
+                          {percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1)}});
+  }
+  d.table(std::move(table));
+}
+
+void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
+  d.heading(2, "Timing, limits, end");
+  std::vector<Cell> lines;
+  lines.push_back(
+      {fmt::format("end: {}", s.cause), s.cause == "finished" ? Tone::good : Tone::bad});
+  if (r.damaged > 0) lines.push_back({damage_line(r), Tone::bad});
+  if (!r.closed) {
+    lines.push_back(
+        {"the recording has no closing record: the process was killed; all rows up to "
+         "then are whole",
+         Tone::bad});
+  } else if (r.closing.contains("scheduling")) {
+    lines.push_back({r.closing.at("host").get<std::string>()});
+    lines.push_back({r.closing.at("scheduling").get<std::string>()});
+    for (const char* key : {"woke_late", "busy"}) {
+      const Json& t = r.closing.at(key);
+      const auto us = [&](const char* q) { return significant(1e6 * t.at(q).get<double>(), 3); };
+      lines.push_back(
+          {fmt::format("{}: p50 {} us, p99 {} us, p99.9 {} us, max {} us",
+                       std::string(key) == "busy" ? "work of a cycle" : "woke after the deadline",
+                       us("p50_s"), us("p99_s"), us("p999_s"), us("max_s"))});
+    }
+    lines.push_back(
+        {fmt::format("records dropped: {}", r.closing.at("dropped_records").get<std::uint64_t>())});
+  } else {
+    lines.push_back({"virtual time: deadlines are met by definition, nothing is said of timing"});
+  }
+  if (r.closed && r.closing.at("device_error").get<int>() != 0) {
+    lines.push_back(
+        {fmt::format("the device said: error {} ({})", r.closing.at("device_error").get<int>(),
+                     r.closing.at("device_error_text").get<std::string>()),
+         Tone::bad});
+  }
+  lines.push_back({fmt::format(
+      "{} cycles; missed periods {}; time guards {}; saturations {}; limited by force {}, "
+      "slipped {}, limited while ramping in {}; damped {}",
+      s.cycles, s.missed, s.time_guards, s.saturations, s.force_limited, s.slipped, s.ramping_in,
+      s.damped)});
+  if (s.beyond_model == 0) {
+    lines.push_back({"within the range that the model is good for in every cycle"});
+  } else {
+    lines.push_back(
+        {fmt::format("beyond the range that the model is good for in {} cycles, first at {} s",
+                     s.beyond_model, significant(s.first_beyond_s, 6)),
+         Tone::bad});
+  }
+  d.bullets(std::move(lines));
+}
+
+void add_energy(Document& d, const RecordingSummary& s) {
+  d.heading(2, "Energy");
+  d.paragraph(fmt::format(
+      "Work of the hand on what was rendered: {} mJ at the end, {} mJ at the least. Holding the "
+      "force within a period gives energy away, {} mJ in all by K dx^2/2 a period, which the "
+      "friction of the device has to take up.",
+      significant(1e3 * s.observed_end_J, 4), significant(1e3 * s.observed_least_J, 3),
+      significant(1e3 * s.leak_J, 3)));
+  d.picture({"energy", "Energy", ""});
+}
+
+}  // namespace
+
+RecordingSummary summary_of(const HilRecording& recording) {
+  RecordingSummary s;
+  s.cause = recording.closed ? recording.closing.at("cause").get<std::string>() : "cut off";
+  for (const ServoRecord& row : recording.rows) {
+    const auto has = [&](ServoFlag flag) -> std::uint64_t {
+      return (row.flags & flag) != 0 ? 1 : 0;
+    };
+    ++s.cycles;
+    s.missed += static_cast<std::uint64_t>(row.missed);
+    s.time_guards += has(kTimeGuarded);
+    s.saturations += has(kSaturated);
+    s.force_limited += has(kForceLimited);
+    s.slipped += has(kSlipping);
+    s.ramping_in += has(kRampingIn);
+    s.damped += has(kDamped);
+    if (has(kBeyondModel) != 0 && s.beyond_model++ == 0) {
+      s.first_beyond_s = static_cast<double>(row.cycle) * recording.session.servo.period_s;
+    }
+    if (row.stop != StopCause::none) continue;  // nothing was rendered in the last one
+    s.observed_end_J = row.observed_J;
+    s.observed_least_J = std::min(s.observed_least_J, row.observed_J);
+    s.leak_J = row.leak_J;
+  }
+  return s;
+}
+
+void write_hil_report(const HilRecording& recording, const Verification& v,
+                      const std::filesystem::path& folder, const std::string& python) {
+  const RecordingSummary summary = summary_of(recording);
+  const auto drawings =
+      draw_into(folder, {session_figure(recording, v), energy_figure(recording)}, python);
+  Document d;
+  d.title = recording.session.title;
+  d.subtitle = device_line(recording);
+  add_glance(d, recording, v, summary);
+  add_experiment(d, v);
+  add_energy(d, summary);
+  add_timing(d, recording, summary);
+  add_identity(d, recording);
+  add_plan(d, recording.header.at("model").value("plan", Json()));
+  add_fidelity(d, v);
+  typeset(d);
+  write_file(folder / "report.md", to_markdown(d));
+  write_file(folder / "report.html", to_html(d, drawings));
+  Json json = verification_json(recording, v);
+  json["end"] = summary.cause;
+  json["rendering"] = recording.header.value("rendering", Json());
+  json["closing"] = recording.closing;
+  json["observed_end_J"] = rounded(summary.observed_end_J, 6);
+  json["observed_least_J"] = rounded(summary.observed_least_J, 6);
+  json["leak_J"] = rounded(summary.leak_J, 6);
+  write_file(folder / "report.json", to_text(json));
+}
+
+}  // namespace tpm::report

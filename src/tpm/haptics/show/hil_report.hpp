@@ -1,0 +1,41 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/haptics/session/jitter_check.hpp"
+#include "tpm/haptics/verify/verify.hpp"
+#include "tpm/show/document.hpp"
+#include "tpm/show/figure.hpp"
+
+namespace tpm::report {
+
+// What each command of tpm hil shows; keys are described in docs/haptics.md.
+
+[[nodiscard]] Json check_json(const JitterCheck& check);
+[[nodiscard]] std::string check_text(const JitterCheck& check);
+
+[[nodiscard]] Json run_json(const HilSession& session, const SessionRun& run);
+[[nodiscard]] std::string run_text(const HilSession& session, const SessionRun& run);
+
+[[nodiscard]] Json verification_json(const HilRecording& recording, const Verification& v);
+/// What the difference between motion recorded and motion compared can cost, in words.
+[[nodiscard]] std::string motion_cost(const Verification& v, double per_newton,
+                                      std::string_view unit);
+[[nodiscard]] std::string verification_text(const HilRecording& recording, const Verification& v);
+
+/// What a recording says about energy and limits, from its rows.
+struct RecordingSummary {
+  std::uint64_t cycles = 0, missed = 0, time_guards = 0, saturations = 0, force_limited = 0,
+                slipped = 0, ramping_in = 0, damped = 0, beyond_model = 0;
+  double observed_end_J = 0.0, observed_least_J = 0.0, leak_J = 0.0;
+  double first_beyond_s = 0.0;  ///< of the first cycle beyond the model; 0 if there is none
+  std::string cause;            ///< of the end; "cut off" if the recording has no closing record
+};
+[[nodiscard]] RecordingSummary summary_of(const HilRecording& recording);
+
+/// One page on a session: report.md, report.html and report.json with figures in a folder.
+void write_hil_report(const HilRecording& recording, const Verification& v,
+                      const std::filesystem::path& folder, const std::string& python);
+
+}  // namespace tpm::report

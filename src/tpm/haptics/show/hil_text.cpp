@@ -1,0 +1,262 @@
+// Declared in tpm/haptics/show/hil_report.hpp.
+#include <fmt/format.h>
+
+#include <map>
+#include <string_view>
+
+#include "tpm/base/printed_number.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpm/haptics/show/hil_report.hpp"
+
+namespace tpm::report {
+namespace {
+
+constexpr int kHilDigits = 6;
+
+std::string us(double seconds) {
+  return significant(1e6 * seconds, 3);
+}
+
+std::string device_words(const DeviceIdentity& device) {
+  if (device.hardware) {
+    return fmt::format("{}, serial {}, communication {}", device.name, device.serial,
+                       word_of(device.link));
+  }
+  return fmt::format("SIMULATED DEVICE, no hardware: {} ({}, communication {})", device.name,
+                     device.kind, word_of(device.link));
+}
+
+std::string times_text(const char* what, const TimeHistogram& times) {
+  return fmt::format("{}: p50 {} us, p99 {} us, p99.9 {} us, max {} us\n", what,
+                     us(times.quantile_s(0.5)), us(times.quantile_s(0.99)),
+                     us(times.quantile_s(0.999)), us(times.max_s()));
+}
+
+Json times_json(const TimeHistogram& times) {
+  return {{"p50_s", rounded(times.quantile_s(0.5), kHilDigits)},
+          {"p99_s", rounded(times.quantile_s(0.99), kHilDigits)},
+          {"p999_s", rounded(times.quantile_s(0.999), kHilDigits)},
+          {"max_s", rounded(times.max_s(), kHilDigits)}};
+}
+
+/// Counts in bins that double in width: up to 1 us, 2 us, 4 us, ...
+std::vector<std::pair<double, std::uint64_t>> octaves(const TimeHistogram& times) {
+  std::vector<std::pair<double, std::uint64_t>> result;
+  std::uint64_t inside = 0, next = 0;
+  for (std::size_t edge = 1, bin = 0; bin < times.bins().size(); edge *= 2) {
+    next = 0;
+    for (; bin < std::min(edge, times.bins().size()); ++bin) next += times.bins()[bin];
+    result.emplace_back(1e-6 * static_cast<double>(edge), next);
+    inside += next;
+  }
+  if (times.count() > inside) result.emplace_back(times.max_s(), times.count() - inside);
+  while (!result.empty() && result.back().second == 0) result.pop_back();
+  return result;
+}
+
+Json fidelity_json(const ForceFidelity& f) {
+  return {{"instants", f.instants},
+          {"rms_N", rounded(f.rms_N, kHilDigits)},
+          {"max_N", rounded(f.max_N, kHilDigits)},
+          {"peak_N", rounded(f.peak_N, kHilDigits)}};
+}
+
+std::string share(double part_N, double peak_N) {
+  return peak_N > 0.0 ? significant(100.0 * part_N / peak_N, 3) + " %" : "-";
+}
+
+}  // namespace
+
+Json check_json(const JitterCheck& check) {
+  const ServoOutcome& o = check.outcome;
+  Json bins = Json::array();
+  for (const auto& [edge, count] : octaves(o.woke_late)) {
+    bins.push_back({{"up_to_s", rounded(edge, kHilDigits)}, {"cycles", count}});
+  }
+  return {{"simulated_device", !check.device.hardware},
+          {"device", to_json(check.device)},
+          {"host", host_line()},
+          {"scheduling", o.scheduling},
+          {"rate_Hz", rounded(check.rate_Hz, kHilDigits)},
+          {"duration_s", rounded(check.duration_s, kHilDigits)},
+          {"cycles", o.cycles},
+          {"late_cycles", o.counts.late},
+          {"missed_periods", o.counts.missed},
+          {"time_guards", o.counts.time_guards},
+          {"saturations", o.counts.saturations},
+          {"woke_late", times_json(o.woke_late)},
+          {"busy", times_json(o.busy)},
+          {"woke_late_histogram", bins},
+          {"cause", word_of(o.cause)},
+          {"most_consecutive_missed", o.counts.most_consecutive_missed},
+          {"most_late_of_1000", o.counts.most_late},
+          {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
+          {"cycle_timeout_s", rounded(check.cycle_timeout_s, kHilDigits)},
+          {"fit", check.fit},
+          {"verdict", check.verdict},
+          {"advice", check.advice}};
+}
+
+std::string check_text(const JitterCheck& check) {
+  const ServoOutcome& o = check.outcome;
+  std::string text = fmt::format(
+      "{}\n{}\n{}\n{} Hz for {} s: {} cycles, {} late, {} periods missed\n",
+      device_words(check.device), host_line(), o.scheduling, significant(check.rate_Hz, 4),
+      significant(check.duration_s, 4), o.cycles, o.counts.late, o.counts.missed);
+  text += times_text("woke after the deadline", o.woke_late);
+  text += times_text("work of a cycle", o.busy);
+  text += fmt::format("time guards {}, saturations {}\nwoke after the deadline, up to\n",
+                      o.counts.time_guards, o.counts.saturations);
+  for (const auto& [edge, count] : octaves(o.woke_late)) {
+    text += fmt::format("  {:>8} us {:>10}\n", us(edge), count);
+  }
+  text += fmt::format(
+      "at most {} consecutive periods missed, {} of 1000 cycles late; watchdog {} ms\n",
+      o.counts.most_consecutive_missed, o.counts.most_late, significant(1e3 * check.watchdog_s, 3));
+  return text + "verdict: " + check.verdict + "\n" + check.advice + "\n";
+}
+
+Json run_json(const HilSession& session, const SessionRun& run) {
+  return {{"simulated_device", !run.device.hardware},
+          {"title", session.title},
+          {"device", to_json(run.device)},
+          {"model",
+           {{"name", run.model.name},
+            {"error_bound", run.model.error_bound},
+            {"plan", run.model.plan}}},
+          {"rendering", to_json(run.rendering)},
+          {"rate_Hz", rounded(1.0 / session.servo.period_s, kHilDigits)},
+          {"duration_s", rounded(session.duration_s(), kHilDigits)},
+          {"phases", session.phases.size()},
+          {"time", run.outcome.real_time ? "real" : "virtual"},
+          {"outcome", recording_closing(run.outcome)}};
+}
+
+std::string run_text(const HilSession& session, const SessionRun& run) {
+  const ServoOutcome& o = run.outcome;
+  const double lived_s = static_cast<double>(o.cycles) * session.servo.period_s;
+  std::string text = fmt::format(
+      "{}\n{}\nrendering: {}\nmodel: {}; error: {}\n{} of {} s at {} Hz in {} time, {} phases\n",
+      session.title, device_words(run.device), run.rendering.verdict(), run.model.name,
+      run.model.error_bound, significant(lived_s, 6), significant(session.duration_s(), 6),
+      significant(1.0 / session.servo.period_s, 4), o.real_time ? "real" : "virtual",
+      session.phases.size());
+  if (o.real_time) {
+    text += o.scheduling + "\n" + times_text("woke after the deadline", o.woke_late) +
+            times_text("work of a cycle", o.busy);
+  }
+  text += fmt::format(
+      "late cycles {}, missed periods {}, time guards {}, saturations {}, limited by force {}, "
+      "slipped {}, damped {}, beyond the model {}, records dropped {}\n",
+      o.counts.late, o.counts.missed, o.counts.time_guards, o.counts.saturations,
+      o.counts.force_limited, o.counts.slipped, o.counts.damped, o.counts.beyond_model,
+      o.dropped_records);
+  text += fmt::format("end: {}{}{}\n", word_of(o.cause), o.detail.empty() ? "" : ": ", o.detail);
+  if (o.device.error != 0) {
+    text += fmt::format("the device said: error {} ({})\n", o.device.error, o.device.error_text);
+  }
+  return text;
+}
+
+Json verification_json(const HilRecording& recording, const Verification& v) {
+  Json phases = Json::array(), others = Json::array(), experiment = Json::array();
+  for (const PhaseFidelity& p : v.phases) {
+    Json json = fidelity_json(p.force);
+    json["phase"] = p.phase.name;
+    json["kind"] = word_of(p.phase.kind);
+    json["start_s"] = rounded(p.start_s, kHilDigits);
+    json["depth_rms_m"] = rounded(p.depth_rms_m, kHilDigits);
+    phases.push_back(std::move(json));
+  }
+  for (const CrossCheck& o : v.others) {
+    Json json = fidelity_json(o.commanded);
+    json["name"] = o.name;
+    json["start_s"] = rounded(o.start_s, kHilDigits);
+    json["end_s"] = rounded(o.end_s, kHilDigits);
+    json["apart_from_reference_N"] = rounded(o.apart_N, kHilDigits);
+    others.push_back(std::move(json));
+  }
+  for (const BesideExperiment& e : v.experiment) {
+    experiment.push_back({{"depth_m", rounded(e.depth_m, kHilDigits)},
+                          {"rate_m_per_s", rounded(e.rate_m_per_s, kHilDigits)},
+                          {"label", e.label},
+                          {"measured_N", e.measured_N},
+                          {"commanded_N", rounded(e.commanded_N, kHilDigits)}});
+  }
+  return {
+      {"simulated_device", recording.simulated()},
+      {"recording", recording.name},
+      {"device", recording.header.at("device")},
+      {"model", recording.header.at("model")},
+      {"reference", v.reference},
+      {"whole", v.whole},
+      {"damaged_rows", recording.damaged},
+      {"without_equilibrium", v.without_equilibrium},
+      {"notes", v.notes},
+      {"end_s", rounded(v.end_s, kHilDigits)},
+      {"knots", v.knots},
+      {"motion_tolerance_m", v.motion_tolerance_m},
+      {"motion_error_N", v.motion_error_N ? Json(rounded(*v.motion_error_N, kHilDigits)) : Json()},
+      {"reference_error_N", rounded(v.reference_error_N, kHilDigits)},
+      {"model_error_N", rounded(v.model_error_N, kHilDigits)},
+      {"all", fidelity_json(v.all)},
+      {"phases", phases},
+      {"others", others},
+      {"experiment", experiment}};
+}
+
+std::string motion_cost(const Verification& v, double per_newton, std::string_view unit) {
+  if (!v.motion_error_N) return "the instants compared among them";
+  return fmt::format("which can cost {} {}", significant(per_newton * *v.motion_error_N, 3), unit);
+}
+
+std::string verification_text(const HilRecording& recording, const Verification& v) {
+  std::string text = fmt::format(
+      "{}\n{}\nverified {} s{} against: {}\nmotion through {} knots within {} um, {}; the "
+      "reference's own error estimate {} N\n",
+      recording.session.title, device_line(recording), significant(v.end_s, 6),
+      v.whole ? "" : " (" + damage_line(recording) + ")", v.reference, v.knots,
+      significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1.0, "N"),
+      significant(v.reference_error_N, 3));
+  text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", "phase", "count", "rms mN", "max mN",
+                      "max/peak");
+  struct Kind {
+    int count = 0;
+    double squares = 0.0, max_N = 0.0;
+    std::size_t instants = 0;
+  };
+  std::map<std::string, Kind> kinds;
+  for (const PhaseFidelity& p : v.phases) {
+    Kind& kind = kinds[std::string(word_of(p.phase.kind))];
+    ++kind.count;
+    kind.squares += p.force.rms_N * p.force.rms_N * static_cast<double>(p.force.instants);
+    kind.instants += p.force.instants;
+    kind.max_N = std::max(kind.max_N, p.force.max_N);
+  }
+  for (const auto& [name, kind] : kinds) {
+    text += fmt::format(
+        "{:<10} {:>7} {:>10} {:>10} {:>10}\n", name, kind.count,
+        significant(1e3 * std::sqrt(kind.squares / static_cast<double>(kind.instants)), 3),
+        significant(1e3 * kind.max_N, 3), share(kind.max_N, v.all.peak_N));
+  }
+  text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}   peak {} N\n", "all", v.phases.size(),
+                      significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
+                      share(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4));
+  for (const std::string& note : v.notes) text += "note: " + note + "\n";
+  for (const CrossCheck& o : v.others) {
+    text += fmt::format("beside: {}, {} to {} s: rms {} mN, max {} mN; {} mN from the reference\n",
+                        o.name, significant(o.start_s, 4), significant(o.end_s, 4),
+                        significant(1e3 * o.commanded.rms_N, 3),
+                        significant(1e3 * o.commanded.max_N, 3), significant(1e3 * o.apart_N, 3));
+  }
+  for (const BesideExperiment& e : v.experiment) {
+    text += fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, commanded {} N ({})\n",
+                        significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3),
+                        e.label, significant(e.measured_N, 3), significant(e.commanded_N, 3),
+                        percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1));
+  }
+  return text;
+}
+
+}  // namespace tpm::report

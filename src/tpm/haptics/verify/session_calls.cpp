@@ -1,0 +1,59 @@
+#include "tpmkit/session.hpp"
+
+#include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpm/haptics/verify/verify.hpp"
+
+namespace tpm::haptics {
+
+Session::Session(const std::filesystem::path& file, const std::filesystem::path& law)
+    : session_(std::make_shared<const HilSession>(read_session(file, {.law = law, .motion = {}}))) {
+}
+
+const std::string& Session::title() const {
+  return session_->title;
+}
+
+double Session::duration_s() const {
+  return session_->duration_s();
+}
+
+const SessionServo& Session::servo() const {
+  return session_->servo;
+}
+
+std::shared_ptr<ContactModel> Session::contact() const {
+  return std::move(make_loop_model(*session_).model);
+}
+
+std::shared_ptr<HapticDevice> Session::simulated_device() const {
+  return make_device(DeviceChoice{}, *session_);
+}
+
+SessionSummary Session::run(const std::shared_ptr<HapticDevice>& device,
+                            const SessionRequest& request) const {
+  SessionRunOptions options;
+  options.real_time = request.real_time;
+  options.wish = request.wish;
+  options.recording = request.recording;
+  options.interrupted = request.interrupted;
+  options.watcher = request.watcher;
+  const SessionRun run = run_session_on(*session_, device, limits_of(request.limits),
+                                        {.may_move = request.may_move}, options);
+  return {.device = run.device,
+          .model = run.model.name,
+          .rendering = run.rendering.verdict(),
+          .outcome = run.outcome};
+}
+
+SessionCheck verify_session(const std::filesystem::path& recording) {
+  const Verification check = verify(read_recording(recording));
+  return {.reference = check.reference,
+          .instants = check.all.instants,
+          .rms_N = check.all.rms_N,
+          .max_N = check.all.max_N,
+          .peak_N = check.all.peak_N,
+          .reference_error_N = check.reference_error_N};
+}
+
+}  // namespace tpm::haptics

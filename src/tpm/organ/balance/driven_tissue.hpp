@@ -1,0 +1,123 @@
+#pragma once
+// The inside of QuasiStatic: the tissue under its probe.
+#include "tpm/organ/balance/quasistatic.hpp"
+#include "tpm/organ/linear/lanes.hpp"
+
+namespace tpm::organ {
+
+/// The tissue at an instant.
+struct TissueState {
+  double time_s = 0.0;
+  double imposed = 0.0;  ///< depth, m, or load, N
+  Positions position;
+  Eigen::VectorXd followed;  ///< V(l) of each bond, m: where nothing stiffens its elongation l
+  Eigen::MatrixXd viscous;   ///< m_j by (bond, branch), m
+  Eigen::VectorXd mean;      ///< y of each bond, the mean of its m_j, m
+  std::vector<char> closed;  ///< contacts, as ViscousState::closed
+
+  /// The viscous elongations at this instant.
+  [[nodiscard]] ViscousState viscous_state() const { return {mean, 0.0, closed}; }
+  /// Every viscous elongation is what it follows: nothing is left to relax.
+  void set_equilibrium() {
+    mean = followed;
+    viscous = followed.replicate(1, viscous.cols());
+  }
+};
+
+/// A network with spheres or tools driven: by an imposed depth, whose response is the contact
+/// force, or by a load, whose response is the depth; see Probes.
+class DrivenTissue {
+ public:
+  /// Throws Error(bad_input) if what an imposed depth drives touches nothing at rest.
+  DrivenTissue(const BondSystem& bonds, Positions rest, Constraints constraints,
+               const Probes& probes, Drive drive, EquilibriumOptions options = {});
+  DrivenTissue(const DrivenTissue&) = delete;
+  DrivenTissue& operator=(const DrivenTissue&) = delete;
+
+  [[nodiscard]] TissueState at_rest(double time_s) const;
+  [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
+  [[nodiscard]] const Constraints& constraints() const { return constraints_; }
+  /// The depth, or its rate, that belongs to displacements, or velocities, of spheres and tools.
+  [[nodiscard]] double depth_of(const Eigen::Matrix3Xd& displacement) const;
+  [[nodiscard]] bool depth_driven() const { return drive_ == Drive::displacement; }
+  [[nodiscard]] Equilibrium& equilibrium() { return equilibrium_; }
+
+  /// Puts what is driven where an imposed depth wants it; under a load there is nothing to do.
+  void impose(Positions& position, double imposed) const;
+  /// Forces from outside, N.
+  void load(double imposed, Eigen::Matrix3Xd& force) const;
+
+  /// The same for states side by side, one imposed value each; loads are added.
+  void impose(LaneMatrix& position, const LaneVector& imposed) const;
+  void add_load(const LaneVector& imposed, LaneMatrix& force) const;
+  /// Puts the displacement of what is driven to a change of an imposed depth.
+  void impose_change(LaneMatrix& displacement, const LaneVector& change) const;
+
+  /// Contact force or depth, given the forces on all spheres.
+  [[nodiscard]] double response(const Positions& position, const Eigen::Matrix3Xd& force) const;
+  [[nodiscard]] double response(const TissueState& state) const;
+  [[nodiscard]] LaneVector response(const LaneMatrix& position, const LaneMatrix& force) const;
+  /// The change of the response, given small displacements and the change of the forces.
+  [[nodiscard]] LaneVector response_change(const LaneMatrix& displacement,
+                                           const LaneMatrix& force) const;
+
+  /// How depths and loads lead to each other at a state.
+  struct UnitField {
+    /// The displacements per unit of what is imposed, probe included; with adjoint_sign() they are
+    /// the adjoint of the response: a force R left on the free spheres changes it by that sign
+    /// times their product.
+    Eigen::Matrix3Xd displacement;
+    /// Weights of errors: `displacement`; where the probe touches nothing and its response
+    /// is nothing, that of a unit depth imposed on the spheres that it touched first.
+    Eigen::Matrix3Xd adjoint;
+    double stiffness = 0.0;  ///< work of `adjoint`: N/m under an imposed depth, m/N under a load
+    double whole = 0.0;      ///< the same with the work of what is driven
+  };
+  /// From the last factorisation, which was at this state and viscous state.
+  [[nodiscard]] UnitField unit_field(const TissueState& state,
+                                     const ViscousState& viscous_state) const;
+  [[nodiscard]] double adjoint_sign() const { return depth_driven() ? -1.0 : 1.0; }
+
+  /// Force on what is driven per displacement along the probe while all else stands still, N/m.
+  [[nodiscard]] double held_stiffness(const Positions& position,
+                                      const ViscousState& viscous_state) const;
+
+  /// Response per unit of what is imposed with the equilibrium stiffness at rest, given what the
+  /// displacements are about: their errors count squared.
+  [[nodiscard]] double relaxed_response(const TissueState& rest,
+                                        const Eigen::Matrix3Xd& displacement) const;
+
+  /// Size of the response to a peak of what is imposed, with the equilibrium stiffness at rest.
+  [[nodiscard]] double linear_response(const TissueState& rest, double peak);
+
+  /// Force on the tissue, N (or impulse, N s), given what the tissue does to what is driven: summed
+  /// with the shares under an imposed depth, as the response is, and plainly under a load.
+  [[nodiscard]] double push_on_tissue(const Eigen::Matrix3Xd& on_driven) const;
+  /// Speeds of what is driven where the imposed depth changes at a rate, added to velocities.
+  void add_imposed_velocity(double rate, Eigen::Matrix3Xd& velocity) const;
+  /// What the masses driven weigh in the force of a probe that moves them, kg.
+  [[nodiscard]] double driven_mass_kg(const Eigen::VectorXd& mass_kg) const;
+
+ private:
+  /// A sphere or tool driven.
+  struct Driven {
+    Eigen::Index column;
+    Eigen::Vector3d direction;
+    double weight;  ///< of what is imposed
+  };
+  /// The parts of forces or displacements along what is driven, weighted and summed.
+  [[nodiscard]] double along(const Eigen::Matrix3Xd& vectors) const;
+  /// The displacements, or loads, of what is driven per unit of what is imposed.
+  [[nodiscard]] Eigen::Matrix3Xd unit() const;
+  /// The same on the spheres that are touched at rest.
+  [[nodiscard]] Eigen::Matrix3Xd unit_on_touched() const;
+
+  const BondSystem& bonds_;
+  Positions rest_;
+  Constraints constraints_;
+  std::vector<Driven> driven_;
+  Drive drive_;
+  Equilibrium equilibrium_;
+};
+
+}  // namespace tpm::organ

@@ -1,0 +1,293 @@
+#include "tpm/organ/balance/inertial.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/require.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/organ/balance/inertial_integration.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
+
+namespace tpm::organ {
+namespace {
+
+void require_valid(const InertialOptions& options) {
+  require_number(options.tolerance >= 1e-12 && options.tolerance <= 0.1, "tolerance",
+                 options.tolerance, "1e-12 to 0.1");
+  require_number(options.highest_order >= 1 && options.highest_order <= 5, "highest order",
+                 options.highest_order, "1 to 5");
+  require_number(options.damping_ratio >= 0.0 && options.damping_ratio <= 10.0, "damping ratio",
+                 options.damping_ratio, "0 to 10");
+  require_number(options.stiffness_share >= 0.0 && options.stiffness_share <= 1.0,
+                 "stiffness share", options.stiffness_share, "0 to 1");
+  require_number(options.contact_damping_ratio >= 0.0 && options.contact_damping_ratio <= 10.0,
+                 "contact damping ratio", options.contact_damping_ratio, "0 to 10");
+}
+
+Inertia inertia_of(const BondSystem& bonds, const Eigen::VectorXd& mass, const LowestMode& lowest,
+                   const InertialOptions& options) {
+  const double omega = lowest.angular_frequency();
+  Inertia inertia{mass,
+                  2.0 * options.damping_ratio * omega * (1.0 - options.stiffness_share),
+                  {},
+                  options.contact_damping_ratio};
+  const double beta = 2.0 * options.damping_ratio * options.stiffness_share / omega;
+  if (beta > 0.0) {
+    inertia.dashpot_N_s_m = beta * bonds.stiffness_when(lowest.relaxation_factor);
+    inertia.dashpot_N_s_m.tail(static_cast<Eigen::Index>(bonds.contact_count())).setZero();
+  }
+  return inertia;
+}
+
+/// The knots up to the last time asked for, where the last value is constant for ever.
+std::vector<Knot> finite_knots(const Protocol& protocol, std::span<const double> times_s) {
+  std::vector<Knot> knots(protocol.knots().begin(), protocol.knots().end());
+  double latest = knots.back().time_s;
+  for (const double t : times_s) {
+    if (std::isinf(t)) {
+      throw bad_input(protocol.name(), "an integrator does not reach t = infinity",
+                      "a finite time, or the quasi-static network");
+    }
+    latest = std::max(latest, t);
+  }
+  if (latest > knots.back().time_s) knots.push_back({latest, knots.back().value});
+  return knots;
+}
+
+void require_no_jump_of_depth(const Protocol& protocol) {
+  if (protocol.drive() == Drive::force) return;
+  const auto knots = protocol.knots();
+  bool jumps = knots.front().value != 0.0 && !protocol.equilibrium_at_start();
+  for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+    jumps =
+        jumps || (knots[k].time_s == knots[k + 1].time_s && knots[k].value != knots[k + 1].value);
+  }
+  if (!jumps) return;
+  throw bad_input(protocol.name(),
+                  "the depth jumps, which takes an infinite force where spheres "
+                  "have mass",
+                  "a ramp");
+}
+
+/// One run: the state and how it is carried through the protocol.
+class MotionRun {
+ public:
+  MotionRun(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
+            const Probes& probes, const Inertia& inertia, const InertialOptions& options,
+            double omega, const Protocol& protocol, std::span<const double> times_s,
+            const InertialObserver& observer, const InertialState* from)
+      : options_(options),
+        protocol_(protocol),
+        observer_(observer),
+        times_s_(times_s),
+        order_(rising_order(times_s)),
+        knots_(finite_knots(protocol, times_s)),
+        tissue_(bonds, rest, constraints, probes, protocol.drive()),
+        equation_(tissue_, rest, inertia) {
+    TissueState start = tissue_.at_rest(knots_.front().time_s);
+    const double response_scale = std::abs(tissue_.linear_response(start, protocol.peak()));
+    const double depth = tissue_.depth_driven() ? protocol.peak() : response_scale;
+    if (!from && protocol.equilibrium_at_start() && knots_.front().value != 0.0) {
+      preload(bonds, rest, constraints, probes, start);
+    }
+    if (from && from->motion.size() != equation_.size()) {
+      throw bad_input("state", fmt::format("{} numbers", from->motion.size()),
+                      fmt::format("{}, as the network has", equation_.size()));
+    }
+    integration_.emplace(equation_, options,
+                         from ? from->motion : equation_.pack(start.position, start.viscous),
+                         step_error(depth, omega), energy_error(response_scale),
+                         from ? from->spent_J : Eigen::Vector4d::Zero());
+    if (from) go_on_from(*from);
+    result_.response.resize(static_cast<Eigen::Index>(times_s.size()));
+    result_.of_driven_sphere.resize(result_.response.size());
+  }
+
+  InertialRun go() {
+    for (std::size_t k = 0; k + 1 < knots_.size(); ++k) {
+      if (knots_[k].time_s == knots_[k + 1].time_s) continue;
+      if (knots_[k + 1].time_s > begin_s_) {
+        cross(knots_[k], knots_[k + 1]);
+      } else {  // over already, but the speed it leaves with counts
+        equation_.set_piece(knots_[k], knots_[k + 1]);
+      }
+    }
+    const double end = knots_.back().time_s;
+    while (next_ < order_.size()) put(end);
+    finish(end);
+    return std::move(result_);
+  }
+
+ private:
+  void go_on_from(const InertialState& from) {
+    started_ = true;
+    begin_s_ = from.time_s;
+    blow_work_ = from.blow_work_J;
+    stored_at_start_ = from.stored_at_start_J;
+  }
+
+  /// Where a load or a depth held for ever has brought the tissue.
+  void preload(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
+               const Probes& probes, TissueState& state) const {
+    const double forever = std::numeric_limits<double>::infinity();
+    const Protocol held(protocol_.drive(), {{0.0, knots_.front().value}}, "preload", true);
+    const QuasiStaticRun run =
+        QuasiStatic(bonds, rest, constraints, probes, {std::min(options_.tolerance, 1e-6), 5})
+            .run(held, std::span(&forever, 1));
+    state.position = run.position;
+    state.viscous = run.viscous;
+  }
+
+  [[nodiscard]] Eigen::VectorXd step_error(double depth, double omega) const {
+    // A protocol that imposes nothing has no scale of its own, and nothing moves.
+    const double scale = options_.tolerance * (depth > 0.0 ? depth : 1e-3);
+    Eigen::VectorXd error = Eigen::VectorXd::Constant(equation_.size(), scale);
+    error.segment(equation_.coordinates(), equation_.coordinates()) *= omega;
+    return error;
+  }
+
+  [[nodiscard]] std::optional<double> energy_error(double response_scale) const {
+    if (!options_.energy) return std::nullopt;
+    const double work = protocol_.peak() * response_scale;
+    return options_.tolerance * (work > 0.0 ? work : 1e-6);
+  }
+
+  void cross(const Knot& from, const Knot& to) {
+    const double speed_before = equation_.imposed_speed();
+    equation_.set_piece(from, to);
+    if (!started_) begin(from.time_s);
+    const double begin_s = std::max(from.time_s, begin_s_);
+    if (begin_s == from.time_s) blow(from.time_s, speed_before);
+    integration_->restart(begin_s, to.time_s);
+    while (next_ < order_.size() && times_s_[order_[next_]] < to.time_s) {
+      const double time = times_s_[order_[next_]];
+      // CVODES refuses times that rounding alone separates from where it starts.
+      const bool apart = time - begin_s > 1e-14 * std::max(std::abs(time), to.time_s);
+      if (apart) advance(time, to.time_s);
+      put(time);
+    }
+    advance(to.time_s, to.time_s);
+  }
+
+  void advance(double time_s, double stop_s) {
+    for (;;) {
+      const double reached = integration_->advance_to(time_s);
+      if (reached == time_s && !equation_.meets(time_s, integration_->state())) return;
+      const ToolImpact impact = integration_->strike(reached);
+      integration_->spend(impact.work_J, impact.lost_J);
+      const double of_probe = tissue_.depth_driven() ? impact.on_tissue_N_s : 0.0;
+      if (impact.on_tissue_N_s != 0.0) {
+        result_.blows.push_back({reached, of_probe, impact.on_tissue_N_s});
+      }
+      if (reached < stop_s) integration_->restart(reached, stop_s);
+      if (!(time_s - reached > 1e-14 * std::max(std::abs(time_s), stop_s))) return;
+    }
+  }
+
+  void begin(double time_s) {
+    started_ = true;
+    stored_at_start_ = equation_.stored_J(time_s, integration_->state());
+  }
+
+  void blow(double time_s, double speed_before) {
+    const double speed = equation_.imposed_speed();
+    if (speed == speed_before) return;
+    const double impulse = equation_.driven_mass_kg() * (speed - speed_before);
+    blow_work_ += 0.5 * impulse * (speed + speed_before);
+    // Spheres that the tool touches are taken along as it gains speed, so that nothing is lost.
+    const ToolImpact impact = integration_->strike(time_s);
+    blow_work_ += impact.work_J - impact.lost_J;
+    const double on_driven_spheres = equation_.driven_sphere_mass_kg() * (speed - speed_before);
+    result_.blows.push_back(
+        {time_s, impulse + impact.on_tissue_N_s, on_driven_spheres + impact.on_tissue_N_s});
+  }
+
+  void put(double time_s) {
+    const auto row = static_cast<Eigen::Index>(order_[next_++]);
+    result_.response[row] = equation_.response(time_s, integration_->state());
+    result_.of_driven_sphere[row] = equation_.drag_on_driven_sphere_N();
+    if (observer_) show(time_s, result_.response[row]);
+  }
+
+  void show(double time_s, double response) {
+    const TissueMotion& now = equation_.unpack(time_s, integration_->state());
+    observer_({time_s, value_at(protocol_, time_s), response, now.position, now.viscous, {}},
+              equation_.contact_pushes_N(time_s, integration_->state()));
+  }
+
+  void finish(double end) {
+    result_.work = integration_->work();
+    if (options_.energy) {
+      const Eigen::Vector4d spent = integration_->spent_J();
+      InertialEnergy energy;
+      energy.work = spent[0] + blow_work_;
+      energy.stored = equation_.stored_J(end, integration_->state()) - stored_at_start_;
+      energy.kinetic = equation_.kinetic_J(end, integration_->state());
+      energy.bond_heat = spent[1];
+      energy.damping_heat = spent[2];
+      energy.contact_heat = spent[3];
+      result_.energy = energy;
+    }
+    const TissueMotion& last = equation_.unpack(end, integration_->state());
+    result_.position = last.position;
+    result_.velocity = last.velocity;
+    result_.viscous = last.viscous;
+    result_.end = {end, integration_->state(),
+                   options_.energy ? integration_->spent_J() : Eigen::Vector4d::Zero(), blow_work_,
+                   stored_at_start_};
+  }
+
+  const InertialOptions& options_;
+  const Protocol& protocol_;
+  const InertialObserver& observer_;
+  std::span<const double> times_s_;
+  std::vector<std::size_t> order_;
+  std::size_t next_ = 0;  ///< the first of order_ not answered yet
+  std::vector<Knot> knots_;
+  DrivenTissue tissue_;
+  InertialEquation equation_;
+  std::optional<InertialIntegration> integration_;
+  bool started_ = false;
+  double begin_s_ = -std::numeric_limits<double>::infinity();  ///< where an earlier run has ended
+  double stored_at_start_ = 0.0;
+  double blow_work_ = 0.0;
+  InertialRun result_;
+};
+
+}  // namespace
+
+Inertial::Inertial(const BondSystem& bonds, Positions rest, Constraints constraints, Probes probes,
+                   Eigen::VectorXd mass_kg, InertialOptions options)
+    : bonds_(bonds),
+      rest_(std::move(rest)),
+      constraints_(std::move(constraints)),
+      probes_(std::move(probes)),
+      mass_kg_(std::move(mass_kg)),
+      options_(options) {
+  require_valid(options_);
+  require_valid(probes_, constraints_);
+  for (Eigen::Index i = 0; i < rest_.cols(); ++i) {
+    if (mass_kg_.size() == rest_.cols() && mass_kg_[i] > 0.0 && std::isfinite(mass_kg_[i]))
+      continue;
+    throw bad_input("mass", fmt::format("of sphere {} is not above 0", i + 1),
+                    "one mass above 0 for every sphere");
+  }
+  lowest_ = lowest_mode(bonds_, rest_, constraints_, mass_kg_);
+}
+
+InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s,
+                          const InertialObserver& observer, const InertialState* from) const {
+  require_times_within(protocol, times_s);
+  require_no_jump_of_depth(protocol);
+  if (from) require_later(times_s, from->time_s);
+  return MotionRun(bonds_, rest_, constraints_, probes_,
+                   inertia_of(bonds_, mass_kg_, lowest_, options_), options_,
+                   lowest_.angular_frequency(), protocol, times_s, observer, from)
+      .go();
+}
+
+}  // namespace tpm::organ

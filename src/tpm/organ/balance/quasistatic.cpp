@@ -1,0 +1,496 @@
+#include "tpm/organ/balance/quasistatic.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/require.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/law/relaxation/sampled_function.hpp"
+#include "tpm/organ/balance/stage_tangents.hpp"
+#include "tpm/organ/balance/step_growth.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
+
+namespace tpm::organ {
+namespace {
+
+constexpr double kStepShare = 0.1;   // of the tolerance, for one step
+constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
+constexpr double kLeastMove = 1e-9;  // of a jump
+// A step of p stages after a change of rate errs by about (h / (kFirstStep tau))^(p + 1), with the
+// shortest relaxation time.
+constexpr double kFirstStep = 28.0;
+constexpr double kMostGrowth = 30.0;    // from one step to the next
+constexpr double kLanded = 1.0 - 1e-6;  // of a step that was to end where a contact changes
+constexpr std::size_t kMostChangesTogether = 4;  // of a contact at one time
+
+/// One run: the state and how it is carried through the protocol.
+class Run {
+ public:
+  Run(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
+      const Probes& probes, const QuasiStaticOptions& options, const Protocol& protocol,
+      std::span<const double> times_s, const QuasiStaticObserver& observer)
+      : protocol_(protocol),
+        options_(options),
+        times_s_(times_s),
+        observer_(observer),
+        tissue_(bonds, rest, constraints, probes, protocol.drive(), options.equilibrium),
+        stages_(tissue_, options.stages, !options.step_s) {
+    order_ = rising_order(times_s);
+    const auto asked = static_cast<Eigen::Index>(times_s.size());
+    result_.response.resize(asked);
+    if (options.directions.empty()) return;
+    tangents_.emplace(tissue_, stages_, options.directions,
+                      kStepShare * options.derivative_tolerance.value_or(options.tolerance));
+    result_.derivative.setZero(asked, tangents_->count());
+  }
+
+  QuasiStaticRun go(const QuasiStaticState* begin) {
+    begin ? start_from(*begin) : start();
+    const auto knots = protocol_.knots();
+    for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+      Knot from = knots[k];
+      const Knot& to = knots[k + 1];
+      if (begin && to.time_s <= begin->time_s) continue;
+      if (begin && from.time_s < begin->time_s) from = {state_.time_s, state_.imposed};
+      if (to.time_s == from.time_s) {
+        jump(to.value);
+      } else {
+        cross(from, to);
+      }
+    }
+    if (next_ < order_.size()) hold_on(knots.back());
+    result_.work = work();
+    result_.solver = tissue_.equilibrium().choice();
+    if (options_.energies) result_.energy = energy_of(state_, energy_);
+    result_.position = state_.position;
+    result_.viscous = state_.viscous;
+    return std::move(result_);
+  }
+
+  [[nodiscard]] QuasiStaticWork work() const {
+    QuasiStaticWork work = stages_.work();
+    work.rejected = result_.work.rejected;
+    return work;
+  }
+
+ private:
+  [[nodiscard]] Error failed(double imposed, std::string_view what) const {
+    const bool depth = protocol_.drive() == Drive::displacement;
+    return Error(
+        ExitCode::numerical, "network",
+        fmt::format("at t = {} s and {} of {} {} {}", significant(state_.time_s, 5),
+                    depth ? "a depth" : "a load", significant(depth ? 1e3 * imposed : imposed, 4),
+                    depth ? "mm" : "N", what));
+  }
+
+  /// Puts the tissue at rest and sets what tolerances refer to.
+  void set_scales(double time_s) {
+    state_ = tissue_.at_rest(time_s);
+    response_.reset();
+    stages_.begin(state_, first_step_s(first_change_s()), protocol_.peak());
+  }
+
+  /// How long the first piece takes in which the imposed value changes gradually, s.
+  [[nodiscard]] double first_change_s() const {
+    const auto knots = protocol_.knots();
+    for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+      const double length_s = knots[k + 1].time_s - knots[k].time_s;
+      if (length_s > 0.0 && knots[k + 1].value != knots[k].value) return length_s;
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  /// The first step that is tried in a piece of the protocol, s.
+  [[nodiscard]] double first_step_s(double length_s) const {
+    const double of_time = kFirstStep * std::pow(options_.tolerance, 1.0 / (options_.stages + 1));
+    const double fit = of_time * tissue_.bonds().shortest_relaxation_time_s();
+    return std::min(length_s, options_.step_s.value_or(fit));
+  }
+
+  void start() {
+    const Knot& first = protocol_.knots().front();
+    set_scales(first.time_s);
+    if (protocol_.equilibrium_at_start()) {
+      move_to(first.value, true);
+    } else if (first.value != 0.0) {
+      jump(first.value);
+    }
+  }
+
+  /// A state is known up to the tolerance of the run that found it; its forces are balanced here.
+  void start_from(const QuasiStaticState& begin) {
+    set_scales(begin.time_s);
+    stages_.see(begin.response);
+    state_.position = begin.position;
+    state_.viscous = begin.viscous;
+    state_.mean = tissue_.bonds().mean_viscous(begin.viscous);
+    tissue_.bonds().followed(state_.position, state_.followed);
+    state_.imposed = begin.imposed;
+    if (begin.energy) energy_ = *begin.energy;
+    follow(begin.imposed, false);
+  }
+
+  void jump(double value) { move_to(value, false); }
+
+  [[nodiscard]] double response_now() {
+    if (!response_) response_ = tissue_.response(state_);
+    return *response_;
+  }
+
+  [[nodiscard]] double stored_J() const {
+    return tissue_.bonds().stored_energy_J(state_.position, state_.viscous);
+  }
+
+  /// The account of the energy where the tissue is in a state.
+  template <class State>
+  [[nodiscard]] QuasiStaticEnergy energy_of(const State& state, QuasiStaticEnergy spent) const {
+    return with_stored(spent, tissue_.bonds().stored_energy_J(state.position, state.viscous));
+  }
+  [[nodiscard]] static QuasiStaticEnergy with_stored(QuasiStaticEnergy spent, double stored_J) {
+    spent.stored_J = stored_J;
+    return spent;
+  }
+
+  /// Goes to an imposed value through equilibria, at once or with everything relaxed on the way.
+  /// Such a move is reversible: the work is what is stored.
+  void move_to(double value, bool relaxed) {
+    const double before_J = stored_J();
+    follow(value, relaxed);
+    energy_.work_J += stored_J() - before_J;
+  }
+
+  /// Waits for ever; what the springs lose then and the probe adds turns into heat.
+  void settle() {
+    const double before_J = stored_J();
+    const double response = response_now();
+    follow(state_.imposed, true);
+    const double work_J =
+        tissue_.depth_driven() ? 0.0 : state_.imposed * (response_now() - response);
+    energy_.work_J += work_J;
+    energy_.dissipated_J += work_J + before_J - stored_J();
+  }
+
+  void follow(double value, bool relaxed) {
+    const double begin = state_.imposed;
+    double done = 0.0;
+    double stride = 1.0;
+    const double tolerance = 1e-3 * options_.tolerance;
+    while (done < 1.0) {
+      const double aim = std::min(1.0, done + stride);
+      const double imposed = begin + aim * (value - begin);
+      const TissueMove move = stages_.move(state_, imposed, relaxed, tolerance);
+      if (move == TissueMove::done) {
+        done = aim;
+        stride *= 2.0;
+        continue;
+      }
+      stride *= 0.5;
+      if (stride > kLeastMove) continue;
+      throw failed(imposed, move == TissueMove::unstable
+                                ? "the tissue buckles: its stiffness is no longer positive"
+                                : "no equilibrium is found: it may snap through");
+    }
+    response_.reset();
+    stages_.see(response_now());
+    if (tangents_) tangents_->follow_move(state_, relaxed);
+  }
+
+  /// Steps through a piece in which the imposed value is linear.
+  void cross(const Knot& from, const Knot& to) {
+    const double length = to.time_s - from.time_s;
+    const double rate = (to.value - from.value) / length;
+    StepGrowth growth(options_.stages + 1);
+    double h = first_step_s(length);
+    if (rate == 0.0 && from.value == 0.0 && is_relaxed()) return stand_still(to.time_s);
+    while (state_.time_s < to.time_s) {
+      const double left = to.time_s - state_.time_s;
+      const bool last = h >= left * (1.0 - 1e-12);
+      if (last) h = left;
+      const StepOutcome outcome =
+          stages_.try_step(state_, h, rate, kStepShare * options_.tolerance);
+      if (options_.may_go_on && !options_.may_go_on(work())) {
+        throw failed(state_.imposed, "the run has taken as long as it may");
+      }
+      const double factor = growth.after(h, outcome);
+      const bool kept = outcome.accepted || (options_.step_s && outcome.balanced);
+      if (!kept) {
+        ++result_.work.rejected;
+        landing_.reset();
+        h *= outcome.balanced ? std::clamp(factor, 0.05, 0.9) : 0.25;
+        if (h > kLeastStep * length) continue;
+        throw failed(state_.imposed, outcome.unstable
+                                         ? "the tissue buckles: its stiffness is no longer positive"
+                                         : "the forces cannot be balanced: it may snap through");
+      }
+      if (!lands_on_contact(h, length)) continue;
+      if (tangents_) tangents_->follow_step(h);
+      std::optional<StepEnergy> energy;
+      if (options_.energies) energy = stages_.energy_of_step(state_, h, rate);
+      report_within(h, rate, energy);
+      if (energy) energy_ = with(energy->whole());
+      result_.error_estimate += outcome.error + outcome.left;
+      response_ = stages_.accept(state_, h, rate);
+      if (tangents_) tangents_->accept();
+      if (last) state_.time_s = to.time_s;
+      state_.imposed = last ? to.value : state_.imposed;
+      if (landing_) {
+        change_contact(landing_->contact);
+        h = landing_->step_s;
+        landing_.reset();
+        growth = StepGrowth(options_.stages + 1);
+      } else {
+        h = options_.step_s ? *options_.step_s : h * std::clamp(factor, 0.2, kMostGrowth);
+      }
+    }
+  }
+
+  /// A step within which a contact with a tool closes or opens is cut to end there. False if it has
+  /// to be found again.
+  /// @param h of the step just balanced, s; of the next one to try
+  /// @param length of the piece, s
+  [[nodiscard]] bool lands_on_contact(double& h, double length) {
+    const auto change = stages_.contact_change(kStepShare * options_.tolerance);
+    if (!change) return true;
+    if (change->fraction * h <= kLeastStep * length) {
+      landing_.reset();
+      change_contact(change->contact);
+      return false;
+    }
+    if (landing_ && landing_->contact == change->contact && change->fraction > kLanded) return true;
+    landing_ = Landing{change->contact, landing_ ? landing_->step_s : h};
+    h *= change->fraction;
+    return false;
+  }
+
+  void change_contact(std::size_t contact) {
+    stages_.change_contact(state_, contact);
+    response_.reset();
+    changes_together_ = state_.time_s == changed_at_s_ ? changes_together_ + 1 : 1;
+    changed_at_s_ = state_.time_s;
+    if (changes_together_ <= kMostChangesTogether * state_.closed.size()) return;
+    throw failed(state_.imposed, "contacts with a tool open and close without end");
+  }
+
+  [[nodiscard]] bool is_relaxed() const { return state_.viscous.isZero(0.0); }
+
+  void stand_still(double until_s) {
+    while (next_ < order_.size() && times_s_[order_[next_]] < until_s) {
+      put(response_now(), state_, energy_);
+    }
+    state_.time_s = until_s;
+  }
+
+  /// The energy at the start of a step, and what is spent since.
+  [[nodiscard]] QuasiStaticEnergy with(const QuasiStaticEnergy& part) const {
+    QuasiStaticEnergy sum = energy_;
+    sum.work_J += part.work_J;
+    sum.dissipated_J += part.dissipated_J;
+    return sum;
+  }
+
+  /// Answers the times asked for within the step just found, its end left out.
+  void report_within(double h, double rate, const std::optional<StepEnergy>& energy) {
+    std::vector<double> fractions;
+    for (std::size_t i = next_; i < order_.size(); ++i) {
+      const double time = times_s_[order_[i]];
+      if (!(time < state_.time_s + h)) break;
+      fractions.push_back(std::max((time - state_.time_s) / h, 0.0));
+    }
+    if (tangents_ || !observer_) answer(fractions, h, rate);
+    for (std::span<const double> rest = fractions; observer_ && !rest.empty();) {
+      const std::size_t count = std::min<std::size_t>(kLanes, rest.size());
+      show_within(rest.first(count), h, rate, energy);
+      rest = rest.subspan(count);
+    }
+  }
+
+  /// Puts derivatives at fractions of the step just found, and responses unless an observer is
+  /// shown states, which bring them.
+  void answer(std::span<const double> fractions, double h, double rate) {
+    while (!tangents_ && !fractions.empty() && fractions.front() == 0.0) {
+      put(response_now());
+      fractions = fractions.subspan(1);
+    }
+    const Eigen::Index derivatives = tangents_ ? tangents_->count() : 0;
+    Eigen::RowVectorXd allowed = Eigen::RowVectorXd::Constant(
+        1 + derivatives, options_.derivative_tolerance.value_or(options_.tolerance));
+    allowed[0] = options_.tolerance;
+    const auto answers_at = [&](std::span<const double> asked) {
+      const auto count = static_cast<Eigen::Index>(asked.size());
+      Eigen::MatrixXd rows(count, 1 + derivatives);
+      rows.col(0) = stages_.responses_within(state_, asked, h, rate).head(count);
+      if (tangents_) {
+        rows.rightCols(derivatives) = tangents_->responses_within(state_, asked, h, rate);
+      }
+      return rows;
+    };
+    const Eigen::MatrixXd answers =
+        sampled(answers_at, fractions, kLanes, kStepShare * stages_.scale() * allowed);
+    for (Eigen::Index i = 0; i < answers.rows() && tangents_; ++i) {
+      derivative_row(next_ + static_cast<std::size_t>(i)) = answers.row(i).tail(derivatives);
+    }
+    if (observer_) return;
+    for (Eigen::Index i = 0; i < answers.rows(); ++i) {
+      const bool begins = fractions[static_cast<std::size_t>(i)] == 0.0;
+      put(begins ? response_now() : answers(i, 0));
+    }
+  }
+
+  /// Responses within the step just found, with the states there.
+  void show_within(std::span<const double> fractions, double h, double rate,
+                   const std::optional<StepEnergy>& energy) {
+    std::vector<QuasiStaticState> states =
+        stages_.states_within(state_, fractions, h, rate, options_.energies);
+    for (std::size_t i = 0; i < fractions.size(); ++i) {
+      if (fractions[i] == 0.0) states[i].response = response_now();
+      const double response = states[i].response;
+      show(states[i], energy ? with(energy->until(fractions[i], response)) : energy_);
+    }
+  }
+
+  /// The last value held for as long as is asked, and for ever.
+  void hold_on(const Knot& last) {
+    while (next_ < order_.size()) {
+      const double time = times_s_[order_[next_]];
+      if (std::isinf(time)) {
+        settle();
+      } else if (time > state_.time_s) {
+        const double latest = latest_finite_time();
+        cross({state_.time_s, last.value}, {latest, last.value});
+        continue;
+      }
+      if (tangents_) derivative_row(next_) = tangents_->response(state_);
+      put(response_now(), state_, energy_);
+    }
+  }
+
+  [[nodiscard]] Eigen::MatrixXd::RowXpr derivative_row(std::size_t rank) {
+    return result_.derivative.row(static_cast<Eigen::Index>(order_[rank]));
+  }
+
+  [[nodiscard]] double latest_finite_time() const {
+    double latest = state_.time_s;
+    for (const double t : times_s_) {
+      if (std::isfinite(t)) latest = std::max(latest, t);
+    }
+    return latest;
+  }
+
+  void put(double response) {
+    result_.response[static_cast<Eigen::Index>(order_[next_++])] = response;
+  }
+
+  void put(double response, const TissueState& state, const QuasiStaticEnergy& spent) {
+    if (!observer_) return put(response);
+    QuasiStaticState shown{state.time_s,   state.imposed, response,
+                           state.position, state.viscous, std::nullopt};
+    show(shown, spent);
+  }
+
+  /// Puts the response of a state, and shows it at the time that was asked for.
+  void show(QuasiStaticState& state, const QuasiStaticEnergy& spent) {
+    state.time_s = times_s_[order_[next_]];
+    put(state.response);
+    if (options_.energies) {
+      state.energy =
+          state.energy ? with_stored(spent, state.energy->stored_J) : energy_of(state, spent);
+    }
+    observer_(state);
+  }
+
+  const Protocol& protocol_;
+  const QuasiStaticOptions& options_;
+  std::span<const double> times_s_;
+  const QuasiStaticObserver& observer_;
+  std::vector<std::size_t> order_;  ///< of times_s_, rising
+  std::size_t next_ = 0;            ///< the first of them not answered yet
+  DrivenTissue tissue_;
+  StageBalance stages_;
+  std::optional<StageTangents> tangents_;
+  /// A step that is to end where a contact closes or opens, and the length of the one before it.
+  struct Landing {
+    std::size_t contact;
+    double step_s;
+  };
+  std::optional<Landing> landing_;
+  double changed_at_s_ = -std::numeric_limits<double>::infinity();
+  std::size_t changes_together_ = 0;
+  TissueState state_;
+  std::optional<double> response_;  ///< there, once known
+  QuasiStaticEnergy energy_;
+  QuasiStaticRun result_;
+};
+
+void require_same_network(const QuasiStaticState& from, const BondSystem& bonds) {
+  const auto spheres = static_cast<std::size_t>(from.position.cols());
+  const auto rows = static_cast<std::size_t>(from.viscous.rows());
+  const bool same_branches = from.viscous.cols() == bonds.most_branches();
+  if (spheres == bonds.spheres() && rows == bonds.size() && same_branches) return;
+  throw bad_input(
+      "state",
+      fmt::format("{} spheres and {} bonds of {} branches", spheres, rows, from.viscous.cols()),
+      fmt::format("{}, {} and {}, as the network has", bonds.spheres(), bonds.size(),
+                  bonds.most_branches()));
+}
+
+}  // namespace
+
+void require_later(std::span<const double> times_s, double from_s) {
+  for (const double time : times_s) {
+    if (time >= from_s) continue;
+    throw bad_input("times", fmt::format("{} s", shortest(time)),
+                    fmt::format("times from {} s on, where the run begins", shortest(from_s)));
+  }
+}
+
+QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Constraints constraints,
+                         Probes probes, QuasiStaticOptions options)
+    : bonds_(bonds),
+      rest_(std::move(rest)),
+      constraints_(std::move(constraints)),
+      probes_(std::move(probes)),
+      options_(std::move(options)) {
+  require_number(options_.tolerance >= 1e-12 && options_.tolerance <= 0.1, "tolerance",
+                 options_.tolerance, "1e-12 to 0.1");
+  if (options_.stages < 2 || options_.stages > kLanes) {
+    throw bad_input("stages", std::to_string(options_.stages), fmt::format("2 to {}", kLanes));
+  }
+  for (const TangentDirection& direction : options_.directions) {
+    const auto size = static_cast<Eigen::Index>(bonds.size());
+    if (direction.stiffness.size() == size && direction.relaxing.size() == size) continue;
+    throw bad_input("directions", "changes of another number of bonds",
+                    fmt::format("one number for each of the {} bonds", size));
+  }
+  if (options_.step_s) {
+    require_number(is_positive(*options_.step_s), "step", *options_.step_s, "a time above 0", " s");
+  }
+  require_valid(probes_, constraints_);
+}
+
+QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double> times_s,
+                                const QuasiStaticObserver& observer,
+                                const QuasiStaticState* from) const {
+  if (from && !options_.directions.empty()) {
+    throw bad_input("directions", "a run that goes on from a state",
+                    "a run from rest: the derivatives of the state are not known");
+  }
+  require_times_within(protocol, times_s);
+  if (from) {
+    require_times_within(protocol, {&from->time_s, 1});
+    require_same_network(*from, bonds_);
+    require_later(times_s, from->time_s);
+  }
+  Run run(bonds_, rest_, constraints_, probes_, options_, protocol, times_s, observer);
+  try {
+    return run.go(from);
+  } catch (const Error&) {
+    if (options_.on_failure) options_.on_failure(run.work());
+    throw;
+  }
+}
+
+}  // namespace tpm::organ

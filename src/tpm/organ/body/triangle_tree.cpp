@@ -1,0 +1,249 @@
+#include "tpm/organ/body/triangle_tree.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "tpm/work/parallel.hpp"
+
+namespace tpm::organ {
+
+namespace {
+
+constexpr int kLeaf = 5;      // the quickest for a liver, building included
+constexpr int kAlone = 4096;  // triangles that one thread splits
+
+using Eigen::Vector3d;
+
+/// Nearest point on the edge from corner `from` to corner `to`, as weights of the three corners.
+Vector3d edge_weights(const Vector3d& start, const Vector3d& end, const Vector3d& point,
+                      Eigen::Index from, Eigen::Index to) {
+  const Vector3d edge = end - start;
+  const double share = std::clamp(edge.dot(point - start) / edge.squaredNorm(), 0.0, 1.0);
+  Vector3d weights = Vector3d::Zero();
+  weights[from] = 1.0 - share;
+  weights[to] = share;
+  return weights;
+}
+
+/// Weights of the corners a, b, c at the point of their triangle nearest to `point`.
+Vector3d nearest_weights(const Vector3d& a, const Vector3d& b, const Vector3d& c,
+                         const Vector3d& point) {
+  const Vector3d normal = (b - a).cross(c - a);
+  const double inside_a = normal.dot((b - point).cross(c - point));
+  const double inside_b = normal.dot((c - point).cross(a - point));
+  const double inside_c = normal.dot((a - point).cross(b - point));
+  if (inside_a > 0.0 && inside_b > 0.0 && inside_c > 0.0) {
+    const Vector3d inside(inside_a, inside_b, inside_c);
+    return inside / inside.sum();
+  }
+  Vector3d best = Vector3d::Zero();
+  double least = std::numeric_limits<double>::infinity();
+  const auto consider = [&](const Vector3d& weights) {
+    const double squared = (weights[0] * a + weights[1] * b + weights[2] * c - point).squaredNorm();
+    if (squared < least) {
+      least = squared;
+      best = weights;
+    }
+  };
+  if (!(inside_c > 0.0)) consider(edge_weights(a, b, point, 0, 1));
+  if (!(inside_a > 0.0)) consider(edge_weights(b, c, point, 1, 2));
+  if (!(inside_b > 0.0)) consider(edge_weights(c, a, point, 2, 0));
+  return best;
+}
+
+/// Nodes of the tree of halves over so many triangles.
+int halves_of(int count) {
+  if (count <= kLeaf) return 1;
+  // Halving leaves parts that differ by one at most: here those beyond a leaf are split once more.
+  int parts = 1;
+  while ((count - 1) / (2 * kLeaf) >= parts) parts *= 2;
+  return 2 * parts - 1 + 2 * std::min(parts, count - kLeaf * parts);
+}
+
+}  // namespace
+
+TriangleTree::TriangleTree(TriangleMesh mesh) : mesh_(std::move(mesh)) {
+  const auto count = static_cast<int>(mesh_.triangles.cols());
+  order_.resize(static_cast<std::size_t>(count));
+  std::iota(order_.begin(), order_.end(), 0);
+  std::vector<Half> halves(static_cast<std::size_t>(halves_of(count)));
+  std::vector<Eigen::AlignedBox3d> boxes(order_.size());
+  packed_.resize(order_.size());
+  for_each_in_parallel(order_.size(),
+                       [&](std::size_t t) { boxes[t] = box_of(static_cast<int>(t)); });
+  split(halves, 0, 1, 0, count, boxes);
+  bounds_ = halves.front().box;
+  nodes_.reserve(halves.size() / kChildren + 1);
+  join(halves, 0);
+}
+
+int TriangleTree::join(const std::vector<Half>& halves, int half) {
+  const auto at = [&](int number) -> const Half& {
+    return halves[static_cast<std::size_t>(number)];
+  };
+  std::array<int, kChildren> children{half};
+  std::size_t count = 1;
+  for (int round = 2; round <= kChildren; round *= 2) {
+    for (std::size_t i = 0, whole = count; i < whole; ++i) {
+      const Half& child = at(children[i]);
+      if (child.count > 0) continue;
+      children[i] = child.first;
+      children[count++] = child.first + 1;
+    }
+  }
+  const std::size_t own = nodes_.size();
+  nodes_.emplace_back();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    nodes_[own].low[axis].setConstant(kAnywhere);
+    nodes_[own].high[axis].setConstant(-kAnywhere);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Half& child = at(children[i]);
+    const auto lane = static_cast<Eigen::Index>(i);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      nodes_[own].low[axis][lane] = child.box.min()[static_cast<Eigen::Index>(axis)];
+      nodes_[own].high[axis][lane] = child.box.max()[static_cast<Eigen::Index>(axis)];
+    }
+    const int first = child.count > 0 ? child.first : join(halves, children[i]);
+    nodes_[own].first[i] = first;
+    nodes_[own].count[i] = child.count;
+  }
+  return static_cast<int>(own);
+}
+
+TriangleTree::OfChildren TriangleTree::squared_distances(const Node& node, const Vector3d& point) {
+  OfChildren squared = OfChildren::Zero();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double at = point[static_cast<Eigen::Index>(axis)];
+    squared += (node.low[axis] - at).max(at - node.high[axis]).max(0.0).square();
+  }
+  return squared;
+}
+
+void TriangleTree::pack(int first, int count) {
+  for (int at = first; at < first + count; ++at) {
+    const int t = order_[static_cast<std::size_t>(at)];
+    packed_[static_cast<std::size_t>(at)] = {mesh_.corner(t, 0), mesh_.corner(t, 1),
+                                             mesh_.corner(t, 2), mesh_.area_vector(t).normalized()};
+  }
+}
+
+Eigen::AlignedBox3d TriangleTree::box_of(int triangle) const {
+  Eigen::AlignedBox3d box;
+  for (Eigen::Index which = 0; which < 3; ++which) box.extend(mesh_.corner(triangle, which));
+  return box;
+}
+
+void TriangleTree::split(std::vector<Half>& halves, int node, int below, int first, int count,
+                         const std::vector<Eigen::AlignedBox3d>& boxes) {
+  const auto own_box = [&](int t) -> const Eigen::AlignedBox3d& {
+    return boxes[static_cast<std::size_t>(t)];
+  };
+  Eigen::AlignedBox3d box;
+  Eigen::AlignedBox3d centres;
+  const auto begin = order_.begin() + first;
+  for (auto it = begin; it != begin + count; ++it) {
+    const Eigen::AlignedBox3d& own = own_box(*it);
+    box.extend(own);
+    centres.extend(own.center());
+  }
+  Half& filled = halves[static_cast<std::size_t>(node)];
+  filled.box = box;
+  filled.first = first;
+  filled.count = count;
+  if (count <= kLeaf) return pack(first, count);
+  Eigen::Index axis = 0;
+  centres.sizes().maxCoeff(&axis);
+  const int half = count / 2;
+  std::nth_element(begin, begin + half, begin + count, [&](int a, int b) {
+    const double left = own_box(a).center()[axis];
+    const double right = own_box(b).center()[axis];
+    return left != right ? left < right : a < b;
+  });
+  filled.first = below;
+  filled.count = 0;
+  const auto split_half = [&](int which) {
+    which == 0
+        ? split(halves, below, below + 2, first, half, boxes)
+        : split(halves, below + 1, below + 1 + halves_of(half), first + half, count - half, boxes);
+  };
+  if (count > kAlone) return for_each_in_parallel(2, split_half);
+  split_half(0);
+  split_half(1);
+}
+
+TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const {
+  TrianglePoint best;
+  best.squared_distance = within * within;
+  struct Open {
+    double bound;
+    int first, count;
+  };
+  // Halving leaves at most 31 levels below an int of triangles, three of them to a node, each with
+  // all children but one set aside.
+  std::array<Open, 96> open;
+  std::size_t depth = 0;
+  open[depth++] = {0.0, 0, 0};
+  while (depth > 0) {
+    const auto [bound, first, count] = open[--depth];
+    if (bound >= best.squared_distance) continue;
+    if (count == 0) {
+      const Node& node = nodes_[static_cast<std::size_t>(first)];
+      const OfChildren squared = squared_distances(node, point);
+      const std::size_t begin = depth;
+      for (std::size_t i = 0; i < kChildren; ++i) {
+        const double here = squared[static_cast<Eigen::Index>(i)];
+        if (!(here < best.squared_distance)) continue;  // also where there is no child
+        // The nearest last, to be taken first.
+        std::size_t place = depth++;
+        for (; place > begin && open[place - 1].bound < here; --place)
+          open[place] = open[place - 1];
+        open[place] = {here, node.first[i], node.count[i]};
+      }
+      continue;
+    }
+    for (int at = first; at < first + count; ++at) {
+      const auto& [a, b, c, normal] = packed_[static_cast<std::size_t>(at)];
+      const double height = normal.dot(point - a);
+      if (height * height >= best.squared_distance) continue;  // its plane is too far already
+      const Vector3d weights = nearest_weights(a, b, c, point);
+      const Vector3d position = weights[0] * a + weights[1] * b + weights[2] * c;
+      const double squared = (position - point).squaredNorm();
+      if (squared < best.squared_distance) {
+        best = {order_[static_cast<std::size_t>(at)], weights, position, squared};
+      }
+    }
+  }
+  return best.triangle >= 0 ? best : nearest(point);
+}
+
+std::vector<int> TriangleTree::meeting(const Eigen::AlignedBox3d& box) const {
+  std::vector<int> found;
+  std::vector<int> open{0};
+  while (!open.empty()) {
+    const Node& node = nodes_[static_cast<std::size_t>(open.back())];
+    open.pop_back();
+    for (std::size_t i = 0; i < kChildren; ++i) {
+      const auto lane = static_cast<Eigen::Index>(i);
+      bool meets = true;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto along = static_cast<Eigen::Index>(axis);
+        meets = meets && node.low[axis][lane] <= box.max()[along] &&
+                box.min()[along] <= node.high[axis][lane];
+      }
+      if (!meets) continue;
+      if (node.count[i] == 0) open.push_back(node.first[i]);
+      for (int at = node.first[i]; at < node.first[i] + node.count[i]; ++at) {
+        const int triangle = order_[static_cast<std::size_t>(at)];
+        if (box_of(triangle).intersects(box)) found.push_back(triangle);
+      }
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+}  // namespace tpm::organ

@@ -1,0 +1,112 @@
+#include "tpm/organ/scene/network_file.hpp"
+
+#include <fmt/format.h>
+
+#include <numeric>
+
+#include "tpm/files/file.hpp"
+#include "tpm/organ/scene/xdmf.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm::organ {
+namespace fs = std::filesystem;
+namespace {
+
+std::vector<double> rows_of(const Eigen::Matrix3Xd& columns) {
+  return {columns.data(), columns.data() + columns.size()};
+}
+
+void write_spheres(const Tissue& tissue, Hdf5Writer& file) {
+  const Organ& organ = tissue.network.organ;
+  std::vector<std::int32_t> number(organ.size());
+  std::iota(number.begin(), number.end(), 1);
+  std::vector<std::int32_t> index(organ.size());
+  std::iota(index.begin(), index.end(), 0);
+  std::vector<std::int32_t> role(organ.size(), 0);
+  for (const Slider& slider : tissue.sliders) role[slider.sphere] = 1;
+  for (const std::size_t sphere : tissue.anchors) role[sphere] = 2;
+  std::vector<std::int32_t> contact(organ.size(), 0);
+  if (organ.contact) contact[*organ.contact] = 1;
+  std::vector<std::int32_t> layer(organ.layer.begin(), organ.layer.end());
+  for (std::int32_t& k : layer) ++k;
+  file.table("/spheres/position_m", rows_of(organ.position), 3);
+  file.table("/spheres/normal", rows_of(organ.normal), 3);
+  file.integers("/spheres/index", index, 1);
+  file.integers("/spheres/number", number, 1);
+  file.integers("/spheres/layer", layer, 1);
+  file.integers("/spheres/constraint", role, 1);
+  file.integers("/spheres/contact", contact, 1);
+  file.attribute("/spheres/layer", "meaning", "1: outermost");
+  file.attribute("/spheres/constraint", "meaning",
+                 "0: free, 1: slides along its normal, 2: anchored");
+}
+
+void write_bonds(const Network& network, Hdf5Writer& file) {
+  std::vector<std::int32_t> ends;
+  std::vector<std::int32_t> kind;
+  std::vector<double> rest_length;
+  std::vector<double> factor;
+  for (const Bond& bond : network.bonds) {
+    ends.push_back(static_cast<std::int32_t>(bond.a));
+    ends.push_back(static_cast<std::int32_t>(bond.b));
+    kind.push_back(bond.kind == BondKind::radial ? 0 : 1);
+    rest_length.push_back(bond.rest_length_m);
+    factor.push_back(bond.factor);
+  }
+  file.integers("/bonds/ends", ends, 2);
+  file.integers("/bonds/kind", kind, 1);
+  file.numbers("/bonds/rest_length_m", rest_length);
+  file.numbers("/bonds/factor", factor);
+  file.attribute("/bonds/ends", "meaning", "spheres by /spheres/index, from 0");
+  file.attribute("/bonds/kind", "meaning", "0: radial, 1: lateral");
+  file.attribute("/bonds/factor", "meaning", "times E A0/l0");
+}
+
+std::string xdmf(const Network& network, const std::string& file) {
+  using Number = XdmfSource::Number;
+  using Centre = XdmfSource::Centre;
+  const XdmfSource source(file);
+  const std::size_t n = network.organ.size();
+  const std::size_t m = network.bonds.size();
+  const std::string position = "/spheres/position_m";
+  std::string text =
+      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
+      "    <Grid Name=\"spheres\" GridType=\"Uniform\">\n";
+  text += source.points(position, n);
+  for (const std::string name : {"number", "layer", "constraint", "contact"}) {
+    text += source.scalar(name, "/spheres/" + name, Centre::node, n, Number::whole);
+  }
+  text += source.vector("normal", "/spheres/normal", n);
+  text += "    </Grid>\n    <Grid Name=\"bonds\" GridType=\"Uniform\">\n";
+  text += source.lines(position, n, m);
+  text += source.scalar("kind", "/bonds/kind", Centre::cell, m, Number::whole);
+  for (const std::string name : {"rest_length_m", "factor"}) {
+    text += source.scalar(name, "/bonds/" + name, Centre::cell, m, Number::real);
+  }
+  return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
+}
+
+}  // namespace
+
+void write_network_datasets(const Tissue& tissue, Hdf5Writer& file) {
+  const Organ& organ = tissue.network.organ;
+  write_spheres(tissue, file);
+  write_bonds(tissue.network, file);
+  file.attribute("/", "title", tissue.title);
+  file.attribute("/", "written_by", fmt::format("tpm {}", version()));
+  file.attribute("/", "assumptions", fmt::format("{}", fmt::join(organ.assumptions, "; ")));
+  file.numbers("/spacing_m", {organ.spacing});
+  file.numbers("/radius_m", {organ.radius});
+}
+
+fs::path write_network(const Tissue& tissue, const fs::path& path) {
+  Hdf5Writer file(path);
+  write_network_datasets(tissue, file);
+  file.commit();
+  fs::path description = path;
+  description.replace_extension(".xdmf");
+  write_file(description, xdmf(tissue.network, path.filename().string()));
+  return description;
+}
+
+}  // namespace tpm::organ

@@ -1,0 +1,330 @@
+#include "tpm/plan/show/plan_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "tpm/base/text.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm::report {
+namespace {
+
+constexpr int kPlanDigits = 6;
+
+Json number(const std::optional<double>& value) {
+  return value ? Json(rounded(*value, kPlanDigits)) : Json(nullptr);
+}
+
+std::string share_text(double share) {
+  return significant(100.0 * share, 3) + " %";
+}
+
+std::string time_text(double seconds) {
+  if (seconds < 1e-6) return significant(1e9 * seconds, 3) + " ns";
+  if (seconds < 1e-3) return significant(1e6 * seconds, 3) + " us";
+  if (seconds < 1.0) return significant(1e3 * seconds, 3) + " ms";
+  return significant(seconds, 3) + " s";
+}
+
+Json candidate_json(const PlannedCandidate& c) {
+  return {{"name", c.name},
+          {"formulation", c.formulation},
+          {"settings", c.settings},
+          {"reach", c.reach == ModelReach::full ? "full" : "reduced"},
+          {"cost_s_per_s", number(c.cost_s_per_s)},
+          {"period_s", number(c.period_s)},
+          {"claimed_error", number(c.claimed_error)},
+          {"verified_error", number(c.verified_error)},
+          {"verified_response_error", number(c.verified_response_error)},
+          {"accurate", c.accurate},
+          {"feasible", c.feasible},
+          {"reason", c.reason.empty() ? Json(nullptr) : Json(c.reason)}};
+}
+
+Json relevance_json(const Plan& plan) {
+  return array_json(plan.relevance, [](const PlanRelevance& r) {
+    return Json{{"part", r.part},
+                {"error", number(r.error)},
+                {"estimated", r.estimated},
+                {"matters", r.matters},
+                {"note", r.note}};
+  });
+}
+
+std::string change_text(const PlanChange& c) {
+  constexpr double kApart = 1.1;  // above, the search ended before the two factors met
+  if (!c.factor && c.survived < kMostChange) {
+    return fmt::format(
+        "  {}: {}, and the plan may not take longer (--thorough)\n", c.change,
+        c.survived > 1.0 ? fmt::format("nothing breaks up to {} times", significant(c.survived, 3))
+                         : std::string("not tried"));
+  }
+  if (!c.factor) {
+    return fmt::format("  {} times {}: nothing breaks\n", shortest(kMostChange), c.change);
+  }
+  const std::string factor = significant(*c.factor, 3);
+  if (*c.factor / c.survived <= kApart) {
+    return fmt::format("  {} times {}: {}\n", factor, c.change, c.breaks);
+  }
+  return fmt::format("  {} to {} times {}: {}\n", significant(c.survived, 3), factor, c.change,
+                     c.breaks);
+}
+
+Json changes_json(const Plan& plan) {
+  return array_json(plan.changes, [](const PlanChange& c) {
+    return Json{{"change", c.change},
+                {"factor", number(c.factor)},
+                {"survived", rounded(c.survived, kPlanDigits)},
+                {"breaks", c.factor ? Json(c.breaks) : Json(nullptr)}};
+  });
+}
+
+std::string budget_text(const PlanBudget& budget) {
+  std::string text;
+  if (budget.rate_Hz) text += fmt::format("a servo of {} Hz", shortest(*budget.rate_Hz));
+  if (budget.wall_s_per_s) {
+    text += fmt::format("{}{} s per s", text.empty() ? "" : ", ", shortest(*budget.wall_s_per_s));
+  }
+  return text.empty() ? "no budget" : text;
+}
+
+std::string relevance_text(const PlanRelevance& r) {
+  const std::string note = r.note.empty() ? "" : fmt::format(" ({})", r.note);
+  if (!r.error) return fmt::format("  {}: {}\n", r.part, r.note);
+  return fmt::format("  {}: {}, {} of the peak{}\n", r.part,
+                     r.matters ? "matters" : "does not matter", share_text(*r.error), note);
+}
+
+/// How the number of masses_left_out was found.
+std::string masses_note(const Plan& plan) {
+  std::string note = "by the linear network";
+  for (const PlanRelevance& r : plan.relevance) {
+    if (r.part == "inertia") note = r.note;
+  }
+  return note.empty() ? note : fmt::format(" ({})", note);
+}
+
+/// What asks for no servo and no budget of time can run the network itself: the cheapest candidate
+/// with the whole network that meets the tolerance, and how long it takes, s.
+std::optional<std::pair<std::string, double>> run_offline(const Plan& plan) {
+  if (plan.request.budget.rate_Hz || plan.request.budget.wall_s_per_s) return std::nullopt;
+  const auto runs = [](const PlannedCandidate& c) {
+    return c.accurate && c.reach == ModelReach::full && c.cost_s_per_s;
+  };
+  const auto found = std::find_if(plan.candidates.begin(), plan.candidates.end(), runs);
+  if (found == plan.candidates.end()) return std::nullopt;
+  return std::pair{found->name, *found->cost_s_per_s * plan.duration_s};
+}
+
+std::string pick_text(const Plan& plan) {
+  const PlannedCandidate& c = plan.chosen();
+  std::string text = fmt::format(
+      "pick: {} ({}{}{})\n  claimed error at most {}, verified {}; margin {} times\n  costs {} "
+      "per "
+      "simulated second{}\n",
+      c.name, c.formulation, c.settings.empty() ? "" : ", ", c.settings,
+      share_text(*c.claimed_error), share_text(*c.verified_error),
+      significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
+      time_text(*c.cost_s_per_s),
+      c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
+  const std::string offline = offline_text(plan);
+  if (!offline.empty()) text += "  " + offline;
+  if (c.verified_response_error) {
+    text += fmt::format("  nothing is claimed of the {}: verified error {}\n",
+                        plan.by_depth ? "contact force" : "indentation depth",
+                        share_text(*c.verified_response_error));
+  }
+  return text;
+}
+
+std::string choice_text(const Plan& plan) {
+  std::string text = plan.choice ? pick_text(plan) : "no model meets tolerance and budget\n";
+  if (!plan.choice && plan.without_budget) {
+    const PlannedCandidate& c = plan.candidates[*plan.without_budget];
+    text += fmt::format("  without the budget: {}, {} per simulated second, verified error {}\n",
+                        c.name, time_text(*c.cost_s_per_s), share_text(*c.verified_error));
+  }
+  if (plan.needs_full) {
+    text += "  the scene needs the full nonlinear model: no reduced one meets the tolerance\n";
+  }
+  return text;
+}
+
+std::string frontier_text(const Plan& plan) {
+  std::string text = fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}\n", "candidate", "per s",
+                                 "a period", "claimed", "verified");
+  for (const PlannedCandidate& c : plan.candidates) {
+    const auto or_dash = [](const std::optional<double>& value, auto&& words) {
+      return value ? words(*value) : std::string("-");
+    };
+    text += fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}  {}\n", c.name,
+                        or_dash(c.cost_s_per_s, time_text), or_dash(c.period_s, time_text),
+                        or_dash(c.claimed_error, share_text), or_dash(c.verified_error, share_text),
+                        c.feasible ? "meets both" : c.reason);
+  }
+  return text;
+}
+
+}  // namespace
+
+Json spheres_json(const SpheresPlan& plan) {
+  Json tried = array_json(plan.tried, [](const TriedSpheres& t) {
+    return Json{{"spheres", t.filling.spheres},
+                {"spacing_m", rounded(t.spacing_m, kPlanDigits)},
+                {"area_ratio", number(t.area_ratio)},
+                {"peak", number(t.peak)},
+                {"claimed_error", number(t.claimed_error)},
+                {"run_s", rounded(t.operations_s, kPlanDigits)},
+                {"reason", t.reason.empty() ? Json(nullptr) : Json(t.reason)}};
+  });
+  return {{"tolerance", plan.request.tolerance},
+          {"most", plan.request.most},
+          {"spheres", plan.choice ? Json(plan.chosen().filling.spheres) : Json(nullptr)},
+          {"claimed_error", plan.choice ? number(plan.chosen().claimed_error) : Json(nullptr)},
+          {"limit_peak", rounded(plan.limit_peak, kPlanDigits)},
+          {"limit_uncertainty", rounded(plan.limit_uncertainty, kPlanDigits)},
+          {"tried", std::move(tried)}};
+}
+
+std::string spheres_text(const SpheresPlan& plan) {
+  std::string text =
+      plan.choice
+          ? fmt::format(
+                "spheres: {}, at most {} of the peak from the limit of many small ones "
+                "({} allowed)\n",
+                plan.chosen().filling.spheres, share_text(*plan.chosen().claimed_error),
+                share_text(plan.request.tolerance))
+          : fmt::format(
+                "spheres: no number up to {} is within {} of the limit of many small ones\n",
+                plan.request.most, share_text(plan.request.tolerance));
+  text += fmt::format("\n{:>9} {:>11} {:>10} {:>12} {:>10} {:>10}\n", "spheres", "spacing, mm",
+                      "area", "peak", "claimed", "a run");
+  for (const TriedSpheres& t : plan.tried) {
+    text += fmt::format("{:>9} {:>11} {:>10} {:>12} {:>10} {:>10}  {}\n", t.filling.spheres,
+                        significant(1e3 * t.spacing_m, 3),
+                        t.area_ratio ? significant(*t.area_ratio, 3) : std::string("-"),
+                        t.peak ? significant(*t.peak, 5) : std::string("-"),
+                        t.claimed_error ? share_text(*t.claimed_error) : std::string("-"),
+                        t.peak ? time_text(t.operations_s) : std::string("-"), t.reason);
+  }
+  return text + fmt::format("{:>9} {:>11} {:>10} {:>12} {:>10}  a line in the spacing, 95 %\n\n",
+                            "limit", 0, plan.tried.front().area_ratio ? "1" : "-",
+                            significant(plan.limit_peak, 5), share_text(plan.limit_uncertainty));
+}
+
+std::string offline_text(const Plan& plan) {
+  constexpr double kNoPlanNeeded_s = 1.0;
+  const auto offline = run_offline(plan);
+  if (!offline || offline->second > kNoPlanNeeded_s) return {};
+  return fmt::format("one offline run needs no plan: the network itself ({}) takes {}\n",
+                     offline->first, time_text(offline->second));
+}
+
+Json expected_plan_json(const ExpectedPlanWork& work) {
+  return {{"first_run_s", rounded(work.first_run_s, kPlanDigits)},
+          {"reference_s", rounded(work.reference_s, 2)},
+          {"all_s", work.all_s ? Json(rounded(*work.all_s, 2)) : Json(nullptr)}};
+}
+
+std::string expected_plan_text(const ExpectedPlanWork& work) {
+  if (!work.all_s)
+    return "masses count, or all is tried: no bound is known of how long planning takes\n";
+  return fmt::format("planning takes up to some {} on a usual machine\n",
+                     time_text(rounded(*work.all_s, 1)));
+}
+
+Json claim_json(const Plan& plan) {
+  const PlanClaim claim = claim_of(plan);
+  return {{"quantity", claim.quantity}, {"norm", claim.norm}, {"protocol", claim.protocol}};
+}
+
+Json plan_json(const Plan& plan) {
+  const PlanRequest& request = plan.request;
+  Json json{{"title", plan.title},
+            {"version", version()},
+            {"spheres", plan.spheres},
+            {"bonds", plan.bonds},
+            {"duration_s", rounded(plan.duration_s, kPlanDigits)},
+            {"tolerance", request.tolerance},
+            {"tolerance_source",
+             request.tolerance_source.empty() ? Json(nullptr) : Json(request.tolerance_source)},
+            {"output", request.measure.output == PlanOutput::field ? "field" : "force"},
+            {"rate_Hz", number(request.budget.rate_Hz)},
+            {"wall_s_per_s", number(request.budget.wall_s_per_s)},
+            {"costs", request.costs.source},
+            {"response", plan.by_depth ? "force_N" : "depth_m"}};
+  json["claim"] = claim_json(plan);
+  json["choice"] = plan.choice ? candidate_json(plan.chosen()) : Json(nullptr);
+  json["margin"] =
+      plan.choice ? Json(rounded(request.tolerance / std::max(*plan.chosen().verified_error, 1e-12),
+                                 kPlanDigits))
+                  : Json(nullptr);
+  const auto offline = run_offline(plan);
+  json["network_offline_s"] = offline ? Json(rounded(offline->second, kPlanDigits)) : Json(nullptr);
+  json["without_budget"] =
+      plan.without_budget ? candidate_json(plan.candidates[*plan.without_budget]) : Json(nullptr);
+  json["needs_full_model"] = plan.needs_full;
+  json["masses_matter"] = plan.inertial;
+  json["masses_left_out"] = number(plan.masses_left_out);
+  json["reference"] = {{"method", plan.reference.method},
+                       {"cross_check", plan.reference.cross_check},
+                       {"difference", rounded(plan.reference.difference, 2)},
+                       {"peak", rounded(plan.reference.peak, kPlanDigits)}};
+  json["work"] = {{"first_run_s", rounded(plan.work.first_run_s, kPlanDigits)},
+                  {"reference_s", rounded(plan.work.reference_s, kPlanDigits)},
+                  {"all_s", rounded(plan.work.all_s, kPlanDigits)}};
+  json["frontier"] = array_json(plan.candidates, candidate_json);
+  json["relevance"] = relevance_json(plan);
+  json["changes"] = changes_json(plan);
+  json["validity_passed"] = plan.validity;
+  return json;
+}
+
+std::string plan_text(const Plan& plan) {
+  const PlanRequest& request = plan.request;
+  std::string text = fmt::format("{}: {} spheres, {} bonds, {} s\n", plan.title, plan.spheres,
+                                 plan.bonds, significant(plan.duration_s, 4));
+  text +=
+      fmt::format("{} within {} of the peak{}, {}; operations cost what {} says\n",
+                  claim_of(plan).quantity, share_text(request.tolerance),
+                  request.tolerance_source.empty() ? std::string()
+                                                   : fmt::format(" ({})", request.tolerance_source),
+                  budget_text(request.budget),
+                  request.costs.source == "nominal"
+                      ? "a usual machine has (nominal; tpm plan --calibrate measures this one)"
+                      : request.costs.source);
+  text += choice_text(plan);
+  text += "\n" + frontier_text(plan);
+  text +=
+      fmt::format("\nreference: {}; peak {} {}; differs from its cross-check ({}) by {}\n",
+                  plan.reference.method,
+                  significant(plan.by_depth ? plan.reference.peak : 1e3 * plan.reference.peak, 6),
+                  plan.by_depth ? "N" : "mm", plan.reference.cross_check,
+                  share_text(plan.reference.difference));
+  text += fmt::format(
+      "planning took what a usual machine does in {}; reference and cross-check {} of it\n",
+      time_text(plan.work.all_s), time_text(plan.work.reference_s));
+  if (!plan.relevance.empty()) text += "what leaving a part out changes:\n";
+  for (const PlanRelevance& r : plan.relevance) {
+    // Of masses that scene and reference leave out there is one sentence, below.
+    if (r.part != "inertia" || plan.inertial || !r.matters) text += relevance_text(r);
+  }
+  if (!plan.changes.empty()) text += "what would break first:\n";
+  for (const PlanChange& c : plan.changes) {
+    text += change_text(c);
+  }
+  if (plan.masses_left_out) {
+    text += fmt::format(
+        "WARNING: inertia matters, and scene and reference leave it out: masses would change the "
+        "answer by {} of the peak{}\n",
+        share_text(*plan.masses_left_out), masses_note(plan));
+  }
+  for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
+  return text;
+}
+
+}  // namespace tpm::report

@@ -1,0 +1,41 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/plan/plan.hpp"
+#include "tpm/plan/spheres_plan.hpp"
+
+namespace tpm::report {
+
+/// What planning will take (`tpm plan --estimate`).
+[[nodiscard]] Json expected_plan_json(const ExpectedPlanWork& work);
+[[nodiscard]] std::string expected_plan_text(const ExpectedPlanWork& work);
+/// A plan, as docs/plan_results.md describes the keys.
+[[nodiscard]] Json plan_json(const Plan& plan);
+[[nodiscard]] std::string plan_text(const Plan& plan);
+
+/// The choice of the number of spheres: the key `spheres_choice` of a plan.
+[[nodiscard]] Json spheres_json(const SpheresPlan& plan);
+[[nodiscard]] std::string spheres_text(const SpheresPlan& plan);
+
+/// That the network itself takes less than a second, where no loop and no budget asks for less;
+/// else empty.
+[[nodiscard]] std::string offline_text(const Plan& plan);
+
+/// What the errors of a plan are about.
+[[nodiscard]] Json claim_json(const Plan& plan);
+
+/// What the planned model answered, and the same in words.
+[[nodiscard]] Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
+                                    const std::vector<double>& times_s, const Trajectory& answer);
+[[nodiscard]] std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,
+                                           const Trajectory& answer);
+
+/// HDF5 with the answer and, as attributes of /, the scene, the model and its errors.
+void write_planned_run(const Plan& plan, const ExperimentScene& scene,
+                       const std::vector<double>& times_s, const Trajectory& answer,
+                       const std::filesystem::path& file);
+
+}  // namespace tpm::report

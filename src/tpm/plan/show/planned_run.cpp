@@ -1,0 +1,98 @@
+// Declared in tpm/plan/show/plan_report.hpp.
+// What a planned model answered.
+#include <fmt/format.h>
+
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/plan/show/plan_report.hpp"
+#include "tpm/plan/show/trajectory_report.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm::report {
+namespace {
+
+std::string model_words(const PlannedCandidate& c) {
+  return fmt::format("{} ({}{}{})", c.name, c.formulation, c.settings.empty() ? "" : ", ",
+                     c.settings);
+}
+
+/// What is known of the response where the claim is about displacements; else empty.
+std::string response_words(const Plan& plan) {
+  const auto& error = plan.chosen().verified_response_error;
+  if (!error) return {};
+  return fmt::format("{}: nothing claimed, verified error {} %\n",
+                     plan.by_depth ? "contact force" : "indentation depth",
+                     significant(100.0 * *error, 3));
+}
+
+/// Under /claim: what is claimed of which quantity, in numbers and words.
+void write_claim(const Plan& plan, Hdf5Writer& file) {
+  const PlannedCandidate& c = plan.chosen();
+  const PlanClaim claim = claim_of(plan);
+  file.group("/claim");
+  file.attribute("/claim", "quantity", claim.quantity);
+  file.attribute("/claim", "norm", claim.norm);
+  file.attribute("/claim", "protocol", claim.protocol);
+  file.numbers("/claim/claimed_error", {rounded(*c.claimed_error, 6)});
+  file.numbers("/claim/verified_error", {rounded(*c.verified_error, 6)});
+  if (c.verified_response_error) {
+    file.numbers("/claim/verified_response_error", {rounded(*c.verified_response_error, 6)});
+  }
+  file.numbers("/claim/tolerance", {plan.request.tolerance});
+}
+
+}  // namespace
+
+Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
+                      const std::vector<double>& times_s, const Trajectory& answer) {
+  const PlannedCandidate& c = plan.chosen();
+  Json json{
+      {"title", plan.title},
+      {"version", version()},
+      {"scene_sha256", sha256_hex(scene.text)},
+      {"model", c.name},
+      {"formulation", c.formulation},
+      {"settings", c.settings},
+      {"claim", claim_json(plan)},
+      {"claimed_error", rounded(c.claimed_error.value(), 6)},
+      {"verified_error", rounded(c.verified_error.value(), 6)},
+      {"verified_response_error",
+       c.verified_response_error ? Json(rounded(*c.verified_response_error, 6)) : Json(nullptr)},
+      {"tolerance", plan.request.tolerance}};
+  add_trajectory(json, scene, times_s, answer);
+  json["validity_passed"] = plan.validity;
+  return json;
+}
+
+std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,
+                             const Trajectory& answer) {
+  const PlannedCandidate& c = plan.chosen();
+  std::string text = fmt::format(
+      "{}: planned model {}\n{}: claimed error at most {} %, verified {} % ({})\n{}{}", plan.title,
+      model_words(c), claim_of(plan).quantity, significant(100.0 * *c.claimed_error, 3),
+      significant(100.0 * *c.verified_error, 3), claim_of(plan).norm, response_words(plan),
+      trajectory_text(plan.by_depth, times_s, answer));
+  text += offline_text(plan);
+  for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
+  return text;
+}
+
+void write_planned_run(const Plan& plan, const ExperimentScene& scene,
+                       const std::vector<double>& times_s, const Trajectory& answer,
+                       const std::filesystem::path& path) {
+  const PlannedCandidate& c = plan.chosen();
+  Hdf5Writer file(path);
+  file.attribute("/", "title", plan.title);
+  file.attribute("/", "scene", scene.text);
+  file.attribute("/", "scene_sha256", sha256_hex(scene.text));
+  file.attribute("/", "written_by", fmt::format("tpm {}", version()));
+  file.attribute("/", "formulation", c.formulation);
+  file.attribute("/", "model", model_words(c));
+  file.attribute("/", "provenance", "model");
+  write_claim(plan, file);
+  write_trajectory(scene, times_s, answer, file);
+  file.commit();
+}
+
+}  // namespace tpm::report

@@ -1,0 +1,379 @@
+#include "tpm/plan/show/simulation_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/organ/run/smoothness.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm::report {
+namespace {
+
+constexpr std::size_t kMostNamed = 12;
+
+double nine_digits(double value) {
+  return rounded(value, 9);
+}
+
+bool by_depth(const ExperimentScene& scene) {
+  return scene.protocol.drive() == Drive::displacement;
+}
+
+/// The first point of the largest response; what differs by less than the tolerance is the same.
+const CurvePoint& largest(const SimulationRecord& record, double tolerance) {
+  double most = 0.0;
+  for (const CurvePoint& p : record.curve) most = std::max(most, std::abs(p.response));
+  return *std::find_if(record.curve.begin(), record.curve.end(), [&](const CurvePoint& p) {
+    return std::abs(p.response) >= (1.0 - tolerance) * most;
+  });
+}
+
+/// The blow that the tissue feels most; none if there is none.
+const ProbeBlow* largest_blow(const std::vector<ProbeBlow>& blows) {
+  const auto most = std::ranges::max_element(
+      blows, {}, [](const ProbeBlow& a) { return std::abs(a.impulse_on_tissue_N_s); });
+  return most == blows.end() ? nullptr : &*most;
+}
+
+/// The point of the largest force on the tissue.
+const CurvePoint& hardest(const SimulationRecord& record) {
+  return *std::ranges::max_element(record.curve, {}, &CurvePoint::force_on_tissue_N);
+}
+
+Json validity_json(const Validity& validity, bool depth_limits) {
+  Json json{{"kept", validity.whole()},
+            {"depth_limits_apply", depth_limits},
+            {"deepest_m", nine_digits(validity.deepest_m)},
+            {"most_turned_rad", nine_digits(validity.most_turned_rad)}};
+  json["limits"] = Json::array();
+  for (std::size_t k = 0; k < kValidityLimits; ++k) {
+    const auto limit = static_cast<ValidityLimit>(k);
+    const ValidityBreach& breach = validity.of(limit);
+    Json entry{{"limit", key_of(limit)}, {"passed", breach.first_time_s.has_value()}};
+    entry["first_time_s"] =
+        breach.first_time_s ? Json(nine_digits(*breach.first_time_s)) : Json(nullptr);
+    entry["spheres"] = array_json(breach.spheres, [](std::size_t sphere) { return sphere + 1; });
+    json["limits"].push_back(entry);
+  }
+  return json;
+}
+
+Json energy_json(const SimulationRun& run) {
+  if (run.record.inertial_energy) {
+    const InertialEnergy& e = *run.record.inertial_energy;
+    return {{"work_J", nine_digits(e.work)},
+            {"stored_J", nine_digits(e.stored)},
+            {"dissipated_J", nine_digits(e.bond_heat + e.damping_heat + e.contact_heat)},
+            {"contact_heat_J", nine_digits(e.contact_heat)},
+            {"kinetic_J", nine_digits(e.kinetic)}};
+  }
+  const QuasiStaticEnergy& e = run.record.curve.back().energy;
+  return {{"work_J", nine_digits(e.work_J)},
+          {"stored_J", nine_digits(e.stored_J)},
+          {"dissipated_J", nine_digits(e.dissipated_J)}};
+}
+
+/// What spheres with mass have besides: blows, forces that a load does not name, and what the
+/// stiffness of contacts changes.
+Json motion_json(const ExperimentScene& scene, const SimulationRun& run) {
+  const std::vector<ProbeBlow>& blows = run.record.blows;
+  Json json{{"blows", {{"count", blows.size()}}}};
+  if (const ProbeBlow* most = largest_blow(blows)) {
+    json["blows"]["largest"] = {{"time_s", nine_digits(most->time_s)},
+                                {"impulse_on_tissue_N_s", nine_digits(most->impulse_on_tissue_N_s)},
+                                {"impulse_of_probe_N_s", nine_digits(most->impulse_N_s)}};
+  }
+  if (!by_depth(scene)) {
+    const CurvePoint& most = hardest(run.record);
+    json["largest_force_on_tissue"] = {{"time_s", nine_digits(most.time_s)},
+                                       {"force_N", nine_digits(most.force_on_tissue_N)}};
+  }
+  json["contact_check"] = nullptr;
+  if (run.contact_check) {
+    const ContactCheck& check = *run.contact_check;
+    json["contact_check"] = {{"times_softer", ContactCheck::kSofter},
+                             {"largest_response", nine_digits(check.largest)},
+                             {"largest_response_softer", nine_digits(check.largest_softer)},
+                             {"response_at_end", nine_digits(check.end)},
+                             {"response_at_end_softer", nine_digits(check.end_softer)},
+                             {"difference", rounded(check.difference, 3)},
+                             {"difference_at_one_time", rounded(check.at_one_time, 3)},
+                             {"depends_on_stiffness", check.depends_on_stiffness()}};
+  }
+  return json;
+}
+
+/// What the contacts are, and the state of the tools among them at the last output.
+Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
+                   const SimulationRun& run) {
+  const QuasiStaticState& last = run.record.outputs.back();
+  const auto states =
+      tool_states(network.driven, last.position, run.record.contact_pushes_N.back());
+  std::size_t tool = 0;
+  Json list = Json::array();
+  for (const SceneContact& contact : scene.contacts) {
+    const Eigen::Vector3d& d = contact.probe.direction;
+    Json json{{"kind", word_of(contact.kind)},
+              {"sphere", contact.probe.sphere + 1},
+              {"direction", {rounded(d.x(), 9), rounded(d.y(), 9), rounded(d.z(), 9)}},
+              {"share", contact.probe.share}};
+    if (contact.kind != ContactKind::sphere) json["radius_m"] = contact.radius_m;
+    if (contact.kind == ContactKind::patch) {
+      json["spheres"] = spheres_of(contact, scene.tissue.network.organ).size();
+    }
+    if (contact.is_tool()) {
+      const ToolState& state = states[tool];
+      json["contact_stiffness_N_per_m"] = nine_digits(network.driven.tools[tool].stiffness_N_per_m);
+      json["last"] = {{"position_m", array_json(state.position, nine_digits)},
+                      {"force_on_tissue_N", array_json(state.force, nine_digits)},
+                      {"touching", state.touching},
+                      {"overlap_m", rounded(state.overlap_m, 3)}};
+      ++tool;
+    }
+    list.push_back(json);
+  }
+  return list;
+}
+
+/// A driven sphere is no tool: nothing holds it across the push unless the scene does.
+std::string sideways_words(const ExperimentScene& scene, const Probe& probe) {
+  const std::vector<Slider>& sliders = scene.tissue.sliders;
+  const bool guided = std::ranges::find(sliders, probe.sphere, &Slider::sphere) != sliders.end();
+  return fmt::format("sphere {} is driven along its push and {} across it\n", probe.sphere + 1,
+                     guided ? "guided" : "free");
+}
+
+std::string contacts_text(const ExperimentScene& scene, const RunNetwork& network,
+                          const SimulationRun& run) {
+  const QuasiStaticState& last = run.record.outputs.back();
+  const auto states =
+      tool_states(network.driven, last.position, run.record.contact_pushes_N.back());
+  std::size_t tool = 0;
+  std::string text;
+  for (const SceneContact& contact : scene.contacts) {
+    if (contact.kind == ContactKind::sphere && scene.contacts.size() == 1) {
+      text += sideways_words(scene, contact.probe);
+      continue;
+    }
+    text += fmt::format("{}", word_of(contact.kind));
+    if (contact.kind != ContactKind::sphere) {
+      text += fmt::format(" of {} mm radius", significant(1e3 * contact.radius_m, 4));
+    }
+    text += fmt::format(" at sphere {}", contact.probe.sphere + 1);
+    if (contact.probe.share != 1.0) {
+      text += contact.probe.share == 0.0 ? std::string(", standing still")
+                                         : fmt::format(", share {}", shortest(contact.probe.share));
+    }
+    if (contact.kind == ContactKind::patch) {
+      text += fmt::format(": {} spheres", spheres_of(contact, scene.tissue.network.organ).size());
+    }
+    if (contact.is_tool()) {
+      const ToolState& state = states[tool++];
+      text += fmt::format(": at the end it touches {} sphere{} with {} N", state.touching,
+                          state.touching == 1 ? "" : "s", significant(state.force.norm(), 6));
+    }
+    text += "\n";
+  }
+  double overlap = 0.0;
+  for (const CurvePoint& p : run.record.curve) overlap = std::max(overlap, p.overlap_m);
+  if (tool > 0) {
+    text += fmt::format("tools come into spheres by at most {} um: contacts are stiff, not rigid\n",
+                        significant(1e6 * overlap, 3));
+  }
+  return text;
+}
+
+Json smoothness_json(const std::optional<Smoothness>& smoothness) {
+  if (!smoothness) return nullptr;
+  Json json{{"near_contact", nine_digits(smoothness->near_contact)},
+            {"near_spheres", smoothness->near_spheres},
+            {"rim_spheres", smoothness->rim_spheres}};
+  json["at_rim"] = smoothness->at_rim ? Json(nine_digits(*smoothness->at_rim)) : Json(nullptr);
+  return json;
+}
+
+std::string smoothness_text(const std::optional<Smoothness>& smoothness) {
+  if (!smoothness) return "";
+  return fmt::format("roughness at the end: {} near the contact ({} spheres){}\n",
+                     significant(smoothness->near_contact, 4), smoothness->near_spheres,
+                     smoothness->at_rim
+                         ? fmt::format(", {} at the rim ({} spheres)",
+                                       significant(*smoothness->at_rim, 4), smoothness->rim_spheres)
+                         : std::string());
+}
+
+/// "71, 72 and 3 others"
+std::string named(const std::vector<std::size_t>& spheres) {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(spheres.size(), kMostNamed); ++i) {
+    text += fmt::format("{}{}", i == 0 ? "" : ", ", spheres[i] + 1);
+  }
+  if (spheres.size() > kMostNamed)
+    text += fmt::format(" and {} others", spheres.size() - kMostNamed);
+  return text;
+}
+
+std::string validity_text(const Validity& validity, bool depth_limits) {
+  std::string text =
+      fmt::format("deepest indentation of a sphere {} mm, most turned lateral bond {} degrees\n",
+                  significant(1e3 * validity.deepest_m, 4),
+                  significant(validity.most_turned_rad * 180.0 / std::numbers::pi, 4));
+  for (std::size_t k = 0; k < kValidityLimits; ++k) {
+    const auto limit = static_cast<ValidityLimit>(k);
+    const ValidityBreach& breach = validity.of(limit);
+    if (!breach.first_time_s) continue;
+    text += fmt::format("WARNING: {}: from {} s on; sphere{} {}\n", words_of(limit),
+                        significant(*breach.first_time_s, 4), breach.spheres.size() == 1 ? "" : "s",
+                        named(breach.spheres));
+  }
+  if (validity.whole()) text += "no limit of validity is passed\n";
+  if (!depth_limits) {
+    text +=
+        "the limits of 10 and 12 mm are those of the paper's liver: not applied to this organ\n";
+  }
+  return text;
+}
+
+std::string motion_text(const ExperimentScene& scene, const SimulationRun& run) {
+  std::string text;
+  if (!by_depth(scene)) {
+    const CurvePoint& most = hardest(run.record);
+    text += fmt::format("largest force on the tissue: {} N, at {} s\n",
+                        significant(most.force_on_tissue_N, 6), significant(most.time_s, 4));
+  }
+  const std::vector<ProbeBlow>& blows = run.record.blows;
+  if (const ProbeBlow* most = largest_blow(blows)) {
+    text += fmt::format(
+        "{} blow{} (a speed that changes in an instant; not in the forces), the largest {} N s on "
+        "the tissue, at {} s\n",
+        blows.size(), blows.size() == 1 ? "" : "s", significant(most->impulse_on_tissue_N_s, 3),
+        significant(most->time_s, 4));
+  }
+  if (!run.contact_check) return text;
+  const ContactCheck& check = *run.contact_check;
+  const double unit = by_depth(scene) ? 1.0 : 1e3;
+  const auto pair = [&](double here, double softer) {
+    return fmt::format("{} {} instead of {}", significant(unit * softer, 6),
+                       by_depth(scene) ? "N" : "mm", significant(unit * here, 6));
+  };
+  text += fmt::format("with contacts {} times softer the largest {} is {}, that at the end {}",
+                      shortest(ContactCheck::kSofter), by_depth(scene) ? "force" : "depth",
+                      pair(check.largest, check.largest_softer), pair(check.end, check.end_softer));
+  text += fmt::format("; the curves differ by {} % of the largest at one time\n",
+                      significant(100.0 * check.at_one_time, 3));
+  if (check.depends_on_stiffness()) {
+    text += fmt::format(
+        "WARNING: numbers of this run depend on the stiffness of its contacts, by {} % of the "
+        "largest; stiffen them\n",
+        significant(100.0 * check.difference, 3));
+  }
+  return text;
+}
+
+std::string equations_text(const ExperimentScene& scene, const SimulationRun& run) {
+  const FormulationChoice& f = scene.formulation;
+  const char* network = f.mass_spring ? "mass-spring model" : "tissue";
+  if (!f.masses) {
+    return fmt::format(
+        "{}, {}, tolerance {}\n", network,
+        !f.entry().can().course ? "static: equilibrium at each time" : "quasi-static",
+        shortest(f.tolerance));
+  }
+  return fmt::format(
+      "{} with mass, damping ratio {} of the tissue's lowest mode ({} Hz), tolerance {}\n", network,
+      shortest(f.damping_ratio), significant(run.lowest_frequency_Hz, 4), shortest(f.tolerance));
+}
+
+/// How linear systems were solved.
+Json solver_json(const SolverChoice& solver) {
+  Json json{{"kind", solver.direct ? "direct" : "iterative"}};
+  if (solver.operations > 0.0) {
+    json["factor_operations"] = nine_digits(solver.operations);
+    json["factor_bytes"] = solver.bytes;
+  }
+  return json;
+}
+
+/// Of a run that iterates.
+std::string solver_text(const SolverChoice& solver) {
+  std::string text = "linear systems are solved by conjugate gradients with multigrid";
+  if (solver.operations > 0.0) {
+    text +=
+        fmt::format(": a factorisation would take {} operations and {} GiB",
+                    significant(solver.operations, 3), significant(solver.bytes / 1073741824.0, 3));
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
+                     const SimulationRun& run) {
+  const FormulationChoice& f = scene.formulation;
+  const SimulationRecord& record = run.record;
+  const bool depth = by_depth(scene);
+  Json json{{"title", scene.tissue.title},
+            {"version", version()},
+            {"scene_sha256", sha256_hex(scene.text)},
+            {"network", f.mass_spring ? "mass_spring" : "tissue"},
+            {"formulation", f.kind},
+            {"tolerance", f.tolerance},
+            {"spheres", scene.tissue.network.organ.size()},
+            {"bonds", scene.tissue.network.bonds.size()},
+            {"contacts", contacts_json(scene, network, run)},
+            {"imposed", depth ? "depth_m" : "load_N"},
+            {"response", depth ? "force_N" : "depth_m"}};
+  const auto point = [](const CurvePoint& p) {
+    return Json{{"time_s", nine_digits(p.time_s)},
+                {"imposed", nine_digits(p.imposed)},
+                {"response", nine_digits(p.response)}};
+  };
+  json["largest"] = point(largest(record, f.tolerance));
+  json["last"] = point(record.curve.back());
+  json["outputs"] = record.outputs.size();
+  json["energy"] = energy_json(run);
+  if (f.masses) json["motion"] = motion_json(scene, run);
+  if (run.solver) json["solver"] = solver_json(*run.solver);
+  json["roughness"] = smoothness_json(smoothness_of(scene, record.outputs.back().position));
+  json["error_estimate"] =
+      f.kind == "quasi_static" ? Json(rounded(record.error_estimate, 3)) : Json(nullptr);
+  json["resumed_at_s"] = run.resumed_at_s ? Json(*run.resumed_at_s) : Json(nullptr);
+  json["validity"] = validity_json(record.validity, depth_limits_apply(scene.tissue));
+  return json;
+}
+
+std::string simulation_text(const ExperimentScene& scene, const RunNetwork& network,
+                            const SimulationRun& run) {
+  const SimulationRecord& record = run.record;
+  const bool depth = by_depth(scene);
+  const auto response = [&](const CurvePoint& p) {
+    return depth ? fmt::format("{} N at a depth of {} mm", significant(p.response, 6),
+                               significant(1e3 * p.imposed, 4))
+                 : fmt::format("{} mm under a load of {} N", significant(1e3 * p.response, 6),
+                               significant(p.imposed, 4));
+  };
+  std::string text =
+      fmt::format("{}: sphere {} of {} is {}\n", scene.tissue.title, scene.probe().sphere + 1,
+                  scene.tissue.network.organ.size(), depth ? "pushed to a depth" : "loaded");
+  text += contacts_text(scene, network, run);
+  text += equations_text(scene, run);
+  if (scene.formulation.masses) text += motion_text(scene, run);
+  if (run.solver && !run.solver->direct) text += solver_text(*run.solver);
+  if (run.resumed_at_s) {
+    text += fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));
+  }
+  const CurvePoint& most = largest(record, scene.formulation.tolerance);
+  text += fmt::format("largest {}: {}, at {} s\n", depth ? "force" : "depth", response(most),
+                      significant(most.time_s, 4));
+  text += fmt::format("at the end, {} s: {}\n", significant(record.curve.back().time_s, 4),
+                      response(record.curve.back()));
+  text += smoothness_text(smoothness_of(scene, record.outputs.back().position));
+  return text + validity_text(record.validity, depth_limits_apply(scene.tissue));
+}
+
+}  // namespace tpm::report

@@ -1,0 +1,193 @@
+#include "tpm/plan/show/trajectory_report.hpp"
+
+#include <fmt/format.h>
+
+#include "tpm/base/lists.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/session/loop_maker.hpp"
+#include "tpmkit/model.hpp"
+#include "tpmkit/units.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm::report {
+namespace {
+
+constexpr int kRunDigits = 9;
+
+Eigen::Index largest_of(const Trajectory& answer) {
+  Eigen::Index at = 0;
+  answer.response.cwiseAbs().maxCoeff(&at);
+  return at;
+}
+
+bool driven_by_depth(const ExperimentScene& scene) {
+  return scene.protocol.drive() == Drive::displacement;
+}
+
+/// Whom a formulation answers: fits, scenes, sessions.
+std::vector<std::string> users_of(const Formulation& f) {
+  std::vector<std::string> users;
+  if (f.as<ModelMaker>() != nullptr) users.emplace_back("fits");
+  if (f.as<SceneRunner>() != nullptr) users.emplace_back("scenes");
+  if (f.as<StateRunner>() != nullptr) users.emplace_back("checkpoints");
+  if (f.can().planned) users.emplace_back("plans");
+  if (for_sessions(f)) users.emplace_back("sessions");
+  return users;
+}
+
+std::vector<std::string> words_of(const Capabilities& can) {
+  std::vector<std::string> words;
+  for (const CapabilityEntry& entry : kCapabilities) {
+    if (can.*entry.meaning) words.emplace_back(entry.text);
+  }
+  return words;
+}
+
+}  // namespace
+
+void add_trajectory(Json& json, const ExperimentScene& scene, const std::vector<double>& times_s,
+                    const Trajectory& answer) {
+  const auto point = [&](Eigen::Index i) {
+    const double time = times_s[static_cast<std::size_t>(i)];
+    return Json{{"time_s", rounded(time, kRunDigits)},
+                {"imposed", rounded(value_at(scene.protocol, time), kRunDigits)},
+                {"response", rounded(answer.response[i], kRunDigits)}};
+  };
+  json["imposed"] = driven_by_depth(scene) ? "depth_m" : "load_N";
+  json["response"] = driven_by_depth(scene) ? "force_N" : "depth_m";
+  json["largest"] = point(largest_of(answer));
+  json["last"] = point(answer.response.size() - 1);
+  json["outputs"] = answer.displacement.size();
+}
+
+std::string trajectory_text(bool by_depth, const std::vector<double>& times_s,
+                            const Trajectory& answer) {
+  const auto point = [&](Eigen::Index i) {
+    const double value = answer.response[i];
+    return fmt::format("{} {} at {} s", significant(by_depth ? value : 1e3 * value, 6),
+                       by_depth ? "N" : "mm", significant(times_s[static_cast<std::size_t>(i)], 4));
+  };
+  return fmt::format("largest {}: {}; at the end: {}\n", by_depth ? "force" : "depth",
+                     point(largest_of(answer)), point(answer.response.size() - 1));
+}
+
+void write_trajectory(const ExperimentScene& scene, const std::vector<double>& times_s,
+                      const Trajectory& answer, Hdf5Writer& file) {
+  const bool by_depth = driven_by_depth(scene);
+  const auto imposed =
+      mapped<double>(times_s, [&](double time) { return value_at(scene.protocol, time); });
+  const std::vector<double> response(answer.response.begin(), answer.response.end());
+  file.numbers("/curve/time_s", times_s);
+  file.numbers(by_depth ? "/curve/depth_m" : "/curve/load_N", imposed);
+  file.numbers(by_depth ? "/curve/force_N" : "/curve/depth_m", response);
+  if (!answer.displacement.empty()) file.numbers("/steps/time_s", times_s);
+  for (std::size_t i = 0; i < answer.displacement.size(); ++i) {
+    const Eigen::Matrix3Xd& u = answer.displacement[i];
+    file.table(fmt::format("/steps/{:05}/displacement_m", i), {u.data(), u.data() + u.size()}, 3);
+  }
+}
+
+Json scene_run_json(const ExperimentScene& scene, const std::vector<double>& times_s,
+                    const Trajectory& answer) {
+  Json json{{"title", scene.tissue.title},
+            {"version", version()},
+            {"scene_sha256", sha256_hex(scene.text)},
+            {"network", scene.formulation.mass_spring ? "mass_spring" : "tissue"},
+            {"formulation", scene.formulation.kind},
+            {"tolerance", scene.formulation.tolerance},
+            {"steps", answer.steps}};
+  add_trajectory(json, scene, times_s, answer);
+  return json;
+}
+
+std::string scene_run_text(const ExperimentScene& scene, const std::vector<double>& times_s,
+                           const Trajectory& answer) {
+  const Formulation& entry = scene.formulation.entry();
+  return fmt::format(
+      "{}: {}\n{}: {}\n{}limits of validity are not watched: this formulation does not show whole "
+      "states\n",
+      scene.tissue.title, scene.formulation.mass_spring ? "mass-spring model" : "tissue",
+      entry.name(), entry.meaning(), trajectory_text(driven_by_depth(scene), times_s, answer));
+}
+
+void write_scene_run(const ExperimentScene& scene, const std::vector<double>& times_s,
+                     const Trajectory& answer, const std::filesystem::path& path) {
+  Hdf5Writer file(path);
+  file.attribute("/", "title", scene.tissue.title);
+  file.attribute("/", "scene", scene.text);
+  file.attribute("/", "scene_sha256", sha256_hex(scene.text));
+  file.attribute("/", "written_by", fmt::format("tpm {}", version()));
+  file.attribute("/", "formulation", scene.formulation.kind);
+  file.attribute("/", "network", scene.formulation.mass_spring ? "mass_spring" : "tissue");
+  file.attribute("/", "tolerance", shortest(scene.formulation.tolerance));
+  file.attribute("/", "provenance", "model");
+  write_trajectory(scene, times_s, answer, file);
+  file.commit();
+}
+
+Json formulations_json() {
+  return array_json(formulations(), [](const Formulation* f) {
+    return Json{{"name", f->name()},
+                {"meaning", f->meaning()},
+                {"can", words_of(f->can())},
+                {"for", users_of(*f)},
+                {"keys", f->keys()}};
+  });
+}
+
+namespace {
+
+/// A servo's kernels step the shape, whatever the values of its parameters: tried at 1 of each.
+bool runs_at_servo_rate(const ElongationShape& shape) {
+  ShapeValues ones;
+  ones.fill(1.0);
+  return shape.cubic_per_m2(ones).has_value();
+}
+
+}  // namespace
+
+Json shapes_json() {
+  Json list = Json::array();
+  for (const ElongationShape* shape : elongation_shapes()) {
+    Json parameters = array_json(shape->parameters(), [](const MaterialParameter& p) {
+      return Json{{"name", p.name},
+                  {"unit", si_symbol(p.dimension)},
+                  {"range", range_of(p)},
+                  {"meaning", p.meaning}};
+    });
+    list.push_back({{"name", shape->name()},
+                    {"meaning", shape->meaning()},
+                    {"parameters", std::move(parameters)},
+                    {"servo", runs_at_servo_rate(*shape)}});
+  }
+  return list;
+}
+
+std::string shapes_text() {
+  std::string text;
+  for (const ElongationShape* shape : elongation_shapes()) {
+    text += fmt::format("{:<12} {}\n", shape->name(), shape->meaning());
+    for (const MaterialParameter& p : shape->parameters()) {
+      const std::string_view symbol = si_symbol(p.dimension);
+      text += fmt::format("{:<12} {}: {}{}{}, {}\n", "", p.name, p.meaning,
+                          symbol.empty() ? "" : ", ", symbol, range_of(p));
+    }
+    text +=
+        fmt::format("{:<12} at servo rate: {}\n", "", runs_at_servo_rate(*shape) ? "yes" : "no");
+  }
+  return text;
+}
+
+std::string formulations_text() {
+  std::string text;
+  for (const Formulation* f : formulations()) {
+    text += fmt::format("{:<20} {}\n{:<20} can: {}\n{:<20} for: {}\n", f->name(), f->meaning(), "",
+                        fmt::join(words_of(f->can()), ", "), "", fmt::join(users_of(*f), ", "));
+    if (!f->keys().empty())
+      text += fmt::format("{:<20} keys: {}\n", "", fmt::join(f->keys(), ", "));
+  }
+  return text;
+}
+
+}  // namespace tpm::report

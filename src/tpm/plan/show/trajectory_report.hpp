@@ -1,0 +1,41 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/organ/run/scene_runner.hpp"
+
+namespace tpm::report {
+
+/// Adds what is imposed, the response, its largest and last value to a description of a run.
+void add_trajectory(Json& json, const ExperimentScene& scene, const std::vector<double>& times_s,
+                    const Trajectory& answer);
+/// The same in a line.
+[[nodiscard]] std::string trajectory_text(bool by_depth, const std::vector<double>& times_s,
+                                          const Trajectory& answer);
+/// Writes /curve and, where displacements are known, /steps.
+void write_trajectory(const ExperimentScene& scene, const std::vector<double>& times_s,
+                      const Trajectory& answer, Hdf5Writer& file);
+
+// Runs of scenes by formulations that do not show whole states.
+[[nodiscard]] Json scene_run_json(const ExperimentScene& scene, const std::vector<double>& times_s,
+                                  const Trajectory& answer);
+[[nodiscard]] std::string scene_run_text(const ExperimentScene& scene,
+                                         const std::vector<double>& times_s,
+                                         const Trajectory& answer);
+/// Throws Error(environment).
+void write_scene_run(const ExperimentScene& scene, const std::vector<double>& times_s,
+                     const Trajectory& answer, const std::filesystem::path& path);
+
+/// All formulations with what they can do: name, meaning, capabilities, keys in scenes, sessions.
+[[nodiscard]] Json formulations_json();
+[[nodiscard]] std::string formulations_text();
+
+/// The shapes of materials with their parameters, and whether they run at servo rate.
+[[nodiscard]] Json shapes_json();
+[[nodiscard]] std::string shapes_text();
+
+}  // namespace tpm::report

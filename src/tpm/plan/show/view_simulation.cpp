@@ -1,0 +1,158 @@
+// Declared in tpm/show/view_parts.hpp.
+#include <fmt/format.h>
+
+#include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/show/view_parts.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::report {
+namespace {
+
+constexpr const char* kExpectedResult = "a result of tpm simulate";
+
+std::string step_name(std::size_t step, const char* what) {
+  return fmt::format("/steps/{:05}/{}", step, what);
+}
+
+/// What all points of an array must agree on: nothing of the file is trusted.
+std::vector<double> table_of(const Hdf5Reader& file, const std::filesystem::path& path,
+                             const std::string& name, std::size_t numbers) {
+  std::vector<double> values = file.table(name);
+  if (values.size() == numbers) return values;
+  throw bad_input(path.string() + ": " + name, fmt::format("has {} numbers", values.size()),
+                  fmt::format("{}", numbers));
+}
+
+/// Displacements, or forces, of the shown states, one after the other.
+std::vector<float> states_of(const Hdf5Reader& file, const std::filesystem::path& path,
+                             const char* what, const std::vector<std::size_t>& shown,
+                             std::size_t spheres) {
+  std::vector<float> all;
+  all.reserve(shown.size() * 3 * spheres);
+  for (const std::size_t step : shown) {
+    for (const double v : table_of(file, path, step_name(step, what), 3 * spheres)) {
+      all.push_back(static_cast<float>(v));
+    }
+  }
+  return all;
+}
+
+std::vector<std::uint32_t> whole_numbers(const Hdf5Reader& file, const std::filesystem::path& path,
+                                         const std::string& name, std::uint64_t below) {
+  const std::vector<std::uint64_t> extents = file.extents(name);
+  std::vector<std::uint32_t> result;
+  for (const double v : file.part(name, std::vector<std::uint64_t>(extents.size(), 0), extents)) {
+    if (!(v >= 0.0) || v >= static_cast<double>(below)) {
+      throw bad_input(path.string() + ": " + name, "has a number that counts nothing",
+                      fmt::format("0 to {}", below - 1));
+    }
+    result.push_back(static_cast<std::uint32_t>(v));
+  }
+  return result;
+}
+
+/// The states that the page holds, and the sentence that says which.
+std::vector<std::size_t> shown_states(std::size_t states, std::size_t spheres, std::size_t most,
+                                      Json& organ) {
+  const std::size_t stride = shown_stride(states, 3 * spheres, most);
+  std::vector<std::size_t> shown;
+  for (std::size_t k = 0; k < states; k += stride) shown.push_back(k);
+  if (shown.back() + 1 != states) shown.push_back(states - 1);
+  organ["shown"] =
+      stride == 1 ? fmt::format("all {} states of the file", states)
+                  : fmt::format("{} of the {} states of the file, so that the page stays small",
+                                shown.size(), states);
+  return shown;
+}
+
+void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::size_t most,
+               ViewPage& page) {
+  const std::vector<double> rest = file.table("/spheres/position_m");
+  const std::size_t spheres = rest.size() / 3;
+  const std::vector<double> times = file.numbers("/steps/time_s");
+  if (spheres == 0 || rest.size() != 3 * spheres || times.empty()) {
+    throw bad_input(path.string(), "holds no state of an organ", kExpectedResult);
+  }
+  Json organ{{"spheres", spheres}, {"radius_m", file.numbers("/radius_m").at(0)}};
+  const std::vector<std::size_t> shown = shown_states(times.size(), spheres, most, organ);
+  std::vector<double> shown_times;
+  for (const std::size_t k : shown) shown_times.push_back(times[k]);
+  constexpr std::uint64_t kAny = std::uint64_t{1} << 31U;
+  organ["rest_m"] = page.put(std::vector<float>(rest.begin(), rest.end()));
+  organ["layer"] = page.put(whole_numbers(file, path, "/spheres/layer", kAny));
+  // Files of version 0.1 name it by another word.
+  const char* const constraint =
+      file.has("/spheres/constraint") ? "/spheres/constraint" : "/spheres/held";
+  organ["constraint"] = page.put(whole_numbers(file, path, constraint, 3));
+  organ["bonds"] = page.put(whole_numbers(file, path, "/bonds/ends", spheres));
+  organ["time_s"] = page.put(shown_times);
+  organ["displacement_m"] = page.put(states_of(file, path, "displacement_m", shown, spheres));
+  if (file.has(step_name(0, "force_N"))) {
+    organ["force_N"] = page.put(states_of(file, path, "force_N", shown, spheres));
+    organ["force_words"] = "force of the bonds on the sphere";
+  }
+  if (file.has("/probe/sphere")) organ["contact"] = file.numbers("/probe/sphere").at(0) - 1.0;
+  if (file.has("/probe/direction")) organ["push"] = file.numbers("/probe/direction");
+  page.description["organ"] = std::move(organ);
+}
+
+/// A curve over time in the unit that people read.
+void add_plot(ViewPage& page, const std::string& time, const Hdf5Reader& file,
+              const std::string& name, const char* title, const char* unit, double scale) {
+  if (!file.has(name)) return;
+  std::vector<double> values = file.numbers(name);
+  for (double& v : values) v *= scale;
+  page.plot_over_time(title, unit,
+                      {{{"kind", "line"}, {"label", title}, {"x", time}, {"y", page.put(values)}}});
+}
+
+void add_curves(const Hdf5Reader& file, ViewPage& page) {
+  constexpr double kMilli = 1e3;
+  const std::string time = page.put(file.numbers("/curve/time_s"));
+  add_plot(page, time, file, "/curve/depth_m", "depth", "mm", kMilli);
+  add_plot(page, time, file, "/curve/force_N", "contact force", "N", 1.0);
+  add_plot(page, time, file, "/curve/load_N", "load", "N", 1.0);
+  add_plot(page, time, file, "/curve/dissipated_J", "dissipated energy", "mJ", kMilli);
+}
+
+void add_origin(const Hdf5Reader& file, ViewPage& page) {
+  const auto attribute = [&file](const char* name) {
+    return file.has_attribute("/", name) ? file.attribute("/", name) : std::string();
+  };
+  page.description["title"] = attribute("title");
+  page.description["badge"] = "SIMULATED";
+  page.description["simulated"] = true;
+  page.fact("origin", "computed from a model; nothing on this page was measured");
+  page.fact("network", attribute("network"));
+  page.fact("formulation", attribute("formulation"));
+  page.fact("written by", attribute("written_by"));
+  page.fact("scene's SHA-256", attribute("scene_sha256"));
+  page.fact("assumptions", attribute("assumptions"));
+  if (!file.has_checksum())
+    page.fact("check sum", "none: the file was not written by tpm, or is older");
+  page.description["scene"] = attribute("scene");
+}
+
+}  // namespace
+
+ViewPage view_simulation(const std::filesystem::path& path, std::string_view bytes,
+                         const ViewOptions& options) {
+  const Hdf5Reader file(path);
+  if (!file.has("/curve/time_s") || !file.has_attribute("/", "formulation")) {
+    const bool session = file.has("/rows");
+    throw bad_input(path.string(),
+                    session ? "is an exported session" : "is an HDF5 file of another kind",
+                    session ? "the recording that it was exported from" : kExpectedResult);
+  }
+  ViewPage page = begun_page("simulation", path, bytes);
+  add_origin(file, page);
+  if (file.has("/spheres/position_m")) {
+    add_organ(file, path, options.most_numbers, page);
+  } else {
+    page.fact("organ", "this formulation does not show whole states: there is no organ to turn");
+  }
+  add_curves(file, page);
+  return page;
+}
+
+}  // namespace tpm::report

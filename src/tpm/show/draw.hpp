@@ -1,0 +1,59 @@
+#pragma once
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tpm/show/document.hpp"
+#include "tpm/show/figure.hpp"
+
+namespace tpm::report {
+
+/// The Python interpreter that draws: $TPMKIT_PYTHON if it is set, else the first of python3 and
+/// /usr/bin/python3 that has matplotlib (a version manager's python3 often has not). Throws
+/// Error(environment) naming those tried.
+[[nodiscard]] std::string find_drawing_python();
+
+enum class Drawings { svg, svg_and_png };
+
+/// Draws every figure of a figures.json into `folder`, one file each, with
+/// scripts/draw_figures.py. Throws Error(environment) with the last words of the script if it
+/// fails.
+void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
+                  const std::filesystem::path& folder, Drawings drawings = Drawings::svg);
+
+/// Writes figures.json into `folder` and draws its figures there as SVG and PNG. Returns the names
+/// of the files, after those of `files`. Throws Error(environment) if drawing is not possible;
+/// figures.json is then there.
+[[nodiscard]] std::vector<std::string> write_figures(const std::filesystem::path& folder,
+                                                     const std::vector<Figure>& figures,
+                                                     std::vector<std::string> files = {});
+
+/// Writes figures.json into `folder` and draws its figures as figures/ID.svg below. Returns the
+/// text of each drawing by id, as to_html wants it. Throws as draw_figures does.
+[[nodiscard]] std::map<std::string, std::string> draw_into(const std::filesystem::path& folder,
+                                                           const std::vector<Figure>& figures,
+                                                           const std::string& python);
+
+/// Writes a report into `folder`: report.md, report.html, figures.json, figures/ID.svg, and
+/// report.run.json with what changes from run to run. Throws as draw_figures does.
+/// @param seconds wall time of each part of the run; that of drawing is added
+/// @param more further keys of report.run.json
+void write_report(const std::filesystem::path& folder, const Document& document,
+                  const std::vector<Figure>& figures, const std::string& python,
+                  std::map<std::string, double> seconds, const Json& more = Json::object());
+
+/// Draws a network_picture() as STEM.svg and STEM.png with scripts/draw_network.py. Throws as
+/// draw_figures does.
+void draw_network(const std::string& python, const std::filesystem::path& picture_json,
+                  const std::filesystem::path& stem);
+
+/// Draws pictures.json of a simulation into `folder` with scripts/draw_deformation.py, SVG and PNG.
+/// Returns the names of the files. Throws as draw_figures does.
+/// @param two there are two states to be drawn side by side
+[[nodiscard]] std::vector<std::string> draw_deformation(const std::string& python,
+                                                        const std::filesystem::path& pictures_json,
+                                                        const std::filesystem::path& folder,
+                                                        bool two);
+
+}  // namespace tpm::report

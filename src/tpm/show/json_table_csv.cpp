@@ -1,0 +1,88 @@
+#include "tpm/show/json_table_csv.hpp"
+
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "tpm/show/table_document.hpp"
+
+namespace tpm::report {
+namespace {
+
+using FlatRow = std::map<std::string, std::string>;
+
+std::string scalar_cell(const Json& value) {
+  if (value.is_null()) return {};
+  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+/// Flat rows and their columns in the order in which these were first met.
+class FlatTable {
+ public:
+  void add(const Json& row, std::string_view spread) {
+    FlatRow flat;
+    flatten(row, "", flat);
+    const Json::json_pointer place{std::string(spread)};
+    if (place.empty() || !row.contains(place) || row.at(place).empty()) {
+      rows_.push_back(std::move(flat));
+      return;
+    }
+    for (const Json& element : row.at(place)) {
+      FlatRow one = flat;
+      flatten(element, place.back() + "_", one);
+      rows_.push_back(std::move(one));
+    }
+  }
+
+  [[nodiscard]] std::string text() const {
+    std::string text = csv_line(columns_);
+    for (const FlatRow& row : rows_) {
+      std::vector<std::string> cells;
+      for (const std::string& column : columns_) {
+        const auto found = row.find(column);
+        cells.push_back(found == row.end() ? std::string() : found->second);
+      }
+      text += csv_line(cells);
+    }
+    return text;
+  }
+
+ private:
+  void set(const std::string& column, std::string cell, FlatRow& row) {
+    if (std::find(columns_.begin(), columns_.end(), column) == columns_.end()) {
+      columns_.push_back(column);
+    }
+    row[column] = std::move(cell);
+  }
+
+  void flatten(const Json& object, const std::string& before, FlatRow& row) {
+    for (const auto& [key, value] : object.items()) {
+      const std::string column = before + key;
+      if (value.is_object()) {
+        flatten(value, column + "_", row);
+      } else if (value.is_array()) {
+        const bool plain = std::ranges::none_of(value, &Json::is_structured);
+        if (!plain || value.empty()) continue;
+        std::string cell;
+        for (const Json& v : value) cell += (cell.empty() ? "" : " ") + scalar_cell(v);
+        set(column, std::move(cell), row);
+      } else {
+        set(column, scalar_cell(value), row);
+      }
+    }
+  }
+
+  std::vector<std::string> columns_;
+  std::vector<FlatRow> rows_;
+};
+
+}  // namespace
+
+std::string json_table_csv(const Json& rows, std::string_view spread) {
+  FlatTable table;
+  for (const Json& row : rows) table.add(row, spread);
+  return table.text();
+}
+
+}  // namespace tpm::report

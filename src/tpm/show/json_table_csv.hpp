@@ -1,0 +1,19 @@
+#pragma once
+#include <string>
+#include <string_view>
+
+#include "tpm/files/json.hpp"
+
+namespace tpm::report {
+
+/// A table of a JSON answer as CSV: the same numbers under the same keys, which carry the unit.
+/// One line for each row; the keys of an object within a row follow its own with an underscore
+/// (`experiment_depth_m`), and a list of numbers or words fills one cell, separated by spaces.
+/// Lists of objects are left out, except `spread`: each of its elements has a line of its own, with
+/// the rest of the row repeated. A row without a key leaves its cell empty, as does null.
+/// @param rows a list of objects
+/// @param spread JSON pointer to a list of objects within each row, such as "/parameters"; empty
+/// for none
+[[nodiscard]] std::string json_table_csv(const Json& rows, std::string_view spread = {});
+
+}  // namespace tpm::report

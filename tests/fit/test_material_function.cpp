@@ -1,0 +1,171 @@
+// Spectra, relaxation moduli and creep compliances, fitted without a configuration.
+#include <fmt/format.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <numbers>
+
+#include "refusal.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/fit/likelihood/config.hpp"
+#include "tpm/fit/select/material_function.hpp"
+
+namespace tpm::study {
+namespace {
+
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinRel;
+
+// Two Maxwell branches beside a spring, Pa and s.
+constexpr double kLasting = 1000.0, kFirst = 2000.0, kSecond = 500.0, kTau1 = 0.1, kTau2 = 5.0;
+
+double modulus(double t) {
+  return kLasting + kFirst * std::exp(-t / kTau1) + kSecond * std::exp(-t / kTau2);
+}
+
+std::vector<double> decades_of(double from, double to, int points) {
+  std::vector<double> values;
+  values.reserve(static_cast<std::size_t>(points));
+  for (int i = 0; i < points; ++i) {
+    values.push_back(from * std::pow(to / from, static_cast<double>(i) / (points - 1)));
+  }
+  return values;
+}
+
+MaterialFunction read(const std::string& path) {
+  auto function = find_material_function(path, {});
+  REQUIRE(function);
+  return *std::move(function);
+}
+
+SelectionOptions quick() {
+  SelectionOptions options;
+  options.setup.starts = 6;
+  return options;
+}
+
+double estimate(const FitResult& fit, const std::string& name) {
+  for (const ParameterResult& p : fit.parameters) {
+    if (p.parameter.name == name) return p.estimate;
+  }
+  FAIL("no parameter " << name);
+  return 0.0;
+}
+
+const FitResult& chosen(const Selection& s) {
+  return s.candidates[s.recommended].fit;
+}
+
+/// The two branches come in any order.
+void check_two_branches(const FitResult& fit) {
+  CHECK_THAT(estimate(fit, "k_inf"), WithinRel(kLasting, 1e-5));
+  const bool in_order = estimate(fit, "tau1") < estimate(fit, "tau2");
+  CHECK_THAT(estimate(fit, in_order ? "k1" : "k2"), WithinRel(kFirst, 1e-5));
+  CHECK_THAT(estimate(fit, in_order ? "k2" : "k1"), WithinRel(kSecond, 1e-5));
+  CHECK_THAT(estimate(fit, in_order ? "tau1" : "tau2"), WithinRel(kTau1, 1e-5));
+  CHECK_THAT(estimate(fit, in_order ? "tau2" : "tau1"), WithinRel(kTau2, 1e-5));
+}
+
+TEST_CASE("A relaxation modulus is fitted from its file alone") {
+  const test::TempFolder folder;
+  std::string text = "time [s],G(t) [kPa]\n";
+  for (const double t : decades_of(0.01, 100.0, 41)) {
+    text += fmt::format("{:.17g},{:.17g}\n", t, 1e-3 * modulus(t));
+  }
+  write_file(folder / "g.csv", text);
+  const MaterialFunction function = read(folder / "g.csv");
+  CHECK(function.kind() == "relaxation modulus");
+  const Selection s = select_law(function, quick());
+  CHECK(law_name(chosen(s).config.law.value()) == "linear-2");
+  check_two_branches(chosen(s));
+  // The written configuration says the same.
+  const FitConfig again = parse_fit_config(config_json(chosen(s).config), "config.json");
+  const FitResult rerun = run_fit(again);
+  CHECK_THAT(estimate(rerun, "k_inf"), WithinRel(kLasting, 1e-5));
+}
+
+TEST_CASE("A creep compliance is fitted from its file alone") {
+  // J(t) of a spring k0 in series with a Kelvin unit k, T; the same solid has k_inf = k0 k/(k0 +
+  // k).
+  constexpr double k0 = 3000.0, k = 1500.0, T = 2.0;
+  const test::TempFolder folder;
+  std::string text = "time [s],compliance [1/Pa]\n";
+  for (const double t : decades_of(0.01, 100.0, 31)) {
+    text += fmt::format("{:.17g},{:.17g}\n", t, 1.0 / k0 + (1.0 - std::exp(-t / T)) / k);
+  }
+  write_file(folder / "j.csv", text);
+  const MaterialFunction function = read(folder / "j.csv");
+  CHECK(function.kind() == "creep compliance");
+  SelectionOptions options = quick();
+  options.laws = {parse_law_name("linear-1", "test")};
+  options.only_listed = true;
+  const FitResult fit = chosen(select_law(function, options));
+  const double lasting = k0 * k / (k0 + k);
+  CHECK_THAT(estimate(fit, "k_inf"), WithinRel(lasting, 1e-5));
+  CHECK_THAT(estimate(fit, "k1"), WithinRel(k0 - lasting, 1e-5));
+  CHECK_THAT(estimate(fit, "tau1"), WithinRel(T * k / (k0 + k), 1e-5));
+}
+
+TEST_CASE("A relaxation modulus that falls by a power of time is fitted by a spring-pot") {
+  constexpr double kSize = 500.0, kOrder = 0.3;
+  const test::TempFolder folder;
+  std::string text = "time [s],G(t) [Pa]\n";
+  for (const double t : decades_of(0.01, 100.0, 41)) {
+    text += fmt::format("{:.17g},{:.17g}\n", t,
+                        kSize * std::pow(t, -kOrder) / std::tgamma(1.0 - kOrder));
+  }
+  write_file(folder / "g.csv", text);
+  const Selection s = select_law(read(folder / "g.csv"), quick());
+  CHECK(law_name(chosen(s).config.law.value()) == "linear-fspringpot");
+  CHECK_THAT(estimate(chosen(s), "k1"), WithinRel(kSize, 1e-6));
+  CHECK_THAT(estimate(chosen(s), "alpha"), WithinRel(kOrder, 1e-6));
+  for (const Candidate& c : s.candidates) {
+    INFO(law_name(c.law) << ": " << c.reason);
+    CHECK_FALSE(c.failed);
+  }
+}
+
+TEST_CASE("A spectrum is fitted from magnitude and phase over an angular frequency") {
+  const test::TempFolder folder;
+  std::string text = "omega [1/s],|G*| [Pa],delta [deg]\n";
+  for (const double f : decades_of(0.01, 100.0, 31)) {
+    const double w = 2.0 * std::numbers::pi * f;
+    double storage = kLasting, loss = 0.0;
+    for (const auto& [stiffness, tau] : {std::pair{kFirst, kTau1}, {kSecond, kTau2}}) {
+      const double x = w * tau;
+      storage += stiffness * x * x / (1.0 + x * x);
+      loss += stiffness * x / (1.0 + x * x);
+    }
+    text += fmt::format("{:.17g},{:.17g},{:.17g}\n", w, std::hypot(storage, loss),
+                        std::atan2(loss, storage) * 180.0 / std::numbers::pi);
+  }
+  write_file(folder / "s.csv", text);
+  const MaterialFunction function = read(folder / "s.csv");
+  CHECK(function.kind() == "spectrum");
+  const Selection s = select_law(function, quick());
+  CHECK(law_name(chosen(s).config.law.value()) == "linear-2");
+  check_two_branches(chosen(s));
+  const FitResult rerun = run_fit(parse_fit_config(config_json(chosen(s).config), "config.json"));
+  check_two_branches(rerun);
+}
+
+TEST_CASE(
+    "A recording with a drive is no material function, and curved kernels are refused for one") {
+  const test::TempFolder folder;
+  write_file(folder / "r.csv", "time [s],depth [mm],force [N]\n0,0,0\n1,1,1\n2,1,0.5\n");
+  CHECK_FALSE(find_material_function(folder / "r.csv", {}));
+  write_file(folder / "g.csv", "time [s],G(t) [Pa]\n1,3\n2,2\n3,1\n");
+  const MaterialFunction function = read(folder / "g.csv");
+  CHECK_THAT(test::refusal_of([&] {
+               static_cast<void>(function_config(parse_law_name("hertz-1", "test"), function, {}));
+             }),
+             Contains("a law with a linear kernel"));
+  write_file(folder / "before.csv", "time [s],G(t) [Pa]\n-1,3\n2,2\n3,1\n");
+  CHECK_THAT(test::refusal_of(
+                 [&] { static_cast<void>(select_law(read(folder / "before.csv"), quick())); }),
+             Contains("times before the step"));
+}
+
+}  // namespace
+}  // namespace tpm::study

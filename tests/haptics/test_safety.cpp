@@ -1,0 +1,567 @@
+// What must not reach the hand: instability, a start inside the tissue, forces in doubt, limits
+// without ceilings.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+
+#include "counted_allocations.hpp"
+#include "hil_scenes.hpp"
+#include "shaken_contact.hpp"
+#include "temp_folder.hpp"
+#include "tpm/base/random.hpp"
+#include "tpm/haptics/loop/empty_space.hpp"
+#include "tpm/haptics/session/live_view.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/servo_loop.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+using test::element_of;
+using test::Puppet;
+using test::spring_of;
+
+ServoSettings guarded(std::uint64_t cycles = 10'000'000) {
+  ServoSettings s;
+  s.phase_ends = {cycles};
+  s.push = Eigen::Vector3d::UnitZ();
+  s.ramp_in_s = 0.0;
+  return s;
+}
+
+// --- the energy watch -----------------------------------------------------------------------
+
+TEST_CASE("An honest release gives the hand what the tissue stored, and no more") {
+  // A spring of 151 N/m pushed to 8 mm over 2 s stores 4.8 mJ; all of it comes back within 40 ms.
+  EnergyWatch watch({.friction_N_s_per_m = 0.0});
+  const double k = 151.0;
+  double at = 0.0;
+  const auto move = [&](double to) {
+    const double now = k * to;
+    watch.observe({0.0, 0.0, -k * at}, {0.0, 0.0, to - at}, 0.5 * (k * at + now) * (to - at), 1);
+    at = to;
+  };
+  for (int i = 1; i <= 2000; ++i) move(4e-6 * i);
+  const double in = watch.delivered_J();
+  for (int i = 1; i <= 40; ++i) move(8e-3 - 2e-4 * i);
+  // What is left is the leak, K dx^2 / 2 a period: 0.12 mJ of 4.8.
+  const double leak = 40 * 0.5 * k * 2e-4 * 2e-4;
+  CHECK_THAT(watch.delivered_J() - in, WithinRel(leak, 1e-9));
+  CHECK_FALSE(watch.too_much());
+  CHECK(watch.tissue_J() < 1e-12);
+}
+
+TEST_CASE("Energy put in earlier is no credit for what is given away later") {
+  EnergyWatch watch({.friction_N_s_per_m = 0.0, .allowance_J = 2e-3});
+  // A damper takes 50 mJ of the hand, then a spring of a force that comes a quarter late gives.
+  for (int i = 0; i < 1000; ++i) watch.observe({0.0, 0.0, -1.0}, {0.0, 0.0, 5e-5}, 0.0, 1);
+  CHECK(watch.delivered_J() == 0.0);
+  double given = 0.0;
+  for (int periods = 0; !watch.too_much() && periods < 1000; ++periods) {
+    watch.observe({0.0, 0.0, 1.0}, {0.0, 0.0, 5e-5}, 0.0, 1);
+    given += 5e-5;
+  }
+  CHECK(given <= 2e-3 + 5e-5 + 1e-12);  // what was allowed, and one period more
+  CHECK_THAT(watch.delivered_J(), WithinRel(given, 1e-9));
+}
+
+TEST_CASE("A known delay is a part of what is watched, an unknown one is not seen") {
+  const auto most_delivered_J = [](int known) {
+    constexpr int kTrue = 20;
+    EnergyWatch watch({.friction_N_s_per_m = 0.1, .delay_periods = known});
+    double before = 0.0;
+    for (int i = 1; i <= 2000; ++i) {
+      const double at = 1e-3 * std::sin(2.0 * M_PI * 5.0 * 1e-3 * i);
+      const double k = 500.0;
+      watch.observe({0.0, 0.0, -k * before}, {0.0, 0.0, at - before},
+                    0.5 * k * (at + before) * (at - before), 1);
+      before = at;
+    }
+    (void)kTrue;
+    return watch.most_delivered_J();
+  };
+  CHECK(most_delivered_J(0) < 0.1e-3);
+  // A spring late by t under a sine: pi K a^2 sin(w t) a cycle, 20 ms late 0.92 mJ, 5 cycles a s.
+  CHECK(most_delivered_J(20) > 2e-3);
+}
+
+TEST_CASE("A tissue that gives more than it got is found as well") {
+  EnergyWatch watch({.friction_N_s_per_m = 0.1, .allowance_J = 1e-3});
+  for (int i = 0; i < 100; ++i) watch.observe({0.0, 0.0, -1.0}, {0.0, 0.0, -2e-5}, -2e-5, 1);
+  CHECK(watch.tissue_J() < -1e-3);
+  CHECK(watch.too_much());
+}
+
+// --- the oscillation watch ------------------------------------------------------------------
+
+bool taken_for_oscillation(const std::function<double(double)>& force_N, double seconds) {
+  OscillationWatch watch{OscillationWatchSettings{}};
+  for (int i = 0; i < static_cast<int>(1e3 * seconds); ++i) watch.observe(force_N(1e-3 * i), 1);
+  return watch.found();
+}
+
+TEST_CASE("A steady oscillation is found, at 5 Hz and at 200; a poke, a hold and a decay are not") {
+  const auto sine = [](double hertz, double size) {
+    return [=](double t) { return 1.0 + size * std::sin(2.0 * M_PI * hertz * t); };
+  };
+  for (const double hertz : {5.0, 12.0, 40.0, 120.0, 200.0}) {
+    CAPTURE(hertz);
+    CHECK(taken_for_oscillation(sine(hertz, 0.3), 3.0));
+    CHECK_FALSE(taken_for_oscillation(sine(hertz, 0.1), 30.0));  // not felt as more than noise
+  }
+  CHECK_FALSE(taken_for_oscillation(sine(2.0, 2.0), 60.0));  // an operator who rocks
+  // Knocked: rings at 20 Hz and dies out.
+  CHECK_FALSE(taken_for_oscillation(
+      [](double t) { return 4.0 * std::exp(-6.0 * t) * std::sin(2.0 * M_PI * 20.0 * t); }, 5.0));
+}
+
+// --- sessions -------------------------------------------------------------------------------
+
+Json stiff_session(const char* modulus, int delay = 0) {
+  Json json = test::with(test::short_session(), "/model/scene/material/E1", modulus);
+  json["model"]["scene"]["material"]["E2"] = modulus;
+  json.erase("creep");
+  json["virtual_device"]["delay_periods"] = delay;
+  return json;
+}
+
+SessionRun accepted(const Json& json) {
+  const test::TempFolder folder;
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  options.accept_unstable = true;
+  return run_session(test::parsed(json), {}, options);
+}
+
+std::string refused(const Json& json, const DeviceChoice& choice = {}, bool accept = false) {
+  const test::TempFolder folder;
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  options.accept_unstable = accept;
+  try {
+    (void)run_session(test::parsed(json), choice, options);
+  } catch (const Error& error) {
+    CHECK_FALSE(std::filesystem::exists(folder / "r"));
+    return error.what();
+  }
+  return "nothing was refused";
+}
+
+TEST_CASE("What would be unstable is refused before a device is opened, with the border") {
+  CHECK_THAT(refused(stiff_session("1e6 kPa")),
+             Contains("stability: unstable: stiffness 1.26e+07 N/m at 1000 Hz"));
+  CHECK_THAT(refused(stiff_session("3 MPa")), Contains("unstable"));
+  CHECK_THAT(refused(stiff_session("0.5 MPa")),
+             Contains("too stiff for the device") && Contains("at most 5e+03 N/m"));
+  CHECK_THAT(refused(stiff_session("1 MPa", 2)), Contains("2 periods of delay"));
+  CHECK_THAT(refused(stiff_session("12 kPa", 50)), Contains("50 periods of delay"));
+  // Hardware is not for trying.
+  DeviceChoice omega;
+  omega.kind = "omega7";
+  omega.library = "/no/such.so";
+  CHECK_THAT(refused(stiff_session("1e6 kPa"), omega), Contains("unstable"));
+  CHECK_THAT(refused(test::short_session(), omega, true),
+             Contains("--accept-unstable: is not for the device 'omega7'"));
+}
+
+/// Mean of the force sent in the second half of the first hold, N.
+double held_force_N(const Json& json) {
+  const test::TempFolder folder;
+  const HilSession session = test::parsed(json);
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  options.accept_unstable = true;
+  (void)run_session(session, {}, options);
+  const HilRecording recording = read_recording(folder / "r");
+  const SessionPhase& hold = session.phases.at(2);
+  REQUIRE(hold.kind == SessionPhaseKind::hold);
+  const double begin_s = 0.5 * (session.phases.at(1).end_s + hold.end_s);
+  double sum_N = 0.0;
+  std::size_t count = 0;
+  for (const ServoRecord& row : recording.rows) {
+    if (recording.time_s(row) < begin_s || recording.time_s(row) > hold.end_s) continue;
+    sum_N += recording.commanded_N(row);
+    ++count;
+  }
+  REQUIRE(count > 10);
+  return sum_N / static_cast<double>(count);
+}
+
+TEST_CASE(
+    "A rise limited below a step of the encoder is refused, because the force would be lost") {
+  const auto limited = [](const char* modulus, double slew_N_per_s) {
+    return test::with(stiff_session(modulus), "/limits", {{"slew_N_per_s", slew_N_per_s}});
+  };
+  // K q / T with the stiffness at the session's depth: 1.6 N/s at 12 kPa and 0.01 mm.
+  CHECK_THAT(refused(limited("12 kPa", 1.0)),
+             Contains("the rise of the force is limited too much") &&
+                 Contains("a step of the encoder (0.01 mm) makes 0.00159 N"));
+  CHECK(held_force_N(limited("12 kPa", 1.0)) < 0.8 * held_force_N(limited("12 kPa", 400.0)));
+  CHECK_THAT(held_force_N(limited("12 kPa", 2.0)),
+             WithinRel(held_force_N(limited("12 kPa", 400.0)), 0.05));
+  CHECK(refused(limited("12 kPa", 2.0)) == "nothing was refused");
+}
+
+TEST_CASE("The borders of a set-up are those of the theory") {
+  const HilSession session = test::parsed(test::short_session());
+  const LoopModel loop = make_loop_model(session);
+  const RenderingCheck check = check_rendering(session, *loop.model, loop, "virtual");
+  // The star at 4 mm: E2 A0/l0 and the tension's slope, 2 E' (1 - cos^3) A0/l0 with tan = e/x.
+  const double depth = check.depth_m, slope = 1.0 - std::pow(1.0 + depth * depth / 9e-4, -1.5);
+  CHECK(check.depth_m > 3e-3);
+  CHECK_THAT(check.stiffness_N_per_m, WithinRel(150.72 * (1.0 + 2.0 * slope), 0.02));
+  CHECK_THAT(check.equilibrium_share, WithinRel(0.5, 1e-6));
+  CHECK_THAT(check.passive_N_per_m, WithinRel(2.0 * 0.3 / 1e-3, 1e-9));
+  CHECK_THAT(check.recovery_s, WithinRel(2.0, 1e-6));  // tau 1 s, E1 = E2
+  CHECK(check.passive());
+  CHECK(check.stable());
+  CHECK(check.spectral_radius < 1.0);
+  // A plain spring of friction b and arm B: about 2 (b + B) / T.
+  CHECK_THAT(check.stable_N_per_m, WithinRel(2.0 * (0.3 + 6.45) / 1e-3, 0.02));
+  // Hardware: its friction and delay are assumed, to the worse side.
+  const RenderingCheck omega = check_rendering(session, *loop.model, loop, "omega7");
+  CHECK(omega.delay_periods == 1);
+  CHECK_THAT(omega.passive_N_per_m, WithinRel(0.1 / 1.5e-3, 1e-9));
+  CHECK_FALSE(omega.passive());
+  CHECK(omega.acceptable());
+}
+
+TEST_CASE("What is unstable and accepted ends with a cause of its own, not as finished") {
+  for (const char* modulus : {"1e6 kPa", "3 MPa"}) {
+    CAPTURE(modulus);
+    const StopCause cause = accepted(stiff_session(modulus)).outcome.cause;
+    CHECK((cause == StopCause::oscillation || cause == StopCause::energy));
+  }
+  Json delayed = stiff_session("36 kPa", 50);
+  const StopCause cause = accepted(delayed).outcome.cause;
+  CHECK((cause == StopCause::oscillation || cause == StopCause::energy));
+}
+
+TEST_CASE("A rest in which the tissue cannot recover is warned of") {
+  const auto warnings = [](const char* rest) {
+    Json json = test::short_session();
+    json["indentations"]["rest"] = rest;
+    const HilSession session = test::parsed(json);
+    const LoopModel loop = make_loop_model(session);
+    return check_rendering(session, *loop.model, loop, "virtual").warnings;
+  };
+  REQUIRE(warnings("1 s").size() == 1);  // the surface recovers in 2 s
+  CHECK_THAT(warnings("1 s").front(), Contains("a rest of 1 s is too short"));
+  CHECK(warnings("9.3 s").empty());
+}
+
+// --- the start ------------------------------------------------------------------------------
+
+TEST_CASE("A hand that rests in the tissue feels nothing, and the session is given up") {
+  Json json = test::short_session();
+  json["virtual_device"]["arm_set_point"] = "12 mm";
+  json["start"]["limit"] = "2 s";
+  const test::TempFolder folder;
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  double most_N = 0.0;
+  std::string said;
+  options.watcher = [&](const ServoRecord& row) {
+    most_N = std::max(most_N, std::abs(row.commanded_N[2]));
+    said = instruction_of(row);
+  };
+  const SessionRun run = run_session(test::parsed(json), {}, options);
+  CHECK(run.outcome.cause == StopCause::not_in_place);
+  CHECK(most_N == 0.0);
+  CHECK(said == "Draw the tool back, out of the tissue: it is 12 mm below the surface");
+  const HilRecording recording = read_recording(folder / "r");
+  CHECK(recording.closing.at("cause") == "operator not in place");
+  REQUIRE(recording.rows.size() == 1);
+  CHECK(recording.rows.back().phase == -1);
+  CHECK_THAT(recording.rows.back().tool_depth_m, WithinAbs(12e-3, 1e-5));
+}
+
+TEST_CASE("Phases wait until the tool is in the air, inside the workspace and at rest") {
+  Puppet device;
+  ElementContact model = element_of(12e3, 1.0);
+  ServoSettings settings = guarded(1000);
+  settings.gate = StartGateSettings{};
+  ServoStep step(device, model, settings);
+  ServoRecord row;
+  const auto run = [&](int cycles) {
+    for (int i = 0; i < cycles; ++i) REQUIRE(step.cycle(0, row) == StopCause::none);
+  };
+  device.at.z() = 5e-3;  // in the tissue
+  run(1000);
+  CHECK((row.flags & kInTissue) != 0);
+  device.at.z() = -0.2;  // out of reach
+  run(1000);
+  CHECK((row.flags & kOutOfReach) != 0);
+  for (int i = 0; i < 2000; ++i) {  // moving at 20 mm/s
+    device.at.z() = -0.01 - 1e-5 * (i % 1000);
+    run(1);
+    REQUIRE((row.flags & kMoving) != 0);
+  }
+  CHECK(step.cycles() == 0);
+  CHECK(device.most_N == 0.0);
+  device.at.z() = -3e-3;
+  run(249);
+  CHECK(row.phase == -1);
+  run(2);
+  CHECK(row.phase == 0);
+  CHECK(row.cycle == 0);
+  CHECK(device.begun == 1);
+}
+
+TEST_CASE("The surface is put before the hand, wherever that is") {
+  Json json = test::short_session();
+  json["surface_before_hand"] = "4 mm";
+  json.erase("creep");
+  const test::TempFolder folder;
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  const SessionRun run = run_session(test::parsed(json), {}, options);
+  CHECK(run.outcome.cause == StopCause::finished);
+  const HilRecording recording = read_recording(folder / "r");
+  CHECK_THAT(recording.rows.front().tool_depth_m, WithinAbs(-4e-3, 1e-12));
+  CHECK_THAT(recording.session.servo.surface_m.z(), WithinAbs(0.0, 1e-5));
+  double deepest = 0.0;
+  for (const ServoRecord& row : recording.rows) deepest = std::max(deepest, row.tool_depth_m);
+  CHECK_THAT(deepest, WithinAbs(4e-3, 0.2e-3));
+  json["surface"] = Json::array({"0 mm", "0 mm", "0 mm"});
+  CHECK_THROWS_WITH(test::parsed(json), Contains("the surface is already given"));
+}
+
+// --- limits ---------------------------------------------------------------------------------
+
+TEST_CASE("Limits have ceilings, and a session has to fit into the workspace") {
+  struct Case {
+    const char* pointer;
+    Json value;
+    const char* message;
+  };
+  const Case bad = GENERATE(
+      Case{"/limits/damping_N_s_per_m", 1e4,
+           "key /limits/damping_N_s_per_m: 10000; expected 0 to 30"},
+      Case{"/limits/slew_N_per_s", 1e9, "key /limits/slew_N_per_s: 1000000000; expected 1 to 2000"},
+      Case{"/limits/ramp_in", "0 s", "key /limits/ramp_in: 0 s; expected 0.1 to 60 s"},
+      Case{"/limits/outside_validity", "1 min", "key /limits/outside_validity: 60 s"},
+      Case{"/indentations/depths", Json::array({"10 m"}),
+           "the tool would go 10 m from the centre of the workspace; expected 0.075 m at most"},
+      Case{"/surface", Json::array({"0.5 m", "0 m", "0 m"}),
+           "key /surface: out of the device's reach"},
+      Case{"/surface", Json::array({"0 m", "0 m", "-72 mm"}), "the tool would go 0.084 m"},
+      Case{"/surface_before_hand", "60 mm", "key /surface_before_hand: 0.06 m"},
+      Case{"/start/limit", "0 s", "key /start/limit"});
+  CAPTURE(bad.pointer, bad.value.dump());
+  CHECK_THROWS_WITH(test::parsed(test::with(test::short_session(), bad.pointer, bad.value)),
+                    Contains(bad.message));
+}
+
+TEST_CASE("The device is asked for no more than the session's limit") {
+  Json json = test::with(test::short_session(), "/limits/force", "3 N");
+  CHECK(test::parsed(json).preparation.max_force_N == 3.0);
+  CHECK(test::parsed(test::short_session()).preparation.max_force_N == 8.0);
+}
+
+// --- the slip element -----------------------------------------------------------------------
+
+TEST_CASE("A slip takes energy and never gives any: a stiff spring, limits that act, random ways") {
+  // The tissue is a pure spring: whatever the hand gets back beyond the leak of the held force,
+  // which friction above the border takes up, would come from the slip.
+  Random random(3);
+  for (int way = 0; way < 20; ++way) {
+    ElementContact model = spring_of(2000.0);
+    Puppet device;
+    ServoSettings settings = guarded();
+    settings.force_limit_N = 0.5 + 4.0 * random.uniform();
+    settings.slew_limit_N_per_s = 5.0 + 400.0 * random.uniform();
+    settings.friction_N_s_per_m = 0.0;
+    settings.energy_allowance_J = std::numeric_limits<double>::infinity();
+    settings.watch_oscillation = false;
+    ServoStep step(device, model, settings);
+    ServoRecord row;
+    double speed = 0.0, target = 0.0, work = 0.0, least = 0.0, before = 0.0, force = 0.0;
+    for (int i = 0; i < 100'000; ++i) {
+      if (i % 100 == 0) target = -2e-3 + 10e-3 * random.uniform();
+      speed += 0.05 * ((target - device.at.z()) / 0.02 - speed);
+      before = device.at.z();
+      device.at.z() += 1e-3 * speed;
+      const double moved = device.at.z() - before;
+      REQUIRE(step.cycle(0, row) == StopCause::none);
+      const double now = -device.force.z();
+      work += 0.5 * (force + now) * moved;  // the force taken as linear within a period: no leak
+      force = now;
+      least = std::min(least, work);
+    }
+    CAPTURE(way, settings.force_limit_N, settings.slew_limit_N_per_s, least);
+    CHECK(step.counts().slipped + step.counts().force_limited > 100);
+    CHECK(work > 1e-3);
+    CHECK(least > -1e-4);
+  }
+}
+
+// --- validity -------------------------------------------------------------------------------
+
+/// A spring of which every second answer, or none after a while, is valid.
+class Doubtful final : public ContactModel {
+ public:
+  enum class Way { alternating, for_good };
+  explicit Doubtful(Way way) : way_(way) {}
+  void reset() noexcept override { steps_ = 0; }
+  ContactAnswer step(const ToolPose& tool) noexcept override {
+    ++steps_;
+    ContactAnswer answer;
+    answer.valid = way_ == Way::alternating ? steps_ < 500 || steps_ % 2 == 0 : steps_ < 500;
+    answer.force_N = (answer.valid ? -200.0 : -600.0) * tool.displacement_m;
+    return answer;
+  }
+  [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
+  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
+    return 200.0 * Eigen::Matrix3d::Identity();
+  }
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return instantaneous_stiffness();
+  }
+
+ private:
+  Way way_;
+  int steps_ = 0;
+};
+
+struct Doubted {
+  double largest_N = 0.0, largest_jump_N = 0.0, last_N = 0.0, energy_J = 0.0;
+  StopCause cause = StopCause::none;
+  int cycles_after = 0;
+};
+
+/// To 2 mm in 0.4 s, held, and slowly on: 0.4 N are valid.
+Doubted doubted(Doubtful::Way way, bool in_space) {
+  Doubtful model(way);
+  Puppet device;
+  ServoSettings settings = guarded();
+  if (in_space) settings.to_model = Eigen::Matrix3d::Identity();
+  ServoStep step(device, model, settings);
+  ServoRecord row;
+  Doubted result;
+  double before_N = 0.0;
+  for (int i = 1; i <= 5000 && result.cause == StopCause::none; ++i) {
+    const double before_m = device.at.z();
+    device.at.z() = i <= 400 ? 5e-6 * i : 2e-3 + 2e-7 * (i - 400);
+    result.cause = step.cycle(0, row);
+    if (result.cause != StopCause::none) break;
+    const double force = -device.force.z();
+    result.energy_J += before_N * (device.at.z() - before_m);
+    result.largest_N = std::max(result.largest_N, force);
+    result.largest_jump_N = std::max(result.largest_jump_N, std::abs(force - before_N));
+    result.last_N = before_N = force;
+    result.cycles_after = i - 500;
+  }
+  return result;
+}
+
+TEST_CASE("A force outside validity is not sent: the last valid one fades, and the session ends") {
+  for (const bool in_space : {false, true}) {
+    CAPTURE(in_space);
+    const Doubted result = doubted(Doubtful::Way::for_good, in_space);
+    CHECK(result.cause == StopCause::outside_validity);
+    CHECK(result.largest_N < 0.41);  // the model answers 1.2 N
+    CHECK(result.largest_jump_N < 0.005);
+    CHECK(result.cycles_after <= 501);
+    CHECK(result.last_N < 0.41 * std::exp(-4.9));
+    const Doubted wave = doubted(Doubtful::Way::alternating, in_space);
+    CHECK(wave.largest_N < 0.45);  // the wave was one of 0.8 N at 500 Hz
+    CHECK(wave.largest_jump_N < 0.02);
+    CHECK(wave.cause == StopCause::outside_validity);
+  }
+}
+
+TEST_CASE("A force in doubt gives back no more than its stiffness stored") {
+  Doubtful model(Doubtful::Way::for_good);
+  Puppet device;
+  ServoStep step(device, model, guarded());
+  ServoRecord row;
+  for (int i = 1; i <= 510; ++i) {
+    device.at.z() = std::min(2e-3, 5e-6 * i);
+    REQUIRE(step.cycle(0, row) == StopCause::none);
+  }
+  const double held_N = -device.force.z();
+  CHECK((row.flags & kBeyondModel) != 0);
+  double delivered_J = 0.0;
+  for (int i = 1; i <= 40; ++i) {
+    const double force = -device.force.z(), before = device.at.z();
+    device.at.z() -= 5e-5;
+    REQUIRE(step.cycle(0, row) == StopCause::none);
+    delivered_J += 0.5 * (force - device.force.z()) * (before - device.at.z());
+  }
+  CHECK(device.force.z() == 0.0);
+  CHECK(delivered_J <= 1.001 * held_N * held_N / (2.0 * 200.0));
+}
+
+TEST_CASE("No part of the watch allocates, also when it acts") {
+  Doubtful model(Doubtful::Way::alternating);
+  Puppet device;
+  ServoSettings settings = guarded();
+  settings.gate = StartGateSettings{};
+  ServoStep step(device, model, settings);
+  ServoRecord row;
+  StopCause cause = StopCause::none;
+  device.at.z() = -2e-3;
+  const testing::HeapWatch heap;
+  for (int i = 0; i < 5000 && cause == StopCause::none; ++i) {
+    if (i > 300) device.at.z() = -2e-3 + 8e-3 * (i % 2);
+    cause = step.cycle(i % 7 == 0 ? 3 : 0, row);
+  }
+  const long calls = heap.calls();
+  CHECK(cause != StopCause::none);
+  CHECK(calls == 0);
+}
+
+// --- catching up ----------------------------------------------------------------------------
+
+/// Counts its steps.
+class Counting final : public EmptySpace {
+ public:
+  ContactAnswer step(const ToolPose&) noexcept override {
+    ++steps;
+    return {};
+  }
+  int steps = 0;
+};
+
+TEST_CASE("A gap of 50 periods is made up for in cycles of eight steps at most") {
+  Counting model;
+  Puppet device;
+  ServoStep step(device, model, guarded());
+  ServoRecord row;
+  (void)step.cycle(0, row);
+  int cycles = 0, most = 0, before = model.steps;
+  CHECK(step.cycle(50, row) == StopCause::none);
+  for (; cycles < 20; ++cycles) {
+    most = std::max(most, model.steps - before);
+    before = model.steps;
+    (void)step.cycle(0, row);
+  }
+  CHECK(most == ServoStep::kMostSteps);
+  CHECK(static_cast<std::uint64_t>(model.steps) == step.cycles());
+}
+
+// --- the last row ---------------------------------------------------------------------------
+
+TEST_CASE("The row of the end holds what was known last, and no command") {
+  const test::TempFolder folder;
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  (void)run_session(test::parsed(test::short_session()), {}, options);
+  const HilRecording recording = read_recording(folder / "r");
+  const ServoRecord& last = recording.rows.back();
+  const ServoRecord& before = recording.rows[recording.rows.size() - 2];
+  CHECK(last.stop == StopCause::finished);
+  CHECK(last.position_m[2] == before.position_m[2]);
+  CHECK(last.tool_depth_m == before.tool_depth_m);
+  CHECK(last.observed_J == before.observed_J);
+  CHECK(last.commanded_N[2] == 0.0);
+  CHECK(last.tool_depth_m < -1e-3);
+}
+
+}  // namespace
+}  // namespace tpm::haptics

@@ -1,0 +1,360 @@
+// The servo loop on the clock, with its threads: hang, signal, kill -9. Times are those of a shared
+// machine: what is asserted leaves room for it, and what must be quick is tried more than once.
+
+#include <algorithm>
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <thread>
+
+#include "expected_values.hpp"
+#include "hil_scenes.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/device/virtual_omega7.hpp"
+#include "tpm/haptics/loop/empty_space.hpp"
+#include "tpm/haptics/session/jitter_check.hpp"
+#include "tpm/haptics/session/network_beside.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpm/haptics/verify/verify.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Loads of other programs must not stop what is not about them.
+HilSession patient_session() {
+  HilSession session = test::parsed(test::short_session());
+  session.servo.most_late = 1001;
+  session.servo.most_missed = 1'000'000;
+  session.cycle_timeout_s = 1.0;
+  return session;
+}
+
+/// A hand that is where a session can begin, and then does what it asks.
+std::string hand_in_place(const test::TempFolder& folder) {
+  write_file(folder / "operator", to_lines(test::parsed(test::short_session()).operator_script()));
+  return "operator " + (folder / "operator") + "\nwait 250\n";
+}
+
+SessionRunOptions on_the_clock(const std::string& file) {
+  SessionRunOptions options;
+  options.real_time = true;
+  options.recording = file;
+  return options;
+}
+
+TEST_CASE("On the clock a session takes its time, and every cycle is recorded or counted") {
+  const test::TempFolder folder;
+  Json json = test::short_session();
+  json.erase("creep");
+  json["indentations"]["hold"] = "0.2 s";
+  json["indentations"]["rest"] = "0.1 s";
+  HilSession session = test::parsed(json);
+  session.servo.most_late = 1001;
+  session.servo.most_missed = 1'000'000;
+  session.cycle_timeout_s = 1.0;
+  session.plant.watchdog_s = session.preparation.watchdog_s = 0.016;
+  const auto start = std::chrono::steady_clock::now();
+  const SessionRun run = run_session(session, {}, on_the_clock(folder / "r"));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  const HilRecording recording = read_recording(folder / "r");
+  // A machine that is stalled for longer than the watchdog waits ends the session early.
+  if (run.outcome.cause == StopCause::finished) {
+    CHECK(took.count() > 0.99 * session.duration_s());
+  }
+  CHECK_FALSE(run.outcome.scheduling.empty());
+  CHECK(run.outcome.dropped_records == 0);
+  // Missed periods are time too: rows and missed ones together are the cycles.
+  std::uint64_t lived = 0;
+  for (const ServoRecord& row : recording.rows) lived += 1 + static_cast<std::uint64_t>(row.missed);
+  CHECK(lived == run.outcome.cycles + 1);
+  CHECK((run.outcome.cause == StopCause::finished || run.outcome.cause == StopCause::watchdog));
+}
+
+TEST_CASE("A session on the clock that is interrupted stops safely and is whole") {
+  const test::TempFolder folder;
+  std::atomic<bool> stop{false};
+  SessionRunOptions options = on_the_clock(folder / "r");
+  options.interrupted = [&] { return stop.load(); };
+  std::thread later([&] {
+    std::this_thread::sleep_for(200ms);
+    stop = true;
+  });
+  const SessionRun run = run_session(patient_session(), {}, options);
+  later.join();
+  const bool cut_by_load = run.outcome.cause == StopCause::watchdog;  // the machine was stalled
+  CHECK((run.outcome.cause == StopCause::signal || cut_by_load));
+  CHECK(read_recording(folder / "r").closed);
+}
+
+long long event_ns(const std::string& file, const std::string& event) {
+  std::ifstream events(file);
+  std::string name;
+  long long time = 0;
+  while (events >> name >> time) {
+    if (name == event) return time;
+  }
+  return -1;
+}
+
+TEST_CASE(
+    "A call that hangs: forces are off within 10 ms, the cause is told, nobody waits for it") {
+  double best_ms = 1e9;
+  for (int attempt = 0; attempt < 10 && best_ms > 10.0; ++attempt) {
+    const test::TempFolder folder;
+    const std::string events = folder / "events";
+    write_file(folder / "script",
+               hand_in_place(folder) + "events " + events + "\nfault hang 350 2000\n");
+    (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+    HilSession session = patient_session();
+    session.cycle_timeout_s = 0.006;
+    DeviceChoice device;
+    device.kind = "omega7";
+    device.library = TPM_STAND_IN_DHD;
+    const auto start = std::chrono::steady_clock::now();
+    const SessionRun run = run_session(session, device, on_the_clock(folder / "r"));
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    (void)unsetenv("TPM_STAND_IN_SCRIPT");
+    REQUIRE(run.outcome.cause == StopCause::cycle_timeout);
+    const HilRecording recording = read_recording(folder / "r");
+    CHECK(recording.closed);
+    CHECK(recording.closing.at("cause") == "cycle timeout");
+    CHECK(took.count() < 2.0);  // the call itself takes as long
+    const long long hung = event_ns(events, "hang"), off = event_ns(events, "forces_off");
+    if (hung > 0 && off > hung) {  // else the machine itself hung before
+      best_ms = std::min(best_ms, 1e-6 * static_cast<double>(off - hung));
+      CHECK(recording.rows.size() >= 90);  // nothing before it is lost
+    }
+    // The stuck thread ends before its library gets another script.
+    for (int wait = 0; wait < 100 && hung > 0 && event_ns(events, "hang_over") < 0; ++wait) {
+      std::this_thread::sleep_for(50ms);
+    }
+    std::this_thread::sleep_for(300ms);
+  }
+  CHECK(best_ms <= test::allowed_cost("servo.forces_off_after_hang"));
+}
+
+TEST_CASE(
+    "A stall stands in the record with its whole length, and agrees with the missed periods") {
+  const test::TempFolder folder;
+  write_file(folder / "script",
+             hand_in_place(folder) + "events " + (folder / "events") + "\nfault hang 350 30\n");
+  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+  HilSession session = patient_session();
+  session.cycle_timeout_s = 1.0;
+  DeviceChoice device;
+  device.kind = "omega7";
+  device.library = TPM_STAND_IN_DHD;
+  SessionRunOptions options = on_the_clock(folder / "r");
+  const auto start = std::chrono::steady_clock::now();
+  options.interrupted = [start] { return std::chrono::steady_clock::now() - start > 1500ms; };
+  (void)run_session(session, device, options);
+  (void)unsetenv("TPM_STAND_IN_SCRIPT");
+  const HilRecording recording = read_recording(folder / "r");
+  const double period_s = session.servo.period_s;
+  double longest_s = 0.0;
+  for (const ServoRecord& row : recording.rows) {
+    INFO("cycle " << row.cycle << " woke late by " << row.woke_late_s << " s");
+    CHECK(row.woke_late_s >= (1.0 - 1e-6) * row.missed * period_s);
+    CHECK(row.woke_late_s <= (1.0 + 1e-6) * (row.missed + 1) * period_s);
+    longest_s = std::max(longest_s, static_cast<double>(row.woke_late_s));
+  }
+  CHECK(longest_s > 0.030 - 2.0 * period_s);
+}
+
+TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as its cause") {
+  double best_ms = 1e9;
+  for (int attempt = 0; attempt < 10 && best_ms > 10.0; ++attempt) {
+    const test::TempFolder folder;
+    const std::string events = folder / "events";
+    write_file(folder / "script",
+               hand_in_place(folder) + "events " + events + "\nfault slow 350 100000\n");
+    (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+    HilSession session = patient_session();
+    session.servo.most_late = 20;
+    DeviceChoice device;
+    device.kind = "omega7";
+    device.library = TPM_STAND_IN_DHD;
+    const SessionRun run = run_session(session, device, on_the_clock(folder / "r"));
+    (void)unsetenv("TPM_STAND_IN_SCRIPT");
+    REQUIRE(run.outcome.cause == StopCause::overrun_storm);
+    const HilRecording recording = read_recording(folder / "r");
+    CHECK(recording.closing.at("cause") == word_of(StopCause::overrun_storm));
+    REQUIRE_FALSE(recording.rows.empty());
+    CHECK(recording.rows.back().stop == StopCause::overrun_storm);
+    // One late cycle more than the session allows, each of them seen.
+    const auto late = [](const ServoRecord& row) { return (row.flags & kLate) != 0; };
+    CHECK(std::count_if(recording.rows.begin(), recording.rows.end(), late) == 21);
+    const long long slow = event_ns(events, "slow"), off = event_ns(events, "forces_off");
+    REQUIRE(off > 0);
+    best_ms = std::min(best_ms, 1e3 * run.outcome.stop_took_s);
+    // Each slow call makes one cycle late: the stop comes after 21 of them, not after seconds.
+    if (slow > 0) CHECK(1e-9 * static_cast<double>(off - slow) < 2.0);
+  }
+  CHECK(best_ms <= test::allowed_cost("servo.stop_with_slow_calls"));
+}
+
+TEST_CASE("Whatever throws while a session runs, its threads end and the forces are off") {
+  class Free final : public EmptySpace {
+   public:
+    ContactAnswer step(const ToolPose&) noexcept override { return {}; }
+  };
+  HilSession session = patient_session();
+  session.servo.gate.reset();
+  session.plant.least_watchdog_s = 10.0;
+  const auto device = std::make_shared<VirtualOmega7>(session.plant, session.operator_script());
+  RealTimeOptions options;
+  options.cycle_timeout_s = 5.0;
+  const RecordSink quiet = [](const ServoRecord&) {};
+
+  device->prepare(session.preparation);
+  options.interrupted = []() -> bool { throw Error(ExitCode::environment, "asking", "failed"); };
+  CHECK_THROWS_WITH(run_in_real_time(device, std::make_shared<Free>(), ServoSettings{session.servo},
+                                     quiet, options),
+                    Catch::Contains("asking: failed"));
+  CHECK(device->status().forces_off == ForcesOff::software);
+
+  device->prepare(session.preparation);
+  options.interrupted = {};
+  const ServoOutcome no_error = run_in_real_time(
+      device, std::make_shared<Free>(), ServoSettings{session.servo},
+      [](const ServoRecord& row) {
+        if (row.cycle == 50) throw 7;  // NOLINT: what is no error
+      },
+      options);
+  CHECK(no_error.cause == StopCause::exception);
+  CHECK_FALSE(no_error.detail.empty());
+  CHECK(device->status().forces_off == ForcesOff::software);
+
+  device->prepare(session.preparation);
+  CHECK(run_in_virtual_time(*device, *std::make_shared<Free>(), ServoSettings{session.servo},
+                            [](const ServoRecord&) { throw 7; })
+            .cause == StopCause::exception);
+  CHECK(device->status().forces_off == ForcesOff::software);
+}
+
+TEST_CASE("What goes through a triple buffer arrives whole, in order, the last one at last") {
+  struct Value {
+    long number = 0, negative = 0, twice = 0;
+  };
+  constexpr long kLast = 200'000;
+  TripleBuffer<Value> buffer;
+  std::thread writer([&] {
+    for (long i = 1; i <= kLast; ++i) buffer.write({i, -i, 2 * i});
+  });
+  long seen = 0, broken = 0;
+  while (seen < kLast) {
+    if (!buffer.refresh()) continue;
+    const Value& value = buffer.latest();
+    if (value.negative != -value.number || value.twice != 2 * value.number) ++broken;
+    if (value.number <= seen) ++broken;
+    seen = value.number;
+  }
+  writer.join();
+  CHECK(broken == 0);
+  CHECK_FALSE(buffer.refresh());
+}
+
+TEST_CASE("A network in a thread of its own follows the loop, however late it is, run after run") {
+  const LoopModel beside =
+      make_loop_model(test::parsed(test::network_session("network_beside")), true);
+  const LoopModel inside = make_loop_model(test::parsed(test::network_session("network")));
+  auto& model = dynamic_cast<NetworkBeside&>(*beside.model);
+  for (int run = 0; run < 2; ++run) {
+    model.reset();
+    inside.model->reset();
+    ContactAnswer answer, expected;
+    for (int i = 1; i <= 20'000 && (i <= 600 || model.age() > 5); ++i) {
+      const Eigen::Vector3d at = 1e-5 * std::min(i, 400) * beside.push;
+      expected = inside.model->step(at);
+      answer = model.step(at);
+      std::this_thread::sleep_for(500us);
+    }
+    INFO("run " << run);
+    CHECK(model.age() <= 5);
+    CHECK(answer.valid);
+    CHECK(expected.force_N.norm() > 0.1);
+    CHECK((answer.force_N - expected.force_N).norm() < 0.01 * expected.force_N.norm());
+  }
+}
+
+TEST_CASE("The jitter check counts and reports") {
+  DeviceChoice device;
+  HilSession session;
+  session.servo.period_s = 2e-3;
+  session.plant.least_watchdog_s = 1.0;
+  const JitterCheck check = check_jitter(device, session, 0.5, RealTimeWish::ignore);
+  CHECK(check.watchdog_s == session.preparation.watchdog_s);
+  CHECK(check.outcome.woke_late.count() > 0);
+  CHECK_FALSE(check.verdict.empty());
+}
+
+TEST_CASE("Quantiles of times are the upper edges of their bins, and beyond the bins the largest") {
+  TimeHistogram times;
+  for (int i = 0; i < 50; ++i) times.note(500);
+  for (int i = 0; i < 49; ++i) times.note(10'500);
+  times.note(60'000'000);
+  CHECK(times.count() == 100);
+  CHECK_THAT(times.quantile_s(0.5), Catch::Matchers::WithinRel(1e-6, 1e-12));
+  CHECK_THAT(times.quantile_s(0.51), Catch::Matchers::WithinRel(11e-6, 1e-12));
+  CHECK_THAT(times.quantile_s(0.99), Catch::Matchers::WithinRel(11e-6, 1e-12));
+  CHECK_THAT(times.quantile_s(1.0), Catch::Matchers::WithinRel(0.06, 1e-12));
+  CHECK_THAT(times.max_s(), Catch::Matchers::WithinRel(0.06, 1e-12));
+}
+
+TEST_CASE("The jitter check says no where a session with the same limits would have been stopped") {
+  JitterCheck check;
+  check.rate_Hz = 4000.0;
+  check.watchdog_s = check.cycle_timeout_s = 0.008;
+  check.late_limit = 100;
+  check.missed_limit = 50;
+  ServoOutcome& o = check.outcome;
+  o.cause = StopCause::finished;
+  o.cycles = 40'000;
+  for (int i = 0; i < 40'000; ++i) o.woke_late.note(30'000);
+  o.counts.missed = o.counts.most_consecutive_missed = 3;
+  assess(check);
+  CHECK(check.fit);
+  CHECK(check.verdict == "fit for 4000 Hz");
+  CHECK_THAT(check.advice, Catch::Contains("can do 4000 Hz; its longest stall was 0.03 ms"));
+
+  // One stall of 17 ms in ten seconds: 68 periods, 0.17 % of all.
+  o.counts.missed = o.counts.most_consecutive_missed = 68;
+  assess(check);
+  CHECK_FALSE(check.fit);
+  CHECK_THAT(check.verdict,
+             Catch::Contains("68 consecutive periods were missed, a session stops after 50"));
+  o.woke_late.note(17'000'000);
+  assess(check);
+  CHECK_THAT(check.verdict,
+             Catch::Contains("a stall of 17 ms is longer than the watchdog of 8 ms"));
+  CHECK_THAT(check.advice, Catch::Contains("longer than any watchdog of the device"));
+
+  check.outcome = ServoOutcome{};
+  o.cause = StopCause::finished;
+  o.cycles = 40'000;
+  o.counts.most_late = 101;
+  assess(check);
+  CHECK_THAT(check.verdict,
+             Catch::Contains("101 cycles of 1000 were late, a session stops after 100"));
+  o.counts.most_late = 100;
+  o.counts.missed = 900;
+  assess(check);
+  CHECK_THAT(check.verdict, Catch::Contains("2.25 % of the periods were missed"));
+  check.outcome = ServoOutcome{};
+  o.cause = StopCause::finished;
+  o.cycles = 1000;
+  for (int i = 0; i < 1000; ++i) o.woke_late.note(300'000);
+  assess(check);
+  CHECK_THAT(check.verdict, Catch::Contains("more than half a period"));
+  CHECK_THAT(check.advice, Catch::Contains("can do 1000 Hz; a lower"));
+}
+
+}  // namespace
+}  // namespace tpm::haptics

@@ -1,0 +1,438 @@
+// The vendor's library, stood in for by one with the same C interface and loaded in the same way.
+#include <sys/wait.h>
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "hil_scenes.hpp"
+#include "refusal.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/haptics/device/force_dimension.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/session/recording_export.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using Catch::Matchers::Contains;
+
+/// A script for the stand-in library, for as long as this lives.
+class Script {
+ public:
+  explicit Script(const std::string& lines) {
+    write_file(folder_ / "script", lines + "events " + (folder_ / "events") + "\n");
+    (void)setenv("TPM_STAND_IN_SCRIPT", (folder_ / "script").c_str(), 1);
+  }
+  ~Script() { (void)unsetenv("TPM_STAND_IN_SCRIPT"); }
+  Script(const Script&) = delete;
+  Script& operator=(const Script&) = delete;
+
+  [[nodiscard]] bool happened(const std::string& event) const {
+    std::ifstream events(folder_ / "events");
+    std::string name;
+    long long time = 0;
+    while (events >> name >> time) {
+      if (name == event) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] std::string file(const char* name) const { return folder_ / name; }
+
+ private:
+  test::TempFolder folder_;
+};
+
+std::string message_of(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const Error& error) {
+    CHECK(error.code() == ExitCode::environment);
+    return error.what();
+  }
+  FAIL("nothing was refused");
+  return {};
+}
+
+DeviceChoice stand_in() {
+  DeviceChoice choice;
+  choice.kind = "omega7";
+  choice.library = TPM_STAND_IN_DHD;
+  return choice;
+}
+
+struct Ran {
+  SessionRun run;
+  HilRecording recording;
+};
+
+Ran ran(const HilSession& session, const DeviceChoice& device, const std::string& file) {
+  SessionRunOptions options;
+  options.recording = file;
+  SessionRun run = run_session(session, device, options);
+  return {std::move(run), read_recording(file)};
+}
+
+/// Cycles before the session begins, in which the tool is at rest.
+constexpr std::uint64_t kWaited = 250;
+
+std::string operator_lines(const HilSession& session, const test::TempFolder& folder) {
+  write_file(folder / "operator", to_lines(session.operator_script()));
+  return "operator " + (folder / "operator") + "\nwait " + std::to_string(kWaited) + "\n";
+}
+
+TEST_CASE("A missing library is told with all that was tried") {
+  (void)setenv("FDSDK", "/no/sdk", 1);
+  const std::string message = message_of([] { ForceDimension device(""); });
+  (void)unsetenv("FDSDK");
+  CHECK_THAT(message, Contains("/no/sdk/lib/release/lin-x86_64-gcc/libdrd.so.3"));
+  CHECK_THAT(message, Contains("libdhd.so.3") && Contains("--dhd-library"));
+  CHECK_THAT(message_of([] { ForceDimension device("/no/such.so"); }), Contains("/no/such.so"));
+}
+
+TEST_CASE("A library without a symbol, or of another version, is refused by name") {
+  const Script script("");
+  CHECK_THAT(message_of([] { ForceDimension device(TPM_STAND_IN_DHD_WITHOUT_A_SYMBOL); }),
+             Contains("has no drdStop;"));
+  const Script old("version 2\n");
+  CHECK_THAT(message_of([] { ForceDimension device(TPM_STAND_IN_DHD); }),
+             Contains("is version 2.14.0.0"));
+}
+
+TEST_CASE("No device, and a device of another type, are told") {
+  {
+    const Script none("devices 0\n");
+    CHECK_THAT(message_of([] { (void)ForceDimension(TPM_STAND_IN_DHD).open(); }),
+               Contains("no device found"));
+  }
+  const Script other("type 33\n");
+  CHECK_THAT(message_of([] { (void)ForceDimension(TPM_STAND_IN_DHD).open(); }),
+             Contains("of type 33"));
+}
+
+TEST_CASE("The device says what it is; a link behind which a simulator may be is no hardware") {
+  const auto identity = [](const std::string& lines) {
+    const Script script(lines);
+    ForceDimension device(TPM_STAND_IN_DHD);
+    return device.open();
+  };
+  const DeviceIdentity real = identity("com_mode 0\n");
+  CHECK(real.hardware);
+  CHECK(real.serial == "4711");
+  CHECK(real.firmware == "2.50");
+  CHECK(real.library_version == "3.14.0.0");
+  CHECK(identity("com_mode 1\n").hardware);
+  for (const char* mode : {"com_mode 3\n", "com_mode 4\n", "com_mode 2\n"}) {
+    CHECK_FALSE(identity(mode).hardware);
+  }
+  CHECK(word_of(identity("com_mode 3\n").link) == "simulated");
+  CHECK(word_of(identity("com_mode 4\n").link) == "network");
+  CHECK(identity("type 37\n").left_handed);
+}
+
+TEST_CASE("A device that is not initialised does not move unasked") {
+  const Script script("initialised 0\n");
+  DevicePreparation preparation;
+  {
+    ForceDimension device(TPM_STAND_IN_DHD);
+    (void)device.open();
+    CHECK_THAT(message_of([&] { device.prepare(preparation); }), Contains("--may-move"));
+  }
+  CHECK_FALSE(script.happened("moved"));
+  preparation.may_move = true;
+  ForceDimension device(TPM_STAND_IN_DHD);
+  (void)device.open();
+  device.prepare(preparation);
+  CHECK(script.happened("moved"));
+}
+
+TEST_CASE("An initialisation that moves the device ends when it is interrupted, motors off") {
+  const Script script("initialised 0\ninit_ms 20000\n");
+  const auto start = std::chrono::steady_clock::now();
+  DevicePreparation preparation;
+  preparation.may_move = true;
+  preparation.interrupted = [&] { return script.happened("moved"); };
+  ForceDimension device(TPM_STAND_IN_DHD);
+  (void)device.open();
+  CHECK_THAT(message_of([&] { device.prepare(preparation); }),
+             Contains("the initialisation was interrupted; the motors are off"));
+  CHECK(script.happened("drd_stop"));
+  CHECK(script.happened("stop"));
+  CHECK(script.happened("forces_off"));
+  CHECK(script.happened("init_over"));
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(15));
+}
+
+TEST_CASE("An initialisation that does not end when told so is left behind") {
+  const Script script("initialised 0\ninit_ms 4000\nstubborn 1\n");
+  DevicePreparation preparation;
+  preparation.may_move = true;
+  preparation.interrupted = [&] { return script.happened("moved"); };
+  {
+    ForceDimension device(TPM_STAND_IN_DHD);
+    (void)device.open();
+    CHECK_THAT(message_of([&] { device.prepare(preparation); }), Contains("does not end"));
+    CHECK(script.happened("drd_stop"));
+    CHECK(script.happened("forces_off"));
+  }
+  CHECK_FALSE(script.happened("close"));  // a call is in the library still
+  for (int i = 0; i < 1000 && !script.happened("init_over"); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+}
+
+TEST_CASE("A session that cannot be prepared leaves no recording, and the next one runs") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  {
+    const Script script(operator_lines(session, folder) + "initialised 0\n");
+    SessionRunOptions options;
+    options.recording = folder / "r";
+    CHECK_THROWS_WITH(run_session(session, stand_in(), options), Contains("--may-move"));
+    CHECK_FALSE(std::filesystem::exists(folder / "r"));
+  }
+  const Script script(operator_lines(session, folder));
+  CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
+}
+
+TEST_CASE("The device is told the session's limit of the force") {
+  const HilSession session =
+      test::parsed(test::with(test::short_session(), "/limits/force", "3 N"));
+  const test::TempFolder folder;
+  const Script script(operator_lines(session, folder));
+  (void)ran(session, stand_in(), folder / "r");
+  CHECK(script.happened("max_force_3000"));
+}
+
+TEST_CASE("Without libdrd nobody can tell whether a device is initialised") {
+  const Script script("");
+  DevicePreparation preparation;
+  ForceDimension device(TPM_STAND_IN_DHD_WITHOUT_DRD);
+  (void)device.open();
+  CHECK_THAT(message_of([&] { device.prepare(preparation); }), Contains("cannot tell"));
+  preparation.take_as_ready = true;
+  device.prepare(preparation);
+}
+
+TEST_CASE("A session through the library gives the forces of the simulated device, bit for bit") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  const Ran direct = ran(session, {}, folder / "direct");
+  const Script script(operator_lines(session, folder) + "period 0.001\n");
+  const Ran loaded = ran(session, stand_in(), folder / "loaded");
+  CHECK(loaded.run.outcome.cause == StopCause::finished);
+  CHECK(direct.recording.simulated());
+  CHECK_FALSE(loaded.recording.simulated());
+  REQUIRE(loaded.recording.rows.size() == direct.recording.rows.size());
+  double peak = 0.0;
+  for (std::size_t i = 0; i < direct.recording.rows.size(); ++i) {
+    const ServoRecord& a = direct.recording.rows[i];
+    const ServoRecord& b = loaded.recording.rows[i];
+    REQUIRE(a.commanded_N[2] == b.commanded_N[2]);
+    REQUIRE(a.position_m[2] == b.position_m[2]);
+    peak = std::max(peak, a.commanded_N[2]);
+  }
+  CHECK(peak > 0.4);
+  CHECK(script.happened("stop"));
+  CHECK(script.happened("forces_off"));
+  CHECK(script.happened("close"));
+}
+
+TEST_CASE("An older status with 16 entries is read") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  const Script script(operator_lines(session, folder) + "entries 16\n");
+  CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
+}
+
+TEST_CASE("Time guards and saturation are counted and the session goes on") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  const Script script(operator_lines(session, folder) +
+                      "fault time_guard 350 40\nfault time_guard 750 3\nfault saturated 450 7\n");
+  const Ran r = ran(session, stand_in(), folder / "r");
+  CHECK(r.run.outcome.cause == StopCause::finished);
+  CHECK(r.run.outcome.counts.time_guards == 43);
+  CHECK(r.run.outcome.counts.saturations == 7);
+  int flagged = 0;
+  for (const ServoRecord& row : r.recording.rows)
+    flagged += (row.flags & kTimeGuarded) != 0 ? 1 : 0;
+  CHECK(flagged == 43);
+}
+
+TEST_CASE("Each fault ends in a safe stop within 10 ms of session, with its cause") {
+  struct Case {
+    const char* fault;
+    StopCause cause;
+    const char* event;
+  };
+  const Case fault = GENERATE(Case{"unplugged", StopCause::unplugged, "unplugged"},
+                              Case{"watchdog", StopCause::watchdog, "watchdog"},
+                              Case{"velocity", StopCause::velocity, "velocity"},
+                              Case{"communication", StopCause::communication, "communication"},
+                              Case{"status", StopCause::communication, "stop"},
+                              Case{"not_available", StopCause::communication, "stop"},
+                              Case{"nan", StopCause::position_not_finite, "nan"});
+  CAPTURE(fault.fault);
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  constexpr std::uint64_t kAt = 1777;
+  const Script script(operator_lines(session, folder) + "fault " + fault.fault + " " +
+                      std::to_string(kAt + kWaited) + " 1\n");
+  const Ran r = ran(session, stand_in(), folder / "r");
+  CHECK(script.happened(fault.event));
+  CHECK(r.run.outcome.cause == fault.cause);
+  // Nothing is lost before it, and the last row tells the cause.
+  REQUIRE(r.recording.rows.size() == r.run.outcome.cycles + 1);
+  CHECK(r.recording.rows.back().stop == fault.cause);
+  CHECK(r.recording.rows.back().cycle >= kAt);
+  CHECK(r.recording.rows.back().cycle <= kAt + 10);
+  CHECK(r.recording.closed);
+  CHECK(r.recording.closing.at("cause") == word_of(fault.cause));
+  CHECK(script.happened("stop"));
+  CHECK(script.happened("forces_off"));
+}
+
+TEST_CASE("Of several devices one is chosen by its kind, its serial number or its index") {
+  const Script script("types 63 35 37 60\n");
+  const auto opened = [](const char* kind, DeviceSelection which) {
+    ForceDimension device(TPM_STAND_IN_DHD, kind, which);
+    return device.open();
+  };
+  CHECK(opened("omega7", {.serial = 4713, .index = std::nullopt}).serial == "4713");
+  CHECK(opened("omega7", {.serial = std::nullopt, .index = 1}).serial == "4712");
+  CHECK(opened("falcon", {}).serial == "4714");
+  const DeviceIdentity delta = opened("delta3", {});
+  CHECK(delta.kind == "delta3");
+  REQUIRE(delta.assumptions.size() == 1);
+  CHECK_THAT(delta.assumptions.front(), Contains("never tried with delta.3"));
+  CHECK_THAT(message_of([&] { (void)opened("omega7", {}); }), Contains("2 devices are 'omega.7'") &&
+                                                                  Contains("serial 4713") &&
+                                                                  Contains("--serial NUMBER"));
+  CHECK_THAT(message_of([&] { (void)opened("sigma7", {}); }), Contains("0 devices are 'sigma.7'"));
+  CHECK_THAT(message_of([&] { (void)opened("omega7", {.serial = 99, .index = std::nullopt}); }),
+             Contains("0 devices are of serial 99"));
+  CHECK_THAT(message_of([&] { (void)opened("omega7", {.serial = std::nullopt, .index = 4}); }),
+             Contains("--index 0 to 3"));
+  CHECK_THAT(message_of([&] { (void)opened("omega7", {.serial = std::nullopt, .index = 0}); }),
+             Contains("type 63") && Contains("--device delta3"));
+  const auto seen = seen_devices(TPM_STAND_IN_DHD);
+  REQUIRE(seen.size() == 4);
+  CHECK(seen[3].kind == "falcon");
+  CHECK(seen[3].serial == 4714);
+}
+
+TEST_CASE("A session that asks for more than a device can take is refused") {
+  const Script script("type 60\n");
+  DeviceChoice falcon = stand_in();
+  falcon.kind = "falcon";
+  const HilSession session =
+      test::parsed(test::with(test::short_session(), "/limits/force", "9 N"));
+  CHECK_THROWS_WITH(run_session(session, falcon, {}),
+                    Contains("limits/force is 9 N; expected at most 8 N"));
+}
+
+TEST_CASE("Gripper, buttons and what was noted stand in the recording") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  {
+    const Script script(operator_lines(session, folder) + "gripper 0.0125\nbuttons 3\n");
+    SessionRunOptions options;
+    options.recording = folder / "r";
+    options.notes = {"2026-11-23", "op-1", "s 7"};
+    (void)run_session(session, stand_in(), options);
+    const HilRecording recording = read_recording(folder / "r");
+    CHECK(recording.header.at("notes").at("subject_code") == "s 7");
+    CHECK(recording.rows.at(500).gripper_m == 0.0125F);
+    CHECK(recording.rows.at(501).buttons == 3);
+    export_recording(recording, "", folder / "r.h5");
+    const Hdf5Reader file(folder / "r.h5");
+    CHECK(file.attribute("/", "operator_code") == "op-1");
+    CHECK(file.numbers("/rows/gripper_m").at(500) == static_cast<double>(0.0125F));
+  }
+  const Script script(operator_lines(session, folder));
+  const Ran r = ran(session, stand_in(), folder / "without");
+  CHECK(std::isnan(r.recording.rows.at(500).gripper_m));
+  CHECK(r.recording.rows.at(500).buttons == 0);
+}
+
+TEST_CASE("The device is told how it stands, and what cannot be told is refused") {
+  const test::TempFolder folder;
+  const Json mounted = test::with(test::short_session(), "/mounting",
+                                  {{"effector_mass_kg", 0.12}, {"base_angle_x", "30 deg"}});
+  const HilSession session = test::parsed(mounted);
+  {
+    const Script script(operator_lines(session, folder));
+    (void)ran(session, stand_in(), folder / "r");
+    CHECK(script.happened("effector_mass_120"));
+    CHECK(script.happened("base_angle_x_524"));
+  }
+  const HilSession other =
+      test::parsed(test::with(test::short_session(), "/mounting", {{"base_angle_z", "1 rad"}}));
+  const Script script(operator_lines(other, folder));
+  CHECK_THAT(message_of([&] { (void)ran(other, stand_in(), folder / "z"); }),
+             Contains("has no dhdSetBaseAngleZRad"));
+  CHECK_FALSE(std::filesystem::exists(folder / "z"));
+}
+
+TEST_CASE("A session that waits for a word begins with a button, and not without") {
+  const test::TempFolder folder;
+  const Json asked =
+      test::with(test::short_session(), "/start", {{"confirm", true}, {"limit", "2 s"}});
+  const HilSession session = test::parsed(asked);
+  {
+    const Script script(operator_lines(session, folder) + "buttons 1\n");
+    CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
+  }
+  const Script script(operator_lines(session, folder));
+  CHECK(ran(session, stand_in(), folder / "s").run.outcome.cause == StopCause::not_in_place);
+  CHECK(ran(session, {}, folder / "simulated").run.outcome.cause == StopCause::finished);
+}
+
+TEST_CASE("The whole way is walked through a library, and said not to be without one") {
+  const test::TempFolder folder;
+  write_file(folder / "session.json", to_text(test::short_session()));
+  const HilSession session = test::parsed(test::short_session());
+  const Script script(operator_lines(session, folder) + "initialised 0\n");
+  const std::string build = std::filesystem::path(TPM_TEST_PROGRAM).parent_path();
+  const auto walked = [&](const std::string& arguments) {
+    const std::string line = "TPM_BUILD='" + build + "' TPM_SESSION='" + (folder / "session.json") +
+                             "' TPM_RUN_OPTIONS='--time virtual' '" TPM_TEST_SOURCE_DIR
+                             "/scripts/try_vendor_library.sh' " +
+                             arguments + " > '" + (folder / "said") + "' 2>&1";
+    const int status = std::system(line.c_str());
+    return std::pair(WEXITSTATUS(status), read_file(folder / "said"));
+  };
+  const auto [none, nothing] = walked("");
+  CHECK(none == 1);
+  CHECK_THAT(nothing, Contains("not run: no vendor library"));
+  const auto [code, said] = walked("'" TPM_STAND_IN_DHD "' --may-move");
+  CAPTURE(said);
+  // Whether this machine is fit for a session is not asked here.
+  CHECK_THAT(said, Contains("0        omega.7, serial 4711: --device omega7 --serial 4711") &&
+                       Contains("drdIsInitialized answered 0") &&
+                       Contains("drdAutoInit answered 0") && Contains("== tpm hil verify"));
+  CHECK_THAT(said, !Contains("did not go through: run") && !Contains("check run") &&
+                       !Contains("verify\n-- exit code 1"));
+}
+
+TEST_CASE("A recording of the stand-in behind a network is labelled as simulated") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  const Script script(operator_lines(session, folder) + "com_mode 4\n");
+  const Ran r = ran(session, stand_in(), folder / "r");
+  CHECK(r.recording.simulated());
+  CHECK_THAT(device_line(r.recording), Contains("SIMULATED DEVICE"));
+}
+
+}  // namespace
+}  // namespace tpm::haptics

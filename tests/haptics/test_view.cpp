@@ -1,0 +1,157 @@
+// The pages of tpm view hold what the files say: read back from the page's own text.
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <fstream>
+
+#include "hil_scenes.hpp"
+#include "simulated_scene.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpm/haptics/show/view_file.hpp"
+#include "tpm/organ/run/simulation_file.hpp"
+
+using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::haptics;
+using namespace tpm::report;
+using Catch::Matchers::Contains;
+using test::TempFolder;
+
+namespace {
+
+/// Of base64, by its definition (RFC 4648), and not by the library that wrote it.
+std::string decoded(const std::string& text) {
+  static const std::string kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes;
+  unsigned bits = 0;
+  int held = 0;
+  for (const char c : text) {
+    if (c == '=') break;
+    const std::size_t digit = kDigits.find(c);
+    REQUIRE(digit != std::string::npos);
+    bits = (bits << 6U) | static_cast<unsigned>(digit);
+    held += 6;
+    if (held >= 8) {
+      held -= 8;
+      bytes += static_cast<char>((bits >> static_cast<unsigned>(held)) & 0xFFU);
+    }
+  }
+  return bytes;
+}
+
+/// An array of the page by its name.
+template <class Number>
+std::vector<Number> numbers(const std::string& html, const Json& name) {
+  const std::string begin = "id=\"" + name.get<std::string>() + "\" data-type=\"";
+  const std::size_t at = html.find(begin);
+  REQUIRE(at != std::string::npos);
+  const std::size_t from = html.find('>', at) + 1;
+  const std::string bytes = decoded(html.substr(from, html.find('<', from) - from));
+  std::vector<Number> values(bytes.size() / sizeof(Number));
+  std::memcpy(values.data(), bytes.data(), values.size() * sizeof(Number));
+  return values;
+}
+
+std::string recorded(const TempFolder& folder) {
+  const HilSession session = test::parsed(test::short_session());
+  SessionRunOptions options;
+  options.recording = folder / "s.tpmrec";
+  (void)run_session(session, DeviceChoice{}, options);
+  return options.recording.string();
+}
+
+}  // namespace
+
+TEST_CASE("the page of a result holds every state, to the precision of a float") {
+  const TempFolder folder;
+  const ExperimentScene scene = test::small_scene(
+      R"("title": "a </script> title", "anchors": [{"kind": "far_side", "fraction": 0.3}],
+         "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "1 s"},
+         "outputs": {"count": 9})");
+  const RunNetwork network = network_to_run(scene);
+  const SimulationRun run = simulate(scene, network);
+  const std::string file = folder / "r.h5";
+  write_simulation(scene, network, run, file);
+  const ViewPage page = view_file(file);
+  const Json& organ = page.description.at("organ");
+  const std::string html = page.html();
+  CHECK(page.description.at("simulated") == true);
+  CHECK_THAT(page.description.dump(), Contains(sha256_hex(read_file(file))));
+  CHECK_THAT(html, !Contains("a </script> title"));
+  const auto times = numbers<double>(html, organ.at("time_s"));
+  const auto moved = numbers<float>(html, organ.at("displacement_m"));
+  const std::vector<QuasiStaticState>& outputs = run.record.outputs;
+  REQUIRE(times.size() == outputs.size());
+  REQUIRE(moved.size() == times.size() * 3 * 60);
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    CHECK(times[k] == outputs[k].time_s);
+    const Positions u = network.spheres(outputs[k].position) - network.network.organ.position;
+    for (Eigen::Index i = 0; i < u.size(); ++i) {
+      const float shown = moved[k * 180 + static_cast<std::size_t>(i)];
+      REQUIRE(std::abs(static_cast<double>(shown) - u.reshaped()[i]) < 1e-7 * 4e-3 + 1e-18);
+    }
+  }
+  // With less room states are left out evenly; the first and the last stay, and the page says so.
+  ViewOptions options;
+  options.most_numbers = 4 * 180;
+  const ViewPage small = view_file(file, options);
+  const std::string small_html = small.html();
+  const auto few = numbers<double>(small_html, small.description.at("organ").at("time_s"));
+  CHECK(few.size() <= 5);
+  CHECK(few.front() == times.front());
+  CHECK(few.back() == times.back());
+  CHECK_THAT(small.description.at("organ").at("shown").get<std::string>(), Contains("so that"));
+}
+
+TEST_CASE("the page of a recording holds every sample, or the extremes of parts") {
+  const TempFolder folder;
+  const std::string file = recorded(folder);
+  const HilRecording recording = read_recording(file);
+  std::vector<float> depth_mm;
+  for (const ServoRecord& row : recording.rows) {
+    if (row.phase >= 0) depth_mm.push_back(static_cast<float>(1e3 * row.tool_depth_m));
+  }
+  const ViewPage page = view_file(file);
+  CHECK(page.description.at("simulated") == true);
+  CHECK(page.description.at("badge") == "SIMULATED DEVICE");
+  CHECK(page.description.at("samples") == depth_mm.size());
+  CHECK(page.description.at("organ").at("spheres") == 4);
+  const Json& whole = page.description.at("plots").at(0).at("series").at(0);
+  CHECK(numbers<float>(page.html(), whole.at("y")) == depth_mm);
+
+  ViewOptions options;
+  options.organ = false;
+  options.most_samples = 100;
+  const ViewPage parts = view_file(file, options);
+  CHECK_FALSE(parts.description.contains("organ"));
+  const auto part = parts.description.at("samples_per_value").get<std::size_t>();
+  CHECK(part == (depth_mm.size() + 99) / 100);
+  const Json& series = parts.description.at("plots").at(0).at("series").at(0);
+  const std::string html = parts.html();
+  const auto least = numbers<float>(html, series.at("y"));
+  const auto most = numbers<float>(html, series.at("most"));
+  REQUIRE(least.size() <= 100);
+  REQUIRE(most.size() == least.size());
+  for (std::size_t k = 0; k < least.size(); ++k) {
+    const auto from = depth_mm.begin() + static_cast<std::ptrdiff_t>(k * part);
+    const auto to =
+        depth_mm.begin() + static_cast<std::ptrdiff_t>(std::min((k + 1) * part, depth_mm.size()));
+    CHECK(least[k] == *std::min_element(from, to));
+    CHECK(most[k] == *std::max_element(from, to));
+  }
+}
+
+TEST_CASE("a law is viewed without its figures, and says so") {
+  const TempFolder folder;
+  std::ofstream(folder / "law.json") << R"({"law": "linear-1", "drive": "indentation_depth",
+    "response": "contact_force", "reference_m": 0.004, "provenance": "derived",
+    "parameters": {"k_inf_N_per_m": 60, "k1_N_per_m": 45, "tau1_s": 2, "contact_m": 0,
+                   "offset_N": 0}})";
+  const ViewPage page = view_file(folder / "law.json");
+  CHECK(page.description.at("table").at("rows").size() == 5);
+  CHECK(page.description.at("table").at("rows").at(2) == Json({"tau1_s", "2", "fixed"}));
+  CHECK_THAT(page.description.dump(), Contains("there is no figures.json beside the law"));
+}

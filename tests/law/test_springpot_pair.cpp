@@ -1,0 +1,212 @@
+// Two spring-pots in series as a sum of exponentials: weights against their formula in 100 digits,
+// sums against the Mittag-Leffler function of free orders, limits, derivatives.
+#include <algorithm>
+#include <boost/multiprecision/cpp_bin_float.hpp>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "fractional_reference.hpp"
+#include "tpm/law/relaxation/cardinal_weight.hpp"
+#include "tpm/law/relaxation/springpot_pair.hpp"
+
+using namespace tpm;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+using Digits100 = boost::multiprecision::cpp_bin_float_100;
+
+namespace {
+
+struct Orders {
+  double alpha;
+  double beta;
+};
+constexpr Orders kOrders[] = {{0.3, 0.0},   {0.9, 0.0},       {1.0, 0.0},       {1.0, 1e-9},
+                              {0.5, 0.1},   {0.5, 0.4999},    {0.6, 0.6},       {0.9, 0.3},
+                              {1.0, 0.3},   {1.0, 0.02},      {0.98, 0.01},     {0.999, 1e-4},
+                              {0.95, 0.9},  {1.0, 0.98},      {0.04, 0.01},     {0.2, 0.7},
+                              {0.01, 0.99}, {1 - 1e-12, 0.0}, {0.999999, 1e-7}, {1.0, 1.0}};
+
+/// G(t) of a pair and its mean over [0, t], tau = 1, by the Mittag-Leffler function.
+double pair_modulus(const Orders& o, double t) {
+  const double low = std::min(o.alpha, o.beta);
+  const double d = std::abs(o.alpha - o.beta);
+  return std::pow(t, -low) * mittag_leffler_with_slopes(d, 1.0 - low, std::pow(t, d)).value;
+}
+double pair_mean(const Orders& o, double t) {
+  const double low = std::min(o.alpha, o.beta);
+  const double d = std::abs(o.alpha - o.beta);
+  return std::pow(t, -low) * mittag_leffler_with_slopes(d, 2.0 - low, std::pow(t, d)).value;
+}
+
+/// The formula of PairWeight in 100 digits and real numbers; alpha > beta.
+Digits100 pair_weight(const Digits100& alpha, const Digits100& beta, const Digits100& x,
+                      const Digits100& h) {
+  const auto& pi = boost::math::constants::pi<Digits100>();
+  const Digits100 d = alpha - beta;
+  const Digits100 density = (exp(beta * x) * sin(pi * alpha) + exp(alpha * x) * sin(pi * beta)) /
+                            (2 * pi * (cosh(d * x) + cos(pi * d)));
+  // Re of exp(i p)/sinh(v), v = -d x + i b
+  const Digits100 b = pi * (1 - d);
+  const Digits100 p = pi * ((alpha + beta) / (2 * d) - x / h);
+  const Digits100 re = -sinh(d * x) * cos(b);
+  const Digits100 im = cosh(d * x) * sin(b);
+  const Digits100 residue =
+      exp(-pi * b / (d * h)) * (cos(p) * re + sin(p) * im) / (re * re + im * im);
+  return h * density - h / pi * residue;
+}
+
+FractionalWeights by_beta(const FractionalWeights& w) {
+  return weights_of(w.d_weight_d_beta, w.d_constant_d_beta, w.d_dashpot_d_beta_s);
+}
+
+FractionalWeights series_weights(const ExponentialSum& exponentials, const Orders& o, double tau) {
+  FractionalWeights w;
+  exponentials.springpots_in_series(o.alpha, o.beta, tau, w);
+  return w;
+}
+
+}  // namespace
+
+TEST_CASE("weights of two spring-pots agree with their formula in 100 digits", "[pair]") {
+  const double h = 0.23;
+  double worst = 0.0;
+  double worst_slope = 0.0;
+  for (const Orders& o : kOrders) {
+    if (!(o.alpha > o.beta + 1e-3)) continue;  // the formula divides by their difference
+    for (const double phase : {-0.5, -1e-3, 0.0, 1e-9, 0.02, 0.25}) {
+      const PairWeight weight(o.alpha, o.beta, phase, h);
+      for (const long m : {-60L, -7L, -1L, 0L, 1L, 2L, 9L, 60L}) {
+        if (o.alpha == 1.0 && o.beta == 0.0 && m == 0 && phase == 0.0) continue;  // 0/0 as written
+        const Digits100 x = Digits100(h) * (m + Digits100(phase));
+        const Digits100 e("1e-25");
+        const auto at = [&](const Digits100& da, const Digits100& db, const Digits100& dx) {
+          return pair_weight(o.alpha + da, o.beta + db, x + dx, h);
+        };
+        const PairValue w = weight.at(m);
+        const double scale = 1.0 + std::exp(static_cast<double>(x) * (x > 0 ? o.beta : o.alpha));
+        const auto off = [&](double got, const Digits100& up, const Digits100& down) {
+          const auto exact = static_cast<double>((up - down) / (2 * e));
+          return std::abs(got - exact) / std::max(scale, std::abs(exact));
+        };
+        worst = std::max(worst, std::abs(w.value - static_cast<double>(at(0, 0, 0))) / scale);
+        worst_slope = std::max({worst_slope, off(w.d_alpha, at(e, 0, 0), at(-e, 0, 0)),
+                                off(w.d_beta, at(0, e, 0), at(0, -e, 0)),
+                                off(w.d_x, at(0, 0, e), at(0, 0, -e))});
+      }
+    }
+  }
+  CHECK(worst < 1e-14);
+  CHECK(worst_slope < 1e-12);
+}
+
+TEST_CASE("without the second order the weights are those of one spring-pot", "[pair]") {
+  for (const double alpha : kAlphas) {
+    const CardinalWeight one(alpha, 0.13, 0.2);
+    const PairWeight two(alpha, 0.0, 0.13, 0.2);
+    const PairWeight exchanged(0.0, alpha, 0.13, 0.2);
+    for (long m = -200; m <= 200; m += 7) {
+      CAPTURE(alpha, m);
+      const SpectralValue w = one.at(m);
+      const PairValue p = two.at(m);
+      CHECK_THAT(p.value, WithinAbs(w.value, 1e-15));
+      CHECK_THAT(p.d_alpha, WithinAbs(w.d_alpha, 1e-12 * (1.0 + std::abs(w.d_alpha))));
+      CHECK_THAT(p.d_x, WithinAbs(w.d_x, 1e-13));
+      CHECK(exchanged.at(m).value == p.value);
+      CHECK(exchanged.at(m).d_beta == p.d_alpha);
+    }
+  }
+}
+
+TEST_CASE("the contour sum of a pair is the Mittag-Leffler function", "[pair]") {
+  for (const Orders& o : kOrders) {
+    for (const double t : decades(1e-6, 1e6, 13)) {
+      CAPTURE(o.alpha, o.beta, t);
+      const double size = 1.0 / (std::pow(t, o.alpha) + std::pow(t, o.beta));
+      CHECK_THAT(pair_relaxation(o.alpha, o.beta, t).value,
+                 WithinAbs(pair_modulus(o, t), 1e-12 * size));
+      CHECK_THAT(pair_relaxation_mean(o.alpha, o.beta, t).value,
+                 WithinAbs(pair_mean(o, t), 1e-12 * size));
+    }
+  }
+}
+
+TEST_CASE("the sum for two spring-pots keeps its stated error over the window", "[pair]") {
+  const double t_min = 0.02;
+  for (const double span : {1e3, 1e7}) {
+    const ExponentialSum exponentials(t_min, span * t_min, 1e-10);
+    double worst = 0.0;
+    double worst_slope = 0.0;
+    for (const Orders& o : kOrders) {
+      for (const double tau : decades(1e-4 * t_min, 1e4 * span * t_min, 12)) {
+        const FractionalWeights w = series_weights(exponentials, o, tau);
+        const double scale = pair_mean(o, t_min / tau);
+        for (const double t : decades(t_min, span * t_min, 14)) {
+          CAPTURE(o.alpha, o.beta, tau, t);
+          const PairValue exact = pair_relaxation(o.alpha, o.beta, t / tau);
+          const double off = std::abs(exponentials.at(w, t) - pair_modulus(o, t / tau));
+          const double mean = exponentials.integral_s(w, t) / t - pair_mean(o, t / tau);
+          if (std::max(off, std::abs(mean)) > 1e-10 * scale) {
+            FAIL_CHECK(off / scale << " " << mean / scale);
+          }
+          worst = std::max({worst, off / scale, std::abs(mean) / scale});
+          // derivatives are of the size of G and of G ln(t/tau)
+          const double steep = scale * (1.0 + std::abs(std::log(t_min / tau)));
+          worst_slope = std::max({worst_slope,
+                                  std::abs(exponentials.at(by_alpha(w), t) - exact.d_alpha) / steep,
+                                  std::abs(exponentials.at(by_beta(w), t) - exact.d_beta) / steep,
+                                  std::abs(exponentials.at(by_log_tau(w), t) - exact.d_x) / steep});
+        }
+      }
+    }
+    CAPTURE(span, worst, worst_slope);
+    CHECK(worst < 1e-10);
+    CHECK(worst_slope < 2e-9);
+  }
+}
+
+TEST_CASE("derivatives of the weights of a pair equal differences", "[pair]") {
+  const ExponentialSum exponentials(0.05, 2e3);
+  const double h = 1e-4;
+  for (const Orders& o : {Orders{0.3, 0.1}, Orders{0.6, 0.55}, Orders{0.9, 0.3}, Orders{0.97, 0.02},
+                          Orders{0.999, 0.002}, Orders{0.2, 0.7}}) {
+    for (const double log_tau : {-9.0, 0.0, 0.115, 3.0, 12.0}) {
+      const auto ask = [&](double da, double db, double dt) {
+        return series_weights(exponentials, {o.alpha + da, o.beta + db}, std::exp(log_tau + dt));
+      };
+      /// central differences of h and h/2 without their leading error
+      const auto slope = [&](double a, double b, double t) {
+        const auto d = [&](double e, const auto& part) {
+          return ((part(ask(a * e, b * e, t * e)) - part(ask(-a * e, -b * e, -t * e))) / (2 * e))
+              .eval();
+        };
+        const auto parts = [](const FractionalWeights& w) {
+          Eigen::VectorXd all(w.weight.size() + 2);
+          all << w.weight, w.constant, w.dashpot_s;
+          return all;
+        };
+        return ((4.0 * d(h / 2, parts) - d(h, parts)) / 3.0).eval();
+      };
+      const auto off = [&](const FractionalWeights& got, const Eigen::VectorXd& exact) {
+        Eigen::VectorXd all(got.weight.size() + 2);
+        all << got.weight, got.constant, got.dashpot_s;
+        return (all - exact).cwiseAbs().maxCoeff() / (1.0 + exact.cwiseAbs().maxCoeff());
+      };
+      const FractionalWeights w = ask(0, 0, 0);
+      CAPTURE(o.alpha, o.beta, log_tau);
+      CHECK(off(by_alpha(w), slope(1, 0, 0)) < 1e-8);
+      CHECK(off(by_beta(w), slope(0, 1, 0)) < 1e-8);
+      CHECK(off(by_log_tau(w), slope(0, 0, 1)) < 1e-8);
+    }
+  }
+}
+
+TEST_CASE("the sum of a pair does not know which spring-pot is named first", "[pair]") {
+  const ExponentialSum exponentials(0.01, 1e3);
+  const FractionalWeights one = series_weights(exponentials, {0.8, 0.25}, 0.4);
+  const FractionalWeights other = series_weights(exponentials, {0.25, 0.8}, 0.4);
+  CHECK((one.weight - other.weight).cwiseAbs().maxCoeff() <=
+        1e-14 * one.weight.cwiseAbs().maxCoeff());
+  CHECK((one.d_weight_d_alpha - other.d_weight_d_beta).cwiseAbs().maxCoeff() <=
+        1e-14 * one.d_weight_d_alpha.cwiseAbs().maxCoeff());
+  CHECK_THAT(one.dashpot_s, WithinRel(other.dashpot_s, 1e-10));
+}

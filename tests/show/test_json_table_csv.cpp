@@ -1,0 +1,23 @@
+// Tables of JSON answers as CSV.
+#include <catch2/catch.hpp>
+
+#include "tpm/show/json_table_csv.hpp"
+
+using namespace tpm;
+using namespace tpm::report;
+
+TEST_CASE("A table of JSON keeps its keys, and the units within, as CSV", "[csv]") {
+  const Json rows = Json::parse(R"([
+    {"name": "a, b", "experiment": {"depth_m": 0.005}, "force_N": 1.25, "safe": true,
+     "times_s": [0.5, 2], "parameters": [{"name": "k1", "lower": 1e-20}, {"name": "k2"}]},
+    {"name": "c", "force_N": null, "late": "x", "parameters": []}])");
+  CHECK(json_table_csv(rows) ==
+        "name,experiment_depth_m,force_N,safe,times_s,late\n"
+        "\"a, b\",0.005,1.25,yes,0.5 2,\n"
+        "c,,,,,x\n");
+  CHECK(json_table_csv(rows, "/parameters") ==
+        "name,experiment_depth_m,force_N,safe,times_s,parameters_name,parameters_lower,late\n"
+        "\"a, b\",0.005,1.25,yes,0.5 2,k1,1e-20,\n"
+        "\"a, b\",0.005,1.25,yes,0.5 2,k2,,\n"
+        "c,,,,,,,x\n");
+}
