@@ -39,8 +39,8 @@ if((NOT TPM_CONSUMER OR "haptics" IN_LIST TPM_WANTED) AND NOT TARGET tpm_httplib
   target_link_libraries(tpm_httplib INTERFACE ${TPM_HTTPLIB_LIBRARY})
 endif()
 
-# --- linked by the component organ, on which fit and haptics stand ------------------------------------
-if(TPM_CONSUMER AND NOT "organ" IN_LIST TPM_WANTED)
+# --- linked by the components files and organ, on which all but base, data and law stand ---------------
+if(TPM_CONSUMER AND NOT "files" IN_LIST TPM_WANTED AND NOT "work" IN_LIST TPM_WANTED)
   return()
 endif()
 tpm_find(SUNDIALS 6.4 COMPONENTS cvodes ida sunmatrixdense sunlinsoldense sunmatrixsparse sunlinsolklu

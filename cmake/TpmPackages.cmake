@@ -45,7 +45,7 @@ allocation, lock or exception. Sessions are checked with the schemas of the
 package tpmkit."
   "tpmkit (= ${PROJECT_VERSION})")
 tpm_package(development libtpmkit-dev libdevel "soft-tissue models, files for development"
-  "Headers, static libraries (one for each component: core, organ, fit,
+  "Headers, static libraries (one for each component, from base to
 haptics) and CMake package of tpmkit, and the header of its C interface
 for haptic loops."
   "libtpmkit-haptics1 (= ${PROJECT_VERSION})" libeigen3-dev libfmt-dev libceres-dev

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What a maintainer checks beyond scripts/test.sh: formatting, the slow tests (with Chromium, ParaView, the
-# Python package, notebooks and full disks), every source compiled with warnings as errors, the fast tests with the folders of
-# TPM_SANITIZED_FOLDERS (cmake/TpmFolders.cmake) under AddressSanitizer and UndefinedBehaviorSanitizer, those
+# Python package, notebooks and full disks), every source compiled with warnings as errors, the fast tests with the rooms of
+# TPM_SANITIZED_ROOMS (cmake/TpmRooms.cmake) under AddressSanitizer and UndefinedBehaviorSanitizer, those
 # with threads under ThreadSanitizer, a minute of fuzzing, clang-tidy on what changed. Stops at the first failure; ends with the
 # closing lines of the slow tests. Everything under sanitizers: presets asan-ubsan and tsan.
 #
@@ -48,7 +48,7 @@ tidy_changed build/tidy
 step "building with warnings as errors, and with sanitizers (build/check)"
 configure check
 build check
-step "fast tests with sanitized folders, tests with threads under ThreadSanitizer"
+step "fast tests with sanitized rooms, tests with threads under ThreadSanitizer"
 ctest --preset sanitized --parallel "$(nproc)" --no-tests=error | tail -n 4
 
 # 21 kinds of input, 6 s of processor time each, on two cores: a minute. scripts/fuzz.sh 310 is the whole of it.

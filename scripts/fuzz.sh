@@ -17,7 +17,7 @@ preset=fuzz quarters="1 2 3 4" coverage=1
 if [[ "${1:-}" == --readers ]]; then
   preset=fuzz-readers
   shift
-  [[ -f build/release/libtpmkit.a ]] || die "no build/release/libtpmkit.a; expected scripts/run.sh before"
+  [[ -f build/release/libtpmkit_base.a ]] || die "no build/release/libtpmkit_base.a; expected scripts/run.sh before"
 fi
 [[ "${1:-}" =~ ^[1-9][0-9]*$ ]] || die "usage: scripts/fuzz.sh [--readers] SECONDS [INPUT...]"
 seconds=$1
@@ -58,26 +58,26 @@ seeds_of() {
 # The file in src/tpm whose coverage is shown.
 reader_of() {
   case $1 in
-    delimited_text) echo store/delimited.cpp ;;
-    curve_description) echo curve/description.cpp ;;
-    digitizer_project) echo curve/import_wpd_json.cpp ;;
-    jpk) echo curve/import_jpk.cpp ;;
-    scene) echo scene/scene.cpp ;;
-    fit) echo fit/config.cpp ;;
+    delimited_text) echo files/delimited.cpp ;;
+    curve_description) echo files/import/description.cpp ;;
+    digitizer_project) echo files/import/import_wpd_json.cpp ;;
+    jpk) echo files/import/import_jpk.cpp ;;
+    scene) echo organ/scene/scene.cpp ;;
+    fit) echo fit/likelihood/config.cpp ;;
     fit_tables) echo fit/petab.cpp ;;
-    session) echo haptics/session.cpp ;;
+    session) echo haptics/session/session.cpp ;;
     sweep) echo sweep/sweep_file.cpp ;;
-    design) echo study/design_file.cpp ;;
-    organ_study) echo study/organ_study_file.cpp ;;
+    design) echo fit/design/design_file.cpp ;;
+    organ_study) echo paper/organ_study_file.cpp ;;
     costs) echo plan/operations.cpp ;;
-    law) echo law/law_file.cpp ;;
-    claims) echo study/claim_reader.cpp ;;
-    stl | obj) echo network/mesh_file.cpp ;;
-    recording) echo haptics/recording.cpp ;;
-    row_log) echo store/row_log.cpp ;;
+    law) echo files/blocks/law_file.cpp ;;
+    claims) echo paper/claims/claim_reader.cpp ;;
+    stl | obj) echo organ/body/mesh_file.cpp ;;
+    recording) echo haptics/session/recording.cpp ;;
+    row_log) echo files/row_log.cpp ;;
     sweep_log) echo sweep/block_log.cpp ;;
-    checkpoint) echo simulate/checkpoint.cpp ;;
-    hdf5) echo store/hdf5_contents.cpp ;;
+    checkpoint) echo organ/run/checkpoint.cpp ;;
+    hdf5) echo files/hdf5/hdf5_contents.cpp ;;
   esac
 }
 

@@ -114,7 +114,7 @@ def seconds_by_folder(build: Path) -> Counter:
             last[fields[3]] = (int(fields[1]) - int(fields[0])) / 1000
     total: Counter = Counter()
     for name, took in last.items():
-        folder = re.search(r"tpm_folder_(\w+?)(?:_of_\w+)?\.dir|(tpm_commands)\.dir", name)
+        folder = re.search(r"tpm_objects_(\w+?)\.dir|(tpm_commands)\.dir", name)
         total[folder.group(1) or "apps/tpm" if folder else "tests" if name.startswith("tests/") else "other"] += took
     return total
 

@@ -75,9 +75,10 @@ inline constexpr std::array<CapabilityEntry, 19> kCapabilities{{
 /// - ModelMaker (tpmkit/model.hpp), asked by fits, tables, designs: response and derivatives of the
 ///   element;
 /// - SceneRunner (tpmkit/simulation.hpp), asked by scenes and sweeps; by plans, if `planned`;
-/// - StateRunner (simulate/scene_runner.hpp), asked by scenes: all states, with checkpoints;
+/// - StateRunner (organ/run/scene_runner.hpp), asked by scenes: all states, with checkpoints;
 /// - PlanOffer (plan/plan_model.hpp), asked by plans: candidates that claim an error and a cost;
-/// - LoopMaker (haptics/loop_maker.hpp), asked by sessions: the model that the servo loop steps.
+/// - LoopMaker (haptics/session/loop_maker.hpp), asked by sessions: the model that the servo loop
+/// steps.
 ///
 /// Formulations are immutable (docs/adding.md, "A formulation").
 class Formulation {
@@ -118,8 +119,9 @@ class Formulation {
 
 using Formulations = std::span<const Formulation* const>;
 
-/// The formulations of this library by rank, from the files of formulations/, which the build
-/// lists.
+/// The formulations of this library by rank: of the component haptics all, of the component plan
+/// those of scenes alone. The build lists them from the files of plan/formulations and
+/// haptics/formulations.
 [[nodiscard]] Formulations shipped_formulations();
 
 /// All formulations by rank: those of the library. A program adds its own by defining this function
@@ -131,6 +133,11 @@ using Formulations = std::span<const Formulation* const>;
 ///     }
 [[nodiscard]] Formulations formulations();
 
+/// formulations() of the program that is running. The library asks by this name, which needs no
+/// list to be linked. Throws std::logic_error where none is: neither the component plan nor haptics
+/// is linked, and the program defines none itself.
+[[nodiscard]] Formulations linked_formulations();
+
 /// Joins several lists, ordered by rank and name. Throws std::logic_error if two share a name.
 [[nodiscard]] std::vector<const Formulation*> joined(std::initializer_list<Formulations> lists);
 
@@ -141,7 +148,7 @@ using Formulations = std::span<const Formulation* const>;
 template <class Predicate>
 [[nodiscard]] std::string formulations_that(Predicate&& is) {
   std::string names;
-  for (const Formulation* f : formulations()) {
+  for (const Formulation* f : linked_formulations()) {
     if (is(*f)) names.append(names.empty() ? "" : ", ").append(f->name());
   }
   return names;

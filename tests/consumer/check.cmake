@@ -13,7 +13,7 @@ endfunction()
 file(REMOVE_RECURSE ${WORK})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/first)
 file(RENAME ${WORK}/first ${WORK}/moved)
-foreach(component "" core organ fit haptics)
+foreach(component "" law files organ plan fit haptics)
   set(build ${WORK}/build_${component})
   run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE} -B ${build} -D CMAKE_PREFIX_PATH=${WORK}/moved -D COMPONENT=${component}
       -D CMAKE_CXX_COMPILER=${CXX} -D CMAKE_BUILD_TYPE=Release)

@@ -1,20 +1,22 @@
-// The component organ alone: the paper's star in a scene, by the closed form and by the network.
+// The component organ alone: two spheres, turned and moved, are as far apart as before.
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdio>
-#include <string>
-#include <tpmkit/scene.hpp>
+#include <tpmkit/organ.hpp>
 
 int main() {
-  double force_N[2];
-  int i = 0;
-  for (const std::string kind : {"closed_form", "quasi_static"}) {
-    const tpm::organ::Scene scene =
-        tpm::organ::Scene::parse(R"({"organ": {"kind": "star", "spacing": "30 mm"},
-      "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "40 mm/s", "hold": "1 s"},
-      "formulation": {"kind": ")" +
-                                 kind + R"("}})");
-    force_N[i++] = scene.run({0.1}).response[0];
-  }
-  std::printf("%.6f N, %.6f N\n", force_N[0], force_N[1]);
-  return std::abs(force_N[0] - force_N[1]) < 1e-5 * force_N[0] ? 0 : 1;
+  tpm::organ::Organ organ;
+  organ.name = "pair";
+  organ.position.resize(3, 2);
+  organ.position << 0.0, 0.002, 0.0, 0.0, 0.0, 0.0;
+  organ.normal = Eigen::Vector3d::UnitZ().replicate(1, 2);
+  organ.layer = {0, 0};
+  organ.radius = 0.001;
+  organ.spacing = 0.002;
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  const tpm::organ::Organ there = tpm::organ::moved(organ, turn, {1.0, 2.0, 3.0});
+  tpm::organ::require_valid(there, "consumer");
+  const double mean = tpm::organ::nearest_distances(there).front().mean;
+  std::printf("%.12f spacings\n", mean);
+  return std::abs(mean - 1.0) < 1e-12 ? 0 : 1;
 }

@@ -9,6 +9,19 @@
 
 namespace tpm {
 
+// Whoever knows all formulations stands above this room: the reference is weak, so that this room
+// is linked without them.
+[[gnu::weak]] Formulations formulations();
+
+Formulations linked_formulations() {
+  if (&formulations == nullptr) {
+    throw std::logic_error(
+        "no list of formulations is linked; expected the component plan or haptics of tpmkit, or a "
+        "definition of tpm::formulations()");
+  }
+  return formulations();
+}
+
 bool Formulation::takes(std::string_view key) const {
   return std::find(entry_.keys.begin(), entry_.keys.end(), key) != entry_.keys.end();
 }
@@ -29,7 +42,7 @@ std::vector<const Formulation*> joined(std::initializer_list<Formulations> lists
 }
 
 const Formulation* find_formulation(std::string_view name) {
-  const Formulations all = formulations();
+  const Formulations all = linked_formulations();
   const auto found = std::find_if(all.begin(), all.end(), [&](const Formulation* f) {
     return f->name() == name || (!name.empty() && f->also() == name);
   });

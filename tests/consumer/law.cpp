@@ -1,4 +1,4 @@
-// The component core alone: closed form and a law of the family, side by side.
+// The component law alone: closed form and a law of the family, side by side.
 #include <cmath>
 #include <cstdio>
 #include <tpmkit/law_model.hpp>
