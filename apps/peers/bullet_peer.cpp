@@ -4,6 +4,9 @@
 #include "peers.hpp"
 
 namespace tpm::peers {
+using namespace organ;
+using namespace accuracy;
+
 namespace {
 
 btVector3 bullet(const Eigen::Vector3d& v) {

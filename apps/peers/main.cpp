@@ -18,6 +18,9 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::show;
+using namespace tpm::organ;
+using namespace tpm::accuracy;
 
 namespace {
 

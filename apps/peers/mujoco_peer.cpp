@@ -7,6 +7,9 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::peers {
+using namespace organ;
+using namespace accuracy;
+
 namespace {
 
 struct FreeModel {

@@ -5,6 +5,8 @@
 #include "tpm/accuracy/posed.hpp"
 
 namespace tpm::peers {
+using namespace organ;
+using namespace accuracy;
 
 /// What an engine is told of the network: springs that pull along themselves, spheres with mass and
 /// drag, some held, one driven.

@@ -4,6 +4,8 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::peers {
+using namespace organ;
+using namespace accuracy;
 
 SpringNetwork::SpringNetwork(const PosedNetwork& posed)
     : rest(posed.network.rest),

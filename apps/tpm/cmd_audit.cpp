@@ -4,7 +4,7 @@
 
 #include "command.hpp"
 #include "tpm/files/json.hpp"
-#include "tpm/fit/claims/audit.hpp"
+#include "tpm/paper/claims/audit.hpp"
 #include "tpm/paper/show/study_report.hpp"
 #include "tpm/show/json_table_csv.hpp"
 

@@ -12,7 +12,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/writable.hpp"
-#include "tpm/plan/show/trajectory_report.hpp"
+#include "tpm/haptics/show/formulation_list.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpm/show/run_record.hpp"
 #include "tpm/work/progress.hpp"

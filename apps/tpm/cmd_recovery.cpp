@@ -38,7 +38,7 @@ double parse_order(const std::string& text) {
 }
 
 Json to_json(const std::vector<RecoveryResult>& results) {
-  const auto law = [](const RecoveryResult& result) { return tpm::study::to_json(result); };
+  const auto law = [](const RecoveryResult& result) { return tpm::fit::to_json(result); };
   return Json{{"laws", array_json(results, law)}};
 }
 

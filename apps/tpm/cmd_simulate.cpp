@@ -10,6 +10,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/replacement.hpp"
+#include "tpm/haptics/show/formulation_list.hpp"
 #include "tpm/organ/run/recorder.hpp"
 #include "tpm/organ/run/simulation_file.hpp"
 #include "tpm/organ/run/vtkhdf.hpp"

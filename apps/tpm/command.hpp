@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
 

@@ -16,6 +16,7 @@
 #include <string>
 #include <thread>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/work/interrupted.hpp"
 
 namespace tpm::python {

@@ -1,5 +1,6 @@
 // Protocols, laws, and the paper's element.
 #include "binding.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/warning.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/json.hpp"

@@ -1,6 +1,7 @@
 // tpmkit._core: the library for Python. The package around it (tpmkit/*.py) makes DataFrames,
 // Datasets and figures of what it answers.
 #include "binding.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/base/warning.hpp"
 #include "tpm/files/file.hpp"
@@ -74,7 +75,7 @@ PYBIND11_MODULE(_core, module) {
                              "frequency");
       },
       py::arg("text"), py::arg("dimension"));
-  module.def("share_dir", [] { return tpm::share_dir(); });
+  module.def("share_dir", [] { return tpm::files::share_dir(); });
   bind_laws(module);
   bind_fits(module);
   bind_contacts(module);

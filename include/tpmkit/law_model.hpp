@@ -8,8 +8,10 @@
 
 namespace tpm {
 
+namespace law {
 class ExponentialSum;
 struct LawAtParameters;
+}  // namespace law
 
 /// A law of the family as a Model for tables, fits and plans.
 ///
@@ -54,15 +56,15 @@ class LawModel final : public Model {
   void require_in_range(std::span<const double> values) const;
   /// The law at given parameters, branches in parallel form, as time steppers use it.
   /// @param rates of a fractional law, else unused
-  [[nodiscard]] LawAtParameters at(std::span<const double> values,
-                                   const ExponentialSum* rates) const;
+  [[nodiscard]] law::LawAtParameters at(std::span<const double> values,
+                                   const law::ExponentialSum* rates) const;
   [[nodiscard]] bool linear_in(std::size_t parameter) const override;
   [[nodiscard]] std::pair<double, double> range(std::size_t parameter) const override;
 
  private:
   struct Prepared;
   /// @param rates of a fractional law, else unused
-  [[nodiscard]] Prepared prepare(std::span<const double> values, const ExponentialSum* rates) const;
+  [[nodiscard]] Prepared prepare(std::span<const double> values, const law::ExponentialSum* rates) const;
   void require_no_jump(const Protocol& protocol, double contact) const;
 
   LawSpec spec_;

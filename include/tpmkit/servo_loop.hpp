@@ -54,7 +54,7 @@ struct SessionServo {
 };
 
 /// All settings and limits of a servo loop: those of its session, and those that follow from its
-/// model and device (loop_settings() in haptics/session_run.hpp).
+/// model and device (loop_settings() in haptics/session/session_run.hpp).
 struct ServoSettings : SessionServo {
   Eigen::Vector3d model_push = Eigen::Vector3d::UnitZ();  ///< the push in coordinates of the model
   /// If set, the tool moves in space. The model receives its displacement from `surface_m`, rotated

@@ -7,8 +7,8 @@
 #include "tpm/files/file.hpp"
 
 using namespace tpm;
-using namespace tpm::study;
-using namespace tpm::report;
+using namespace tpm::files;
+using namespace tpm::accuracy;
 using Catch::Matchers::Contains;
 using test::refusal_of;
 using test::TempFolder;

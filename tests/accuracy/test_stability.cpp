@@ -7,7 +7,7 @@
 
 using namespace tpm;
 using namespace tpm::organ;
-using namespace tpm::study;
+using namespace tpm::accuracy;
 
 TEST_CASE(
     "a run that stays on one side of the reference has a wrong steady state, whatever rounding "

@@ -16,6 +16,8 @@
 #include "tpmkit/units.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
 using Catch::Matchers::WithinRel;
 
 TEST_CASE("a quantity is a number and a unit of the right dimension") {
@@ -124,7 +126,7 @@ std::pair<int, int> blocks_until_full() {
   std::vector<std::unique_ptr<char[]>> blocks;
   blocks.reserve(100);
   int before = 0;
-  const tpm::MemoryReserve reserve(20 * kMegabyte);
+  const tpm::base::MemoryReserve reserve(20 * kMegabyte);
   try {
     while (blocks.size() < 100) {
       blocks.emplace_back(new char[8 * kMegabyte]);
@@ -153,6 +155,6 @@ TEST_CASE("A reserve of memory meets the request that fails, and says that it wa
   int status = 0;
   REQUIRE(::waitpid(child, &status, 0) == child);
   CHECK(status == 0);
-  const tpm::MemoryReserve unused(kMegabyte);
+  const tpm::base::MemoryReserve unused(kMegabyte);
   CHECK_NOTHROW(unused.require_unused());
 }

@@ -7,11 +7,12 @@
 #include "expected_values.hpp"
 #include "sensitivity_problems.hpp"
 #include "tpm/base/grid_convergence.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/point_set.hpp"
 #include "tpm/base/sensitivity.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::base {
 namespace {
 
 using Catch::Matchers::WithinAbs;
@@ -170,4 +171,4 @@ TEST_CASE("A design out of range is refused in one line") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::base

@@ -8,6 +8,7 @@
 
 using namespace tpm;
 using namespace tpm::organ;
+using namespace tpm::contact;
 using namespace tpm::testing;
 
 namespace {

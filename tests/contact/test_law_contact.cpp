@@ -17,7 +17,9 @@
 #include "tpm/haptics/verify/verify.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::haptics {
+namespace tpm::contact {
+using namespace haptics;
+
 namespace {
 
 using Catch::Matchers::Contains;
@@ -287,4 +289,4 @@ TEST_CASE("A motion and a law named in a call stand beside the caller, not besid
 }
 
 }  // namespace
-}  // namespace tpm::haptics
+}  // namespace tpm::contact

@@ -14,8 +14,10 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using namespace tpm::organ;
-using namespace tpm::study;
+using namespace tpm::contact;
+using namespace tpm::accuracy;
 using tpm::testing::OrganScene;
 
 namespace {

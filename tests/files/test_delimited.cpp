@@ -4,6 +4,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using Catch::Matchers::WithinRel;
 
 namespace {

@@ -24,12 +24,13 @@
 #include "tpmkit/curve_file.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using test::ErrorCase;
-using test::files;
 using test::Files;
 using test::kGarbage;
 using test::long_line;
 using test::TempFolder;
+using test::with_files;
 
 namespace {
 
@@ -54,11 +55,11 @@ std::vector<ErrorCase> curve_csv_cases() {
   const std::string show = "data show {}/c.csv";
   const std::string head = "depth_mm,force_N,provenance\n";
   const auto points = [](std::string csv) {
-    return files({{"c.json", kPointsJson}, {"c.csv", std::move(csv)}});
+    return with_files({{"c.json", kPointsJson}, {"c.csv", std::move(csv)}});
   };
   return {
-      {type, "missing", show, files({{"c.json", kPointsJson}})},
-      {type, "missing description", show, files({{"c.csv", head}})},
+      {type, "missing", show, with_files({{"c.json", kPointsJson}})},
+      {type, "missing description", show, with_files({{"c.csv", head}})},
       {type, "empty", show, points("")},
       {type, "header only", show, points(head)},
       {type, "wrong column", show, points("depth_mm,farce_N,provenance\n2,1,table\n")},
@@ -73,7 +74,7 @@ std::vector<ErrorCase> curve_csv_cases() {
       {type, "binary garbage", show, points(kGarbage)},
       {type, "100 MB line", show, points(head + long_line())},
       {type, "unsorted time", show,
-       files({{"c.json", kRecordingJson}, {"c.csv", "time_s,force_N\n0,0\n2,1\n1,1\n"}})},
+       with_files({{"c.json", kRecordingJson}, {"c.csv", "time_s,force_N\n0,0\n2,1\n1,1\n"}})},
   };
 }
 
@@ -85,11 +86,11 @@ std::vector<ErrorCase> curve_json_cases() {
     const auto at = json.find(from);
     if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
     json.replace(at, from.size(), to);
-    return files({{"c.json", json}, {"c.csv", "depth_mm,force_N,provenance\n2,1,table\n"}});
+    return with_files({{"c.json", json}, {"c.csv", "depth_mm,force_N,provenance\n2,1,table\n"}});
   };
-  const auto json = [](std::string text) { return files({{"c.json", std::move(text)}}); };
+  const auto json = [](std::string text) { return with_files({{"c.json", std::move(text)}}); };
   return {
-      {type, "missing", show, files({})},
+      {type, "missing", show, with_files({})},
       {type, "empty", show, json("")},
       {type, "truncated", show, json(kPointsJson.substr(0, 100))},
       {type, "binary garbage", show, json(kGarbage)},
@@ -112,9 +113,9 @@ std::vector<ErrorCase> machine_cases() {
   const std::string type = "machine export";
   const std::string import = "data import {}/m.csv -o {}/out";
   const std::string head = "Time,Force,Depth\ns,N,mm\n";
-  const auto machine = [](std::string text) { return files({{"m.csv", std::move(text)}}); };
+  const auto machine = [](std::string text) { return with_files({{"m.csv", std::move(text)}}); };
   return {
-      {type, "missing", import, files({})},
+      {type, "missing", import, with_files({})},
       {type, "empty", import, machine("")},
       {type, "header only", import, machine(head)},
       {type, "wrong column", import, machine("a,b,c\n0,0,0\n1,1,1\n")},
@@ -145,12 +146,12 @@ std::vector<ErrorCase> spectrum_cases() {
   const std::string import = "data import {}/m.csv -o {}/out";
   const std::string head = "frequency_Hz,storage_Pa,loss_Pa\n";
   const auto rows = [&head](const std::string& text) {
-    return files({{"c.json", kSpectrumJson}, {"c.csv", head + text}});
+    return with_files({{"c.json", kSpectrumJson}, {"c.csv", head + text}});
   };
   const auto described = [&head](const std::string& from, const std::string& to) {
-    return files({{"c.json", replaced(kSpectrumJson, from, to)}, {"c.csv", head + "1,1,1\n"}});
+    return with_files({{"c.json", replaced(kSpectrumJson, from, to)}, {"c.csv", head + "1,1,1\n"}});
   };
-  const auto machine = [](std::string text) { return files({{"m.csv", std::move(text)}}); };
+  const auto machine = [](std::string text) { return with_files({{"m.csv", std::move(text)}}); };
   return {
       {type, "frequency of 0", show, rows("0,1,1\n")},
       {type, "frequency twice", show, rows("1,1,1\n1,2,2\n")},
@@ -175,13 +176,13 @@ std::vector<ErrorCase> spectrum_cases() {
 std::vector<ErrorCase> digitizer_cases() {
   const std::string type = "WebPlotDigitizer project";
   const std::string import = "data import {}/w.json -o {}/out --x time:s --y contact_force:N";
-  const auto project = [](std::string text) { return files({{"w.json", std::move(text)}}); };
+  const auto project = [](std::string text) { return with_files({{"w.json", std::move(text)}}); };
   const auto data = [&project](const std::string& points) {
     return project(R"({"axesColl": [], "datasetColl": [{"name": "d", "axesName": "XY", "data": [)" +
                    points + "]}]}");
   };
   return {
-      {type, "missing", import, files({})},
+      {type, "missing", import, with_files({})},
       {type, "empty", import, project("")},
       {type, "truncated", import, project(R"({"datasetColl": [{"name": "d", "da)")},
       {type, "another JSON file", import, project(R"({"a": 1})")},
@@ -211,14 +212,14 @@ std::vector<ErrorCase> hdf5_cases() {
   const std::string type = "HDF5";
   const std::string show = "data show {}/p.h5";
   return {
-      {type, "missing", show, files({})},
-      {type, "empty", show, files({{"p.h5", ""}})},
+      {type, "missing", show, with_files({})},
+      {type, "empty", show, with_files({{"p.h5", ""}})},
       {type, "truncated", show, packed(0.5)},
-      {type, "signature only", show, files({{"p.h5", "\x89HDF\r\n\x1a\n"}})},
-      {type, "binary garbage", show, files({{"p.h5", kGarbage}})},
-      {type, "100 MB line", show, files({{"p.h5", long_line()}})},
-      {type, "curve twice", "data pack evren_static evren_static -o {}/out.h5", files({})},
-      {type, "unknown curve", "data pack evren_static nobody -o {}/out.h5", files({})},
+      {type, "signature only", show, with_files({{"p.h5", "\x89HDF\r\n\x1a\n"}})},
+      {type, "binary garbage", show, with_files({{"p.h5", kGarbage}})},
+      {type, "100 MB line", show, with_files({{"p.h5", long_line()}})},
+      {type, "curve twice", "data pack evren_static evren_static -o {}/out.h5", with_files({})},
+      {type, "unknown curve", "data pack evren_static nobody -o {}/out.h5", with_files({})},
   };
 }
 
@@ -242,18 +243,19 @@ std::vector<ErrorCase> fit_config_cases() {
   const std::string type = "fit configuration";
   const std::string fit = "fit {}/f.json --format json -o {}/out";
   const auto config = [](std::string text) {
-    return files({{"c.json", kFittedJson}, {"c.csv", kFittedCsv}, {"f.json", std::move(text)}});
+    return with_files(
+        {{"c.json", kFittedJson}, {"c.csv", kFittedCsv}, {"f.json", std::move(text)}});
   };
   const auto with = [&](const std::string& from, const std::string& to) {
     return config(replaced(kFitConfig, from, to));
   };
   const auto data = [](const std::string& from, const std::string& to) {
-    return files({{"c.json", kFittedJson},
-                  {"c.csv", replaced(kFittedCsv, from, to)},
-                  {"f.json", kFitConfig}});
+    return with_files({{"c.json", kFittedJson},
+                       {"c.csv", replaced(kFittedCsv, from, to)},
+                       {"f.json", kFitConfig}});
   };
   return {
-      {type, "missing", fit, files({})},
+      {type, "missing", fit, with_files({})},
       {type, "empty", fit, config("")},
       {type, "truncated", fit, config(kFitConfig.substr(0, 120))},
       {type, "binary garbage", fit, config(kGarbage)},
@@ -314,9 +316,9 @@ std::vector<ErrorCase> oscillation_cases() {
   const std::string type = "fit of a spectrum";
   const std::string fit = "fit {}/f.json --format json -o {}/out";
   const auto fitted = [](std::string config, const std::string& rows) {
-    return files({{"c.json", kSpectrumJson},
-                  {"c.csv", "frequency_Hz,storage_Pa,loss_Pa\n" + rows},
-                  {"f.json", std::move(config)}});
+    return with_files({{"c.json", kSpectrumJson},
+                       {"c.csv", "frequency_Hz,storage_Pa,loss_Pa\n" + rows},
+                       {"f.json", std::move(config)}});
   };
   const auto with = [&](const std::string& from, const std::string& to) {
     return fitted(replaced(kOscillationConfig, from, to), "1,1000,100\n");
@@ -361,7 +363,7 @@ std::vector<ErrorCase> fit_tables_cases() {
     for (auto& [name, bytes] : list) {
       if (name == file) bytes = replaced(bytes, from, to);
     }
-    return files(std::move(list));
+    return with_files(std::move(list));
   };
   return {
       {type, "table is missing", fit, with("f.json", "m.csv", "n.csv")},
@@ -392,12 +394,12 @@ const std::string kClaims = R"({
 std::vector<ErrorCase> claims_cases() {
   const std::string type = "claims file";
   const std::string audit = "audit {}/c.json -o {}/out";
-  const auto claims = [](std::string text) { return files({{"c.json", std::move(text)}}); };
+  const auto claims = [](std::string text) { return with_files({{"c.json", std::move(text)}}); };
   const auto with = [&](const std::string& from, const std::string& to) {
     return claims(replaced(kClaims, from, to));
   };
   return {
-      {type, "missing", audit, files({})},
+      {type, "missing", audit, with_files({})},
       {type, "empty", audit, claims("")},
       {type, "truncated", audit, claims(kClaims.substr(0, 150))},
       {type, "binary garbage", audit, claims(kGarbage)},
@@ -429,12 +431,12 @@ const std::string kDesign = R"({"title": "t", "law": {"name": "linear-1", "refer
 std::vector<ErrorCase> design_cases() {
   const std::string type = "design";
   const std::string run_design = "design {}/d.json --check 0 -o {}/out";
-  const auto design = [](std::string text) { return files({{"d.json", std::move(text)}}); };
+  const auto design = [](std::string text) { return with_files({{"d.json", std::move(text)}}); };
   const auto with = [&](const std::string& from, const std::string& to) {
     return design(replaced(kDesign, from, to));
   };
   return {
-      {type, "missing", run_design, files({})},
+      {type, "missing", run_design, with_files({})},
       {type, "missing key", run_design, with("\"title\": \"t\",", "")},
       {type, "wrong unit", run_design, with("2 s", "2 mm")},
       {type, "rate of 0", run_design, with("4 mm/s", "0 mm/s")},
@@ -457,12 +459,12 @@ std::vector<ErrorCase> recording_folder_cases() {
     csv += std::to_string(0.1 * i) + "," + std::to_string(depth_mm) + "," +
            std::to_string(0.1 * depth_mm) + "," + (i < 20 ? "a" : "b") + "\n";
   }
-  const auto folder = files({{"a1.csv", csv}});
+  const auto folder = with_files({{"a1.csv", csv}});
   const auto fit = [](const std::string& options) {
     return "fit {} --no-draw --law linear-1 " + options + " -o {}/out";
   };
   return {
-      {type, "no recording", "fit {} --no-draw -o {}/out", files({})},
+      {type, "no recording", "fit {} --no-draw -o {}/out", with_files({})},
       {type, "name without a specimen", fit("--group-by '(cow[0-9])'"), folder},
       {type, "two groups in a pattern", fit("--group-by '(a)(1)'"), folder},
       {type, "no pattern", fit("--group-by '(['"), folder},
@@ -481,14 +483,14 @@ const std::string kLaw = R"({"law": "linear-1", "drive": "indentation_depth",
 std::vector<ErrorCase> law_cases() {
   const std::string type = "law file";
   const std::string spectrum = "spectrum {}/l.json -o {}/out";
-  const auto law = [](std::string text) { return files({{"l.json", std::move(text)}}); };
+  const auto law = [](std::string text) { return with_files({{"l.json", std::move(text)}}); };
   const auto with = [&](const std::string& from, const std::string& to) {
     return law(replaced(kLaw, from, to));
   };
   const std::string to_febio = "export {}/l.json --to febio -o {}/out";
   const std::string bar = R"("k1_N_per_m": 30.0, "tau1_s": 1.5)";
   return {
-      {type, "missing", spectrum, files({})},
+      {type, "missing", spectrum, with_files({})},
       {type, "empty", spectrum, law("")},
       {type, "truncated", spectrum, law(kLaw.substr(0, 90))},
       {type, "binary garbage", spectrum, law(kGarbage)},
@@ -535,12 +537,12 @@ std::string polygon(int corners) {
 std::vector<ErrorCase> scene_cases() {
   const std::string type = "scene";
   const std::string check = "network check {}/s.json";
-  const auto scene = [](std::string text) { return files({{"s.json", std::move(text)}}); };
+  const auto scene = [](std::string text) { return with_files({{"s.json", std::move(text)}}); };
   // A dented tetrahedron without its last face.
   const std::string corners = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nv 3 3 3\n";
   const std::string open = corners + "f 1 3 2\nf 1 2 4\nf 2 3 5\nf 3 4 5\nf 4 2 5\n";
   const auto mesh = [&](std::string obj) {
-    return files(
+    return with_files(
         {{"m.obj", std::move(obj)},
          {"s.json", R"({"organ": {"kind": "mesh", "mesh": "m.obj", "unit": "cm", "count": 90}})"}});
   };
@@ -550,7 +552,7 @@ std::vector<ErrorCase> scene_cases() {
   const auto organ = [&](const std::string& keys) { return scene(R"({"organ": {)" + keys + "}}"); };
   const std::string listed = R"("kind": "listed", "unit": "mm", "spacing": "20 mm", "spheres": )";
   return {
-      {type, "missing", check, files({})},
+      {type, "missing", check, with_files({})},
       {type, "empty", check, scene("")},
       {type, "truncated", check, scene("{\"organ\": {")},
       {type, "binary garbage", check, scene(kGarbage)},
@@ -582,8 +584,9 @@ std::vector<ErrorCase> scene_cases() {
       {type, "face of too many corners", check, mesh(polygon(5000))},
       {type, "mesh that names an endless file", check, mesh("mtllib /dev/zero\n" + open)},
       {type, "landing far off", check,
-       files({{"m.obj", corners + "f 1 3 2\nf 1 2 4\nf 2 3 5\nf 3 4 5\nf 4 2 5\nf 1 4 3\n"},
-              {"s.json", R"({"organ": {"kind": "mesh", "mesh": "m.obj", "unit": "cm", "count": 90,
+       with_files(
+           {{"m.obj", corners + "f 1 3 2\nf 1 2 4\nf 2 3 5\nf 3 4 5\nf 4 2 5\nf 1 4 3\n"},
+            {"s.json", R"({"organ": {"kind": "mesh", "mesh": "m.obj", "unit": "cm", "count": 90,
 "landing": ["50 m", "0 m", "0 m"]}})"}})},
       {type, "missing mesh", check,
        organ(R"("kind": "mesh", "mesh": "m.stl", "unit": "mm", "count": 90)")},
@@ -607,17 +610,17 @@ std::vector<ErrorCase> scene_cases() {
       {type, "one radial bond a sphere", check, liver(R"("bonds": {"diagonals": false})")},
       {type, "unguided star", check, scene(R"({"organ": {"kind": "star"}, "sliders": []})")},
       {type, "scene and options", check + " --count 424", liver(R"("title": "t")")},
-      {type, "bad count", "network build --count 1 -o {}/out", files({})},
+      {type, "bad count", "network build --count 1 -o {}/out", with_files({})},
   };
 }
 
 std::vector<ErrorCase> table_option_cases() {
   const std::string type = "options of tpm tables";
   return {
-      {type, "depth that overflows", "tables --depths 1e300 -o {}/out", files({})},
-      {type, "depth in newtons", "tables --depths '2,8 N' -o {}/out", files({})},
-      {type, "infinite depth", "tables --depths 1e400 -o {}/out", files({})},
-      {type, "depth without unit", "tables --depths inf -o {}/out", files({})},
+      {type, "depth that overflows", "tables --depths 1e300 -o {}/out", with_files({})},
+      {type, "depth in newtons", "tables --depths '2,8 N' -o {}/out", with_files({})},
+      {type, "infinite depth", "tables --depths 1e400 -o {}/out", with_files({})},
+      {type, "depth without unit", "tables --depths inf -o {}/out", with_files({})},
   };
 }
 
@@ -629,12 +632,12 @@ const std::string kSession = R"({"model": {"kind": "condensed", "scene": {
 std::vector<ErrorCase> session_cases() {
   const std::string type = "session";
   const std::string run_session = "hil run {}/h.json -o {}/out";
-  const auto session = [](std::string text) { return files({{"h.json", std::move(text)}}); };
+  const auto session = [](std::string text) { return with_files({{"h.json", std::move(text)}}); };
   const auto with = [&](const std::string& from, const std::string& to) {
     return session(replaced(kSession, from, to));
   };
   return {
-      {type, "missing", run_session, files({})},
+      {type, "missing", run_session, with_files({})},
       {type, "empty", run_session, session("")},
       {type, "truncated", run_session, session(kSession.substr(0, 90))},
       {type, "binary garbage", run_session, session(kGarbage)},
@@ -655,9 +658,11 @@ std::vector<ErrorCase> session_cases() {
 std::vector<ErrorCase> session_recording_cases() {
   const std::string type = "recording of a session";
   const std::string to_hdf5 = "hil export {}/r.tpmrec -o {}/out.h5";
-  const auto recording = [](std::string bytes) { return files({{"r.tpmrec", std::move(bytes)}}); };
+  const auto recording = [](std::string bytes) {
+    return with_files({{"r.tpmrec", std::move(bytes)}});
+  };
   return {
-      {type, "missing", to_hdf5, files({})},
+      {type, "missing", to_hdf5, with_files({})},
       {type, "empty", to_hdf5, recording("")},
       {type, "binary garbage", to_hdf5, recording(kGarbage)},
       {type, "100 MB line", to_hdf5, recording(long_line())},
@@ -665,16 +670,16 @@ std::vector<ErrorCase> session_recording_cases() {
       {type, "verification of garbage", "hil verify {}/r.tpmrec", recording(kGarbage)},
       {type, "replay of garbage",
        "hil run {}/h.json --device replay --recording {}/r.tpmrec -o {}/out",
-       files({{"h.json", kSession}, {"r.tpmrec", kGarbage}})},
+       with_files({{"h.json", kSession}, {"r.tpmrec", kGarbage}})},
   };
 }
 
 std::vector<ErrorCase> view_cases() {
   const std::string type = "file to view";
   const std::string show = "view {}/f -o {}/out.html";
-  const auto file = [](std::string bytes) { return files({{"f", std::move(bytes)}}); };
+  const auto file = [](std::string bytes) { return with_files({{"f", std::move(bytes)}}); };
   return {
-      {type, "missing", show, files({})},
+      {type, "missing", show, with_files({})},
       {type, "empty", show, file("")},
       {type, "binary garbage", show, file(kGarbage)},
       {type, "100 MB line", show, file(long_line())},
@@ -768,7 +773,7 @@ std::string table_row(const ErrorCase& error_case, const Answer& answer, const T
 TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md says which") {
   std::string table =
       "# What tpm says to bad input\n\n"
-      "Written by `tests/store/test_errors.cpp`, which runs the program on each of these files; "
+      "Written by `tests/files/test_errors.cpp`, which runs the program on each of these files; "
       "after a\n"
       "wanted change run it with `TPM_UPDATE_DOCS=1`. Exit codes: 1 the answer is no, 2 command\n"
       "line, 3 bad input, 4 numerical failure, 5 environment.\n\n"
@@ -798,7 +803,8 @@ TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md 
 
 TEST_CASE("tpm data check reports every failing file and answers no") {
   const TempFolder folder;
-  files({{"c.json", kPointsJson}, {"c.csv", "depth_mm,force_N,provenance\n2,x,table\n"}})(folder);
+  with_files({{"c.json", kPointsJson}, {"c.csv", "depth_mm,force_N,provenance\n2,x,table\n"}})(
+      folder);
   const Answer answer = run("data check {}/c.csv evren_static {}/missing.csv", folder);
   CHECK(answer.exit_code == 1);
   CHECK(std::count(answer.error.begin(), answer.error.end(), '\n') == 2);
@@ -807,7 +813,7 @@ TEST_CASE("tpm data check reports every failing file and answers no") {
 
 TEST_CASE("tpm data import and pack do not replace files without --force") {
   const TempFolder folder;
-  files({{"m.csv", "Time (s),Force (N)\n0,0\n1,1\n"}})(folder);
+  with_files({{"m.csv", "Time (s),Force (N)\n0,0\n1,1\n"}})(folder);
   CHECK(run("data import {}/m.csv -o {}/out", folder).exit_code == 0);
   const std::string first = read_file(folder / "out.csv");
   CHECK(run("data import {}/m.csv -o {}/out", folder).exit_code == 3);

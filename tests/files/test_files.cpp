@@ -18,6 +18,7 @@
 
 #include "refusal.hpp"
 #include "temp_folder.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/check_sum.hpp"
 #include "tpm/files/file.hpp"
@@ -26,7 +27,7 @@
 #include "tpm/files/replacement.hpp"
 #include "tpm/files/row_log.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 namespace fs = std::filesystem;
@@ -406,4 +407,4 @@ TEST_CASE("Inputs without an end are refused by every command that reads") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::files

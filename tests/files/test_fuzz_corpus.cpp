@@ -9,9 +9,10 @@
 #include "fuzz/inputs.hpp"
 #include "fuzz/json_mutator.hpp"
 #include "temp_folder.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 std::vector<std::filesystem::path> corpus_of(std::string_view name) {
@@ -107,4 +108,4 @@ TEST_CASE("what is shipped is taken by the reader that the fuzzer tries it with"
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::files

@@ -14,12 +14,13 @@
 #include "refusal.hpp"
 #include "sanitizer.hpp"
 #include "temp_folder.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/contained.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -194,4 +195,4 @@ TEST_CASE("Damaged HDF5 is read or refused in one line, by a process that goes o
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::files

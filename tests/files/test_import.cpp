@@ -11,6 +11,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using Catch::Matchers::WithinRel;
 using test::TempFolder;
 

@@ -21,6 +21,8 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
 using test::TempFolder;
 
 namespace {

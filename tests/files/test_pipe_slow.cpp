@@ -7,9 +7,10 @@
 #include <string>
 
 #include "temp_folder.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -44,4 +45,4 @@ TEST_CASE("A pipe that something is written into is read, with a name and withou
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::files

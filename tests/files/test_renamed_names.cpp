@@ -19,7 +19,12 @@
 #include "tpm/sweep/sweep.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::files {
+using namespace organ;
+using namespace fit;
+using namespace haptics;
+using namespace sweep;
+
 namespace {
 
 using Catch::Matchers::Contains;
@@ -113,8 +118,8 @@ TEST_CASE("a former word of a list is read as the new one, in formulas as well")
                            "'instantaneous_creep_depth'; the former name is read until version "
                            "0.3"});
   CHECK(checked(current, "sweep", "w2.json") == current);
-  CHECK(study::parse_sweep(parse_json(former, "w.json"), "w.json", ".").document ==
-        study::parse_sweep(current, "w2.json", ".").document);
+  CHECK(sweep::parse_sweep(parse_json(former, "w.json"), "w.json", ".").document ==
+        sweep::parse_sweep(current, "w2.json", ".").document);
   CHECK(heard.lines.size() == 1);
 
   Json both = current;
@@ -186,10 +191,10 @@ TEST_CASE("the design's former criterion chooses the same") {
   Heard heard;
   Json design = read_json(share_dir() / "configs" / "design_liver.json");
   design["criterion"] = "eta1";
-  const study::DesignProblem by_new = study::parse_design(design, "d.json");
+  const fit::DesignProblem by_new = fit::parse_design(design, "d.json");
   design.erase("criterion");
   design["goal"] = "eta1";
-  const study::DesignProblem by_former = study::parse_design(design, "d.json");
+  const fit::DesignProblem by_former = fit::parse_design(design, "d.json");
   CHECK(by_former.criterion == by_new.criterion);
   CHECK(by_former.criterion_parameter == by_new.criterion_parameter);
   CHECK(heard.lines.size() == 1);
@@ -277,4 +282,4 @@ TEST_CASE("the program warns of a former name in one line on standard error") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::files

@@ -8,12 +8,13 @@
 #include <filesystem>
 
 #include "temp_folder.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/files/row_log.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 struct Row {
@@ -164,4 +165,4 @@ TEST_CASE("A pipe is written into, not replaced") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::files

@@ -12,6 +12,7 @@
 #include "tpmkit/curve_file.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using Catch::Matchers::WithinRel;
 using test::TempFolder;
 

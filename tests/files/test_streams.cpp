@@ -17,8 +17,9 @@
 #include "tpm/show/draw.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
-using namespace report;
+namespace tpm::files {
+using namespace show;
+
 namespace {
 
 using Catch::Matchers::Contains;
@@ -181,4 +182,4 @@ TEST_CASE("An attribute of many texts is refused, not read into the room for one
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::files

@@ -11,7 +11,7 @@
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -183,4 +183,4 @@ TEST_CASE("laws and devices that no budget is made for are refused") {
              Contains("a protocol of loads"));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -7,7 +7,7 @@
 #include "tpm/organ/run/scene_runner.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -70,4 +70,4 @@ TEST_CASE("a finer scene of another material is refused") {
              Contains("a smaller one"));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -5,6 +5,7 @@
 #include "tpm/fit/coverage.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using namespace tpm::fit;
 
 namespace {

@@ -9,9 +9,10 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
+using namespace tpm::show;
+using namespace tpm::organ;
 using namespace tpm::fit;
-using namespace tpm::study;
-using namespace tpm::report;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
@@ -59,7 +60,7 @@ Eigen::MatrixXd fisher(const Json& document) {
 
 std::string message(const Json& document) {
   try {
-    static_cast<void>(plan(parsed(document)));
+    static_cast<void>(fit::plan(parsed(document)));
   } catch (const Error& error) {
     CHECK(error.code() == ExitCode::bad_input);
     return error.what();
@@ -71,7 +72,7 @@ std::string message(const Json& document) {
 
 TEST_CASE("a straight line through unknown zero has the standard error of the textbook") {
   // Depths 0, 1, 2, 3, 4 mm: sum (u - mean)^2 = 10 mm^2, se(k) = sigma / sqrt(10 mm^2).
-  const DesignResult result = plan(parsed(spring()));
+  const DesignResult result = fit::plan(parsed(spring()));
   const DesignCandidate& best = result.ranked.front();
   CHECK(best.one.samples == 5.0);
   const double expected = 0.01 / std::sqrt(10e-6) / 100.0;
@@ -98,7 +99,7 @@ TEST_CASE("a straight line through unknown zero has the standard error of the te
   SECTION("an estimated scale takes Student's t with the degrees of freedom that are left") {
     Json document = spring();
     document["noise"]["scale"] = "estimated";
-    const DesignResult wider = plan(parsed(document));
+    const DesignResult wider = fit::plan(parsed(document));
     const double t3 = 3.182446305284263;  // 97.5 %, 5 - 2 degrees of freedom
     CHECK_THAT(*wider.ranked.front().expected.parameters.front().upper,
                WithinRel(100.0 * std::exp(t3 * expected), 1e-9));
@@ -108,7 +109,7 @@ TEST_CASE("a straight line through unknown zero has the standard error of the te
 TEST_CASE("n repeats shrink the standard error by sqrt(n); previous ones count alike") {
   Json document = decay();
   const auto error_of = [](const Json& j) {
-    return plan(parsed(j)).ranked.front().expected.parameters[1].relative_error;
+    return fit::plan(parsed(j)).ranked.front().expected.parameters[1].relative_error;
   };
   const double once = error_of(document);
   document["previous"] = document["candidates"];
@@ -123,7 +124,7 @@ TEST_CASE("what is known beforehand adds to the information") {
   document["known"] = {{"k_inf", 0.02}};
   const double alone = 0.01 / std::sqrt(10e-6) / 100.0;
   const double both = 1.0 / std::sqrt(1.0 / (alone * alone) + 1.0 / (0.02 * 0.02));
-  CHECK_THAT(plan(parsed(document)).ranked.front().expected.parameters[0].relative_error,
+  CHECK_THAT(fit::plan(parsed(document)).ranked.front().expected.parameters[0].relative_error,
              WithinRel(both, 1e-9));
 }
 
@@ -147,7 +148,7 @@ TEST_CASE("a decay of unknown size and rate: D-optimal are readings at 0 and tau
                                        {"depth", {"4 mm"}},
                                        {"hold", {"0 s"}},
                                        {"interval", {"4e-6 s"}}}});
-  const DesignResult result = plan(parsed(document));
+  const DesignResult result = fit::plan(parsed(document));
   CHECK(result.ranked.front().experiment.hold_s == 10.0);
   const double det = std::pow(result.ranked.front().expected.score, -4.0);
   const double signal = std::pow(100.0 * 4e-3 / 0.01, 4);
@@ -160,7 +161,7 @@ TEST_CASE("a hold long compared with tau goes before one that is too short") {
   document["candidates"][0]["hold"] = {"1 s", "40 s"};
   for (const char* criterion : {"all", "worst", "tau1"}) {
     document["criterion"] = criterion;
-    const DesignResult result = plan(parsed(document));
+    const DesignResult result = fit::plan(parsed(document));
     CHECK(result.ranked.front().experiment.hold_s == 40.0);
     CHECK_THAT(result.words[1],
                Contains("with a hold of 1 s") && Contains("ends before a relaxation of 10 s"));
@@ -174,7 +175,7 @@ TEST_CASE("a slow ramp hides a short relaxation, and the words say so") {
   document["parameters"]["tau1"]["start"] = "0.3 s";
   document["candidates"][0]["interval"] = {"0.1 s"};
   document["candidates"][0]["rate"] = {"1 mm/s", "10 mm/s"};
-  const DesignResult result = plan(parsed(document));
+  const DesignResult result = fit::plan(parsed(document));
   CHECK(result.ranked.front().experiment.rate_m_per_s == 0.01);
   bool said = false;
   for (const std::string& words : result.words) {
@@ -205,7 +206,7 @@ TEST_CASE("the expected standard errors are those of a fit to such data") {
     document["candidates"][0]["rate"] = {"2 mm/s"};
     document["candidates"][0]["repeats"] = {2};
     const DesignProblem problem = parsed(document);
-    const DesignResult result = plan(problem);
+    const DesignResult result = fit::plan(problem);
     const PlannedFit planned = planned_fit(problem, std::vector{problem.candidates.front()});
     const FitResult fit = run_fit(planned.config, planned.data);
     for (std::size_t i = 0; i < problem.config.parameters.size(); ++i) {
@@ -228,7 +229,7 @@ TEST_CASE("the paper's element and creep are planned through the same interface"
   document["noise"]["depth"] = {{"absolute", "0.05 mm"}};
   document["candidates"] = Json::array(
       {{{"kind", "creep"}, {"load", {"0.2 N", "5 N"}}, {"hold", {"60 s"}}, {"interval", {"1 s"}}}});
-  const DesignResult result = plan(parsed(document));
+  const DesignResult result = fit::plan(parsed(document));
   REQUIRE(result.ranked.size() == 1);
   CHECK(result.ranked.front().experiment.load_N == 0.2);
   CHECK(result.ranked.front().expected.all_identified());
@@ -245,7 +246,7 @@ TEST_CASE("correlated noise thins the samples") {
   Json document = decay();
   document["noise"]["correlation_time"] = "1 s";
   document["candidates"][0]["interval"] = {"0.1 s", "0.01 s"};
-  const DesignResult result = plan(parsed(document));
+  const DesignResult result = fit::plan(parsed(document));
   CHECK_THAT(result.ranked[1].expected.score, WithinRel(result.ranked[0].expected.score, 0.02));
 }
 
@@ -268,7 +269,7 @@ TEST_CASE("the limits of the machine leave candidates out and say why") {
   document["candidates"][0]["rate"] = {"10 mm/s", "30 mm/s"};
   document["candidates"][0]["depth"] = {"4 mm", "13 mm"};
   document["candidates"][0]["repeats"] = {1, 3};
-  const DesignResult result = plan(parsed(document));
+  const DesignResult result = fit::plan(parsed(document));
   REQUIRE(result.ranked.size() == 1);
   CHECK(result.left_out.size() == 3);
   CHECK_THAT(message([&] {
@@ -281,7 +282,7 @@ TEST_CASE("the limits of the machine leave candidates out and say why") {
 TEST_CASE("the best pair is no worse than the best done twice") {
   Json document = decay();
   document["candidates"][0]["hold"] = {"2 s", "20 s", "80 s"};
-  const DesignResult result = plan(parsed(document));
+  const DesignResult result = fit::plan(parsed(document));
   CHECK(result.pair.expected.score <=
         result.ranked.front().expected.score / std::sqrt(2.0) * (1.0 + 1e-12));
 }
@@ -290,7 +291,7 @@ TEST_CASE("the figures hold a curve per rate and a panel per parameter") {
   Json document = decay();
   document["candidates"][0]["rate"] = {"1 mm/s", "10 mm/s", "100 mm/s"};
   document["candidates"][0]["hold"] = {"5 s", "40 s"};
-  const std::vector<Figure> figures = design_figures(plan(parsed(document)));
+  const std::vector<Figure> figures = design_figures(fit::plan(parsed(document)));
   REQUIRE(figures.size() == 2);
   REQUIRE(figures[0].panels.size() == 2);
   CHECK(figures[0].panels[0].series.size() == 3);

@@ -4,7 +4,8 @@
 #include "tpm/fit/design/design.hpp"
 
 using namespace tpm;
-using namespace tpm::study;
+using namespace tpm::organ;
+using namespace tpm::fit;
 
 namespace {
 

@@ -15,7 +15,6 @@
 #include "tpm/organ/scene/organ_model.hpp"
 
 namespace tpm::fit {
-using namespace study;
 namespace {
 
 /// A fit of the paper's relaxation table with a star of four spheres.

@@ -12,7 +12,7 @@
 #include "tpm/fit/online/identification.hpp"
 #include "tpm/fit/online/identified_loop.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -312,4 +312,4 @@ TEST_CASE("laws that are identified are handed to the loop") {
   }
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

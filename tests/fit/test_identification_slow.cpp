@@ -4,7 +4,7 @@
 #include "coverage_studies.hpp"
 #include "random_hand_over.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 TEST_CASE("intervals at the stopping time hold the true value as often as they say") {
   constexpr int kSimulations = 120;
@@ -40,4 +40,4 @@ TEST_CASE("ten thousand hand-overs never store more energy than before, but for 
   CHECK(jump < 1e-12);
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

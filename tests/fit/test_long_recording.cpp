@@ -8,8 +8,10 @@
 #include "tpm/fit/select/selection.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
+using namespace tpm::organ;
 using namespace tpm::fit;
-using namespace tpm::study;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinRel;
 

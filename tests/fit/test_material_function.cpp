@@ -11,7 +11,7 @@
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/select/material_function.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -168,4 +168,4 @@ TEST_CASE(
 }
 
 }  // namespace
-}  // namespace tpm::study
+}  // namespace tpm::fit

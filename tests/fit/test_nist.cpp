@@ -9,6 +9,8 @@
 #include "tpm/fit/fit.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Matchers::WithinRel;
 

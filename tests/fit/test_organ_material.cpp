@@ -10,7 +10,7 @@
 #include "tpm/organ/run/scene_runner.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -99,4 +99,4 @@ TEST_CASE("laws, motions and scenes that no organ can take are refused") {
              Contains("does not press"));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

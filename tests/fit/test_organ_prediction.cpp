@@ -12,7 +12,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/fit/predict/organ_prediction.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -199,4 +199,4 @@ TEST_CASE("an organ under a load has no contact and offset") {
              Contains("under a load with a contact point"));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

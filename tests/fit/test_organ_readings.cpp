@@ -9,7 +9,7 @@
 #include "tpm/fit/predict/organ_profile.hpp"
 #include "tpm/fit/predict/organ_readings.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -233,4 +233,4 @@ TEST_CASE("intervals of readings need a recording") {
              Contains("intervals of readings along a protocol"));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

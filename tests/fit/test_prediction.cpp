@@ -14,7 +14,6 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::fit {
-using namespace study;
 namespace {
 
 using Catch::Matchers::Contains;
@@ -112,7 +111,7 @@ TEST_CASE("a law file keeps its uncertainty") {
   const LawFile law = fit_of(noisy_recording(0.6, 1, "abc"));
   REQUIRE(law.uncertainty);
   CHECK(law.uncertainty->readings_per_independent > 1.5);
-  const LawFile back = law_from_json(to_json(law), "test");
+  const LawFile back = law_from_json(files::to_json(law), "test");
   REQUIRE(back.uncertainty);
   const LawUncertainty &a = *law.uncertainty, &b = *back.uncertainty;
   CHECK(a.place == b.place);
@@ -124,11 +123,11 @@ TEST_CASE("a law file keeps its uncertainty") {
   REQUIRE(b.data.size() == 1);
   CHECK(b.data.front().sha256 == "abc");
   CHECK(b.data.front().to_s == a.data.front().to_s);
-  CHECK(to_text(to_json(back)) == to_text(to_json(law)));
+  CHECK(to_text(files::to_json(back)) == to_text(files::to_json(law)));
 }
 
 TEST_CASE("a covariance that is none is refused") {
-  const Json good = to_json(spring());
+  const Json good = files::to_json(spring());
   const auto refused = [&](const std::function<void(Json&)>& change) {
     Json bad = good;
     change(bad["fit"]);

@@ -6,8 +6,8 @@
 #include "tpm/fit/design/recovery.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using namespace tpm::fit;
-using namespace tpm::study;
 
 namespace {
 

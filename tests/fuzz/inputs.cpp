@@ -14,7 +14,7 @@
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/files/row_log.hpp"
-#include "tpm/fit/claims/audit.hpp"
+#include "tpm/paper/claims/audit.hpp"
 #include "tpm/fit/design/design.hpp"
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/petab.hpp"
@@ -32,10 +32,14 @@
 #include "tpmkit/units.hpp"
 
 namespace tpm::fuzz {
+using namespace files;
 using namespace organ;
+using namespace plan;
 using namespace fit;
 using namespace haptics;
-using namespace study;
+using namespace sweep;
+using namespace paper;
+
 namespace {
 
 using Path = std::filesystem::path;

@@ -9,6 +9,8 @@
 #include "tpm/files/json.hpp"
 
 namespace tpm::fuzz {
+using namespace files;
+
 namespace {
 
 /// Brackets open at once, those in texts counted too.

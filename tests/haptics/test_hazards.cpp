@@ -11,7 +11,6 @@
 #include "tpm/haptics/show/hazard_report.hpp"
 
 namespace tpm::haptics {
-using namespace report;
 namespace {
 
 TEST_CASE("No hazard leaves its bounds, and nothing that is passive is refused") {

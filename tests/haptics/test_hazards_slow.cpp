@@ -6,7 +6,6 @@
 #include "tpm/haptics/show/hazard_report.hpp"
 
 namespace tpm::haptics {
-using namespace report;
 namespace {
 
 TEST_CASE("On the clock, too, every hazard ends as it should, and in time") {

@@ -16,7 +16,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
-using namespace report;
 namespace {
 
 using Catch::Matchers::Contains;

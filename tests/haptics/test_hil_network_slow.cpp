@@ -17,7 +17,6 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
-using namespace report;
 namespace {
 
 using Catch::Matchers::Contains;

@@ -13,9 +13,10 @@
 #include "tpm/organ/run/simulation_file.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
+using namespace tpm::show;
 using namespace tpm::organ;
 using namespace tpm::haptics;
-using namespace tpm::report;
 using Catch::Matchers::Contains;
 using test::TempFolder;
 

@@ -13,6 +13,8 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::law;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 using Quad = boost::multiprecision::cpp_bin_float_100;

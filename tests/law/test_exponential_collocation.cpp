@@ -6,6 +6,7 @@
 #include "tpm/law/relaxation/exponential_collocation.hpp"
 
 using namespace tpm;
+using namespace tpm::law;
 
 namespace {
 

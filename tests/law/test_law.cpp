@@ -13,6 +13,8 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::law;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 

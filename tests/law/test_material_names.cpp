@@ -12,9 +12,11 @@
 #include "tpm/sweep/cell_model.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
 using namespace tpm::organ;
 using namespace tpm::fit;
-using namespace tpm::study;
+using namespace tpm::sweep;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 

@@ -15,9 +15,11 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
+using namespace tpm::show;
+using namespace tpm::organ;
 using namespace tpm::fit;
-using namespace tpm::study;
-using namespace tpm::report;
 using Catch::Contains;
 using Catch::Matchers::WithinRel;
 

@@ -13,10 +13,11 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
+using namespace tpm::show;
 using namespace tpm::organ;
 using namespace tpm::fit;
-using namespace tpm::study;
-using namespace tpm::report;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 

@@ -7,6 +7,7 @@
 #include "tpm/law/relaxation/sampled_function.hpp"
 
 using namespace tpm;
+using namespace tpm::law;
 
 namespace {
 

@@ -11,6 +11,7 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::law;
 
 namespace {
 

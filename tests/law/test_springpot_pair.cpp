@@ -10,6 +10,7 @@
 #include "tpm/law/relaxation/springpot_pair.hpp"
 
 using namespace tpm;
+using namespace tpm::law;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 using Digits100 = boost::multiprecision::cpp_bin_float_100;

@@ -18,8 +18,9 @@
 
 using namespace tpm;
 using namespace tpm::organ;
+using namespace tpm::contact;
 using namespace tpm::haptics;
-using namespace tpm::study;
+using namespace tpm::accuracy;
 
 namespace {
 

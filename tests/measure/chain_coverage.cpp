@@ -11,7 +11,8 @@
 namespace {
 
 using namespace tpm;
-using namespace tpm::study;
+using namespace tpm::organ;
+using namespace tpm::fit;
 
 void predict(int simulations, std::uint64_t seed) {
   fmt::print(

@@ -58,6 +58,7 @@ class StiffnessBlocks {
 #endif
 
 using namespace tpm;
+using namespace tpm::base;
 using namespace tpm::organ;
 
 namespace {

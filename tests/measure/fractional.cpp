@@ -12,6 +12,8 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::law;
 
 namespace {
 

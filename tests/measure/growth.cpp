@@ -28,8 +28,10 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
+using namespace tpm::show;
 using namespace tpm::organ;
-using namespace tpm::report;
 
 namespace {
 

@@ -18,6 +18,7 @@
 #include "tpm/haptics/session/session.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using namespace tpm::haptics;
 
 namespace {

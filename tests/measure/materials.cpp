@@ -16,7 +16,10 @@
 #include "written_out_network.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::law;
 using namespace tpm::organ;
+using namespace tpm::contact;
 using namespace tpm_test;
 using tpm::testing::OrganScene;
 

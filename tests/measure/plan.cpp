@@ -46,7 +46,7 @@ double cpu_s() {
 
 std::string lines_of_plan(const tpm::test::RandomPlan& random, const std::string& scene) {
   std::string lines, outcome, phases;
-  tpm::organ::PlanRequest request = random.request();
+  tpm::plan::PlanRequest request = random.request();
   double phase_begin = cpu_s();
   std::string phase;
   const auto end_phase = [&](const std::string& next) {
@@ -58,10 +58,10 @@ std::string lines_of_plan(const tpm::test::RandomPlan& random, const std::string
   request.progress = end_phase;
   const double begin = cpu_s();
   try {
-    const tpm::organ::Plan plan = tpm::organ::make_plan(random.scene(), request);
+    const tpm::plan::Plan plan = tpm::plan::make_plan(random.scene(), request);
     outcome = plan.choice ? "pick" : plan.without_budget ? "budget" : "none";
     for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
-      const tpm::organ::PlannedCandidate& c = plan.candidates[i];
+      const tpm::plan::PlannedCandidate& c = plan.candidates[i];
       if (!c.claimed_error || !c.verified_error) continue;
       lines += fmt::format("claim;{};{};{};{:.4g};{:.4g};{:.2g};{:d};{:d}\n", scene, c.name,
                            c.formulation, *c.claimed_error,

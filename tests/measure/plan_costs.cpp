@@ -15,6 +15,8 @@
 
 using namespace tpm;
 using namespace tpm::organ;
+using namespace tpm::contact;
+using namespace tpm::plan;
 
 namespace {
 

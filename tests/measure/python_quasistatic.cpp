@@ -11,6 +11,7 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using namespace tpm::organ;
 
 namespace {

@@ -9,6 +9,7 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
 using namespace tpm::organ;
 
 namespace {

@@ -19,7 +19,8 @@
 
 using namespace tpm;
 using namespace tpm::organ;
-using namespace tpm::study;
+using namespace tpm::contact;
+using namespace tpm::accuracy;
 
 namespace {
 

@@ -14,6 +14,7 @@
 #include "tpm/haptics/session/surface_scene.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using namespace tpm::haptics;
 
 namespace {

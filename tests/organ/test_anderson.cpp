@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 
 using namespace tpm;
+using namespace tpm::organ;
 
 namespace {
 

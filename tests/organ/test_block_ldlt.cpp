@@ -11,6 +11,8 @@
 #include "tpm/organ/linear/lane_factor.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::organ;
 
 namespace {
 

@@ -6,6 +6,7 @@
 #include "tpm/organ/linear/aligned_floats.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 
 TEST_CASE("packed panels are the matrix to 1/256 of each number, on every processor") {
   std::mt19937 random(0);

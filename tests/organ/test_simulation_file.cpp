@@ -17,8 +17,9 @@
 #include "tpmkit/version.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using namespace tpm::organ;
-using namespace tpm::report;
+using namespace tpm::plan;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using test::run_of;

@@ -16,6 +16,8 @@
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::organ {
+using namespace contact;
+
 namespace {
 
 using Catch::Matchers::WithinAbs;

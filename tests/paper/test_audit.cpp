@@ -4,14 +4,17 @@
 #include <catch2/catch.hpp>
 
 #include "expected_values.hpp"
-#include "tpm/fit/claims/audit.hpp"
-#include "tpm/fit/claims/expression.hpp"
+#include "tpm/fit/expression/expression.hpp"
+#include "tpm/paper/claims/audit.hpp"
 #include "tpm/paper/show/study_report.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::study;
-using namespace tpm::report;
+using namespace tpm::base;
+using namespace tpm::files;
+using namespace tpm::show;
+using namespace tpm::fit;
+using namespace tpm::paper;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
@@ -22,7 +25,7 @@ Json paper_document() {
   return read_json(paper_claims_path());
 }
 
-const AuditReport& paper() {
+const AuditReport& printed_paper() {
   static const AuditReport report = run_audit(paper_document(), "paper_claims.json");
   return report;
 }
@@ -131,72 +134,74 @@ TEST_CASE(
 }
 
 TEST_CASE("item 1: the stated viscosity relaxes in 0.2 ms") {
-  CHECK(finding(paper(), "relaxation-after-1s").verdict == AuditVerdict::contradicted);
-  CHECK_THAT(finding(paper(), "relaxation-after-1s").consequence, Contains("0.2083 ms"));
-  CHECK(finding(paper(), "relaxed-at-30s").verdict == AuditVerdict::holds);
-  CHECK(finding(paper(), "rate-dependence").verdict == AuditVerdict::contradicted);
-  CHECK_THAT(finding(paper(), "peak-with-ramp").recomputed->value,
+  CHECK(finding(printed_paper(), "relaxation-after-1s").verdict == AuditVerdict::contradicted);
+  CHECK_THAT(finding(printed_paper(), "relaxation-after-1s").consequence, Contains("0.2083 ms"));
+  CHECK(finding(printed_paper(), "relaxed-at-30s").verdict == AuditVerdict::holds);
+  CHECK(finding(printed_paper(), "rate-dependence").verdict == AuditVerdict::contradicted);
+  CHECK_THAT(finding(printed_paper(), "peak-with-ramp").recomputed->value,
              test::expected("paper_audit.peak_with_ramp"));
 }
 
 TEST_CASE("item 2: Eq. 18 is not the limit of Eq. 14") {
-  CHECK(finding(paper(), "eq18-limit").verdict == AuditVerdict::contradicted);
-  CHECK_THAT(finding(paper(), "creep-small-end").recomputed->value,
+  CHECK(finding(printed_paper(), "eq18-limit").verdict == AuditVerdict::contradicted);
+  CHECK_THAT(finding(printed_paper(), "creep-small-end").recomputed->value,
              test::expected("paper_audit.creep_small_end"));
-  CHECK_THAT(finding(paper(), "creep-large-end").recomputed->value,
+  CHECK_THAT(finding(printed_paper(), "creep-large-end").recomputed->value,
              test::expected("paper_audit.creep_large_end"));
-  CHECK(finding(paper(), "creep-small-end-eq18").verdict == AuditVerdict::holds);
+  CHECK(finding(printed_paper(), "creep-small-end-eq18").verdict == AuditVerdict::holds);
 }
 
 TEST_CASE("items 3 and 4: the search finds the two loads, 0.20 N and 3.68 mm by itself") {
-  const Finding& mixed = finding(paper(), "creep-large-end-eq18");
+  const Finding& mixed = finding(printed_paper(), "creep-large-end-eq18");
   REQUIRE_FALSE(mixed.causes.empty());
   CHECK(mixed.causes.front().only_printed);
   CHECK_THAT(mixed.causes.front().text, Contains("0.98 N (Fig. 9) in term 1, 0.96 N"));
   CHECK_THAT(mixed.causes.front().recomputed,
              test::expected("paper_audit.creep_large_end_of_two_loads"));
-  const Finding& start = finding(paper(), "creep-small-start");
+  const Finding& start = finding(printed_paper(), "creep-small-start");
   CHECK(start.verdict == AuditVerdict::differs);
   CHECK_THAT(start.recomputed->value, test::expected("paper_audit.creep_small_start"));
   CHECK_THAT(start.causes.at(0).text, Contains("load_small = 0.2 N instead of 0.196 N"));
-  CHECK_THAT(finding(paper(), "creep-small-lambda1").causes.at(0).text, Contains("3.68 mm"));
-  CHECK_THAT(finding(paper(), "creep-large-start").causes.at(0).text, Contains("0.98 N (Fig. 9)"));
+  CHECK_THAT(finding(printed_paper(), "creep-small-lambda1").causes.at(0).text,
+             Contains("3.68 mm"));
+  CHECK_THAT(finding(printed_paper(), "creep-large-start").causes.at(0).text,
+             Contains("0.98 N (Fig. 9)"));
 }
 
 TEST_CASE("item 5: with lambda1(e) one creep claim survives, the other does not") {
-  CHECK_THAT(finding(paper(), "creep-large-angle").consequence,
+  CHECK_THAT(finding(printed_paper(), "creep-large-angle").consequence,
              Contains("40.68 degrees") && Contains("25.79 mm"));
-  const Finding& large = finding(paper(), "creep-large-self-consistent");
+  const Finding& large = finding(printed_paper(), "creep-large-self-consistent");
   CHECK(large.verdict == AuditVerdict::holds);
   CHECK_THAT(1e-3 * large.recomputed->value, test::expected("paper.creep_end_at_0.98_N"));
-  const Finding& small = finding(paper(), "creep-small-self-consistent");
+  const Finding& small = finding(printed_paper(), "creep-small-self-consistent");
   CHECK(small.verdict == AuditVerdict::contradicted);
   CHECK_THAT(1e-3 * small.recomputed->value, test::expected("paper.creep_end_at_0.196_N"));
 }
 
 TEST_CASE("items 6 to 13") {
-  CHECK_THAT(finding(paper(), "lambda1-range-pi6").details.at(1).recomputed.value,
+  CHECK_THAT(finding(printed_paper(), "lambda1-range-pi6").details.at(1).recomputed.value,
              test::expected("paper_audit.lambda1_at_pi_6"));
-  CHECK_THAT(finding(paper(), "lambda1-range-pi4").details.at(1).recomputed.value,
+  CHECK_THAT(finding(printed_paper(), "lambda1-range-pi4").details.at(1).recomputed.value,
              test::expected("paper_audit.lambda1_at_pi_4"));
-  CHECK(finding(paper(), "angle-ranges").verdict == AuditVerdict::contradicted);
-  CHECK(finding(paper(), "eq10-as-converted").verdict == AuditVerdict::contradicted);
-  CHECK(finding(paper(), "eq10-without-s").verdict == AuditVerdict::holds);
-  CHECK_THAT(finding(paper(), "static-modulus").recomputed->value, WithinAbs(6.0, 1e-9));
-  CHECK(finding(paper(), "tables-forces").cells->by_rounding == 16);
-  CHECK(finding(paper(), "tables-forces").cells->by_truncation == 14);
-  CHECK(finding(paper(), "tables-forces-area").recomputed_words() == "28 of 32");
-  CHECK(finding(paper(), "peak-to-end-ratio").verdict == AuditVerdict::contradicted);
-  CHECK_THAT(finding(paper(), "angle-guards-damage").recomputed->value,
+  CHECK(finding(printed_paper(), "angle-ranges").verdict == AuditVerdict::contradicted);
+  CHECK(finding(printed_paper(), "eq10-as-converted").verdict == AuditVerdict::contradicted);
+  CHECK(finding(printed_paper(), "eq10-without-s").verdict == AuditVerdict::holds);
+  CHECK_THAT(finding(printed_paper(), "static-modulus").recomputed->value, WithinAbs(6.0, 1e-9));
+  CHECK(finding(printed_paper(), "tables-forces").cells->by_rounding == 16);
+  CHECK(finding(printed_paper(), "tables-forces").cells->by_truncation == 14);
+  CHECK(finding(printed_paper(), "tables-forces-area").recomputed_words() == "28 of 32");
+  CHECK(finding(printed_paper(), "peak-to-end-ratio").verdict == AuditVerdict::contradicted);
+  CHECK_THAT(finding(printed_paper(), "angle-guards-damage").recomputed->value,
              test::expected("paper_audit.depth_of_angle_30"));
-  CHECK(finding(paper(), "creep-validity").verdict == AuditVerdict::contradicted);
-  CHECK(finding(paper(), "table1-lambda1-range").verdict == AuditVerdict::contradicted);
-  CHECK(finding(paper(), "strain-rate-unit").verdict == AuditVerdict::contradicted);
-  CHECK(finding(paper(), "fit-with-ramp").recomputed->value > 100.0);
-  CHECK(finding(paper(), "gap").verdict == AuditVerdict::holds);
-  CHECK(finding(paper(), "distance-as-x").verdict == AuditVerdict::contradicted);
-  CHECK(finding(paper(), "close-to-experiment").verdict == AuditVerdict::cannot_be_told);
-  CHECK_THAT(finding(paper(), "creep-probe").recomputed->value,
+  CHECK(finding(printed_paper(), "creep-validity").verdict == AuditVerdict::contradicted);
+  CHECK(finding(printed_paper(), "table1-lambda1-range").verdict == AuditVerdict::contradicted);
+  CHECK(finding(printed_paper(), "strain-rate-unit").verdict == AuditVerdict::contradicted);
+  CHECK(finding(printed_paper(), "fit-with-ramp").recomputed->value > 100.0);
+  CHECK(finding(printed_paper(), "gap").verdict == AuditVerdict::holds);
+  CHECK(finding(printed_paper(), "distance-as-x").verdict == AuditVerdict::contradicted);
+  CHECK(finding(printed_paper(), "close-to-experiment").verdict == AuditVerdict::cannot_be_told);
+  CHECK_THAT(finding(printed_paper(), "creep-probe").recomputed->value,
              test::expected("paper_audit.creep_probe"));
 }
 
@@ -322,15 +327,15 @@ TEST_CASE("bad files are refused") {
 }
 
 TEST_CASE("JSON of the audit is complete and the same each time") {
-  const Json json = to_json(paper());
-  CHECK(json.at("findings").size() == paper().findings.size());
+  const Json json = to_json(printed_paper());
+  CHECK(json.at("findings").size() == printed_paper().findings.size());
   CHECK(to_text(json) == to_text(to_json(run_audit(paper_document(), "paper_claims.json"))));
-  for (const Finding& f : paper().findings) {
+  for (const Finding& f : printed_paper().findings) {
     CAPTURE(f.id);
     CHECK_FALSE(f.consequence.empty());
     CHECK_FALSE(f.expression.empty());
   }
-  CHECK_THAT(audit_text(paper(), false),
+  CHECK_THAT(audit_text(printed_paper(), false),
              Contains("creep-small-start") && !Contains("eq1-geometry"));
-  CHECK_THAT(audit_text(paper(), true), Contains("eq1-geometry"));
+  CHECK_THAT(audit_text(printed_paper(), true), Contains("eq1-geometry"));
 }

@@ -10,8 +10,10 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
+using namespace tpm::organ;
 using namespace tpm::fit;
-using namespace tpm::study;
+using namespace tpm::paper;
 using namespace tpm::test;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

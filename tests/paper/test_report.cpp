@@ -7,7 +7,8 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::report;
+using namespace tpm::files;
+using namespace tpm::show;
 using Catch::Matchers::Contains;
 
 namespace {

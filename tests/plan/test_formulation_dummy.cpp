@@ -9,8 +9,10 @@
 #include "tpm/files/file.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
 using namespace tpm::organ;
-using namespace tpm::study;
+using namespace tpm::accuracy;
 using test::answer_of;
 using test::names;
 using test::TempFolder;

@@ -8,7 +8,9 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using namespace tpm::organ;
+using namespace tpm::plan;
 
 namespace {
 

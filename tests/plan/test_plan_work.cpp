@@ -10,6 +10,7 @@
 
 using namespace tpm;
 using namespace tpm::organ;
+using namespace tpm::plan;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinRel;
 

@@ -9,7 +9,10 @@
 #include "tpm/plan/spheres_plan.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
 using namespace tpm::organ;
+using namespace tpm::plan;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
@@ -94,7 +97,7 @@ TEST_CASE("claims of a cube hold against one that is much finer", "[heavy]") {
     }
     if (*plan.choice > 0) CHECK(*plan.tried[*plan.choice - 1].claimed_error > request.tolerance);
   }
-  const Json json = report::spheres_json(plan);
+  const Json json = plan::spheres_json(plan);
   CHECK(json.at("tried").size() == plan.tried.size());
 }
 

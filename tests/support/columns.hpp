@@ -5,6 +5,7 @@
 #include "tpm/organ/bonds/network.hpp"
 
 namespace tpm::test {
+using namespace organ;
 
 /// Columns of two spheres with one radial bond each, side by side along x; the top of each lower by
 /// a step than that before it.

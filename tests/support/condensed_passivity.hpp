@@ -9,7 +9,9 @@
 #include "tpm/contact/condensed/condensed.hpp"
 
 namespace tpm::testing {
+using namespace base;
 using namespace organ;
+using namespace contact;
 
 struct EnergyAccount {
   double created_J = 0.0;   ///< the most in one step: change of the stored energy less the work

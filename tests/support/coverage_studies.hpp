@@ -15,8 +15,9 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::test {
+using namespace base;
+using namespace organ;
 using namespace fit;
-using namespace study;
 
 /// Successes of independent trials.
 struct Count {

@@ -11,6 +11,7 @@
 #include "tpm/files/json.hpp"
 
 namespace tpm::test {
+using namespace files;
 
 /// What it prints, and its exit code.
 struct DummyAnswer {

@@ -20,7 +20,7 @@ struct ErrorCase {
 
 using Files = std::vector<std::pair<std::string, std::string>>;
 
-inline std::function<void(const TempFolder&)> files(Files list) {
+inline std::function<void(const TempFolder&)> with_files(Files list) {
   return [list = std::move(list)](const TempFolder& folder) {
     for (const auto& [name, bytes] : list) {
       std::ofstream(folder / name, std::ios::binary) << bytes;

@@ -5,6 +5,8 @@
 #include "tpm/fit/fit.hpp"
 
 namespace tpm::fit {
+using namespace organ;
+using namespace fit;
 
 /// The result of the parameter of this name.
 inline const ParameterResult& find(const FitResult& fit, const std::string& name) {

@@ -16,8 +16,13 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::test {
+using namespace base;
+using namespace law;
+using namespace files;
 using namespace organ;
+using namespace plan;
 using namespace haptics;
+
 namespace {
 
 using Broken = std::vector<BrokenWord>;
@@ -462,7 +467,7 @@ Broken broken_words(const Formulation& f) {
 
 Broken broken_in_loop(const Formulation& f, HeapCalls heap_calls) {
   Broken broken;
-  // A law needs a file of its own: tests/haptics/test_law_contact.cpp.
+  // A law needs a file of its own: tests/contact/test_law_contact.cpp.
   if (f.name() == "law") return broken;
   const std::string organ = f.name() == "element" ? R"({"kind": "star", "spacing": "30 mm"})"
                                                   : R"({"kind": "liver", "count": 40})";

@@ -3,10 +3,11 @@
 #include <cmath>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/law/relaxation/exponential_sum.hpp"
 #include "tpm/law/relaxation/mittag_leffler.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 inline constexpr double kAlphas[] = {0.01, 0.05, 0.1,  0.25, 0.4999, 0.5,      0.5001,    0.66, 0.7,
                                      0.9,  0.96, 0.97, 0.99, 0.999,  0.999999, 1 - 1e-12, 1.0};
@@ -57,4 +58,4 @@ inline FractionalWeights by_log_tau(const FractionalWeights& w) {
   return weights_of(w.d_weight_d_log_tau, w.d_constant_d_log_tau, w.d_dashpot_d_log_tau_s);
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

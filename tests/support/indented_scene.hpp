@@ -10,7 +10,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::organ {
-
 /// A network that stands on its far side while a patch is pushed along a direction.
 struct IndentedScene {
   IndentedScene(Organ organ, double patch_radius, double far_thickness,

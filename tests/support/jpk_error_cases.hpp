@@ -8,7 +8,9 @@ namespace tpm::test {
 inline std::vector<ErrorCase> jpk_error_cases() {
   const std::string type = "JPK force file";
   const std::string import = "data import {}/c.jpk-force -o {}/out";
-  const auto file = [](std::string bytes) { return files({{"c.jpk-force", std::move(bytes)}}); };
+  const auto file = [](std::string bytes) {
+    return with_files({{"c.jpk-force", std::move(bytes)}});
+  };
   const auto curve = [&file](const ZipMembers& members) { return file(zipped(members)); };
   const auto replaced = [&curve](const std::string& from, const std::string& to) {
     return curve(with_replaced(jpk_curve(), from, to));
@@ -56,14 +58,14 @@ inline std::vector<ErrorCase> jpk_error_cases() {
       {type, "unit of a column", import + " --unit height=mm", curve(jpk_curve())},
       {type, "spring constant of a table",
        "data import {}/m.csv -o {}/out --spring-constant \"1 N/m\"",
-       files({{"m.csv", "Time (s),Force (N),Depth (mm)\n0,0,0\n1,1,1\n"}})},
+       with_files({{"m.csv", "Time (s),Force (N),Depth (mm)\n0,0,0\n1,1,1\n"}})},
       {type, "segments that are not all rows", "data show {}/c.csv",
-       files({{"c.json", R"({"id": "c", "title": "t", "kind": "recording",
+       with_files({{"c.json", R"({"id": "c", "title": "t", "kind": "recording",
 "observable": "contact_force", "provenance": "measured",
 "columns": {"time_s": {"quantity": "time", "unit": "s"},
             "force_N": {"quantity": "contact_force", "unit": "N"}},
 "segments": [{"kind": "extend", "samples": 3}]})"},
-              {"c.csv", "time_s,force_N\n0,0\n1,1\n"}})},
+                   {"c.csv", "time_s,force_N\n0,0\n1,1\n"}})},
   };
 }
 

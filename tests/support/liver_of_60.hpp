@@ -5,7 +5,9 @@
 #include "tpmkit/protocol.hpp"
 
 namespace tpm::testing {
-using namespace study;
+using namespace files;
+using namespace organ;
+using namespace fit;
 
 inline Json liver_of_60() {
   return Json::parse(R"({"organ": {"kind": "liver", "count": 60, "spacing": "20 mm"},

@@ -9,18 +9,18 @@ inline std::vector<ErrorCase> material_error_cases() {
   const std::string type = "material of a scene";
   const std::string check = "network check {}/s.json";
   const auto material = [](const std::string& keys) {
-    return files(
+    return with_files(
         {{"s.json", R"({"organ": {"kind": "liver", "count": 60}, "material": {)" + keys + "}}"}});
   };
   const auto region = [&](const std::string& keys) {
     return material(R"("regions": [{)" + keys + "}]");
   };
-  const auto run = [](const std::string& keys, const std::string& kind) {
-    return files({{"s.json", R"({"organ": {"kind": "star"}, "material": {)" + keys + R"(},
+  const auto run =
+      [](const std::string& keys, const std::string& kind) {
+        return with_files({{"s.json", R"({"organ": {"kind": "star"}, "material": {)" + keys + R"(},
       "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "1 s"},
-      "formulation": {"kind": ")" +
-                                 kind + R"("}})"}});
-  };
+      "formulation": {"kind": ")" + kind + R"("}})"}});
+      };
   const std::string two = R"("Einf": "5 kPa", "branches": [{"g": "3 kPa", "tau": "1 s"},
     {"g": "2 kPa", "tau": "9 s"}])";
   std::string many;
@@ -70,10 +70,10 @@ inline std::vector<ErrorCase> plugin_error_cases() {
   const std::string type = "device plugin";
   const std::string devices = "hil devices --plugin {}/p.so";
   return {
-      {type, "missing", devices, files({})},
-      {type, "empty", devices, files({{"p.so", ""}})},
-      {type, "binary garbage", devices, files({{"p.so", kGarbage}})},
-      {type, "no library", devices, files({{"p.so", std::string(4096, 'x')}})},
+      {type, "missing", devices, with_files({})},
+      {type, "empty", devices, with_files({{"p.so", ""}})},
+      {type, "binary garbage", devices, with_files({{"p.so", kGarbage}})},
+      {type, "no library", devices, with_files({{"p.so", std::string(4096, 'x')}})},
   };
 }
 

@@ -17,6 +17,7 @@
 namespace tpm_test {
 
 using namespace tpm;
+using namespace tpm::law;
 using namespace tpm::organ;
 
 /// A problem with its true answers.

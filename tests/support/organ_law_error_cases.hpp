@@ -23,12 +23,12 @@ inline std::vector<ErrorCase> organ_law_error_cases() {
            more + "}";
   };
   const auto both = [](std::string l, std::string s) {
-    return files({{"l.json", std::move(l)}, {"s.json", std::move(s)}});
+    return with_files({{"l.json", std::move(l)}, {"s.json", std::move(s)}});
   };
   const std::string put = "material {}/l.json {}/s.json -o {}/out";
   const std::string press = put + " --depth '2 mm' --rate '2 mm/s' --hold '2 s'";
   return {
-      {type, "missing scene", press, files({{"l.json", law}})},
+      {type, "missing scene", press, with_files({{"l.json", law}})},
       {type, "scene that is no JSON", press, both(law, kGarbage)},
       {type, "no motion", put, both(law, scene(""))},
       {type, "load imposed", put,

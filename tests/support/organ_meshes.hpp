@@ -11,6 +11,7 @@
 #include "tpm/organ/body/triangle_mesh.hpp"
 
 namespace tpm::test {
+using namespace base;
 using namespace organ;
 
 using Triangles = std::vector<Eigen::Vector3i>;

@@ -5,7 +5,6 @@
 #include "tpm/organ/bonds/bond_system.hpp"
 
 namespace tpm::organ {
-
 /// Stress per strain, Pa, in Voigt's order xx, yy, zz, yz, xz, xy with engineering shear strains.
 using Elasticity = Eigen::Matrix<double, 6, 6>;
 

@@ -8,7 +8,6 @@
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::organ {
-
 enum class PunchShape { square, round };
 
 struct PunchOnBlock {

@@ -11,6 +11,7 @@
 #include "tpm/files/json.hpp"
 
 namespace tpm_test {
+using namespace tpm::files;
 
 /// A python3 that has scipy: the one on the path may be a version manager's without it.
 inline std::string python_with_scipy() {
@@ -32,10 +33,10 @@ inline std::string output_of(const std::string& command) {
 }
 
 /// What such a reference prints.
-inline tpm::Json python_reference(const std::string& script, const std::string& arguments) {
+inline tpm::files::Json python_reference(const std::string& script, const std::string& arguments) {
   const std::string command = fmt::format("{} '{}/scripts/{}' {}", python_with_scipy(),
                                           TPM_TEST_SOURCE_DIR, script, arguments);
-  return tpm::parse_json(output_of(command), script);
+  return tpm::files::parse_json(output_of(command), script);
 }
 
 }  // namespace tpm_test

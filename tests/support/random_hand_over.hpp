@@ -9,7 +9,8 @@
 #include "tpm/contact/law_handover.hpp"
 
 namespace tpm::test {
-using namespace haptics;
+using namespace base;
+using namespace contact;
 
 inline LawFile random_law(Random& random) {
   static const std::vector<std::string> names{

@@ -9,7 +9,10 @@
 #include "tpm/plan/plan.hpp"
 
 namespace tpm::test {
+using namespace base;
+using namespace files;
 using namespace organ;
+using namespace plan;
 
 /// A scene and a request, both decided by a seed and a number: livers of 50 to 200 spheres in two
 /// or three layers (one in ten a star); E1, E2, E' from 3 to 30 kPa, relaxation time from 1 ms to

@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/sensitivity.hpp"
 
-namespace tpm {
+namespace tpm::base {
 
 /// A function of the unit cube whose Sobol indices are known.
 struct SensitivityProblem {
@@ -75,4 +76,4 @@ inline std::vector<double> outputs_of(const SensitivityProblem& problem,
   return outputs;
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -11,7 +11,10 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::test {
+using namespace base;
+using namespace files;
 using namespace organ;
+
 namespace {
 
 using Broken = std::vector<std::string>;

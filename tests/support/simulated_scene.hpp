@@ -5,6 +5,7 @@
 #include "tpm/organ/run/simulation.hpp"
 
 namespace tpm::test {
+using namespace files;
 using namespace organ;
 
 inline ExperimentScene experiment(const std::string& scene) {

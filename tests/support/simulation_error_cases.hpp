@@ -8,7 +8,7 @@ inline std::vector<ErrorCase> simulation_error_cases() {
   const std::string type = "simulation scene";
   const std::string simulate = "simulate {}/s.json -o {}/out.h5 --figures {}/out";
   const auto scene = [](const std::string& more) {
-    return files({{"s.json", R"({"organ": {"kind": "liver"})" + more + "}"}});
+    return with_files({{"s.json", R"({"organ": {"kind": "liver"})" + more + "}"}});
   };
   const std::string push = R"("protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s",
     "hold": "1 s"})";
@@ -96,8 +96,8 @@ inline std::vector<ErrorCase> simulation_error_cases() {
       {type, "output cannot be written", "simulate {}/s.json -o /proc/none/out.h5",
        pushed(R"("title": "t")")},
       {type, "garbage as checkpoint", simulate,
-       files({{"s.json", R"({"organ": {"kind": "liver"}, )" + push + "}"},
-              {"out.h5.checkpoint", kGarbage}})},
+       with_files({{"s.json", R"({"organ": {"kind": "liver"}, )" + push + "}"},
+                   {"out.h5.checkpoint", kGarbage}})},
   };
 }
 

@@ -5,6 +5,7 @@
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm_test {
+using namespace tpm::organ;
 
 /// B between A and C at the spacing, its partner D below; only B may move.
 inline tpm::organ::Organ star_organ(double spacing) {

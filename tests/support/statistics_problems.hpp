@@ -11,6 +11,7 @@
 #include "tpm/fit/uncertainty.hpp"
 
 namespace tpm::test {
+using namespace base;
 using namespace fit;
 
 /// A curve with two parameters: f(x, p) and its derivatives by p.

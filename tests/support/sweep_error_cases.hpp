@@ -16,21 +16,21 @@ inline std::vector<ErrorCase> sweep_error_cases() {
     std::string text = good;
     const auto at = text.find(from);
     if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
-    return files({{"s.json", text.replace(at, from.size(), to)}});
+    return with_files({{"s.json", text.replace(at, from.size(), to)}});
   };
   const auto by_name = [](const std::string& target, const std::string& value) {
-    return files({{"s.json", R"({"model": "organ", "scene": {"organ": {"kind": "star"},
+    return with_files({{"s.json", R"({"model": "organ", "scene": {"organ": {"kind": "star"},
 "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "1 s"}},
-"axes": [{"parameter": ")" + target +
-                                 R"(", "values": [")" + value + R"("]}],
+"axes": [{"parameter": ")" + target + R"(", "values": [")" +
+                                      value + R"("]}],
 "outputs": ["peak_force"]})"}});
   };
   const std::string run = "sweep {}/s.json -o {}/out.h5";
   return {
-      {type, "missing", run, files({})},
-      {type, "empty", run, files({{"s.json", ""}})},
-      {type, "truncated", run, files({{"s.json", good.substr(0, 60)}})},
-      {type, "binary garbage", run, files({{"s.json", kGarbage}})},
+      {type, "missing", run, with_files({})},
+      {type, "empty", run, with_files({{"s.json", ""}})},
+      {type, "truncated", run, with_files({{"s.json", good.substr(0, 60)}})},
+      {type, "binary garbage", run, with_files({{"s.json", kGarbage}})},
       {type, "unknown key", run, with("\"axes\"", "\"axis\"")},
       {type, "unknown model", run, with("single_contact", "double_contact")},
       {type, "unknown parameter", run, with("\"spacing\"", "\"distance\"")},
@@ -67,22 +67,22 @@ inline std::vector<ErrorCase> sweep_error_cases() {
       {type, "name that the results have", run,
        with("\"peak_force\"", "{\"formula\": \"1\", \"name\": \"sweep\"}")},
       {type, "output over the sweep itself", "sweep {}/s.json -o {}/./s.json",
-       files({{"s.json", good}})},
+       with_files({{"s.json", good}})},
       {type, "output where the CSV goes", "sweep {}/s.json -o {}/out.csv",
-       files({{"s.json", good}})},
+       with_files({{"s.json", good}})},
       {type, "output whose times go over the sweep", "sweep {}/out.run.json -o {}/out.h5",
-       files({{"out.run.json", good}})},
-      {type, "shard beyond the last", run + " --shard 3/2", files({{"s.json", good}})},
+       with_files({{"out.run.json", good}})},
+      {type, "shard beyond the last", run + " --shard 3/2", with_files({{"s.json", good}})},
       {type, "merge without shards", "sweep merge {}/s.json -o {}/out.h5",
-       files({{"s.json", good}})},
+       with_files({{"s.json", good}})},
       {type, "merge of garbage", "sweep merge {}/s.json {}/shard -o {}/out.h5",
-       files({{"s.json", good}, {"shard", kGarbage}})},
-      {type, "garbage as log", run, files({{"s.json", good}, {"out.h5.blocks", kGarbage}})},
+       with_files({{"s.json", good}, {"shard", kGarbage}})},
+      {type, "garbage as log", run, with_files({{"s.json", good}, {"out.h5.blocks", kGarbage}})},
       {type, "output cannot be written", "sweep {}/s.json -o /proc/none/out.h5",
-       files({{"s.json", good}})},
+       with_files({{"s.json", good}})},
       {type, "parameter that the material has not", run, by_name("material.tau2", "1 s")},
       {type, "material's parameter of another unit", run, by_name("material.tau1", "1 kPa")},
-      {type, "show of another file", "sweep show {}/s.json", files({{"s.json", good}})},
+      {type, "show of another file", "sweep show {}/s.json", with_files({{"s.json", good}})},
   };
 }
 

@@ -18,6 +18,7 @@
 #include "tpmkit/bond_material.hpp"
 
 namespace tpm_test {
+using namespace tpm::organ;
 
 /// One spring with its dashpots between two spheres.
 struct WrittenBond {
@@ -219,7 +220,7 @@ inline void integrate(const std::function<void(double, const double*, double*)>&
                       Eigen::VectorXd& y, double t0, const std::vector<double>& times,
                       double relative, double absolute, bool stiff,
                       const std::function<void(double, const Eigen::VectorXd&)>& see) {
-  using namespace tpm::sundials;
+  using namespace tpm::organ::sundials;
   const Context context = make_context();
   const Vector state(N_VMake_Serial(y.size(), y.data(), context.get()));
   const Cvodes cvodes(CVodeCreate(stiff ? CV_BDF : CV_ADAMS, context.get()));

@@ -22,8 +22,13 @@
 #include "tpm/sweep/sweep_result.hpp"
 
 using namespace tpm;
-using namespace tpm::study;
-using namespace tpm::report;
+using namespace tpm::base;
+using namespace tpm::law;
+using namespace tpm::files;
+using namespace tpm::show;
+using namespace tpm::fit;
+using namespace tpm::sweep;
+using namespace tpm::paper;
 using Catch::Matchers::WithinRel;
 
 namespace {

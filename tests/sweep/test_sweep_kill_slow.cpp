@@ -18,6 +18,8 @@
 #include "tpm/files/file.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
 namespace fs = std::filesystem;
 
 namespace {

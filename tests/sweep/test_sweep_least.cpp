@@ -11,8 +11,10 @@
 #include "tpm/sweep/sweep_reader.hpp"
 
 using namespace tpm;
+using namespace tpm::files;
 using namespace tpm::organ;
-using namespace tpm::study;
+using namespace tpm::plan;
+using namespace tpm::sweep;
 
 namespace {
 

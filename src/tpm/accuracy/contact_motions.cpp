@@ -8,10 +8,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/base/text.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 constexpr double kPressing_m_per_s = 0.020;
@@ -205,4 +206,4 @@ ContactMotion refined(ContactMotion motion, int pieces) {
   return motion;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

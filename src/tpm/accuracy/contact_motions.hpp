@@ -7,7 +7,7 @@
 
 #include "tpmkit/protocol.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 /// Where a contact sphere goes at a servo rate, beginning at rest; between two periods it moves
 /// linearly.
@@ -66,4 +66,4 @@ struct ContactAxes {
 /// @param pieces of each period, >= 1
 [[nodiscard]] ContactMotion refined(ContactMotion motion, int pieces);
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -8,7 +8,7 @@
 #include "tpm/organ/balance/quasistatic.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 constexpr double kBalance = 1e-13;  // of the stiffest bond times 1 m
@@ -187,4 +187,4 @@ Eigen::VectorXd line_reference(const TouchedTissue& tissue, const ContactMotion&
   return -solver.run(*motion.line, times).response;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

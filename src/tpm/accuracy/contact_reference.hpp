@@ -5,7 +5,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/organ/balance/equilibrium.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 /// A tissue and the sphere at which it is touched.
 struct TouchedTissue {
@@ -89,4 +89,4 @@ class FineContact {
 [[nodiscard]] Eigen::VectorXd line_reference(const TouchedTissue& tissue,
                                              const ContactMotion& motion, double tolerance);
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

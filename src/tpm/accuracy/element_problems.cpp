@@ -8,7 +8,7 @@
 #include "tpm/organ/bonds/lowest_mode.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 /// One bond under a protocol, and the star of four spheres, which is the same thing.
@@ -197,4 +197,4 @@ BenchmarkProblem bond_mass_problem() {
   return problem;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/accuracy/problem.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 /// eta1 of the README's first fit, `tpm fit configs/liver_relaxation.json`.
 inline constexpr double kFittedEta1_Pa_s = 257.3e3;
@@ -17,4 +17,4 @@ inline constexpr double kPaperEta1_Pa_s = 5.0, kPaperSprings_Pa = 24e3;
 /// One sphere with mass under a suddenly applied load.
 [[nodiscard]] BenchmarkProblem bond_mass_problem();
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -7,7 +7,7 @@
 #include "tpm/organ/bonds/lowest_mode.hpp"
 #include "tpm/organ/scene/scene.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 /// The scene's tissue driven at its contact sphere along the normal.
@@ -187,4 +187,4 @@ std::shared_ptr<const PosedNetwork> posed_elastic_poke() {
   return posed_moving_liver(tissue, true);
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/accuracy/posed.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 // On the liver of 424 spheres of configs/liver_scene.json.
 
@@ -21,4 +21,4 @@ namespace tpm::study {
 [[nodiscard]] BenchmarkProblem poke_with_mass_problem(
     const std::shared_ptr<const PosedNetwork>& posed);
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -10,7 +10,7 @@
 #include "tpm/organ/run/scene_runner.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 PosedNetwork::PosedNetwork(DrivenNetwork driven, Protocol imposed, std::vector<double> asked_s)
     : network(std::move(driven)), protocol(std::move(imposed)), times_s(std::move(asked_s)) {}
@@ -202,7 +202,7 @@ std::vector<BenchmarkSetting> own_formulation_settings(
     const std::shared_ptr<const ExperimentScene>& scene, const std::vector<double>& times_s) {
   const Formulations shipped = shipped_formulations();
   std::vector<BenchmarkSetting> all;
-  for (const Formulation* f : formulations()) {
+  for (const Formulation* f : linked_formulations()) {
     if (std::find(shipped.begin(), shipped.end(), f) != shipped.end()) continue;
     const auto posed = std::make_shared<ExperimentScene>(*scene);
     posed->formulation = {};
@@ -248,4 +248,4 @@ void add(std::vector<BenchmarkSetting>& all, std::vector<BenchmarkSetting> more)
   for (BenchmarkSetting& setting : more) all.push_back(std::move(setting));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -6,7 +6,7 @@
 #include "tpm/organ/scene/experiment_scene.hpp"
 #include "tpmkit/organ.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 /// A network with what is done to it; shared by the settings that run it.
 struct PosedNetwork {
@@ -86,4 +86,4 @@ struct RuleSettings {
 /// Appends.
 void add(std::vector<BenchmarkSetting>& all, std::vector<BenchmarkSetting> more);
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

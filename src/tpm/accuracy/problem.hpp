@@ -11,7 +11,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/organ/steps/method.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 /// What one run of a setting brought.
 struct BenchmarkRun {
@@ -128,4 +128,4 @@ struct BenchmarkEntry {
 /// Throws Error(usage) with the known names for one that is not there.
 [[nodiscard]] std::vector<BenchmarkEntry> chosen_benchmarks(std::span<const std::string> names);
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -9,7 +9,7 @@
 #include "tpm/accuracy/servo_problems.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 constexpr std::array<BenchmarkEntry, 11> kEntries{{
@@ -50,4 +50,4 @@ std::vector<BenchmarkEntry> chosen_benchmarks(std::span<const std::string> names
   return chosen;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -7,7 +7,7 @@
 #include "tpm/accuracy/problem.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 Eigen::VectorXd sizes_of(const Eigen::VectorXd& response, int components) {
   return response.reshaped(components, response.size() / components).colwise().norm().transpose();
@@ -50,4 +50,4 @@ BenchmarkReference checked_reference(BenchmarkAnswer first, BenchmarkAnswer seco
   return reference;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -11,7 +11,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -169,4 +169,4 @@ BenchmarkResult run_benchmark(const BenchmarkProblem& problem, const BenchmarkOp
   return result;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

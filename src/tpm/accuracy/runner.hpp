@@ -3,7 +3,7 @@
 
 #include "tpm/accuracy/problem.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 struct BenchmarkOptions {
   int repeats = 20;              ///< of every run that completes, >= 1
@@ -76,4 +76,4 @@ struct BenchmarkResult {
 /// @param values not empty, rising
 [[nodiscard]] double quantile_of_sorted(std::span<const double> values, double share);
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

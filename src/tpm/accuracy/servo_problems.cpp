@@ -14,7 +14,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/organ/scene/scene.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 constexpr double kServoPeriod_s = 1e-3;
@@ -463,4 +463,4 @@ BenchmarkProblem servo_inner_problem() {
        zone_model(3, kServoPeriod_s), full_model(kServoPeriod_s)});
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

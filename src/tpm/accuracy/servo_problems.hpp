@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/accuracy/problem.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 // Contact models at servo rate (src/tpm/reduce) on the liver of 424 spheres, each at relaxation
 // times from 0.2 ms to 100 s, against the full network.
@@ -13,4 +13,4 @@ namespace tpm::study {
 /// The same with the organ's inner layer fixed.
 [[nodiscard]] BenchmarkProblem servo_inner_problem();
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

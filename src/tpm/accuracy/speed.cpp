@@ -10,7 +10,7 @@
 #include "tpm/accuracy/runner.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 double processor_s() {
@@ -92,4 +92,4 @@ std::vector<SpeedRow> measure_speed(const std::vector<SpeedWork>& works,
   return rows;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

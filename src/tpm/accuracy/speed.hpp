@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 /// A named piece of work whose processor time is followed from commit to commit.
 struct SpeedWork {
@@ -41,4 +41,4 @@ struct SpeedRow {
                                                   const SpeedOptions& options,
                                                   const std::function<void()>& done);
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

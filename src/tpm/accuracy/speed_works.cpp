@@ -18,7 +18,7 @@
 #include "tpmkit/bond_element.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 /// A liver of some spheres in two layers, or solid, that stands on its far side.
@@ -214,4 +214,4 @@ const std::vector<SpeedWork>& speed_works() {
   return works;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

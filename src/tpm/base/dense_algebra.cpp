@@ -7,7 +7,7 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
-namespace tpm {
+namespace tpm::base {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -85,4 +85,4 @@ Eigen::Matrix3d turn_onto(const Eigen::Vector3d& from, const Eigen::Vector3d& to
   return Eigen::Matrix3d::Identity() + cross + cross * cross / (1.0 + cosine);
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

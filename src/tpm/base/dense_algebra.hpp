@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <optional>
 
-namespace tpm {
+namespace tpm::base {
 
 // Decompositions of small dense matrices, compiled once: Eigen's templates for them cost the
 // compiler seconds in every source that uses one (docs/build_times.md). Singular systems are
@@ -56,4 +56,4 @@ struct RightSingular {
 /// The smallest turn that takes one unit vector onto another.
 [[nodiscard]] Eigen::Matrix3d turn_onto(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -9,7 +9,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::base {
 
 /// An entry of a table of the words that files and options use for the values of an enumeration.
 /// Tables may have richer entries, with members of these names.
@@ -61,4 +61,4 @@ auto parse_word(const Words& words, std::string_view noun, std::string_view text
                   fmt::format("one of {}", listed(words)));
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -7,6 +7,8 @@
 #include "tpm/base/text.hpp"
 
 namespace tpm {
+using namespace base;
+
 namespace {
 
 std::string one_line(std::string_view where, std::string_view what, std::string_view expected) {

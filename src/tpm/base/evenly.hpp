@@ -2,7 +2,7 @@
 #include <cmath>
 #include <vector>
 
-namespace tpm {
+namespace tpm::base {
 
 /// So many values from `from` to `to`, evenly in the logarithm; one alone lies in the middle.
 [[nodiscard]] inline std::vector<double> evenly_in_log(double from, double to, int count) {
@@ -14,4 +14,4 @@ namespace tpm {
   return values;
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -7,7 +7,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::base {
 namespace {
 
 constexpr double kSafety = 1.25;  // Roache: with three grids
@@ -87,4 +87,4 @@ GridConvergence grid_convergence(std::span<const double> spacing,
   return g;
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -2,7 +2,7 @@
 #include <span>
 #include <string>
 
-namespace tpm {
+namespace tpm::base {
 
 /// What three solutions on ever finer grids tell (Roache 1994; the procedure of Celik et al. 2008).
 struct GridConvergence {
@@ -23,4 +23,4 @@ struct GridConvergence {
 [[nodiscard]] GridConvergence grid_convergence(std::span<const double> spacing,
                                                std::span<const double> solution);
 
-}  // namespace tpm
+}  // namespace tpm::base

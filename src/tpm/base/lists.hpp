@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace tpm {
+namespace tpm::base {
 
 /// What `value` makes of the items, a member or a function.
 template <class Made, class Items, class Value>
@@ -38,4 +38,4 @@ auto each_once(const Items& items, Value value) {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace tpm {
+namespace tpm::base {
 
 /// Of at least one value; the upper of the two middle ones of an even number.
 [[nodiscard]] inline double median(std::vector<double> values) {
@@ -11,4 +11,4 @@ namespace tpm {
   return *middle;
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <new>
 
-namespace tpm {
+namespace tpm::base {
 namespace {
 
 thread_local MemoryReserve* innermost = nullptr;
@@ -37,4 +37,4 @@ void MemoryReserve::give_back() {
   throw std::bad_alloc();
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

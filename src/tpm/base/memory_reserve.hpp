@@ -1,7 +1,7 @@
 #pragma once
 #include <cstddef>
 
-namespace tpm {
+namespace tpm::base {
 
 /// Memory kept back for a library that does not survive a request that fails (it follows a null
 /// pointer, or throws where it must not). While a reserve lives, the first request of its thread
@@ -33,4 +33,4 @@ class MemoryReserve {
   MemoryReserve* outer_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::base

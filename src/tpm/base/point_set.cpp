@@ -8,7 +8,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::base {
 namespace {
 
 constexpr int kDigits = 32;
@@ -166,4 +166,4 @@ std::unique_ptr<CubePoints> sobol_points(int dimensions, std::uint64_t seed) {
   return std::make_unique<ScrambledSobol>(dimensions, seed);
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

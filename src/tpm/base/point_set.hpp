@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <memory>
 
-namespace tpm {
+namespace tpm::base {
 
 /// Points in the unit cube. Every coordinate can be asked for by itself and in any order, so that
 /// any number of workers share one set of points and it never stands in memory.
@@ -32,4 +32,4 @@ class CubePoints {
 /// uniform, the even filling of the cube kept, and sets of different seeds independent.
 [[nodiscard]] std::unique_ptr<CubePoints> sobol_points(int dimensions, std::uint64_t seed);
 
-}  // namespace tpm
+}  // namespace tpm::base

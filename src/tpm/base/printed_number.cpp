@@ -9,7 +9,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm::study {
+namespace tpm::base {
 namespace {
 
 /// Power of ten of the last digit of the part before an exponent: -2 for "0.61", 0 for "490".
@@ -116,4 +116,4 @@ DigitCheck compare_digits(const PrintedNumber& printed, double computed) {
   return check;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::base

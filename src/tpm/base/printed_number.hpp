@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-namespace tpm::study {
+namespace tpm::base {
 
 /// A number as a paper prints it. Its digits say how well it is known: "0.61" has a last digit
 /// worth 0.01, "1.2e-3" one worth 0.0001, "490" one worth 1 (a final zero counts as a digit).
@@ -61,4 +61,4 @@ struct DigitCheck {
 /// @param computed finite, in the unit in which the number is printed
 [[nodiscard]] DigitCheck compare_digits(const PrintedNumber& printed, double computed);
 
-}  // namespace tpm::study
+}  // namespace tpm::base

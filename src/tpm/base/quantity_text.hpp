@@ -5,7 +5,7 @@
 
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::base {
 
 /// The parts of "4 mm" or "4mm"; the unit is empty if there is none.
 struct QuantityText {
@@ -21,4 +21,4 @@ struct QuantityText {
 /// "0.613 N"; just the number if the unit is 1.
 [[nodiscard]] std::string with_unit(std::string_view number, const Unit& unit);
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace tpm {
+namespace tpm::base {
 
 double Random::uniform() {
   return static_cast<double>(generator_() >> 11) * 0x1.0p-53;
@@ -26,4 +26,4 @@ std::size_t Random::below(std::size_t n) {
   return static_cast<std::size_t>(uniform() * static_cast<double>(n));
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <random>
 
-namespace tpm {
+namespace tpm::base {
 
 /// Random numbers that are the same on every machine for the same seed: the distributions of the
 /// standard library may differ between implementations, its generators do not. 0 is a valid seed.
@@ -23,4 +23,4 @@ class Random {
   bool has_spare_ = false;
 };
 
-}  // namespace tpm
+}  // namespace tpm::base

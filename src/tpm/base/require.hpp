@@ -5,7 +5,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::base {
 
 [[nodiscard]] inline bool is_positive(double value) noexcept {
   return value > 0.0 && std::isfinite(value);
@@ -17,4 +17,4 @@ inline void require_number(bool good, std::string_view what, double given,
   if (!good) throw bad_input(what, shortest(given) + std::string(unit), expected);
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <string>
 
+#include "tpm/base/distributions.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::base {
 namespace {
 
 constexpr int kMostInputs = 1833;
@@ -105,9 +105,8 @@ IndexEstimate estimate(const std::vector<Replicate>& all, std::vector<double> Re
   for (const Replicate& r : all) e.value += (r.*index)[input] / count;
   double squares = 0.0;
   for (const Replicate& r : all) squares += std::pow((r.*index)[input] - e.value, 2);
-  const boost::math::students_t student(count - 1.0);
-  const double half = boost::math::quantile(student, 0.5 + 0.5 * level) *
-                      std::sqrt(squares / (count - 1.0) / count);
+  const double half =
+      student_quantile(0.5 + 0.5 * level, count - 1.0) * std::sqrt(squares / (count - 1.0) / count);
   e.low = e.value - half;
   e.high = e.value + half;
   return e;
@@ -153,4 +152,4 @@ SensitivityResult sobol_indices(const SensitivityDesign& design, std::span<const
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -6,7 +6,7 @@
 
 #include "tpm/base/point_set.hpp"
 
-namespace tpm {
+namespace tpm::base {
 
 /// Where a function of the unit cube is asked for its Sobol indices. Each replicate has its own
 /// scrambled Sobol points in 2 * inputs dimensions; a point's halves are a row of A and of B, and
@@ -54,4 +54,4 @@ struct SensitivityResult {
 [[nodiscard]] SensitivityResult sobol_indices(const SensitivityDesign& design,
                                               std::span<const double> outputs, double level = 0.95);
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <iterator>
 
-namespace tpm {
+namespace tpm::base {
 
 std::string shortest(double value) {
   return fmt::format("{}", value);
@@ -58,4 +58,4 @@ std::string for_terminal(std::string_view text, LineEnds line_ends) {
   return safe;
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -2,7 +2,7 @@
 #include <string>
 #include <string_view>
 
-namespace tpm {
+namespace tpm::base {
 
 /// Shortest decimal text that reads back as the same double; the same on every machine.
 [[nodiscard]] std::string shortest(double value);
@@ -26,4 +26,4 @@ enum class LineEnds { kept, escaped };
 /// are not UTF-8 become '?'. Tabs stay.
 [[nodiscard]] std::string for_terminal(std::string_view text, LineEnds line_ends);
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -15,6 +15,8 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
+
 namespace {
 
 /// Units in which the project writes numbers. Of those with one size the first gives its symbol to
@@ -366,7 +368,7 @@ double parse_number(std::string_view text, std::string_view where) {
                   "a number such as 12.5 or 1.2e-3");
 }
 
-std::optional<double> find_share(std::string_view text) {
+std::optional<double> base::find_share(std::string_view text) {
   constexpr double kPercent = 100.0;
   const bool percent = text.ends_with('%');
   if (percent) text.remove_suffix(1);
@@ -375,12 +377,12 @@ std::optional<double> find_share(std::string_view text) {
   return share;
 }
 
-std::string with_unit(std::string_view number, const Unit& unit) {
+std::string base::with_unit(std::string_view number, const Unit& unit) {
   if (unit.symbol.empty()) return std::string(number);
   return fmt::format("{} {}", number, unit.symbol);
 }
 
-QuantityText split_quantity(std::string_view text) {
+QuantityText base::split_quantity(std::string_view text) {
   const std::string_view t = trimmed(text);
   std::size_t split = std::min(t.find_first_of(" \t"), t.size());
   if (split == t.size()) {  // "4mm": the unit begins where the number ends

@@ -7,7 +7,7 @@
 
 #include "tpm/base/text.hpp"
 
-namespace tpm {
+namespace tpm::base {
 namespace {
 
 struct Warnings {
@@ -44,4 +44,4 @@ WarningSink set_warning_sink(WarningSink sink) {
   return std::exchange(all.sink, std::move(sink));
 }
 
-}  // namespace tpm
+}  // namespace tpm::base

@@ -2,7 +2,7 @@
 #include <functional>
 #include <string>
 
-namespace tpm {
+namespace tpm::base {
 
 /// Tells the user what does not stop the work: the line "tpm: warning: TEXT" on standard error,
 /// once for each text in the life of the program. Callable from several threads.
@@ -15,4 +15,4 @@ using WarningSink = std::function<void(const std::string& text)>;
 /// function must be callable from several threads. Returns the function that had them before.
 WarningSink set_warning_sink(WarningSink sink);
 
-}  // namespace tpm
+}  // namespace tpm::base

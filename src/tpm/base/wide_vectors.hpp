@@ -2,7 +2,7 @@
 // Loops over numbers side by side, compiled three times: for any processor, for those with AVX2,
 // and for those with AVX-512.
 
-namespace tpm {
+namespace tpm::base {
 
 #if defined(__x86_64__) && defined(__GNUC__)
 
@@ -52,4 +52,4 @@ void run_wide(const Kernel& kernel) {
 
 #endif
 
-}  // namespace tpm
+}  // namespace tpm::base

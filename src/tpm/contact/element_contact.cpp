@@ -5,7 +5,7 @@
 #include "tpm/base/require.hpp"
 #include "tpm/law/element/validity_limits.hpp"
 
-namespace tpm::haptics {
+namespace tpm::contact {
 
 ElementContact::ElementContact(const BondElement& material, double period_s, ElementRule rule,
                                double dashpot_N_s_per_m)
@@ -57,4 +57,4 @@ Eigen::Matrix3d ElementContact::equilibrium_stiffness() const noexcept {
   return stiffness;
 }
 
-}  // namespace tpm::haptics
+}  // namespace tpm::contact

@@ -1,9 +1,10 @@
 #pragma once
+#include "tpm/base/namespaces.hpp"
 #include "tpm/law/relaxation/relaxation_filter.hpp"
 #include "tpmkit/bond_element.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm::haptics {
+namespace tpm::contact {
 
 /// How the relaxing spring of an element is advanced over a period.
 enum class ElementRule {
@@ -37,4 +38,4 @@ class ElementContact final : public ContactModel {
   double followed_m_ = 0.0;  ///< w: what the relaxing spring has relaxed to, dw/dt = (e - w)/tau
 };
 
-}  // namespace tpm::haptics
+}  // namespace tpm::contact

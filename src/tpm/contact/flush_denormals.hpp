@@ -4,7 +4,7 @@
 #include <immintrin.h>
 #endif
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// Numbers too small for full precision count as 0 while this lives: what decays towards 0 would
 /// otherwise slow the processor down a hundredfold.
@@ -31,4 +31,4 @@ class FlushDenormals {
   FlushDenormals& operator=(const FlushDenormals&) = delete;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

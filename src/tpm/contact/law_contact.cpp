@@ -8,7 +8,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::haptics {
+namespace tpm::contact {
 namespace {
 
 constexpr double kRoom = 1.2;  // a hand overshoots; a law may be followed so far beyond its data
@@ -118,4 +118,4 @@ double valid_depth_m(const LawFile& law, double deepest_m) {
   return kRoom * (law.fitted_to ? *law.fitted_to : deepest_m);
 }
 
-}  // namespace tpm::haptics
+}  // namespace tpm::contact

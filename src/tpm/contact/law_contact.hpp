@@ -1,11 +1,12 @@
 #pragma once
 #include <Eigen/Core>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/law/contact_history.hpp"
 #include "tpmkit/contact_model.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm::haptics {
+namespace tpm::contact {
 
 /// How a law is stepped in a loop.
 struct LawContactSettings {
@@ -75,4 +76,4 @@ class LawContact final : public ContactModel {
 /// beyond the deepest place asked for.
 [[nodiscard]] double valid_depth_m(const LawFile& law, double deepest_m);
 
-}  // namespace tpm::haptics
+}  // namespace tpm::contact

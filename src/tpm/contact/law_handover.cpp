@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm::haptics {
+namespace tpm::contact {
 
 double LawInLoop::stored_J() const {
   const double u = std::max(contact.depth_m(), 0.0);
@@ -49,4 +49,4 @@ void hand_over(const HandOver& decision, LawInLoop& to) noexcept {
   to.contact.take_over(decision.depth_m, decision.relaxed_kernel_m);
 }
 
-}  // namespace tpm::haptics
+}  // namespace tpm::contact

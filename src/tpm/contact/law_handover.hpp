@@ -1,8 +1,9 @@
 #pragma once
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/law_contact.hpp"
-#include "tpm/law/stored_energy.hpp"
+#include "tpm/contact/stored_energy.hpp"
 
-namespace tpm::haptics {
+namespace tpm::contact {
 
 /// A law in the loop and what it stores.
 struct LawInLoop {
@@ -42,4 +43,4 @@ struct HandOver {
 /// Carries out a possible hand-over; the new law then stands where the old one stood.
 void hand_over(const HandOver& decision, LawInLoop& to) noexcept;
 
-}  // namespace tpm::haptics
+}  // namespace tpm::contact

@@ -7,7 +7,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr double kStride_m = 1e-3;
@@ -134,4 +134,4 @@ ContactFields PushedContact::fields(const Positions& position, const ViscousStat
   return fields;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -4,9 +4,10 @@
 #include <array>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/balance/equilibrium.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// How a tissue answers small displacements of its contact sphere.
 struct ContactFields {
@@ -84,4 +85,4 @@ class PushedContact {
   std::vector<Found> found_;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

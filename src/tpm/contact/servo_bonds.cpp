@@ -12,7 +12,7 @@
 #define TPM_HAS_AVX2 1
 #endif
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 float ServoWeights::longest_kept() const {
   float longest = keep;
@@ -416,4 +416,4 @@ void ServoBonds::add_next(const float* displacement, const ServoWeights& weights
   ServoBondKernels::sweep<Sweep::next>(*this, weights, displacement, force);
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -5,9 +5,10 @@
 #include <span>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/bonds/bond_system.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// Weights of the exact update of one branch over a servo period in which elongations are linear:
 /// m_new = keep m + of_start l_old + of_end l_new.
@@ -109,4 +110,4 @@ class ServoBonds {
   bool cubic_ = false;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

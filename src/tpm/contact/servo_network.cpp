@@ -12,7 +12,7 @@
 #include "tpm/contact/flush_denormals.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr double kFieldStride_m = 2e-3;
@@ -294,4 +294,4 @@ void ServoNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcep
   }
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

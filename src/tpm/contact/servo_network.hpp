@@ -2,11 +2,12 @@
 #include <memory>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/servo_stiffness.hpp"
 #include "tpm/contact/step_error.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 struct ServoNetworkOptions {
   double period_s = 1e-3;        ///< > 0
@@ -104,4 +105,4 @@ class ServoNetwork final : public ContactModel {
   int balances_ = 0;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -1,6 +1,6 @@
 #include "tpm/contact/servo_stiffness.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 ServoStiffness::ServoStiffness(const BondSystem& bonds, const Constraints& constraints)
     : column_(bonds.spheres(), 0) {
@@ -63,4 +63,4 @@ void ServoStiffness::solve(float* four_per_sphere) noexcept {
   project(four_per_sphere);
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -2,11 +2,12 @@
 #include <memory>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/servo_bonds.hpp"
 #include "tpm/organ/bonds/constraints.hpp"
 #include "tpm/organ/linear/frontal_factor.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// The spheres of a tissue in the order in which servo models keep them, and its stiffness at one
 /// position, factorised for many solutions (FrontalFactor).
@@ -47,4 +48,4 @@ class ServoStiffness {
   std::unique_ptr<FrontalFactor> factor_;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -6,7 +6,7 @@
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/law/relaxation/relaxation_filter.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr double kNoMode = 1e-9;  // of the contact's stiffness: a field that adds nothing
@@ -132,4 +132,4 @@ Eigen::Vector3d StepError::advance(const Eigen::Vector3d& displacement_m) noexce
   return error_N;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

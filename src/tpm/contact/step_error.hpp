@@ -1,7 +1,8 @@
 #pragma once
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/pushed_contact.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// What it costs to take elongations as linear within a servo period, estimated with a small linear
 /// model of the tissue: its displacements are combinations of the fields that follow the contact at
@@ -34,4 +35,4 @@ class StepError {
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -14,7 +14,7 @@
 #include "tpm/law/relaxation/relaxation_filter.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr double kNearBy_m = 0.2e-3;  // beyond the way of the ball in a period
@@ -443,4 +443,4 @@ void SurfaceNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexc
   }
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

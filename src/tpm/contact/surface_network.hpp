@@ -2,11 +2,12 @@
 #include <array>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/servo_stiffness.hpp"
 #include "tpm/organ/balance/ball_on_network.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 struct SurfaceNetworkOptions {
   double period_s = 1e-3;    ///< > 0
@@ -127,4 +128,4 @@ class SurfaceNetwork final : public ContactModel {
   int balances_ = 0;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

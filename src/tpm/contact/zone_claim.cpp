@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr std::size_t kClaimIntervals = 24;
@@ -69,4 +69,4 @@ void ZoneClaim::require_aside(const ZonePlace& place, double aside_m, double err
   aside_N_per_m_ = std::max(aside_N_per_m_, (error_N - at(place, 0.0)) / aside_m);
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -4,7 +4,7 @@
 
 #include "tpm/contact/servo_bonds.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// Where a contact is and was.
 struct ZonePlace {
@@ -55,4 +55,4 @@ class ZoneClaim {
   ZonePlace place_;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

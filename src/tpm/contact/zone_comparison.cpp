@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/contact/compared_motion.hpp"
+#include "tpm/contact/condensed/compared_motion.hpp"
 #include "tpm/contact/zone_network.hpp"
 #include "tpm/organ/bonds/material_refusal.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 /// Errors under other motions than the ones compared: the rule of the plan's step candidates.
@@ -128,4 +128,4 @@ void ZoneNetwork::compare(PushedContact& tissue, const Constraints& constraints,
   reset();
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -7,7 +7,7 @@
 #include "tpm/contact/flush_denormals.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr double kValidZoneError = 0.05;    // error over the largest force
@@ -247,4 +247,4 @@ void ZoneNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept
   }
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

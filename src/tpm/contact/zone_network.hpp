@@ -2,7 +2,8 @@
 #include <memory>
 #include <vector>
 
-#include "tpm/contact/compared_motion.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/contact/condensed/compared_motion.hpp"
 #include "tpm/contact/servo_bonds.hpp"
 #include "tpm/contact/step_error.hpp"
 #include "tpm/contact/zone_claim.hpp"
@@ -11,7 +12,7 @@
 #include "tpm/organ/linear/panel_kernels.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 struct ZoneNetworkOptions {
   double period_s = 1e-3;           ///< > 0
@@ -129,4 +130,4 @@ class ZoneNetwork final : public ContactModel {
   double largest_N_ = 0.0;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

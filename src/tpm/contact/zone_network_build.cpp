@@ -8,7 +8,7 @@
 #include "tpm/contact/zone_network.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr double kNoField = 1e-8;  // of the energy of a field: what it adds is nothing
@@ -201,4 +201,4 @@ void ZoneNetwork::set_weights(const PushedContact& tissue, const Parts& parts,
   }
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -1,6 +1,6 @@
 #include "tpm/contact/zone_surroundings.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 LinearBonds::LinearBonds(const PushedContact& tissue, const Positions& position, double relaxed,
                          const std::vector<char>& chosen)
@@ -47,4 +47,4 @@ BlockMatrix LinearBonds::matrix(double relaxation_factor) const {
   return matrix;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

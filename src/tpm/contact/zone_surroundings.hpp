@@ -1,9 +1,10 @@
 #pragma once
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/pushed_contact.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// Some bonds of a tissue as linear springs with viscous state, about an equilibrium.
 class LinearBonds {
@@ -31,4 +32,4 @@ class LinearBonds {
   std::vector<Linear> linear_;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

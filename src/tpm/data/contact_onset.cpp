@@ -4,8 +4,9 @@
 #include <cmath>
 
 #include "tpm/base/median.hpp"
+#include "tpm/base/namespaces.hpp"
 
-namespace tpm {
+namespace tpm::data {
 namespace {
 
 constexpr double kNoise = 5.0;   // standard deviations of the noise that a floor stays within
@@ -143,4 +144,4 @@ std::optional<Release> find_release(const TouchSearch& search, const DrivePiece&
   return std::nullopt;
 }
 
-}  // namespace tpm
+}  // namespace tpm::data

@@ -5,7 +5,7 @@
 
 #include "tpm/data/drive_pieces.hpp"
 
-namespace tpm {
+namespace tpm::data {
 
 /// The first of `count` samples in a row, from `first` to `last` (inclusive), that are at least
 /// `level`; none if there is no such run.
@@ -48,4 +48,4 @@ struct Release {
 /// How far the response must be from its floor to be told from noise, SI.
 [[nodiscard]] double touch_margin(const TouchSearch& search);
 
-}  // namespace tpm
+}  // namespace tpm::data

@@ -9,9 +9,12 @@
 #include <utility>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
+
 namespace {
 
 constexpr auto kProvenances = std::to_array<Word<Provenance>>({

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <utility>
 
-namespace tpm {
+namespace tpm::data {
 namespace {
 
 // In standard deviations of the drive's noise: what a single sample stays within, and what the
@@ -169,4 +169,4 @@ std::vector<DrivePiece> drive_pieces(const std::vector<double>& time,
   return Pieces(time, drive, jitter, hold_tolerance).take();
 }
 
-}  // namespace tpm
+}  // namespace tpm::data

@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace tpm {
+namespace tpm::data {
 
 /// Standard deviation of the noise of samples `first` to `last` (inclusive), in the unit of the
 /// values: each sample against the straight line through its neighbours, which a smooth signal
@@ -33,4 +33,4 @@ struct DrivePiece {
                                                    const std::vector<double>& drive, double jitter,
                                                    double hold_tolerance);
 
-}  // namespace tpm
+}  // namespace tpm::data

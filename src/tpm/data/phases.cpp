@@ -8,6 +8,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/median.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/data/contact_onset.hpp"
@@ -15,7 +16,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::data {
 namespace {
 
 void require_finite(const Recording& recording, const std::vector<double>& values,
@@ -350,4 +351,4 @@ RecordingPhases find_phases(const Recording& recording, const PhaseOptions& opti
   return Finder(recording, options).find();
 }
 
-}  // namespace tpm
+}  // namespace tpm::data

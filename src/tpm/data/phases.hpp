@@ -7,7 +7,7 @@
 
 #include "tpmkit/curve.hpp"
 
-namespace tpm {
+namespace tpm::data {
 
 /// What happens in a part of a recording.
 enum class PhaseKind {
@@ -70,4 +70,4 @@ struct RecordingPhases {
 [[nodiscard]] RecordingPhases find_phases(const Recording& recording,
                                           const PhaseOptions& options = {});
 
-}  // namespace tpm
+}  // namespace tpm::data

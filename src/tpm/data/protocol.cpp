@@ -6,10 +6,13 @@
 #include <cmath>
 #include <utility>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
+
 namespace {
 
 void require_positive(double value, std::string_view what, std::string_view unit) {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace tpm {
+namespace tpm::data {
 namespace {
 
 /// The knots that the straight lines between them leave within a distance of all others.
@@ -50,4 +50,4 @@ Protocol followed_by_organ(const Protocol& measured, double contact) {
   return motion;
 }
 
-}  // namespace tpm
+}  // namespace tpm::data

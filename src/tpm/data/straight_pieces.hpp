@@ -1,7 +1,7 @@
 #pragma once
 #include "tpmkit/protocol.hpp"
 
-namespace tpm {
+namespace tpm::data {
 
 /// How far from a measured motion an organ may be driven, in parts of its depth. Every sample of a
 /// recording would be a knot, and at every knot the steps of an organ end.
@@ -13,4 +13,4 @@ inline constexpr double kMotionWithin = 2e-3;
 /// @param contact where the tissue is met, of the history's unit
 [[nodiscard]] Protocol followed_by_organ(const Protocol& measured, double contact = 0.0);
 
-}  // namespace tpm
+}  // namespace tpm::data

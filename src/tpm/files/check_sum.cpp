@@ -3,7 +3,7 @@
 #include <libdeflate.h>
 #include <zlib.h>
 
-namespace tpm {
+namespace tpm::files {
 
 // The same sum as zlib's, several times as fast: every row of a recording is summed.
 std::uint32_t check_sum(const void* bytes, std::size_t size, std::uint32_t before) {
@@ -17,4 +17,4 @@ std::uint32_t joined_check_sum(std::uint32_t first, std::uint32_t second,
       crc32_combine(first, second, static_cast<z_off_t>(size_of_second)));
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace tpm {
+namespace tpm::files {
 
 /// CRC-32 of bytes (ISO 3309, as in gzip), or of what stands before them and the bytes.
 /// @param before the check sum of what stands before; 0: nothing does
@@ -13,4 +13,4 @@ namespace tpm {
 [[nodiscard]] std::uint32_t joined_check_sum(std::uint32_t first, std::uint32_t second,
                                              std::uint64_t size_of_second);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -12,11 +12,12 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/check_sum.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/work/parallel.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "check sums hold little-endian numbers");
@@ -90,4 +91,4 @@ ChecksumState checksum_of(int descriptor) {
   return whole ? ChecksumState::whole : ChecksumState::broken;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -1,7 +1,7 @@
 #pragma once
 #include <cstdint>
 
-namespace tpm {
+namespace tpm::files {
 
 /// Writes behind the first `size` bytes of an open file a check sum of them, and passes the file to
 /// the disk: from here on it survives the machine. HDF5 ignores what stands behind its own end.
@@ -13,4 +13,4 @@ enum class ChecksumState { none, whole, broken };
 
 [[nodiscard]] ChecksumState checksum_of(int descriptor);
 
-}  // namespace tpm
+}  // namespace tpm::files

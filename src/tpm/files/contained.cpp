@@ -20,7 +20,7 @@
 #include <new>
 #include <utility>
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 constexpr int kFile = 3, kParent = 4;  // descriptors of the child
@@ -292,4 +292,4 @@ std::string Contained::next_answer() {
   throw Error(code, "", std::string_view(reply).substr(std::min<std::size_t>(1, reply.size())));
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

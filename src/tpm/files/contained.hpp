@@ -7,7 +7,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// What a contained process may do and use.
 struct ContainedLimits {
@@ -68,4 +68,4 @@ class Contained {
   std::deque<Taker> due_;  ///< of the answers that are due
 };
 
-}  // namespace tpm
+}  // namespace tpm::files

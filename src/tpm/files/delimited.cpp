@@ -9,11 +9,12 @@
 #include <utility>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
@@ -389,4 +390,4 @@ std::string quoted_field(std::string_view text) {
   return quoted;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

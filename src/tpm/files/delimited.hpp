@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm {
+namespace tpm::files {
 
 /// How the characters of a text file are stored.
 enum class Encoding { utf8, utf8_with_mark, utf16_little_endian, utf16_big_endian, latin1 };
@@ -85,4 +85,4 @@ template <typename Where>
 /// "comma", "semicolon" or "tab".
 [[nodiscard]] std::string_view separator_name(char separator) noexcept;
 
-}  // namespace tpm
+}  // namespace tpm::files

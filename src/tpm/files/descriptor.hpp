@@ -3,7 +3,7 @@
 
 #include <utility>
 
-namespace tpm {
+namespace tpm::files {
 
 /// Owns a file descriptor, or none (-1).
 class Descriptor {
@@ -30,4 +30,4 @@ class Descriptor {
   int file_ = -1;
 };
 
-}  // namespace tpm
+}  // namespace tpm::files

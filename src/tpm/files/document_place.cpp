@@ -4,10 +4,11 @@
 
 #include <algorithm>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 DocumentPlace DocumentPlace::key(std::string_view name) const {
   return {where.find(": key ") == std::string::npos ? fmt::format("{}: key /{}", where, name)
@@ -52,4 +53,4 @@ void require_keys_of(const Json& block, std::string_view kind,
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -6,7 +6,7 @@
 #include "tpm/files/json.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// A place in a document, for messages: "FILE: key /a/b".
 struct DocumentPlace {
@@ -31,4 +31,4 @@ void require_keys_of(const Json& block, std::string_view kind,
                      const std::vector<std::string_view>& needed,
                      const std::vector<std::string_view>& allowed, const DocumentPlace& place);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -18,7 +18,7 @@
 #include "tpm/files/replacement.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace fs = std::filesystem;
 namespace {
 
@@ -258,4 +258,4 @@ std::string sha256_hex(std::string_view bytes) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

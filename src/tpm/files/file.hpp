@@ -7,7 +7,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// No text or mesh that a person hands over is larger; what has no end (/dev/zero) is.
 inline constexpr std::uint64_t kLargestInput = std::uint64_t{1} << 30U;
@@ -59,4 +59,4 @@ void write_file(const std::filesystem::path& path, std::string_view bytes);
 /// SHA-256 of the bytes in lower-case hexadecimal; ties a result to the data that made it.
 [[nodiscard]] std::string sha256_hex(std::string_view bytes);
 
-}  // namespace tpm
+}  // namespace tpm::files

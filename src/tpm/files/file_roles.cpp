@@ -12,7 +12,7 @@
 #include "tpm/files/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 namespace fs = std::filesystem;
@@ -113,4 +113,4 @@ void note_written(const fs::path& path) {
   if (const auto file = identity_of(path)) roles->written.insert(*file);
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

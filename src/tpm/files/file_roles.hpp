@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <vector>
 
-namespace tpm {
+namespace tpm::files {
 
 /// Keeps the files that a command reads apart from those that it writes. While a FileRoles lives,
 /// the readers and writers of store/ report every file to it, and a file is known by its device and
@@ -34,4 +34,4 @@ void require_not_read(const std::filesystem::path& path);
 /// Called by writers once the file has its content: it may be read back and written again.
 void note_written(const std::filesystem::path& path);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -9,7 +9,7 @@
 #include "tpm/files/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 /// Notices a key that comes twice in one object; nlohmann-json keeps the last one without a word.
@@ -81,4 +81,4 @@ std::string to_text(const Json& value) {
   return value.dump(2) + "\n";
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace tpm {
+namespace tpm::files {
 
 /// Keys keep the order in which they were written: reports are compared byte for byte.
 using Json = nlohmann::ordered_json;
@@ -33,4 +33,4 @@ template <class Items, class Convert>
 /// Error(bad_input): "where: key /a/b: what", the first violation.
 void check_schema(const Json& value, std::string_view schema_name, std::string_view where);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -9,10 +9,11 @@
 #include <string>
 #include <utility>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/warning.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 using Kind = RenamedName::Kind;
@@ -247,4 +248,4 @@ Json checked(Json document, std::string_view schema, std::string_view where) {
   return current;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

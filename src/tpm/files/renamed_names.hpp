@@ -4,7 +4,7 @@
 
 #include "tpm/files/json.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// A key, or a word that stands as a value, of an input file that has a new name. docs/library.md
 /// says for how long the former name is read.
@@ -34,4 +34,4 @@ enum class FormerNames { told, silent };
 /// with_current_names() and check_schema(): how every file that users write is read.
 [[nodiscard]] Json checked(Json document, std::string_view schema, std::string_view where);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -14,7 +14,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 namespace fs = std::filesystem;
@@ -203,4 +203,4 @@ void Replacement::put_in_place() {
   note_written(target_);
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

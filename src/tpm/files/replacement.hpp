@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace tpm {
+namespace tpm::files {
 
 /// A file on its way to a name: written without a name in the same folder (O_TMPFILE) and given its
 /// name when it is whole, so that a reader sees the old file or the new one, and a process that is
@@ -54,4 +54,4 @@ class Replacement {
 /// Error(environment) for links that lead round in a circle.
 [[nodiscard]] std::filesystem::path followed(const std::filesystem::path& path);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -13,7 +13,7 @@
 #include "tpm/files/replacement.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "row logs hold little-endian numbers");
@@ -184,4 +184,4 @@ RowLog read_row_log(const std::filesystem::path& path) {
   return log;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

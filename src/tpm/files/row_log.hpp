@@ -10,7 +10,7 @@
 #include "tpm/files/descriptor.hpp"
 #include "tpm/files/replacement.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Appends rows of one size to a file, each with its number and a check sum, so that what was
 /// written stands even if the process is killed. After the rows a closing text says that the
@@ -57,4 +57,4 @@ struct RowLog {
 /// Throws Error(bad_input) if the beginning is no such file.
 [[nodiscard]] RowLog read_row_log(const std::filesystem::path& path);
 
-}  // namespace tpm
+}  // namespace tpm::files

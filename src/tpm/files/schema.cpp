@@ -15,11 +15,12 @@
 #include <vector>
 
 #include "tpm/base/memory_reserve.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 using Path = std::vector<std::string>;
@@ -240,4 +241,4 @@ void check_schema(const Json& value, std::string_view schema_name, std::string_v
   if (violation) throw in_plain_words(*violation, root, where);
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -2,7 +2,7 @@
 
 #include "tpm/files/file.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 void require_writable_folder(const std::filesystem::path& folder) {
   const std::filesystem::path trial = folder / ".tpm-trial";
@@ -10,4 +10,4 @@ void require_writable_folder(const std::filesystem::path& folder) {
   std::filesystem::remove(trial);
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

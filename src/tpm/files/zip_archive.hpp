@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm {
+namespace tpm::files {
 
 /// True for bytes that begin like a ZIP archive with at least one member.
 [[nodiscard]] bool looks_like_zip(std::string_view bytes) noexcept;
@@ -42,4 +42,4 @@ class ZipArchive {
   std::vector<Member> members_;  ///< by name
 };
 
-}  // namespace tpm
+}  // namespace tpm::files

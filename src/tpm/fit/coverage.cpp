@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
@@ -45,11 +45,10 @@ bool holds(const ParameterResult& p, double true_value) {
 }  // namespace
 
 double binomial_test(int k, int n, double p) {
-  const boost::math::binomial distribution(n, p);
-  const double here = boost::math::pdf(distribution, k);
+  const double here = binomial_density(k, n, p);
   double sum = 0.0;
   for (int i = 0; i <= n; ++i) {
-    const double there = boost::math::pdf(distribution, i);
+    const double there = binomial_density(i, n, p);
     if (there <= here * (1.0 + 1e-7)) sum += there;
   }
   return std::min(sum, 1.0);

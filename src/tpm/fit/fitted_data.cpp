@@ -1,9 +1,9 @@
 #include "tpm/fit/fitted_data.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/fit/prediction.hpp"
 
 namespace tpm::fit {
@@ -189,8 +189,7 @@ void fill_data(FitResult& result, const ExperimentResiduals& function,
         return d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
       });
   if (known_normal && result.degrees_of_freedom > 0 && result.config.loss.kind == Loss::none) {
-    result.chi_square_p = boost::math::cdf(boost::math::complement(
-        boost::math::chi_squared(result.degrees_of_freedom), result.chi_square));
+    result.chi_square_p = chi_squared_tail(result.chi_square, result.degrees_of_freedom);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/likelihood/least_squares.hpp"
 

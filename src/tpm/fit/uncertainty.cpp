@@ -4,14 +4,14 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/distributions.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -34,11 +34,10 @@ double Threshold::variance_factor(double minimum_deviance) const {
 
 double Threshold::rise(double minimum_deviance, int constrained) const {
   if (scale_known) {
-    return inflation * boost::math::quantile(boost::math::chi_squared(constrained), level);
+    return inflation * chi_squared_quantile(level, constrained);
   }
   const double factor = inflation * variance_factor(minimum_deviance);
-  const boost::math::fisher_f f(constrained, residual_degrees());
-  return factor * constrained * boost::math::quantile(f, level);
+  return factor * constrained * fisher_quantile(level, constrained, residual_degrees());
 }
 
 double Threshold::multiplier(double minimum_deviance) const {
@@ -49,11 +48,10 @@ double Threshold::multiplier(double minimum_deviance) const {
 double Threshold::p_value(double rise, double minimum_deviance, int constrained) const {
   rise = std::max(rise, 0.0) / inflation;
   if (scale_known) {
-    return boost::math::cdf(boost::math::complement(boost::math::chi_squared(constrained), rise));
+    return chi_squared_tail(rise, constrained);
   }
-  const boost::math::fisher_f f(constrained, residual_degrees());
-  return boost::math::cdf(
-      boost::math::complement(f, rise / variance_factor(minimum_deviance) / constrained));
+  return fisher_tail(rise / variance_factor(minimum_deviance) / constrained, constrained,
+                     residual_degrees());
 }
 
 Eigen::MatrixXd Covariance::theta_covariance() const {

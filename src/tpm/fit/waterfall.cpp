@@ -6,12 +6,13 @@
 #include <cmath>
 #include <iterator>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 
 namespace tpm::fit {
 namespace {
 
-constexpr double kSameDeviance = 1e-5;  // relative above 1: one minimum
+constexpr double kSameMinimum = 1e-5;  // relative above 1: one minimum
 
 std::vector<int> clusters_of(const std::vector<double>& sorted) {
   std::vector<int> clusters;
@@ -23,7 +24,7 @@ std::vector<int> clusters_of(const std::vector<double>& sorted) {
       first = d;
       continue;
     }
-    const bool same = d - first <= kSameDeviance * std::max(1.0, std::abs(first));
+    const bool same = d - first <= kSameMinimum * std::max(1.0, std::abs(first));
     clusters.push_back(same ? clusters.back() : clusters.back() + 1);
     if (!same) first = d;
   }

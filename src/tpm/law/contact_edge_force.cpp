@@ -3,7 +3,7 @@
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/contact_retreat.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// exp(-rate (t - t1)); 0 for what was met under rest, all of which has relaxed
@@ -42,4 +42,4 @@ Slopes ContactHistory::force_slopes_within(const ContactEdge& edge) const {
   return slopes + law_.kernel.tangent(met.u).slope * edge.pull_by;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -5,10 +5,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// Depth over radius up to which Hertz's parabola stands for a sphere.
@@ -115,4 +116,4 @@ std::vector<std::string> geometry_warnings(const LawSpec& spec, const ContactGeo
   return warnings;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -5,7 +5,7 @@
 
 #include "tpmkit/law.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// What turns a stiffness in N/m into Young's modulus E in Pa: the rigid probe that was pressed
 /// into a half space, or a bar. nu is Poisson's ratio, u_ref the law's reference depth.
@@ -47,4 +47,4 @@ struct ContactGeometry {
                                                          const ContactGeometry& geometry,
                                                          std::optional<double> depth_m);
 
-}  // namespace tpm
+}  // namespace tpm::law

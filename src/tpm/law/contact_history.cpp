@@ -8,7 +8,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 constexpr double kRelativeTolerance = 1e-10;
@@ -402,4 +402,4 @@ void ContactHistory::move_to_surface(const Point& surface, double h) {
   accept(surface, (surface.v - now_.v) / h, (surface.v_by - now_.v_by) / h);
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

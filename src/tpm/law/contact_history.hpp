@@ -9,7 +9,7 @@
 #include "tpm/law/relaxation_sum.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// Where the parameters that shape the kernel stand in the parameter vector; -1 if there is none.
 struct KernelPlaces {
@@ -150,4 +150,4 @@ class ContactHistory {
   StepWeights weights_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -7,7 +7,7 @@
 
 #include "tpm/law/contact_history.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 void ContactHistory::rest_at_load(double load) {
   Balance b{law_.relaxation.constant, 0.0, zero_slopes(), zero_slopes()};
@@ -125,4 +125,4 @@ void ContactHistory::move_load_adaptive(double from, double to, double h, double
   move_load_adaptive(middle, to, 0.5 * h, time_scale, level + 1);
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

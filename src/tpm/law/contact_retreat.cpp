@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// The depth u and, for each branch, h = integral of exp(-rate (t - s)) du(s): what a kernel that
@@ -290,4 +290,4 @@ std::vector<ContactEdge> contact_edges(const LawAtParameters& law, const Protoco
   return edges;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -7,7 +7,7 @@
 #include "tpm/law/contact_history.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// A depth that falls, or a contact that grows again, by less than this part of the largest depth
 /// is taken for the jitter of a measured drive. The force is off by a term of second order in it.
@@ -66,4 +66,4 @@ struct ContactEdge {
                                                      const Protocol& protocol, const Turn& turn,
                                                      std::span<const double> times_s, Want want);
 
-}  // namespace tpm
+}  // namespace tpm::law

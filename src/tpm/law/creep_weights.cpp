@@ -6,7 +6,7 @@
 
 #include "tpm/law/relaxation/exponential_sum.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 using Place = ExponentialCollocation::Place;
@@ -125,4 +125,4 @@ double CreepWeights::lag_by_z(Eigen::Index branch, Eigen::Index node, const Cree
   return -at.weight_slopes(z).dot(course) - at.fraction() * (*this)[branch].decay[node] * carried;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

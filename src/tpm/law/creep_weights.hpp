@@ -5,7 +5,7 @@
 #include "tpm/law/relaxation/exponential_collocation.hpp"
 #include "tpm/law/relaxation_sum.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 inline constexpr int kCreepNodes = 7;  ///< of Radau; the begin of the step is one more
 /// The nodes, and three places between them where the balance is checked.
@@ -68,4 +68,4 @@ class CreepWeights {
   std::vector<const BranchWeights*> weights_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// Steps that differ by less have weights of first order in the difference: off by its square.
@@ -105,4 +105,4 @@ void DepthPieces::sort_into_runs(double same) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -7,7 +7,7 @@
 #include "tpm/law/drive_path.hpp"
 #include "tpm/law/kernel.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// How V(u) runs over a piece: straight, the cubic through values and slopes at both ends
 /// (kernel_between), or the quartic through five values.
@@ -66,4 +66,4 @@ class DepthPieces {
   Eigen::ArrayXd off_length_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

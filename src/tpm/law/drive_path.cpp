@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::law {
 
 std::optional<DrivePath> drive_path(const Protocol& protocol, std::span<const double> times_s) {
   const auto knots = protocol.knots();
@@ -38,4 +38,4 @@ std::optional<DrivePath> drive_path(const Protocol& protocol, std::span<const do
   return path;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

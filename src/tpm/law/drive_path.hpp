@@ -5,7 +5,7 @@
 
 #include "tpmkit/protocol.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// A stretch of an imposed history: the drive moves linearly within h > 0.
 struct DriveStep {
@@ -25,4 +25,4 @@ struct DrivePath {
 [[nodiscard]] std::optional<DrivePath> drive_path(const Protocol& protocol,
                                                   std::span<const double> times_s);
 
-}  // namespace tpm
+}  // namespace tpm::law

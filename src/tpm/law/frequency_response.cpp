@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/kernel.hpp"
 #include "tpm/law/operational_stiffness.hpp"
@@ -14,6 +15,9 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm {
+using namespace base;
+using namespace law;
+
 namespace {
 
 using Complex = std::complex<double>;

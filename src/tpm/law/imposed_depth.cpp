@@ -8,7 +8,7 @@
 #include "tpm/law/kernel_tables.hpp"
 #include "tpm/law/relaxation/exponential_quadrature.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// The states of one branch after each piece: w follows V (column 0) or a derivative of V.
@@ -202,4 +202,4 @@ std::optional<Response> respond_in_contact(const LawAtParameters& law, const Dri
   return response;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

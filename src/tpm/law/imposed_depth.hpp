@@ -4,7 +4,7 @@
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/drive_path.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// What ContactHistory answers to an imposed drive, for laws whose branches have times among the
 /// parameters: all steps of one branch after those of another, in plain arrays, several times as
@@ -14,4 +14,4 @@ namespace tpm {
 [[nodiscard]] std::optional<Response> respond_in_contact(const LawAtParameters& law,
                                                          const DrivePath& path, Want want);
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// Branches below this part of the instantaneous stiffness count with it: the derivative by the
@@ -256,4 +256,4 @@ Slopes LoadedSurface::drive_slopes() const {
   return slopes;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -5,7 +5,7 @@
 
 #include "tpm/law/contact_history.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// The depth of a contact under an imposed load in closed form, where the kernel alone carries it
 /// (no tension, or one that relaxes with the rest). The balance
@@ -85,4 +85,4 @@ class LoadedSurface {
   double v_ = 0.0, u_ = 0.0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

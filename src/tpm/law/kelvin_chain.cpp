@@ -11,7 +11,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 // With s = -1/x (x a time), the operational stiffness of a Prony law and the compliance of a
@@ -260,51 +260,6 @@ Coefficients<Jet> as_jets(double first, std::span<const double> k, std::span<con
 
 }  // namespace
 
-KelvinChain to_series(const Prony& law) {
-  require_coefficients(law.k_inf, law.k, law.tau_s, "Prony law");
-  Coefficients<double> merged;
-  merged.first = law.k_inf;
-  for (const std::size_t i : order_of_times(law.tau_s)) {
-    if (law.k[i] == 0.0) continue;
-    if (!merged.time.empty() && merged.time.back() == law.tau_s[i]) {
-      merged.k.back() += law.k[i];
-      continue;
-    }
-    merged.time.push_back(law.tau_s[i]);
-    merged.k.push_back(law.k[i]);
-  }
-  if (merged.k.empty() && merged.first == 0.0) {
-    throw bad_input("Prony law", "no stiffness at all", "at least one above 0");
-  }
-  const Coefficients<double> c = series_of(merged);
-  return {c.first, c.k, c.time, c.eta};
-}
-
-Prony to_parallel(const KelvinChain& chain) {
-  require_coefficients(chain.k0, chain.k, chain.T_s, "Kelvin chain");
-  if (!(chain.k0 > 0.0) ||
-      std::any_of(chain.k.begin(), chain.k.end(), [](double k) { return !(k > 0.0); }) ||
-      !(chain.eta >= 0.0)) {
-    throw bad_input("Kelvin chain", "a spring of stiffness 0 carries no load in series",
-                    "springs above 0 and eta of at least 0");
-  }
-  Coefficients<double> merged;
-  merged.first = chain.k0;
-  merged.eta = chain.eta;
-  merged.fluid = chain.eta > 0.0;
-  for (const std::size_t i : order_of_times(chain.T_s)) {
-    if (!merged.time.empty() && merged.time.back() == chain.T_s[i]) {
-      // Two units of one retardation time are one unit with the sum of their compliances.
-      merged.k.back() = 1.0 / (1.0 / merged.k.back() + 1.0 / chain.k[i]);
-      continue;
-    }
-    merged.time.push_back(chain.T_s[i]);
-    merged.k.push_back(chain.k[i]);
-  }
-  const Coefficients<double> c = parallel_of(merged);
-  return {c.first, c.k, c.time};
-}
-
 namespace {
 
 /// The values of converted coefficients and, from row 1 on, the slopes of the k's, then the times'.
@@ -379,6 +334,56 @@ SeriesWithSlopes to_series_with_slopes(const Prony& law) {
   require_units(law.k.size(), "Prony law");
   return with_enough_units(law.k.size(),
                            [&](auto units) { return series_with_slopes<units>(law); });
+}
+
+}  // namespace tpm::law
+
+namespace tpm {
+using namespace law;
+
+KelvinChain to_series(const Prony& law) {
+  require_coefficients(law.k_inf, law.k, law.tau_s, "Prony law");
+  Coefficients<double> merged;
+  merged.first = law.k_inf;
+  for (const std::size_t i : order_of_times(law.tau_s)) {
+    if (law.k[i] == 0.0) continue;
+    if (!merged.time.empty() && merged.time.back() == law.tau_s[i]) {
+      merged.k.back() += law.k[i];
+      continue;
+    }
+    merged.time.push_back(law.tau_s[i]);
+    merged.k.push_back(law.k[i]);
+  }
+  if (merged.k.empty() && merged.first == 0.0) {
+    throw bad_input("Prony law", "no stiffness at all", "at least one above 0");
+  }
+  const Coefficients<double> c = series_of(merged);
+  return {c.first, c.k, c.time, c.eta};
+}
+
+Prony to_parallel(const KelvinChain& chain) {
+  require_coefficients(chain.k0, chain.k, chain.T_s, "Kelvin chain");
+  if (!(chain.k0 > 0.0) ||
+      std::any_of(chain.k.begin(), chain.k.end(), [](double k) { return !(k > 0.0); }) ||
+      !(chain.eta >= 0.0)) {
+    throw bad_input("Kelvin chain", "a spring of stiffness 0 carries no load in series",
+                    "springs above 0 and eta of at least 0");
+  }
+  Coefficients<double> merged;
+  merged.first = chain.k0;
+  merged.eta = chain.eta;
+  merged.fluid = chain.eta > 0.0;
+  for (const std::size_t i : order_of_times(chain.T_s)) {
+    if (!merged.time.empty() && merged.time.back() == chain.T_s[i]) {
+      // Two units of one retardation time are one unit with the sum of their compliances.
+      merged.k.back() = 1.0 / (1.0 / merged.k.back() + 1.0 / chain.k[i]);
+      continue;
+    }
+    merged.time.push_back(chain.T_s[i]);
+    merged.k.push_back(chain.k[i]);
+  }
+  const Coefficients<double> c = parallel_of(merged);
+  return {c.first, c.k, c.time};
 }
 
 }  // namespace tpm

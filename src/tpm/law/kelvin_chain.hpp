@@ -3,7 +3,7 @@
 
 #include "tpmkit/law.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// Parallel form of a solid Kelvin chain with the derivatives of its coefficients.
 struct ParallelWithSlopes {
@@ -25,4 +25,4 @@ struct SeriesWithSlopes {
 
 [[nodiscard]] SeriesWithSlopes to_series_with_slopes(const Prony& law);
 
-}  // namespace tpm
+}  // namespace tpm::law

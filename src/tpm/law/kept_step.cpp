@@ -8,7 +8,7 @@
 #include "tpm/law/tension_creep.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// The value of a step that is imposed at the first knot and kept; nothing for other histories.
@@ -122,4 +122,4 @@ std::optional<Response> respond_to_step(const LawSpec& spec, const std::vector<L
   return response;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -5,7 +5,7 @@
 
 #include "tpm/law/contact_history.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// The kernel of a law at given parameters, what acts beside it, and where these stand.
 struct KernelAtParameters {
@@ -33,4 +33,4 @@ struct KernelAtParameters {
                                                       const Protocol& protocol,
                                                       std::span<const double> times_s, Want want);
 
-}  // namespace tpm
+}  // namespace tpm::law

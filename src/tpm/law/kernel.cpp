@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::law {
 
 TensionShape::Values TensionShape::at(double u) const {
   if (u <= 0.0) return {0.0, 0.0, 0.0};
@@ -155,4 +155,4 @@ KernelBetween kernel_between(double depth_change, double v0, double slope0, doub
            (1.125 * rise - 0.3125 * m0 + 0.1875 * m1) / depth_change}};
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

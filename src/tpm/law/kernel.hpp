@@ -4,7 +4,7 @@
 
 #include "tpmkit/law.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// T(u) = u phi(u)/phi(u_ref), phi = 1 - cos(arctan(u/x)): the pull of the neighbour bonds, scaled
 /// so that T(u_ref) = u_ref. The spacing x may be infinite (T = u^3/u_ref^2).
@@ -77,4 +77,4 @@ inline constexpr double kCubicPart = 3e-3;  ///< of the smaller depth
 [[nodiscard]] KernelBetween kernel_between(double depth_change, double v0, double slope0, double v1,
                                            double slope1);
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace tpm {
+namespace tpm::law {
 
 KernelTables::KernelTables(const LawAtParameters& law, const DepthPieces& pieces, double start,
                            Want want)
@@ -101,4 +101,4 @@ void KernelTables::fill_middle(Eigen::Index k, const DepthPiece& piece,
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -6,7 +6,7 @@
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/depth_pieces.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// V(u) along the pieces in the first column, its derivatives by the kernel's parameters in the
 /// others.
@@ -35,4 +35,4 @@ class KernelTables {
   std::vector<int> parameters_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -8,10 +8,13 @@
 #include <limits>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
+
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/contact_retreat.hpp"
@@ -17,6 +18,9 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
+using namespace law;
+
 namespace {
 
 /// Value of the imposed history inside a piece.

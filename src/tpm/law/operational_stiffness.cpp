@@ -4,7 +4,7 @@
 
 #include "tpm/law/kelvin_chain.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 using Complex = std::complex<double>;
@@ -125,4 +125,4 @@ void OperationalStiffness::fractional(const Powers& powers, ComplexStiffness& g)
   if (pair) g.by[at_alpha + 1] = by_beta * powers.log;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

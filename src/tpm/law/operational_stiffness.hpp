@@ -7,7 +7,7 @@
 
 #include "tpmkit/law.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// A complex stiffness and its derivatives by the parameters of a law.
 struct ComplexStiffness {
@@ -77,4 +77,4 @@ class OperationalStiffness {
   Eigen::MatrixXcd chain_slopes_;  ///< of these by k0, kc_i, T_i
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -8,12 +8,13 @@
 #include <numeric>
 
 #include "tpm/base/evenly.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/relaxation/mittag_leffler.hpp"
 #include "tpm/law/relaxation/nonnegative.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// The branches of a classical law, of either form.
@@ -144,4 +145,4 @@ PronyTable prony_table(const LawSpec& spec, std::span<const double> values,
   return table;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -4,7 +4,7 @@
 
 #include "tpmkit/law.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// A relaxation function as other programs take it: G(t) = instant (long_share + sum_i g_i
 /// exp(-t/tau_i)) with long_share + sum g_i = 1.
@@ -41,4 +41,4 @@ struct PronyWindow {
 [[nodiscard]] PronyTable prony_table(const LawSpec& spec, std::span<const double> values,
                                      const PronyWindow& window);
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -4,12 +4,13 @@
 
 #include <cmath>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/relaxation/laplace_contour.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 StepResponse::StepResponse(const LawSpec& spec, std::span<const double> values)
     : spec_(spec), count_(std::ssize(values)), stiffness_(spec, values) {
@@ -79,4 +80,4 @@ SlopedNumber law_creep(const LawSpec& spec, std::span<const double> values, doub
   return StepResponse(spec, values).creep(t_s);
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -7,7 +7,7 @@
 #include "tpm/law/operational_stiffness.hpp"
 #include "tpmkit/law.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// A number and its derivatives by all parameters of a law.
 struct SlopedNumber {
@@ -57,4 +57,4 @@ class StepResponse {
   std::vector<Node> nodes_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -6,7 +6,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// So slow that only an infinite time relaxes it.
@@ -178,4 +178,4 @@ RelaxationSum fractional_relaxation(Fractional law, std::span<const double> valu
   return m;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

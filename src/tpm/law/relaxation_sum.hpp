@@ -6,7 +6,7 @@
 #include "tpm/law/relaxation/exponential_sum.hpp"
 #include "tpmkit/law.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// The error that the rates of a fractional law are chosen for, ExponentialSum's tolerance.
 inline constexpr double kFractionalTolerance = 1e-10;
@@ -47,4 +47,4 @@ struct RelaxationSum {
 [[nodiscard]] RelaxationSum fractional_relaxation(Fractional law, std::span<const double> values,
                                                   const ExponentialSum& rates);
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -9,7 +9,7 @@
 
 #include "tpm/law/creep_weights.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 constexpr double kCreepTolerance = 3e-9;   // of V at the reference depth
@@ -333,4 +333,4 @@ std::optional<Response> creep_with_tension(const LawAtParameters& law, double lo
   return response;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

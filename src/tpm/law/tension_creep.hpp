@@ -4,7 +4,7 @@
 
 #include "tpm/law/contact_history.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// The depth under a load that is imposed suddenly and then constant, where elastic tension helps
 /// to carry it, which leaves no closed form:
@@ -26,4 +26,4 @@ namespace tpm {
                                                          std::span<const double> times_s, Want want,
                                                          int* attempts = nullptr);
 
-}  // namespace tpm
+}  // namespace tpm::law

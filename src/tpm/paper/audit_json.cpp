@@ -1,7 +1,7 @@
-// Declared in tpm/fit/claims/audit.hpp.
-#include "tpm/fit/claims/audit.hpp"
+// Declared in tpm/paper/claims/audit.hpp.
+#include "tpm/paper/claims/audit.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 Json optional_number(const std::optional<double>& value) {
@@ -77,4 +77,4 @@ Json to_json(const AuditReport& report) {
   return json;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

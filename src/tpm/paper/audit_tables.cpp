@@ -1,17 +1,17 @@
-// Declared in tpm/fit/claims/audit_kinds.hpp.
+// Declared in tpm/paper/claims/audit_kinds.hpp.
 // The kinds of claims that speak of many numbers at once: bands, tables and misfits.
 #include <fmt/format.h>
 
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/printed_number.hpp"
 #include "tpm/base/quantity_text.hpp"
-#include "tpm/fit/claims/audit_kinds.hpp"
+#include "tpm/paper/claims/audit_kinds.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 /// One row of a table that a claim speaks of, with a name for it.
@@ -180,11 +180,11 @@ void check_misfit(const ClaimReader& claim, Finding& finding) {
   if (!claim.has("relative_error")) return;
   const double sigma = claim.quantity(claim.text("relative_error"), claim.scope());
   if (!(sigma > 0.0)) throw bad_input(claim.at(), "'relative_error' is not above 0", "e.g. 10 %");
-  const double limit = boost::math::quantile(boost::math::chi_squared(data), 0.95);
+  const double limit = chi_squared_quantile(0.95, data);
   finding.recomputed = {squared / (sigma * sigma), plain};
   finding.bound = {limit, plain};
   finding.verdict =
       squared / (sigma * sigma) <= limit ? AuditVerdict::holds : AuditVerdict::contradicted;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

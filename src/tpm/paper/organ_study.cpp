@@ -13,7 +13,7 @@
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -221,4 +221,4 @@ OrganStudy run_organ_study(const OrganStudyConfig& config) {
   return study;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

@@ -6,7 +6,7 @@
 
 #include "tpm/fit/fit.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 
 /// A tissue that the paper's experiments are done on.
 struct StudyTissue {
@@ -127,4 +127,4 @@ struct OrganStudy {
 /// organ's runs and searches are good for.
 [[nodiscard]] Json to_json(const OrganStudy& study);
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

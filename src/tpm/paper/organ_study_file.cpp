@@ -11,7 +11,7 @@
 #include "tpm/paper/organ_study.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -201,4 +201,4 @@ OrganStudyConfig read_organ_study(const std::filesystem::path& path) {
   return parse_organ_study(read_json(path), path.string(), path.parent_path());
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

@@ -4,7 +4,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/paper/organ_study.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -109,4 +109,4 @@ Json to_json(const OrganStudy& study) {
   return j;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

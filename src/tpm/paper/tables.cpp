@@ -12,7 +12,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 struct Forces {
@@ -247,4 +247,4 @@ TablesResult make_tables(const TableRequest& request, const std::vector<PrintedT
   return result;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

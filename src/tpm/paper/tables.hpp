@@ -3,11 +3,12 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/printed_number.hpp"
-#include "tpm/fit/claims/claims.hpp"
+#include "tpm/paper/claims/claims.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 
 /// What a table assumes about the loading.
 enum class TableMode {
@@ -104,4 +105,4 @@ struct TablesResult {
 /// docs/json_tables_audit.md lists the keys.
 [[nodiscard]] Json to_json(const TablesResult& result);
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

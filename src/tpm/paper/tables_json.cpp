@@ -1,7 +1,7 @@
 // Declared in tpm/paper/tables.hpp.
 #include "tpm/paper/tables.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 Json check_json(const DigitCheck& check, const Unit& unit, std::string_view si_suffix) {
@@ -105,4 +105,4 @@ Json to_json(const TablesResult& result) {
   return json;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

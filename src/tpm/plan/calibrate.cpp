@@ -20,7 +20,7 @@
 #include "tpm/plan/scalar_model.hpp"
 #include "tpmkit/bond_element.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr int kRepeats = 60;
@@ -256,4 +256,4 @@ OperationCosts measured_costs() {
   return costs;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -14,7 +14,7 @@
 #include "tpm/plan/plan_model.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr double kParallel = 1e-9;
@@ -338,4 +338,4 @@ PlanModels servo_network_candidates() {
   return models;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -11,7 +11,7 @@
 #include "tpm/organ/bonds/material_refusal.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr int kThetas = 9;
@@ -196,4 +196,4 @@ std::vector<ScalarBranch> fitted_branches(const ContactSpectrum& spectrum, int m
   return best.branches;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -4,7 +4,7 @@
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/plan/scalar_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// The linear network at rest, seen along what is imposed: its stiffness where a share theta of all
 /// that can relax has relaxed. At a rate s of the Laplace transform theta = sum gamma_j/(1 + s
@@ -35,4 +35,4 @@ struct ContactSpectrum {
 /// shares by least squares. None if nothing relaxes.
 [[nodiscard]] std::vector<ScalarBranch> fitted_branches(const ContactSpectrum& spectrum, int most);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -11,7 +11,7 @@
 #include "tpm/plan/rest_answers.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr int kLanczosSteps = 24;
@@ -230,4 +230,4 @@ InertiaEstimate estimate_inertia(const PlanScene& scene) {
   return estimate;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -3,7 +3,7 @@
 
 #include "tpm/plan/plan_scene.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// A mode as the contact sees it.
 struct SeenMode {
@@ -39,4 +39,4 @@ struct InertiaEstimate {
 /// What of it no protocol changes. Throws as estimate_inertia does.
 [[nodiscard]] InertiaModes inertia_modes(const PlanScene& scene);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -8,7 +8,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/plan/plan_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 /// The network of a scene with deeper layers fixed, or as it is.
@@ -248,4 +248,4 @@ PlanModels inertial_candidates() {
   return models;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

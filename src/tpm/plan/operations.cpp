@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/document_place.hpp"
 #include "tpm/files/file.hpp"
@@ -10,7 +11,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr const char* kSeconds = "seconds_per_operation";
@@ -95,4 +96,4 @@ OperationCosts read_costs(const std::filesystem::path& file) {
   return costs;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

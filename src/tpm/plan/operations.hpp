@@ -7,7 +7,7 @@
 
 #include "tpmkit/operation_count.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// A kind of work in words and figures.
 struct OperationEntry {
@@ -40,4 +40,4 @@ void write_costs(const OperationCosts& costs, const std::filesystem::path& file)
 /// Throws Error(bad_input) with the key.
 [[nodiscard]] OperationCosts read_costs(const std::filesystem::path& file);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -1,7 +1,7 @@
 #pragma once
 // What a hand can feel.
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// Just noticeable difference of force, a share of it: between thumb and finger (Pang, Tan and
 /// Durlach 1991: about 7 %). docs/plan_method.md lists the sources.
@@ -21,4 +21,4 @@ inline constexpr double kViscosityJnd = 0.19, kViscosityAdjusted = 0.34;
 /// 10.1109/TOH.2009.16, abstract).
 inline constexpr double kStiffnessTouched = 0.15, kStiffnessThroughTool = 0.45;
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

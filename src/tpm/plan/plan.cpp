@@ -15,7 +15,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr double kLeastTolerance = 1e-6, kMostTolerance = 0.5;
@@ -401,4 +401,4 @@ ExperimentScene contact_scene(const ExperimentScene& scene, const ContactRange& 
   return probed;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/plan/plan_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// Counted operations of a plan, at nominal costs.
 struct PlanWork {
@@ -164,4 +165,4 @@ struct ContactRange {
 [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> planned_contacts(
     const Plan& plan, const ExperimentScene& scene, std::span<const double> periods_s);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

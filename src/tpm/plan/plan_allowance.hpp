@@ -3,7 +3,7 @@
 
 #include "tpm/plan/plan_scene.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// How much work a plan may take, in seconds of nominal costs: on every machine the same.
 class PlanAllowance {
@@ -28,4 +28,4 @@ class PlanAllowance {
   double most_s_;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

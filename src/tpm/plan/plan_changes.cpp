@@ -10,7 +10,7 @@
 #include "tpm/plan/plan_relevance.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr double kStride = 1.5;    // between factors tried
@@ -164,4 +164,4 @@ std::vector<PlanChange> plan_changes(const PlanSurrogate& surrogate, const PlanM
           survival.first("stiffer", 1.0, [&](double f) { return scene.stiffer(f); })};
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -6,10 +6,11 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/plan/plan_surrogate.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// What a model answers a period late at most, and how fast it has to be.
 struct PlanBudget {
@@ -117,4 +118,4 @@ class PlanOffer {
 [[nodiscard]] Trajectory run_candidate_on(const PlanModel& candidate, const ExperimentScene& scene,
                                           const std::vector<double>& times_s, bool with_field);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

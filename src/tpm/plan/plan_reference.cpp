@@ -7,7 +7,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr int kReferenceTimesOfPiece = 640;
@@ -81,4 +81,4 @@ VerifiedReference verified_reference(const PlanSurrogate& surrogate, double tole
       fmt::format("at most {}: a looser tolerance", significant(kAgreement * tolerance, 2)));
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/plan/plan.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// The reference that a pick is verified against, and how sure it is.
 struct VerifiedReference {
@@ -20,4 +20,4 @@ struct VerifiedReference {
 [[nodiscard]] VerifiedReference verified_reference(const PlanSurrogate& surrogate,
                                                    double tolerance);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -7,7 +7,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr double kServoShare = 0.5;    // of a period: what else happens in it needs the rest
@@ -173,4 +173,4 @@ std::vector<PlanRelevance> plan_relevance(const PlanSurrogate& surrogate, double
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -2,7 +2,7 @@
 #include "tpm/plan/plan.hpp"
 #include "tpm/plan/plan_allowance.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// What switching inertia, the deepest moving layer, tension and viscosity off changes, each by a
 /// run of the reference's formulation without it, as long as the plan may take such a run.
@@ -30,4 +30,4 @@ namespace tpm::organ {
                                                      const PlanBudget& budget,
                                                      const OperationCosts& costs);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -10,7 +10,7 @@
 #include "tpm/plan/rest_answers.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 ExperimentScene plannable(ExperimentScene scene) {
@@ -252,4 +252,4 @@ PlanScene PlanScene::with_layers(int layers) const {
   return {std::move(scene), spent_};
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

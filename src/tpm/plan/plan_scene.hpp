@@ -5,10 +5,11 @@
 #include <mutex>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/run/scene_runner.hpp"
 #include "tpm/plan/operations.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// Which results a tolerance is about.
 enum class PlanOutput {
@@ -114,4 +115,4 @@ class PlanScene {
   std::shared_ptr<WorkSpent> spent_;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <iterator>
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 // Those of the reference, whose run is one of these, and which other runs are compared with.
@@ -173,4 +173,4 @@ double PlanSurrogate::claim_of(const Trajectory& model) const {
          trajectory_error(with_masses(kRoughTolerance), moving, measure_);
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

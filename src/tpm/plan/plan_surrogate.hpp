@@ -4,9 +4,10 @@
 #include <memory>
 #include <optional>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/plan/rest_answers.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// The static force of a contact over its depths: at equilibrium, and the relaxing part.
 struct ContactCurves {
@@ -90,4 +91,4 @@ class PlanSurrogate {
 /// The tolerance of CVODES that aims at an error of the response.
 [[nodiscard]] InertialOptions inertial_options(const PlanScene& scene, double tolerance);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

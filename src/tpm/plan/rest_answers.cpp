@@ -1,6 +1,6 @@
 #include "tpm/plan/rest_answers.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 const ContactSpectrum& spectrum_at_rest(const PlanScene& scene) {
   RestAnswers& answers = scene.at_rest();
@@ -14,4 +14,4 @@ const InertiaModes& modes_at_rest(const PlanScene& scene) {
   return *answers.modes;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

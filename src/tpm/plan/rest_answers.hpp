@@ -5,7 +5,7 @@
 #include "tpm/plan/contact_spectrum.hpp"
 #include "tpm/plan/inertia_estimate.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// What the linear network at rest answers, whatever the protocol is: found when first asked for,
 /// also by several threads. What throws does so each time.
@@ -20,4 +20,4 @@ struct RestAnswers {
 /// inertia_modes, found once.
 [[nodiscard]] const InertiaModes& modes_at_rest(const PlanScene& scene);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -5,7 +5,7 @@
 #include "tpm/plan/plan_model.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 /// A formulation as it runs scenes, compared with the coarse run of the network.
@@ -80,7 +80,7 @@ Trajectory run_candidate_on(const PlanModel& candidate, const ExperimentScene& s
 
 PlanModels plan_models(const PlanScene& scene) {
   PlanModels models;
-  for (const Formulation* formulation : formulations()) {
+  for (const Formulation* formulation : linked_formulations()) {
     if (!formulation->can().planned) continue;
     if (const auto* offer = formulation->as<PlanOffer>()) {
       for (auto& candidate : offer->candidates(scene)) models.push_back(std::move(candidate));
@@ -91,4 +91,4 @@ PlanModels plan_models(const PlanScene& scene) {
   return models;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -6,7 +6,7 @@
 #include "tpm/plan/scalar_contact.hpp"
 #include "tpm/plan/scalar_run.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 /// What all of them share: a ScalarModel made for the scene and stepped over the protocol.
@@ -192,4 +192,4 @@ PlanModels curves_candidates() {
   return models;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 ScalarContact::ScalarContact(ScalarModel model, const Eigen::Vector3d& into_tissue,
                              const Range& range, double period_s)
@@ -31,4 +31,4 @@ ContactAnswer ScalarContact::step(const ToolPose& tool) noexcept {
   return answer;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

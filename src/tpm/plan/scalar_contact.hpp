@@ -2,7 +2,7 @@
 #include "tpm/plan/scalar_model.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// A ScalarModel for a servo loop: a contact that moves along its push. Across it there is no
 /// force, and motion across is not seen.
@@ -34,4 +34,4 @@ class ScalarContact final : public ContactModel {
   double period_s_;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 double DepthCurve::operator()(double depth_m) const {
   if (force_N.empty()) {
@@ -116,4 +117,4 @@ double ScalarModel::jump_under(double load_N) {
   return depth_m_;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

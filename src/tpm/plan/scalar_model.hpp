@@ -3,7 +3,7 @@
 
 #include "tpmkit/protocol.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// A function of the depth: a stiffness, or a curve through even points, cubic between them.
 struct DepthCurve {
@@ -68,4 +68,4 @@ class ScalarModel {
   double depth_m_ = 0.0, start_N_ = 0.0;  ///< and B there
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

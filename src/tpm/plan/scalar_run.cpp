@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace tpm::organ {
+namespace tpm::plan {
 ScalarModel linear_contact(const ContactSpectrum& spectrum, int branches) {
   return {{.stiffness_N_per_m = spectrum.equilibrium()},
           {.stiffness_N_per_m = spectrum.instantaneous() - spectrum.equilibrium()},
@@ -82,4 +82,4 @@ void ScalarRun::cross(double time_s, double value) {
   value_ = value;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

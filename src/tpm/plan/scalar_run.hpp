@@ -4,7 +4,7 @@
 #include "tpm/plan/plan_surrogate.hpp"
 #include "tpm/plan/scalar_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// The contact as a linear one, with so many exponentials (1 to 3).
 [[nodiscard]] ScalarModel linear_contact(const ContactSpectrum& spectrum, int branches);
@@ -40,4 +40,4 @@ class ScalarRun {
   double time_s_ = 0.0, value_ = 0.0, response_ = 0.0, steps_ = 0.0;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -7,7 +7,7 @@
 #include "tpm/plan/scalar_run.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr double kUnitDepth_m = 1e-3;    // of the grid; the next is sqrt(2) times deeper
@@ -162,4 +162,4 @@ std::optional<SharedAnswer> SharedPlan::answer(const Protocol& protocol, double 
   return answer;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -6,9 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/plan/plan_surrogate.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// What a shared plan answers to one protocol.
 struct SharedAnswer {
@@ -60,4 +61,4 @@ class SharedPlan {
   std::map<Place, std::vector<double>> claims_;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -5,17 +5,17 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/require.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 constexpr std::size_t kFewestSpheres = 50;
@@ -162,9 +162,8 @@ SpacingLimit spacing_limit(const Eigen::MatrixXd& terms, const Eigen::MatrixXd& 
   const Eigen::MatrixXd found = inverse * (line.transpose() * weighted);
   const auto freedom = static_cast<double>(line.rows() - line.cols());
   const double variance = (weighted - line * found).colwise().squaredNorm().maxCoeff() / freedom;
-  const boost::math::students_t student(freedom);
   return {found.row(0).transpose(),
-          boost::math::quantile(student, 0.975) * std::sqrt(variance * inverse(0, 0))};
+          student_quantile(0.975, freedom) * std::sqrt(variance * inverse(0, 0))};
 }
 
 SpheresPlan plan_spheres(const RefilledScene& scene, const SpheresRequest& request) {
@@ -180,4 +179,4 @@ SpheresPlan plan_spheres(const RefilledScene& scene, const SpheresRequest& reque
   return search.take(widest);
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

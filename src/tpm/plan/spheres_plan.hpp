@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/scene/refilled_scene.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 
 /// What a choice of the number of spheres is asked for.
 struct SpheresRequest {
@@ -65,4 +66,4 @@ struct SpacingLimit {
 [[nodiscard]] SpacingLimit spacing_limit(const Eigen::MatrixXd& terms,
                                          const Eigen::MatrixXd& responses);
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-namespace tpm::report {
+namespace tpm::show {
 
 namespace {
 
@@ -104,4 +104,4 @@ void Document::picture(Picture picture) {
   blocks.emplace_back(std::move(picture));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

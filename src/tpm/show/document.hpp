@@ -4,7 +4,7 @@
 #include <variant>
 #include <vector>
 
-namespace tpm::report {
+namespace tpm::show {
 
 /// How a verdict is tinted where there is colour; the words always carry the meaning.
 enum class Tone { plain, good, fair, bad };
@@ -74,4 +74,4 @@ void typeset(Document& document);
 [[nodiscard]] std::string to_html(const Document& document,
                                   const std::map<std::string, std::string>& drawings);
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -5,10 +5,11 @@
 #include <string_view>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/show/document.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 namespace {
 
 constexpr std::string_view kStyle = R"css(
@@ -194,4 +195,4 @@ std::string to_html(const Document& document, const std::map<std::string, std::s
   return out + "</body>\n</html>\n";
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -3,7 +3,7 @@
 
 #include "tpm/show/document.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 namespace {
 
 /// Outside code, characters that Markdown would read as markup are escaped.
@@ -76,4 +76,4 @@ std::string to_markdown(const Document& document) {
   return out;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -18,7 +18,7 @@
 #include "tpm/show/run_record.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 namespace {
 
 /// What became of a program that was run.
@@ -209,4 +209,4 @@ std::vector<std::string> write_figures(const std::filesystem::path& folder,
   return files;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -4,10 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/show/document.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 
 /// The Python interpreter that draws: $TPMKIT_PYTHON if it is set, else the first of python3 and
 /// /usr/bin/python3 that has matplotlib (a version manager's python3 often has not). Throws
@@ -56,4 +57,4 @@ void draw_network(const std::string& python, const std::filesystem::path& pictur
                                                         const std::filesystem::path& folder,
                                                         bool two);
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -11,7 +11,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 namespace {
 
 std::string_view kind_name(Series::Kind kind) {
@@ -145,4 +145,4 @@ std::string spaced(std::string_view name) {
   return words;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -4,9 +4,10 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 
 /// One thing drawn in a panel. All numbers are in the units of the panel's axes.
 struct Series {
@@ -83,4 +84,4 @@ void add_if_any(Panel& panel, Series series);
 /// A name as words: "contact force" of "contact_force".
 [[nodiscard]] std::string spaced(std::string_view name);
 
-}  // namespace tpm::report
+}  // namespace tpm::show

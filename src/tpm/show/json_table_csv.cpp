@@ -6,7 +6,7 @@
 
 #include "tpm/show/table_document.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 namespace {
 
 using FlatRow = std::map<std::string, std::string>;
@@ -85,4 +85,4 @@ std::string json_table_csv(const Json& rows, std::string_view spread) {
   return table.text();
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -2,9 +2,10 @@
 #include <string>
 #include <string_view>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 
 /// A table of a JSON answer as CSV: the same numbers under the same keys, which carry the unit.
 /// One line for each row; the keys of an object within a row follow its own with an underscore
@@ -16,4 +17,4 @@ namespace tpm::report {
 /// for none
 [[nodiscard]] std::string json_table_csv(const Json& rows, std::string_view spread = {});
 
-}  // namespace tpm::report
+}  // namespace tpm::show

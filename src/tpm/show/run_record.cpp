@@ -11,7 +11,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 namespace {
 
 /// "model name : ..." of /proc/cpuinfo; "unknown" where there is none.
@@ -42,4 +42,4 @@ Json run_record(const std::map<std::string, double>& seconds) {
   return record;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

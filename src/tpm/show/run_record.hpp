@@ -3,9 +3,10 @@
 #include <map>
 #include <string>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 
 /// What changes from run to run and so stays out of the results: version, compiler, machine, date
 /// and wall times.
@@ -21,4 +22,4 @@ auto timed(std::map<std::string, double>& seconds, const char* part, Work work) 
   return result;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

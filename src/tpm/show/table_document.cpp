@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace tpm::report {
+namespace tpm::show {
 namespace {
 
 /// Columns a terminal needs; our texts have no wide or combining characters.
@@ -188,4 +188,4 @@ std::string wrapped(std::string_view text, std::size_t width, std::size_t indent
   return out;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -3,7 +3,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm::report {
+namespace tpm::show {
 
 /// A table ready to be written: text cells only, no physics.
 struct TableSection {
@@ -35,4 +35,4 @@ enum class TableStyle { text, markdown, latex };
 [[nodiscard]] std::string wrapped(std::string_view text, std::size_t width, std::size_t indent,
                                   std::size_t column = 0);
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -6,7 +6,7 @@
 #include "tpm/files/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 namespace {
 
 constexpr std::string_view kPlaceOfData = "<!-- data -->";
@@ -93,4 +93,4 @@ std::string ViewPage::html() const {
   return page.replace(at, kPlaceOfData.size(), data);
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::show

@@ -5,9 +5,10 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 
-namespace tpm::report {
+namespace tpm::show {
 
 /// One self-contained HTML page that shows a file: pages/view.html with a description (JSON) and
 /// arrays of numbers in it. The page asks nothing of a network.
@@ -40,4 +41,4 @@ class ViewPage {
   std::size_t count_ = 0;
 };
 
-}  // namespace tpm::report
+}  // namespace tpm::show

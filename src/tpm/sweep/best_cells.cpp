@@ -10,7 +10,7 @@
 #include "tpm/files/document_place.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 /// Numbers of all cells, the axis that is summed over taken out.
@@ -127,4 +127,4 @@ Json fit_from_cell(Json fit, const BestCell& cell, std::string_view where) {
   return fit;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -3,9 +3,10 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/sweep/sweep_reader.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// A parameter of a cell.
 struct CellParameter {
@@ -35,4 +36,4 @@ struct BestCell {
 /// @param where of `fit`, for messages
 [[nodiscard]] Json fit_from_cell(Json fit, const BestCell& cell, std::string_view where);
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -17,7 +17,7 @@
 #include "tpm/files/file_roles.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "logs hold little-endian numbers");
@@ -280,4 +280,4 @@ void BlockLog::sync() {
   if (::fdatasync(file_.get()) != 0) throw cannot_write_log(path_);
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -6,10 +6,11 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/descriptor.hpp"
 #include "tpm/sweep/cell_block.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// A block as a log holds it, check sums included: made where the block was computed, so that who
 /// writes the log has nothing left to do but that.
@@ -64,4 +65,4 @@ class BlockLog {
   std::vector<std::uint64_t> place_;  ///< of each block in the file; 0: it is not there
 };
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

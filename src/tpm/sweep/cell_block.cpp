@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <limits>
 
-#include "tpm/fit/claims/expression.hpp"
+#include "tpm/fit/expression/expression.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
@@ -135,4 +135,4 @@ void CellRunner::set_aside(std::size_t cell, CellStatus status, const std::strin
   block.reason[cell] = static_cast<std::uint16_t>(found - block.reasons.begin() + 1);
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

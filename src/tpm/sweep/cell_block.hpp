@@ -8,7 +8,7 @@
 
 #include "tpm/sweep/sweep.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// What became of a cell.
 enum class CellStatus : std::uint8_t { done, skipped, failed };
@@ -64,4 +64,4 @@ class CellRunner {
   std::vector<std::int64_t> counts_;
 };
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -8,10 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// What is found for each cell under one name: a number, or a curve.
 struct SweepVariable {
@@ -98,4 +99,4 @@ class SweepModel {
 [[nodiscard]] std::shared_ptr<const SweepModel> organ_sweep_model(
     const Json& document, std::string_view where, const std::filesystem::path& folder);
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

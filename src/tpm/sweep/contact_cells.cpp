@@ -16,7 +16,7 @@
 #include "tpm/sweep/sweep_outputs.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 using Kind = SweepOutput::Kind;
@@ -315,4 +315,4 @@ std::shared_ptr<const SweepModel> single_contact_model(const Json& document,
   return std::make_shared<ContactModel>(std::move(setup));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -20,7 +20,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 using Kind = SweepOutput::Kind;
@@ -446,4 +446,4 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::s
   return std::make_shared<OrganSweepModel>(std::move(setup));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

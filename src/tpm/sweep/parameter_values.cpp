@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 double between(double from, double to, AxisScale scale, double share) {
@@ -44,4 +44,4 @@ double ParameterValues::at(std::uint64_t number) const {
   return between(from_, to_, scale_, static_cast<double>(number) / static_cast<double>(count_ - 1));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// How the places between two ends are spread.
 enum class AxisScale { linear, logarithmic };
@@ -32,4 +32,4 @@ class ParameterValues {
   std::function<double(std::uint64_t)> coordinate_;
 };
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -10,7 +10,7 @@
 
 #include "tpm/sweep/workers.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 double processor_seconds() {
@@ -106,4 +106,4 @@ std::filesystem::path log_path(const std::filesystem::path& output) {
   return output.string() + ".blocks";
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

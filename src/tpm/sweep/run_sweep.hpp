@@ -6,7 +6,7 @@
 
 #include "tpm/sweep/block_log.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// A part of a sweep's blocks: those whose number leaves `index` when divided by `count`.
 struct Shard {
@@ -47,4 +47,4 @@ struct SweepRun {
 /// File of the log of a sweep whose results go into `output`.
 [[nodiscard]] std::filesystem::path log_path(const std::filesystem::path& output);
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -8,7 +8,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 constexpr std::string_view kOfMaterial = "material.", kProtocol = "/protocol/",
@@ -92,4 +92,4 @@ void SceneField::set(ProtocolBlock& protocol, double value) const {
   }
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

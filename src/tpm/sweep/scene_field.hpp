@@ -2,11 +2,12 @@
 #include <string>
 #include <string_view>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/blocks/protocol_block.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/bond_material.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// A number of a scene that a sweep sets: `material.tau2`, a parameter of the first material by its
 /// name in the table (parameters_of), or a JSON pointer to a number, such as /protocol/depth.
@@ -41,4 +42,4 @@ class SceneField {
   bool quantity_ = false, whole_ = false;
 };
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -7,11 +7,12 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/sweep/cell_model.hpp"
 #include "tpm/sweep/parameter_values.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// One dimension of a sweep.
 struct SweepAxis {
@@ -73,4 +74,4 @@ inline constexpr double kMostCells = 1e12;
                                 const std::filesystem::path& folder);
 [[nodiscard]] Sweep read_sweep(const std::filesystem::path& path);
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "tpm/fit/claims/expression.hpp"
+#include "tpm/fit/expression/expression.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 void require_no_samples(const SweepReader& sweep, const ReadAxis& axis) {
@@ -83,4 +83,4 @@ SweepConvergence convergence_of(const SweepReader& sweep, const std::string& var
   return found;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

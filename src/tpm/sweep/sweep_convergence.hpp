@@ -3,9 +3,10 @@
 #include <vector>
 
 #include "tpm/base/grid_convergence.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/sweep/sweep_reader.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// A number of a sweep over ever finer places of one axis.
 struct SweepConvergence {
@@ -35,4 +36,4 @@ struct SweepConvergence {
                                               const std::optional<std::string>& axis,
                                               const std::string& size, const FixedPlaces& fixed);
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

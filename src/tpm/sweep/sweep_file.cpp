@@ -12,13 +12,13 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/renamed_names.hpp"
-#include "tpm/fit/claims/expression.hpp"
+#include "tpm/fit/expression/expression.hpp"
 #include "tpm/sweep/sweep.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 /// "/material/E1" becomes "E1".
@@ -390,4 +390,4 @@ Sweep read_sweep(const std::filesystem::path& path) {
   return parse_sweep(read_json(path), path.string(), path.parent_path());
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -11,7 +11,7 @@
 #include "tpm/base/enum_names.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 using Kind = SweepOutput::Kind;
@@ -168,4 +168,4 @@ void require_identifier(const std::string& name, std::string_view where) {
                   "letters, digits and _, no digit first");
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

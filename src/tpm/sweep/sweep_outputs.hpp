@@ -3,11 +3,12 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/document_place.hpp"
 #include "tpm/sweep/cell_model.hpp"
 #include "tpm/sweep/parameter_values.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// Of what and when a variable is.
 struct SweepOutput {
@@ -59,4 +60,4 @@ struct CountedValues {
 /// Throws Error(bad_input) unless a text can stand for a number in an expression.
 void require_identifier(const std::string& name, std::string_view where);
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -14,7 +14,7 @@
 #include "tpmkit/error.hpp"
 #endif
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 #ifndef TPM_MPI
 
@@ -201,4 +201,4 @@ void SweepRanks::serve(const Sweep& sweep) {
 
 #endif
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

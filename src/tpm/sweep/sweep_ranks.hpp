@@ -3,7 +3,7 @@
 
 #include "tpm/sweep/run_sweep.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// The processes that mpirun has started together. The first one hands out blocks one by one,
 /// stores what comes back, and computes blocks itself in between; the others compute. Files are
@@ -31,4 +31,4 @@ class SweepRanks {
   bool sent_home_ = false;
 };
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -7,7 +7,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 std::string path_of(const std::string& name) {
@@ -176,4 +176,4 @@ std::vector<FixedValue> other_places(const SweepReader& sweep, const ReadAxis& a
   return others;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -7,10 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// An axis of a file of results.
 struct ReadAxis {
@@ -89,4 +90,4 @@ class SweepReader {
 [[nodiscard]] std::vector<FixedValue> other_places(const SweepReader& sweep, const ReadAxis& along,
                                                    const FixedPlaces& fixed);
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -17,7 +17,7 @@
 #include "tpm/sweep/workers.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 namespace {
 
 namespace fs = std::filesystem;
@@ -335,4 +335,4 @@ std::string fingerprint_of(const fs::path& file) {
   }
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

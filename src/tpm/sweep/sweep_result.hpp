@@ -6,7 +6,7 @@
 
 #include "tpm/sweep/block_log.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// How many cells ended in which way.
 struct CellTally {
@@ -36,4 +36,4 @@ bool write_sweep_csv(const Sweep& sweep, const std::vector<const BlockLog*>& log
 /// The fingerprint of the sweep whose results a file holds; empty if it holds none.
 [[nodiscard]] std::string fingerprint_of(const std::filesystem::path& file);
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

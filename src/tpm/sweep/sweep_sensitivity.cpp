@@ -2,7 +2,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 SweepSensitivity sensitivity_of(const SweepReader& sweep, const std::string& variable,
                                 const FixedPlaces& fixed, double level) {
@@ -21,4 +21,4 @@ SweepSensitivity sensitivity_of(const SweepReader& sweep, const std::string& var
                   "{\"samples\": \"sensitivity\", \"count\": 256, \"replicates\": 16, ...}");
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

@@ -1,10 +1,11 @@
 #pragma once
 #include <string>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/sensitivity.hpp"
 #include "tpm/sweep/sweep_reader.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// Sobol indices of a number over an axis of samples of the kind `sensitivity`.
 struct SweepSensitivity {
@@ -20,4 +21,4 @@ struct SweepSensitivity {
 [[nodiscard]] SweepSensitivity sensitivity_of(const SweepReader& sweep, const std::string& variable,
                                               const FixedPlaces& fixed, double level = 0.95);
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

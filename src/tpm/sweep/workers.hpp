@@ -6,9 +6,10 @@
 #include <exception>
 #include <mutex>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/work/parallel.hpp"
 
-namespace tpm::study {
+namespace tpm::sweep {
 
 /// The first exception of a pipeline's filters, kept until the pipeline is through: one that left a
 /// filter would leak what waits between filters (oneTBB 2021).
@@ -51,4 +52,4 @@ void on_workers(int workers, const Work& work) {
   with_threads([&] { tbb::task_arena(workers).execute(work); });
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::sweep

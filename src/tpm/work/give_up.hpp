@@ -3,7 +3,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::work {
 
 /// Does some work. Returns what is said where a solver gave up (Error(numerical)), which is not an
 /// error for everybody; empty if the work was done. Other errors pass.
@@ -18,4 +18,4 @@ std::string gave_up(const Work& work) {
   return {};
 }
 
-}  // namespace tpm
+}  // namespace tpm::work

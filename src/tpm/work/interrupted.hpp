@@ -1,7 +1,7 @@
 #pragma once
 #include <stdexcept>
 
-namespace tpm {
+namespace tpm::work {
 
 /// A computation that was asked to stop; says where it stands.
 class Interrupted : public std::runtime_error {
@@ -9,4 +9,4 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-}  // namespace tpm
+}  // namespace tpm::work

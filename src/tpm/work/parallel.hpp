@@ -7,7 +7,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::work {
 
 /// Does work for which oneTBB may start threads. Throws Error(environment) if the system has none
 /// left; oneTBB says so by a std::runtime_error, which nothing of ours throws.
@@ -35,4 +35,4 @@ void for_each_in_parallel(Index count, const Function& f) {
       [&] { tbb::this_task_arena::isolate([&] { tbb::parallel_for(Index{0}, count, f); }); });
 }
 
-}  // namespace tpm
+}  // namespace tpm::work

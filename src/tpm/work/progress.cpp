@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <utility>
 
-namespace tpm {
+namespace tpm::work {
 
 Progress::Progress(std::string what, std::size_t total, std::size_t already)
     : what_(std::move(what)),
@@ -50,4 +50,4 @@ std::string Progress::time_left() const {
   return fmt::format(", {:.1f} h left", left_s / 3600.0);
 }
 
-}  // namespace tpm
+}  // namespace tpm::work

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <string>
 
-namespace tpm {
+namespace tpm::work {
 
 /// One line of progress on standard error, rewritten in place, with an estimate of the time that is
 /// left once some seconds have passed; silent unless standard error is a
@@ -33,4 +33,4 @@ class Progress {
   bool on_terminal_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::work

@@ -1,7 +1,9 @@
 // A formulation that does not keep its word: the suite has to find it.
 #include "tpm/organ/run/scene_runner.hpp"
 
-namespace tpm::organ {
+namespace tpm {
+using namespace organ;
+using namespace files;
 namespace {
 
 /// Says that it answers the star as its closed form does. It forgets the tension, pulls at rest,
@@ -43,4 +45,4 @@ Formulations broken_formulations() {
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm

@@ -2,7 +2,9 @@
 #include "tpm/organ/balance/mass_spring.hpp"
 #include "tpm/organ/run/scene_runner.hpp"
 
-namespace tpm::organ {
+namespace tpm {
+using namespace organ;
+using namespace files;
 namespace {
 
 /// The contact as an elastic spring with the network's equilibrium stiffness at rest:
@@ -43,4 +45,4 @@ Formulations dummy_formulations() {
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm

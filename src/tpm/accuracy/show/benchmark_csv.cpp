@@ -7,7 +7,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/show/table_document.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 namespace {
 
 constexpr int kCellDigits = 5;
@@ -96,4 +96,4 @@ std::string benchmark_csv(const BenchmarkResult& result, bool timing) {
   return text;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

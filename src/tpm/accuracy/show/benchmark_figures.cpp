@@ -9,7 +9,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 namespace {
 
 /// Longest step that a servo loop of 1 kHz can use.
@@ -178,4 +178,4 @@ std::vector<Figure> benchmark_figures(const BenchmarkRecord& record) {
   return figures;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

@@ -13,7 +13,7 @@
 #include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 namespace {
 
 constexpr int kBenchmarkDigits = 5;
@@ -270,4 +270,4 @@ void put_result(BenchmarkRecord& record, BenchmarkResult result, Json run) {
   }
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

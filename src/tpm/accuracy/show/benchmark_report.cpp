@@ -12,7 +12,7 @@
 #include "tpm/show/draw.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 namespace {
 
 constexpr std::array<double, 4> kAims{1e-2, 1e-3, 1e-4, 1e-6};
@@ -352,4 +352,4 @@ void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path&
                Json{{"problems", record.runs}});
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

@@ -8,7 +8,7 @@
 #include "tpm/show/document.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 
 /// What was run, and how.
 struct BenchmarkRecord {
@@ -67,4 +67,4 @@ void put_result(BenchmarkRecord& record, BenchmarkResult result, Json run);
 void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path& folder,
                      const std::string& python);
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

@@ -8,7 +8,7 @@
 #include "tpm/show/run_record.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 namespace {
 
 constexpr std::string_view kColumns =
@@ -75,4 +75,4 @@ std::string speed_text(const std::vector<SpeedRow>& rows) {
   return text;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

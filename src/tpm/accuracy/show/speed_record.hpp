@@ -5,7 +5,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 
 /// What the rows of one measurement have in common.
 struct SpeedOrigin {
@@ -25,4 +25,4 @@ void append_speed_record(const std::filesystem::path& file, const std::vector<Sp
 /// A table for people.
 [[nodiscard]] std::string speed_text(const std::vector<SpeedRow>& rows);
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

@@ -3,7 +3,7 @@
 
 #include "tpm/accuracy/show/stability_report.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 namespace {
 
 /// Maps that stand side by side.
@@ -71,4 +71,4 @@ std::vector<Figure> stability_figures(const StabilityStudy& study) {
   return figures;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

@@ -13,7 +13,7 @@
 #include "tpm/show/draw.hpp"
 #include "tpm/show/table_document.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 namespace {
 
 std::string number(double value) {
@@ -364,4 +364,4 @@ void write_stability(const StabilityStudy& study, const std::filesystem::path& f
   }
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

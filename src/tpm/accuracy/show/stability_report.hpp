@@ -7,7 +7,7 @@
 #include "tpm/show/document.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::accuracy {
 
 /// The maps of each rule, two to a figure, with the limit of theory drawn in.
 [[nodiscard]] std::vector<Figure> stability_figures(const StabilityStudy& study);
@@ -27,4 +27,4 @@ namespace tpm::report {
 void write_stability(const StabilityStudy& study, const std::filesystem::path& folder,
                      const std::string& python, double seconds);
 
-}  // namespace tpm::report
+}  // namespace tpm::accuracy

@@ -7,7 +7,7 @@
 #include "tpm/law/element/closed_form.hpp"
 #include "tpm/organ/body/liver.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 namespace {
 
@@ -100,4 +100,4 @@ std::string study_organ_words() {
 StudyOrgan::StudyOrgan(const BondElement& p, std::size_t spheres)
     : network(small_liver(spheres)), bonds(network, p), driven(pushed(network, bonds)) {}
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -8,7 +8,7 @@
 #include "tpm/organ/balance/driven_network.hpp"
 #include "tpm/organ/bonds/network.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 struct CheckedProblem {
   std::unique_ptr<MethodProblem> problem;
@@ -51,4 +51,4 @@ struct StudyOrgan {
   DrivenNetwork driven;
 };
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

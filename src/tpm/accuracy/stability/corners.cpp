@@ -10,7 +10,7 @@
 #include "tpm/organ/body/simple_organs.hpp"
 #include "tpm/work/progress.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 using Expect = std::function<StabilityClass(StepRule)>;
@@ -312,4 +312,4 @@ std::vector<StabilityCorner> stability_corners() {
   return corners;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

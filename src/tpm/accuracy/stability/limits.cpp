@@ -13,7 +13,7 @@
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 constexpr double kShare = 0.005;  // to which a limit is bisected: less than 1 %
@@ -263,4 +263,4 @@ StabilityStudy run_stability_study(int along, const StabilityParts& parts) {
   return study;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -9,7 +9,7 @@
 #include "tpm/base/evenly.hpp"
 #include "tpm/work/progress.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 /// What is varied, and how a problem follows from it.
@@ -187,4 +187,4 @@ std::vector<StabilityMap> stability_maps(int along) {
   return maps;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

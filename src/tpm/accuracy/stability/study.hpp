@@ -6,7 +6,7 @@
 
 #include "tpm/accuracy/stability/verdict.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 /// One run of a map.
 struct StabilityPoint {
@@ -90,4 +90,4 @@ struct StabilityParts {
 [[nodiscard]] StabilityStudy run_stability_study(int along = kPointsAlongMaps,
                                                  const StabilityParts& parts = {});
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

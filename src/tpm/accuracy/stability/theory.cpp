@@ -5,7 +5,7 @@
 #include <cmath>
 #include <complex>
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
@@ -100,4 +100,4 @@ Eigen::VectorXd linear_motion_m(const LinearElement& e, double load_N,
   return depth;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

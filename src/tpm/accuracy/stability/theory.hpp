@@ -6,7 +6,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/organ/steps/method.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 /// The element about a depth, linear: force k e - g y under a load, with or without a mass.
 struct LinearElement {
@@ -30,4 +30,4 @@ struct LinearElement {
 [[nodiscard]] Eigen::VectorXd linear_motion_m(const LinearElement& element, double load_N,
                                               std::span<const double> times_s);
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tpm::study {
+namespace tpm::accuracy {
 namespace {
 
 constexpr double kGrows = 1.1;       // of the largest difference, from the first half to the second
@@ -57,4 +57,4 @@ StabilityVerdict classify_run(const MethodRun& run, const Eigen::VectorXd& refer
   return verdict;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

@@ -7,7 +7,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/organ/steps/method.hpp"
 
-namespace tpm::study {
+namespace tpm::accuracy {
 
 /// How a run is classified.
 enum class StabilityClass {
@@ -57,4 +57,4 @@ struct StabilityVerdict {
 [[nodiscard]] StabilityVerdict classify_run(const MethodRun& run, const Eigen::VectorXd& reference,
                                             double peak, bool moves);
 
-}  // namespace tpm::study
+}  // namespace tpm::accuracy

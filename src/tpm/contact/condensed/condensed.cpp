@@ -12,7 +12,7 @@
 #include "tpm/contact/condensed/condensed_phi.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 /// std::hypot guards against numbers that no place in an organ has, and takes tens of nanoseconds.
@@ -175,4 +175,4 @@ void CondensedContact::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noe
   all.col(fit_->contact) = fit_->frame.axes * state_.u;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

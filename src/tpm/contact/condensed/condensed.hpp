@@ -3,12 +3,13 @@
 #include <memory>
 #include <optional>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/condensed/condensed_branches.hpp"
 #include "tpm/organ/bonds/bond_system.hpp"
 #include "tpm/organ/bonds/constraints.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// What a condensed model is built for.
 struct CondensedOptions {
@@ -95,4 +96,4 @@ class CondensedContact final : public ContactModel {
                                                const Eigen::Vector3d& into_tissue,
                                                const CondensedOptions& options = {});
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

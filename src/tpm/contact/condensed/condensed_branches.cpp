@@ -7,7 +7,7 @@
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/contact/condensed/condensed_phi.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 using Eigen::Index;
@@ -173,4 +173,4 @@ void CondensedBranches::step(CondensedState& state, const Eigen::Vector3d& to) n
   state.force_N = condensed_pull(*tables_, to, state.viscous, state.matrices).force_N;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

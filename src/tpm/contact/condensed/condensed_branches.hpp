@@ -2,9 +2,10 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/condensed/condensed_fit.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// One of the branches by which all relaxing bonds of a condensed network relax.
 struct CondensedBranch {
@@ -79,4 +80,4 @@ class CondensedBranches {
   Columns lacks_, moved_, next_;  ///< of the step
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -11,7 +11,7 @@
 #include "tpm/organ/bonds/material_refusal.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr int kMemories = 30;               // places of w
@@ -155,4 +155,4 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
   return model;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -8,7 +8,7 @@
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/wide_vectors.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr std::array<int, 3> kFieldDegrees{5, 4, 2};
@@ -190,4 +190,4 @@ void CondensedField::displacements(const Eigen::Vector3d& u_m, const Eigen::Vect
   }
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -7,7 +7,7 @@
 #include "tpm/contact/condensed/condensed_monomials.hpp"
 #include "tpm/contact/condensed/condensed_samples.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// Displacements of all spheres from few modes. Their amplitudes are polynomials of u and w, and
 /// linear in q with polynomials of w. In single precision.
@@ -51,4 +51,4 @@ class CondensedField {
   std::vector<float> modes_;        ///< by groups of 16 spheres: mode by mode; m
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

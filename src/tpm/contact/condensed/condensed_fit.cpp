@@ -4,7 +4,7 @@
 
 #include "tpm/base/dense_algebra.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr std::array<int, 3> kDegrees{4, 2, 0};  // in the depth, by degree in the tangents
@@ -57,4 +57,4 @@ CondensedMatrices::CondensedMatrices(const CondensedFrame& frame,
   coefficients_ = least_squares(rows, values.transpose()).transpose();
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -1,9 +1,10 @@
 #pragma once
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/condensed/condensed_field.hpp"
 #include "tpm/contact/condensed/condensed_potential.hpp"
 #include "tpm/contact/condensed/condensed_tables.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// What the motion of the viscous state needs, as polynomials of w: symmetric matrices in the axes
 /// of the contact.
@@ -48,4 +49,4 @@ struct CondensedFit {
   Eigen::Matrix3d equilibrium = Eigen::Matrix3d::Zero();
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

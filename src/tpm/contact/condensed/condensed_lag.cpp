@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
-#include "tpm/contact/compared_motion.hpp"
+#include "tpm/contact/condensed/compared_motion.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr int kStepsOfRamp = 50;
@@ -49,4 +49,4 @@ double condensed_lag_error_N(const CondensedContact& model, const CondensedFit& 
   return per_lag_N;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -1,9 +1,10 @@
 #pragma once
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/condensed/condensed.hpp"
 #include "tpm/contact/condensed/condensed_fit.hpp"
 #include "tpm/organ/bonds/constraints.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// How far the viscous state lags behind the contact and has left rest at once:
 ///
@@ -28,4 +29,4 @@ namespace tpm::organ {
                                            const Constraints& constraints,
                                            const Eigen::Vector3d& into_tissue);
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -4,7 +4,7 @@
 
 #include "tpm/contact/condensed/condensed_fit.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 static_assert(kCondensedDegrees[0] < CondensedTables::kDepths);
 static_assert(CondensedMatrices::kTerms == CondensedTables::kMatrixTerms);
@@ -40,4 +40,4 @@ CondensedTables condensed_tables(const CondensedFrame& frame, const CondensedPot
   return tables;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -1,6 +1,6 @@
 #include "tpm/contact/condensed/condensed_monomials.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 std::vector<CondensedExponents> condensed_monomials(std::span<const int> depth_degree) {
   std::vector<CondensedExponents> all;
@@ -46,4 +46,4 @@ double CondensedPowers::monomial(CondensedExponents e, int by, int again) const 
   return factor;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

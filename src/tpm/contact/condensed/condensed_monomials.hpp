@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// Axes and scales of the contact: the depth p along the push, scaled to -1..1 over the depths of
 /// the fit, and two tangential coordinates in units of the largest tangential displacement.
@@ -52,4 +52,4 @@ class CondensedPowers {
   std::array<std::array<double, 8>, 6> of_{};
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

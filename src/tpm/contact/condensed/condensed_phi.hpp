@@ -1,7 +1,7 @@
 #pragma once
 #include <cmath>
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// (1 - exp(-y))/y, and the next one: (1 - that)/y. Without loss of digits for y >= 0.
 inline double first_phi(double y) {
@@ -12,4 +12,4 @@ inline double second_phi(double y) {
   return 0.5 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0 - y / 720.0)));
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

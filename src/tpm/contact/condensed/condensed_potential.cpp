@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr double kEnergyLength_m = 2e-3;  // an error of energy counts as one of force over it
@@ -132,4 +132,4 @@ CondensedPotential::Gradient CondensedPotential::gradient(const Eigen::Vector3d&
   return result;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

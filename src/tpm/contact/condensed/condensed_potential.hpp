@@ -7,7 +7,7 @@
 #include "tpm/contact/condensed/condensed_monomials.hpp"
 #include "tpm/contact/condensed/condensed_samples.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// Psi(u, w) as a polynomial, fitted to values, gradients and second derivatives of samples.
 /// Displacements are local (CondensedFrame).
@@ -38,4 +38,4 @@ class CondensedPotential {
   double worst_N_ = 0.0;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

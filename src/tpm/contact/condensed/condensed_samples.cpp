@@ -10,7 +10,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr double kSampleBalance = 1e-9;  // of stiffness at the contact times the stride
@@ -202,4 +202,4 @@ CondensedSample CondensedSampler::sample_at(const Eigen::Vector3d& u_m) {
   return sample;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

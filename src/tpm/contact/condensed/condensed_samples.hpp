@@ -2,9 +2,10 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/balance/equilibrium.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// A network whose contact sphere stands at u while its viscous elongations are those of the
 /// equilibrium under the contact displacement w: y_b = l_b there. With
@@ -86,4 +87,4 @@ class CondensedSampler {
   int factorisations_ = 0;
 };
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

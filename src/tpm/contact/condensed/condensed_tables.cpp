@@ -2,7 +2,7 @@
 
 #include "tpm/contact/condensed/condensed_monomials.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 /// Psi(u, w) and its gradient, J and N.
@@ -126,4 +126,4 @@ void step_condensed(const CondensedTables& tables, const CondensedRates& rates,
   state.force_N = condensed_pull(tables, to, state.viscous, state.matrices).force_N;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// Of w, then of q: a viscous state of a condensed model in the axes of the contact, m.
 using CondensedVector = Eigen::Matrix<double, 6, 1>;
@@ -80,4 +80,4 @@ struct CondensedRates {
 void step_condensed(const CondensedTables& tables, const CondensedRates& rates,
                     CondensedState& state, const Eigen::Vector3d& to) noexcept;
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

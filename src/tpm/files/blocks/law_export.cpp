@@ -10,7 +10,7 @@
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 /// Digits of the exported numbers: the curve is reproduced to 1e-6 and better.
@@ -265,4 +265,4 @@ std::string export_law(const LawFile& law, const ExportOptions& options) {
   return json_text(e, law);
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -4,11 +4,12 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/law/contact_geometry.hpp"
 #include "tpm/law/prony_table.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// The programs that a relaxation can be written for; docs/law_files.md has their conventions.
 enum class ExportTarget { abaqus, ansys, febio, json };
@@ -33,4 +34,4 @@ struct ExportOptions {
 [[nodiscard]] std::vector<std::string> export_warnings(const LawFile& law,
                                                        const ExportOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::files

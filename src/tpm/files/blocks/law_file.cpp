@@ -12,6 +12,8 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm {
+using namespace files;
+
 namespace {
 
 const char* reference_key(const LawSpec& spec) {
@@ -74,7 +76,7 @@ std::string law_key(const LawParameter& parameter) {
   return parameter.name + "_" + unit;
 }
 
-LawFile law_from_json(const Json& written, std::string_view where) {
+LawFile files::law_from_json(const Json& written, std::string_view where) {
   const Json json = checked(written, "law", where);
   LawFile law;
   law.spec = spec_of(json, where);
@@ -96,7 +98,7 @@ LawFile law_from_json(const Json& written, std::string_view where) {
   return law;
 }
 
-Json to_json(const LawFile& law) {
+Json files::to_json(const LawFile& law) {
   Json json{{"law", law_name(law.spec)},
             {"drive", quantity_name(law.spec.drive)},
             {"response", quantity_name(law.spec.response)},

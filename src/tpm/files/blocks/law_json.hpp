@@ -6,7 +6,7 @@
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_uncertainty.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Throws Error(bad_input) for anything that schemas/law.schema.json or the law does not allow: an
 /// unknown law or key, a missing parameter without a preset, a value out of range.
@@ -23,4 +23,4 @@ namespace tpm {
                                                    std::span<const double> values,
                                                    std::string_view where);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -3,17 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
 
 namespace tpm {
+using namespace base;
+using namespace files;
+
 namespace {
 
 constexpr auto kCoordinateWords =
@@ -114,11 +117,11 @@ double coordinate_slope(Coordinate coordinate, double natural) {
 
 double LawUncertainty::quantile(double at_level) const {
   const double tail = 0.5 + 0.5 * at_level;
-  if (!degrees_of_freedom) return boost::math::quantile(boost::math::normal(), tail);
-  return boost::math::quantile(boost::math::students_t(*degrees_of_freedom), tail);
+  if (!degrees_of_freedom) return base::normal_quantile(tail);
+  return base::student_quantile(tail, *degrees_of_freedom);
 }
 
-Json to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
+Json files::to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
   const std::vector<LawParameter> parameters = law_parameters(spec);
   Json names = Json::array(), coordinates = Json::array(), rows = Json::array();
   for (std::size_t i = 0; i < uncertainty.place.size(); ++i) {
@@ -152,8 +155,9 @@ Json to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
   return json;
 }
 
-LawUncertainty uncertainty_from_json(const Json& block, const LawSpec& spec,
-                                     std::span<const double> values, std::string_view where) {
+LawUncertainty files::uncertainty_from_json(const Json& block, const LawSpec& spec,
+                                            std::span<const double> values,
+                                            std::string_view where) {
   const std::vector<LawParameter> parameters = law_parameters(spec);
   LawUncertainty u;
   for (const Json& name : block.at("parameters")) {

@@ -9,7 +9,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 constexpr ProtocolKey kDepthKey{"depth", Dimension::length, &ProtocolBlock::depth_m, false};
@@ -195,4 +195,4 @@ std::vector<ProtocolBlock> parse_protocol_lists(const Json& block, const Documen
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

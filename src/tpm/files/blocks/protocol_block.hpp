@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/document_place.hpp"
 #include "tpmkit/protocol.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// The protocols that files name.
 enum class ProtocolKind {
@@ -81,4 +82,4 @@ struct ProtocolKeyName {
     const Json& block, const DocumentPlace& place, ProtocolKind kind, Openness openness,
     std::initializer_list<ProtocolKeyName> renamed, const std::vector<std::string_view>& others);
 
-}  // namespace tpm
+}  // namespace tpm::files

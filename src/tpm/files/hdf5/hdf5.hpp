@@ -11,7 +11,7 @@
 
 #include "tpm/files/replacement.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Owns one HDF5 identifier and closes it with the function that belongs to its kind. Spelled with
 /// plain types, so that users of this header need no HDF5 header.
@@ -143,4 +143,4 @@ class Hdf5Reader {
   std::unique_ptr<Contained> child_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -10,7 +10,7 @@
 #include "tpm/files/hdf5/hdf5_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "arrays hold little-endian numbers");
@@ -162,4 +162,4 @@ std::uint64_t Hdf5Assembly::close() {
   return storage_.begin_of_free;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -6,7 +6,7 @@
 
 #include "tpm/files/hdf5/hdf5_driver.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Arranges an HDF5 file: groups, datasets, texts and attributes. Numbers are not written here:
 /// array() says where they belong. Names as in Hdf5Writer; errors are Error(environment).
@@ -45,4 +45,4 @@ class Hdf5Assembly {
   Hdf5Handle file_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::files

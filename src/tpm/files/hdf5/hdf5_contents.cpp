@@ -8,7 +8,7 @@
 #include "tpm/files/hdf5/hdf5_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 constexpr std::string_view kWholeFile = "a whole HDF5 file";
@@ -245,4 +245,4 @@ std::string Hdf5Contents::attribute(const std::string& object, const std::string
   return borrowed.copy().front();
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -6,7 +6,7 @@
 
 #include "tpm/files/hdf5/hdf5_driver.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Reads an HDF5 file that may be crafted. Before every read the kind of object, its type, its rank
 /// and its extent are checked, and that the file holds the numbers itself: no link and no storage
@@ -43,4 +43,4 @@ class Hdf5Contents {
   Hdf5Handle file_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -11,7 +11,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5_parts.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 /// HDF5 allocates none of these itself; it takes the address of `base`.
@@ -173,4 +173,4 @@ Hdf5Handle open_hdf5(Hdf5Storage& storage) {
   return {H5Fopen(kOnlyName, H5F_ACC_RDONLY, access.get()), H5Fclose};
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -7,7 +7,7 @@
 
 #include "tpm/files/hdf5/hdf5.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// A file under HDF5. The library does not survive a disk that gets full under it: it crashes or
 /// loops while it closes. So it is never told: a write that fails is kept here, what could not be
@@ -25,4 +25,4 @@ struct Hdf5Storage {
 [[nodiscard]] Hdf5Handle create_hdf5(Hdf5Storage& storage);
 [[nodiscard]] Hdf5Handle open_hdf5(Hdf5Storage& storage);
 
-}  // namespace tpm
+}  // namespace tpm::files

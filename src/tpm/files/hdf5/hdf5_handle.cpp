@@ -3,7 +3,7 @@
 
 #include "tpm/files/hdf5/hdf5.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 Hdf5Handle::Hdf5Handle(Hdf5Handle&& other) noexcept
     : id_(std::exchange(other.id_, -1)), closer_(other.closer_) {}
@@ -22,4 +22,4 @@ void Hdf5Handle::reset() noexcept {
   id_ = -1;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

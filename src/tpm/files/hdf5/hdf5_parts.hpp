@@ -8,7 +8,7 @@
 
 #include "tpm/files/hdf5/hdf5.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 static_assert(std::is_same_v<hid_t, Hdf5Handle::Id> && std::is_same_v<herr_t, int>);
 
@@ -43,4 +43,4 @@ inline std::vector<hsize_t> shape_of(const Hdf5Handle& space) {
   return shape;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

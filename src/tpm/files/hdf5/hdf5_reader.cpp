@@ -16,7 +16,7 @@
 #include "tpm/files/hdf5/packed.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace fs = std::filesystem;
 namespace {
 
@@ -176,4 +176,4 @@ std::string Hdf5Reader::attribute(const std::string& object, const std::string& 
   return ask<std::string>(Wish::attribute, object, name);
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

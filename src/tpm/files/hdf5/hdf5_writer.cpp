@@ -17,7 +17,7 @@
 #include "tpm/files/hdf5/packed.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace fs = std::filesystem;
 namespace {
 
@@ -222,4 +222,4 @@ void Hdf5Writer::commit() {
   place_.put_in_place();
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

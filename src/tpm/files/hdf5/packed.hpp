@@ -11,7 +11,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Packs what goes between a process and its contained child (contained.hpp), both on one machine
 /// and of one program: numbers as they are, lists and texts after their length.
@@ -102,4 +102,4 @@ template <class... Arguments, class Call>
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -4,10 +4,11 @@
 
 #include <algorithm>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 std::string header_of(const ImportedColumn& column) {
@@ -298,4 +299,4 @@ ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
   return curve;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -3,7 +3,7 @@
 
 #include "tpm/files/import/import.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Gives an imported series the project's own form and adds what it measures (rows, sampling,
 /// range, peak) to its findings. `usual` is its provenance unless options.provenance says
@@ -25,4 +25,4 @@ namespace tpm {
 [[nodiscard]] Spectrum assemble_spectrum(ImportedSeries series, const std::string& file,
                                          const ImportOptions& options, Provenance usual);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -4,10 +4,11 @@
 
 #include <algorithm>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 const ImportedColumn* column_of(const ImportedSeries& series, Quantity quantity) {
@@ -74,4 +75,4 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
        fmt::format("{}; counted from there, {} samples before it left out", found, row)});
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

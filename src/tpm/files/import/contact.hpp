@@ -3,7 +3,7 @@
 
 #include "tpm/files/import/import.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Leaves out the samples before contact and counts time and depth from there. Contact is the first
 /// sample at which the force reaches options.contact_force_N and stays there for
@@ -13,4 +13,4 @@ namespace tpm {
 void start_at_contact(ImportedSeries& series, const std::string& file,
                       const ImportOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::files

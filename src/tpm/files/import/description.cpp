@@ -5,11 +5,12 @@
 #include <array>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 constexpr auto kBounds = std::to_array<Word<Bound>>(
@@ -202,4 +203,4 @@ Json description_json(const CurveDescription& description) {
   return json;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

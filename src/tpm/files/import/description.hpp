@@ -9,7 +9,7 @@
 #include "tpmkit/curve.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// What part of a reading a column holds.
 enum class Bound { value, lower, upper, sd };
@@ -55,4 +55,4 @@ struct CurveDescription {
 /// The inverse of read_description.
 [[nodiscard]] Json description_json(const CurveDescription& description);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -8,7 +8,7 @@
 
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 std::string_view trimmed(std::string_view text) noexcept {
@@ -297,4 +297,4 @@ bool is_angular(std::string_view name) {
   return has_word(words, "omega") || has_word(words, "angular") || has_word(words, "kreisfrequenz");
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

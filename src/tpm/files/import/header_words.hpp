@@ -5,7 +5,7 @@
 
 #include "tpmkit/curve.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// A column title taken apart: "Force [N]", "Force (N)", "Force / N", "Force, N", "Kraft in N" and
 /// "force_N" all give {"Force", "N"}. The unit is empty if there is none that parse_unit knows,
@@ -47,4 +47,4 @@ struct Recognized {
 /// rad/s.
 [[nodiscard]] bool is_angular(std::string_view name);
 
-}  // namespace tpm
+}  // namespace tpm::files

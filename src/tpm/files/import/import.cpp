@@ -16,7 +16,7 @@
 #include "tpm/files/zip_archive.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 bool looks_like_json(std::string_view bytes) {
@@ -181,4 +181,4 @@ std::vector<ImportedCurve> import_curves(const std::filesystem::path& path,
   return curves;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -10,7 +10,7 @@
 #include "tpm/files/import/description.hpp"
 #include "tpmkit/curve.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// The kinds of files that are imported, as --from takes them: "auto", which finds the kind out
 /// from the content, "machine", "jpk", ...
@@ -126,4 +126,4 @@ struct ImportedFile {
 [[nodiscard]] std::vector<ImportedCurve> import_curves(const std::filesystem::path& path,
                                                        const ImportOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -4,7 +4,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 bool is_word(std::string_view field, char word) {
@@ -143,4 +143,4 @@ bool is_engauge(const DelimitedTable& table) {
   return first.size() > 1 && is_word(first[0], 'x') && !is_word(first[1], 'y');
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -5,7 +5,7 @@
 
 #include "tpm/files/import/import.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// One digitised curve: pairs of plot coordinates.
 struct DigitizedDataset {
@@ -34,4 +34,4 @@ struct DigitizedDataset {
 [[nodiscard]] bool is_wpd_csv(const DelimitedTable& table);
 [[nodiscard]] bool is_engauge(const DelimitedTable& table);
 
-}  // namespace tpm
+}  // namespace tpm::files

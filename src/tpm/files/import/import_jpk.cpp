@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/contact.hpp"
 #include "tpm/files/import/jpk_channel.hpp"
@@ -14,7 +15,7 @@
 #include "tpm/files/zip_archive.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 constexpr std::uint64_t kMostPropertyBytes = std::uint64_t{4} << 20U;
@@ -372,4 +373,4 @@ ImportedSeries read_jpk(std::string_view bytes, const std::string& file,
   return series;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -4,7 +4,7 @@
 
 #include "tpm/files/import/import.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Reads one force curve of a JPK atomic force microscope (.jpk-force): a ZIP archive with the
 /// segments that the instrument ran (extend, pause, retract), each with its channels.
@@ -25,4 +25,4 @@ namespace tpm {
 [[nodiscard]] ImportedSeries read_jpk(std::string_view bytes, const std::string& file,
                                       const ImportOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::files

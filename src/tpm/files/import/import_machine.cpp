@@ -12,7 +12,7 @@
 #include "tpm/files/import/specimen_size.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 std::string column_list(const MachineHeader& header) {
@@ -394,4 +394,4 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   return series;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -3,7 +3,7 @@
 
 #include "tpm/files/import/import.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Reads the export of a testing machine: any number of header rows (found where the numbers begin,
 /// or options.header_rows), among them one with titles and perhaps one with units, then samples.
@@ -12,4 +12,4 @@ namespace tpm {
 [[nodiscard]] ImportedSeries read_machine(const DelimitedTable& table, const std::string& file,
                                           const ImportOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -9,7 +9,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 /// A key of a JSON document written by another program: errors name the path.
@@ -184,4 +184,4 @@ std::vector<DigitizedDataset> read_wpd_json(std::string_view text, const std::st
   return datasets;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

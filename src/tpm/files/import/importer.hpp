@@ -6,7 +6,7 @@
 
 #include "tpm/files/import/import.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// A file that is being imported. It is taken apart as a table once an importer asks for that.
 class ImportInput {
@@ -39,4 +39,4 @@ struct Importer {
   std::vector<ImportedSeries> (*read)(ImportInput& input);
 };
 
-}  // namespace tpm
+}  // namespace tpm::files

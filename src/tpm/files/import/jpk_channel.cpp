@@ -9,7 +9,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 /// How one sample is stored.
@@ -170,4 +170,4 @@ std::vector<double> read_jpk_channel(const ZipArchive& archive, const std::strin
   return values;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -8,7 +8,7 @@
 #include "tpm/files/import/jpk_properties.hpp"
 #include "tpm/files/zip_archive.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Turns what a channel stores (usually volts) into a physical quantity: the conversions of a JPK
 /// file are linear, and so is their chain.
@@ -41,4 +41,4 @@ struct JpkConversion {
                                                    const JpkProperties& properties,
                                                    const std::string& channel, std::size_t samples);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -7,7 +7,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 constexpr std::string_view kBlank = " \t\f";
@@ -119,4 +119,4 @@ std::string JpkProperties::place_of(std::string_view key) const {
   return fmt::format("{}: key {}", place_, printable(key, 120));
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm {
+namespace tpm::files {
 
 using PropertyMap = std::map<std::string, std::string, std::less<>>;
 
@@ -47,4 +47,4 @@ class JpkProperties {
   std::vector<Reference> references_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -14,6 +14,8 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace files;
+
 namespace fs = std::filesystem;
 namespace {
 

@@ -6,7 +6,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 std::string MachineColumn::label() const {
   return name.empty() ? fmt::format("column {}", index + 1)
@@ -181,4 +181,4 @@ MachineHeader read_machine_header(const DelimitedTable& table, const std::string
   return header;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

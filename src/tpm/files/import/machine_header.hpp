@@ -7,7 +7,7 @@
 #include "tpm/files/import/header_words.hpp"
 #include "tpm/files/import/import.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// A column as the header shows it.
 struct MachineColumn {
@@ -33,4 +33,4 @@ struct MachineHeader {
                                                 const std::string& file,
                                                 const ImportOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -9,11 +9,12 @@
 #include <set>
 #include <utility>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 constexpr const char* kFormat = "tpmkit curves 1";
@@ -399,4 +400,4 @@ std::vector<Curve> unpack_curves(const std::filesystem::path& path) {
   return curves;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

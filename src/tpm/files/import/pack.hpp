@@ -4,7 +4,7 @@
 
 #include "tpmkit/curve_file.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Writes curves into one HDF5 file, each as a group /curves/ID with its description in attributes
 /// and one dataset for each column. Numbers are SI doubles with attributes "quantity" and "unit";
@@ -17,4 +17,4 @@ void pack_curves(const std::filesystem::path& path, const std::vector<Curve>& cu
 /// back exactly. Throws Error(bad_input).
 [[nodiscard]] std::vector<Curve> unpack_curves(const std::filesystem::path& path);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -12,7 +12,7 @@
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace fs = std::filesystem;
 namespace {
 
@@ -180,4 +180,4 @@ Spectrum read_spectrum_file(const fs::path& path, const ImportOptions& options) 
   throw bad_input(path.string(), "holds a recording", "a spectrum: frequency, storage and loss");
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

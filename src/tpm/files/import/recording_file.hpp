@@ -7,7 +7,7 @@
 
 #include "tpm/files/import/import.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// How the columns of a file and their units were understood: "read as time: column 1 'Time', s;
 /// ...". Empty for a file with a description.
@@ -49,4 +49,4 @@ using MeasuredFile = std::variant<RecordingFile, SpectrumFile>;
 [[nodiscard]] std::string recording_label(const std::filesystem::path& path, std::string_view key,
                                           const ImportOptions& options = {});
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -8,7 +8,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::files {
 namespace {
 
 constexpr std::array<std::string_view, 4> kTextColumns = {"label", "provenance", "where", "note"};
@@ -208,4 +208,4 @@ ValueSet read_values(const CurveHeader& header, std::string_view bytes, const st
   return set;
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

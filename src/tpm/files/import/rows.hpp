@@ -10,7 +10,7 @@
 #include "tpm/files/import/description.hpp"
 #include "tpmkit/curve.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// The rows of a curve's CSV file, read through its description: fields become SI numbers, and
 /// errors name file, line and column. The first row holds the column names.
@@ -61,4 +61,4 @@ class CurveRows {
 [[nodiscard]] ValueSet read_values(const CurveHeader& header, std::string_view bytes,
                                    const std::string& file);
 
-}  // namespace tpm
+}  // namespace tpm::files

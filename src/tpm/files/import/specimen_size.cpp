@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 void divide_by_size(ImportedSeries& series, const ImportOptions& options) {
   for (ImportedColumn& column : series.columns) {
@@ -64,4 +65,4 @@ void resolve_kept_step(ImportedSeries& series) {
   series.columns.erase(relaxation ? strain : stress);
 }
 
-}  // namespace tpm
+}  // namespace tpm::files

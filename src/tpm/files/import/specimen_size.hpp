@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/files/import/import.hpp"
 
-namespace tpm {
+namespace tpm::files {
 
 /// Divides columns in the units of the machine by the size of the specimen: a length or an
 /// elongation by its length at rest, a force by its cross section, so that the series holds
@@ -13,4 +13,4 @@ void divide_by_size(ImportedSeries& series, const ImportOptions& options);
 /// series stay as they are.
 void resolve_kept_step(ImportedSeries& series);
 
-}  // namespace tpm
+}  // namespace tpm::files

@@ -4,18 +4,17 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <map>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/design/design_words.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 using ExperimentKind = PlannedExperiment::Kind;
@@ -85,8 +84,8 @@ double relative_slope(const FitParameter& p) {
 /// Multiplier of the standard error.
 double quantile(const DesignProblem& problem, double degrees) {
   const double p = 0.5 * (1.0 + problem.config.level);
-  if (problem.scale_known) return boost::math::quantile(boost::math::normal(), p);
-  return boost::math::quantile(boost::math::students_t(std::max(degrees, 1.0)), p);
+  if (problem.scale_known) return normal_quantile(p);
+  return student_quantile(p, std::max(degrees, 1.0));
 }
 
 /// Natural values of theta -+ reach; limits beyond the bounds are missing.
@@ -402,4 +401,4 @@ PlannedFit planned_fit(const DesignProblem& problem,
   return fit;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

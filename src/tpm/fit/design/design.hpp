@@ -12,7 +12,7 @@
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// An experiment that could be done: one protocol, sampled evenly from its first moment on, on
 /// `repeats` fresh sites.
@@ -219,4 +219,4 @@ struct DesignCheck {
 [[nodiscard]] std::string to_terminal_text(const DesignResult& result, const DesignCheck* check,
                                            std::size_t top);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -12,7 +12,7 @@
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr int kFewestSets = 10;
@@ -166,4 +166,4 @@ DesignCheck check_design(const DesignProblem& problem, const PlannedExperiment& 
   return check;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

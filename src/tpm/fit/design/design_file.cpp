@@ -10,7 +10,7 @@
 #include "tpm/fit/design/design.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 using ExperimentKind = PlannedExperiment::Kind;
@@ -214,4 +214,4 @@ DesignProblem read_design(const std::filesystem::path& path) {
   return parse_design(read_json(path), path.string());
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -9,7 +9,7 @@
 #include "tpm/fit/design/design_words.hpp"
 #include "tpm/fit/fit.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr int kDesignDigits = 6;
@@ -177,4 +177,4 @@ std::string to_terminal_text(const DesignResult& result, const DesignCheck* chec
   return text;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -8,7 +8,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 /// One thing about a protocol that a person can turn.
@@ -177,4 +177,4 @@ std::vector<std::string> design_words(const DesignResult& result) {
   return words;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

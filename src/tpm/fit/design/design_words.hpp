@@ -4,7 +4,7 @@
 
 #include "tpm/fit/design/design.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// "0.28-0.33 s", "below 3 s", "any value": the expected interval in the parameter's own unit.
 [[nodiscard]] std::string interval_words(const FitParameter& parameter,
@@ -17,4 +17,4 @@ namespace tpm::study {
 /// "relative standard error of eta1"
 [[nodiscard]] std::string criterion_words(const DesignProblem& problem);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

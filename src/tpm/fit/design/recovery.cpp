@@ -12,7 +12,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kRequired = 0.95;  // of the trials: the right law, and none that is larger
@@ -282,4 +282,4 @@ std::string to_terminal_text(std::span<const RecoveryResult> results) {
   return text;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -8,7 +8,7 @@
 #include "tpm/fit/coverage.hpp"
 #include "tpm/fit/select/selection.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// A ramp and hold as a machine records it: the probe approaches from above the surface (depth 0)
 /// at the speed of the ramp.
@@ -85,4 +85,4 @@ struct RecoveryResult {
 /// One row for each law and margin, the intervals in the first row of a law.
 [[nodiscard]] std::string to_terminal_text(std::span<const RecoveryResult> results);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <numeric>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/likelihood/correlation.hpp"
 #include "tpm/work/progress.hpp"
@@ -192,11 +193,10 @@ std::optional<BootstrapInterval> bca_interval(const std::vector<double>& sorted,
                                          sorted.begin());
   const double share = 0.5 * (below + up_to) / static_cast<double>(sorted.size());
   if (!(share > 0.0 && share < 1.0)) return std::nullopt;
-  const boost::math::normal normal;
-  const double z0 = boost::math::quantile(normal, share);
+  const double z0 = normal_quantile(share);
   const auto limit = [&](double p) {
-    const double z = z0 + boost::math::quantile(normal, p);
-    return quantile_of(sorted, boost::math::cdf(normal, z0 + z / (1.0 - acceleration * z)));
+    const double z = z0 + normal_quantile(p);
+    return quantile_of(sorted, normal_cdf(z0 + z / (1.0 - acceleration * z)));
   };
   return BootstrapInterval{limit(0.5 * (1.0 - level)), limit(0.5 * (1.0 + level))};
 }

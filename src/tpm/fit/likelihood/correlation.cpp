@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <bit>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <complex>
 #include <unsupported/Eigen/FFT>
 
+#include "tpm/base/distributions.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -71,8 +72,7 @@ double ljung_box_p(std::span<const std::span<const double>> recordings,
     // For one recording there are n - k pairs, and this is n (n + 2) rho^2 / (n - k).
     q += count * (count + 2.0) * rho[k] * rho[k] / static_cast<double>(pairs(recordings, k));
   }
-  const boost::math::chi_squared chi_squared(static_cast<double>(lags));
-  return boost::math::cdf(boost::math::complement(chi_squared, q));
+  return chi_squared_tail(q, static_cast<double>(lags));
 }
 
 std::string correlation_words(const Correlation& c) {

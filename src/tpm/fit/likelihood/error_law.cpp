@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
@@ -29,7 +28,7 @@ double standard_log_density(const ErrorLaw& law, double z) {
     case ErrorShape::laplace:
       return -std::abs(z) - std::numbers::ln2;
     case ErrorShape::student_t:
-      return boost::math::lgamma(0.5 * (nu + 1.0)) - boost::math::lgamma(0.5 * nu) -
+      return log_gamma(0.5 * (nu + 1.0)) - log_gamma(0.5 * nu) -
              0.5 * std::log(nu * std::numbers::pi) - 0.5 * (nu + 1.0) * std::log1p(z * z / nu);
   }
   return 0.0;
@@ -153,7 +152,7 @@ double draw_error(const ErrorLaw& law, Random& random) {
       const double z = random.normal();
       // The middle of one of 2^53 cells: never 0 or 1.
       const double u = random.uniform() + 0x1.0p-54;
-      return z / std::sqrt(boost::math::quantile(boost::math::chi_squared(nu), u) / nu);
+      return z / std::sqrt(chi_squared_quantile(u, nu) / nu);
     }
   }
   return random.normal();

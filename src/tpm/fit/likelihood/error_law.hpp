@@ -1,6 +1,7 @@
 #pragma once
 #include <string_view>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
 
 namespace tpm::fit {

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/likelihood/surrogate_minimum.hpp"
 

@@ -7,6 +7,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 

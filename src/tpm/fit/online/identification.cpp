@@ -10,7 +10,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 void require_possible(const IdentifyOptions& options) {
@@ -207,4 +207,4 @@ LawFile identified_law(const Identification& identification, const PreparedRecor
   return law;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

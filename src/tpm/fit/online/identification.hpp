@@ -7,7 +7,7 @@
 #include "tpm/fit/online/sequential_fit.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 struct IdentifyOptions {
   /// Empty: linear and power kernels with 0 to 2 branches, and a linear one with a branch and
@@ -72,4 +72,4 @@ struct Identification {
 [[nodiscard]] Json to_json(const Identification& identification);
 [[nodiscard]] std::string to_terminal_text(const Identification& identification);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -9,7 +9,7 @@
 #include "tpm/fit/online/identification.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr int kStoredDigits = 6;
@@ -112,4 +112,4 @@ std::string to_terminal_text(const Identification& id) {
   return text;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

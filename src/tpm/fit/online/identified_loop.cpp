@@ -9,7 +9,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kRoomBelow = 1.5;  // of the recording's depth: the loop never leaves it
@@ -165,4 +165,4 @@ std::string to_terminal_text(const IdentifiedLoop& loop) {
   return text;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

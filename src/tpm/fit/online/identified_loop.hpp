@@ -7,7 +7,7 @@
 #include "tpm/files/json.hpp"
 #include "tpm/fit/online/identification.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 struct IdentifiedLoopOptions {
   double period_s = 1e-3;
@@ -41,4 +41,4 @@ struct IdentifiedLoop {
 [[nodiscard]] Json to_json(const IdentifiedLoop& loop);
 [[nodiscard]] std::string to_terminal_text(const IdentifiedLoop& loop);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -4,16 +4,16 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/fit/likelihood/starts.hpp"
 #include "tpm/fit/online/whitened_prefix.hpp"
 #include "tpm/fit/predict/contact_profile.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
@@ -21,11 +21,8 @@ constexpr std::size_t kFirstPass = 12;
 constexpr std::size_t kKeptStarts = 4;
 constexpr double kFirstNoise = 1e-2;  // of the peak, until it is known
 
-double student_quantile(double degrees, double level) {
-  // In long double, which Boost would take, a quantile costs more than the rest of a sample.
-  using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
-  const boost::math::students_t_distribution<double, InDouble> t(degrees);
-  return boost::math::quantile(t, 0.5 + 0.5 * level);
+double half_width(double degrees, double level) {
+  return quick_student_quantile(0.5 + 0.5 * level, degrees);
 }
 
 }  // namespace
@@ -143,7 +140,7 @@ struct SequentialFit::Linearisation {
     std::vector<double> quantiles;
     for (Eigen::Index k = 0; k < std::ssize(free); ++k) {
       quantiles.push_back(
-          student_quantile(satterthwaite_degrees(*correlation, k, n, std::ssize(free)), level));
+          half_width(satterthwaite_degrees(*correlation, k, n, std::ssize(free)), level));
     }
     wider = profile_contact(function, {.parameters = parameters,
                                        .natural = natural,
@@ -300,7 +297,7 @@ void set_sequential_interval(SequentialParameter& s, double theta, double standa
   s.estimate = s.parameter.natural(theta);
   s.standard_error = standard_error;
   s.degrees_of_freedom = degrees;
-  const double half = standard_error * student_quantile(degrees, level);
+  const double half = standard_error * half_width(degrees, level);
   s.lower = s.parameter.natural(theta - half * lower);
   s.upper = s.parameter.natural(theta + half * upper);
 }
@@ -383,4 +380,4 @@ std::optional<std::size_t> least_law(std::span<const SequentialFit> fits, double
   return std::nullopt;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -12,7 +12,7 @@
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// How a law is fitted sample by sample.
 struct SequentialSettings {
@@ -107,4 +107,4 @@ class SequentialFit {
 [[nodiscard]] std::optional<std::size_t> least_law(std::span<const SequentialFit> fits,
                                                    double margin);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

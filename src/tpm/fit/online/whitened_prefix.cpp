@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kLeastPivot = 1e-10;  // of a gram matrix with columns of length 1
@@ -132,4 +132,4 @@ std::optional<AutoregressionEstimate> improve_in_turn(WhitenedPrefix& function,
   return correlation_near(function, parameters, best.natural, noise.step_s());
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

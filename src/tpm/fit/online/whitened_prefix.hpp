@@ -10,7 +10,7 @@
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// Whitened residuals (answer less reading, over sigma) of what has been recorded so far. Refers to
 /// the model and the configuration it is made from.
@@ -57,4 +57,4 @@ class WhitenedPrefix final : public ResidualFunction {
     WhitenedPrefix& function, std::span<const FitParameter> parameters, AutoregressiveNoise& noise,
     Minimum& best);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -13,7 +13,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 std::vector<double> to_vector(const Eigen::VectorXd& values) {
@@ -211,4 +211,4 @@ ErrorBudget contact_budget(const LawFile& law, const PreparedRecording& recordin
   return budget;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -12,7 +12,7 @@
 #include "tpm/plan/plan_scene.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kTighterRun = 0.01;   // of the scene's tolerance: what its runs are compared with
@@ -176,4 +176,4 @@ ErrorBudget organ_budget(const std::optional<LawFile>& law, const ExperimentScen
   return budget;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -6,7 +6,7 @@
 #include "tpm/fit/predict/error_budget.hpp"
 #include "tpm/plan/perception.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr int kStoredDigits6 = 6;
@@ -118,4 +118,4 @@ std::string to_csv(const ErrorBudget& b) {
   return text;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -5,7 +5,7 @@
 #include "tpm/fit/predict/error_budget.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// The stage `law`: its exact answer along a motion.
 [[nodiscard]] BudgetStage law_stage(const LawFile& law, const Protocol& motion,
@@ -36,4 +36,4 @@ void add_random_part(ErrorBudget& budget, const LawPrediction& prediction);
 void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& motion,
                      const BudgetOptions& options);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kContactStep = 1.0 / 3.0;  // of contact's standard error
@@ -153,4 +153,4 @@ IntervalFactors profile_contact(const ResidualFunction& residuals, const Contact
   return factors;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -6,7 +6,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/fit/likelihood/least_squares.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// Widths of intervals in parts of what derivatives at the estimate say, to each side, in the order
 /// of the parameters of the search.
@@ -39,4 +39,4 @@ struct ContactWalk {
 [[nodiscard]] IntervalFactors profile_contact(const ResidualFunction& residuals,
                                               const ContactWalk& walk);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -10,7 +10,7 @@
 #include "tpm/plan/perception.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr auto kBudgetWords =
@@ -162,4 +162,4 @@ double tolerance_of_data(const Json& budget, std::string_view where) {
   throw bad_input(where, "knows nothing of the data", "a budget of a law that was fitted");
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

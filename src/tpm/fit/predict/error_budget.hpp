@@ -10,7 +10,7 @@
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// What a stage of the chain from a recording to a hand belongs to.
 enum class BudgetKind {
@@ -128,4 +128,4 @@ void conclude(ErrorBudget& budget);
 /// Throws Error(bad_input) for a file that is no budget.
 [[nodiscard]] double tolerance_of_data(const Json& budget, std::string_view where);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -8,7 +8,7 @@
 #include "tpm/fit/predict/organ_material_parts.hpp"
 #include "tpm/organ/scene/organ_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 /// A material that is not the paper's element, with the fitted values.
@@ -109,4 +109,4 @@ std::optional<FittedScene> fitted_scene(const FitResult& fit) {
   return result;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 #include "tpm/files/json.hpp"
 #include "tpm/fit/fit.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// An organ with the material that a fit found, ready for tpm simulate, plan and sweep, and a
 /// session for tpm hil run that steps its network.
@@ -18,4 +18,4 @@ struct FittedScene {
 /// if no organ was fitted. A spring-pot is written as the branches that stand for it.
 [[nodiscard]] std::optional<FittedScene> fitted_scene(const FitResult& fit);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/random.hpp"
@@ -15,7 +15,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr auto kPlacementWords = std::to_array<Word<Placement>>(
@@ -95,8 +95,7 @@ class LawDraws {
     double scale = 1.0;
     if (degrees_) {
       const double share = std::max(random_.uniform(), 1e-12);
-      scale =
-          std::sqrt(*degrees_ / boost::math::quantile(boost::math::chi_squared(*degrees_), share));
+      scale = std::sqrt(*degrees_ / chi_squared_quantile(share, *degrees_));
     }
     const Eigen::VectorXd moved = scale * (u_.root * z);
     std::vector<double> values = centre_;
@@ -351,4 +350,4 @@ LawPrediction predict_by(const Model& model, const LawFile& law, const Protocol&
   return p;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -11,7 +11,7 @@
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// Contact point and offset of what is predicted.
 enum class Placement {
@@ -119,4 +119,4 @@ struct PredictionVerdict {
 /// Columns time_s, the drive, mean, standard error, both bands and what was observed, SI.
 [[nodiscard]] std::string to_csv(const LawPrediction& prediction);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

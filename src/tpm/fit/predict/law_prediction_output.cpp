@@ -12,7 +12,7 @@
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/select/selection.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr int kStored = 6;  // significant digits
@@ -210,4 +210,4 @@ std::string verdict_words(const PredictionVerdict& verdict, double peak) {
       significant(verdict.factor, 2));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

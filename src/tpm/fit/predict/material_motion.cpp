@@ -10,7 +10,7 @@
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr std::size_t kMostTimes = 200;  // of a motion, that the forces are compared at
@@ -66,4 +66,4 @@ MaterialMotion motion_of_protocol(const Protocol& protocol, std::vector<double> 
   return {{}, protocol, std::move(times)};
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -9,7 +9,7 @@
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kLateralRatio = 1.0;  // E' over instantaneous radial modulus: the paper's
@@ -102,4 +102,4 @@ Eigen::MatrixXd FittedBonds::along(const OrganModel& model) const {
   return changes;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -11,7 +11,7 @@
 #include "tpm/files/json.hpp"
 #include "tpm/organ/scene/organ_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// The organ of a scene, driven at the sphere and in the direction of the scene's contact; without
 /// a contact at the organ's contact sphere.
@@ -55,4 +55,4 @@ class FittedBonds {
   bool times_;
 };
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -16,7 +16,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kBoundFactor = 1e4;        // of moduli about their start
@@ -445,4 +445,4 @@ OrganMaterial put_on_organ(const LawFile& law, const std::vector<MaterialMotion>
   return m;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -12,7 +12,7 @@
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// Contact point and zero error of a recording.
 struct RecordingPlacement {
@@ -150,4 +150,4 @@ struct OrganMaterial {
 /// recording (1, 2, ...), time_s, depth_m and every force, SI.
 [[nodiscard]] std::string to_csv(const OrganMaterial& result);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -10,7 +10,7 @@
 #include "tpm/fit/predict/organ_bonds.hpp"
 #include "tpm/fit/predict/organ_material_parts.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr int kMaterialDigits = 8;
@@ -365,7 +365,7 @@ Json to_json(const OrganMaterial& m) {
     json["organ_less_recording"] = mismatch_json(*m.organ_to_recording);
   }
   json["flags"] = m.flags;
-  json["fitted_law"] = to_json(m.fitted_law);
+  json["fitted_law"] = files::to_json(m.fitted_law);
   json["scene"] = m.scene;
   return json;
 }
@@ -428,4 +428,4 @@ std::string to_csv(const OrganMaterial& m) {
   return text;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

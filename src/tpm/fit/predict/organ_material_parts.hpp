@@ -2,7 +2,7 @@
 // What put_on_organ and fitted_scene write, and how forces are compared.
 #include "tpm/fit/predict/organ_material.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// The block `material` of a scene.
 /// @param before the block in its place, whose A0, l0 and regions stay
@@ -27,4 +27,4 @@ void add_protocol_and_session(OrganMaterial& m);
 /// @param motions of the courses, in their order
 void compare(OrganMaterial& m, const std::vector<MaterialMotion>& motions);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -13,10 +13,10 @@
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
-constexpr double kContactStep = 1e-3;  // of the largest depth, for the derivative by the contact
+constexpr double kContactShift = 1e-3;  // of the largest depth, for the derivative by the contact
 
 /// Places of the times within a protocol.
 std::vector<Eigen::Index> answered(const Protocol& protocol, std::span<const double> times_s) {
@@ -102,7 +102,7 @@ Response OrganOfLaw::respond(const Protocol& protocol, std::span<const double> t
   }
   if (load) return response;
   response.sensitivity(places, count - 1).setOnes();
-  const double h = kContactStep * protocol.peak();
+  const double h = kContactShift * protocol.peak();
   const auto beside = [&](double c) {
     return model.respond(beyond_contact(protocol, c), times, values, Want::values).value;
   };
@@ -296,4 +296,4 @@ LawPrediction predict_organ(const OrganOfLaw& organ, const PreparedRecording& re
                organ);
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

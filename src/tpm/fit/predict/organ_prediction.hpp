@@ -9,7 +9,7 @@
 #include "tpm/fit/predict/organ_material.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// An organ that answers in place of the law that was put on it (tpm material), as a model of the
 /// law's parameters. With theta_B the logarithms of the bonds' parameters and theta_L the
@@ -76,4 +76,4 @@ class OrganOfLaw final : public Model {
                                           const PreparedRecording& recording,
                                           const PredictionOptions& options);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kEnough = 1e-3;       // of the threshold: a step that promises less is not taken
@@ -200,4 +200,4 @@ Profile short_profile(const ResidualFunction& function, std::span<const FitParam
   return profile;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -5,7 +5,7 @@
 #include "tpm/fit/likelihood/least_squares.hpp"
 #include "tpm/fit/uncertainty.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// The likelihood profile of one parameter where an evaluation takes a second, not a microsecond:
 /// each side is walked in a few points, the others fitted again by damped Gauss-Newton steps until
@@ -18,4 +18,4 @@ namespace tpm::study {
                                     std::span<const FitParameter> parameters, const Minimum& best,
                                     std::size_t index, double half_width, double rise);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -13,7 +13,7 @@
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr double kContactDifference = 1e-3;  // of the largest depth
@@ -254,4 +254,4 @@ ReadingsFit fit_to_readings(const OrganModel& model, const FittedBonds& bonds,
   return result;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

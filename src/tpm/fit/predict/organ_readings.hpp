@@ -6,7 +6,7 @@
 #include "tpm/fit/predict/organ_bonds.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// A recording that bonds are fitted to.
 struct OrganReadings {
@@ -43,4 +43,4 @@ struct ReadingsFit {
                                           const std::vector<OrganReadings>& recordings,
                                           bool profiles);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

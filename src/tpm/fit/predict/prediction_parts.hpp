@@ -4,7 +4,7 @@
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// A linear root of a covariance: covariance = root root'. Singular ones are allowed.
 [[nodiscard]] Eigen::MatrixXd covariance_root(const Eigen::MatrixXd& covariance);
@@ -67,4 +67,4 @@ struct OwnPlacement {
                                                  const std::function<OwnPlacement()>& place,
                                                  const PredictionOptions& options);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

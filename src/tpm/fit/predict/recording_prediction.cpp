@@ -11,7 +11,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 /// Adds the directions in which contact and offset of the recording move: with the material (they
@@ -164,4 +164,4 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
   return p;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

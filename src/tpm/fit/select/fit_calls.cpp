@@ -1,12 +1,11 @@
-#include "tpmkit/fit.hpp"
-
+// Declared in tpmkit/fit.hpp.
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpmkit/fit.hpp"
 
 namespace tpm::fit {
-using namespace study;
 namespace {
 
 FitSummary summary_of(const FitResult& fit) {

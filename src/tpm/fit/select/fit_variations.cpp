@@ -11,7 +11,7 @@
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr std::array kRates_m_per_s{1e-3, 2e-3, 4e-3};
@@ -125,4 +125,4 @@ Json held_out_json(const FitStudy& study) {
                })}};
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

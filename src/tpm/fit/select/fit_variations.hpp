@@ -3,7 +3,7 @@
 
 #include "tpm/fit/fit.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// A fit under another assumption about what the paper does not state.
 struct FitVariant {
@@ -44,4 +44,4 @@ struct FitStudy {
 /// {"held_out": [{"depth_m", "fit"}]}
 [[nodiscard]] Json held_out_json(const FitStudy& study);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

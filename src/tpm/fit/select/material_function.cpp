@@ -13,7 +13,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 /// What the readings tell about the sizes of a law's parameters.
@@ -291,4 +291,4 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   return s;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -5,7 +5,7 @@
 
 #include "tpm/fit/select/selection.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// What a rheometer measures of a linear material, whatever the specimen: storage and loss over
 /// frequency, a relaxation modulus G(t) or a creep compliance J(t).
@@ -38,4 +38,4 @@ struct MaterialFunction {
 [[nodiscard]] Selection select_law(const MaterialFunction& function,
                                    const SelectionOptions& options);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

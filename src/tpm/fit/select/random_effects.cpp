@@ -3,18 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/fisher_f.hpp>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <vector>
 
+#include "tpm/base/distributions.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 void require_valid(std::span<const SpecimenEstimate> specimens, double level) {
@@ -104,7 +102,7 @@ RandomEffects one_specimen(const SpecimenEstimate& s, double level) {
   result.specimens = 1;
   result.mean = s.estimate;
   result.standard_error = s.standard_error;
-  const double z = boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + level));
+  const double z = normal_quantile(0.5 * (1.0 + level));
   result.interval = around(s.estimate, z * s.standard_error);
   result.words = "one specimen: nothing is known about the spread between specimens";
   return result;
@@ -180,11 +178,11 @@ RandomEffects random_effects(std::span<const SpecimenEstimate> specimens, double
   const WeightedMean m = weighted_mean(specimens, *r.tau_squared);
   r.mean = m.mean;
   r.standard_error = std::sqrt(std::max(1.0, m.squares / degrees) / m.weights);
-  const double t = boost::math::quantile(boost::math::students_t(degrees), 0.5 * (1.0 + level));
+  const double t = student_quantile(0.5 * (1.0 + level), degrees);
   r.interval = around(r.mean, t * r.standard_error);
   const double q = weighted_mean(specimens, 0.0).squares;
   r.q = q;
-  r.q_p_value = boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), q));
+  r.q_p_value = chi_squared_tail(q, degrees);
   r.i_squared = q > 0.0 ? std::max(0.0, (q - degrees) / q) : 0.0;
   if (r.specimens >= 3) {
     r.new_specimen = around(r.mean, t * std::hypot(std::sqrt(*r.tau_squared), r.standard_error));
@@ -212,13 +210,13 @@ RandomEffects random_effects_of_repeats(std::span<const SpecimenEstimate> repeat
   if (r.specimens > 1) {
     const double f = (sums.between / static_cast<double>(r.specimens - 1)) /
                      (sums.within / static_cast<double>(sums.degrees));
-    const boost::math::fisher_f distribution(static_cast<double>(r.specimens - 1), sums.degrees);
     r.q = f;
-    r.q_p_value = std::isfinite(f) ? boost::math::cdf(boost::math::complement(distribution, f)) : 0;
+    r.q_p_value =
+        std::isfinite(f) ? fisher_tail(f, static_cast<double>(r.specimens - 1), sums.degrees) : 0;
     r.words = effects_words(r);
   }
   r.words += repeat_words(r);
   return r;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

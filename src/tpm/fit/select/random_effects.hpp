@@ -3,7 +3,7 @@
 #include <span>
 #include <string>
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// Estimate of one parameter from one specimen, in theta (ln E, say).
 struct SpecimenEstimate {
@@ -59,4 +59,4 @@ struct RandomEffects {
 [[nodiscard]] RandomEffects random_effects_of_repeats(std::span<const SpecimenEstimate> repeats,
                                                       double level = 0.95);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

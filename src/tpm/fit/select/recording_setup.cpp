@@ -12,7 +12,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 bool is_after_the_test(PhaseKind kind) {
@@ -432,4 +432,4 @@ FitResult fit_placement(const LawSpec& law, std::span<const double> values,
   return run_fit(config, data_sets(std::span(&recording, 1)));
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -10,7 +10,7 @@
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// A recording ready to be fitted: what happened in it and which part is used.
 struct PreparedRecording {
@@ -86,4 +86,4 @@ struct SetupOptions {
                                       const PreparedRecording& recording,
                                       const SetupOptions& setup);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

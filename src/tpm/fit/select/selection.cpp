@@ -12,7 +12,7 @@
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 /// Residuals of a fit, one run for each recording, in the order of time.
@@ -469,4 +469,4 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   return s;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

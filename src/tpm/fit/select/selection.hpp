@@ -8,7 +8,7 @@
 #include "tpm/fit/likelihood/correlation.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// How well a law that was fitted to some data predicts other data.
 struct HeldOut {
@@ -143,4 +143,4 @@ void reassess(Candidate& chosen, const ProtocolSpans& spans);
 [[nodiscard]] std::vector<std::string> protocol_warnings(
     const FitResult& fit, std::span<const PreparedRecording> recordings);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/select/selection.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 double kept_digits(double value) {
@@ -83,4 +83,4 @@ std::string to_terminal_text(const Selection& s) {
   return text;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -9,7 +9,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/select/selection.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 /// The samples after the fitted part, and those of them that the law predicts.
@@ -140,4 +140,4 @@ std::vector<std::string> protocol_warnings(const FitResult& fit,
   return warnings;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -12,7 +12,7 @@
 #include "tpm/work/give_up.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 /// Evidence for a law over all recordings.
@@ -321,4 +321,4 @@ std::string to_terminal_text(const SpecimenStudy& study) {
   return text;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

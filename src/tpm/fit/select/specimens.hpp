@@ -7,7 +7,7 @@
 #include "tpm/fit/select/random_effects.hpp"
 #include "tpm/fit/select/selection.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// One recording's own fit of the common law.
 struct SpecimenRow {
@@ -60,4 +60,4 @@ struct SpecimenStudy {
 [[nodiscard]] Json to_json(const SpecimenStudy& study);
 [[nodiscard]] std::string to_terminal_text(const SpecimenStudy& study);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

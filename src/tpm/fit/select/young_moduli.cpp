@@ -3,14 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr int kKept = 6;  // significant digits in JSON
@@ -74,7 +74,7 @@ std::optional<YoungModulus> sum_of(const FitResult& fit, const std::vector<std::
   }
   if (!c.full_rank) return sum;
   const double sd = factor * std::sqrt(direction.dot(c.theta_covariance() * direction));
-  const double z = boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + fit.config.level));
+  const double z = normal_quantile(0.5 * (1.0 + fit.config.level));
   sum.standard_error = sd;
   sum.lower = sum.estimate - z * sd;
   sum.upper = sum.estimate + z * sd;
@@ -211,4 +211,4 @@ std::optional<double> probe_exponent(const ContactGeometry& geometry) {
   return geometry.cone_half_angle_rad ? std::optional(2.0) : std::nullopt;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -7,7 +7,7 @@
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/law/contact_geometry.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// Young's modulus of one stiffness of a fitted law, with its interval. SI.
 struct YoungModulus {
@@ -51,4 +51,4 @@ struct YoungModuli {
                                                  const ContactGeometry& geometry);
 [[nodiscard]] std::optional<double> probe_exponent(const ContactGeometry& geometry);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -10,7 +10,7 @@
 #include "tpm/plan/perception.hpp"
 #include "tpm/show/draw.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 std::size_t instant_of_largest_sum(const ErrorBudget& b) {
@@ -97,4 +97,4 @@ std::vector<std::string> write_budget_report(const std::filesystem::path& folder
   return write_figures(folder, {budget_figure(budget)}, std::move(files));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -8,7 +8,7 @@
 
 #include "tpm/base/text.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 /// The two things about a protocol that a figure varies.
@@ -104,4 +104,4 @@ std::vector<Figure> design_figures(const DesignResult& result) {
   return figures;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 #include "tpm/fit/design/design.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 /// Expected relative standard error of each parameter (one panel each): against the hold with a
 /// curve per ramp rate, and against the rate with a curve per hold. Depth (or load), sampling and
@@ -13,4 +13,4 @@ namespace tpm::report {
 /// out; so are candidates that leave a parameter unknown.
 [[nodiscard]] std::vector<Figure> design_figures(const DesignResult& result);
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -6,7 +6,7 @@
 
 #include "tpm/base/text.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 Tone tone_of(Verdict verdict) {
   switch (verdict) {
@@ -49,4 +49,4 @@ std::string predicted(const FittedDatum& d, bool with_sd) {
   return fmt::format("{} {}", significant(d.predicted / unit, 4), symbol);
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/show/document.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 [[nodiscard]] Tone tone_of(Verdict verdict);
 
@@ -21,4 +21,4 @@ namespace tpm::report {
 /// @param with_sd its standard error, too, if it has one
 [[nodiscard]] std::string predicted(const FittedDatum& datum, bool with_sd);
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -9,7 +9,7 @@
 #include "tpm/fit/verdict.hpp"
 #include "tpm/show/table_document.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 constexpr int kCells = 6;  // significant digits, as in JSON
@@ -213,4 +213,4 @@ std::vector<std::string> write_fit_csv(const std::filesystem::path& folder, cons
   return files;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

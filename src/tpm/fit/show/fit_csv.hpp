@@ -10,7 +10,7 @@
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 /// The tables of a fit as CSV: the same numbers as in its JSON, SI, one row for each thing, every
 /// row with the unit, the reference depth and the level that its numbers depend on.
@@ -38,4 +38,4 @@ namespace tpm::report {
 /// of a fit into a folder. Returns the names.
 std::vector<std::string> write_fit_csv(const std::filesystem::path& folder, const FitResult& fit);
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

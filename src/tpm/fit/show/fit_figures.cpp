@@ -9,7 +9,7 @@
 #include "tpm/fit/uncertainty.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 Axis parameter_axis(const FitParameter& p) {
@@ -128,4 +128,4 @@ Figure sensitivity_figure(const FitStudy& study, const std::string& parameter, d
   return figure;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 #include "tpm/fit/select/fit_variations.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 /// Rise of the deviance along each parameter, the others re-optimised, with the level that bounds
 /// the confidence interval. No panels if the fit was not profiled.
@@ -38,4 +38,4 @@ struct ProfileLimit {
 /// The parameter's result; throws Error(bad_input) if the fit does not estimate it.
 [[nodiscard]] const ParameterResult& parameter_of(const FitResult& fit, const std::string& name);
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -16,7 +16,7 @@
 #include "tpm/show/draw.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 bool is_storage(Quantity quantity) {
@@ -232,4 +232,4 @@ std::vector<std::string> write_specimen_report(const std::filesystem::path& fold
   return write_figures(folder, figures, std::move(files));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

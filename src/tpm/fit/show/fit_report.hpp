@@ -6,7 +6,7 @@
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 /// Storage and loss of a data set over frequency with the fitted law, both axes logarithmic; what
 /// is not above 0 cannot be drawn and is counted in the caption.
@@ -29,4 +29,4 @@ namespace tpm::report {
 [[nodiscard]] std::vector<std::string> write_specimen_report(const std::filesystem::path& folder,
                                                              const SpecimenStudy& study);
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -8,7 +8,7 @@
 #include "tpm/fit/show/recording_report.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 /// Relaxation modulus or creep compliance over time, with the fitted law, on logarithmic axes.
@@ -65,4 +65,4 @@ std::vector<std::string> write_function_report(const std::filesystem::path& fold
   return write_selection(folder, selection, std::move(figures));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

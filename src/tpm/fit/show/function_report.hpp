@@ -6,7 +6,7 @@
 #include "tpm/fit/select/material_function.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 /// Writes config.json, selection.json, law.json, tables as CSV (fit_csv.hpp) and figures of a
 /// material function.
@@ -15,4 +15,4 @@ namespace tpm::report {
                                                              const MaterialFunction& function,
                                                              const Selection& selection);
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -10,7 +10,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/show/draw.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 constexpr double kWidestDrawn = 3.0;  // of the estimate; wider says nothing
@@ -104,4 +104,4 @@ std::vector<std::string> write_identification_report(const std::filesystem::path
   return write_figures(folder, {identification_figure(identification)}, std::move(files));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

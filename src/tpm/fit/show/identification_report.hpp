@@ -6,7 +6,7 @@
 #include "tpm/fit/online/identification.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 /// Writes identification.json, law.json, figures.json and the figure into `folder`; returns the
 /// names of the files.
@@ -14,4 +14,4 @@ namespace tpm::report {
     const std::filesystem::path& folder, const Identification& identification, const LawFile& law,
     const Json& answer);
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -7,7 +7,7 @@
 #include "tpm/fit/show/fit_figures.hpp"
 #include "tpm/show/draw.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 Series less(const OrganMaterial& m, const char* label, std::vector<double> MaterialCourse::*force) {
@@ -93,4 +93,4 @@ std::vector<std::string> write_organ_material_report(const std::filesystem::path
   return write_figures(folder, material_figures(result), std::move(files));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

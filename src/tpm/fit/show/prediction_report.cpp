@@ -9,7 +9,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/show/draw.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 constexpr std::size_t kMostBandPoints = 4000;  // more only make the file heavy
@@ -95,4 +95,4 @@ std::vector<std::string> write_prediction_report(const std::filesystem::path& fo
   return write_figures(folder, {prediction_figure(prediction)}, std::move(files));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -6,7 +6,7 @@
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 /// Writes prediction.csv, prediction.json, figures.json and the figure as SVG and PNG into
 /// `folder`. Returns the names of the files. Throws Error(environment) if drawing is not possible;
@@ -15,4 +15,4 @@ namespace tpm::report {
                                                                const LawPrediction& prediction,
                                                                const Json& answer);
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -12,7 +12,7 @@
 #include "tpm/show/draw.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 /// More points than this only make the file heavy.
@@ -205,4 +205,4 @@ std::vector<std::string> write_recording_report(const std::filesystem::path& fol
   return write_selection(folder, selection, std::move(figures));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

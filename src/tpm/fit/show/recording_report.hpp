@@ -7,7 +7,7 @@
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 
 /// Response over time with the fitted law, the residuals below it, and response over drive; samples
 /// outside the window are drawn apart.
@@ -28,4 +28,4 @@ namespace tpm::report {
 [[nodiscard]] std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
                                                               const Selection& selection);
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

@@ -1,4 +1,5 @@
-// Declared in tpm/show/view_parts.hpp.
+#include "tpm/fit/show/view_fit.hpp"
+
 #include <fmt/format.h>
 
 #include <cmath>
@@ -9,7 +10,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm::report {
+namespace tpm::fit {
 namespace {
 
 constexpr int kShownDigits = 6;
@@ -222,4 +223,4 @@ ViewPage view_fit(const std::filesystem::path& file, std::string_view bytes) {
   return page;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::fit

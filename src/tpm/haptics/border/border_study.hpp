@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/haptics/session/rendering_border.hpp"
 
 namespace tpm::haptics {

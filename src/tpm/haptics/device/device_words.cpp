@@ -2,6 +2,7 @@
 #include "tpmkit/device.hpp"
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 
 namespace tpm::haptics {
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 

@@ -9,7 +9,7 @@
 #include "tpm/haptics/session/surface_scene.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::haptics {
 using namespace haptics;
 namespace {
 
@@ -116,4 +116,4 @@ Formulations loop_contacts_formulations() {
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::haptics

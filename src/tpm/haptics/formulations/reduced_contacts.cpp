@@ -9,7 +9,7 @@
 #include "tpm/plan/plan_model.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::haptics {
 using namespace haptics;
 namespace {
 
@@ -186,4 +186,4 @@ Formulations reduced_contacts_formulations() {
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::haptics

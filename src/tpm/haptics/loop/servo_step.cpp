@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 
 namespace tpm::haptics {
 namespace {

@@ -66,7 +66,7 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
                       const Json& rendering) {
   Json said = parse_json(session.text, "session");
   if (session.law) {
-    said["model"]["law"] = to_json(*session.law);
+    said["model"]["law"] = files::to_json(*session.law);
   } else {
     said["model"]["scene"] = session.scene;
   }

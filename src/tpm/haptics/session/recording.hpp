@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/haptics/session/session.hpp"
 #include "tpmkit/servo_loop.hpp"
 

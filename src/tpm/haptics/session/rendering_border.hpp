@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/contact/element_contact.hpp"
 #include "tpm/haptics/device/virtual_plant.hpp"
 

@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/haptics/session/session.hpp"
 
 namespace tpm::haptics {

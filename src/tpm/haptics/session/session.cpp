@@ -417,7 +417,7 @@ void require_within(const HilSession& session, const DeviceLimits& limits) {
 HilSession read_session(const std::filesystem::path& file, const SessionChanges& changes) {
   Json json = checked(read_json(file), "hil", file.string());
   if (!changes.law.empty()) {
-    json["model"] = {{"kind", "law"}, {"law", to_json(read_law(changes.law))}};
+    json["model"] = {{"kind", "law"}, {"law", files::to_json(read_law(changes.law))}};
   }
   if (!changes.motion.empty()) {
     if (json.at("model").value("kind", "") != "law") {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/device/virtual_plant.hpp"

@@ -1,4 +1,5 @@
 #pragma once
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/document_place.hpp"
 #include "tpm/haptics/session/session.hpp"
 

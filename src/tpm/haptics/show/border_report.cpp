@@ -7,7 +7,7 @@
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
 
-namespace tpm::report {
+namespace tpm::haptics {
 namespace {
 
 constexpr int kBorderDigits = 6;
@@ -326,4 +326,4 @@ std::vector<Figure> border_figures(const BorderStudy& study) {
   return {border_figure(study), rule_figure(study), impact_figure(study)};
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::haptics

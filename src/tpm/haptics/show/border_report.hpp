@@ -6,7 +6,7 @@
 #include "tpm/haptics/border/border_study.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::haptics {
 
 /// What `tpm hil stability` shows; keys are described in docs/haptics.md.
 [[nodiscard]] Json border_json(const BorderStudy& study);
@@ -14,4 +14,4 @@ namespace tpm::report {
 /// The borders of passivity and of stability, and the three rules.
 [[nodiscard]] std::vector<Figure> border_figures(const BorderStudy& study);
 
-}  // namespace tpm::report
+}  // namespace tpm::haptics

@@ -6,7 +6,7 @@
 
 #include "tpm/base/text.hpp"
 
-namespace tpm::report {
+namespace tpm::haptics {
 namespace {
 
 constexpr int kHazardDigits = 4;
@@ -131,4 +131,4 @@ std::string clock_hazard_text(const ClockHazardStudy& study) {
                     within, study.rows.size(), study.force_limit_N, study.most_tries);
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::haptics

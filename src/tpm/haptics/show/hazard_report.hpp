@@ -6,7 +6,7 @@
 #include "tpm/haptics/hazards/clock_hazard_study.hpp"
 #include "tpm/haptics/hazards/hazard_study.hpp"
 
-namespace tpm::report {
+namespace tpm::haptics {
 
 /// What `tpm hil hazards` shows; keys are described in docs/haptics.md. The text is a table in
 /// Markdown.
@@ -15,4 +15,4 @@ namespace tpm::report {
 [[nodiscard]] Json clock_hazard_json(const ClockHazardStudy& study);
 [[nodiscard]] std::string clock_hazard_text(const ClockHazardStudy& study);
 
-}  // namespace tpm::report
+}  // namespace tpm::haptics

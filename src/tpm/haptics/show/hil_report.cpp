@@ -10,7 +10,7 @@
 #include "tpm/show/draw.hpp"
 #include "tpm/show/run_record.hpp"
 
-namespace tpm::report {
+namespace tpm::haptics {
 namespace {
 
 constexpr double kMostError = 0.005;  // of the session's peak force
@@ -401,4 +401,4 @@ void write_hil_report(const HilRecording& recording, const Verification& v,
   write_file(folder / "report.json", to_text(json));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::haptics

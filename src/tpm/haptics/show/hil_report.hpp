@@ -8,7 +8,7 @@
 #include "tpm/show/document.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::haptics {
 
 // What each command of tpm hil shows; keys are described in docs/haptics.md.
 
@@ -38,4 +38,4 @@ struct RecordingSummary {
 void write_hil_report(const HilRecording& recording, const Verification& v,
                       const std::filesystem::path& folder, const std::string& python);
 
-}  // namespace tpm::report
+}  // namespace tpm::haptics

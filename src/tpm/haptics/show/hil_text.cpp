@@ -9,7 +9,7 @@
 #include "tpm/haptics/loop/real_time.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 
-namespace tpm::report {
+namespace tpm::haptics {
 namespace {
 
 constexpr int kHilDigits = 6;
@@ -259,4 +259,4 @@ std::string verification_text(const HilRecording& recording, const Verification&
   return text;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::haptics

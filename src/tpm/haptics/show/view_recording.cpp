@@ -1,4 +1,5 @@
-// Declared in tpm/show/view_parts.hpp.
+#include "tpm/haptics/show/view_recording.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/show/view_parts.hpp"
 
-namespace tpm::report {
+namespace tpm::haptics {
 namespace {
 
 using Value = double (*)(const HilRecording&, const ServoRecord&);
@@ -234,4 +235,4 @@ ViewPage view_recording(const std::filesystem::path& file, std::string_view byte
   return page;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::haptics

@@ -3,6 +3,7 @@
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/law/contact_history.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"

@@ -1,8 +1,8 @@
-#include "tpmkit/session.hpp"
-
+// Declared in tpmkit/session.hpp.
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/verify/verify.hpp"
+#include "tpmkit/session.hpp"
 
 namespace tpm::haptics {
 

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <limits>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
 
 double TensionLaw::slope(double e) const {
   // d/de of 2 E' (e - x e / sqrt(x^2 + e^2)) = 2 E' (1 - cos^3), and 1 - c^3 = (1 - c)(1 + c +

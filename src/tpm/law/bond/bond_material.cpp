@@ -5,10 +5,13 @@
 #include <charconv>
 #include <cmath>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
+
 namespace {
 
 /// The number behind a letter: branch_number("tau12", "tau") is 12; 0 if there is none.

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
 
 std::string range_of(const MaterialParameter& parameter) {
   const std::string least = shortest(parameter.least);

@@ -4,10 +4,12 @@
 
 #include <cmath>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
 
 TpmVector to_vector(const TpmParameters& p) {
   return {p.E1_Pa, p.E2_Pa, p.Eprime_Pa, p.eta1_Pa_s, p.spacing_m, p.A0_m2, p.l0_m};

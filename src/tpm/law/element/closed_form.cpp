@@ -8,7 +8,7 @@
 #include "tpm/law/relaxation/relaxation_filter.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 Response make_response(std::size_t n, Want want) {
@@ -197,10 +197,14 @@ Response ClosedForm::respond(const Protocol& protocol, std::span<const double> t
   return force_driven_exact(protocol, times_s, p, want);
 }
 
+}  // namespace tpm::law
+
+namespace tpm {
+
 std::unique_ptr<Model> make_closed_form(const TensionRule& tension) {
   ModelOptions options;
   options.tension = tension;
-  return std::make_unique<ClosedForm>(options);
+  return std::make_unique<law::ClosedForm>(options);
 }
 
 }  // namespace tpm

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// The single contact, exact:
 ///  - displacement-driven, any piecewise linear history: exact update of the relaxing branch,
@@ -30,4 +30,4 @@ class ClosedForm final : public Model {
 /// Reads and checks a parameter vector of kTpmParameterTable; shared by the formulations.
 [[nodiscard]] TpmParameters tpm_parameters(std::span<const double> parameters);
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -7,11 +7,14 @@
 #include <numbers>
 #include <numeric>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/element/validity_limits.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
+using namespace law;
 
 Response Model::respond_along(const Protocol& protocol, std::span<const double> times_s,
                               std::span<const double> parameters,

@@ -3,7 +3,7 @@
 #include <complex>
 #include <cstddef>
 
-namespace tpm {
+namespace tpm::law {
 
 /// A function of one complex number with its derivative.
 struct Analytic {
@@ -39,4 +39,4 @@ struct Analytic {
   return {sum.value, 2.0 * v * sum.slope};
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

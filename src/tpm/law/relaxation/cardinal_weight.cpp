@@ -6,7 +6,7 @@
 
 #include "tpm/law/relaxation/analytic.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 namespace {
 
@@ -90,4 +90,4 @@ SpectralValue CardinalWeight::sum_from(long m, int direction) const {
   return sum;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/law/relaxation/relaxation_spectrum.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// The weight of the rate exp(x)/tau, x = (m + phase) h, in a sum that replaces the spectral
 /// integral of E_alpha(-(t/tau)^alpha) over x. With y = -x + i pi (1 - alpha)/alpha
@@ -39,4 +39,4 @@ class CardinalWeight {
   double pole_cosine_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -8,7 +8,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// The moduli and the load of the problem, as numbers or as numbers with derivatives.
@@ -168,4 +168,4 @@ TpmVector CreepUnderConstantLoad::depth_sensitivity(double time_s) const {
   return s;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

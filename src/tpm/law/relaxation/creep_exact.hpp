@@ -1,7 +1,7 @@
 #pragma once
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// Creep of the element under a constant load with the true lambda1(e): exact up to quadrature.
 ///
@@ -37,4 +37,4 @@ class CreepUnderConstantLoad {
   double tau_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

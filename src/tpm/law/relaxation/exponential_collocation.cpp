@@ -5,7 +5,7 @@
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// Above this z c the quadrature gives way to the asymptotic sum, which then is exact to rounding:
@@ -114,4 +114,4 @@ Eigen::VectorXd ExponentialCollocation::Place::weight_slopes(double z) const {
   return coefficient_ * power;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

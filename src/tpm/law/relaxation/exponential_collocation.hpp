@@ -4,7 +4,7 @@
 
 #include "tpm/law/relaxation/lagrange_basis.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// Right-hand Radau nodes of the unit interval: `count` rising numbers, the last of them 1.
 /// @param count 1 to 8
@@ -64,4 +64,4 @@ class ExponentialCollocation {
   LagrangeBasis basis_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

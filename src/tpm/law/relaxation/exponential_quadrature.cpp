@@ -4,7 +4,7 @@
 
 #include "tpm/law/relaxation/relaxation_filter.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// I_k and z dI_k/dz for k = 0 to 4.
@@ -84,4 +84,4 @@ QuadratureWeights line_weights(double z) {
   return {k.r, {k.w0, 0.0, 0.0, 0.0, k.w1}, k.d_r, {k.d_w0, 0.0, 0.0, 0.0, k.d_w1}};
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -1,7 +1,7 @@
 #pragma once
 #include <array>
 
-namespace tpm {
+namespace tpm::law {
 
 /// Weights of the exact update of  dw/dt = (v - w)/tau  over an interval h in which v is the
 /// polynomial of fourth degree through its values at 0, 1/4, 1/2, 3/4 and 1 of the interval:
@@ -22,4 +22,4 @@ struct QuadratureWeights {
 /// The same with v a straight line: b[1] to b[3] are 0.
 [[nodiscard]] QuadratureWeights line_weights(double z);
 
-}  // namespace tpm
+}  // namespace tpm::law

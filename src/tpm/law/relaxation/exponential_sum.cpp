@@ -7,12 +7,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/relaxation/cardinal_weight.hpp"
 #include "tpm/law/relaxation/springpot_pair.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 namespace {
 
@@ -270,4 +271,4 @@ double ExponentialSum::integral_s(const FractionalWeights& weights, double t_s) 
   return sum;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-namespace tpm {
+namespace tpm::law {
 
 /// A fractional relaxation function as a sum over the rates r_j of a ExponentialSum,
 ///
@@ -100,4 +100,4 @@ class ExponentialSum {
   std::vector<double> damping_;  ///< exp(-j h), j = 1 ... until it no longer counts
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -6,12 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/relaxation/mittag_leffler.hpp"
 #include "tpm/law/relaxation/nonnegative.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 constexpr double kFittedPerDecade = 40.0, kComparedPerDecade = 97.0;
@@ -110,4 +111,4 @@ FractionalBranches fractional_branches(double alpha, double tau_s, const Fractio
                   "a larger error or a shorter window");
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-namespace tpm {
+namespace tpm::law {
 
 /// A fractional relaxation function as a sum of exponentials with positive weights,
 ///
@@ -36,4 +36,4 @@ struct FractionalWindow {
                                                      const FractionalWindow& window,
                                                      std::size_t most);
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -1,6 +1,6 @@
 #include "tpm/law/relaxation/lagrange_basis.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 LagrangeBasis::LagrangeBasis(std::vector<double> nodes)
     : nodes_(std::move(nodes)), scale_(static_cast<Eigen::Index>(nodes_.size())) {
@@ -31,4 +31,4 @@ Eigen::VectorXd LagrangeBasis::at(double c) const {
   return others(c).cwiseQuotient(scale_);
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace tpm {
+namespace tpm::law {
 
 /// The Lagrange polynomials of some nodes: L_k is 1 at node k and 0 at the others.
 class LagrangeBasis {
@@ -23,4 +23,4 @@ class LagrangeBasis {
   Eigen::VectorXd scale_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

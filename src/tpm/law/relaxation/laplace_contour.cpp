@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace tpm {
+namespace tpm::law {
 
 namespace {
 
@@ -33,4 +33,4 @@ std::span<const ContourNode> contour_nodes() {
   return nodes;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

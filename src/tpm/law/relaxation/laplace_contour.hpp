@@ -2,7 +2,7 @@
 #include <complex>
 #include <span>
 
-namespace tpm {
+namespace tpm::law {
 
 /// A node of the contour over which inverse Laplace transforms are summed.
 struct ContourNode {
@@ -21,4 +21,4 @@ struct ContourNode {
 /// where f is far smaller, such as exp(-t) at t = 50, it has few digits.
 [[nodiscard]] std::span<const ContourNode> contour_nodes();
 
-}  // namespace tpm
+}  // namespace tpm::law

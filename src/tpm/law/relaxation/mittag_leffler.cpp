@@ -7,12 +7,13 @@
 #include <complex>
 #include <numbers>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/relaxation/laplace_contour.hpp"
 #include "tpm/law/relaxation/relaxation_spectrum.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 namespace {
 
@@ -143,4 +144,4 @@ MittagLeffler mittag_leffler_with_slopes(double a, double b, double z) {
   return sum;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace tpm {
+namespace tpm::law {
 
 /// The Mittag-Leffler function of a relaxing argument,
 ///
@@ -8,7 +8,7 @@ namespace tpm {
 ///
 /// by its power series up to z = 0.1 and above it by the spectral integral with the trapezoidal
 /// rule, where every term is positive, so that the *relative* accuracy holds however small the
-/// value is: better than 1e-13 against a table in 25 digits (tests/solve/test_fractional.cpp). For
+/// value is: better than 1e-13 against a table in 25 digits (tests/law/test_fractional.cpp). For
 /// alpha = 1 it is exp(-z) and (1 - exp(-z))/z exactly.
 ///
 ///     E_alpha(-(t/tau)^alpha)             relaxation after a step, beta = 1
@@ -40,4 +40,4 @@ struct MittagLeffler {
 /// Throws Error(bad_input) for anything else.
 [[nodiscard]] MittagLeffler mittag_leffler_with_slopes(double a, double b, double z);
 
-}  // namespace tpm
+}  // namespace tpm::law

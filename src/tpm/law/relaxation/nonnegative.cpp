@@ -4,9 +4,10 @@
 #include <vector>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 /// The least squares solution with the columns outside `used` held at 0.
@@ -71,4 +72,4 @@ Eigen::VectorXd nonnegative_least_squares(const Eigen::MatrixXd& a, const Eigen:
   throw Error(ExitCode::numerical, "least squares", "the non-negative solution was not found");
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-namespace tpm {
+namespace tpm::law {
 
 /// The x >= 0 that minimises |A x - b|, by the active set method of Lawson and Hanson (Solving
 /// Least Squares Problems, 1974, chapter 23).
@@ -10,4 +10,4 @@ namespace tpm {
 [[nodiscard]] Eigen::VectorXd nonnegative_least_squares(const Eigen::MatrixXd& a,
                                                         const Eigen::VectorXd& b);
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace tpm {
+namespace tpm::law {
 
 RelaxationWeights relaxation_weights(double z) {
   RelaxationWeights k{};
@@ -52,4 +52,4 @@ void run_relaxation(
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -4,7 +4,7 @@
 
 #include "tpmkit/protocol.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 /// Weights of the exact update of  dw/dt = (u - w) / tau  over an interval h in which u is linear:
 ///
@@ -42,4 +42,4 @@ void run_relaxation(
     std::span<const std::size_t> order,
     const std::function<void(std::size_t, double u, const RelaxationState&)>& report);
 
-}  // namespace tpm
+}  // namespace tpm::law

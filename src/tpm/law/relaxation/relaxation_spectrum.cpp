@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace tpm {
+namespace tpm::law {
 
 namespace {
 
@@ -75,4 +75,4 @@ SpectralValue RelaxationSpectrum::sum_from(double x, double h) const {
   return sum;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace tpm {
+namespace tpm::law {
 
 /// A number that depends on the order alpha and on a place x on an axis of logarithmic rates.
 struct SpectralValue {
@@ -56,4 +56,4 @@ class RelaxationSpectrum {
   double gap_;     ///< 1 + cos(pi alpha), without cancellation
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

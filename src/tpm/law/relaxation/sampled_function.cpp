@@ -7,7 +7,7 @@
 
 #include "tpm/law/relaxation/lagrange_basis.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 constexpr std::size_t kNodes = 16;
@@ -104,4 +104,4 @@ Eigen::MatrixXd sampled(const RowsAt& function, std::span<const double> places,
   return Sampling(function, places, together, allowed).all();
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

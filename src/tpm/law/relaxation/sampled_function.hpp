@@ -3,7 +3,7 @@
 #include <functional>
 #include <span>
 
-namespace tpm {
+namespace tpm::law {
 
 /// Values of a function at rising places: a row for each place, a column for each of its parts.
 using RowsAt = std::function<Eigen::MatrixXd(std::span<const double>)>;
@@ -21,4 +21,4 @@ using RowsAt = std::function<Eigen::MatrixXd(std::span<const double>)>;
 [[nodiscard]] Eigen::MatrixXd sampled(const RowsAt& function, std::span<const double> places,
                                       std::size_t together, const Eigen::RowVectorXd& allowed);
 
-}  // namespace tpm
+}  // namespace tpm::law

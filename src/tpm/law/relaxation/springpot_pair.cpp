@@ -9,7 +9,7 @@
 #include "tpm/law/relaxation/analytic.hpp"
 #include "tpm/law/relaxation/laplace_contour.hpp"
 
-namespace tpm {
+namespace tpm::law {
 
 namespace {
 
@@ -156,4 +156,4 @@ PairValue PairWeight::near_pole(double x) const {
   return w;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

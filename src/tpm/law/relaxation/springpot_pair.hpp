@@ -1,6 +1,6 @@
 #pragma once
 
-namespace tpm {
+namespace tpm::law {
 
 /// A number that depends on two orders and on a place x on an axis of logarithmic rates.
 struct PairValue {
@@ -73,4 +73,4 @@ class PairWeight {
   double pole_damping_;  ///< exp(-pi height/h): size of the residue
 };
 
-}  // namespace tpm
+}  // namespace tpm::law

@@ -4,7 +4,7 @@
 
 #include "tpmkit/elongation_function.hpp"
 
-namespace tpm {
+namespace tpm::law {
 namespace {
 
 class LinearShape final : public ElongationShape {
@@ -101,4 +101,4 @@ ElongationShapes stiffening_elongation_shapes() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::law

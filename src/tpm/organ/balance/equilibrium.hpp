@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/balance/newton_balance.hpp"
 #include "tpm/organ/bonds/stiffness_blocks.hpp"
 

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/balance/newton_balance.hpp"
 #include "tpm/organ/bonds/stiffness_rows.hpp"
 #include "tpm/organ/linear/multigrid.hpp"

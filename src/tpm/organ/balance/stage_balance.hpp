@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/law/relaxation/exponential_collocation.hpp"
 #include "tpm/organ/balance/driven_tissue.hpp"
 #include "tpm/organ/balance/lane_bonds.hpp"

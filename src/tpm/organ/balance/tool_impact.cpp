@@ -13,7 +13,7 @@ namespace {
 constexpr int kMostSweeps = 20'000;
 constexpr double kSettled = 1e-14;  // of the largest approach speed
 // Roundings of a speed in a sum of three products: no approach slower than that is told from none.
-constexpr double kRoundings = 8.0 * std::numeric_limits<double>::epsilon();
+constexpr double kImpulseRoundings = 8.0 * std::numeric_limits<double>::epsilon();
 
 /// What an impulse along the normal changes.
 struct Answer {
@@ -61,7 +61,7 @@ Eigen::VectorXd inelastic_impact(std::span<const TouchingPair> pairs,
       velocity.col(pairs[i].tool) += more * answer.of_tool;
       changed = std::max(changed, std::abs(more) * answer.of_gap);
     }
-    if (changed <= std::max(kSettled * scale, kRoundings * speed)) return impulse;
+    if (changed <= std::max(kSettled * scale, kImpulseRoundings * speed)) return impulse;
   }
   throw Error(ExitCode::numerical, "tools", "the impulses of an impact do not settle");
 }

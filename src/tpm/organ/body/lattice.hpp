@@ -3,6 +3,7 @@
 #include <array>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 
 namespace tpm::organ {
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/body/edge_table.hpp"
 #include "tpm/work/parallel.hpp"
 #include "tpmkit/error.hpp"

@@ -9,6 +9,7 @@
 #include <assimp/Importer.hpp>
 #include <string>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
 #include "tpmkit/error.hpp"
 

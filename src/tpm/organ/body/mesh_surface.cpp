@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
 
 namespace tpm::organ {

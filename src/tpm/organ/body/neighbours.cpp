@@ -8,6 +8,7 @@
 #include <nanoflann.hpp>
 #include <utility>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/work/parallel.hpp"
 #include "tpmkit/error.hpp"
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/work/parallel.hpp"
 #include "tpmkit/error.hpp"

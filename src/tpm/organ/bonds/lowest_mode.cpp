@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/organ/bonds/rigidity.hpp"
 #include "tpmkit/error.hpp"

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/organ/bonds/local_support.hpp"
 #include "tpm/organ/bonds/stiffness_blocks.hpp"

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

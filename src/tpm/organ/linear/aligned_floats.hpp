@@ -4,7 +4,7 @@
 #include <new>
 #include <vector>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Memory that starts with a line of the processor's cache, so that its vectors may be loaded.
 template <class T>
@@ -30,4 +30,4 @@ struct LineAllocator {
 using AlignedFloats = std::vector<float, LineAllocator<float>>;
 using AlignedWords = std::vector<std::uint32_t, LineAllocator<std::uint32_t>>;
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,9 +4,10 @@
 #include <array>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/wide_vectors.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kWide = 16;    // sums side by side
@@ -117,4 +118,4 @@ void Anderson::step(Eigen::Ref<Eigen::VectorXd> x, const Eigen::Ref<const Eigen:
   });
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

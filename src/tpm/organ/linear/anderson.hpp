@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Anderson acceleration of a fixed-point iteration x <- x + d(x) (Walker and Ni 2011): the step
 /// that would have brought the latest few d's nearest to 0, were d linear. Differences are kept in
@@ -32,4 +32,4 @@ class Anderson {
   Eigen::Index known_ = -1;  ///< differences so far; -1 before the first point
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

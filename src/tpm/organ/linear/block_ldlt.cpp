@@ -4,10 +4,11 @@
 #include <stdexcept>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/wide_vectors.hpp"
 #include "tpm/work/parallel.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kSlack = 16;  // numbers that rounded-up tiles may touch behind an array
@@ -389,4 +390,4 @@ void BlockLdlt::solve(Eigen::Ref<Eigen::Matrix3Xd> x) const {
   for (std::uint32_t p = 0; p < n; ++p) x.col(pattern_.node_of_[p]) = permuted.col(p);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

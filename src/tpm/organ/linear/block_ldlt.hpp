@@ -10,7 +10,7 @@
 #include "tpm/organ/linear/dense_update.hpp"
 #include "tpm/organ/linear/zeroed_numbers.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// L D L^T of a symmetric matrix with 3x3 pivots, without exchange of rows: stable for positive
 /// definite matrices, and for others good enough to count signs.
@@ -78,4 +78,4 @@ class BlockLdlt {
   std::size_t negative_ = 0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// About as many parts as this. 4 to 16 take the same time on two processors; each has stacks of
@@ -149,4 +149,4 @@ void BlockMatrix::set_zero() {
   std::fill(below.begin(), below.end(), Eigen::Matrix3d::Zero());
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -7,7 +7,7 @@
 
 #include "tpm/organ/linear/elimination_fronts.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Which 3x3 blocks of a symmetric matrix may differ from 0, and the dense fronts in which it is
 /// factorised: found once for a graph, used by every matrix on it.
@@ -89,4 +89,4 @@ struct BlockMatrix {
   std::vector<Eigen::Matrix3d> below;     ///< where BlockPattern::place says
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

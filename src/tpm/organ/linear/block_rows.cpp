@@ -5,7 +5,7 @@
 #include <array>
 #include <numeric>
 
-namespace tpm {
+namespace tpm::organ {
 
 template <int R, int C>
 typename BlockRows<R, C>::Block& RowGatherer<R, C>::at(std::uint32_t column) {
@@ -105,4 +105,4 @@ template BlockRows<6, 6> transposed_product(const BlockRows<6, 6>&, const BlockR
 template std::vector<Eigen::Matrix3d> inverse_diagonal(const BlockRows<3, 3>&);
 template std::vector<Eigen::Matrix<double, 6, 6>> inverse_diagonal(const BlockRows<6, 6>&);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Vectors of a block matrix: N numbers per node, one column each.
 template <int N>
@@ -81,4 +81,4 @@ template <int N>
 [[nodiscard]] std::vector<Eigen::Matrix<double, N, N>> inverse_diagonal(
     const BlockRows<N, N>& matrix);
 
-}  // namespace tpm
+}  // namespace tpm::organ

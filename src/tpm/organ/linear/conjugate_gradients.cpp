@@ -2,9 +2,10 @@
 
 #include <cmath>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 double dot(const BlockVector<3>& a, const BlockVector<3>& b) {
@@ -62,4 +63,4 @@ GradientsOutcome probe_definiteness(const BlockRows<3, 3>& matrix,
   return conjugate_gradients(matrix, preconditioner, b, tolerance, most_iterations, x);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/organ/linear/block_rows.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// An approximate inverse M^-1 of a symmetric positive definite matrix, symmetric and positive
 /// definite itself.
@@ -53,4 +53,4 @@ struct GradientsOutcome {
                                                   double tolerance, int most_iterations,
                                                   std::uint64_t seed);
 
-}  // namespace tpm
+}  // namespace tpm::organ

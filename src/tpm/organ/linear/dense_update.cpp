@@ -7,7 +7,7 @@
 #define TPM_DENSE_AVX2 1
 #endif
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Product = DenseUpdate::Product;
@@ -125,4 +125,4 @@ const DenseUpdate& dense_update(bool portable) noexcept {
   return kPortableUpdate;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,7 +1,7 @@
 #pragma once
 #include <cstddef>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A dense matrix by columns in double precision, `stride` numbers from one column to the next.
 struct DensePanel {
@@ -35,4 +35,4 @@ struct DenseUpdate {
 /// processor are always the same to the bit.
 [[nodiscard]] const DenseUpdate& dense_update(bool portable = false) noexcept;
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -5,7 +5,7 @@
 
 #include "tpm/organ/linear/elimination_order.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Numbers = std::vector<std::uint32_t>;
@@ -322,4 +322,4 @@ void EliminationFronts::find_rows(std::span<const Edge> edges) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// How a symmetric matrix with a block per node is eliminated in dense fronts (multifrontal method;
 /// Duff & Reid 1983): which nodes are eliminated together, and which later nodes each front
@@ -61,4 +61,4 @@ class EliminationFronts {
   std::vector<std::uint32_t> row_, row_in_parent_, child_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

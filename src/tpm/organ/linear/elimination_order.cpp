@@ -12,7 +12,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using GraphEdge = std::array<std::uint32_t, 2>;
@@ -114,4 +114,4 @@ std::vector<std::uint32_t> elimination_order(std::size_t nodes, std::span<const 
   return nodes <= kFewNodes ? minimum_degree(nodes, edges) : nested_dissection(nodes, edges);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// An order of elimination with little fill for a symmetric matrix on a graph: approximate minimum
 /// degree (Amestoy, Davis & Duff 1996, by Eigen) up to 500 nodes, where it is as good and faster,
@@ -21,4 +21,4 @@ namespace tpm {
 [[nodiscard]] std::vector<std::uint32_t> elimination_order(
     std::size_t nodes, std::span<const std::array<std::uint32_t, 2>> edges);
 
-}  // namespace tpm
+}  // namespace tpm::organ

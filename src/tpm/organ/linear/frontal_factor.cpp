@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Index = Eigen::Index;
@@ -209,4 +209,4 @@ void FrontalFactor::solve(float* x) noexcept {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,7 @@
 #include "tpm/organ/linear/elimination_fronts.hpp"
 #include "tpm/organ/linear/panel_kernels.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A positive definite matrix of 3x3 blocks, factorised in double precision (multifrontal; Duff and
 /// Reid, ACM TOMS 1983) and kept for many solutions at little cost, to correct iterates whose
@@ -55,4 +55,4 @@ class FrontalFactor {
   AlignedFloats own_, reached_, sum_;  ///< of one front, three floats per node
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/wide_vectors.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// y -= A v.
@@ -117,4 +118,4 @@ void LaneFactor::solve(LaneMatrix& x) {
   });
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 #include "tpm/organ/linear/block_ldlt.hpp"
 #include "tpm/organ/linear/lanes.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Three coordinates of a node, one number per lane, in vectors of the processor (g++ and clang).
 struct alignas(kLanes * sizeof(float)) LaneNode {
@@ -38,4 +38,4 @@ class LaneFactor {
   std::vector<LaneNode> y_;     ///< by place
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -2,9 +2,10 @@
 
 #include <array>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/wide_vectors.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// out = weights in + what `first` makes of (column, lane).
@@ -66,4 +67,4 @@ void mix_lanes(const LaneSquare& weights, const LaneMatrix& in, LaneMatrix& out)
       [](std::size_t, std::size_t) __attribute__((always_inline)) { return 0.0; });
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// States that are worked on side by side, one number of each in turn, so that one instruction of
 /// the processor serves several of them.
@@ -38,4 +38,4 @@ void mix_lanes(const LaneSquare& weights, const LaneMatrix& in, LaneMatrix& out)
   return {lanes.data(), lanes.size()};
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/random.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kCoarsestNodes = 100;  // solved directly: 600 numbers
@@ -283,4 +284,4 @@ void Multigrid::apply(const BlockVector<3>& r, BlockVector<3>& z) const {
   cycle(0, fine_, r, z);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -5,7 +5,7 @@
 
 #include "tpm/organ/linear/conjugate_gradients.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The six rigid motions at each node, restricted to what the node may do: N x 6 blocks.
 template <int N>
@@ -77,4 +77,4 @@ struct Aggregates {
 [[nodiscard]] Aggregates aggregate(std::span<const std::size_t> begin,
                                    std::span<const std::uint32_t> column);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -8,7 +8,7 @@
 #define TPM_HAS_AVX2 1
 #endif
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kPanelWide = 8;
@@ -293,4 +293,4 @@ const PanelKernels& panel_kernels(bool portable) noexcept {
   return kPortable;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A dense matrix by columns in single precision, each column filled up with zeros.
 struct FloatPanel {
@@ -49,4 +49,4 @@ struct PanelKernels {
 /// The fastest that this processor has, or those that every processor has.
 [[nodiscard]] const PanelKernels& panel_kernels(bool portable = false) noexcept;
 
-}  // namespace tpm
+}  // namespace tpm::organ

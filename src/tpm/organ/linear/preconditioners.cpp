@@ -2,7 +2,7 @@
 
 #include <Eigen/Cholesky>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kFirstShift = 1e-3;
@@ -89,4 +89,4 @@ void IncompleteCholesky::apply(const BlockVector<3>& r, BlockVector<3>& z) const
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/organ/linear/conjugate_gradients.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The inverse of each diagonal block.
 class BlockJacobi final : public Preconditioner {
@@ -31,4 +31,4 @@ class IncompleteCholesky final : public Preconditioner {
   double shift_ = 0.0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

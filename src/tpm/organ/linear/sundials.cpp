@@ -4,7 +4,7 @@
 
 #include <cstdlib>
 
-namespace tpm::sundials {
+namespace tpm::organ::sundials {
 
 extern "C" {
 // A custom matrix and its solver hold nothing of their own.
@@ -80,4 +80,4 @@ void mute(void* cvodes) {
 #endif
 }
 
-}  // namespace tpm::sundials
+}  // namespace tpm::organ::sundials

@@ -15,7 +15,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm::sundials {
+namespace tpm::organ::sundials {
 
 struct FreeContext {
   void operator()(SUNContext c) const { SUNContext_Free(&c); }
@@ -63,4 +63,4 @@ void check(int flag, std::string_view call);
 /// Lets an integrator print nothing: what goes wrong is thrown where its return value is checked.
 void mute(void* cvodes);
 
-}  // namespace tpm::sundials
+}  // namespace tpm::organ::sundials

@@ -4,7 +4,7 @@
 #include <memory>
 #include <new>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Numbers that are 0 at first. Unlike a vector it does not write them: large memory that the
 /// system hands out is 0, and is not touched before it is used.
@@ -25,4 +25,4 @@ class ZeroedNumbers {
   std::unique_ptr<double[], Free> numbers_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

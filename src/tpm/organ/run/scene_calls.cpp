@@ -1,9 +1,9 @@
-#include "tpmkit/scene.hpp"
-
+// Declared in tpmkit/scene.hpp.
 #include "tpm/files/json.hpp"
 #include "tpm/files/replacement.hpp"
 #include "tpm/organ/run/scene_runner.hpp"
 #include "tpm/organ/run/simulation_file.hpp"
+#include "tpmkit/scene.hpp"
 
 namespace tpm::organ {
 

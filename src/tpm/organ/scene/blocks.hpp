@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/document_place.hpp"
 #include "tpm/organ/scene/scene.hpp"
 

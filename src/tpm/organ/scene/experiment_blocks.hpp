@@ -1,6 +1,7 @@
 #pragma once
 // Parts of parse_experiment, one per block of a scene that says what is done to the tissue.
 // All throw Error(bad_input) with the key; all are given blocks that the schema has accepted.
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/document_place.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/balance/equilibrium.hpp"
 #include "tpm/organ/balance/mass_spring.hpp"
 #include "tpm/organ/scene/scene.hpp"

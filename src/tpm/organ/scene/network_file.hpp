@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/organ/scene/scene.hpp"
 

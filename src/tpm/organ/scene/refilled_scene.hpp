@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
 
 namespace tpm::organ {

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/organ/bonds/bond_system.hpp"
 #include "tpm/organ/bonds/constraints.hpp"

@@ -7,12 +7,13 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/element/closed_form.hpp"
 #include "tpm/organ/linear/sundials.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// What the state is differentiated with respect to: the five material parameters and the factor
@@ -337,4 +338,4 @@ Response CvodesElement::respond(const Protocol& protocol, std::span<const double
   return response;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

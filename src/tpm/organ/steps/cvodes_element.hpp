@@ -1,7 +1,7 @@
 #pragma once
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The single contact as an initial value problem in the paper's own state e1, integrated by
 /// CVODES (BDF) with forward sensitivities under error control:
@@ -27,4 +27,4 @@ class CvodesElement final : public Model {
   ModelOptions options_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

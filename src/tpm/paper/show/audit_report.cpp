@@ -5,14 +5,14 @@
 #include "tpm/base/text.hpp"
 #include "tpm/paper/show/study_report.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 constexpr std::size_t kWidth = 100;
 constexpr std::size_t kLabel = 13;
 
-std::string with_unit(const AuditQuantity& quantity, int digits) {
-  return tpm::with_unit(significant(quantity.value, digits), quantity.unit);
+std::string quantity_with_unit(const AuditQuantity& quantity, int digits) {
+  return with_unit(significant(quantity.value, digits), quantity.unit);
 }
 
 std::string entry(std::string_view label, std::string_view text) {
@@ -23,7 +23,7 @@ std::string entry(std::string_view label, std::string_view text) {
 std::string inputs_text(const Finding& finding) {
   return listed(finding.inputs, [](const AuditInput& input) {
     return fmt::format("{} = {}{}", input.name,
-                       input.printed.empty() ? with_unit(input.value, 4) : input.printed,
+                       input.printed.empty() ? quantity_with_unit(input.value, 4) : input.printed,
                        input.provenance == "assumed" ? " (assumed)" : "");
   });
 }
@@ -34,7 +34,7 @@ std::string details_text(const Finding& finding) {
   for (const AuditDetail& detail : finding.details) {
     if (detail.verdict.starts_with("exact") && finding.details.size() > 4) continue;
     out += fmt::format("    {:<{}}{}: {} against {}, {}\n", "", kLabel - 4, detail.what,
-                       detail.printed, with_unit(detail.recomputed, 4), detail.verdict);
+                       detail.printed, quantity_with_unit(detail.recomputed, 4), detail.verdict);
   }
   return out;
 }
@@ -80,4 +80,4 @@ std::string audit_text(const AuditReport& report, bool all) {
   return out + summary_text(report);
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

@@ -5,7 +5,7 @@
 #include "tpm/paper/show/organ_study_report.hpp"
 #include "tpm/show/table_document.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -94,4 +94,4 @@ std::string fits_csv(const OrganStudy& study) {
   return text;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

@@ -8,7 +8,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/paper/show/organ_study_report.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -249,4 +249,4 @@ std::vector<Figure> organ_study_figures(const OrganStudy& study) {
   return figures;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

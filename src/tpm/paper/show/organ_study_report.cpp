@@ -11,7 +11,7 @@
 #include "tpm/law/element/validity_limits.hpp"
 #include "tpm/show/draw.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -365,4 +365,4 @@ void write_organ_study(const OrganStudy& study, const std::filesystem::path& fol
   write_file(folder / "curves.csv", curves_csv(study));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

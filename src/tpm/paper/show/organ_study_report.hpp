@@ -7,7 +7,7 @@
 #include "tpm/show/document.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 
 /// Static force over depth, relaxation at every depth, the rates at one depth, and creep under
 /// every load, each for all tissues and with the data.
@@ -32,4 +32,4 @@ namespace tpm::report {
 void write_organ_study(const OrganStudy& study, const std::filesystem::path& folder,
                        const std::string& python, double seconds);
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

@@ -11,7 +11,7 @@
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 constexpr double kDepth_m = 4e-3;  // Figs. 7 and 10
@@ -264,4 +264,4 @@ std::vector<Figure> paper_figures(const PaperFigureData& data) {
   return figures;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

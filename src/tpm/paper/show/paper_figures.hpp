@@ -2,11 +2,12 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/show/figure.hpp"
 #include "tpmkit/curve.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 
 /// A creep experiment as the paper prints it (Sec. 4.2, beside Figs. 8 and 9).
 struct PrintedCreep {
@@ -44,4 +45,4 @@ struct PaperFigureData {
 /// The paper's five in its order, and the spectrum.
 [[nodiscard]] std::vector<Figure> paper_figures(const PaperFigureData& data);
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

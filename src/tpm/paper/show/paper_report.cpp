@@ -6,8 +6,8 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/fit/claims/claims.hpp"
 #include "tpm/fit/show/fit_figures.hpp"
+#include "tpm/paper/claims/claims.hpp"
 #include "tpm/paper/show/sections.hpp"
 #include "tpm/paper/show/study_report.hpp"
 #include "tpm/show/draw.hpp"
@@ -15,7 +15,7 @@
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 namespace fs = std::filesystem;
@@ -124,4 +124,4 @@ void write_paper_report(const PaperReport& report, const fs::path& folder,
   write_json(folder / "fit_held_out.json", held_out_json(report.fits));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

@@ -4,15 +4,15 @@
 #include <string>
 #include <vector>
 
-#include "tpm/fit/claims/audit.hpp"
 #include "tpm/fit/select/fit_variations.hpp"
+#include "tpm/paper/claims/audit.hpp"
 #include "tpm/paper/show/paper_figures.hpp"
 #include "tpm/paper/tables.hpp"
 #include "tpm/show/document.hpp"
 #include "tpm/show/figure.hpp"
 #include "tpmkit/curve.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 
 /// Everything the report on the paper says, computed: the same input gives the same content.
 struct PaperReport {
@@ -42,4 +42,4 @@ struct PaperReport {
 void write_paper_report(const PaperReport& report, const std::filesystem::path& folder,
                         const std::string& python);
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

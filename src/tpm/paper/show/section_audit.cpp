@@ -7,7 +7,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/paper/show/sections.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 Tone tone_of_finding(AuditVerdict verdict) {
@@ -87,4 +87,4 @@ void add_audit(Document& document, const PaperReport& report) {
   }
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

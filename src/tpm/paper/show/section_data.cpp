@@ -9,7 +9,7 @@
 #include "tpm/paper/show/sections.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 std::vector<const PointSet*> data_sets(const PaperReport& report) {
@@ -136,4 +136,4 @@ void add_assumptions(Document& document, const PaperReport& report) {
   document.bullets(std::move(items));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

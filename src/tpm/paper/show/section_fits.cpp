@@ -9,7 +9,7 @@
 #include "tpm/fit/verdict.hpp"
 #include "tpm/paper/show/sections.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 std::string interval(const ParameterResult& p) {
@@ -192,4 +192,4 @@ void add_fits(Document& document, const PaperReport& report) {
   document.table(held_out_table(study));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

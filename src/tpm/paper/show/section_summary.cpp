@@ -9,7 +9,7 @@
 #include "tpm/paper/show/sections.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 Cell tables_sentence(const TablesResult& tables) {
@@ -101,4 +101,4 @@ void add_paper_figures(Document& document, const PaperReport& report) {
   }
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

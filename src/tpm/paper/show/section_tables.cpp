@@ -9,7 +9,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/paper/show/sections.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 Tone tone_of_digits(DigitVerdict verdict) {
@@ -119,4 +119,4 @@ void add_tables(Document& document, const PaperReport& report) {
   document.table(consistent_table(report.consistent));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

@@ -2,7 +2,7 @@
 #include "tpm/paper/show/paper_report.hpp"
 #include "tpm/show/document.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 
 /// The sections of the report on the paper, in its order. Each adds its blocks to the document;
 /// every sentence with a verdict is made from the numbers of `report`.
@@ -19,4 +19,4 @@ void add_assumptions(Document& document, const PaperReport& report);
 /// id.
 [[nodiscard]] Picture caption_of(const PaperReport& report, const std::string& figure_id);
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

@@ -2,11 +2,11 @@
 #include <string>
 
 #include "tpm/base/namespaces.hpp"
-#include "tpm/fit/claims/audit.hpp"
+#include "tpm/paper/claims/audit.hpp"
 #include "tpm/paper/tables.hpp"
 #include "tpm/show/table_document.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 
 /// The tables with printed and measured values, verdicts and the counts, one section per depth.
 /// The columns for printed and measured values are left out where no row has any.
@@ -19,4 +19,4 @@ namespace tpm::report {
 /// @param all also the findings that hold, else only their number
 [[nodiscard]] std::string audit_text(const AuditReport& report, bool all);
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

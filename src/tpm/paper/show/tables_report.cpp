@@ -8,7 +8,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/paper/show/study_report.hpp"
 
-namespace tpm::report {
+namespace tpm::paper {
 namespace {
 
 /// Enough for any use, and the same on machines whose last bits differ.
@@ -19,7 +19,7 @@ std::string ten_digits(double value) {
 constexpr double kMillimetres = 1e3;
 constexpr double kKilo = 1e-3;
 
-std::string millimetres(double metres) {
+std::string spacing_text(double metres) {
   return significant(metres * kMillimetres, 6) + " mm";
 }
 
@@ -84,7 +84,7 @@ TableSection depth_section(const TablesResult& result, double depth_m) {
   const auto printed = std::find_if(rows.begin(), rows.end(),
                                     [](const TableRow* r) { return !r->printed_where.empty(); });
   const bool compare = printed != rows.end();
-  std::string title = "Depth " + millimetres(depth_m);
+  std::string title = "Depth " + spacing_text(depth_m);
   if (compare) title += fmt::format(" (paper: {})", (*printed)->printed_where);
   TableSection section = new_section(title, {"x", "quantity", "computed"}, compare);
   section.right_aligned[1] = false;
@@ -95,7 +95,7 @@ TableSection depth_section(const TablesResult& result, double depth_m) {
   for (const TableRow* row : rows) {
     for (const Line& line : lines_of(*row)) {
       std::vector<std::string> cells{
-          millimetres(row->spacing_m), std::string(line.quantity),
+          spacing_text(row->spacing_m), std::string(line.quantity),
           fmt::format("{} {}", significant(line.cell->value * line.to_display, 4), line.unit)};
       if (compare) {
         for (auto& text : printed_texts(*line.cell)) cells.push_back(std::move(text));
@@ -111,12 +111,12 @@ TableSection band_section(const TablesResult& result) {
   const BandRow& first = result.bands.front();
   TableSection section =
       new_section(fmt::format("Relaxed force and static band, x = {} (paper: {})",
-                              millimetres(first.spacing_m), first.printed_where),
+                              spacing_text(first.spacing_m), first.printed_where),
                   {"depth", "relaxed force"}, true);
   section.columns.insert(section.columns.end(), {"measured band", ""});
   section.right_aligned.insert(section.right_aligned.end(), {true, false});
   for (const BandRow& row : result.bands) {
-    std::vector<std::string> cells{millimetres(row.depth_m),
+    std::vector<std::string> cells{spacing_text(row.depth_m),
                                    significant(row.force.value, 4) + " N"};
     for (auto& text : printed_texts(row.force)) cells.push_back(std::move(text));
     cells.push_back(fmt::format("{} - {}", row.band_low, with_unit(row.band_high, row.band_unit)));
@@ -132,7 +132,7 @@ std::vector<std::string> introduction(const TableRequest& request) {
   lines.push_back(fmt::format("E1 = {} kPa, E2 = {} kPa, E' = {} kPa, A0 = {} mm^2, l0 = {}.",
                               significant(p.E1_Pa * kKilo, 6), significant(p.E2_Pa * kKilo, 6),
                               significant(p.Eprime_Pa * kKilo, 6), significant(p.A0_m2 * 1e6, 6),
-                              millimetres(p.l0_m)));
+                              spacing_text(p.l0_m)));
   if (request.mode == TableMode::as_printed) {
     lines.emplace_back(
         "As printed: a step (Eqs. 15 and 16); the end force is the limit t -> infinity.");
@@ -219,4 +219,4 @@ std::string tables_csv(const TablesResult& result) {
   return out;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::paper

@@ -6,7 +6,7 @@
 #include "tpm/organ/steps/cvodes_element.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 /// The element knows the motion of one sphere along its normal.
@@ -73,4 +73,4 @@ Formulations closed_form_formulations() {
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

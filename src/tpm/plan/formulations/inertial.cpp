@@ -6,7 +6,7 @@
 #include "tpm/organ/run/recorder.hpp"
 #include "tpm/plan/plan_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 InertialOptions options_with_mass(const ExperimentScene& scene) {
@@ -123,4 +123,4 @@ Formulations inertial_formulations() {
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

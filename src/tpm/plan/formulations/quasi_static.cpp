@@ -4,7 +4,7 @@
 #include "tpm/organ/run/recorder.hpp"
 #include "tpm/plan/plan_model.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 /// Every part of a quasi-static run begins with some factorisations and ends a step of time: a run
@@ -111,4 +111,4 @@ Formulations quasi_static_formulations() {
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

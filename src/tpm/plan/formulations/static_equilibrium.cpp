@@ -3,7 +3,7 @@
 #include "tpm/organ/run/scene_runner.hpp"
 #include "tpm/organ/run/static_path.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 // A static run takes some factorisations at each stride: it iterates earlier than a quasi-static
@@ -80,4 +80,4 @@ Formulations static_equilibrium_formulations() {
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

@@ -7,7 +7,7 @@
 #include "tpm/organ/steps/method.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::plan {
 namespace {
 
 class StepRuleFormulation final : public Formulation, public SceneRunner {
@@ -86,4 +86,4 @@ Formulations step_rules_formulations() {
   return all;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::plan

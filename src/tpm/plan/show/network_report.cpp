@@ -5,7 +5,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 namespace {
 
 constexpr int kNetworkDigits = 6;
@@ -130,4 +130,4 @@ Json network_picture(const Tissue& tissue) {
   return json;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

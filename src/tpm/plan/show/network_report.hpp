@@ -5,7 +5,7 @@
 #include "tpm/files/json.hpp"
 #include "tpm/organ/scene/inspection.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 
 /// What a network is like, as docs/network_files.md describes the keys. Spheres are numbered
 /// from 1.
@@ -15,4 +15,4 @@ namespace tpm::report {
 /// The picture that scripts/draw_network.py draws: spheres, bonds, anchors, contact.
 [[nodiscard]] Json network_picture(const Tissue& tissue);
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

@@ -10,7 +10,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 namespace {
 
 constexpr int kPlanDigits = 6;
@@ -327,4 +327,4 @@ std::string plan_text(const Plan& plan) {
   return text;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

@@ -7,7 +7,7 @@
 #include "tpm/plan/plan.hpp"
 #include "tpm/plan/spheres_plan.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 
 /// What planning will take (`tpm plan --estimate`).
 [[nodiscard]] Json expected_plan_json(const ExpectedPlanWork& work);
@@ -38,4 +38,4 @@ void write_planned_run(const Plan& plan, const ExperimentScene& scene,
                        const std::vector<double>& times_s, const Trajectory& answer,
                        const std::filesystem::path& file);
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

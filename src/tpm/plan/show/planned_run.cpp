@@ -9,7 +9,7 @@
 #include "tpm/plan/show/trajectory_report.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 namespace {
 
 std::string model_words(const PlannedCandidate& c) {
@@ -95,4 +95,4 @@ void write_planned_run(const Plan& plan, const ExperimentScene& scene,
   file.commit();
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

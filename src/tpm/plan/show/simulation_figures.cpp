@@ -10,7 +10,7 @@
 #include "tpm/show/draw.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 namespace {
 
 namespace fs = std::filesystem;
@@ -138,4 +138,4 @@ std::vector<std::string> write_simulation_figures(const fs::path& folder,
   return files;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

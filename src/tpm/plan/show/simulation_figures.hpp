@@ -7,7 +7,7 @@
 #include "tpm/organ/run/simulation.hpp"
 #include "tpm/show/figure.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 
 /// A run to be drawn; all must live as long as this.
 struct FiguredRun {
@@ -23,4 +23,4 @@ struct FiguredRun {
 std::vector<std::string> write_simulation_figures(const std::filesystem::path& folder,
                                                   const std::vector<FiguredRun>& runs);
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

@@ -11,7 +11,7 @@
 #include "tpm/organ/run/smoothness.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 namespace {
 
 constexpr std::size_t kMostNamed = 12;
@@ -376,4 +376,4 @@ std::string simulation_text(const ExperimentScene& scene, const RunNetwork& netw
   return text + validity_text(record.validity, depth_limits_apply(scene.tissue));
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

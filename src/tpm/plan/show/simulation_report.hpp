@@ -5,7 +5,7 @@
 #include "tpm/files/json.hpp"
 #include "tpm/organ/run/simulation.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 
 /// What a run has shown, as docs/simulation_files.md describes the keys. Spheres are numbered
 /// from 1.
@@ -14,4 +14,4 @@ namespace tpm::report {
 [[nodiscard]] std::string simulation_text(const ExperimentScene& scene, const RunNetwork& network,
                                           const SimulationRun& run);
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

@@ -8,7 +8,7 @@
 #include "tpm/files/json.hpp"
 #include "tpm/organ/run/scene_runner.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 
 /// Adds what is imposed, the response, its largest and last value to a description of a run.
 void add_trajectory(Json& json, const ExperimentScene& scene, const std::vector<double>& times_s,
@@ -30,12 +30,4 @@ void write_trajectory(const ExperimentScene& scene, const std::vector<double>& t
 void write_scene_run(const ExperimentScene& scene, const std::vector<double>& times_s,
                      const Trajectory& answer, const std::filesystem::path& path);
 
-/// All formulations with what they can do: name, meaning, capabilities, keys in scenes, sessions.
-[[nodiscard]] Json formulations_json();
-[[nodiscard]] std::string formulations_text();
-
-/// The shapes of materials with their parameters, and whether they run at servo rate.
-[[nodiscard]] Json shapes_json();
-[[nodiscard]] std::string shapes_text();
-
-}  // namespace tpm::report
+}  // namespace tpm::plan

@@ -1,11 +1,12 @@
-// Declared in tpm/show/view_parts.hpp.
+#include "tpm/plan/show/view_simulation.hpp"
+
 #include <fmt/format.h>
 
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/show/view_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::report {
+namespace tpm::plan {
 namespace {
 
 constexpr const char* kExpectedResult = "a result of tpm simulate";
@@ -155,4 +156,4 @@ ViewPage view_simulation(const std::filesystem::path& path, std::string_view byt
   return page;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::plan

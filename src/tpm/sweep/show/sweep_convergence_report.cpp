@@ -8,7 +8,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/sweep/show/sweep_report.hpp"
 
-namespace tpm::report {
+namespace tpm::sweep {
 namespace {
 
 using Behaviour = GridConvergence::Behaviour;
@@ -154,4 +154,4 @@ std::vector<Figure> convergence_figures(const std::vector<SweepConvergence>& all
                         [&](const SweepConvergence& c) { return convergence_figure(c, title); });
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::sweep

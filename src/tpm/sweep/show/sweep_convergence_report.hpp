@@ -6,7 +6,7 @@
 #include "tpm/show/figure.hpp"
 #include "tpm/sweep/sweep_convergence.hpp"
 
-namespace tpm::report {
+namespace tpm::sweep {
 
 /// For each number a table over the sizes: order, extrapolated value and grid convergence index of
 /// the three sizes that end there, and a sentence on what they tell.
@@ -18,4 +18,4 @@ namespace tpm::report {
 [[nodiscard]] std::vector<Figure> convergence_figures(const std::vector<SweepConvergence>& all,
                                                       const std::string& title);
 
-}  // namespace tpm::report
+}  // namespace tpm::sweep

@@ -11,7 +11,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm::report {
+namespace tpm::sweep {
 namespace {
 
 constexpr std::size_t kMostPlaces = 200;   ///< of a map along one axis
@@ -392,4 +392,4 @@ std::vector<Figure> sweep_figures(const SweepReader& sweep, const SweepFigures& 
   return figures;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::sweep

@@ -8,7 +8,7 @@
 #include "tpm/sweep/sweep_sensitivity.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm::report {
+namespace tpm::sweep {
 
 /// The unit in which people read numbers of an SI unit; empty for plain numbers.
 [[nodiscard]] Unit shown_unit_of(const std::string& si_unit);
@@ -52,4 +52,4 @@ struct SweepFigures {
 [[nodiscard]] std::vector<std::pair<double, double>> pareto_front(
     std::vector<std::pair<double, double>> pairs);
 
-}  // namespace tpm::report
+}  // namespace tpm::sweep

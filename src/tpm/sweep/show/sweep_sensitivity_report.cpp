@@ -5,7 +5,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/sweep/show/sweep_report.hpp"
 
-namespace tpm::report {
+namespace tpm::sweep {
 namespace {
 
 /// Indices beside each other, with their intervals; `of` picks one of the two kinds.
@@ -94,4 +94,4 @@ std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all
   return figures;
 }
 
-}  // namespace tpm::report
+}  // namespace tpm::sweep

@@ -4,11 +4,12 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
-#include "tpm/fit/claims/expression.hpp"
+#include "tpm/fit/expression/expression.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 
 /// A value that the paper prints for a symbol in another place.
 struct PrintedAlternative {
@@ -80,4 +81,4 @@ struct ClaimSet {
 /// and so is a formula.
 [[nodiscard]] std::optional<double> quantity_si(std::string_view text);
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

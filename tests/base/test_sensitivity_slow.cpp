@@ -3,7 +3,7 @@
 
 #include "sensitivity_problems.hpp"
 
-namespace tpm::study {
+namespace tpm::base {
 namespace {
 
 constexpr std::uint64_t kRepetitions = 1000;
@@ -44,4 +44,4 @@ TEST_CASE("Intervals of Sobol indices hold the true value in 95 of 100 studies")
 }
 
 }  // namespace
-}  // namespace tpm::study
+}  // namespace tpm::base

@@ -1,4 +1,4 @@
-#include "tpm/fit/claims/audit.hpp"
+#include "tpm/paper/claims/audit.hpp"
 
 #include <fmt/format.h>
 
@@ -10,10 +10,10 @@
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/fit/claims/audit_kinds.hpp"
+#include "tpm/paper/claims/audit_kinds.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 struct ClaimKind {
@@ -152,4 +152,4 @@ AuditReport run_audit(const Json& claims, std::string_view file) {
   return report;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

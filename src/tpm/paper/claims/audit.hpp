@@ -4,9 +4,10 @@
 #include <vector>
 
 #include "tpm/base/enum_names.hpp"
-#include "tpm/fit/claims/claims.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/paper/claims/claims.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 
 /// Whether what the paper prints stands up to recomputing it.
 enum class AuditVerdict {
@@ -113,4 +114,4 @@ struct AuditReport {
 /// docs/json_tables_audit.md lists the keys.
 [[nodiscard]] Json to_json(const AuditReport& report);
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

@@ -1,10 +1,10 @@
-#include "tpm/contact/compared_motion.hpp"
+#include "tpm/contact/condensed/compared_motion.hpp"
 
 #include <cmath>
 
 #include "tpmkit/error.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 namespace {
 
 constexpr double kReferenceTolerance = 1e-5;
@@ -111,4 +111,4 @@ std::vector<ComparedMotion> compared_motions(const BondSystem& bonds, const Posi
   return motions;
 }
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact

@@ -1,4 +1,4 @@
-#include "tpm/fit/claims/claims.hpp"
+#include "tpm/paper/claims/claims.hpp"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include "tpm/files/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 std::string text_of(const Json& object, std::string_view key) {
@@ -163,4 +163,4 @@ std::optional<double> quantity_si(std::string_view text) {
   return parse_number(text.substr(0, space), text) * unit.to_si;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

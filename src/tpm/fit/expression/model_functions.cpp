@@ -1,14 +1,15 @@
-#include "tpm/fit/claims/model_functions.hpp"
+#include "tpm/fit/expression/model_functions.hpp"
 
 #include <muParser.h>
 
 #include <array>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/law/relaxation/creep_exact.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 double tension_modulus(double Eprime, double depth, double spacing) {
@@ -77,4 +78,4 @@ void define_model_functions(mu::Parser& parser) {
   parser.DefineFun("equilibrium_depth", equilibrium_depth);
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

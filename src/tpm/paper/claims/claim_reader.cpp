@@ -1,4 +1,4 @@
-#include "tpm/fit/claims/claim_reader.hpp"
+#include "tpm/paper/claims/claim_reader.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -11,7 +11,7 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 
 ClaimReader::ClaimReader(const ClaimSet& set, const Json& claim)
     : set_(set),
@@ -183,4 +183,4 @@ std::vector<AuditInput> ClaimValue::inputs(const Scope& scope) const {
   return inputs;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

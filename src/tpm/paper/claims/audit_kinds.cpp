@@ -1,4 +1,4 @@
-#include "tpm/fit/claims/audit_kinds.hpp"
+#include "tpm/paper/claims/audit_kinds.hpp"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,10 @@
 
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/fit/claims/cause_search.hpp"
+#include "tpm/paper/claims/cause_search.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 /// The inputs that the cause search may change: those named in `search`, else all.
@@ -245,4 +245,4 @@ void check_dimension(const ClaimReader& claim, Finding& finding) {
   finding.verdict = same ? AuditVerdict::holds : AuditVerdict::contradicted;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

@@ -2,7 +2,7 @@
 #include "tpm/law/kernel.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::contact {
 
 /// Energy stored in a contact that answers by a law with parallel branches on a kernel V,
 ///
@@ -41,4 +41,4 @@ class StoredEnergy {
   double exponent_, share_, k_inf_, k_tension_, relaxing_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::contact

@@ -1,10 +1,11 @@
 #pragma once
 #include <utility>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/printed_number.hpp"
-#include "tpm/fit/claims/claim_reader.hpp"
+#include "tpm/paper/claims/claim_reader.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 
 /// Each fills the verdict and the numbers of a finding from one claim; id, kind and quote are
 /// there already. All throw Error(bad_input) naming the claim.
@@ -35,4 +36,4 @@ void add_check(Finding& finding, std::string what, const DigitCheck& check, cons
 /// Key "printed" of a range or a band: two numbers, low before high.
 [[nodiscard]] std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim);
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

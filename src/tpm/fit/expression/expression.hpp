@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// What one evaluation knows beside the evaluator's symbols and definitions; it comes before them,
 /// values before formulas.
@@ -48,4 +48,4 @@ class Evaluator {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

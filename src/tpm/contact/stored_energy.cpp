@@ -1,4 +1,4 @@
-#include "tpm/law/stored_energy.hpp"
+#include "tpm/contact/stored_energy.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::contact {
 namespace {
 
 double value_or(const LawFile& law, std::string_view name, double otherwise) {
@@ -99,4 +99,4 @@ double StoredEnergy::lasting(double u) const {
   return energy;
 }
 
-}  // namespace tpm
+}  // namespace tpm::contact

@@ -1,4 +1,4 @@
-#include "tpm/fit/claims/cause_search.hpp"
+#include "tpm/paper/claims/cause_search.hpp"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 namespace {
 
 Scope with_value(const Scope& scope, const std::string& name, double si) {
@@ -193,4 +193,4 @@ std::vector<AuditCause> search_causes(const ClaimReader& reader, const ClaimValu
   return causes;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

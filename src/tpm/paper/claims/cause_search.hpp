@@ -2,11 +2,12 @@
 #include <functional>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/printed_number.hpp"
-#include "tpm/fit/claims/audit.hpp"
-#include "tpm/fit/claims/claim_reader.hpp"
+#include "tpm/paper/claims/audit.hpp"
+#include "tpm/paper/claims/claim_reader.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 
 /// Asks which changed input would give a printed number that the formula does not give:
 ///  1. other printed values of an input, in the whole formula or in single terms of a sum (so that
@@ -22,4 +23,4 @@ namespace tpm::study {
                                                     const std::vector<AuditInput>& inputs,
                                                     std::size_t limit = 4);
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

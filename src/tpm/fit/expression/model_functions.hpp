@@ -4,7 +4,7 @@ namespace mu {
 class Parser;
 }
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// Makes the element of tpm_element.hpp callable in formulas, all arguments and results SI:
 ///
@@ -19,4 +19,4 @@ namespace tpm::study {
 /// A call with parameters out of range throws Error(bad_input).
 void define_model_functions(mu::Parser& parser);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -3,10 +3,11 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/fit/claims/audit.hpp"
-#include "tpm/fit/claims/claims.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/paper/claims/audit.hpp"
+#include "tpm/paper/claims/claims.hpp"
 
-namespace tpm::study {
+namespace tpm::paper {
 
 /// Reads the keys of one claim and evaluates formulas in its scope. Errors name file and claim.
 class ClaimReader {
@@ -74,4 +75,4 @@ class ClaimValue {
   std::string expression_;
 };
 
-}  // namespace tpm::study
+}  // namespace tpm::paper

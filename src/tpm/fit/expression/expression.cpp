@@ -1,4 +1,4 @@
-#include "tpm/fit/claims/expression.hpp"
+#include "tpm/fit/expression/expression.hpp"
 
 #include <fmt/format.h>
 #include <muParser.h>
@@ -8,10 +8,11 @@
 #include <set>
 
 #include "tpm/base/lists.hpp"
-#include "tpm/fit/claims/model_functions.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/fit/expression/model_functions.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr int kDeepestDefinition = 50;
@@ -219,4 +220,4 @@ std::vector<std::string> Evaluator::inputs(const std::string& text, const Scope&
   return {found.begin(), found.end()};
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

@@ -1,9 +1,10 @@
 #pragma once
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/organ/balance/quasistatic.hpp"
 
-namespace tpm::organ {
+namespace tpm::contact {
 
 /// A motion along which a reduced model is compared with the network when it is built: to a depth,
 /// a hold, a release and a rest of one length each, in steps of one length.
@@ -45,4 +46,4 @@ struct WeightedTime {
                                                            const Probes& probes,
                                                            const ComparedMotions& asked);
 
-}  // namespace tpm::organ
+}  // namespace tpm::contact
