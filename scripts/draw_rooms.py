@@ -28,7 +28,15 @@ def rows_after(text: str, heading: str) -> list:
 
 
 def rooms_of(page: str) -> dict:
+    """The folders of each room, in order."""
     return {row[0]: row[1].split(", ") for row in rows_after(page, "| room |")}
+
+
+def needs_of(root: Path) -> dict:
+    """The rooms that each room needs, from tpm_room() in CMakeLists.txt."""
+    text = (root / "CMakeLists.txt").read_text(encoding="utf-8")
+    called = re.findall(r"^tpm_room\((\w+)(?: NEEDS ([a-z ]+?))?(?: LINKS .*)?\)$", text, re.M)
+    return {room: needs.split() for room, needs in called}
 
 
 def flows_of(page: str) -> dict:
@@ -42,25 +50,46 @@ def flows_of(page: str) -> dict:
 
 
 def public_headers(root: Path) -> dict:
-    """The folder of src/tpm that implements each public header, from docs/library.md."""
+    """The room of src/tpm that implements each public header, from docs/library.md."""
     rows = rows_after((root / "docs/library.md").read_text(encoding="utf-8"), "| header |")
     return {row[0].strip("`"): row[3] for row in rows}
 
 
+def files(root: Path):
+    """Every header and source of the library."""
+    return sorted((root / "src/tpm").rglob("*.[ch]pp"))
+
+
+def folder_of(file: Path) -> str:
+    """Of a file below src/tpm, such as law/bond."""
+    parts = file.parent.parts
+    return "/".join(parts[parts.index("tpm", parts.index("src")) + 1:])
+
+
 def includes(root: Path):
-    """Pairs of folders, the one that includes first, with the file."""
+    """Pairs of folders, the one that includes first, with the file; a public header counts as its room's own folder only
+    between rooms."""
     public = public_headers(root)
-    for file in sorted((root / "src/tpm").glob("*/*.[ch]pp")):
-        here = file.parent.name
+    for file in files(root):
+        here = folder_of(file)
         for place, name in re.findall(r'#include "(tpm|tpmkit)/([\w/.]+)"', file.read_text(encoding="utf-8")):
-            there = name.split("/")[0] if place == "tpm" else public.get(name)
-            if there and there != here:
-                yield here, there, file
+            there = name.rpartition("/")[0] if place == "tpm" else public.get(name)
+            if not there or there == here or place == "tpmkit" and there == here.split("/")[0]:
+                continue
+            yield here, there, file
 
 
-def arrows(root: Path, rooms: dict) -> list:
-    room_of = {folder: room for room, folders in rooms.items() for folder in folders}
-    return sorted({(room_of[a], room_of[b]) for a, b, _ in includes(root) if room_of[a] != room_of[b]})
+def arrows(root: Path) -> list:
+    pairs = ((a.split("/")[0], b.split("/")[0]) for a, b, _ in includes(root))
+    return sorted({(a, b) for a, b in pairs if a != b})
+
+
+def floors(pairs: list) -> int:
+    """How many rooms stand on one another, the longest way down."""
+    def height(room, seen=()):
+        return 1 + max((height(b, (*seen, room)) for a, b in pairs if a == room and b not in seen), default=0)
+
+    return max(height(room) for room in {a for a, _ in pairs})
 
 
 def nearest(pairs: list) -> list:
@@ -85,7 +114,6 @@ def nearest(pairs: list) -> list:
 def drawing(root: Path) -> str:
     page = (root / "docs/architecture.md").read_text(encoding="utf-8")
     rooms = rooms_of(page)
-    room_of = {folder: room for room, folders in rooms.items() for folder in folders}
     names = list(reversed(rooms))  # the ground at the bottom
     y_of = {name: TOP + i * (BOX_HEIGHT + GAP) for i, name in enumerate(names)}
     height = TOP + len(names) * (BOX_HEIGHT + GAP) + 20
@@ -94,7 +122,7 @@ def drawing(root: Path) -> str:
            '<defs><marker id="tip" markerWidth="8" markerHeight="8" refX="7" refY="4" orient="auto">'
            '<path d="M0,0 L8,4 L0,8 z" fill="#888"/></marker></defs>']
     # Includes: a curve at the left of the boxes, further out the further it reaches.
-    for i, (a, b) in enumerate(nearest(arrows(root, rooms))):
+    for i, (a, b) in enumerate(nearest(arrows(root))):
         span = names.index(b) - names.index(a)
         start, end = y_of[a] + BOX_HEIGHT - 12, y_of[b] + 12 + 3 * (i % 4)
         if span == 1:
@@ -109,12 +137,12 @@ def drawing(root: Path) -> str:
         y = y_of[name]
         out.append(f'<rect x="{LEFT}" y="{y}" width="{BOX_WIDTH}" height="{BOX_HEIGHT}" rx="6" fill="#f3f1ec" stroke="#555"/>')
         out.append(f'<text x="{LEFT + 12}" y="{y + 20}" font-weight="bold">{escape(name)}</text>')
-        out.append(f'<text x="{LEFT + 12}" y="{y + 38}" fill="#333">{escape(", ".join(rooms[name]))}</text>')
+        out.append(f'<text x="{LEFT + 12}" y="{y + 38}" fill="#333">{escape(", ".join(f for f in rooms[name] if f != "."))}</text>')
     # Flows: a line at the right through the rooms of its steps.
     for i, (flow, steps) in enumerate(flows_of(page).items()):
         x = LEFT + BOX_WIDTH + 70 + 150 * i
         headers = public_headers(root)
-        at = [room_of[headers[h.split("/")[1]] if h.startswith("tpmkit/") else h.split("/")[0]] for _, h, _ in steps]
+        at = [headers[h.split("/")[1]] if h.startswith("tpmkit/") else h.split("/")[0] for _, h, _ in steps]
         visited = [at[0]] + [b for a, b in zip(at, at[1:]) if a != b]
         colour = COLOURS[i]
         path, drop = [], {}

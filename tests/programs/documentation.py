@@ -6,7 +6,6 @@
 - every relative link in a Markdown page leads to a file, and its anchor to a heading;
 - every docs/PAGE.md named in a source, a script or a page exists;
 - docs/README.md links every page of docs;
-- a folder of src/tpm includes only those below it in the list of docs/architecture.md;
 - paper/paper.md shows every figure of paper/figures, cites every entry of paper/paper.bib and nothing else, and names
   only files that exist;
 - the groups of `tpm --help` and of the README hold the same commands, each once;
@@ -75,23 +74,6 @@ def unlisted_pages(root):
             yield f"docs/README.md: does not list {page.name}"
 
 
-def upward_includes(root):
-    text = (root / "docs/architecture.md").read_text(encoding="utf-8")
-    order = re.findall(r"^    (\w+)/ +\w", text, re.M)
-    folders = sorted(d.name for d in (root / "src/tpm").iterdir() if d.is_dir())
-    for folder in folders:
-        if folder not in order:
-            yield f"docs/architecture.md: does not list src/tpm/{folder}"
-    for name in order:
-        if name not in folders:
-            yield f"docs/architecture.md: lists {name}, which is not in src/tpm"
-    for file in tracked(root / "src/tpm", ".hpp", ".cpp"):
-        here = file.relative_to(root / "src/tpm").parts[0]
-        for other in re.findall(r'#include "tpm/(\w+)/', file.read_text(encoding="utf-8")):
-            if here in order and other in order and order.index(other) < order.index(here):
-                yield f"{file.relative_to(root)}: includes {other}, which is above {here}"
-
-
 def faults_of_paper(root):
     page = (root / "paper/paper.md").read_text(encoding="utf-8")
     body = re.sub(r"\A---\n.*?\n---\n", "", page, flags=re.S)
@@ -142,8 +124,8 @@ def without_example(root, program):
 
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
-    faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *upward_includes(root),
-              *faults_of_paper(root), *differing_groups(root, program), *without_example(root, program)]
+    faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *faults_of_paper(root),
+              *differing_groups(root, program), *without_example(root, program)]
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")
