@@ -97,7 +97,7 @@ void require_text(std::string_view text, std::string_view where) {
     const auto position = static_cast<std::size_t>(invalid - text.begin());
     throw bad_input(at_line(where, line_of(text, position)),
                     fmt::format("byte 0x{:02X} is not UTF-8", static_cast<unsigned char>(*invalid)),
-                    fmt::format("{} (older Windows exports are latin-1)", kTextExpected));
+                    fmt::format("{} (older Windows exports: --encoding latin-1)", kTextExpected));
   }
 }
 
@@ -143,27 +143,134 @@ bool holds_outside_quotes(std::string_view line, char wanted) {
   return false;
 }
 
-char find_separator(std::string_view text) {
-  constexpr std::size_t kSample = 200;
+/// Lines from all over a text: a preamble may be longer than the samples that a start would show.
+std::vector<std::string_view> sampled_lines(std::string_view text) {
+  constexpr std::size_t kAtStart = 500, kPlaces = 16, kAtPlace = 40;
   std::vector<std::string_view> sample;
-  LineReader lines(text);
-  std::string_view line;
-  while (sample.size() < kSample && lines.next(line)) {
-    if (!is_blank(line) && !line.starts_with('#')) sample.push_back(line);
+  const auto take = [&sample](std::string_view part, std::size_t most) {
+    LineReader lines(part);
+    std::string_view line;
+    for (std::size_t taken = 0; taken < most && lines.next(line);) {
+      if (is_blank(line) || line.starts_with('#')) continue;
+      sample.push_back(line);
+      ++taken;
+    }
+    return sample.size() < most;
+  };
+  if (take(text, kAtStart)) return sample;
+  for (std::size_t place = 1; place <= kPlaces; ++place) {
+    const auto feed = text.find_first_of("\r\n", place * (text.size() / (kPlaces + 1)));
+    if (feed != std::string_view::npos) take(text.substr(feed), kAtPlace);
   }
+  return sample;
+}
+
+std::string_view without_blanks(std::string_view field) noexcept {
+  const auto first = field.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return field.substr(first, field.find_last_not_of(" \t") - first + 1);
+}
+
+/// What stands between quotes, or the field itself.
+std::string_view without_quotes(std::string_view field) noexcept {
+  const bool quoted = field.size() > 1 && field.front() == '"' && field.back() == '"';
+  return quoted ? without_blanks(field.substr(1, field.size() - 2)) : field;
+}
+
+/// The fields of a line as far as a separator can be told from them: quotes keep their content.
+std::vector<std::string_view> rough_fields(std::string_view line, char separator) {
+  std::vector<std::string_view> fields;
+  bool quoted = false;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i <= line.size(); ++i) {
+    const bool end = i == line.size();
+    if (!end && line[i] == '"') quoted = !quoted;
+    const bool blank = separator == ' ' && !end && line[i] == '\t';
+    if (!end && (quoted || (line[i] != separator && !blank))) continue;
+    const std::string_view field = without_quotes(without_blanks(line.substr(begin, i - begin)));
+    if (separator != ' ' || !field.empty()) fields.push_back(field);
+    begin = i + 1;
+  }
+  return fields;
+}
+
+/// A field that another separator would cut into several numbers.
+bool holds_several_numbers(std::string_view field) {
+  if (is_number_in_some_style(field)) return false;
+  for (const char other : {'\t', ';', ',', ' '}) {
+    if (field.find(other) == std::string_view::npos) continue;
+    const auto parts = rough_fields(field, other);
+    if (parts.size() > 1 && std::all_of(parts.begin(), parts.end(), is_number_in_some_style)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Two or more numbers, which are most of what the line holds, and nothing left to cut.
+bool is_row_of_numbers(std::string_view line, char separator) {
+  std::size_t numbers = 0, filled = 0;
+  for (const std::string_view field : rough_fields(line, separator)) {
+    if (field.empty()) continue;
+    ++filled;
+    if (is_number_in_some_style(field)) {
+      ++numbers;
+    } else if (holds_several_numbers(field)) {
+      return false;
+    }
+  }
+  return numbers >= 2 && 2 * numbers > filled;
+}
+
+/// The separator that makes the most rows of numbers; without any, the first that stands in at
+/// least half of the lines.
+char find_separator(std::string_view text) {
+  constexpr auto kCandidates = std::to_array({'\t', ';', ',', ' '});
+  const std::vector<std::string_view> sample = sampled_lines(text);
+  const auto lines_with = [&](auto&& holds) {
+    return static_cast<std::size_t>(std::count_if(sample.begin(), sample.end(), holds));
+  };
+  char best = '\0';
+  std::size_t most = 0;
+  for (const char candidate : kCandidates) {
+    const std::size_t rows = lines_with(
+        [candidate](std::string_view line) { return is_row_of_numbers(line, candidate); });
+    if (rows > most) best = candidate;
+    most = std::max(most, rows);
+  }
+  if (most > 0) return best;
   for (const char candidate : {'\t', ';', ','}) {
-    const auto n = std::count_if(
-        sample.begin(), sample.end(),
-        [candidate](std::string_view sampled) { return holds_outside_quotes(sampled, candidate); });
-    if (n > 0 && 2 * static_cast<std::size_t>(n) >= sample.size()) return candidate;
+    const std::size_t n = lines_with(
+        [candidate](std::string_view line) { return holds_outside_quotes(line, candidate); });
+    if (n > 0 && 2 * n >= sample.size()) return candidate;
   }
   return ',';
+}
+
+/// True if a field of the line begins with a quote. Quotes elsewhere are letters: G", or inches.
+bool has_quoted_field(std::string_view line, char separator) {
+  bool begins = true;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == separator) {
+      begins = true;
+      continue;
+    }
+    if (line[i] == ' ' || line[i] == '\t') continue;
+    if (begins && line[i] == '"') {
+      // A quote alone in its field is an inch.
+      const auto next = line.find_first_not_of(" \t", i + 1);
+      if (next != std::string_view::npos && line[next] != separator) return true;
+      if (line.find('"', i + 1) != std::string_view::npos) return true;
+    }
+    begins = false;
+  }
+  return false;
 }
 
 /// More fields than a text can have: fields must not move once a row looks at them.
 std::size_t most_fields(std::string_view text, char separator) {
   const auto ends = std::count_if(text.begin(), text.end(), [separator](char c) {
-    return c == separator || c == '\n' || c == '\r';
+    return c == separator || c == '\n' || c == '\r' || (separator == ' ' && c == '\t');
   });
   return static_cast<std::size_t>(ends) + 1;
 }
@@ -198,7 +305,12 @@ class RowParser {
   /// `line` is a part of the text. False if libcsv finds a quote where none belongs.
   bool feed(std::string_view line, int line_number) {
     if (!open_) line_ = line_number;
-    if (!open_ && line.find('"') == std::string_view::npos) {
+    if (separator_ == ' ') {
+      cut_at_blanks(line);
+      return true;
+    }
+    if (!open_ &&
+        (line.find('"') == std::string_view::npos || !has_quoted_field(line, separator_))) {
       cut(line);
       return true;
     }
@@ -215,6 +327,21 @@ class RowParser {
       text_.fields.push_back(without_space(line.substr(0, end)));
       if (end == std::string_view::npos) break;
       line.remove_prefix(end + 1);
+    }
+    end_row();
+  }
+  /// Blanks in a row count once; a field in quotes keeps its own.
+  void cut_at_blanks(std::string_view line) {
+    for (line = without_blanks(line); !line.empty(); line = without_blanks(line)) {
+      const auto close = line.front() == '"' ? line.find('"', 1) : std::string_view::npos;
+      if (close != std::string_view::npos) {
+        text_.fields.push_back(line.substr(1, close - 1));
+        line.remove_prefix(close + 1);
+        continue;
+      }
+      const auto end = std::min(line.find_first_of(" \t"), line.size());
+      text_.fields.push_back(line.substr(0, end));
+      line.remove_prefix(end);
     }
     end_row();
   }
@@ -255,7 +382,8 @@ class RowParser {
 
 /// Rows, and comments into `comments`. Throws for long lines and misplaced quotes.
 std::vector<DelimitedRow> read_rows(DelimitedText& text, char separator, std::string_view where,
-                                    std::size_t longest_line, std::vector<std::string>& comments) {
+                                    std::size_t longest_line,
+                                    std::vector<DelimitedComment>& comments) {
   RowParser parser(text, separator);
   LineReader lines(text.text);
   std::string_view line;
@@ -268,7 +396,7 @@ std::vector<DelimitedRow> read_rows(DelimitedText& text, char separator, std::st
     if (!parser.inside_row()) {
       if (is_blank(line)) continue;
       if (line.starts_with('#')) {
-        comments.emplace_back(line.substr(1));
+        comments.push_back({lines.number(), std::string(line.substr(1))});
         continue;
       }
     }
@@ -295,8 +423,7 @@ void require_same_width(const std::vector<DelimitedRow>& rows, std::string_view 
   }
 }
 
-bool uses_decimal_comma(const std::vector<DelimitedRow>& rows, char separator) {
-  if (separator == ',') return false;
+bool uses_decimal_comma(const std::vector<DelimitedRow>& rows) {
   bool comma = false;
   for (const DelimitedRow& row : rows) {
     for (const std::string_view field : row.fields) {
@@ -327,6 +454,8 @@ std::string_view separator_name(char separator) noexcept {
       return "tab";
     case ';':
       return "semicolon";
+    case ' ':
+      return "blank";
     default:
       return "comma";
   }
@@ -345,11 +474,10 @@ DelimitedTable parse_delimited(std::string_view bytes, std::string_view where,
   table.rows = read_rows(*text, table.separator, where, options.longest_line, table.comments);
   if (table.rows.empty()) throw bad_input(where, "no rows", "at least one row of fields");
   if (!options.ragged) require_same_width(table.rows, where);
-  table.decimal_comma =
-      options.decimal_comma.value_or(uses_decimal_comma(table.rows, table.separator));
-  if (table.decimal_comma && table.separator == ',') {
+  table.decimal_comma = options.decimal_comma.value_or(uses_decimal_comma(table.rows));
+  if (table.decimal_comma && table.separator == ',' && text->unquoted.empty()) {
     throw bad_input(where, "the comma cannot be both separator and decimal sign",
-                    "another separator");
+                    "another separator, or numbers in quotes");
   }
   return table;
 }

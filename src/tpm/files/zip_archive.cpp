@@ -82,7 +82,7 @@ Error damaged(const std::string& place) {
   return bad_input(place, "the ZIP archive is damaged", "the file as the instrument wrote it");
 }
 
-constexpr std::size_t kLongestName = 1024;
+constexpr std::size_t kLongestEntryName = 1024;
 
 /// Unpacks the current member, whose size was checked.
 std::string unpacked(unzFile archive, std::uint64_t size, const std::string& place) {
@@ -116,11 +116,12 @@ ZipArchive::ZipArchive(std::string_view bytes, std::string file)
   int state = unzGoToFirstFile(archive.get());
   for (; state == UNZ_OK; state = unzGoToNextFile(archive.get())) {
     unz_file_info64 info{};
-    std::array<char, kLongestName + 1> name{};
+    std::array<char, kLongestEntryName + 1> name{};
     unz64_file_pos place{};
-    if (unzGetCurrentFileInfo64(archive.get(), &info, name.data(), kLongestName, nullptr, 0,
+    if (unzGetCurrentFileInfo64(archive.get(), &info, name.data(), kLongestEntryName, nullptr, 0,
                                 nullptr, 0) != UNZ_OK ||
-        info.size_filename > kLongestName || unzGetFilePos64(archive.get(), &place) != UNZ_OK) {
+        info.size_filename > kLongestEntryName ||
+        unzGetFilePos64(archive.get(), &place) != UNZ_OK) {
       throw damaged(file_);
     }
     std::string text(name.data(), info.size_filename);

@@ -9,6 +9,7 @@
 #include "tpm/base/median.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/import/reading_options.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -322,29 +323,16 @@ namespace {
 
 Json import_json(const ImportOptions& import) {
   Json j = Json::object();
-  const auto put = [&](const char* key, const std::string& value) {
-    if (!value.empty()) j[key] = value;
-  };
-  put("time", import.time_column);
-  put("drive", import.drive_column);
-  put("response", import.response_column);
-  put("sd", import.sd_column);
-  put("frequency", import.frequency_column);
-  put("storage", import.storage_column);
-  put("loss", import.loss_column);
-  if (import.drive_quantity) j["drive_quantity"] = quantity_name(*import.drive_quantity);
-  if (import.response_quantity) j["response_quantity"] = quantity_name(*import.response_quantity);
+  for (const auto& [key, text] : reading_texts(import)) {
+    if (key == "segments") {
+      j[key] = import.segments;
+    } else if (text == "true") {
+      j[key] = true;
+    } else {
+      j[key] = text;
+    }
+  }
   if (!import.units.empty()) j["units"] = import.units;
-  if (import.negate_drive) j["negate_drive"] = true;
-  if (import.negate_response) j["negate_response"] = true;
-  if (import.rest_length_m) {
-    j["rest_length"] = fmt::format("{} mm", shortest(1e3 * *import.rest_length_m));
-  }
-  if (import.spring_constant_N_per_m) {
-    j["spring_constant"] = fmt::format("{} N/m", shortest(*import.spring_constant_N_per_m));
-  }
-  if (!import.segments.empty()) j["segments"] = import.segments;
-  if (import.area_m2) j["area"] = fmt::format("{} mm^2", shortest(1e6 * *import.area_m2));
   return j;
 }
 

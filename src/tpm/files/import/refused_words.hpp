@@ -1,0 +1,21 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tpm {
+
+/// Why a title that names a quantity does not name its measurement: "Displacement command" is what
+/// was asked for, "Max. load" a limit or a summary, "Load cell temperature" another quantity.
+struct RefusedWord {
+  std::string word;      ///< as it stands among `words`
+  std::string_view why;  ///< "is what was asked for, not what was measured"
+};
+
+/// The first word of a title that refuses it a meaning, in English, French, German, Spanish or
+/// Italian.
+/// @param words of the title, in small letters without accents
+[[nodiscard]] std::optional<RefusedWord> find_refused_word(const std::vector<std::string>& words);
+
+}  // namespace tpm
