@@ -72,12 +72,21 @@ ImportOptions import_options(const RecordingOptions& options) {
   return reading_of(options.reading);
 }
 
-std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) {
+PreparedRecording prepared(const std::string& name, RecordingFile file,
+                           const RecordingOptions& options) {
   PhaseOptions phases;
   if (!options.contact_response.empty()) {
     phases.contact_response =
         parse_quantity(options.contact_response, Dimension::force, "--contact-force");
   }
+  std::string read_as = columns_words(file.findings);
+  PreparedRecording recording = prepare_recording(name, std::move(file.recording), phases);
+  recording.import = import_options(options);
+  recording.read_as = std::move(read_as);
+  return recording;
+}
+
+std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) {
   const ImportOptions import = import_options(options);
   std::vector<PreparedRecording> recordings;
   recordings.reserve(options.files.size());
@@ -88,11 +97,7 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
       throw Error(ExitCode::usage, "FILE", fmt::format("'{}' is given twice", printable(file)),
                   "each recording once");
     }
-    RecordingFile read = read_recording_file(file, import);
-    std::string read_as = columns_words(read.findings);
-    recordings.push_back(prepare_recording(file, std::move(read.recording), phases));
-    recordings.back().import = import;
-    recordings.back().read_as = std::move(read_as);
+    recordings.push_back(prepared(file, read_recording_file(file, import), options));
   }
   return recordings;
 }

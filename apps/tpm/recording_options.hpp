@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/files/import/import.hpp"
+#include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 
 namespace tpm::app {
@@ -38,6 +39,10 @@ void add_recording_options(CLI::App& command, RecordingOptions& options);
 
 /// Reads and prepares every file.
 [[nodiscard]] std::vector<PreparedRecording> read_recordings(const RecordingOptions& options);
+
+/// Prepares a recording that was read.
+[[nodiscard]] PreparedRecording prepared(const std::string& name, RecordingFile file,
+                                         const RecordingOptions& options);
 
 /// --family classical|fractional|all.
 void add_family_option(CLI::App& command, std::string& family);

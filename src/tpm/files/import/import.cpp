@@ -10,6 +10,7 @@
 
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/assemble.hpp"
+#include "tpm/files/import/file_kind.hpp"
 #include "tpm/files/import/import_digitizer.hpp"
 #include "tpm/files/import/import_jpk.hpp"
 #include "tpm/files/import/import_machine.hpp"
@@ -163,6 +164,9 @@ DigitizedAxis parse_axis(std::string_view text, std::string_view where) {
 
 ImportedFile import_series(const std::filesystem::path& path, const ImportOptions& options) {
   ImportInput input(read_file(path), path.string(), options);
+  if (const auto other = find_other_kind(input.bytes(), input.file())) {
+    throw bad_input(input.file(), other->what, other->expected);
+  }
   const Importer& importer = importer_of(input);
   if (importer.name != "jpk" && !options.segments.empty()) {
     throw bad_input(input.file(), "is no JPK force file",

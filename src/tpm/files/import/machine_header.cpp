@@ -66,7 +66,8 @@ std::string sheet_name(const HeaderRow& row) {
   std::string name;
   for (const std::string& cell : row.cells) {
     if (cell.empty()) continue;
-    if (!name.empty() && cell != name) return {};
+    const bool mark = cell.front() == '<';  // <DATA>
+    if (mark || (!name.empty() && cell != name)) return {};
     name = cell;
   }
   return name;

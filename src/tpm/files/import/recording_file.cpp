@@ -143,6 +143,9 @@ std::string recording_label(const fs::path& path, std::string_view key,
 
 MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& options) {
   const std::string file = path.string();
+  if (file == "-") {
+    throw bad_input("-", "is no file", "a file, or /dev/stdin for what a pipe brings");
+  }
   if (is_described(path)) {
     if (curve_kind_of(path) == "spectrum") return SpectrumFile{load_spectrum(file), {}};
     return read_described(path, options);

@@ -36,6 +36,11 @@ double start_drive(const PreparedRecording& r) {
                                                        : r.recording.drive.front();
 }
 
+bool is_only_a_hold(const PreparedRecording& r) {
+  return std::all_of(r.phases.phases.begin(), r.phases.phases.end(),
+                     [](const Phase& phase) { return phase.kind == PhaseKind::hold; });
+}
+
 Sizes sizes_of(std::span<const PreparedRecording> recordings) {
   Sizes sizes;
   sizes.shortest_s = std::numeric_limits<double>::infinity();
@@ -52,10 +57,23 @@ Sizes sizes_of(std::span<const PreparedRecording> recordings) {
   };
   const std::string where = fmt::format("recording '{}'", first.name);
   const bool down = falls(first.recording.drive, sizes.drive);
-  if (down || falls(first.recording.response, sizes.response)) {
-    throw bad_input(where, fmt::format("the {} falls", down ? "drive" : "response"),
-                    "values that rise with the load: --negate-drive, --negate-response or both, if "
-                    "the machine counts them the other way");
+  const bool response_down = falls(first.recording.response, sizes.response);
+  if (is_only_a_hold(first)) {
+    throw bad_input(where, "only a hold: the drive stays where it is from the first sample on",
+                    "the recording from before the ramp on (nothing else tells how the response "
+                    "began), or a strain and a stress, which make a relaxation modulus");
+  }
+  if (down || response_down) {
+    throw bad_input(where,
+                    fmt::format("the {} where the load rises", down && response_down
+                                                                   ? "drive and the response fall"
+                                                               : down ? "drive falls"
+                                                                      : "response falls"),
+                    fmt::format("{}, if the machine counts {} the other way",
+                                down && response_down ? "--negate-drive --negate-response"
+                                : down                ? "--negate-drive"
+                                                      : "--negate-response",
+                                down && response_down ? "them" : "it"));
   }
   throw bad_input(where,
                   sizes.drive > 0.0 ? "the response never rises above where it starts"
