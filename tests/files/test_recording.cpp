@@ -264,9 +264,9 @@ TEST_CASE("recordings in which little happens get an explained answer") {
 
   Recording upside_down = made(kRampHold, Making{});
   for (double& force : upside_down.response) force = -force;
-  CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate response"));
+  CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate-response"));
   for (double& depth : upside_down.drive) depth = -depth;
-  CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate drive"));
+  CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate-drive"));
 }
 
 TEST_CASE("what cannot be cut into phases is refused") {

@@ -216,7 +216,7 @@ TEST_CASE("what was asked for, limits and other quantities have no meaning") {
              Catch::StartsWith("read as ") &&
                  Contains("no meaning: column 2 'Depth command': 'command' is what was asked for"));
   // Alone, such a column is not taken either; the option that takes it is named.
-  CHECK_THAT(read.refusal("Time [s],Depth command [mm],x,Force [N]\n" + rows),
+  CHECK_THAT(read.refusal("Time [s],Depth command [mm],Channel 3,Force [N]\n" + rows),
              Contains("--drive 2 to take this one"));
 }
 
@@ -302,7 +302,7 @@ TEST_CASE("tables in every layout give the same recording") {
   }
   // Decimal commas between separating commas: nothing tells them apart.
   CHECK_THAT(read.refusal("Time [s],Depth [mm]\n0,05,0,12\n0,15,0,25\n0,25,0,31\n"),
-             Contains("decimal commas cannot be told from separators"));
+             Contains("commas in numbers cannot be told from separators"));
   // Two blocks that both may be meant.
   const std::string two = titles + rows + "Zweiter Versuch\n" + titles + rows;
   CHECK_THAT(read.refusal(two), Contains("holds 2 blocks of samples") && Contains("--block"));

@@ -208,13 +208,17 @@ bool holds_several_numbers(std::string_view field) {
 }
 
 /// Two or more numbers, which are most of what the line holds, and nothing left to cut.
-bool is_row_of_numbers(std::string_view line, char separator) {
+/// @param labelled  the line may begin with a text
+bool is_row_of_numbers(std::string_view line, char separator, bool labelled) {
   std::size_t numbers = 0, filled = 0;
   for (const std::string_view field : rough_fields(line, separator)) {
     if (field.empty()) continue;
+    const bool digits = field.front() >= '0' && field.front() <= '9';  // a date or a clock
     ++filled;
     if (is_number_in_some_style(field)) {
       ++numbers;
+    } else if (!labelled && filled == 1 && !digits) {
+      return false;
     } else if (holds_several_numbers(field)) {
       return false;
     }
@@ -230,15 +234,17 @@ char find_separator(std::string_view text) {
   const auto lines_with = [&](auto&& holds) {
     return static_cast<std::size_t>(std::count_if(sample.begin(), sample.end(), holds));
   };
-  char best = '\0';
-  std::size_t most = 0;
-  for (const char candidate : kCandidates) {
-    const std::size_t rows = lines_with(
-        [candidate](std::string_view line) { return is_row_of_numbers(line, candidate); });
-    if (rows > most) best = candidate;
-    most = std::max(most, rows);
+  for (const bool labelled : {false, true}) {
+    char best = '\0';
+    std::size_t most = 0;
+    for (const char candidate : kCandidates) {
+      const std::size_t rows = lines_with(
+          [&](std::string_view line) { return is_row_of_numbers(line, candidate, labelled); });
+      if (rows > most) best = candidate;
+      most = std::max(most, rows);
+    }
+    if (most > 0) return best;
   }
-  if (most > 0) return best;
   for (const char candidate : {'\t', ';', ','}) {
     const std::size_t n = lines_with(
         [candidate](std::string_view line) { return holds_outside_quotes(line, candidate); });

@@ -353,7 +353,8 @@ std::optional<ColumnTitle> split_at(std::string_view title, std::string_view sep
   const auto cut = title.rfind(separator);
   if (cut == std::string_view::npos || cut == 0) return std::nullopt;
   const auto unit = trimmed(title.substr(cut + separator.size()));
-  if (unit.empty() || !is_unit(unit) || is_plain_number(unit)) return std::nullopt;
+  const bool known = is_unit(unit) || is_foreign_unit(unit);
+  if (unit.empty() || !known || is_plain_number(unit)) return std::nullopt;
   return ColumnTitle{std::string(trimmed(title.substr(0, cut))), std::string(unit)};
 }
 
@@ -364,7 +365,9 @@ std::optional<ColumnTitle> split_known(std::string_view title, std::string_view 
   if (!split) return std::nullopt;
   const auto meaning = recognize_title(split->name);
   if (!meaning) return std::nullopt;
-  return is_dimension_of(*meaning, parse_unit(split->unit, {}).dimension) ? split : std::nullopt;
+  const bool fits =
+      is_unit(split->unit) && is_dimension_of(*meaning, parse_unit(split->unit, {}).dimension);
+  return fits || is_foreign_unit(split->unit) ? split : std::nullopt;
 }
 
 }  // namespace
@@ -450,9 +453,9 @@ std::optional<Recognized> recognize_title(std::string_view name) {
 std::optional<RefusedTitle> refused_title(std::string_view name) {
   if (recognize_primes(name) || recognize_step_response(name)) return std::nullopt;
   const std::vector<std::string> words = words_of(spelled_out(name));
-  const auto known = recognize_words(words);
-  if (!known || known->role == ColumnRole::sd) return std::nullopt;
   const auto refused = find_refused_word(words);
+  const auto known = recognize_words(with_parts_of_joined(words));
+  if (!known || known->role == ColumnRole::sd) return std::nullopt;
   if (!refused) return std::nullopt;
   return RefusedTitle{*known, fmt::format("'{}' {}", refused->word, refused->why)};
 }

@@ -187,7 +187,7 @@ class SeriesReader {
     const std::size_t all = end_;
     const auto blank = [&](const DelimitedRow& row) {
       return std::all_of(uses.begin(), uses.end(), [&row](const Use& use) {
-        return field_at(row, use.column->index).empty();
+        return use.column->index < row.fields.size() && row.fields[use.column->index].empty();
       });
     };
     while (end_ > header_.block.first + 1 && blank(table_.rows[end_ - 1])) --end_;
@@ -223,7 +223,7 @@ class SeriesReader {
 
   [[nodiscard]] Unit unit_of_use(const Use& use) const {
     if (use.volts) return {"V", Dimension::length, use.column->unit == "mV" ? 1e-3 : 1.0};
-    if (use.clock && use.column->unit.empty()) return parse_unit("s", Dimension::time, file_);
+    if (use.clock) return parse_unit("s", Dimension::time, file_);
     return unit_of(*use.column, dimension_of(use), file_);
   }
 

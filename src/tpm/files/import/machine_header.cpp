@@ -112,12 +112,20 @@ HeaderRows header_rows(const std::vector<HeaderRow>& rows) {
 /// and where titles stand two blanks apart, words one blank apart belong together.
 std::vector<std::string> blank_separated_titles(std::span<const std::string_view> fields,
                                                 std::size_t width) {
+  const std::vector<std::string> as_they_stand{fields.begin(), fields.end()};
+  const auto is_bracket = [](std::string_view field) {
+    return field.starts_with('[') || field.starts_with('(');
+  };
+  const auto brackets = std::count_if(fields.begin(), fields.end(), is_bracket);
+  const bool alike = brackets == 0 || static_cast<std::size_t>(brackets) == fields.size();
+  if (fields.size() == width && alike) return as_they_stand;
   std::vector<std::string> words;
   std::vector<std::string> spaced;
   const char* end = nullptr;
   for (const std::string_view field : fields) {
-    if (words.empty() && (field == "#" || field == "%" || field == "//")) continue;
-    const bool bracket = field.starts_with('[') || field.starts_with('(');
+    const bool mark = field == "#" || field == "%" || field == "//";
+    if (words.empty() && mark) continue;
+    const bool bracket = is_bracket(field);
     if (bracket && !words.empty()) {
       words.back() += fmt::format(" {}", field);
     } else {
@@ -366,15 +374,14 @@ void require_titles_for_fields(const DelimitedTable& table, const MachineHeader&
     titles = std::max(titles, width);
   }
   const DelimitedRow& first = table.rows[header.block.first];
-  const bool points = std::any_of(first.fields.begin(), first.fields.end(), [](auto field) {
-    return field.find('.') != std::string_view::npos;
-  });
-  if (titles == 0 || titles >= header.block.width || points) return;
+  std::size_t filled = first.fields.size();
+  while (filled > 0 && first.fields[filled - 1].empty()) --filled;
+  if (titles == 0 || titles >= filled) return;
   throw bad_input(
       fmt::format("{}:{}", file, first.line),
-      fmt::format("{} fields below {} titles: decimal commas cannot be told from separators",
-                  header.block.width, titles),
-      "another separator than the comma, or numbers in quotes");
+      fmt::format("{} fields below {} titles: commas in numbers cannot be told from separators",
+                  filled, titles),
+      "another separator than the comma, numbers in quotes, or a title for each column");
 }
 
 NumberStyle style_of(const DelimitedTable& table, const MachineHeader& header,

@@ -184,4 +184,18 @@ std::optional<RefusedWord> find_refused_word(const std::vector<std::string>& wor
   return std::nullopt;
 }
 
+std::vector<std::string> with_parts_of_joined(std::vector<std::string> words) {
+  const std::size_t whole = words.size();
+  for (std::size_t i = 0; i < whole; ++i) {
+    for (const RefusingWord& start : kJoinedStarts) {
+      if (words[i].starts_with(start.word)) words.push_back(words[i].substr(start.word.size()));
+    }
+    for (const RefusingWord& end : kJoinedEnds) {
+      if (!words[i].ends_with(end.word)) continue;
+      words.push_back(words[i].substr(0, words[i].size() - end.word.size()));
+    }
+  }
+  return words;
+}
+
 }  // namespace tpm

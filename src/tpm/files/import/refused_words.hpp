@@ -18,4 +18,7 @@ struct RefusedWord {
 /// @param words of the title, in small letters without accents
 [[nodiscard]] std::optional<RefusedWord> find_refused_word(const std::vector<std::string>& words);
 
+/// The words, and what is left of joined ones: "sollkraft" also as "kraft".
+[[nodiscard]] std::vector<std::string> with_parts_of_joined(std::vector<std::string> words);
+
 }  // namespace tpm

@@ -41,7 +41,40 @@ bool is_only_a_hold(const PreparedRecording& r) {
                      [](const Phase& phase) { return phase.kind == PhaseKind::hold; });
 }
 
+/// Loading that falls much farther than it rises is counted the other way.
+bool falls_instead(const std::vector<double>& values, double noise_sd) {
+  constexpr double kMuch = 3.0, kNoise = 20.0;
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const double fall = values.front() - *low, rise = *high - values.front();
+  return fall > kMuch * std::max(rise, 0.0) && fall > kNoise * noise_sd;
+}
+
+/// Refuses a force or a depth that is counted negative, naming the option that turns it.
+void require_rise(const PreparedRecording& r) {
+  const std::vector<double>& drive = r.recording.drive;
+  const auto loaded =
+      std::max_element(drive.begin(), drive.end()) - drive.begin() + std::ptrdiff_t{1};
+  const bool down = falls_instead(drive, r.phases.drive_jitter_sd);
+  const std::vector<double>& all = r.recording.response;
+  const std::vector<double> response(all.begin(), down ? all.end() : all.begin() + loaded);
+  const bool response_down = falls_instead(response, r.phases.noise_sd_estimate);
+  if (!down && !response_down) return;
+  const bool both = down && response_down;
+  throw bad_input(fmt::format("recording '{}'", r.name),
+                  fmt::format("the {} where the load rises", both   ? "drive and the response fall"
+                                                             : down ? "drive falls"
+                                                                    : "response falls"),
+                  fmt::format("{}, if the machine counts {} the other way",
+                              both   ? "--negate-drive --negate-response"
+                              : down ? "--negate-drive"
+                                     : "--negate-response",
+                              both ? "them" : "it"));
+}
+
 Sizes sizes_of(std::span<const PreparedRecording> recordings) {
+  for (const PreparedRecording& r : recordings) {
+    if (!is_only_a_hold(r)) require_rise(r);
+  }
   Sizes sizes;
   sizes.shortest_s = std::numeric_limits<double>::infinity();
   for (const PreparedRecording& r : recordings) {
@@ -52,28 +85,11 @@ Sizes sizes_of(std::span<const PreparedRecording> recordings) {
   }
   if (sizes.drive > 0.0 && sizes.response > 0.0) return sizes;
   const PreparedRecording& first = recordings.front();
-  const auto falls = [](const std::vector<double>& values, double rise) {
-    return values.front() - *std::min_element(values.begin(), values.end()) > std::max(rise, 0.0);
-  };
   const std::string where = fmt::format("recording '{}'", first.name);
-  const bool down = falls(first.recording.drive, sizes.drive);
-  const bool response_down = falls(first.recording.response, sizes.response);
   if (is_only_a_hold(first)) {
     throw bad_input(where, "only a hold: the drive stays where it is from the first sample on",
                     "the recording from before the ramp on (nothing else tells how the response "
                     "began), or a strain and a stress, which make a relaxation modulus");
-  }
-  if (down || response_down) {
-    throw bad_input(where,
-                    fmt::format("the {} where the load rises", down && response_down
-                                                                   ? "drive and the response fall"
-                                                               : down ? "drive falls"
-                                                                      : "response falls"),
-                    fmt::format("{}, if the machine counts {} the other way",
-                                down && response_down ? "--negate-drive --negate-response"
-                                : down                ? "--negate-drive"
-                                                      : "--negate-response",
-                                down && response_down ? "them" : "it"));
   }
   throw bad_input(where,
                   sizes.drive > 0.0 ? "the response never rises above where it starts"
