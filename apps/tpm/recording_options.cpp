@@ -36,7 +36,9 @@ void add_reading_options(CLI::App& command, ReadingArguments& arguments, const c
       continue;
     }
     const std::string names = key == "from" ? std::string(from) : option_name(key);
-    command.add_option(names, arguments.texts[key], meaning)->group(group);
+    CLI::Option* added = command.add_option(names, arguments.texts[key], meaning)->group(group);
+    const std::vector<std::string> choices = CLI::detail::split(std::string(option.choices), ',');
+    if (!option.choices.empty()) added->check(CLI::IsMember(choices));
   }
   command
       .add_option("--unit", arguments.units, "Unit of a column, e.g. \"Force=N\" (may be repeated)")

@@ -16,6 +16,13 @@ bool is_height(const MachineColumn& column) {
   return column.meaning && column.meaning->role == ColumnRole::height;
 }
 
+/// The position of a stage beside forces of nN is that of a cantilever's base.
+bool is_travel(const MachineColumn& column) {
+  constexpr int kTravel = 2;  // rank of what is farther from the specimen than a displacement
+  return column.meaning && column.meaning->role == ColumnRole::drive &&
+         column.meaning->rank >= kTravel;
+}
+
 /// The columns of an AFM among those of a series.
 struct CantileverSeries {
   std::optional<std::size_t> height, deflection, force;
@@ -23,12 +30,19 @@ struct CantileverSeries {
 
 CantileverSeries cantilever_series(const ImportedSeries& series,
                                    const std::vector<CantileverColumn>& columns) {
+  constexpr double kSmallForce_N = 1e-9;  // the unit of an AFM
+  const bool small =
+      std::any_of(series.columns.begin(), series.columns.end(), [](const ImportedColumn& column) {
+        return column.quantity == Quantity::contact_force && column.unit.to_si <= kSmallForce_N &&
+               column.unit.dimension == Dimension::force;
+      });
   CantileverSeries found;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const ImportedColumn& column = series.columns[i];
     if (column.bound != Bound::value) continue;
+    const MachineColumn& from = *columns[i].column;
     const bool depth = column.quantity == Quantity::indentation_depth;
-    if (depth && is_height(*columns[i].column)) found.height = i;
+    if (depth && (is_height(from) || (small && is_travel(from)))) found.height = i;
     if (column.quantity != Quantity::contact_force) continue;
     (is_deflection(*columns[i].column) ? found.deflection : found.force) = i;
   }

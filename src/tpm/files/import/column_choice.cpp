@@ -164,7 +164,8 @@ const MachineColumn* ColumnChoice::find(ColumnRole role, const std::string& sele
 
 const MachineColumn* ColumnChoice::refused(ColumnRole role) const {
   for (const MachineColumn& column : header_.columns) {
-    if (column.refused && column.refused->meaning.role == role) return &column;
+    const bool asked = column.refused && column.refused->asked;
+    if (asked && column.refused->meaning.role == role) return &column;
   }
   return nullptr;
 }

@@ -28,7 +28,7 @@ class ColumnChoice {
   [[nodiscard]] const MachineColumn* by_title(ColumnRole role, const char* option,
                                               const Condition& condition = {}) const;
 
-  /// A column whose title would have this role but for a word; null if there is none.
+  /// A column of what was asked for in this role; null if there is none.
   [[nodiscard]] const MachineColumn* refused(ColumnRole role) const;
 
   /// "column 1 'Time', column 2 'Force'"

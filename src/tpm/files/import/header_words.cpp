@@ -457,7 +457,7 @@ std::optional<RefusedTitle> refused_title(std::string_view name) {
   const auto known = recognize_words(with_parts_of_joined(words));
   if (!known || known->role == ColumnRole::sd) return std::nullopt;
   if (!refused) return std::nullopt;
-  return RefusedTitle{*known, fmt::format("'{}' {}", refused->word, refused->why)};
+  return RefusedTitle{*known, fmt::format("'{}' {}", refused->word, refused->why), refused->asked};
 }
 
 bool is_angular(std::string_view name) {

@@ -52,6 +52,7 @@ struct Recognized {
 struct RefusedTitle {
   Recognized meaning;  ///< without that word
   std::string why;     ///< "'command' is what was asked for, not what was measured"
+  bool asked = false;  ///< the quantity as it was asked for, and not another one
 };
 
 /// None for a title that recognize_title recognises, and for one without any known word.

@@ -89,7 +89,8 @@ struct ReadingKey {
 };
 
 constexpr auto kKeys = std::to_array<ReadingKey>({
-    {{"encoding", "auto (UTF-8, UTF-16 with a mark, else latin-1), utf-8 or latin-1"},
+    {{"encoding", "auto (UTF-8, UTF-16 with a mark, else latin-1), utf-8 or latin-1",
+      "auto,utf-8,latin-1"},
      [](ImportOptions& o, Text t, Where w) {
        if (t == kFound) return;
        o.text.latin1 = parse_word(kEncodings, "encoding", t, w);
@@ -98,7 +99,7 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
      [](const ImportOptions& o) {
        return std::string(o.text.latin1 ? "latin-1" : o.text.utf8 ? "utf-8" : "");
      }},
-    {{"separator", "auto, comma, semicolon, tab or blank"},
+    {{"separator", "auto, comma, semicolon, tab or blank", "auto,comma,semicolon,tab,blank"},
      [](ImportOptions& o, Text t, Where w) {
        if (t != kFound) o.text.separator = parse_word(kSeparators, "separator", t, w);
      },
@@ -106,7 +107,7 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
        return text_or_empty<char>(
            o.text.separator, [](const char& c) { return std::string(word_for(kSeparators, c)); });
      }},
-    {{"decimal", "Decimal sign: auto, point or comma"},
+    {{"decimal", "Decimal sign: auto, point or comma", "auto,point,comma"},
      [](ImportOptions& o, Text t, Where w) {
        if (t != kFound) o.text.decimal_comma = parse_word(kDecimals, "decimal sign", t, w);
      },
@@ -116,8 +117,8 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
        });
      }},
     {{"thousands",
-      "Mark between groups of three digits: auto, none, comma, point, apostrophe or "
-      "space"},
+      "Mark between groups of three digits: auto, none, comma, point, apostrophe or space",
+      "auto,none,comma,point,apostrophe,space"},
      [](ImportOptions& o, Text t, Where w) {
        if (t != kFound) o.text.thousands = parse_thousands_name(t, w);
      },

@@ -14,7 +14,8 @@ namespace tpm {
 /// through here.
 struct ReadingOption {
   std::string_view key;
-  std::string_view meaning;  ///< one line, for the help
+  std::string_view meaning;       ///< one line, for the help
+  std::string_view choices = "";  ///< the texts that it takes, with commas; empty: others
 };
 
 /// All of them, but the units, which are pairs.

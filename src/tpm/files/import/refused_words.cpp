@@ -35,6 +35,7 @@ constexpr auto kRefusing = std::to_array<RefusingWord>({
     {"nominal", kAsked},
     {"nominale", kAsked},
     {"programmed", kAsked},
+    {"preset", kAsked},
     {"planned", kAsked},
     {"soll", kAsked},
     {"sollwert", kAsked},
@@ -167,7 +168,9 @@ constexpr auto kJoinedEnds = std::to_array<RefusingWord>({
 std::optional<RefusedWord> find_refused_word(const std::vector<std::string>& words) {
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
-    const auto found = [&word](std::string_view why) { return RefusedWord{word, why}; };
+    const auto found = [&word](std::string_view why) {
+      return RefusedWord{word, why, why == kAsked};
+    };
     for (const RefusingWord& refusing : kRefusing) {
       if (word == refusing.word) return found(refusing.why);
     }

@@ -11,6 +11,7 @@ namespace tpm {
 struct RefusedWord {
   std::string word;      ///< as it stands among `words`
   std::string_view why;  ///< "is what was asked for, not what was measured"
+  bool asked = false;    ///< it is that: a column of the same quantity, and not another one
 };
 
 /// The first word of a title that refuses it a meaning, in English, French, German, Spanish or

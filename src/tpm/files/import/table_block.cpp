@@ -64,13 +64,17 @@ class BlockFinder {
   }
 
  private:
-  /// Samples come in rows of one width; the last row may stand alone.
+  [[nodiscard]] bool is_sample(std::size_t i) const { return count_row(rows_[i]).is_sample(); }
+  [[nodiscard]] bool same_width(std::size_t i, std::size_t j) const {
+    return rows_[i].fields.size() == rows_[j].fields.size() ||
+           filled_width(rows_[i]) == filled_width(rows_[j]);
+  }
+
+  /// Samples come in rows of one width: a row of another above two of them is no sample.
   [[nodiscard]] bool begins_at(std::size_t i) const {
-    if (!count_row(rows_[i]).is_sample()) return false;
-    if (i + 1 == rows_.size()) return true;
-    return filled_width(rows_[i + 1]) == filled_width(rows_[i]) ||
-           rows_[i + 1].fields.size() == rows_[i].fields.size() ||
-           !count_row(rows_[i + 1]).is_sample();
+    if (!is_sample(i)) return false;
+    if (i + 2 >= rows_.size() || !is_sample(i + 1) || !is_sample(i + 2)) return true;
+    return same_width(i, i + 1) || !same_width(i + 1, i + 2);
   }
 
   [[nodiscard]] std::size_t end_of(std::size_t first) const {

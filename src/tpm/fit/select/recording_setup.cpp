@@ -61,9 +61,9 @@ void require_rise(const PreparedRecording& r) {
   if (!down && !response_down) return;
   const bool both = down && response_down;
   throw bad_input(fmt::format("recording '{}'", r.name),
-                  fmt::format("the {} where the load rises", both   ? "drive and the response fall"
-                                                             : down ? "drive falls"
-                                                                    : "response falls"),
+                  both   ? "the drive falls, and so does the response"
+                  : down ? "the drive falls"
+                         : "the response falls where the drive rises",
                   fmt::format("{}, if the machine counts {} the other way",
                               both   ? "--negate-drive --negate-response"
                               : down ? "--negate-drive"
