@@ -1,5 +1,6 @@
 // Fits: of recordings and material functions by the least law, of configurations.
 #include <filesystem>
+#include <map>
 
 #include "binding.hpp"
 #include "tpm/files/blocks/law_json.hpp"

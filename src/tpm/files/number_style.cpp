@@ -113,6 +113,21 @@ bool is_plainly_written(std::string_view field) noexcept {
   return true;
 }
 
+/// "-12.5": a sign, digits and a point between them at most.
+bool is_plain_decimal(std::string_view field) noexcept {
+  if (!field.empty() && field.front() == '-') field.remove_prefix(1);
+  if (field.empty() || !is_digit(field.front()) || !is_digit(field.back())) return false;
+  bool point = false;
+  for (const char c : field) {
+    if (c == '.' && !point) {
+      point = true;
+    } else if (!is_digit(c)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 std::string_view styled_field(const StyledColumn& column, std::size_t row) {
   const auto fields = column.first[row].fields;
   return column.index < fields.size() ? fields[column.index] : std::string_view();
@@ -333,6 +348,7 @@ double parse_styled_number(std::string_view field, NumberStyle style, std::strin
 }
 
 bool is_number_in_some_style(std::string_view field) {
+  if (is_plain_decimal(field)) return true;  // nearly all fields of nearly all files
   const auto number = take_apart(field);
   return number && (fits(*number, false, std::nullopt) || fits(*number, true, std::nullopt));
 }

@@ -313,8 +313,8 @@ std::vector<SampleBlock> large_blocks(const std::vector<SampleBlock>& blocks) {
 }
 
 SampleBlock chosen_block(const DelimitedTable& table, const std::string& file,
-                         const ImportOptions& options, MachineHeader& header) {
-  const std::vector<SampleBlock> all = find_sample_blocks(table);
+                         const ImportOptions& options, const std::vector<SampleBlock>& all,
+                         MachineHeader& header) {
   if (all.empty()) {
     throw bad_input(
         file,
@@ -344,8 +344,9 @@ SampleBlock chosen_block(const DelimitedTable& table, const std::string& file,
 }
 
 /// Other rows of numbers, and rows below the samples.
-void tell_unread_rows(const DelimitedTable& table, MachineHeader& header) {
-  for (const SampleBlock& block : find_sample_blocks(table)) {
+void tell_unread_rows(const DelimitedTable& table, const std::vector<SampleBlock>& all,
+                      MachineHeader& header) {
+  for (const SampleBlock& block : all) {
     if (block.size() < 2 || block.first == header.block.first) continue;
     if (block.end > header.block.first && block.first < header.block.end) continue;
     header.findings.push_back({"not read", fmt::format("{}, another block of samples",
@@ -401,6 +402,7 @@ MachineHeader read_machine_header(const DelimitedTable& table, const std::string
                                   const ImportOptions& options) {
   MachineHeader header;
   SampleBlock block;
+  std::vector<SampleBlock> all;
   if (options.header_rows) {
     const auto rows = static_cast<std::size_t>(*options.header_rows);
     if (rows >= table.rows.size()) {
@@ -409,11 +411,12 @@ MachineHeader read_machine_header(const DelimitedTable& table, const std::string
     }
     block = block_below(table, rows);
   } else {
-    block = chosen_block(table, file, options, header);
+    all = find_sample_blocks(table);
+    block = chosen_block(table, file, options, all, header);
   }
   describe_columns(table, block, header, options);
   require_titles_for_fields(table, header, file);
-  if (!options.header_rows) tell_unread_rows(table, header);
+  tell_unread_rows(table, all, header);
   header.style = style_of(table, header, file, options);
   return header;
 }
