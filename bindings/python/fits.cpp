@@ -35,19 +35,20 @@ ImportOptions import_of(const py::dict& said) {
   ImportOptions import;
   for (const auto& [key, value] : said) {
     const auto name = py::cast<std::string>(key);
+    const std::string where = "columns: " + name;
     if (name == "units") {
       for (const auto& [column, unit] : py::cast<std::map<std::string, std::string>>(value)) {
-        set_reading_unit(import, column, unit, "units: " + column);
+        set_reading_unit(import, column, unit, where + ": " + column);
       }
     } else if (name == "segments") {
       import.segments = py::cast<std::vector<std::string>>(value);
     } else if (name == "provenance") {
-      import.provenance = parse_provenance(py::cast<std::string>(value), name);
+      import.provenance = parse_provenance(py::cast<std::string>(value), where);
     } else if (py::isinstance<py::bool_>(value)) {
-      set_reading_option(import, name, py::cast<bool>(value) ? "true" : "false", name);
+      set_reading_option(import, name, py::cast<bool>(value) ? "true" : "false", where);
     } else {
       // Counts may be numbers: header_rows=3.
-      set_reading_option(import, name, py::cast<std::string>(py::str(value)), name);
+      set_reading_option(import, name, py::cast<std::string>(py::str(value)), where);
     }
   }
   return import;
