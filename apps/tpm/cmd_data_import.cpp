@@ -24,17 +24,11 @@ struct ImportArguments {
   std::vector<std::string> files;
   std::string output;
   bool force = false;
-  ImportOptions options;  ///< what needs no reading: columns, segments, names
-  std::string separator = "auto";
-  std::string decimal = "auto";
-  std::string encoding = "auto";
-  std::string header_rows;
-  std::string drive_quantity, response_quantity;
-  std::vector<std::string> units;
+  ImportOptions options;  ///< what needs no reading: names
+  ReadingArguments reading;
   std::string negate = "none";
   std::string contact_force;
   std::string contact_samples = "3";
-  std::string spring_constant;
   std::string x, y, depth, load;
   std::string time_origin = "none";
   std::string provenance, probe_diameter;
@@ -56,34 +50,18 @@ double positive(const std::string& text, Dimension dimension, const std::string&
   return value;
 }
 
-DelimitedOptions text_options(const ImportArguments& arguments) {
-  DelimitedOptions text;
-  if (arguments.separator == "comma") text.separator = ',';
-  if (arguments.separator == "semicolon") text.separator = ';';
-  if (arguments.separator == "tab") text.separator = '\t';
-  if (arguments.decimal != "auto") text.decimal_comma = arguments.decimal == "comma";
-  text.latin1 = arguments.encoding == "latin-1";
-  return text;
-}
-
 ImportOptions options_of(const ImportArguments& arguments) {
-  ImportOptions options = arguments.options;
-  options.text = text_options(arguments);
-  if (!arguments.header_rows.empty()) {
-    options.header_rows = parse_count(arguments.header_rows, 0, "--header-rows");
-  }
-  set_quantities(options, arguments.drive_quantity, arguments.response_quantity, arguments.units);
-  options.negate_drive = arguments.negate == "drive" || arguments.negate == "both";
-  options.negate_response = arguments.negate == "response" || arguments.negate == "both";
+  ImportOptions options = reading_of(arguments.reading);
+  options.format = arguments.options.format;
+  options.header = arguments.options.header;
+  options.dataset = arguments.options.dataset;
+  options.negate_drive |= arguments.negate == "drive" || arguments.negate == "both";
+  options.negate_response |= arguments.negate == "response" || arguments.negate == "both";
   if (!arguments.contact_force.empty()) {
     options.contact_force_N =
         positive(arguments.contact_force, Dimension::force, "--contact-force");
   }
   options.contact_samples = parse_count(arguments.contact_samples, 1, "--contact-samples");
-  if (!arguments.spring_constant.empty()) {
-    options.spring_constant_N_per_m =
-        positive(arguments.spring_constant, Dimension::stiffness, "--spring-constant");
-  }
   if (!arguments.x.empty()) options.x = parse_axis(arguments.x, "--x");
   if (!arguments.y.empty()) options.y = parse_axis(arguments.y, "--y");
   if (!arguments.depth.empty()) {
@@ -230,49 +208,17 @@ void add_text_options(CLI::App& command, ImportArguments& a) {
   const std::vector<std::string> formats = import_formats();
   command.add_option("--from", a.options.format, fmt::format("{}", fmt::join(formats, ", ")))
       ->check(CLI::IsMember(formats));
-  command.add_option("--separator", a.separator, "auto, comma, semicolon or tab")
-      ->check(CLI::IsMember({"auto", "comma", "semicolon", "tab"}));
-  command.add_option("--decimal", a.decimal, "Decimal sign: auto, point or comma")
-      ->check(CLI::IsMember({"auto", "point", "comma"}));
-  command.add_option("--encoding", a.encoding, "auto (UTF-8 or marked UTF-16) or latin-1")
-      ->check(CLI::IsMember({"auto", "latin-1"}));
 }
 
 void add_machine_options(CLI::App& command, ImportArguments& a) {
-  const char* group = "Testing machines";
+  const char* group = "Testing machines and force curves";
+  add_reading_options(command, a.reading, group, "--from-time");
   const auto add = options_of_group(command, group);
-  add("--header-rows", a.header_rows, "Rows above the samples, if not found by themselves");
-  add("--time", a.options.time_column, "Time column: title, or number from 1");
-  add("--drive", a.options.drive_column, "Column of what was imposed (displacement)");
-  add("--response", a.options.response_column, "Column of what was observed (force)");
-  add("--sd", a.options.sd_column, "Column of the standard deviation of the response");
-  add("--frequency", a.options.frequency_column, "Frequency column of a spectrum");
-  add("--storage", a.options.storage_column, "Column of its storage modulus or stiffness");
-  add("--loss", a.options.loss_column, "Column of its loss modulus or stiffness");
-  add("--drive-quantity", a.drive_quantity, "indentation_depth, relative_length or abscissa");
-  add("--response-quantity", a.response_quantity, "contact_force, stress or ordinate");
-  command.add_option("--unit", a.units, "COLUMN=UNIT where the file does not say, repeatable")
-      ->allow_extra_args(false)
-      ->group(group);
   add("--negate", a.negate, "Turn the sign of: none, drive, response or both")
       ->check(CLI::IsMember({"none", "drive", "response", "both"}));
   add("--contact-force", a.contact_force,
       "Start time and depth where the force reaches this, such as \"0.05 N\"");
   add("--contact-samples", a.contact_samples, "Samples in a row that must reach it (3)");
-}
-
-void add_jpk_options(CLI::App& command, ImportArguments& a) {
-  const char* group = "JPK force files (--drive and --response name channels)";
-  command
-      .add_option("--spring-constant", a.spring_constant,
-                  "Of the cantilever instead of that of the file, such as \"0.05 N/m\"")
-      ->group(group);
-  command
-      .add_option("--segments", a.options.segments,
-                  "Kinds to read, such as extend,pause; all if left out")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->group(group);
 }
 
 void add_figure_options(CLI::App& command, ImportArguments& a) {
@@ -311,7 +257,6 @@ void add_data_import_command(CLI::App& data, Session& session) {
   command->add_flag("--force", arguments->force, "Replace files that exist");
   add_text_options(*command, *arguments);
   add_machine_options(*command, *arguments);
-  add_jpk_options(*command, *arguments);
   add_figure_options(*command, *arguments);
   add_description_options(*command, *arguments);
   add_format_option(*command, session);

@@ -9,6 +9,7 @@
 #include "command.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/import/file_kind.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/fit.hpp"
@@ -105,8 +106,12 @@ FitProblem configured(const FitOptions& options) {
 
 /// The JSON description of a curve says what kind it is; any other JSON file is a configuration.
 bool is_configuration(const std::vector<std::string>& files) {
-  return files.size() == 1 && files.front().ends_with(".json") &&
-         !read_json(files.front()).contains("kind");
+  if (files.size() != 1 || !files.front().ends_with(".json")) return false;
+  const Json document = read_json(files.front());
+  if (const auto other = find_other_document(document)) {
+    throw bad_input(files.front(), other->what, other->expected);
+  }
+  return !document.contains("kind");
 }
 
 SelectionOptions selection_options(const FitOptions& options) {
@@ -283,9 +288,9 @@ int fit_folder(const FitOptions& options, const Session& session) {
   return 0;
 }
 
-int fit_recordings(const FitOptions& options, const Session& session) {
+int fit_recordings(const FitOptions& options, const std::vector<PreparedRecording>& recordings,
+                   const Session& session) {
   const auto csv = csv_beside(options.output, session);
-  const auto recordings = read_recordings(options.recordings);
   if (!options.no_draw) {
     will_write_into(figure_folder(options, recordings.front().name),
                     {"figures.json", "config.json", "selection.json", "law.json"});
@@ -366,15 +371,22 @@ int fit(const FitOptions& options, const Session& session) {
                 "it only with one folder");
   }
   if (files.size() == 1) {
-    const auto function = find_material_function(files.front(), import_options(options.recordings));
+    // A pipe can be read only once.
+    const ImportOptions import = import_options(options.recordings);
+    MeasuredFile measured = read_measured_file(files.front(), import);
+    const auto function = material_function_of(files.front(), import, measured);
     if (function && probe_of(options)) {
       throw Error(ExitCode::usage, "--radius, --cone-angle, --punch-radius",
                   fmt::format("with a {}", function->kind()),
                   "them with a contact force over an indentation depth");
     }
     if (function) return fit_function(options, *function, session);
+    return fit_recordings(
+        options,
+        {prepared(files.front(), std::get<RecordingFile>(std::move(measured)), options.recordings)},
+        session);
   }
-  return fit_recordings(options, session);
+  return fit_recordings(options, read_recordings(options.recordings), session);
 }
 
 }  // namespace

@@ -5,90 +5,90 @@
 #include <algorithm>
 
 #include "command.hpp"
+#include "tpm/files/import/reading_options.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {
 
-void set_quantities(ImportOptions& import, const std::string& drive, const std::string& response,
-                    const std::vector<std::string>& units) {
-  if (!drive.empty()) import.drive_quantity = parse_quantity_name(drive, "--drive-quantity");
-  if (!response.empty()) {
-    import.response_quantity = parse_quantity_name(response, "--response-quantity");
+namespace {
+
+/// "step_time" is --step-time on the command line.
+std::string option_name(std::string_view key) {
+  std::string name = fmt::format("--{}", key);
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
+}
+
+}  // namespace
+
+void add_reading_options(CLI::App& command, ReadingArguments& arguments, const char* group,
+                         const char* from) {
+  for (const ReadingOption& option : reading_options()) {
+    const std::string key(option.key);
+    const std::string meaning(option.meaning);
+    if (key.starts_with("negate_")) {
+      command
+          .add_flag_callback(
+              option_name(key), [&arguments, key] { arguments.texts[key] = "true"; }, meaning)
+          ->group(group);
+      continue;
+    }
+    const std::string names = key == "from" ? std::string(from) : option_name(key);
+    CLI::Option* added = command.add_option(names, arguments.texts[key], meaning)->group(group);
+    const std::vector<std::string> choices = CLI::detail::split(std::string(option.choices), ',');
+    if (!option.choices.empty()) added->check(CLI::IsMember(choices));
   }
-  for (const std::string& pair : units) {
+  command
+      .add_option("--unit", arguments.units, "Unit of a column, e.g. \"Force=N\" (may be repeated)")
+      ->allow_extra_args(false)
+      ->group(group);
+}
+
+ImportOptions reading_of(const ReadingArguments& arguments) {
+  ImportOptions import;
+  for (const auto& [key, text] : arguments.texts) {
+    if (!text.empty()) set_reading_option(import, key, text, option_name(key));
+  }
+  for (const std::string& pair : arguments.units) {
     const auto equals = pair.rfind('=');
     if (equals == std::string::npos || equals == 0) {
       throw Error(ExitCode::usage, "--unit", fmt::format("'{}' has no '='", printable(pair)),
                   "COLUMN=UNIT, such as \"Force=N\"");
     }
-    static_cast<void>(parse_unit(pair.substr(equals + 1), "--unit"));
-    import.units[pair.substr(0, equals)] = pair.substr(equals + 1);
+    set_reading_unit(import, pair.substr(0, equals), pair.substr(equals + 1), "--unit");
   }
+  return import;
 }
 
 void add_recording_options(CLI::App& command, RecordingOptions& options) {
-  const auto add = options_of_group(command, "What the files do not say");
-  add("--time", options.import.time_column, "Column of the times: name, or number from 1");
-  add("--drive", options.import.drive_column, "Column of the depth or relative length");
-  add("--response", options.import.response_column, "Column of the force or stress");
-  add("--sd", options.import.sd_column, "Column of the response's standard deviation");
-  add("--frequency", options.import.frequency_column, "Column of the frequency of a spectrum");
-  add("--storage", options.import.storage_column, "Column of the storage modulus");
-  add("--loss", options.import.loss_column, "Column of the loss modulus");
-  add("--drive-quantity", options.drive_quantity, "indentation_depth, strain or relative_length");
-  add("--response-quantity", options.response_quantity,
-      "contact_force, stress, relaxation_modulus or creep_compliance");
-  command
-      .add_option("--unit", options.units, "Unit of a column, e.g. \"Force=N\" (may be repeated)")
-      ->group("What the files do not say");
-  add("--rest-length", options.rest_length,
-      "Unloaded length of a stretched specimen, for columns of its length or elongation");
-  add("--area", options.area, "Cross section of that specimen, for a column of its force");
-  add("--spring-constant", options.spring_constant,
-      "JPK force files: of the cantilever, instead of that of the file");
-  command
-      .add_option("--segments", options.import.segments,
-                  "JPK force files: kinds to read, such as extend,pause; default: all")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->group("What the files do not say");
-  command
-      .add_flag("--negate-drive", options.import.negate_drive,
-                "The machine counts the imposed motion negative")
-      ->group("What the files do not say");
-  command
-      .add_flag("--negate-response", options.import.negate_response,
-                "The machine counts the force or stress negative")
-      ->group("What the files do not say");
-  add("--contact-force", options.contact_response,
+  const char* group = "What the files do not say";
+  add_reading_options(command, options.reading, group);
+  options_of_group(command, group)(
+      "--contact-force", options.contact_response,
       "Contact begins where the force passes this, e.g. \"0.05 N\"; default: found");
 }
 
 ImportOptions import_options(const RecordingOptions& options) {
-  ImportOptions import = options.import;
-  set_quantities(import, options.drive_quantity, options.response_quantity, options.units);
-  const auto size = [](const std::string& text, Dimension dimension,
-                       const char* option) -> std::optional<double> {
-    if (text.empty()) return std::nullopt;
-    const double value = parse_quantity(text, dimension, option);
-    if (value > 0.0) return value;
-    throw Error(ExitCode::usage, option, fmt::format("'{}'", printable(text)), "a size above 0");
-  };
-  import.rest_length_m = size(options.rest_length, Dimension::length, "--rest-length");
-  import.area_m2 = size(options.area, Dimension::area, "--area");
-  import.spring_constant_N_per_m =
-      size(options.spring_constant, Dimension::stiffness, "--spring-constant");
-  return import;
+  return reading_of(options.reading);
 }
 
-std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) {
+PreparedRecording prepared(const std::string& name, RecordingFile file,
+                           const RecordingOptions& options) {
   PhaseOptions phases;
   if (!options.contact_response.empty()) {
     phases.contact_response =
         parse_quantity(options.contact_response, Dimension::force, "--contact-force");
   }
+  std::string read_as = columns_words(file.findings);
+  PreparedRecording recording = prepare_recording(name, std::move(file.recording), phases);
+  recording.import = import_options(options);
+  recording.read_as = std::move(read_as);
+  return recording;
+}
+
+std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) {
   const ImportOptions import = import_options(options);
   std::vector<PreparedRecording> recordings;
   recordings.reserve(options.files.size());
@@ -99,11 +99,7 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
       throw Error(ExitCode::usage, "FILE", fmt::format("'{}' is given twice", printable(file)),
                   "each recording once");
     }
-    RecordingFile read = read_recording_file(file, import);
-    std::string read_as = columns_words(read.findings);
-    recordings.push_back(prepare_recording(file, std::move(read.recording), phases));
-    recordings.back().import = import;
-    recordings.back().read_as = std::move(read_as);
+    recordings.push_back(prepared(file, read_recording_file(file, import), options));
   }
   return recordings;
 }

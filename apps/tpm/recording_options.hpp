@@ -1,28 +1,36 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "tpm/files/import/import.hpp"
+#include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 
 namespace tpm::app {
 
+/// How a file is read, as it was typed: the same options for every command.
+struct ReadingArguments {
+  std::map<std::string, std::string> texts;  ///< by the keys of reading_options()
+  std::vector<std::string> units;            ///< "COLUMN=UNIT"
+};
+
+/// Adds them in one group of the help.
+/// @param from  names of the option of the first time that is read: tpm data import has another
+///              --from
+void add_reading_options(CLI::App& command, ReadingArguments& arguments, const char* group,
+                         const char* from = "--from,--from-time");
+
+/// Throws Error(bad_input) naming the option.
+[[nodiscard]] ImportOptions reading_of(const ReadingArguments& arguments);
+
 /// What the user says about recordings that are read without a description.
 struct RecordingOptions {
   std::vector<std::string> files;
-  ImportOptions import;  ///< what needs no reading: columns, segments, signs
-  std::string drive_quantity, response_quantity;
-  std::vector<std::string> units;
+  ReadingArguments reading;
   std::string contact_response;
-  std::string rest_length, area;
-  std::string spring_constant;
 };
-
-/// Reads --drive-quantity, --response-quantity (may be empty) and the pairs "COLUMN=UNIT" of
-/// --unit. Throws Error(usage).
-void set_quantities(ImportOptions& import, const std::string& drive, const std::string& response,
-                    const std::vector<std::string>& units);
 
 /// Adds the options above; `files` is the command's own.
 void add_recording_options(CLI::App& command, RecordingOptions& options);
@@ -31,6 +39,10 @@ void add_recording_options(CLI::App& command, RecordingOptions& options);
 
 /// Reads and prepares every file.
 [[nodiscard]] std::vector<PreparedRecording> read_recordings(const RecordingOptions& options);
+
+/// Prepares a recording that was read.
+[[nodiscard]] PreparedRecording prepared(const std::string& name, RecordingFile file,
+                                         const RecordingOptions& options);
 
 /// --family classical|fractional|all.
 void add_family_option(CLI::App& command, std::string& family);

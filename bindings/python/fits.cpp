@@ -1,8 +1,10 @@
 // Fits: of recordings and material functions by the least law, of configurations.
 #include <filesystem>
+#include <map>
 
 #include "binding.hpp"
 #include "tpm/files/blocks/law_json.hpp"
+#include "tpm/files/import/reading_options.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/fitted_law.hpp"
@@ -33,42 +35,21 @@ ImportOptions import_of(const py::dict& said) {
   ImportOptions import;
   for (const auto& [key, value] : said) {
     const auto name = py::cast<std::string>(key);
+    const std::string where = "columns: " + name;
     if (name == "units") {
-      import.units = py::cast<std::map<std::string, std::string>>(value);
-      for (const auto& [column, unit] : import.units) (void)parse_unit(unit, "units: " + column);
-      continue;
-    }
-    if (name == "segments") {
+      for (const auto& [column, unit] : py::cast<std::map<std::string, std::string>>(value)) {
+        set_reading_unit(import, column, unit, where + ": " + column);
+      }
+    } else if (name == "segments") {
       import.segments = py::cast<std::vector<std::string>>(value);
-      continue;
+    } else if (name == "provenance") {
+      import.provenance = parse_provenance(py::cast<std::string>(value), where);
+    } else if (py::isinstance<py::bool_>(value)) {
+      set_reading_option(import, name, py::cast<bool>(value) ? "true" : "false", where);
+    } else {
+      // Counts may be numbers: header_rows=3.
+      set_reading_option(import, name, py::cast<std::string>(py::str(value)), where);
     }
-    const auto text = py::cast<std::string>(value);
-    if (name == "spring_constant")
-      import.spring_constant_N_per_m = parse_quantity(text, Dimension::stiffness, name);
-    else if (name == "time")
-      import.time_column = text;
-    else if (name == "drive")
-      import.drive_column = text;
-    else if (name == "response")
-      import.response_column = text;
-    else if (name == "sd")
-      import.sd_column = text;
-    else if (name == "frequency")
-      import.frequency_column = text;
-    else if (name == "storage")
-      import.storage_column = text;
-    else if (name == "loss")
-      import.loss_column = text;
-    else if (name == "drive_quantity")
-      import.drive_quantity = parse_quantity_name(text, name);
-    else if (name == "provenance")
-      import.provenance = parse_provenance(text, name);
-    else if (name == "response_quantity")
-      import.response_quantity = parse_quantity_name(text, name);
-    else
-      throw Error(ExitCode::usage, "columns", "'" + printable(name) + "'",
-                  "time, drive, response, sd, frequency, storage, loss, drive_quantity, "
-                  "response_quantity, provenance, spring_constant, segments or units");
   }
   return import;
 }

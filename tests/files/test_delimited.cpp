@@ -66,7 +66,10 @@ TEST_CASE("quoted fields keep separators, quotes and line ends, and lines stay c
   CHECK(fields(table.rows[2]) == Fields{"two\nlines", "2"});
   CHECK(table.rows[2].line == 5);
   CHECK(table.rows[3].line == 8);
-  CHECK(table.comments == Fields{" first", "last"});
+  REQUIRE(table.comments.size() == 2);
+  CHECK(table.comments[0].text == " first");
+  CHECK(table.comments[1].text == "last");
+  CHECK(table.comments[1].line == 7);
 }
 
 TEST_CASE("decimal commas are found, and never mixed up with separators or points") {
@@ -101,7 +104,7 @@ TEST_CASE("what is no delimited text is refused with its line and without repeat
                     Catch::StartsWith("f:2: byte 0x00 is not text"));
   CHECK_THROWS_WITH(parse_delimited("a,b\n\"1,2\n3,4\n", "f"),
                     Catch::StartsWith("f:2: a quoted field is never closed"));
-  CHECK_THROWS_WITH(parse_delimited("a,b\n1\"2,3\n", "f"),
+  CHECK_THROWS_WITH(parse_delimited("a,b\n\"1\"2,3\n", "f"),
                     Catch::StartsWith("f:2: a quote stands where none belongs"));
   CHECK_THROWS_WITH(parse_delimited("# only a comment\n", "f"), Catch::StartsWith("f: no rows"));
   CHECK_THROWS_AS(parse_delimited("\xFF\xFE"
@@ -114,6 +117,22 @@ TEST_CASE("what is no delimited text is refused with its line and without repeat
   narrow.longest_line = 10;
   CHECK_THROWS_WITH(parse_delimited("a,b\n" + std::string(11, 'x'), "f", narrow),
                     "f:2: the line is 11 bytes long; expected at most 10 bytes a line");
+}
+
+TEST_CASE("a quote inside a field is a letter, and a quote alone an inch") {
+  const auto table = parse_delimited("Frequency\tG'\tG\"\nHz\tPa\t\"\n1\t2\t3\n", "f");
+  CHECK(fields(table.rows[0]) == Fields{"Frequency", "G'", "G\""});
+  CHECK(fields(table.rows[1]) == Fields{"Hz", "Pa", "\""});
+}
+
+TEST_CASE("blanks separate where they make the most rows of numbers") {
+  const auto table = parse_delimited("time  force\n 0.0   1.5e+00\n0.5\t2\n", "f");
+  CHECK(table.separator == ' ');
+  CHECK(fields(table.rows[1]) == Fields{"0.0", "1.5e+00"});
+  CHECK(fields(table.rows[2]) == Fields{"0.5", "2"});
+  std::string preamble;
+  for (int i = 0; i < 300; ++i) preamble += "a setting, with a comma\n";
+  CHECK(parse_delimited(preamble + "0;1\n1;2\n2;3\n", "f", {.ragged = true}).separator == ';');
 }
 
 TEST_CASE("a field quoted by quoted_field is read back") {

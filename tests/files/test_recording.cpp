@@ -191,6 +191,31 @@ TEST_CASE("several ramps and holds, no hold, and a triangle") {
   CHECK(kinds(phases_of(pulled)) == "loading, unloading, loading, unloading");
 }
 
+TEST_CASE("a measured depth that wobbles and overshoots is no unloading") {
+  // A ramp of 4 mm with a slow wobble of 2 % and an overshoot of 3 %, then a hold: neither is an
+  // unloading; a fall of a quarter is one.
+  const auto drive_of = [](double t) {
+    if (t < 4.0) return 1.0 * t + 0.08 * std::sin(9.0 * t) * std::min(1.0, 4.0 - t);
+    return 4.0 + 0.12 * std::exp(-(t - 4.0) / 0.1) - 0.0 * t;
+  };
+  Recording recording = made({{0, 0}, {10, 4}}, {});
+  recording.time_s.clear();
+  recording.drive.clear();
+  recording.response.clear();
+  for (int i = 0; i <= 400; ++i) {
+    const double t = 0.03 * i;
+    recording.time_s.push_back(t);
+    recording.drive.push_back(1e-3 * drive_of(t));
+    recording.response.push_back(0.1 * drive_of(t));
+  }
+  const RecordingPhases found = find_phases(recording);
+  INFO(kinds(found) << "\n" << all_words(found));
+  for (const Phase& phase : found.phases) CHECK(phase.kind != PhaseKind::unloading);
+  CHECK(found.phases.back().kind == PhaseKind::hold);
+  const RecordingPhases partly = find_phases(made({{0, 0}, {4, 4}, {8, 4}, {9, 3}, {13, 3}}, {}));
+  CHECK(kinds(partly).find("unloading") != std::string::npos);
+}
+
 TEST_CASE("unloading leaves the force at its floor before the drive is back") {
   Making making;
   making.step_s = 0.02;
@@ -266,9 +291,9 @@ TEST_CASE("recordings in which little happens get an explained answer") {
 
   Recording upside_down = made(kRampHold, Making{});
   for (double& force : upside_down.response) force = -force;
-  CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate response"));
+  CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate-response"));
   for (double& depth : upside_down.drive) depth = -depth;
-  CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate drive"));
+  CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate-drive"));
 }
 
 TEST_CASE("what cannot be cut into phases is refused") {

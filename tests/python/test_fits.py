@@ -89,7 +89,7 @@ class Fits(unittest.TestCase):
                    "response_quantity": "contact_force", "units": {"a": "s", "b": "mm", "c": "N"}}
         fit = tpmkit.fit(path, law="linear-1", starts=3, columns=columns)
         self.assertAlmostEqual(fit.parameters.estimate["k1"], self.fit.parameters.estimate["k1"], delta=0.01)
-        with self.assertRaisesRegex(tpmkit.Error, "columns: 'tiem'"):
+        with self.assertRaisesRegex(tpmkit.Error, "columns: tiem: unknown option 'tiem'"):
             tpmkit.fit(path, columns={"tiem": "a"})
 
     def test_errors(self):

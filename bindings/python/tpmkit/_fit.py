@@ -200,7 +200,10 @@ def fit(
     columns
         What a file does not say: ``{"time": "t", "drive": "z", "response": "F", "units": {"F": "mN"}}``;
         also sd, frequency, storage, loss, drive_quantity, response_quantity; and provenance, such as "assumed"
-        for a synthetic recording (default "measured").
+        for a synthetic recording (default "measured"). How the file is written and which part of it is read:
+        encoding, separator, decimal, thousands, header_rows, block, step_time, from, until, negate_drive,
+        negate_response, rest_length, area, spring_constant, deflection_sensitivity, segments, as the options
+        of ``tpm fit`` of these names: ``{"decimal": "comma", "step_time": "185 s", "block": 2}``.
 
     Raises
     ------

@@ -31,6 +31,9 @@ constexpr double kPerTurn = 0.15915494309189535;  // 1/(2 pi)
 constexpr double kDegree = 0.017453292519943295;  // pi/180
 constexpr double kMercury = 133.322387415;        // Pa in 1 mmHg
 constexpr double kGram = 9.80665e-3, kMinute = 60.0, kHour = 3600.0;
+constexpr double kInch = 0.0254, kFoot = 0.3048;
+constexpr double kPoundForce = 4.4482216152605;  // N, exactly
+constexpr double kPsi = kPoundForce / (kInch * kInch);
 
 constexpr auto kListed = std::to_array<ListedUnit>({
     {"", Dimension::dimensionless, 1.0},
@@ -45,6 +48,7 @@ constexpr auto kListed = std::to_array<ListedUnit>({
     {"mm", Dimension::length, 1e-3},
     {"um", Dimension::length, 1e-6},
     {"nm", Dimension::length, 1e-9},
+    {"in", Dimension::length, kInch},
     {"m^2", Dimension::area, 1.0},
     {"cm^2", Dimension::area, 1e-4},
     {"mm^2", Dimension::area, 1e-6},
@@ -56,11 +60,13 @@ constexpr auto kListed = std::to_array<ListedUnit>({
     {"kN", Dimension::force, 1e3},
     {"gf", Dimension::force, kGram},
     {"kgf", Dimension::force, 1e3 * kGram},
+    {"lbf", Dimension::force, kPoundForce},
     {"Pa", Dimension::stress, 1.0},
     {"kPa", Dimension::stress, 1e3},
     {"MPa", Dimension::stress, 1e6},
     {"GPa", Dimension::stress, 1e9},
     {"mmHg", Dimension::stress, kMercury},
+    {"psi", Dimension::stress, kPsi},
     {"Pa s", Dimension::viscosity, 1.0},
     {"kPa s", Dimension::viscosity, 1e3},
     {"m/s", Dimension::speed, 1.0},
@@ -102,9 +108,17 @@ constexpr auto kBases = std::to_array<BaseUnit>({
     {"secs", kTimePowers, 1.0, false},
     {"second", kTimePowers, 1.0, false},
     {"seconds", kTimePowers, 1.0, false},
+    {"sek", kTimePowers, 1.0, false},
+    {"Sek", kTimePowers, 1.0, false},
+    {"msec", kTimePowers, 1e-3, false},
     {"min", kTimePowers, kMinute, false},
+    {"mins", kTimePowers, kMinute, false},
+    {"minute", kTimePowers, kMinute, false},
     {"minutes", kTimePowers, kMinute, false},
     {"h", kTimePowers, kHour, false},
+    {"hr", kTimePowers, kHour, false},
+    {"hrs", kTimePowers, kHour, false},
+    {"hour", kTimePowers, kHour, false},
     {"hours", kTimePowers, kHour, false},
     {"m", {1, 0, 0, 0}, 1.0, true},
     {"N", kForcePowers, 1.0, true},
@@ -113,6 +127,17 @@ constexpr auto kBases = std::to_array<BaseUnit>({
     {"Pa", kStressPowers, 1.0, true},
     {"bar", kStressPowers, 1e5, true},
     {"mmHg", kStressPowers, kMercury, false},
+    {"in", {1, 0, 0, 0}, kInch, false},
+    {"inch", {1, 0, 0, 0}, kInch, false},
+    {"inches", {1, 0, 0, 0}, kInch, false},
+    {"\"", {1, 0, 0, 0}, kInch, false},
+    {"ft", {1, 0, 0, 0}, kFoot, false},
+    {"micron", {1, 0, 0, 0}, 1e-6, false},
+    {"microns", {1, 0, 0, 0}, 1e-6, false},
+    {"lbf", kForcePowers, kPoundForce, false},
+    {"ozf", kForcePowers, kPoundForce / 16.0, false},
+    {"psi", kStressPowers, kPsi, false},
+    {"ksi", kStressPowers, 1e3 * kPsi, false},
     {"Pas", {-1, 1, -1, 0}, 1.0, true},
     {"Hz", {0, 0, -1, 0}, 1.0, true},
     {"rad", kAnglePowers, 1.0, true},

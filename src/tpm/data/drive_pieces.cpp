@@ -75,6 +75,8 @@ class Pieces {
     calm_drifts();
     settle_brief_pieces();
     join();
+    settle_reversals();
+    join();
     return std::move(pieces_);
   }
 
@@ -116,6 +118,26 @@ class Pieces {
         piece.motion = own == after ? after : before;
       } else if (moves && (own == before || own == after)) {
         piece.motion = own;
+      }
+    }
+  }
+
+  /// A measured drive wobbles, and overshoots where it stops: a small fall that is made up for, or
+  /// that ends in a hold, is no unloading.
+  void settle_reversals() {
+    constexpr double kSmall = 0.05;  // of the range
+    constexpr double kMadeUp = 1.5;  // of the fall: a larger rise is a motion of its own
+    for (std::size_t i = 1; i + 1 < pieces_.size(); ++i) {
+      DrivePiece& piece = pieces_[i];
+      const double fall = -change(piece);
+      if (piece.motion != Motion::falling || fall > kSmall * range_) continue;
+      const Motion before = pieces_[i - 1].motion;
+      DrivePiece& next = pieces_[i + 1];
+      if (before == Motion::rising) {
+        if (next.motion != Motion::falling) piece.motion = next.motion;
+      } else if (before == Motion::still && next.motion == Motion::rising) {
+        piece.motion = Motion::still;
+        if (change(next) <= kMadeUp * fall) next.motion = Motion::still;
       }
     }
   }

@@ -24,7 +24,8 @@ struct DrivePiece {
 
 /// Cuts a drive where it starts, stops or turns. Neighbouring pieces share the sample between them
 /// and have different motions; together they cover everything. A drive that moves no more than its
-/// jitter is one still piece.
+/// jitter is one still piece, and a fall of less than 5 % of the range inside a rise, or between a
+/// rise and a hold, belongs to these.
 /// @param time             s, strictly increasing, at least 2
 /// @param drive            of the same length
 /// @param jitter           standard deviation of the drive's noise, at least 0

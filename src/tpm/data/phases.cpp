@@ -267,13 +267,13 @@ class Finder {
       tell("the drive never moves by more than its own jitter: there is no ramp");
     } else if (pieces_.front().motion == Motion::falling ||
                (pieces_.front().motion == Motion::still && pieces_[1].motion == Motion::falling)) {
-      tell("the drive falls first: if the machine counts loading negative, --negate drive");
+      tell("the drive falls first: if the machine counts loading negative, --negate-drive");
     }
     const double lowest = *std::min_element(response_.begin(), response_.end());
     if (-lowest > 2.0 * std::max(found_.peak_response, 0.0) && lowest < 0.0) {
       tell(
           "the response is mostly negative: if the machine counts loading negative, "
-          "--negate response");
+          "--negate-response");
     }
     if (indentation_ && moves && !found_.contact_found) {
       tell(options_.contact_response ? fmt::format("the response never stays at {}: no contact",

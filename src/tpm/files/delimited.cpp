@@ -11,6 +11,7 @@
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/separator.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -98,7 +99,7 @@ void require_text(std::string_view text, std::string_view where) {
     const auto position = static_cast<std::size_t>(invalid - text.begin());
     throw bad_input(at_line(where, line_of(text, position)),
                     fmt::format("byte 0x{:02X} is not UTF-8", static_cast<unsigned char>(*invalid)),
-                    fmt::format("{} (older Windows exports are latin-1)", kTextExpected));
+                    fmt::format("{} (older Windows exports: --encoding latin-1)", kTextExpected));
   }
 }
 
@@ -135,36 +136,36 @@ bool is_blank(std::string_view line) {
   return line.find_first_not_of(" \t") == std::string_view::npos;
 }
 
-bool holds_outside_quotes(std::string_view line, char wanted) {
-  bool quoted = false;
-  for (const char c : line) {
-    if (c == '"') quoted = !quoted;
-    if (c == wanted && !quoted) return true;
-  }
-  return false;
+std::string_view without_blanks(std::string_view field) noexcept {
+  const auto first = field.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return field.substr(first, field.find_last_not_of(" \t") - first + 1);
 }
 
-char find_separator(std::string_view text) {
-  constexpr std::size_t kSample = 200;
-  std::vector<std::string_view> sample;
-  LineReader lines(text);
-  std::string_view line;
-  while (sample.size() < kSample && lines.next(line)) {
-    if (!is_blank(line) && !line.starts_with('#')) sample.push_back(line);
+/// True if a field of the line begins with a quote. Quotes elsewhere are letters: G", or inches.
+bool has_quoted_field(std::string_view line, char separator) {
+  bool begins = true;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == separator) {
+      begins = true;
+      continue;
+    }
+    if (line[i] == ' ' || line[i] == '\t') continue;
+    if (begins && line[i] == '"') {
+      // A quote alone in its field is an inch.
+      const auto next = line.find_first_not_of(" \t", i + 1);
+      if (next != std::string_view::npos && line[next] != separator) return true;
+      if (line.find('"', i + 1) != std::string_view::npos) return true;
+    }
+    begins = false;
   }
-  for (const char candidate : {'\t', ';', ','}) {
-    const auto n = std::count_if(
-        sample.begin(), sample.end(),
-        [candidate](std::string_view sampled) { return holds_outside_quotes(sampled, candidate); });
-    if (n > 0 && 2 * static_cast<std::size_t>(n) >= sample.size()) return candidate;
-  }
-  return ',';
+  return false;
 }
 
 /// More fields than a text can have: fields must not move once a row looks at them.
 std::size_t most_fields(std::string_view text, char separator) {
   const auto ends = std::count_if(text.begin(), text.end(), [separator](char c) {
-    return c == separator || c == '\n' || c == '\r';
+    return c == separator || c == '\n' || c == '\r' || (separator == ' ' && c == '\t');
   });
   return static_cast<std::size_t>(ends) + 1;
 }
@@ -199,7 +200,12 @@ class RowParser {
   /// `line` is a part of the text. False if libcsv finds a quote where none belongs.
   bool feed(std::string_view line, int line_number) {
     if (!open_) line_ = line_number;
-    if (!open_ && line.find('"') == std::string_view::npos) {
+    if (separator_ == ' ') {
+      cut_at_blanks(line);
+      return true;
+    }
+    if (!open_ &&
+        (line.find('"') == std::string_view::npos || !has_quoted_field(line, separator_))) {
       cut(line);
       return true;
     }
@@ -216,6 +222,21 @@ class RowParser {
       text_.fields.push_back(without_space(line.substr(0, end)));
       if (end == std::string_view::npos) break;
       line.remove_prefix(end + 1);
+    }
+    end_row();
+  }
+  /// Blanks in a row count once; a field in quotes keeps its own.
+  void cut_at_blanks(std::string_view line) {
+    for (line = without_blanks(line); !line.empty(); line = without_blanks(line)) {
+      const auto close = line.front() == '"' ? line.find('"', 1) : std::string_view::npos;
+      if (close != std::string_view::npos) {
+        text_.fields.push_back(line.substr(1, close - 1));
+        line.remove_prefix(close + 1);
+        continue;
+      }
+      const auto end = std::min(line.find_first_of(" \t"), line.size());
+      text_.fields.push_back(line.substr(0, end));
+      line.remove_prefix(end);
     }
     end_row();
   }
@@ -256,7 +277,8 @@ class RowParser {
 
 /// Rows, and comments into `comments`. Throws for long lines and misplaced quotes.
 std::vector<DelimitedRow> read_rows(DelimitedText& text, char separator, std::string_view where,
-                                    std::size_t longest_line, std::vector<std::string>& comments) {
+                                    std::size_t longest_line,
+                                    std::vector<DelimitedComment>& comments) {
   RowParser parser(text, separator);
   LineReader lines(text.text);
   std::string_view line;
@@ -269,7 +291,7 @@ std::vector<DelimitedRow> read_rows(DelimitedText& text, char separator, std::st
     if (!parser.inside_row()) {
       if (is_blank(line)) continue;
       if (line.starts_with('#')) {
-        comments.emplace_back(line.substr(1));
+        comments.push_back({lines.number(), std::string(line.substr(1))});
         continue;
       }
     }
@@ -296,8 +318,7 @@ void require_same_width(const std::vector<DelimitedRow>& rows, std::string_view 
   }
 }
 
-bool uses_decimal_comma(const std::vector<DelimitedRow>& rows, char separator) {
-  if (separator == ',') return false;
+bool uses_decimal_comma(const std::vector<DelimitedRow>& rows) {
   bool comma = false;
   for (const DelimitedRow& row : rows) {
     for (const std::string_view field : row.fields) {
@@ -328,6 +349,8 @@ std::string_view separator_name(char separator) noexcept {
       return "tab";
     case ';':
       return "semicolon";
+    case ' ':
+      return "blank";
     default:
       return "comma";
   }
@@ -346,11 +369,10 @@ DelimitedTable parse_delimited(std::string_view bytes, std::string_view where,
   table.rows = read_rows(*text, table.separator, where, options.longest_line, table.comments);
   if (table.rows.empty()) throw bad_input(where, "no rows", "at least one row of fields");
   if (!options.ragged) require_same_width(table.rows, where);
-  table.decimal_comma =
-      options.decimal_comma.value_or(uses_decimal_comma(table.rows, table.separator));
-  if (table.decimal_comma && table.separator == ',') {
+  table.decimal_comma = options.decimal_comma.value_or(uses_decimal_comma(table.rows));
+  if (table.decimal_comma && table.separator == ',' && text->unquoted.empty()) {
     throw bad_input(where, "the comma cannot be both separator and decimal sign",
-                    "another separator");
+                    "another separator, or numbers in quotes");
   }
   return table;
 }

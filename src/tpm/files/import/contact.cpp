@@ -52,7 +52,7 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
     throw bad_input(file,
                     fmt::format("the force never stays at {} N for {} samples",
                                 significant(*options.contact_force_N, 6), options.contact_samples),
-                    "a smaller contact force, or --negate response if compression counts negative");
+                    "a smaller contact force, or --negate-response if compression counts negative");
   }
   const auto row = static_cast<std::size_t>(contact - force->values.begin());
   std::string found = fmt::format("{} {}, {}", series.segments.empty() ? "line" : "sample",

@@ -1,11 +1,13 @@
 #include "tpm/files/import/header_words.hpp"
 
+#include <fmt/format.h>
 #include <utf8.h>
 
 #include <algorithm>
 #include <array>
 #include <vector>
 
+#include "tpm/files/import/refused_words.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::files {
@@ -60,6 +62,8 @@ struct TitleWord {
   Recognized meaning;
 };
 
+// The time of a step goes before that of the whole test.
+constexpr Recognized kStepTime{ColumnRole::time, Quantity::time, -1};
 constexpr Recognized kTime{ColumnRole::time, Quantity::time, 0};
 constexpr Recognized kForce{ColumnRole::response, Quantity::contact_force, 0};
 constexpr Recognized kStress{ColumnRole::response, Quantity::stress, 1};
@@ -71,6 +75,8 @@ constexpr Recognized kStretch{ColumnRole::drive, Quantity::relative_length, 4};
 constexpr Recognized kStrain{ColumnRole::drive, Quantity::strain, 5};
 constexpr Recognized kRelaxation{ColumnRole::response, Quantity::relaxation_modulus, 2};
 constexpr Recognized kCompliance{ColumnRole::response, Quantity::creep_compliance, 2};
+constexpr Recognized kHeight{ColumnRole::height, Quantity::indentation_depth, 0};
+constexpr Recognized kDeflection{ColumnRole::deflection, Quantity::indentation_depth, 0};
 constexpr Recognized kSd{ColumnRole::sd, Quantity::contact_force, 0};
 
 constexpr Recognized kFrequency{ColumnRole::frequency, Quantity::frequency, 0};
@@ -89,6 +95,10 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"testzeit", kTime},
     {"tiempo", kTime},
     {"tempo", kTime},
+    {"schrittzeit", kStepTime},
+    {"intervallzeit", kStepTime},
+    {"segmentzeit", kStepTime},
+    {"abschnittszeit", kStepTime},
     {"force", kForce},
     {"load", kForce},
     {"kraft", kForce},
@@ -97,17 +107,35 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"fuerza", kForce},
     {"forza", kForce},
     {"f", kForce},
+    {"normalkraft", kForce},
+    {"fz", kForce},
+    {"effort", kForce},
+    {"carga", kForce},
+    {"carico", kForce},
+    {"charge", kForce},
     {"stress", kStress},
     {"spannung", kStress},
     {"contrainte", kStress},
     {"sigma", kStress},
     {"tau", kStress},
+    {"tension", kStress},
+    {"esfuerzo", kStress},
+    {"sforzo", kStress},
+    {"tensione", kStress},
+    {"schubspannung", kStress},
+    {"druckspannung", kStress},
     {"depth", kDepth},
     {"indentation", kDepth},
     {"penetration", kDepth},
     {"eindringtiefe", kDepth},
     {"profondeur", kDepth},
     {"enfoncement", kDepth},
+    {"indentacion", kDepth},
+    {"profundidad", kDepth},
+    {"profondita", kDepth},
+    {"tiefe", kDepth},
+    {"penetracion", kDepth},
+    {"penetrazione", kDepth},
     {"displacement", kDisplacement},
     {"extension", kDisplacement},
     {"elongation", kDisplacement},
@@ -123,15 +151,36 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"weg", kTravel},
     {"course", kTravel},
     {"stroke", kTravel},
+    {"carrera", kTravel},
+    {"corsa", kTravel},
+    {"recorrido", kTravel},
     {"traverse", kCrosshead},
     {"crosshead", kCrosshead},
     {"traversenweg", kCrosshead},
     {"position", kCrosshead},
+    {"posicion", kCrosshead},
+    {"posizione", kCrosshead},
     {"stretch", kStretch},
     {"length", kStretch},
     {"lange", kStretch},
     {"longueur", kStretch},
     {"strain", kStrain},
+    {"height", kHeight},
+    {"hohe", kHeight},
+    {"hauteur", kHeight},
+    {"altura", kHeight},
+    {"altezza", kHeight},
+    {"piezo", kHeight},
+    {"zsensor", kHeight},
+    {"zsnsr", kHeight},
+    {"zpiezo", kHeight},
+    {"zheight", kHeight},
+    {"deflection", kDeflection},
+    {"defl", kDeflection},
+    {"auslenkung", kDeflection},
+    {"deflexion", kDeflection},
+    {"deflessione", kDeflection},
+    {"vdeflection", kDeflection},
     {"gamma", kStrain},
     {"epsilon", kStrain},
     {"scherung", kStrain},
@@ -233,13 +282,92 @@ bool has_word(const std::vector<std::string>& words, std::string_view word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
+/// The word without the number behind it: "force2" is the second force.
+std::string_view without_number(std::string_view word) {
+  const auto last = word.find_last_not_of("0123456789");
+  return last == std::string_view::npos ? word : word.substr(0, last + 1);
+}
+
+bool is_plain_number(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+/// Units of what no recording of a force holds: in brackets they tell that a title means that.
+bool is_foreign_unit(std::string_view text) {
+  constexpr auto kForeign = std::to_array<std::string_view>(
+      {"\xC2\xB0"
+       "C",
+       "degC", "deg C",
+       "\xC2\xB0"
+       "F",
+       "degF", "V", "mV", "mA", "W", "J", "mJ", "Nm", "N m", "N.m", "mNm", "rpm", "1/min"});
+  return std::find(kForeign.begin(), kForeign.end(), text) != kForeign.end();
+}
+
+/// "Step time", "temps de l'intervalle".
+bool is_of_a_step(const std::vector<std::string>& words) {
+  constexpr auto kSteps = std::to_array<std::string_view>(
+      {"step", "interval", "segment", "schritt", "intervall", "abschnitt", "etape", "intervalle",
+       "paso", "intervalo", "segmento", "passo", "intervallo"});
+  return std::any_of(kSteps.begin(), kSteps.end(),
+                     [&words](std::string_view step) { return has_word(words, step); });
+}
+
+/// What the words of a title say, whatever else stands among them.
+std::optional<Recognized> recognize_words(const std::vector<std::string>& words) {
+  // "tan delta", "loss tangent", "loss factor".
+  const bool tangent = has_word(words, "tan") || has_word(words, "tangent") ||
+                       (has_word(words, "loss") && has_word(words, "factor"));
+  if (tangent) return kLossTangent;
+  if (has_word(words, "compliance")) return kCompliance;
+  if (has_word(words, "modulus") && has_word(words, "relaxation")) return kRelaxation;
+  const auto meaning_of = [](std::string_view word) {
+    const auto known = std::find_if(kWords.begin(), kWords.end(),
+                                    [word](const TitleWord& w) { return w.word == word; });
+    return known == kWords.end() ? nullptr : &known->meaning;
+  };
+  std::optional<Recognized> found;
+  for (const std::string& word : words) {
+    const Recognized* known = meaning_of(word);
+    if (known == nullptr) known = meaning_of(without_number(word));
+    if (known == nullptr) continue;
+    // "Piezo deflection" is a deflection, and the height of a cantilever's base is no depth.
+    const bool deflection =
+        found && (found->role == ColumnRole::deflection || known->role == ColumnRole::deflection);
+    if (deflection) {
+      found = kDeflection;
+      continue;
+    }
+    // "Piezo position" is the height of the cantilever's base.
+    const bool travel = known->role == ColumnRole::drive && known->rank >= kTravel.rank;
+    if (found && found->role == ColumnRole::height && travel) continue;
+    // "Course traverse absolue" is crosshead travel: the word that says more counts.
+    if (!found || known->rank > found->rank) found = *known;
+  }
+  if (found && found->role == ColumnRole::time && is_of_a_step(words)) return kStepTime;
+  return found;
+}
+
 /// The text before and after the last separator, if a unit stands after it.
 std::optional<ColumnTitle> split_at(std::string_view title, std::string_view separator) {
   const auto cut = title.rfind(separator);
-  if (cut == std::string_view::npos) return std::nullopt;
+  if (cut == std::string_view::npos || cut == 0) return std::nullopt;
   const auto unit = trimmed(title.substr(cut + separator.size()));
-  if (!is_unit(unit)) return std::nullopt;
+  const bool known = is_unit(unit) || is_foreign_unit(unit);
+  if (unit.empty() || !known || is_plain_number(unit)) return std::nullopt;
   return ColumnTitle{std::string(trimmed(title.substr(0, cut))), std::string(unit)};
+}
+
+/// A unit behind a mark that also stands inside names ("Force N", "Force/N", "step-1"): taken only
+/// if the rest is a known title of that dimension.
+std::optional<ColumnTitle> split_known(std::string_view title, std::string_view separator) {
+  auto split = split_at(title, separator);
+  if (!split) return std::nullopt;
+  const auto meaning = recognize_title(split->name);
+  if (!meaning) return std::nullopt;
+  const bool fits =
+      is_unit(split->unit) && is_dimension_of(*meaning, parse_unit(split->unit, {}).dimension);
+  return fits || is_foreign_unit(split->unit) ? split : std::nullopt;
 }
 
 }  // namespace
@@ -252,44 +380,84 @@ std::string_view without_brackets(std::string_view cell) noexcept {
 }
 
 ColumnTitle split_title(std::string_view title) {
-  const std::string_view text = trimmed(title);
+  std::string_view text = trimmed(title);
+  while (text.starts_with('#') || text.starts_with('%')) text = trimmed(text.substr(1));
   const auto open = text.find_last_of("([");
   if (open != std::string_view::npos && open > 0) {
-    const auto unit = without_brackets(text.substr(open));
-    const bool square = text[open] == '[' && text.back() == ']' && !unit.empty();
-    if (square || is_unit(unit)) {
-      return {std::string(trimmed(text.substr(0, open))), std::string(unit)};
+    // "Load (N) Ch. 1": the unit may stand inside the title.
+    const auto close = text.find(text[open] == '[' ? ']' : ')', open);
+    const std::string_view unit =
+        close == std::string_view::npos ? "" : trimmed(text.substr(open + 1, close - open - 1));
+    const bool square = text[open] == '[';
+    const bool number = is_plain_number(unit) && !(square && unit == "1");
+    if (!unit.empty() && !number && (square || is_unit(unit) || is_foreign_unit(unit))) {
+      const std::string_view before = trimmed(text.substr(0, open));
+      const std::string_view after = trimmed(text.substr(close + 1));
+      return {fmt::format("{}{}{}", before, after.empty() ? "" : " ", after), std::string(unit)};
     }
   }
-  for (const std::string_view separator : {" / ", ", ", " in ", "_"}) {
+  for (const std::string_view separator : {" / ", ", ", " in ", " en ", "_"}) {
     if (auto split = split_at(text, separator)) return *split;
   }
+  for (const std::string_view separator : {"/", ",", ":", " ", "-"}) {
+    if (auto split = split_known(text, separator)) return *split;
+  }
   return {std::string(text), {}};
+}
+
+bool is_dimension_of(const Recognized& meaning, Dimension dimension) {
+  const auto is_one_of = [dimension](std::initializer_list<Dimension> known) {
+    return std::find(known.begin(), known.end(), dimension) != known.end();
+  };
+  switch (meaning.role) {
+    case ColumnRole::time:
+      return dimension == Dimension::time;
+    case ColumnRole::response:
+      if (meaning.quantity == Quantity::contact_force || meaning.quantity == Quantity::stress) {
+        return is_one_of({Dimension::force, Dimension::stress, Dimension::compliance});
+      }
+      return meaning.quantity == Quantity::ordinate ||
+             dimension == quantity_dimension(meaning.quantity);
+    case ColumnRole::drive:
+      return meaning.quantity == Quantity::abscissa ||
+             is_one_of({Dimension::length, Dimension::dimensionless});
+    case ColumnRole::height:
+      return dimension == Dimension::length;
+    case ColumnRole::frequency:
+      return dimension == Dimension::frequency;
+    case ColumnRole::storage:
+    case ColumnRole::loss:
+    case ColumnRole::magnitude:
+      return is_one_of({Dimension::stress, Dimension::stiffness});
+    case ColumnRole::phase:
+      return is_one_of({Dimension::angle, Dimension::dimensionless});
+    case ColumnRole::loss_tangent:
+      return dimension == Dimension::dimensionless;
+    case ColumnRole::sd:
+    case ColumnRole::deflection:
+      return true;
+  }
+  return true;
 }
 
 std::optional<Recognized> recognize_title(std::string_view name) {
   if (const auto primes = recognize_primes(name)) return primes;
   if (const auto function = recognize_step_response(name)) return function;
   const std::vector<std::string> words = words_of(spelled_out(name));
-  // "tan delta", "loss tangent", "loss factor".
-  const bool tangent = has_word(words, "tan") || has_word(words, "tangent") ||
-                       (has_word(words, "loss") && has_word(words, "factor"));
-  if (tangent) return kLossTangent;
-  // "complex viscosity" is no modulus, "strain rate" no strain.
-  for (const std::string_view other : {"viscosity", "rate", "geschwindigkeit", "vitesse"}) {
-    if (has_word(words, other)) return std::nullopt;
-  }
-  if (has_word(words, "compliance")) return kCompliance;
-  if (has_word(words, "modulus") && has_word(words, "relaxation")) return kRelaxation;
-  std::optional<Recognized> found;
-  for (const std::string& word : words) {
-    const auto known = std::find_if(kWords.begin(), kWords.end(),
-                                    [&word](const TitleWord& w) { return w.word == word; });
-    if (known == kWords.end()) continue;
-    // "Course traverse absolue" is crosshead travel: the word that says more counts.
-    if (!found || known->meaning.rank > found->rank) found = known->meaning;
-  }
-  return found;
+  const auto known = recognize_words(words);
+  // The standard deviation of a force is no deviation from what was asked for.
+  const bool sd = known && known->role == ColumnRole::sd;
+  return known && (sd || !find_refused_word(words)) ? known : std::nullopt;
+}
+
+std::optional<RefusedTitle> refused_title(std::string_view name) {
+  if (recognize_primes(name) || recognize_step_response(name)) return std::nullopt;
+  const std::vector<std::string> words = words_of(spelled_out(name));
+  const auto refused = find_refused_word(words);
+  const auto known = recognize_words(with_parts_of_joined(words));
+  if (!known || known->role == ColumnRole::sd) return std::nullopt;
+  if (!refused) return std::nullopt;
+  return RefusedTitle{*known, fmt::format("'{}' {}", refused->word, refused->why), refused->asked};
 }
 
 bool is_angular(std::string_view name) {

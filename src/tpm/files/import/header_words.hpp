@@ -4,12 +4,15 @@
 #include <string_view>
 
 #include "tpmkit/curve.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::files {
 
-/// A column title taken apart: "Force [N]", "Force (N)", "Force / N", "Force, N", "Kraft in N" and
-/// "force_N" all give {"Force", "N"}. The unit is empty if there is none that parse_unit knows,
-/// except in square brackets: "Force [foo]" gives "foo", for whoever reads the column to refuse.
+/// A column title taken apart: "Force [N]", "Force (N)", "Force / N", "Force, N", "Kraft in N",
+/// "Force N" and "force_N" all give {"Force", "N"}. The unit is empty if there is none that
+/// parse_unit knows, except in square brackets: "Force [foo]" gives "foo", for whoever reads the
+/// column to refuse. A number is no unit: "Strain_1" and "Strain (1)" are the first of several, and
+/// only "Strain [1]" is a plain number.
 struct ColumnTitle {
   std::string name;
   std::string unit;
@@ -32,6 +35,8 @@ enum class ColumnRole {
   magnitude,     ///< of the complex modulus, |G*|
   phase,         ///< the angle delta by which the stress leads the strain
   loss_tangent,  ///< tan delta
+  height,        ///< of an AFM: travel of the piezo, which its cantilever shortens
+  deflection,    ///< of that cantilever, as a length or as the signal of its detector
 };
 
 /// What a title says in English, French, German, Spanish or Italian, or as G', G", E' and E".
@@ -42,6 +47,19 @@ struct Recognized {
 };
 
 [[nodiscard]] std::optional<Recognized> recognize_title(std::string_view name);
+
+/// A title that would have a meaning but for a word: "Displacement command", "Max. load".
+struct RefusedTitle {
+  Recognized meaning;  ///< without that word
+  std::string why;     ///< "'command' is what was asked for, not what was measured"
+  bool asked = false;  ///< the quantity as it was asked for, and not another one
+};
+
+/// None for a title that recognize_title recognises, and for one without any known word.
+[[nodiscard]] std::optional<RefusedTitle> refused_title(std::string_view name);
+
+/// Whether numbers in this dimension can be what a title says.
+[[nodiscard]] bool is_dimension_of(const Recognized& meaning, Dimension dimension);
 
 /// True for an angular frequency ("omega", "angular frequency", "Kreisfrequenz"): there 1/s means
 /// rad/s.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <utf8.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +10,7 @@
 
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/assemble.hpp"
+#include "tpm/files/import/file_kind.hpp"
 #include "tpm/files/import/import_digitizer.hpp"
 #include "tpm/files/import/import_jpk.hpp"
 #include "tpm/files/import/import_machine.hpp"
@@ -120,9 +122,14 @@ std::vector<ImportFinding> format_findings(const Importer& importer, ImportInput
   std::vector<ImportFinding> findings{{"format", std::string(importer.name)}};
   if (!input.is_table()) return findings;
   const DelimitedTable& table = input.table();
-  findings.push_back({"encoding", std::string(encoding_name(table.encoding))});
+  const bool told = table.encoding == Encoding::latin1 && !input.options().text.latin1;
+  findings.push_back({"encoding", fmt::format("{}{}", encoding_name(table.encoding),
+                                              told ? ", because it is not UTF-8" : "")});
   findings.push_back({"separator", std::string(separator_name(table.separator))});
-  findings.push_back({"decimal sign", table.decimal_comma ? "comma" : "point"});
+  // A machine's samples tell their decimal sign, whatever stands above them.
+  if (importer.name != "machine") {
+    findings.push_back({"decimal sign", table.decimal_comma ? "comma" : "point"});
+  }
   return findings;
 }
 
@@ -132,6 +139,9 @@ const DelimitedTable& ImportInput::table() {
   if (!table_) {
     DelimitedOptions text = options_.text;
     text.ragged = true;  // headers and columns of unequal length
+    // Numbers are the same in both: only titles and units can differ.
+    const bool marked = bytes_.starts_with("\xFF\xFE") || bytes_.starts_with("\xFE\xFF");
+    if (!text.utf8 && !marked && !utf8::is_valid(bytes_)) text.latin1 = true;
     table_ = parse_delimited(bytes_, file_, text);
   }
   return *table_;
@@ -154,10 +164,21 @@ DigitizedAxis parse_axis(std::string_view text, std::string_view where) {
 
 ImportedFile import_series(const std::filesystem::path& path, const ImportOptions& options) {
   ImportInput input(read_file(path), path.string(), options);
+  if (const auto other = find_other_kind(input.bytes(), input.file())) {
+    throw bad_input(input.file(), other->what, other->expected);
+  }
   const Importer& importer = importer_of(input);
-  if (importer.name != "jpk" && (options.spring_constant_N_per_m || !options.segments.empty())) {
+  if (importer.name != "jpk" && !options.segments.empty()) {
     throw bad_input(input.file(), "is no JPK force file",
-                    "--spring-constant and --segments only for such a file (.jpk-force)");
+                    "--segments only for such a file (.jpk-force)");
+  }
+  const bool machine = importer.name == "machine";
+  if (importer.name != "jpk" && !machine && options.spring_constant_N_per_m) {
+    throw bad_input(input.file(), "is no force curve", "--spring-constant only for such a file");
+  }
+  if (!machine && (options.step_time_s || options.from_s || options.until_s || options.block)) {
+    throw bad_input(input.file(), fmt::format("is a file of kind {}", importer.name),
+                    "--step-time, --from, --until and --block only for tables of a machine");
   }
   ImportedFile imported;
   imported.usual = importer.usual;

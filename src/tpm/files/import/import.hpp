@@ -35,6 +35,7 @@ struct ImportOptions {
 
   // Testing machines. A column is chosen by its name or its number from 1.
   std::optional<int> header_rows;
+  std::optional<int> block;  ///< of several blocks of samples in a file, from 1
   std::string time_column;
   std::string drive_column;
   std::string response_column;
@@ -51,12 +52,19 @@ struct ImportOptions {
   /// it.
   std::optional<double> rest_length_m;
   std::optional<double> area_m2;  ///< of the specimen: a column of its force is divided by it
+  /// Time of the step in the file's own clock, for G(t), J(t) and steps that are kept: earlier
+  /// samples are left out, and times count from here.
+  std::optional<double> step_time_s;
+  std::optional<double> from_s;           ///< samples before this time of the file are left out
+  std::optional<double> until_s;          ///< and those after this one
   std::optional<double> contact_force_N;  ///< above 0: samples before contact are left out
   int contact_samples = 3;                ///< how many samples in a row must reach it, from 1
 
-  // JPK force files, whose channels drive_column and response_column may name.
-  std::optional<double> spring_constant_N_per_m;  ///< above 0; else that of the file
-  std::vector<std::string> segments;              ///< kinds to read ("extend", "pause"); empty: all
+  // Force curves of an AFM: JPK files, whose channels drive_column and response_column may name,
+  // and tables with the height of the piezo.
+  std::optional<double> spring_constant_N_per_m;         ///< above 0; else that of the file
+  std::optional<double> deflection_sensitivity_m_per_V;  ///< above 0; tables with a deflection in V
+  std::vector<std::string> segments;  ///< kinds to read ("extend", "pause"); empty: all
 
   // Digitised figures.
   std::optional<DigitizedAxis> x;

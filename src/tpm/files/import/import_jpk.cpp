@@ -301,7 +301,8 @@ void require_jpk_options(const ImportOptions& options, const std::string& file) 
                        !options.frequency_column.empty() || !options.storage_column.empty() ||
                        !options.loss_column.empty() || options.drive_quantity ||
                        options.response_quantity || !options.units.empty() || options.header_rows ||
-                       options.rest_length_m || options.area_m2;
+                       options.rest_length_m || options.area_m2 ||
+                       options.deflection_sensitivity_m_per_V;
   if (columns || options.x || options.y || options.depth_m || options.load_N) {
     throw bad_input(file, "a JPK force file says itself what its channels are",
                     "only --drive and --response with the names of channels, --negate, "

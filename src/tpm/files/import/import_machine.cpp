@@ -3,55 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <tuple>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/import/cantilever.hpp"
+#include "tpm/files/import/clock_text.hpp"
+#include "tpm/files/import/column_choice.hpp"
 #include "tpm/files/import/contact.hpp"
-#include "tpm/files/import/machine_header.hpp"
 #include "tpm/files/import/specimen_size.hpp"
+#include "tpm/files/import/step_clock.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
 namespace {
-
-std::string column_list(const MachineHeader& header) {
-  std::string list;
-  for (const MachineColumn& column : header.columns) {
-    list += fmt::format("{}{}", list.empty() ? "" : ", ", column.label());
-  }
-  return printable(list, 200);
-}
-
-const MachineColumn& column_by_selector(const MachineHeader& header, const std::string& selector,
-                                        const std::string& file) {
-  for (const MachineColumn& column : header.columns) {
-    if (column.name == selector) return column;
-  }
-  std::size_t number = 0;
-  const char* end = selector.data() + selector.size();
-  const auto parsed = std::from_chars(selector.data(), end, number);
-  if (parsed.ec == std::errc{} && parsed.ptr == end && number >= 1 &&
-      number <= header.columns.size()) {
-    return header.columns[number - 1];
-  }
-  throw bad_input(file, fmt::format("no column '{}'", printable(selector)), column_list(header));
-}
-
-const MachineColumn* column_by_title(const MachineHeader& header, ColumnRole role) {
-  const MachineColumn* best = nullptr;
-  for (const MachineColumn& column : header.columns) {
-    if (!column.meaning || column.meaning->role != role) continue;
-    if (best == nullptr || column.meaning->rank < best->meaning->rank) best = &column;
-  }
-  return best;
-}
-
-const MachineColumn* find_column(const MachineHeader& header, ColumnRole role,
-                                 const std::string& selector, const std::string& file) {
-  if (!selector.empty()) return &column_by_selector(header, selector, file);
-  return column_by_title(header, role);
-}
 
 /// What to add to the command line. The unit itself is for the user to say.
 std::string unit_option(const MachineColumn& column, Dimension dimension) {
@@ -79,6 +45,8 @@ struct Use {
   Bound bound;
   bool negate;
   std::optional<Dimension> dimension = std::nullopt;  ///< if it is not that of the quantity
+  bool clock = false;                                 ///< its fields are "11:09:16.5"
+  bool volts = false;  ///< a detector's signal, which the deflection sensitivity makes a length
 };
 
 Dimension dimension_of(const Use& use) {
@@ -94,7 +62,8 @@ void require_units(const std::vector<Use>& uses, const std::string& file) {
     const Dimension dimension = dimension_of(use);
     // A strain without a unit may be a plain number or percent.
     const bool plain = dimension == Dimension::dimensionless && use.quantity != Quantity::strain;
-    if (!use.column->unit.empty() || plain) continue;
+    const bool clock = use.quantity == Quantity::time && use.clock;
+    if (!use.column->unit.empty() || plain || clock) continue;
     ++missing;
     labels += fmt::format("{}{}", labels.empty() ? "" : ", ", use.column->label());
     options +=
@@ -117,6 +86,7 @@ Quantity response_quantity(const MachineColumn& column, const ImportOptions& opt
                              : std::nullopt;
   if (dimension == Dimension::compliance) return Quantity::creep_compliance;
   if (dimension == Dimension::stress) return Quantity::stress;
+  if (dimension == Dimension::force && titled == Quantity::stress) return Quantity::contact_force;
   return titled;
 }
 
@@ -157,15 +127,13 @@ std::string finding_name(const Use& use) {
 /// Builds the series column by column and says which column became what.
 class SeriesReader {
  public:
-  SeriesReader(const DelimitedTable& table, const MachineHeader& header, const std::string& file)
-      : table_(table), header_(header), file_(file) {
-    series_.lines.reserve(table.rows.size() - header.rows);
-    for (std::size_t i = header.rows; i < table.rows.size(); ++i) {
-      if (table.rows[i].fields.size() != header.columns.size()) {
-        throw bad_input(fmt::format("{}:{}", file, table.rows[i].line),
-                        fmt::format("{} fields in this row", table.rows[i].fields.size()),
-                        fmt::format("{} as in the first row of samples", header.columns.size()));
-      }
+  SeriesReader(const DelimitedTable& table, const MachineHeader& header,
+               const std::vector<Use>& uses, const std::string& file)
+      : table_(table), header_(header), file_(file), end_(header.block.end) {
+    leave_out_blank_rows(uses);
+    series_.lines.reserve(end_ - header.block.first);
+    for (std::size_t i = header.block.first; i < end_; ++i) {
+      require_width(table.rows[i], uses);
       series_.lines.push_back(table.rows[i].line);
     }
   }
@@ -177,20 +145,21 @@ class SeriesReader {
     ImportedColumn imported;
     imported.quantity = use.quantity;
     imported.bound = bound;
-    imported.unit = unit_of(column, dimension_of(use), file_);
+    imported.unit = unit_of_use(use);
     imported.values.reserve(series_.lines.size());
-    for (std::size_t i = header_.rows; i < table_.rows.size(); ++i) {
-      const DelimitedRow& row = table_.rows[i];
-      const double value = parse_field_at(row.fields[column.index], table_.decimal_comma, [&] {
-        return fmt::format("{}:{}: {}", file_, row.line, column.label());
-      });
+    for (std::size_t i = header_.block.first; i < end_; ++i) {
+      const double value = number_at(table_.rows[i], use);
       imported.values.push_back(negate ? 0.0 - value : value);  // 0, not -0
     }
-    series_.findings.push_back(
-        {bound == Bound::sd ? "standard deviation" : finding_name(use),
-         fmt::format("{}, {}{}", column.label(),
-                     imported.unit.symbol.empty() ? "plain number" : imported.unit.symbol,
-                     negate ? ", negated" : "")});
+    if (use.clock) unwrap_midnights(imported.values);
+    require_plausible_number(use, imported);
+    series_.findings.push_back({bound == Bound::sd ? "standard deviation" : finding_name(use),
+                                fmt::format("{}, {}{}", column.label(),
+                                            use.volts                      ? column.unit
+                                            : use.clock                    ? "a clock, in s"
+                                            : imported.unit.symbol.empty() ? "plain number"
+                                                                           : imported.unit.symbol,
+                                            negate ? ", negated" : "")});
     used_.push_back(column.index);
     series_.columns.push_back(std::move(imported));
   }
@@ -202,20 +171,90 @@ class SeriesReader {
       unused += fmt::format("{}{}", unused.empty() ? "" : ", ", column.label());
     }
     if (!unused.empty()) series_.findings.push_back({"not used", printable(unused, 200)});
+    for (const MachineColumn& column : header_.columns) {
+      if (!column.refused) continue;
+      if (std::find(used_.begin(), used_.end(), column.index) != used_.end()) continue;
+      series_.findings.push_back(
+          {"no meaning", fmt::format("{}: {}", column.label(), column.refused->why)});
+    }
+    series_.findings.insert(series_.findings.end(), header_.findings.begin(),
+                            header_.findings.end());
     return std::move(series_);
   }
 
  private:
+  /// A specimen that is shorter than the one beside it leaves its cells blank.
+  void leave_out_blank_rows(const std::vector<Use>& uses) {
+    const std::size_t all = end_;
+    const auto blank = [&](const DelimitedRow& row) {
+      return std::all_of(uses.begin(), uses.end(), [&row](const Use& use) {
+        return use.column->index < row.fields.size() && row.fields[use.column->index].empty();
+      });
+    };
+    while (end_ > header_.block.first + 1 && blank(table_.rows[end_ - 1])) --end_;
+    if (end_ == all) return;
+    series_.findings.push_back(
+        {"blank", fmt::format("{} in these columns", lines_of(table_, end_, all))});
+  }
+
+  void require_width(const DelimitedRow& row, const std::vector<Use>& uses) const {
+    const std::size_t width = header_.block.width;
+    const bool longer =
+        row.fields.size() > width &&
+        std::any_of(row.fields.begin() + static_cast<std::ptrdiff_t>(width), row.fields.end(),
+                    [](std::string_view field) { return !field.empty(); });
+    const bool shorter = std::any_of(uses.begin(), uses.end(), [&row](const Use& use) {
+      return use.column->index >= row.fields.size();
+    });
+    if (!longer && !shorter) return;
+    throw bad_input(fmt::format("{}:{}", file_, row.line),
+                    fmt::format("{} fields in this row", row.fields.size()),
+                    fmt::format("{} as in the first row of samples", width));
+  }
+
+  [[nodiscard]] double number_at(const DelimitedRow& row, const Use& use) const {
+    const std::string_view field = field_at(row, use.column->index);
+    if (const auto number = find_styled_number(field, header_.style)) return *number;
+    const std::string where = fmt::format("{}:{}: {}", file_, row.line, use.column->label());
+    if (!use.clock) return parse_styled_number(field, header_.style, where);
+    if (const auto seconds = find_clock_seconds(field)) return *seconds;
+    throw bad_input(where, fmt::format("'{}'", printable(field)),
+                    "a time such as 11:09:16.5 (h:mm:ss), or m:ss.s");
+  }
+
+  [[nodiscard]] Unit unit_of_use(const Use& use) const {
+    if (use.volts) return {"V", Dimension::length, use.column->unit == "mV" ? 1e-3 : 1.0};
+    if (use.clock) return parse_unit("s", Dimension::time, file_);
+    return unit_of(*use.column, dimension_of(use), file_);
+  }
+
+  /// A strain of 2000 % is hardly one: a plain number that large is more likely percent.
+  void require_plausible_number(const Use& use, const ImportedColumn& imported) const {
+    constexpr double kImplausible = 20.0;
+    const bool relative =
+        use.quantity == Quantity::strain || use.quantity == Quantity::relative_length;
+    const bool plain = imported.unit.dimension == Dimension::dimensionless &&
+                       imported.unit.to_si == 1.0 && !use.column->unit_is_chosen;
+    if (!relative || !plain) return;
+    const auto large = std::find_if(imported.values.begin(), imported.values.end(),
+                                    [](double v) { return std::abs(v) >= kImplausible; });
+    if (large == imported.values.end()) return;
+    throw bad_input(fmt::format("{}: {}", file_, use.column->label()),
+                    fmt::format("reaches {} and has no unit", shortest(*large)),
+                    unit_option(*use.column, Dimension::dimensionless));
+  }
+
   const DelimitedTable& table_;
   const MachineHeader& header_;
   const std::string& file_;
+  std::size_t end_;  ///< row behind the last sample
   ImportedSeries series_;
   std::vector<std::size_t> used_;
 };
 
 /// The columns of a spectrum, nothing if the file holds something else: a frequency alone may be
 /// that of the sampling, and a column that is named as time, drive or response says what is meant.
-std::vector<Use> spectrum_uses(const MachineHeader& header, const std::string& file,
+std::vector<Use> spectrum_uses(const ColumnChoice& choice, const std::string& file,
                                const ImportOptions& options) {
   const bool chosen = !options.frequency_column.empty() || !options.storage_column.empty() ||
                       !options.loss_column.empty();
@@ -223,15 +262,15 @@ std::vector<Use> spectrum_uses(const MachineHeader& header, const std::string& f
                          !options.response_column.empty();
   if (recording && !chosen) return {};
   const MachineColumn* frequency =
-      find_column(header, ColumnRole::frequency, options.frequency_column, file);
+      choice.find(ColumnRole::frequency, options.frequency_column, "--frequency");
   const MachineColumn* storage =
-      find_column(header, ColumnRole::storage, options.storage_column, file);
-  const MachineColumn* loss = find_column(header, ColumnRole::loss, options.loss_column, file);
+      choice.find(ColumnRole::storage, options.storage_column, "--storage");
+  const MachineColumn* loss = choice.find(ColumnRole::loss, options.loss_column, "--loss");
   const MachineColumn* magnitude =
-      chosen ? nullptr : column_by_title(header, ColumnRole::magnitude);
-  const MachineColumn* angle = chosen ? nullptr : column_by_title(header, ColumnRole::phase);
+      chosen ? nullptr : choice.by_title(ColumnRole::magnitude, "--storage");
+  const MachineColumn* angle = chosen ? nullptr : choice.by_title(ColumnRole::phase, "--storage");
   const MachineColumn* tangent =
-      chosen ? nullptr : column_by_title(header, ColumnRole::loss_tangent);
+      chosen ? nullptr : choice.by_title(ColumnRole::loss_tangent, "--storage");
   const bool polar = magnitude != nullptr && (angle != nullptr || tangent != nullptr);
   if (!chosen && (frequency == nullptr || (storage == nullptr && loss == nullptr && !polar))) {
     return {};
@@ -253,7 +292,7 @@ std::vector<Use> spectrum_uses(const MachineHeader& header, const std::string& f
                                               std::tuple{loss, "a loss modulus", "--loss"}}) {
     if (column != nullptr) continue;
     throw bad_input(file, fmt::format("no column is recognised as {}", words),
-                    fmt::format("{} with one of {}", option, column_list(header)));
+                    fmt::format("{} with one of {}", option, choice.list()));
   }
   return {{frequency, Quantity::frequency, Bound::value, false},
           {storage, spectrum_quantity(*storage, false), Bound::value, false},
@@ -283,20 +322,16 @@ void resolve_phase(ImportedSeries& series, const std::vector<Use>& uses) {
 }
 
 /// The response of a strain is a stress, if there is one beside a force.
-const MachineColumn* response_column(const MachineHeader& header, const MachineColumn* drive,
-                                     const ImportOptions& options, const std::string& file) {
-  const MachineColumn* found =
-      find_column(header, ColumnRole::response, options.response_column, file);
+const MachineColumn* response_column(const ColumnChoice& choice, const MachineColumn* drive,
+                                     const ImportOptions& options) {
   const bool chosen = !options.response_column.empty() || options.response_quantity;
-  if (chosen || drive == nullptr || !is_answered_by_stress(drive_quantity(*drive, options))) {
-    return found;
+  if (!chosen && drive != nullptr && is_answered_by_stress(drive_quantity(*drive, options))) {
+    const auto* stress = choice.by_title(
+        ColumnRole::response, "--response",
+        [](const MachineColumn& column) { return column.meaning->quantity == Quantity::stress; });
+    if (stress != nullptr) return stress;
   }
-  const auto stress =
-      std::find_if(header.columns.begin(), header.columns.end(), [](const MachineColumn& column) {
-        return column.meaning && column.meaning->quantity == Quantity::stress &&
-               column.meaning->role == ColumnRole::response;
-      });
-  return stress == header.columns.end() ? found : &*stress;
+  return choice.find(ColumnRole::response, options.response_column, "--response");
 }
 
 /// A length, or how far the specimen was drawn, becomes a relative length or a strain by its length
@@ -333,28 +368,62 @@ void resolve_specimen(Use& drive, Use& response, const std::string& file,
   response.dimension = Dimension::force;
 }
 
-std::vector<Use> recording_uses(const MachineHeader& header, const std::string& file,
+/// Refuses a recording that would go without what only a refused title could give.
+void require_not_refused(const ColumnChoice& choice, ColumnRole role, const std::string& file,
+                         const char* option) {
+  const MachineColumn* column = choice.refused(role);
+  if (column == nullptr) return;
+  throw bad_input(fmt::format("{}: {}", file, column->label()), column->refused->why,
+                  fmt::format("a column of what was measured, or {} {} to take this one", option,
+                              column->index + 1));
+}
+
+bool is_clock(const DelimitedTable& table, const MachineHeader& header,
+              const MachineColumn& column) {
+  for (std::size_t i = header.block.first; i < header.block.end; ++i) {
+    const std::string_view field = field_at(table.rows[i], column.index);
+    if (!field.empty()) return is_clock_text(field);
+  }
+  return false;
+}
+
+/// The columns of a recording. Those of an AFM are a height, and a deflection or a force.
+std::vector<Use> recording_uses(const DelimitedTable& table, const MachineHeader& header,
+                                const ColumnChoice& choice, const std::string& file,
                                 const ImportOptions& options) {
-  const MachineColumn* time = find_column(header, ColumnRole::time, options.time_column, file);
-  const MachineColumn* drive = find_column(header, ColumnRole::drive, options.drive_column, file);
-  const MachineColumn* response = response_column(header, drive, options, file);
-  const MachineColumn* sd = find_column(header, ColumnRole::sd, options.sd_column, file);
+  const MachineColumn* time = choice.find(ColumnRole::time, options.time_column, "--time");
+  const MachineColumn* drive = choice.find(ColumnRole::drive, options.drive_column, "--drive");
+  if (drive == nullptr) drive = choice.by_title(ColumnRole::height, "--drive");
+  const MachineColumn* response = response_column(choice, drive, options);
+  const bool deflection = response == nullptr;
+  if (deflection) response = choice.by_title(ColumnRole::deflection, "--response");
+  const MachineColumn* sd = choice.find(ColumnRole::sd, options.sd_column, "--sd");
   if (response == nullptr) {
+    require_not_refused(choice, ColumnRole::response, file, "--response");
     throw bad_input(file, "no column is recognised as a force, stress, modulus or compliance",
-                    fmt::format("--response with one of {}", column_list(header)));
+                    fmt::format("--response with one of {}", choice.list()));
+  }
+  const Quantity observed = response_quantity(*response, options);
+  if (drive == nullptr && !is_step_response(observed)) {
+    require_not_refused(choice, ColumnRole::drive, file, "--drive");
   }
   if (time == nullptr && drive == nullptr) {
+    require_not_refused(choice, ColumnRole::time, file, "--time");
     throw bad_input(file, "no column is recognised as time or displacement",
-                    fmt::format("--time or --drive with one of {}", column_list(header)));
+                    fmt::format("--time or --drive with one of {}", choice.list()));
   }
 
-  const Quantity observed = response_quantity(*response, options);
   std::vector<Use> uses;
-  if (time != nullptr) uses.push_back({time, Quantity::time, Bound::value, false});
+  if (time != nullptr) {
+    uses.push_back({time, Quantity::time, Bound::value, false});
+    uses.back().clock = is_clock(table, header, *time);
+  }
   Use answer{response, observed, Bound::value, options.negate_response};
+  answer.volts = is_deflection(*response) && (response->unit == "V" || response->unit == "mV");
+  if (is_deflection(*response)) answer.dimension = Dimension::length;
   if (drive != nullptr && !is_step_response(observed)) {
     Use imposed{drive, drive_quantity(*drive, options), Bound::value, options.negate_drive};
-    resolve_specimen(imposed, answer, file, options);
+    if (!is_deflection(*response)) resolve_specimen(imposed, answer, file, options);
     uses.push_back(imposed);
   }
   uses.push_back(answer);
@@ -364,29 +433,51 @@ std::vector<Use> recording_uses(const MachineHeader& header, const std::string& 
   return uses;
 }
 
+std::vector<CantileverColumn> cantilever_columns(const std::vector<Use>& uses) {
+  std::vector<CantileverColumn> columns;
+  for (const Use& use : uses) columns.push_back({use.column, use.volts});
+  return columns;
+}
+
 }  // namespace
 
 ImportedSeries read_machine(const DelimitedTable& table, const std::string& file,
                             const ImportOptions& options) {
   const MachineHeader header = read_machine_header(table, file, options);
-  std::vector<Use> uses = spectrum_uses(header, file, options);
+  const ColumnChoice choice(table, header, file);
+  std::vector<Use> uses = spectrum_uses(choice, file, options);
   const bool spectrum = !uses.empty();
-  if (!spectrum) uses = recording_uses(header, file, options);
+  if (!spectrum) uses = recording_uses(table, header, choice, file, options);
   require_units(uses, file);
-  SeriesReader reader(table, header, file);
+  SeriesReader reader(table, header, uses, file);
   for (const Use& use : uses) reader.add(use);
   ImportedSeries series = reader.take();
+  if (choice.specimens() > 1) {
+    series.findings.push_back(
+        {"specimens", fmt::format("{} side by side, of which the first is read (--time, --drive "
+                                  "and --response choose another)",
+                                  choice.specimens())});
+  }
   if (spectrum) {
     resolve_phase(series, uses);
   } else {
+    resolve_cantilever(series, cantilever_columns(uses), file, options);
     divide_by_size(series, options);
+    keep_time_window(series, file, options);
     resolve_kept_step(series);
+    require_step_clock(series, file, options);
   }
   series.name = header.sheet;
   series.findings.insert(
       series.findings.begin(),
-      {"header rows", fmt::format("{}{}{}", header.rows, header.sheet.empty() ? "" : ", sheet ",
-                                  printable(header.sheet))});
+      {{"decimal sign", header.style.decimal_comma ? "comma" : "point"},
+       {"header rows", fmt::format("{}{}{}", header.rows, header.sheet.empty() ? "" : ", sheet ",
+                                   printable(header.sheet))}});
+  if (header.style.thousands != ThousandsMark::none) {
+    series.findings.insert(
+        series.findings.begin() + 1,
+        {"marks of thousands", std::string(thousands_name(header.style.thousands))});
+  }
   const bool step = !spectrum && is_step_response(series.columns.back().bound == Bound::sd
                                                       ? series.columns.at(1).quantity
                                                       : series.columns.back().quantity);

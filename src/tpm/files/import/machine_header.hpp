@@ -6,6 +6,8 @@
 
 #include "tpm/files/import/header_words.hpp"
 #include "tpm/files/import/import.hpp"
+#include "tpm/files/import/table_block.hpp"
+#include "tpm/files/number_style.hpp"
 
 namespace tpm::files {
 
@@ -15,20 +17,28 @@ struct MachineColumn {
   std::string name;  ///< may be empty
   std::string unit;  ///< may be empty
   std::optional<Recognized> meaning;
+  std::optional<RefusedTitle> refused;  ///< what it would mean but for a word or its unit
+  bool misfit = false;  ///< the unit is none of what the title says: taken if no other column fits
+  bool unit_is_chosen = false;  ///< by the options, not by the file
 
   /// "column 2 'Force'"
   [[nodiscard]] std::string label() const;
 };
 
 struct MachineHeader {
-  std::size_t rows = 0;
+  std::size_t rows = 0;  ///< above the samples
+  SampleBlock block;
+  NumberStyle style;
   std::string sheet;
   std::vector<MachineColumn> columns;
+  std::vector<ImportFinding> findings;  ///< what of the file is not read
 };
 
-/// Finds the rows above the samples, and in them titles and units in any order: blank rows, titles
-/// of the file and sheet names may stand between them. Units that the options give go before those
-/// of the file. Throws Error(bad_input) if there are no samples.
+/// Finds the samples, and above them titles and units in any order: blank rows, titles of the file
+/// and sheet names may stand between them, and titles may stand in comments. Of several blocks of
+/// samples the one is taken whose titles are understood; options.block chooses. Units that the
+/// options give go before those of the file. Throws Error(bad_input) if there are no samples, or
+/// several blocks that could be meant.
 [[nodiscard]] MachineHeader read_machine_header(const DelimitedTable& table,
                                                 const std::string& file,
                                                 const ImportOptions& options);

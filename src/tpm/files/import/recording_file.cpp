@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <utility>
 
 #include "tpm/files/delimited.hpp"
 #include "tpm/files/import/assemble.hpp"
+#include "tpm/files/import/reading_options.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
@@ -28,15 +30,8 @@ bool is_described(const fs::path& path) {
 }
 
 bool says_something_about_columns(const ImportOptions& options) {
-  return options.format != "auto" || options.header_rows || !options.time_column.empty() ||
-         !options.drive_column.empty() || !options.response_column.empty() ||
-         !options.sd_column.empty() || !options.frequency_column.empty() ||
-         !options.storage_column.empty() || !options.loss_column.empty() ||
-         options.drive_quantity || options.response_quantity || !options.units.empty() ||
-         options.negate_drive || options.negate_response || options.contact_force_N ||
-         options.spring_constant_N_per_m || !options.segments.empty() || options.rest_length_m ||
-         options.area_m2 || options.x || options.y || !options.dataset.empty() || options.depth_m ||
-         options.load_N;
+  return options.format != "auto" || says_how_to_read(options) || options.contact_force_N ||
+         options.x || options.y || !options.dataset.empty() || options.depth_m || options.load_N;
 }
 
 /// The kind that a description names; an id is one of the shipped curves.
@@ -99,11 +94,17 @@ std::string described_label(const fs::path& path, std::string_view key) {
 }  // namespace
 
 std::string columns_words(const std::vector<ImportFinding>& findings) {
+  // What a reader would not expect stands there too, and why.
+  constexpr auto kTold =
+      std::to_array<std::string_view>({"converted", "marks of thousands", "specimens", "blank",
+                                       "window", "step", "not read", "no meaning", "warning"});
   std::string words;
   for (const ImportFinding& finding : findings) {
     const bool column =
         finding.value.starts_with("column ") || finding.value.starts_with("channel ");
-    if (!column && finding.what != "converted") continue;
+    const bool told = std::find(kTold.begin(), kTold.end(), finding.what) != kTold.end() ||
+                      (finding.what == "encoding" && finding.value.find(',') != std::string::npos);
+    if (finding.what == "not used" || (!column && !told)) continue;
     words +=
         fmt::format("{}{}: {}", words.empty() ? "read as " : "; ", finding.what, finding.value);
   }
@@ -142,6 +143,9 @@ std::string recording_label(const fs::path& path, std::string_view key,
 
 MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& options) {
   const std::string file = path.string();
+  if (file == "-") {
+    throw bad_input("-", "is no file", "a file, or /dev/stdin for what a pipe brings");
+  }
   if (is_described(path)) {
     if (curve_kind_of(path) == "spectrum") return SpectrumFile{load_spectrum(file), {}};
     return read_described(path, options);

@@ -8,9 +8,4 @@ namespace tpm::files {
 /// relative lengths or strains and stresses.
 void divide_by_size(ImportedSeries& series, const ImportOptions& options);
 
-/// Turns a strain that is kept from the first sample on, and its stress, into a relaxation modulus,
-/// and a stress that is kept, and its strain, into a creep compliance. Kept means within 2 %. Other
-/// series stay as they are.
-void resolve_kept_step(ImportedSeries& series);
-
 }  // namespace tpm::files

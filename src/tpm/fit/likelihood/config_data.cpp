@@ -5,6 +5,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/files/blocks/protocol_block.hpp"
+#include "tpm/files/import/reading_options.hpp"
 #include "tpm/fit/likelihood/config_parts.hpp"
 #include "tpmkit/error.hpp"
 
@@ -92,38 +93,20 @@ void parse_stiffness_per_modulus(const Json& j, const FitConfig& config, DataCho
   throw bad_input(here.where, "not above 0", "A0/l0 such as \"12.56 mm\"");
 }
 
-/// The columns and units of a recording that has no description.
+/// How a recording that has no description is read.
 ImportOptions parse_import(const Json& j, const DocumentPlace& place) {
   ImportOptions import;
-  import.time_column = j.value("time", "");
-  import.drive_column = j.value("drive", "");
-  import.response_column = j.value("response", "");
-  import.sd_column = j.value("sd", "");
-  import.frequency_column = j.value("frequency", "");
-  import.storage_column = j.value("storage", "");
-  import.loss_column = j.value("loss", "");
-  if (j.contains("drive_quantity")) {
-    import.drive_quantity = parse_quantity_name(j.at("drive_quantity").get<std::string>(),
-                                                place.key("drive_quantity").where);
-  }
-  if (j.contains("response_quantity")) {
-    import.response_quantity = parse_quantity_name(j.at("response_quantity").get<std::string>(),
-                                                   place.key("response_quantity").where);
-  }
-  import.negate_drive = j.value("negate_drive", false);
-  import.negate_response = j.value("negate_response", false);
-  if (j.contains("rest_length")) {
-    import.rest_length_m = quantity_at(j, "rest_length", Dimension::length, place);
-  }
-  if (j.contains("spring_constant")) {
-    import.spring_constant_N_per_m = quantity_at(j, "spring_constant", Dimension::stiffness, place);
-  }
-  import.segments = j.value("segments", std::vector<std::string>());
-  if (j.contains("area")) import.area_m2 = quantity_at(j, "area", Dimension::area, place);
-  if (j.contains("units")) {
-    for (const auto& [column, unit] : j.at("units").items()) {
-      import.units[column] = unit.get<std::string>();
-      static_cast<void>(parse_unit(import.units[column], place.key("units").key(column).where));
+  for (const auto& [key, value] : j.items()) {
+    const DocumentPlace here = place.key(key);
+    if (key == "units") {
+      for (const auto& [column, unit] : value.items()) {
+        set_reading_unit(import, column, unit.get<std::string>(), here.key(column).where);
+      }
+    } else if (key == "segments") {
+      import.segments = value.get<std::vector<std::string>>();
+    } else {
+      const bool text = value.is_string();
+      set_reading_option(import, key, text ? value.get<std::string>() : value.dump(), here.where);
     }
   }
   return import;

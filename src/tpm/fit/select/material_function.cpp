@@ -194,6 +194,12 @@ std::string MaterialFunction::kind() const {
 std::optional<MaterialFunction> find_material_function(const std::string& path,
                                                        const ImportOptions& import) {
   MeasuredFile measured = read_measured_file(path, import);
+  return material_function_of(path, import, measured);
+}
+
+std::optional<MaterialFunction> material_function_of(const std::string& path,
+                                                     const ImportOptions& import,
+                                                     MeasuredFile& measured) {
   if (auto* spectrum = std::get_if<SpectrumFile>(&measured)) {
     return MaterialFunction{path, std::move(spectrum->spectrum), import,
                             columns_words(spectrum->findings)};

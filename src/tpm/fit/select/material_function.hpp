@@ -3,6 +3,7 @@
 #include <string>
 #include <variant>
 
+#include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/select/selection.hpp"
 
 namespace tpm::fit {
@@ -24,6 +25,11 @@ struct MaterialFunction {
 /// holds a recording with a drive. Throws as these do.
 [[nodiscard]] std::optional<MaterialFunction> find_material_function(const std::string& path,
                                                                      const ImportOptions& import);
+
+/// The same of a file that was read; `measured` is moved from if it holds one.
+[[nodiscard]] std::optional<MaterialFunction> material_function_of(const std::string& path,
+                                                                   const ImportOptions& import,
+                                                                   MeasuredFile& measured);
 
 /// The configuration that fits one law with a linear kernel: of stress over strain for moduli and
 /// compliances, of force over depth for dynamic stiffnesses. Noise in parts of each reading (or the

@@ -9,6 +9,7 @@
 #include "tpm/base/median.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/import/reading_options.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -35,7 +36,45 @@ double start_drive(const PreparedRecording& r) {
                                                        : r.recording.drive.front();
 }
 
+bool is_only_a_hold(const PreparedRecording& r) {
+  return std::all_of(r.phases.phases.begin(), r.phases.phases.end(),
+                     [](const Phase& phase) { return phase.kind == PhaseKind::hold; });
+}
+
+/// Loading that falls much farther than it rises is counted the other way.
+bool falls_instead(const std::vector<double>& values, double noise_sd) {
+  constexpr double kMuch = 3.0, kNoise = 20.0;
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const double fall = values.front() - *low, rise = *high - values.front();
+  return fall > kMuch * std::max(rise, 0.0) && fall > kNoise * noise_sd;
+}
+
+/// Refuses a force or a depth that is counted negative, naming the option that turns it.
+void require_rise(const PreparedRecording& r) {
+  const std::vector<double>& drive = r.recording.drive;
+  const auto loaded =
+      std::max_element(drive.begin(), drive.end()) - drive.begin() + std::ptrdiff_t{1};
+  const bool down = falls_instead(drive, r.phases.drive_jitter_sd);
+  const std::vector<double>& all = r.recording.response;
+  const std::vector<double> response(all.begin(), down ? all.end() : all.begin() + loaded);
+  const bool response_down = falls_instead(response, r.phases.noise_sd_estimate);
+  if (!down && !response_down) return;
+  const bool both = down && response_down;
+  throw bad_input(fmt::format("recording '{}'", r.name),
+                  both   ? "the drive falls, and so does the response"
+                  : down ? "the drive falls"
+                         : "the response falls where the drive rises",
+                  fmt::format("{}, if the machine counts {} the other way",
+                              both   ? "--negate-drive --negate-response"
+                              : down ? "--negate-drive"
+                                     : "--negate-response",
+                              both ? "them" : "it"));
+}
+
 Sizes sizes_of(std::span<const PreparedRecording> recordings) {
+  for (const PreparedRecording& r : recordings) {
+    if (!is_only_a_hold(r)) require_rise(r);
+  }
   Sizes sizes;
   sizes.shortest_s = std::numeric_limits<double>::infinity();
   for (const PreparedRecording& r : recordings) {
@@ -46,15 +85,11 @@ Sizes sizes_of(std::span<const PreparedRecording> recordings) {
   }
   if (sizes.drive > 0.0 && sizes.response > 0.0) return sizes;
   const PreparedRecording& first = recordings.front();
-  const auto falls = [](const std::vector<double>& values, double rise) {
-    return values.front() - *std::min_element(values.begin(), values.end()) > std::max(rise, 0.0);
-  };
   const std::string where = fmt::format("recording '{}'", first.name);
-  const bool down = falls(first.recording.drive, sizes.drive);
-  if (down || falls(first.recording.response, sizes.response)) {
-    throw bad_input(where, fmt::format("the {} falls", down ? "drive" : "response"),
-                    "values that rise with the load: --negate-drive, --negate-response or both, if "
-                    "the machine counts them the other way");
+  if (is_only_a_hold(first)) {
+    throw bad_input(where, "only a hold: the drive stays where it is from the first sample on",
+                    "the recording from before the ramp on (nothing else tells how the response "
+                    "began), or a strain and a stress, which make a relaxation modulus");
   }
   throw bad_input(where,
                   sizes.drive > 0.0 ? "the response never rises above where it starts"
@@ -322,29 +357,16 @@ namespace {
 
 Json import_json(const ImportOptions& import) {
   Json j = Json::object();
-  const auto put = [&](const char* key, const std::string& value) {
-    if (!value.empty()) j[key] = value;
-  };
-  put("time", import.time_column);
-  put("drive", import.drive_column);
-  put("response", import.response_column);
-  put("sd", import.sd_column);
-  put("frequency", import.frequency_column);
-  put("storage", import.storage_column);
-  put("loss", import.loss_column);
-  if (import.drive_quantity) j["drive_quantity"] = quantity_name(*import.drive_quantity);
-  if (import.response_quantity) j["response_quantity"] = quantity_name(*import.response_quantity);
+  for (const auto& [key, text] : reading_texts(import)) {
+    if (key == "segments") {
+      j[key] = import.segments;
+    } else if (text == "true") {
+      j[key] = true;
+    } else {
+      j[key] = text;
+    }
+  }
   if (!import.units.empty()) j["units"] = import.units;
-  if (import.negate_drive) j["negate_drive"] = true;
-  if (import.negate_response) j["negate_response"] = true;
-  if (import.rest_length_m) {
-    j["rest_length"] = fmt::format("{} mm", shortest(1e3 * *import.rest_length_m));
-  }
-  if (import.spring_constant_N_per_m) {
-    j["spring_constant"] = fmt::format("{} N/m", shortest(*import.spring_constant_N_per_m));
-  }
-  if (!import.segments.empty()) j["segments"] = import.segments;
-  if (import.area_m2) j["area"] = fmt::format("{} mm^2", shortest(1e6 * *import.area_m2));
   return j;
 }
 

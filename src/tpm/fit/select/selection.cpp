@@ -232,9 +232,12 @@ std::optional<HeldOut> predict_second_half(const Candidate& candidate,
                                            const PreparedRecording& recording, SetupOptions setup) {
   PreparedRecording early = recording;
   double hold_begin = recording.from_s;
+  bool loaded = false;  // the rest before the ramp is no hold
   for (const Phase& phase : recording.phases.phases) {
     const double begin = recording.recording.time_s[phase.first];
-    if (phase.kind == PhaseKind::hold && begin < recording.to_s) hold_begin = begin;
+    if (phase.kind == PhaseKind::loading && !loaded) hold_begin = std::max(hold_begin, begin);
+    loaded = loaded || phase.kind == PhaseKind::loading;
+    if (phase.kind == PhaseKind::hold && loaded && begin < recording.to_s) hold_begin = begin;
   }
   early.to_s = 0.5 * (hold_begin + recording.to_s);
   setup.profiles = false;

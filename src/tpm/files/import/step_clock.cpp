@@ -1,0 +1,166 @@
+#include "tpm/files/import/step_clock.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::files {
+namespace {
+
+const ImportedColumn* time_of(const ImportedSeries& series) {
+  const auto found = std::find_if(series.columns.begin(), series.columns.end(), [](const auto& c) {
+    return c.quantity == Quantity::time && c.bound == Bound::value;
+  });
+  return found == series.columns.end() ? nullptr : &*found;
+}
+
+bool holds_step_response(const ImportedSeries& series) {
+  return std::any_of(
+      series.columns.begin(), series.columns.end(),
+      [](const ImportedColumn& column) { return is_step_response(column.quantity); });
+}
+
+/// The ratio of the large values (nine tenths are smaller) to the small ones.
+double spread_of(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t tenth = values.size() / 10;
+  return values[values.size() - 1 - tenth] / values[tenth];
+}
+
+template <typename T>
+void keep_rows(std::vector<T>& values, std::size_t first, std::size_t end) {
+  if (values.empty()) return;
+  values.erase(values.begin() + static_cast<std::ptrdiff_t>(end), values.end());
+  values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(first));
+}
+
+}  // namespace
+
+void keep_time_window(ImportedSeries& series, const std::string& file,
+                      const ImportOptions& options) {
+  if (!options.from_s && !options.until_s && !options.step_time_s) return;
+  const ImportedColumn* time = time_of(series);
+  if (time == nullptr) {
+    throw bad_input(file, "no column is recognised as time",
+                    "--from, --until and --step-time only with times (--time COLUMN)");
+  }
+  const std::vector<double>& times = time->values;
+  const double to_si = time->unit.to_si;
+  double from_s = options.from_s.value_or(times.front() * to_si);
+  if (options.step_time_s) from_s = std::max(from_s, *options.step_time_s);
+  // Times are compared in the unit of the file, in which they have few digits.
+  constexpr double kRounding = 1e-9;
+  const double tolerance = kRounding * std::abs(times.back());
+  const auto begin = std::find_if(times.begin(), times.end(),
+                                  [&](double t) { return t >= from_s / to_si - tolerance; });
+  const auto end = std::find_if(begin, times.end(), [&](double t) {
+    return options.until_s && t > *options.until_s / to_si + tolerance;
+  });
+  if (end - begin < 2) {
+    throw bad_input(
+        file,
+        fmt::format("fewer than 2 samples in the chosen times; the file holds {} s to "
+                    "{} s",
+                    significant(times.front() * to_si, 6), significant(times.back() * to_si, 6)),
+        "--from, --until and --step-time within these");
+  }
+  const auto first = static_cast<std::size_t>(begin - times.begin());
+  const auto last = static_cast<std::size_t>(end - times.begin());
+  const std::size_t all = times.size();
+  for (ImportedColumn& column : series.columns) keep_rows(column.values, first, last);
+  keep_rows(series.lines, first, last);
+  if (first > 0 || last < all) {
+    series.findings.push_back({"window", fmt::format("{} of {} samples", last - first, all)});
+  }
+  if (!options.step_time_s || *options.step_time_s == 0.0) return;
+  for (ImportedColumn& column : series.columns) {
+    if (column.quantity != Quantity::time) continue;
+    for (double& value : column.values) value -= *options.step_time_s / to_si;
+    column.shifted = true;
+  }
+  series.findings.push_back({"step", fmt::format("at {} s of the file, from which the times count",
+                                                 significant(*options.step_time_s, 9))});
+}
+
+void resolve_kept_step(ImportedSeries& series) {
+  constexpr double kKept = 0.02;  // of its mean, from the smallest to the largest
+  const auto column = [&](Quantity quantity) {
+    return std::find_if(series.columns.begin(), series.columns.end(), [&](const auto& c) {
+      return c.quantity == quantity && c.bound == Bound::value;
+    });
+  };
+  const auto time = column(Quantity::time);
+  const auto strain = column(Quantity::strain);
+  const auto stress = column(Quantity::stress);
+  const auto end = series.columns.end();
+  const bool sd =
+      std::any_of(series.columns.begin(), end, [](const auto& c) { return c.bound == Bound::sd; });
+  if (time == end || strain == end || stress == end || sd || time->values.front() < 0.0) return;
+  const auto kept = [](const std::vector<double>& values) {
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    return *low * *high > 0.0 && *high - *low <= kKept * std::abs(0.5 * (*low + *high));
+  };
+  const bool relaxation = kept(strain->values);
+  if (!relaxation && !kept(stress->values)) return;
+  ImportedColumn& answer = relaxation ? *stress : *strain;
+  const ImportedColumn& step = relaxation ? *strain : *stress;
+  for (std::size_t i = 0; i < answer.values.size(); ++i) {
+    answer.values[i] *= answer.unit.to_si / (step.values[i] * step.unit.to_si);
+  }
+  answer.quantity = relaxation ? Quantity::relaxation_modulus : Quantity::creep_compliance;
+  const Dimension dimension = quantity_dimension(answer.quantity);
+  answer.unit = parse_unit(si_symbol(dimension), dimension, {});
+  answer.shifted = true;
+  series.findings.push_back(
+      {"converted", relaxation ? "stress over the strain that is kept, to a relaxation modulus; "
+                                 "the times count from the step"
+                               : "strain over the stress that is kept, to a creep compliance; the "
+                                 "times count from the step"});
+  series.columns.erase(relaxation ? strain : stress);
+}
+
+bool counts_from_step(const std::vector<double>& times) {
+  constexpr double kSteps = 2.0;  // of the sampling, after which a clock is late
+  constexpr double kRounding = 1e-6;
+  constexpr double kGeometric = 4.0;  // spread of the ratios of a rounded geometric progression
+  if (times.size() < 2) return true;
+  const double first_step = times[1] - times[0];
+  if (times.front() <= kSteps * first_step * (1.0 + kRounding)) return true;
+  std::vector<double> steps, ratios;
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    steps.push_back(times[i] - times[i - 1]);
+    ratios.push_back(steps.back() / times[i - 1]);
+  }
+  const double uniform = spread_of(std::move(steps)), geometric = spread_of(std::move(ratios));
+  return geometric < kGeometric && geometric < uniform;
+}
+
+void require_step_clock(const ImportedSeries& series, const std::string& file,
+                        const ImportOptions& options) {
+  const bool step = holds_step_response(series);
+  if (options.step_time_s) {
+    if (step) return;
+    throw bad_input(
+        file, "holds no step: neither strain nor stress is kept from --step-time on",
+        "--step-time only with G(t), J(t), or a strain or stress that is kept after it");
+  }
+  const ImportedColumn* time = time_of(series);
+  if (!step || time == nullptr || counts_from_step(time->values)) return;
+  const double to_si = time->unit.to_si;
+  throw bad_input(
+      file,
+      fmt::format("the first sample is {} s after the step, by a clock that ticks every {} s",
+                  significant(time->values[0] * to_si, 6),
+                  significant((time->values[1] - time->values[0]) * to_si, 3)),
+      fmt::format("--step-time with the time of the step on this clock, such as --step-time \"{} "
+                  "s\"; --step-time \"0 s\" if it counts from the step",
+                  significant((time->values[0] - (time->values[1] - time->values[0])) * to_si, 6)));
+}
+
+}  // namespace tpm::files

@@ -1,0 +1,30 @@
+#pragma once
+#include <string>
+
+#include "tpm/files/import/import.hpp"
+
+namespace tpm::files {
+
+/// Leaves out samples before options.from_s, after options.until_s and before options.step_time_s,
+/// from which the times then count. Throws Error(bad_input) if no two samples remain, or if there
+/// is no time to choose by.
+void keep_time_window(ImportedSeries& series, const std::string& file,
+                      const ImportOptions& options);
+
+/// Turns a strain that is kept from the first sample on, and its stress, into a relaxation modulus,
+/// and a stress that is kept, and its strain, into a creep compliance. Kept means within 2 %. Other
+/// series stay as they are.
+void resolve_kept_step(ImportedSeries& series);
+
+/// Whether samples that begin late may count from a step at 0. Times in geometric progression may,
+/// and so may times that begin within two steps of the sampling; others are those of a clock that
+/// ran before the step.
+/// @param times strictly increasing
+[[nodiscard]] bool counts_from_step(const std::vector<double>& times);
+
+/// Refuses a relaxation modulus or creep compliance whose clock does not start at its step, naming
+/// --step-time, and a step time for a recording that holds no step. Throws Error(bad_input).
+void require_step_clock(const ImportedSeries& series, const std::string& file,
+                        const ImportOptions& options);
+
+}  // namespace tpm::files

@@ -1,0 +1,146 @@
+// What tpm fit answers to tables as people have them; tests/curve/test_table_kinds.cpp holds how
+// they are read. The parameters are those the tables were made with. Tables that are read right and
+// need a better fit belong to other tests: a drifting zero and a clipped force, a compliance in
+// parallel form, a ramped creep, strips with a slack length, units that change verdicts (issue 47),
+// and recordings of a stiffer material (issue 51).
+#include <fmt/format.h>
+#include <sys/wait.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/json.hpp"
+
+using namespace tpm;
+using namespace tpm::files;
+using Catch::Contains;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+struct Answer {
+  int code;
+  std::string said;
+};
+
+/// @param before  a command whose output goes into the program, such as "cat FILE |"
+Answer answer_in(const test::TempFolder& folder, const std::string& arguments,
+                 const std::string& before = "") {
+  const std::string out = folder / "said.log";
+  const int status = std::system(fmt::format("cd '{}' && {} '" TPM_TEST_PROGRAM "' {} > '{}' 2>&1",
+                                             folder.path().string(), before, arguments, out)
+                                     .c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out)};
+}
+
+/// In SI, of a fit that was asked for JSON.
+double estimate_in(const std::string& said, const std::string& name) {
+  const Json json = parse_json(said, "said");
+  for (const Json& p : json.at("fit").at("parameters")) {
+    if (p.at("name") == name) return p.at("estimate_SI").get<double>();
+  }
+  throw std::runtime_error(name);
+}
+
+/// 60 N/m beside 45 N/m that relax in 2 s; a ramp of 2 mm/s to 4 mm, from 1 s.
+double force_at(double t) {
+  const double ramp = std::clamp(t - 1.0, 0.0, 2.0);
+  const double since = std::max(t - 1.0, 0.0);
+  return 0.060 * 2.0 * ramp +
+         0.045 * 4.0 * (std::exp((ramp - since) / 2.0) - std::exp(-since / 2.0));
+}
+
+}  // namespace
+
+TEST_CASE("marks of thousands do not scale a fit", "[tables]") {
+  const test::TempFolder folder;
+  std::string text = "Time [s]\tDepth [um]\tForce [uN]\n";
+  for (int i = 0; i <= 300; ++i) {
+    const double t = 0.1 * i;
+    text += fmt::format("{:.1f}\t{:.0f}\t", t, 2000.0 * std::clamp(t - 1.0, 0.0, 2.0));
+    const long force = std::lround(1e6 * force_at(t)) + (i * 7919) % 401 - 200;
+    text += std::abs(force) < 1000
+                ? fmt::format("{}\n", force)
+                : fmt::format("{},{:03}\n", force / 1000, std::abs(force) % 1000);
+  }
+  write_file(folder / "t.txt", text);
+  const Answer answer = answer_in(folder, "fit t.txt --law linear-1 --no-draw --format json");
+  INFO(answer.said);
+  REQUIRE(answer.code == 0);
+  CHECK_THAT(estimate_in(answer.said, "k_inf"), WithinRel(60.0, 0.01));
+  CHECK_THAT(estimate_in(answer.said, "k1"), WithinRel(45.0, 0.01));
+  CHECK_THAT(estimate_in(answer.said, "tau1"), WithinRel(2.0, 0.01));
+}
+
+TEST_CASE("the time of a step is an option that the configuration keeps", "[tables]") {
+  const test::TempFolder folder;
+  std::string text = "Time\tStrain\tStress\ns\t%\tPa\n";
+  for (int i = 1; i <= 300; ++i) {
+    const double t = 0.1 * i;
+    text += fmt::format("{:.1f}\t1.000\t{:.4f}\n", 185.0 + t, 20.0 + 30.0 * std::exp(-t / 5.0));
+  }
+  write_file(folder / "t.txt", text);
+  const Answer late = answer_in(folder, "fit t.txt --no-draw");
+  CHECK(late.code == 3);
+  CHECK_THAT(late.said,
+             Contains("the first sample is 185.1 s after the step") && Contains("--step-time"));
+  const Answer told =
+      answer_in(folder, "fit t.txt --step-time '185 s' --law linear-1 --format json");
+  INFO(told.said);
+  REQUIRE(told.code == 0);
+  CHECK_THAT(estimate_in(told.said, "k_inf"), WithinRel(2000.0, 1e-3));
+  CHECK_THAT(estimate_in(told.said, "k1"), WithinRel(3000.0, 1e-3));
+  CHECK_THAT(estimate_in(told.said, "tau1"), WithinRel(5.0, 1e-3));
+  const Answer again = answer_in(folder, "fit t_fit/config.json");
+  INFO(again.said);
+  CHECK(again.code == 0);
+}
+
+TEST_CASE("a rest at a zero error before a ramp without a hold is fitted", "[tables]") {
+  const test::TempFolder folder;
+  std::string text = "Time (s),Depth (mm),Force (N)\n";
+  for (int i = 0; i <= 60; ++i) {
+    const double t = 0.1 * i;
+    const double depth = std::max(t - 5.0, 0.0);
+    const double noise = 1e-3 * ((i * 7919) % 13 - 6) / 6.0;
+    text += fmt::format("{:.1f},{:.2f},{:.4f}\n", t, depth, 0.5 + 0.060 * depth + noise);
+  }
+  write_file(folder / "t.csv", text);
+  const Answer answer = answer_in(folder, "fit t.csv --no-draw --format json");
+  INFO(answer.said);
+  REQUIRE(answer.code == 0);
+  CHECK_THAT(estimate_in(answer.said, "k_inf"), WithinRel(60.0, 0.03));
+  CHECK_THAT(estimate_in(answer.said, "offset"), WithinAbs(0.5, 1e-3));
+}
+
+TEST_CASE("a pipe is read, and what cannot be fitted says what to type", "[tables]") {
+  const test::TempFolder folder;
+  std::string plain = "Time (s),Depth (mm),Force (N)\n";
+  std::string negative = plain, held = plain;
+  for (int i = 0; i <= 150; ++i) {
+    const double t = 0.1 * i;
+    const double depth = 2.0 * std::clamp(t - 1.0, 0.0, 2.0);
+    const double force = force_at(t) + 2e-4 * ((i * 7919) % 13 - 6) / 6.0;
+    plain += fmt::format("{:.1f},{:.3f},{:.5f}\n", t, depth, force);
+    negative += fmt::format("{:.1f},{:.3f},{:.5f}\n", t, depth, -force);
+    if (t >= 3.0) held += fmt::format("{:.1f},{:.3f},{:.5f}\n", t - 3.0, depth, force);
+  }
+  write_file(folder / "plain.csv", plain);
+  write_file(folder / "negative.csv", negative);
+  write_file(folder / "held.csv", held);
+  const Answer piped =
+      answer_in(folder, "fit /dev/stdin --law linear-1 --no-draw --format json", "cat plain.csv |");
+  INFO(piped.said);
+  REQUIRE(piped.code == 0);
+  CHECK_THAT(estimate_in(piped.said, "k_inf"), WithinRel(60.0, 0.01));
+  const Answer turned = answer_in(folder, "fit negative.csv --no-draw");
+  CHECK(turned.code == 3);
+  CHECK_THAT(turned.said, Contains("the response falls") && Contains("--negate-response"));
+  const Answer only = answer_in(folder, "fit held.csv --no-draw");
+  CHECK(only.code == 3);
+  CHECK_THAT(only.said, Contains("only a hold") && !Contains("--negate"));
+}
