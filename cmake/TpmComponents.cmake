@@ -34,7 +34,7 @@ set(TPM_haptics_OF_library session)
 set(TPM_core_NEEDS)
 set(TPM_core_LIBRARIES)
 set(TPM_organ_NEEDS core)
-set(TPM_organ_LIBRARIES tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_deflate tpm_minizip tpm_assimp tpm_metis
+set(TPM_organ_LIBRARIES tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_deflate tpm_minizip tpm_metis
     OpenSSL::Crypto Threads::Threads TBB::tbb ZLIB::ZLIB)
 set(TPM_fit_NEEDS organ)
 set(TPM_fit_LIBRARIES tpm_ceres)

@@ -1,6 +1,6 @@
 # The folders of src/tpm, each a library of objects, so that a library can be put together of folders
 # compiled in one way and folders compiled in another.
-set(TPM_PRIVATE_LIBRARIES tpm_ceres tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_deflate tpm_minizip tpm_assimp tpm_httplib
+set(TPM_PRIVATE_LIBRARIES tpm_ceres tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_deflate tpm_minizip tpm_httplib
     tpm_metis OpenSSL::Crypto Threads::Threads TBB::tbb ZLIB::ZLIB ${CMAKE_DL_LIBS}
     $<$<BOOL:${TPM_MPI}>:$<LINK_ONLY:MPI::MPI_C>>)
 

@@ -6,7 +6,7 @@ set(readers_store check_sum contained delimited document_place file file_roles h
 set(readers_curve assemble contact description drive_pieces header_words import import_digitizer import_jpk import_machine import_wpd_json
     jpk_channel jpk_properties recording_file rows)
 set(readers_law law_file)
-set(readers_network mesh_file mesh_surface triangle_mesh)
+set(readers_network mesh_coordinate mesh_file mesh_polygon mesh_surface obj_file stl_file triangle_mesh)
 set(readers_scene contact_blocks experiment_blocks experiment_scene material_block organ_block place_function protocol_file scene
     tissue_blocks)
 set(readers_simulate checkpoint)
