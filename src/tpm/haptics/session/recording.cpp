@@ -41,6 +41,24 @@ std::string format_of(const Json& header) {
   return format.is_string() ? format.get<std::string>() : std::string();
 }
 
+/// A recording holds its tissue and its motion: names of files would be looked for beside whoever
+/// reads it.
+void require_written_out(const Json& session, const DocumentPlace& place) {
+  const auto refuse = [](const DocumentPlace& at) {
+    return bad_input(at.where, "is the name of a file",
+                     "what the file held, as tpm hil run writes it");
+  };
+  for (const char* key : {"law", "scene"}) {
+    const Json model = session.value("model", Json());
+    if (!model.is_object() || !model.contains(key) || !model.at(key).is_string()) continue;
+    throw refuse(place.key("model").key(key));
+  }
+  const Json motion = session.value("motion", Json());
+  if (motion.is_object() && motion.contains("recording")) {
+    throw refuse(place.key("motion").key("recording"));
+  }
+}
+
 }  // namespace
 
 Json to_json(const ServoCounts& counts) {
@@ -145,6 +163,7 @@ HilRecording read_recording(const std::filesystem::path& file) {
   const std::string at_session = at_header + ": session";
   const Json session =
       with_current_names(recording.header.at("session"), "hil", at_session, FormerNames::silent);
+  require_written_out(session, DocumentPlace{at_session});
   recording.session = parse_session(session, at_session, {});
   if (recording.header.contains("surface_by_phase_m")) {  // before, slides went straight
     set_surface(recording.session, recording.header.at("surface_by_phase_m"),

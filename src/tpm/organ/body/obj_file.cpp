@@ -53,9 +53,16 @@ class ObjStatements {
     ++last_line_;
     return true;
   }
+  /// "#" begins a comment where a word could begin: "1.#QNAN" is no 1.
+  static std::string_view without_comment(std::string_view line) {
+    for (std::size_t at = line.find('#'); at < line.size(); at = line.find('#', at + 1)) {
+      if (at == 0 || kBlank.find(line[at - 1]) != std::string_view::npos) return line.substr(0, at);
+    }
+    return line;
+  }
   /// True if the statement goes on in the next line.
   bool add_words(std::string_view line) {
-    line = line.substr(0, line.find('#'));
+    line = without_comment(line);
     line = line.substr(0, line.find_last_not_of(kBlank) + 1);
     const bool goes_on = line.ends_with('\\');
     if (goes_on) line.remove_suffix(1);
