@@ -149,7 +149,7 @@ void require_no_hole(std::span<const JpkSegment> segments, const std::string& fi
                      const std::string& all) {
   const auto refuse = [&](const std::string& what) {
     return bad_input(file, what,
-                     fmt::format("--segments without a gap in {}", printable(all, 200)));
+                     fmt::format("--segments on one side of it, of {}", printable(all, 200)));
   };
   for (std::size_t i = 1; i < segments.size(); ++i) {
     const int expected = segments[i - 1].number + 1;
