@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <iterator>
 #include <utility>
 
 #include "tpm/base/enum_names.hpp"
@@ -38,8 +39,11 @@ std::string from_utf16(std::string_view bytes, bool big_endian, std::string_view
     const auto second = static_cast<unsigned char>(bytes[2 * i + 1]);
     units[i] = static_cast<char16_t>(big_endian ? first * 256 + second : second * 256 + first);
   }
+  std::string text;
+  text.reserve(units.size());
   try {
-    return utf8::utf16to8(units);
+    utf8::utf16to8(units.begin(), units.end(), std::back_inserter(text));
+    return text;
   } catch (const utf8::exception&) {
     throw bad_input(where, "the byte order mark says UTF-16 but the text is not", kTextExpected);
   }
