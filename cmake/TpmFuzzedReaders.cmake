@@ -8,7 +8,7 @@ set(readers_files_import assemble contact description header_words import import
     import_machine import_wpd_json jpk_channel jpk_properties recording_file rows)
 set(readers_data drive_pieces)
 set(readers_files_blocks law_file)
-set(readers_organ_body mesh_file mesh_surface triangle_mesh)
+set(readers_organ_body mesh_coordinate mesh_file mesh_polygon mesh_surface obj_file stl_file triangle_mesh)
 set(readers_organ_scene contact_blocks experiment_blocks experiment_scene material_block organ_block place_function
     protocol_file scene tissue_blocks)
 set(readers_organ_run checkpoint)

@@ -49,7 +49,7 @@ tpm_package(development libtpmkit-dev libdevel "soft-tissue models, files for de
 haptics) and CMake package of tpmkit, and the header of its C interface
 for haptic loops."
   "libtpmkit-haptics1 (= ${PROJECT_VERSION})" libeigen3-dev libfmt-dev libceres-dev
-  libsundials-dev libhdf5-dev libcsv-dev libmuparser-dev libcpp-httplib-dev libassimp-dev libssl-dev libtbb-dev
+  libsundials-dev libhdf5-dev libcsv-dev libmuparser-dev libcpp-httplib-dev libssl-dev libtbb-dev
   libdeflate-dev libmetis-dev libminizip-dev zlib1g-dev)
 tpm_package(python python3-tpmkit python "soft-tissue models from Python"
   "The package tpmkit: fits as DataFrames, laws and protocols, contacts stepped,

@@ -6,7 +6,7 @@ packages_run=(
   g++ cmake ninja-build
   libeigen3-dev libceres-dev libsundials-dev libboost-dev
   libhdf5-dev nlohmann-json3-dev libcsv-dev libutfcpp-dev libssl-dev
-  libmuparser-dev libcpp-httplib-dev pkg-config libcli11-dev libfmt-dev libassimp-dev libnanoflann-dev
+  libmuparser-dev libcpp-httplib-dev pkg-config libcli11-dev libfmt-dev libnanoflann-dev
   libtbb-dev zlib1g-dev libdeflate-dev libminizip-dev libmetis-dev
   python3 python3-numpy python3-matplotlib
 )

@@ -146,6 +146,70 @@ TEST_CASE("segments are chosen by kind, and contact cuts the first of them") {
   CHECK_THROWS_WITH(import_curves(file, options), Catch::Contains("the force never stays"));
 }
 
+namespace {
+
+std::string jpk_file(const TempFolder& folder, const test::ZipMembers& members) {
+  std::string path = folder / "curve.jpk-force";
+  write_file(path, test::zipped(members));
+  return path;
+}
+
+/// The curve without the members of one segment.
+test::ZipMembers without_segment(test::ZipMembers members, int number) {
+  std::erase_if(members, [&](const auto& member) {
+    return member.first.starts_with("segments/" + std::to_string(number) + "/");
+  });
+  return members;
+}
+
+/// The curve with other text in the properties of one segment.
+test::ZipMembers with_property(test::ZipMembers members, int number, const std::string& from,
+                               const std::string& to) {
+  const std::string wanted = "segments/" + std::to_string(number) + "/segment-header.properties";
+  for (auto& [name, bytes] : members) {
+    if (name == wanted) bytes.replace(bytes.find(from), from.size(), to);
+  }
+  return members;
+}
+
+}  // namespace
+
+TEST_CASE("a missing segment leaves a hole in the time, and is refused") {
+  const TempFolder folder;
+  const test::ZipMembers whole = test::jpk_curve({"extend", "pause", "retract"});
+  const auto end_s = [&](const test::ZipMembers& members, std::vector<std::string> kinds = {}) {
+    ImportOptions options;
+    options.segments = std::move(kinds);
+    return read_recording_file(jpk_file(folder, members), options).recording.time_s.back();
+  };
+  CHECK(end_s(whole) == 5.5);
+  for (const auto& [kinds, expected] :
+       std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{}, "segment 1 is not in the archive"},
+           {{"extend", "retract"}, "segment 1 is not in the archive"}}) {
+    CHECK_THROWS_WITH(
+        end_s(without_segment(whole, 1), kinds),
+        Catch::Contains(expected) && Catch::Contains("--segments on one side of it, of"));
+  }
+  CHECK(end_s(without_segment(whole, 1), {"extend"}) == 1.5);
+  CHECK(end_s(without_segment(whole, 2)) == 3.5);
+  CHECK_THROWS_WITH(end_s(without_segment(whole, 0)),
+                    Catch::Contains("segment 0 is not in the archive: the approach is missing"));
+  CHECK(end_s(without_segment(whole, 0), {"pause", "retract"}) == 3.5);
+
+  const auto unrecorded = with_property(whole, 1, "num-points=4", "num-points=0");
+  CHECK_THROWS_WITH(end_s(unrecorded), Catch::Contains("segment 1 (pause, 2 s) has no samples"));
+  CHECK_THROWS_WITH(end_s(unrecorded, {"extend", "retract"}), Catch::Contains("has no samples"));
+  CHECK_THROWS_WITH(end_s(unrecorded, {"pause"}), Catch::Contains("has no segment 'pause'"));
+  CHECK(end_s(unrecorded, {"extend"}) == 1.5);
+  CHECK(end_s(unrecorded, {"retract"}) == 1.5);
+  CHECK(end_s(with_property(unrecorded, 1, "duration=2", "duration=0")) == 3.5);
+  CHECK(end_s(with_property(whole, 2, "num-points=4", "num-points=0")) == 3.5);
+  const auto without_approach = with_property(whole, 0, "num-points=4", "num-points=0");
+  CHECK_THROWS_WITH(end_s(without_approach), Catch::Contains("segment 0 (extend, 2 s) has no"));
+  CHECK(end_s(without_approach, {"pause", "retract"}) == 3.5);
+}
+
 TEST_CASE("the law fitted to a JPK force curve is the law that made it") {
   // Approach, contact at 1 s, ramp to 3 um in 1.5 s, hold: in closed form, with a little noise.
   const double k_inf = 0.02, k1 = 0.03, tau = 0.5, speed = 2e-6, ramp = 1.5;

@@ -364,6 +364,10 @@ TEST_CASE("Indentations answer Young's modulus with its interval", "[rheometer]"
   deep.reference = kReference;
   CHECK_THAT(geometry_warnings(deep, sphere, 1e-3).at(0),
              Contains("the depth of 1 mm is 2.5 of the sphere's radius (0.4 mm)"));
+  // What the probe travelled before contact is no depth; without a fit the reference has to do.
+  deep.reference = 5e-3;
+  CHECK(geometry_warnings(deep, sphere, 0.02e-3).empty());
+  CHECK_THAT(geometry_warnings(deep, sphere, std::nullopt).at(0), Contains("the depth of 5 mm"));
   ContactGeometry both = sphere;
   both.punch_radius_m = 1e-3;
   CHECK_THROWS_AS(modulus_Pa(deep, 1.0, both), Error);

@@ -3,13 +3,11 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <limits>
 
+#include "mesh_bytes.hpp"
 #include "organ_meshes.hpp"
 #include "refusal.hpp"
-#include "temp_folder.hpp"
 #include "tpm/organ/body/filling.hpp"
 #include "tpm/organ/body/mesh_file.hpp"
 #include "tpm/organ/body/mesh_surface.hpp"
@@ -37,51 +35,9 @@ TriangleMesh without_triangle(const TriangleMesh& mesh, Eigen::Index dropped) {
   return result;
 }
 
-std::string ascii_stl(const TriangleMesh& mesh) {
-  std::string text = "solid body\n";
-  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
-    text += "facet normal 0 0 0\nouter loop\n";
-    for (Eigen::Index which = 0; which < 3; ++which) {
-      const Vector3d p = mesh.corner(t, which);
-      text += fmt::format("vertex {} {} {}\n", p.x(), p.y(), p.z());
-    }
-    text += "endloop\nendfacet\n";
-  }
-  return text + "endsolid body\n";
-}
-
-std::string binary_stl(const TriangleMesh& mesh) {
-  std::string bytes(80, ' ');
-  const auto put = [&bytes](const auto& value) {
-    char raw[sizeof value];
-    std::memcpy(raw, &value, sizeof value);
-    bytes.append(raw, sizeof value);
-  };
-  put(static_cast<std::uint32_t>(mesh.triangles.cols()));
-  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
-    for (int zero = 0; zero < 3; ++zero) put(0.0F);
-    for (Eigen::Index which = 0; which < 3; ++which) {
-      const Vector3d p = mesh.corner(t, which);
-      for (const double x : p) put(static_cast<float>(x));
-    }
-    put(std::uint16_t{0});
-  }
-  return bytes;
-}
-
 const std::string kCubeObj =
     "# a cube of quads\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n"
     "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
-
-std::string write(const TempFolder& folder, const std::string& name, const std::string& bytes) {
-  std::ofstream(folder / name, std::ios::binary) << bytes;
-  return folder / name;
-}
-
-std::string file_refusal(const std::string& path) {
-  return refusal_of(
-      [&] { (void)read_closed_mesh(path, parse_unit("mm", Dimension::length, "test")); });
-}
 
 }  // namespace
 

@@ -55,6 +55,25 @@ inline std::vector<ErrorCase> jpk_error_cases() {
       {type, "unknown segment", import + " --segments pause", curve(jpk_curve())},
       {type, "segments with a gap", import + " --segments extend,retract",
        curve(jpk_curve({"extend", "pause", "retract"}))},
+      {type, "missing segment", import, curve([] {
+         ZipMembers members = jpk_curve({"extend", "pause", "retract"});
+         std::erase_if(members, [](const auto& m) { return m.first.starts_with("segments/1/"); });
+         return members;
+       }())},
+      {type, "pause without samples", import, curve([] {
+         ZipMembers members = jpk_curve({"extend"});
+         for (auto& member : jpk_segment("pause", 1)) {
+           members.push_back(
+               member.first.ends_with("header.properties")
+                   ? std::pair(member.first,
+                               std::string("force-segment-header.settings.style=pause\nforce-"
+                                           "segment-header.num-points=0\n"
+                                           "force-segment-header.duration=2\n"))
+                   : member);
+         }
+         for (auto& member : jpk_segment("retract", 2)) members.push_back(member);
+         return members;
+       }())},
       {type, "unit of a column", import + " --unit height=mm", curve(jpk_curve())},
       {type, "spring constant of a table",
        "data import {}/m.csv -o {}/out --spring-constant \"1 N/m\"",

@@ -1,4 +1,5 @@
 #pragma once
+#include "tpm/base/namespaces.hpp"
 #include "tpm/law/kernel.hpp"
 #include "tpmkit/law_file.hpp"
 

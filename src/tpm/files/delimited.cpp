@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <iterator>
 #include <utility>
 
 #include "tpm/base/enum_names.hpp"
@@ -40,8 +41,11 @@ std::string from_utf16(std::string_view bytes, bool big_endian, std::string_view
     const auto second = static_cast<unsigned char>(bytes[2 * i + 1]);
     units[i] = static_cast<char16_t>(big_endian ? first * 256 + second : second * 256 + first);
   }
+  std::string text;
+  text.reserve(units.size());
   try {
-    return utf8::utf16to8(units);
+    utf8::utf16to8(units.begin(), units.end(), std::back_inserter(text));
+    return text;
   } catch (const utf8::exception&) {
     throw bad_input(where, "the byte order mark says UTF-16 but the text is not", kTextExpected);
   }
@@ -170,24 +174,39 @@ std::size_t most_fields(std::string_view text, char separator) {
   return static_cast<std::size_t>(ends) + 1;
 }
 
+/// Of the usual texts more rows than they have, so that rows are never copied as they grow; CRLF
+/// counts once.
+std::size_t most_rows(std::string_view text) {
+  std::size_t feeds = 0, returns = 0;
+  for (const char c : text) {
+    feeds += c == '\n' ? 1 : 0;
+    returns += c == '\r' ? 1 : 0;
+  }
+  return std::max(feeds, returns) + 1;
+}
+
 }  // namespace
 
 struct DelimitedText {
   std::string text;
-  std::deque<std::string> unquoted;  ///< fields that stand in quotes, without them
+  /// Fields in quotes, without them, that are no part of the text as it stands, and the first of
+  /// the others: empty only if no field stands in quotes.
+  std::deque<std::string> unquoted;
   std::vector<std::string_view> fields;
 };
 
 namespace {
 
-/// Gathers fields into rows. A line without quotes is only cut up, without copying; the others go
-/// through libcsv, whose rules (white space around a field does not count) the cutting follows.
+/// Gathers fields into rows. A line is only cut up, without copying, if quotes stand around whole
+/// fields or nowhere; the others go through libcsv, whose rules (white space around a field does
+/// not count) the cutting follows.
 class RowParser {
  public:
   RowParser(DelimitedText& text, char separator) : text_(text), separator_(separator) {
     csv_init(&parser_, CSV_STRICT | CSV_STRICT_FINI);
     csv_set_delim(&parser_, static_cast<unsigned char>(separator));
     text_.fields.reserve(most_fields(text_.text, separator));
+    rows_.reserve(most_rows(text_.text));
   }
   ~RowParser() { csv_free(&parser_); }
   RowParser(const RowParser&) = delete;
@@ -209,6 +228,7 @@ class RowParser {
       cut(line);
       return true;
     }
+    if (!open_ && cut_quoted(line)) return true;
     open_ = true;
     return parse(line) && parse("\n");
   }
@@ -239,6 +259,33 @@ class RowParser {
       line.remove_prefix(end);
     }
     end_row();
+  }
+  /// False, with nothing done, for quotes within a field and for one that goes on in the next line.
+  bool cut_quoted(std::string_view line) {
+    while (true) {
+      const auto begin = std::min(line.find_first_not_of(" \t"), line.size());
+      const bool quoted = line.substr(begin).starts_with('"');
+      const auto close = quoted ? line.find('"', begin + 1) : begin;
+      const auto end = std::min(line.find(separator_, std::min(close, line.size())), line.size());
+      const bool whole =
+          quoted ? close < line.size() && is_blank(line.substr(close + 1, end - close - 1))
+                 : line.substr(0, end).find('"') == std::string_view::npos;
+      if (!whole) {
+        text_.fields.resize(row_end_);
+        return false;
+      }
+      if (quoted) {
+        const std::string_view field = line.substr(begin + 1, close - begin - 1);
+        if (text_.unquoted.empty()) text_.unquoted.emplace_back(field);
+        text_.fields.push_back(field);
+      } else {
+        text_.fields.push_back(without_space(line.substr(0, end)));
+      }
+      if (end == line.size()) break;
+      line.remove_prefix(end + 1);
+    }
+    end_row();
+    return true;
   }
   void end_row() {
     const std::size_t first = row_end_;

@@ -173,10 +173,15 @@ RowLog read_row_log(const std::filesystem::path& path) {
   std::string magic(kMagic.size(), '\0');
   std::uint32_t row_bytes = 0;
   constexpr std::uint32_t kMostRowBytes = 1U << 20U;
+  constexpr const char* kExpected = "a file that tpm hil run has written";
   if (!cursor.take(magic.data(), magic.size()) || magic != kMagic ||
-      !cursor.take(&row_bytes, sizeof row_bytes) || row_bytes == 0 || row_bytes > kMostRowBytes ||
-      !cursor.take_text(log.header)) {
-    throw bad_input(path.string(), "is no recording", "a file that tpm hil run has written");
+      !cursor.take(&row_bytes, sizeof row_bytes) || row_bytes == 0 || row_bytes > kMostRowBytes) {
+    throw bad_input(path.string(), "is no recording", kExpected);
+  }
+  if (!cursor.holds_text()) throw bad_input(path.string(), "ends inside its header", kExpected);
+  if (!cursor.take_text(log.header)) {
+    throw bad_input(path.string() + ": header", "is damaged: its check sum does not fit",
+                    kExpected);
   }
   log.row_bytes = row_bytes;
   log.bytes.reserve(bytes.size());

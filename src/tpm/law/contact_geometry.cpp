@@ -92,7 +92,7 @@ std::vector<std::string> geometry_warnings(const LawSpec& spec, const ContactGeo
   std::vector<std::string> warnings;
   if (spec.response == Quantity::stress) return warnings;
   if (g.sphere_radius_m) {
-    const double deepest = std::max(spec.reference, depth_m.value_or(0.0));
+    const double deepest = depth_m.value_or(spec.reference);
     const double share = deepest / *g.sphere_radius_m;
     if (share > kShallow) {
       warnings.push_back(fmt::format(

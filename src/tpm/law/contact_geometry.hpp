@@ -42,7 +42,8 @@ struct ContactGeometry {
 
 /// What a reader has to know before using moduli of that geometry: a depth that is not small beside
 /// the sphere, a kernel that is not the probe's.
-/// @param depth_m largest depth that the law was fitted to
+/// @param depth_m largest depth that the law was fitted to, from contact on; the law's reference
+///   depth if it is not known
 [[nodiscard]] std::vector<std::string> geometry_warnings(const LawSpec& spec,
                                                          const ContactGeometry& geometry,
                                                          std::optional<double> depth_m);

@@ -89,10 +89,17 @@ std::vector<ImportedSeries> datasets_series(std::vector<DigitizedDataset> datase
 
 using AllSeries = std::vector<ImportedSeries>;
 
+/// Moved, not copied as the items of a list would be.
+AllSeries only(ImportedSeries series) {
+  AllSeries all;
+  all.push_back(std::move(series));
+  return all;
+}
+
 // Asked in this order whether they recognise a file; the last takes what is left.
 constexpr auto kImporters = std::to_array<Importer>({
     {"jpk", Provenance::measured, [](ImportInput& in) { return looks_like_zip(in.bytes()); },
-     [](ImportInput& in) { return AllSeries{read_jpk(in.bytes(), in.file(), in.options())}; }},
+     [](ImportInput& in) { return only(read_jpk(in.bytes(), in.file(), in.options())); }},
     {"wpd-json", Provenance::digitized, [](ImportInput& in) { return looks_like_json(in.bytes()); },
      [](ImportInput& in) {
        return datasets_series(read_wpd_json(in.bytes(), in.file()), in.file(), in.options());
@@ -106,7 +113,7 @@ constexpr auto kImporters = std::to_array<Importer>({
        return datasets_series(read_engauge(in.table(), in.file()), in.file(), in.options());
      }},
     {"machine", Provenance::measured, [](ImportInput& /*in*/) { return true; },
-     [](ImportInput& in) { return AllSeries{read_machine(in.table(), in.file(), in.options())}; }},
+     [](ImportInput& in) { return only(read_machine(in.table(), in.file(), in.options())); }},
 });
 
 const Importer& importer_of(ImportInput& input) {

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <numeric>
+#include <span>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
@@ -109,7 +111,7 @@ JpkSegment read_segment(const ZipArchive& archive, int number, const PropertyMap
   return segment;
 }
 
-/// In the order in which they were run; those without samples are left out.
+/// In the order in which they were run, also those without samples.
 std::vector<JpkSegment> read_jpk_segments(const ZipArchive& archive, const PropertyMap& shared) {
   std::vector<int> numbers;
   for (const std::string& name : archive.names()) {
@@ -129,9 +131,9 @@ std::vector<JpkSegment> read_jpk_segments(const ZipArchive& archive, const Prope
       throw bad_input(archive.file(), "holds too many samples",
                       fmt::format("at most {} in all segments", kMostSamples));
     }
-    if (segment.what.samples > 0) segments.push_back(std::move(segment));
+    segments.push_back(std::move(segment));
   }
-  if (segments.empty()) throw bad_input(archive.file(), "no segment has samples", "a force curve");
+  if (samples == 0) throw bad_input(archive.file(), "no segment has samples", "a force curve");
   return segments;
 }
 
@@ -142,29 +144,64 @@ std::vector<RecordedSegment> recorded(const std::vector<JpkSegment>& segments) {
   return words;
 }
 
-/// Those of the wanted kinds. A history with a hole in it is none: they have to follow each other.
+/// A history with a hole in it is none: between two segments no other is missing, and none without
+/// samples takes time.
+void require_no_hole(std::span<const JpkSegment> segments, const std::string& file,
+                     const std::string& all) {
+  const auto refuse = [&](const std::string& what) {
+    return bad_input(file, what,
+                     fmt::format("--segments on one side of it, of {}", printable(all, 200)));
+  };
+  for (std::size_t i = 1; i < segments.size(); ++i) {
+    const int expected = segments[i - 1].number + 1;
+    if (segments[i].number == expected) continue;
+    throw refuse(fmt::format("segment {} is not in the archive", expected));
+  }
+  for (const JpkSegment& segment : segments) {
+    if (segment.what.samples > 0 || segment.duration_s == 0.0) continue;
+    throw refuse(fmt::format("segment {} ({}, {} s) has no samples", segment.number,
+                             segment.what.kind, significant(segment.duration_s, 4)));
+  }
+}
+
+/// Those of the wanted kinds that have samples; none wanted: all. They have to follow each other,
+/// and all of them begin with the first.
 std::vector<JpkSegment> chosen_segments(std::vector<JpkSegment> segments, const std::string& file,
                                         const std::vector<std::string>& kinds) {
-  if (kinds.empty()) return segments;
   const std::string all = segments_words(recorded(segments));
   for (const std::string& kind : kinds) {
-    const bool known = std::any_of(segments.begin(), segments.end(),
-                                   [&kind](const auto& s) { return s.what.kind == kind; });
+    const bool known = std::any_of(segments.begin(), segments.end(), [&kind](const auto& s) {
+      return s.what.kind == kind && s.what.samples > 0;
+    });
     if (!known) {
       throw bad_input(file, fmt::format("has no segment '{}'", printable(kind)),
                       fmt::format("--segments of {}", printable(all, 200)));
     }
   }
+  if (kinds.empty() && segments.front().number != 0) {
+    throw bad_input(file, "segment 0 is not in the archive: the approach is missing",
+                    fmt::format("a whole file, or --segments of {}", printable(all, 200)));
+  }
   const auto wanted = [&kinds](const JpkSegment& segment) {
-    return std::find(kinds.begin(), kinds.end(), segment.what.kind) != kinds.end();
+    return segment.what.samples > 0 &&
+           (kinds.empty() ||
+            std::find(kinds.begin(), kinds.end(), segment.what.kind) != kinds.end());
   };
-  const auto first = std::find_if(segments.begin(), segments.end(), wanted);
-  const auto last = std::find_if_not(first, segments.end(), wanted);
-  if (std::any_of(last, segments.end(), wanted)) {
+  const auto first =
+      kinds.empty() ? segments.begin() : std::find_if(segments.begin(), segments.end(), wanted);
+  const auto last = std::find_if(segments.rbegin(), segments.rend(), wanted).base();
+  const auto other = std::find_if(first, last, [&](const JpkSegment& segment) {
+    return segment.what.samples > 0 && !wanted(segment);
+  });
+  if (other != last) {
     throw bad_input(file, "the chosen segments do not follow each other",
                     fmt::format("--segments without a gap in {}", printable(all, 200)));
   }
-  return {std::make_move_iterator(first), std::make_move_iterator(last)};
+  require_no_hole({first, last}, file, all);
+  std::vector<JpkSegment> chosen;
+  std::copy_if(std::make_move_iterator(first), std::make_move_iterator(last),
+               std::back_inserter(chosen), wanted);
+  return chosen;
 }
 
 bool all_have(const std::vector<JpkSegment>& segments, const std::string& channel) {

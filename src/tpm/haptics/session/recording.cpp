@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "tpm/files/blocks/law_json.hpp"
+#include "tpm/files/document_place.hpp"
 #include "tpm/files/renamed_names.hpp"
 #include "tpm/files/row_log.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
@@ -30,6 +31,31 @@ void set_surface(HilSession& session, const Json& by_phase, const std::string& w
   }
   for (std::size_t i = 0; i < by_phase.size(); ++i) {
     session.phases[i].surface_m = by_phase[i].get<std::vector<double>>();
+  }
+}
+
+/// Empty where a header says none.
+std::string format_of(const Json& header) {
+  if (!header.is_object() || !header.contains("format")) return {};
+  const Json& format = header.at("format");
+  return format.is_string() ? format.get<std::string>() : std::string();
+}
+
+/// A recording holds its tissue and its motion: names of files would be looked for beside whoever
+/// reads it.
+void require_written_out(const Json& session, const DocumentPlace& place) {
+  const auto refuse = [](const DocumentPlace& at) {
+    return bad_input(at.where, "is the name of a file",
+                     "what the file held, as tpm hil run writes it");
+  };
+  for (const char* key : {"law", "scene"}) {
+    const Json model = session.value("model", Json());
+    if (!model.is_object() || !model.contains(key) || !model.at(key).is_string()) continue;
+    throw refuse(place.key("model").key(key));
+  }
+  const Json motion = session.value("motion", Json());
+  if (motion.is_object() && motion.contains("recording")) {
+    throw refuse(place.key("motion").key("recording"));
   }
 }
 
@@ -124,19 +150,24 @@ double HilRecording::commanded_N(const ServoRecord& row) const {
 
 HilRecording read_recording(const std::filesystem::path& file) {
   const RowLog log = read_row_log(file);
+  const std::string at_header = file.string() + ": header";
   HilRecording recording;
   recording.name = file.filename().string();
-  recording.header = parse_json(log.header, file.string());
-  const std::string format = recording.header.value("format", "");
+  recording.header = parse_json(log.header, at_header);
+  const std::string format = format_of(recording.header);
   const std::size_t row_bytes = format == kFirstFormat ? kFirstRowBytes : sizeof(ServoRecord);
   if ((format != kFormat && format != kFirstFormat) || log.row_bytes != row_bytes) {
     throw bad_input(file.string(), "is a recording of another version of tpm", kFormat);
   }
+  check_schema(recording.header, "hil_recording", at_header);
+  const std::string at_session = at_header + ": session";
   const Json session =
-      with_current_names(recording.header.at("session"), "hil", file.string(), FormerNames::silent);
-  recording.session = parse_session(session, file.string(), {});
+      with_current_names(recording.header.at("session"), "hil", at_session, FormerNames::silent);
+  require_written_out(session, DocumentPlace{at_session});
+  recording.session = parse_session(session, at_session, {});
   if (recording.header.contains("surface_by_phase_m")) {  // before, slides went straight
-    set_surface(recording.session, recording.header.at("surface_by_phase_m"), file.string());
+    set_surface(recording.session, recording.header.at("surface_by_phase_m"),
+                DocumentPlace{at_header}.key("surface_by_phase_m").where);
   }
   recording.rows.resize(log.rows);
   for (std::size_t i = 0; i < log.rows; ++i) {
@@ -149,7 +180,11 @@ HilRecording read_recording(const std::filesystem::path& file) {
   }
   recording.closed = log.closed;
   recording.damaged = log.damaged;
-  if (log.closed) recording.closing = parse_json(log.closing, file.string());
+  if (log.closed) {
+    const std::string at_closing = file.string() + ": closing record";
+    recording.closing = parse_json(log.closing, at_closing);
+    check_schema(recording.closing, "hil_closing", at_closing);
+  }
   return recording;
 }
 

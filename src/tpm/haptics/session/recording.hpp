@@ -44,7 +44,9 @@ struct HilRecording {
   [[nodiscard]] double commanded_N(const ServoRecord& row) const;
 };
 
-/// Reads a recording, also of a session that was cut off. Throws Error(bad_input).
+/// Reads a recording, also of a session that was cut off. Header and closing record are checked
+/// against schemas/hil_recording.schema.json and hil_closing.schema.json, the session within the
+/// header as that of a file. Throws Error(bad_input) with the key.
 [[nodiscard]] HilRecording read_recording(const std::filesystem::path& file);
 
 /// What of a recording is missing, one line for a person; empty if nothing is.

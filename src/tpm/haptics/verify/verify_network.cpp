@@ -209,13 +209,14 @@ void run_reference(Verification& v, const QuasiStatic& network, const Protocol& 
   }
 }
 
-/// Of the model, N/m. Recordings of version 0.1 name it by another key.
-double recorded_stiffness(const Json& header) {
+/// Of the model, N/m. Recordings of version 0.1 name it by another key, the first of them not at
+/// all.
+std::optional<double> recorded_stiffness(const Json& header) {
   const Json& model = header.at("model");
-  const char* const key = model.contains("instantaneous_stiffness_N_per_m")
-                              ? "instantaneous_stiffness_N_per_m"
-                              : "stiffness_at_once_N_per_m";
-  return model.at(key).get<double>();
+  for (const char* key : {"instantaneous_stiffness_N_per_m", "stiffness_at_once_N_per_m"}) {
+    if (model.contains(key)) return model.at(key).get<double>();
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -259,7 +260,9 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
     ask_others(v, recording, motion, protocol, rows,
                element_constants(tissue.element("hil verify")), options);
   }
-  v.motion_error_N = options.motion_tolerance_m * recorded_stiffness(recording.header);
+  if (const auto stiffness_N_per_m = recorded_stiffness(recording.header)) {
+    v.motion_error_N = options.motion_tolerance_m * *stiffness_N_per_m;
+  }
   put_beside_experiment(v, recording, rows);
   leave_out_what_has_no_reference(v);
   return v;
