@@ -1,5 +1,4 @@
 #pragma once
-#include "tpm/base/namespaces.hpp"
 #include "tpm/law/kernel.hpp"
 #include "tpmkit/law_file.hpp"
 

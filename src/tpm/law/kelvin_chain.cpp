@@ -322,14 +322,14 @@ void require_units(std::size_t units, const char* what) {
 
 }  // namespace
 
-ParallelWithSlopes law::to_parallel_with_slopes(const KelvinChain& chain) {
+ParallelWithSlopes to_parallel_with_slopes(const KelvinChain& chain) {
   require_coefficients(chain.k0, chain.k, chain.T_s, "Kelvin chain");
   require_units(chain.k.size(), "Kelvin chain");
   return with_enough_units(chain.k.size(),
                            [&](auto units) { return parallel_with_slopes<units>(chain); });
 }
 
-SeriesWithSlopes law::to_series_with_slopes(const Prony& law) {
+SeriesWithSlopes to_series_with_slopes(const Prony& law) {
   require_coefficients(law.k_inf, law.k, law.tau_s, "Prony law");
   require_units(law.k.size(), "Prony law");
   return with_enough_units(law.k.size(),

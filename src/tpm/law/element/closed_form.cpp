@@ -166,7 +166,7 @@ Response force_driven_exact(const Protocol& protocol, std::span<const double> ti
 
 }  // namespace
 
-TpmParameters law::tpm_parameters(std::span<const double> parameters) {
+TpmParameters tpm_parameters(std::span<const double> parameters) {
   if (parameters.size() != kTpmParameterCount) {
     throw bad_input("model", fmt::format("{} parameters given", parameters.size()),
                     fmt::format("{}", static_cast<int>(kTpmParameterCount)));
