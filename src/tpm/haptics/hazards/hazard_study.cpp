@@ -54,6 +54,7 @@ class FaultyDevice final : public HapticDevice {
 
   const DeviceIdentity& open() override { return device_.open(); }
   void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
+  void enable_forces() override { device_.enable_forces(); }
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
     constexpr double kJump_m = 0.05;
     if (begun_) ++period_;
@@ -450,6 +451,7 @@ HazardRow row_of(const Hazard& hazard, bool accepted, const HazardBounds& bounds
     FaultyDevice device(simulated, hazard.fault);
     device.open();
     device.prepare(session.preparation);
+    device.enable_forces();
     DoubtfulModel doubtful(
         *model.model, hazard.doubt,
         hazard.doubt == Doubt::none ? std::numeric_limits<std::uint64_t>::max() : hazard.fault.at);
