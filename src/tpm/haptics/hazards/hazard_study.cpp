@@ -421,7 +421,7 @@ void serve(ServoStep& step, FaultyDevice& device, const Fault& fault, double per
 bool is_within(const HazardRow& row, const Hazard& hazard, const HazardBounds& b) {
   if (!row.refused.empty()) return !row.passive;
   const bool force = row.largest_force_N <= b.force_N * (1.0 + 1e-12);
-  const bool rise = row.damped || row.largest_rise_N <= b.rise_N * (1.0 + 1e-9);
+  const bool rise = row.largest_rise_N <= b.rise_N * (1.0 + 1e-9);
   if (row.cause == StopCause::finished) return force && rise && row.delivered_J <= b.delivered_J;
   const bool injected = hazard.fault.kind != FaultKind::none;
   const double stall_s = hazard.fault.kind == FaultKind::stall

@@ -277,25 +277,27 @@ void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
   if (!force_N.isZero(0.0)) row.flags |= kTouching;
 }
 
-/// The tissue's force and, once energy has been given away, damping; it never pulls, and rises no
-/// faster than a force may.
+/// The tissue's force and, once energy has been given away, damping. It never pulls, and rises no
+/// faster than a force may, nor does the tissue's where damping had made it smaller.
 Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
   constexpr double kTolerated = 0.1;  // of what ends the session
-  const double before_N = sent_size_N_;
+  const double most_N = std::min(settings_.force_limit_N,
+                                 sent_size_N_ + settings_.slew_limit_N_per_s * settings_.period_s);
+  Eigen::Vector3d force_N = tissue_N_;
   sent_size_N_ = tissue_size_N_;
   const double delivered_J = energy_.delivered_J() - kTolerated * settings_.energy_allowance_J;
-  if (!(delivered_J > 0.0) || !(tissue_size_N_ > 0.0)) return tissue_N_;
-  const Eigen::Vector3d damping = passivity_.damping_N(moved_m_, delivered_J);
-  if (damping.isZero(0.0)) return tissue_N_;
-  row.flags |= kDamped;
-  const Eigen::Vector3d out = tissue_N_ / tissue_size_N_;
-  Eigen::Vector3d force_N = tissue_N_ + damping;
-  const double push_N = force_N.dot(out);
-  if (push_N < 0.0) force_N -= push_N * out;
-  sent_size_N_ = force_N.norm();
-  const double risen_N = before_N + settings_.slew_limit_N_per_s * settings_.period_s;
-  const double most_N = std::min(settings_.force_limit_N, std::max(tissue_size_N_, risen_N));
-  if (sent_size_N_ <= most_N) return force_N;
+  if (delivered_J > 0.0 && tissue_size_N_ > 0.0) {
+    const Eigen::Vector3d damping = passivity_.damping_N(moved_m_, delivered_J);
+    if (!damping.isZero(0.0)) {
+      row.flags |= kDamped;
+      const Eigen::Vector3d out = tissue_N_ / tissue_size_N_;
+      force_N += damping;
+      const double push_N = force_N.dot(out);
+      if (push_N < 0.0) force_N -= push_N * out;
+      sent_size_N_ = force_N.norm();
+    }
+  }
+  if (sent_size_N_ <= most_N * (1.0 + 1e-12)) return force_N;
   row.flags |= kForceLimited;
   force_N *= most_N / sent_size_N_;
   sent_size_N_ = most_N;
