@@ -24,7 +24,8 @@ struct LateEnergyWatchSettings {
 /// is what the hand would have received if forces acted `lateness` after they were sent. An
 /// operator who moves on purpose has such an E, too. Therefore the hand must turn back and forth
 /// within the window, each stroke longer than the one before by `growth`: a loop that feeds an
-/// oscillation does that, an operator rarely. Neither allocates nor throws but in the constructor.
+/// oscillation does that, an operator rarely: of jerky motions over the surface and into it, one in
+/// some thousand. Neither allocates nor throws but in the constructor.
 class LateEnergyWatch {
  public:
   explicit LateEnergyWatch(const LateEnergyWatchSettings& settings);

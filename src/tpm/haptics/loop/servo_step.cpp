@@ -42,6 +42,12 @@ double stiffness_of(const ContactModel& model, const ServoSettings& settings) {
   return std::max(kLeast_N_per_m, settings.to_model ? k.norm() : push.dot(k * push));
 }
 
+/// With what is known of the device: K (T/2 + delay) <= b.
+bool is_passive(const ContactModel& model, const ServoSettings& settings) {
+  const double late_s = (0.5 + settings.delay_periods) * settings.period_s;
+  return stiffness_of(model, settings) * late_s <= settings.friction_N_s_per_m;
+}
+
 /// The vendor's number for "no device". 6, "not available", is said of calls that a device does not
 /// have.
 bool is_gone(int error) {
@@ -90,6 +96,7 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
                .allowance_J = settings_.energy_allowance_J}),
       oscillation_({.period_s = settings_.period_s}),
       late_({.period_s = settings_.period_s}),
+      watch_late_(!is_passive(model, settings_)),
       outside_validity_periods_(settings_.outside_validity_limit_s / settings_.period_s),
       stiffness_N_per_m_(stiffness_of(model, settings_)),
       least_stiffness_N_per_m_(stiffness_N_per_m_),
@@ -310,7 +317,7 @@ StopCause ServoStep::check_rendering(int periods) noexcept {
   if (energy_.too_much()) return StopCause::energy;
   if (settings_.watch_oscillation) {
     late_.observe(sent_N_, tool_m_, moved_m_, tissue_work_J_, periods);
-    if (oscillation_.found() || late_.found()) return StopCause::oscillation;
+    if (oscillation_.found() || (watch_late_ && late_.found())) return StopCause::oscillation;
     if (damped_share_ > kMostDamped) return StopCause::damping;
   }
   return doubted_ > outside_validity_periods_ ? StopCause::outside_validity : StopCause::none;

@@ -97,6 +97,7 @@ class ServoStep {
   EnergyWatch energy_;
   OscillationWatch oscillation_;
   LateEnergyWatch late_;
+  bool watch_late_;  ///< a rendering that is passive with the friction of the device is not watched
   double outside_validity_periods_;  ///< after which the session ends
   std::optional<StartGate> gate_;
   ServoCounts counts_;

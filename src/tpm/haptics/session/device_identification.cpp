@@ -288,7 +288,8 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
   constexpr double kOverlap = 2.0, kOneSided = 2.33, kBothSides = 1.96;
   const auto error = [&](Eigen::Index i) { return std::sqrt(kOverlap * s.spread(i, i)); };
   found.viscous_N_s_per_m = s.value[1];
-  found.viscous_lower_95_N_s_per_m = std::max(0.0, s.value[1] - kOneSided * error(1));
+  constexpr double kSums = 0.98;  // sums over samples are not quite the integrals
+  found.viscous_lower_95_N_s_per_m = std::max(0.0, kSums * s.value[1] - kOneSided * error(1));
   found.coulomb_low_N = std::max(0.0, s.value[2] - kBothSides * error(2));
   found.coulomb_high_N = std::max(0.0, s.value[2] + kBothSides * error(2));
   found.held_N_per_m = s.value[3];
