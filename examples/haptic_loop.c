@@ -58,7 +58,8 @@ int main(int argc, char **argv) {
     double position_m[3], force_N[3]; /* here: read the position from your device */
     for (int k = 0; k < 3; ++k) position_m[k] = info.surface_m[k] + depth * info.push[k];
     const double begin_us = now_us();
-    const int answer = tpm_haptics_step(contact, position_m, force_N);
+    const double t_s = i * info.period_s; /* here: CLOCK_MONOTONIC when the position was read */
+    const int answer = tpm_haptics_step_at(contact, t_s, position_m, force_N);
     took_us[i] = now_us() - begin_us; /* here: send the force to your device */
     tpm_haptics_get_state(contact, &state);
     if (answer != TPM_HAPTICS_OK) break;

@@ -64,6 +64,8 @@ int main(int argc, char** argv) try {
   const auto device = std::make_shared<PathDevice>(session.servo());
   SessionRequest request;
   request.recording = "own_device.tpmrec";
+  request.limits =
+      "virtual";  // a path has no motors; for a real device name it and its device_file
   const SessionSummary run = session.run(device, request);
   std::printf("%s, %s\n%llu cycles, ended: %s, largest force %.3f N\n", run.device.name.c_str(),
               run.model.c_str(), static_cast<unsigned long long>(run.outcome.cycles),

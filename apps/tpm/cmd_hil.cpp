@@ -306,6 +306,10 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
                      "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
   command.add_option("--plugin", options.plugin,
                      "Of --device plugin: a shared library after tpmkit/haptic_device.h");
+  command.add_option(
+      "--device-file", options.file,
+      "What was measured of the device (tpm hil identify; schemas/device.schema.json); "
+      "without it hardware counts as 20 ms late and free of friction");
   command.add_option("--recording", options.replay, "What --device replay plays");
   command.add_flag("--may-move", options.choice.may_move,
                    "The device may move by itself to initialise");
@@ -325,6 +329,7 @@ DeviceChoice chosen_device(const DeviceOptions& options) {
   if (options.index >= 0) choice.which.index = options.index;
   choice.replay = options.replay;
   choice.plugin = options.plugin;
+  choice.file = options.file;
   return choice;
 }
 
@@ -388,6 +393,7 @@ void add_hil_command(CLI::App& app, Session& session) {
   set_run(*run, session, [choice, &session] { return run_hil(*choice, session); });
 
   add_hil_check_command(*hil, session);
+  add_hil_identify_command(*hil, session);
   add_hil_verify_commands(*hil, session);
   add_hil_export_command(*hil, session);
   add_hil_stability_command(*hil, session);

@@ -37,7 +37,7 @@ double parse_order(const std::string& text) {
               "an order of a fractional element above 0 and below 1");
 }
 
-Json to_json(const std::vector<RecoveryResult>& results) {
+Json results_json(const std::vector<RecoveryResult>& results) {
   const auto law = [](const RecoveryResult& result) { return tpm::fit::to_json(result); };
   return Json{{"laws", array_json(results, law)}};
 }
@@ -57,7 +57,8 @@ int recovery(const RecoveryCommandOptions& options, const Session& session) {
   for (const LawSpec& law : chosen_laws(options.laws, options.family)) {
     results.push_back(recover(law, visible_parameters(law, order), study));
   }
-  deliver(session.json() ? to_text(to_json(results)) : to_terminal_text(results), options.output);
+  deliver(session.json() ? to_text(results_json(results)) : to_terminal_text(results),
+          options.output);
   deliver_csv(recovery_csv(results), csv);
   return exit_code(std::ranges::all_of(results, &RecoveryResult::fulfilled));
 }

@@ -8,7 +8,7 @@ namespace tpm::app {
 /// Options that every command with a device has.
 struct DeviceOptions {
   DeviceChoice choice;
-  std::string library, replay, plugin;
+  std::string library, replay, plugin, file;
   int serial = -1, index = -1;  ///< -1: not given
   std::string real_time = "ignore";
 };

@@ -2,6 +2,8 @@
 
 #include <ctime>
 
+#include "tpm/haptics/device/forces_off_guard.hpp"
+
 namespace tpm::app {
 namespace {
 
@@ -19,6 +21,7 @@ void note_signal(int signal) {
     stop_signal = signal;
     first_s = seconds_now();
   } else if (seconds_now() - first_s >= patience_s) {
+    haptics::cut_all_forces();
     (void)std::signal(signal, SIG_DFL);
     (void)std::raise(signal);
   }
@@ -31,13 +34,22 @@ InterruptWatch::InterruptWatch(Of of) {
   patience_s = of == Of::motors ? kPatience_s : 0;
   struct sigaction action {};
   action.sa_handler = note_signal;
-  sigaction(SIGINT, &action, &before_interrupt_);
-  sigaction(SIGTERM, &action, &before_terminate_);
+  std::vector<int> signals{SIGINT, SIGTERM};
+  if (of == Of::motors) signals.insert(signals.end(), {SIGHUP, SIGQUIT});
+  watched_.reserve(signals.size());
+  for (const int signal : signals) {
+    Watched watched;
+    watched.signal = signal;
+    // What the caller ignores stays ignored: nohup tpm hil run ...
+    if (sigaction(signal, nullptr, &watched.before) != 0) continue;
+    if (signal == SIGHUP && watched.before.sa_handler == SIG_IGN) continue;
+    sigaction(signal, &action, nullptr);
+    watched_.push_back(watched);
+  }
 }
 
 InterruptWatch::~InterruptWatch() {
-  sigaction(SIGINT, &before_interrupt_, nullptr);
-  sigaction(SIGTERM, &before_terminate_, nullptr);
+  for (const Watched& watched : watched_) sigaction(watched.signal, &watched.before, nullptr);
 }
 
 bool InterruptWatch::seen() {

@@ -1,11 +1,12 @@
 #pragma once
 #include <csignal>
+#include <vector>
 
 namespace tpm::app {
 
 /// While this lives, the first SIGINT or SIGTERM is remembered and a second one kills. With
-/// `motors`, only one that comes two seconds after the first: until then the program is stopping
-/// them, and must not be killed in the middle of it.
+/// `motors`, SIGHUP and SIGQUIT too, and only one kills that comes two seconds after the first:
+/// until then the program is stopping them, and must not be killed in the middle of it.
 class InterruptWatch {
  public:
   enum class Of { work, motors };
@@ -20,8 +21,11 @@ class InterruptWatch {
   [[nodiscard]] static int exit_code() { return 128 + signal(); }
 
  private:
-  struct sigaction before_interrupt_ {};
-  struct sigaction before_terminate_ {};
+  struct Watched {
+    int signal = 0;
+    struct sigaction before {};
+  };
+  std::vector<Watched> watched_;
 };
 
 }  // namespace tpm::app

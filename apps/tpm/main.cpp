@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -22,6 +23,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
+#include "tpm/haptics/device/forces_off_guard.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -206,6 +208,7 @@ namespace {
 /// During a session (OutOfMemoryIsThrown), libraries that ask for memory where they must not throw
 /// (nlohmann-json does in its destructor) end here: then nothing is unwound.
 [[noreturn]] void end_without_memory() noexcept {
+  tpm::haptics::cut_all_forces();
   try {
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
   } catch (const std::bad_alloc&) {
@@ -252,6 +255,8 @@ int answer(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   std::set_terminate(end_without_memory);
+  // A limit of the size of files is an error of the write, which says which file it was.
+  (void)std::signal(SIGXFSZ, SIG_IGN);
   keep_large_arrays();
   tpm::app::end_when_out_of_memory();
   try {

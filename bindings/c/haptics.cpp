@@ -2,6 +2,7 @@
 #include "tpmkit/haptics.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
 #include <memory>
 #include <new>
@@ -31,8 +32,13 @@ void say(char* message, std::size_t room, std::string_view text) noexcept {
   message[length] = '\0';
 }
 
+// Sizes of the structs of the first version, the least that there are.
+constexpr std::size_t kFirstOptions = offsetof(tpm_haptics_options, device_file);
+constexpr std::size_t kFirstInfo = offsetof(tpm_haptics_info, hands_N_per_m);
+constexpr std::size_t kFirstState = offsetof(tpm_haptics_state, missed);
+
 /// A struct of a caller that was compiled for another version of this library is read as far as
-/// both know it. The first version is the least that there is.
+/// both know it.
 template <class Struct>
 bool known(const Struct& given, std::size_t least) noexcept {
   return given.version >= 1 && given.size >= least && given.size <= 65536;
@@ -65,6 +71,7 @@ constexpr Cause kCauses[] = {
     {StopCause::outside_validity, TPM_HAPTICS_OUTSIDE_VALIDITY, "model outside validity"},
     {StopCause::energy, TPM_HAPTICS_ENERGY, "energy given to the hand"},
     {StopCause::oscillation, TPM_HAPTICS_OSCILLATION, "oscillation"},
+    {StopCause::damping, TPM_HAPTICS_TOO_MUCH_DAMPING, "damped for too long"},
 };
 
 int cause_of(StopCause cause) noexcept {
@@ -101,16 +108,20 @@ tpm::haptics::LoopContactOptions options_of(const tpm_haptics_options* given) {
   tpm::haptics::LoopContactOptions options;
   if (given == nullptr) return options;
   // An option that this library does not know yet must not be ignored.
-  if (!known(*given, sizeof(tpm_haptics_options)) || given->version > TPM_HAPTICS_VERSION) {
+  if (!known(*given, kFirstOptions) || given->version > TPM_HAPTICS_VERSION ||
+      given->size > sizeof(tpm_haptics_options)) {
     throw tpm::Error(tpm::ExitCode::usage, "options", "size or version is not one of this library",
                      "TPM_HAPTICS_OPTIONS_INIT");
   }
-  options.rate_Hz = given->rate_Hz;
-  options.longest_s = given->longest_s;
-  options.start_gate = given->no_start_gate == 0;
-  options.accept_unstable = given->accept_unstable != 0;
-  const std::string device(given->device, strnlen(given->device, sizeof given->device));
+  tpm_haptics_options said = TPM_HAPTICS_OPTIONS_INIT;
+  std::memcpy(&said, given, given->size);  // what the caller does not have stays the default
+  options.rate_Hz = said.rate_Hz;
+  options.longest_s = said.longest_s;
+  options.start_gate = said.no_start_gate == 0;
+  options.accept_unstable = said.accept_unstable != 0;
+  const std::string device(said.device, strnlen(said.device, sizeof said.device));
   if (!device.empty()) options.device = device;
+  if (said.device_file != nullptr) options.device_file = said.device_file;
   return options;
 }
 
@@ -170,14 +181,24 @@ int tpm_haptics_step_after(tpm_haptics_contact* contact, uint32_t missed,
   return cause == StopCause::none ? TPM_HAPTICS_OK : TPM_HAPTICS_STOPPED;
 }
 
+int tpm_haptics_step_at(tpm_haptics_contact* contact, double t_s, const double position_m[3],
+                        double force_N[3]) {
+  if (contact == nullptr || position_m == nullptr || force_N == nullptr) return TPM_HAPTICS_USAGE;
+  Eigen::Vector3d force;
+  const StopCause cause =
+      contact->contact.step_at(t_s, Eigen::Map<const Eigen::Vector3d>(position_m), force);
+  std::copy_n(force.data(), 3, force_N);
+  if (cause == StopCause::none) return TPM_HAPTICS_OK;
+  return cause == tpm::haptics::LoopContact::kBadTime ? TPM_HAPTICS_USAGE : TPM_HAPTICS_STOPPED;
+}
+
 int tpm_haptics_reset(tpm_haptics_contact* contact) {
   if (contact == nullptr) return TPM_HAPTICS_USAGE;
   return guarded(nullptr, 0, [&] { contact->contact.reset(); });
 }
 
 int tpm_haptics_get_info(const tpm_haptics_contact* contact, tpm_haptics_info* info) {
-  if (contact == nullptr || info == nullptr || !known(*info, sizeof *info))
-    return TPM_HAPTICS_USAGE;
+  if (contact == nullptr || info == nullptr || !known(*info, kFirstInfo)) return TPM_HAPTICS_USAGE;
   const tpm::haptics::LoopContact& c = contact->contact;
   const tpm::haptics::SessionServo& servo = c.session().servo;
   const tpm::haptics::TissueShape& shape = c.loop().shape;
@@ -195,12 +216,14 @@ int tpm_haptics_get_info(const tpm_haptics_contact* contact, tpm_haptics_info* i
   filled.spheres = static_cast<std::uint64_t>(c.spheres());
   filled.contact_sphere = shape.contact;
   copy_text(c.loop().name, filled.model);
+  filled.hands_N_per_m = c.rendering().hands_N_per_m;
+  filled.delay_s = c.rendering().delay_s;
   hand_over(filled, *info);
   return TPM_HAPTICS_OK;
 }
 
 int tpm_haptics_get_state(tpm_haptics_contact* contact, tpm_haptics_state* state) {
-  if (contact == nullptr || state == nullptr || !known(*state, sizeof *state)) {
+  if (contact == nullptr || state == nullptr || !known(*state, kFirstState)) {
     return TPM_HAPTICS_USAGE;
   }
   const tpm::haptics::LoopContactState newest = contact->contact.state();
@@ -214,6 +237,7 @@ int tpm_haptics_get_state(tpm_haptics_contact* contact, tpm_haptics_state* state
   filled.model_error_N = newest.row.model_error_N;
   filled.flags = flags_of(newest.row.flags);
   filled.cause = cause_of(newest.row.stop);
+  filled.missed = newest.missed;
   hand_over(filled, *state);
   return TPM_HAPTICS_OK;
 }

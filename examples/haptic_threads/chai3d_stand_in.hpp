@@ -1,4 +1,4 @@
-// Stands in for the two types of CHAI3D 3.x that chai3d_tool.cpp uses, with their names and
+// Stands in for the three types of CHAI3D 3.x that chai3d_tool.cpp uses, with their names and
 // signatures. It is not CHAI3D, and its device is a scripted motion.
 #pragma once
 #include <algorithm>
@@ -20,10 +20,22 @@ class cVector3d {
   double x_ = 0.0, y_ = 0.0, z_ = 0.0;
 };
 
+/// The time of the scripted motion.
+class cPrecisionClock {
+ public:
+  void start(bool /*reset*/) { stand_in_s() = 0.0; }
+  double getCurrentTimeSeconds() { return stand_in_s(); }
+  static double& stand_in_s() {
+    static double time_s = 0.0;
+    return time_s;
+  }
+};
+
 class cGenericHapticDevice {
  public:
   bool getPosition(cVector3d& position) {
     if (period_ == kScriptedPeriods) return false;
+    cPrecisionClock::stand_in_s() = 1e-3 * period_;
     position = cVector3d(0.0, 0.0, scripted_height_m(period_++));
     return true;
   }

@@ -1,6 +1,7 @@
 // The haptic thread of a CHAI3D 3.x application with a tpmkit tissue: read the device, step the
 // tissue, send the force. In CHAI3D a device is a cGenericHapticDevicePtr whose getPosition and
-// setForce take a cVector3d; this thread uses nothing else of it.
+// setForce take a cVector3d, and cPrecisionClock tells the time; this thread uses nothing else of
+// it.
 //
 // Compiled here against a stand-in for these few types (chai3d_stand_in.hpp), as CHAI3D is not a
 // dependency of tpmkit: never run with CHAI3D itself or with hardware. With CHAI3D, include
@@ -22,11 +23,13 @@ int haptic_thread(chai3d::cGenericHapticDevicePtr device, tpm_haptics_contact* t
                   const std::atomic<bool>& running) {
   int answer = TPM_HAPTICS_OK;
   chai3d::cVector3d position;
+  chai3d::cPrecisionClock clock;
+  clock.start(true);
   while (running && answer == TPM_HAPTICS_OK) {
     if (!device->getPosition(position)) break;
     const double position_m[3] = {position.x(), position.y(), position.z()};
     double force_N[3];
-    answer = tpm_haptics_step(tissue, position_m, force_N);
+    answer = tpm_haptics_step_at(tissue, clock.getCurrentTimeSeconds(), position_m, force_N);
     if (!device->setForce(chai3d::cVector3d(force_N[0], force_N[1], force_N[2]))) break;
   }
   device->setForce(chai3d::cVector3d(0.0, 0.0, 0.0));

@@ -1,6 +1,6 @@
 // A ROS 2 node around a tpmkit tissue: it subscribes to the tool's position
 // (geometry_msgs/PointStamped) and publishes the force on the hand (geometry_msgs/WrenchStamped),
-// one for one. Times of arrival decide how many periods were missed in between.
+// one for one. The stamps of the messages are the clock of the tissue.
 //
 // Compiled here against a stand-in for rclcpp and the messages (ros2_stand_in.hpp), as ROS 2 is not
 // a dependency of tpmkit: never run inside ROS 2 or with hardware. With ROS 2 include
@@ -8,8 +8,6 @@
 // with jitter, so keep stiff contacts in the loop of the device itself (chai3d_tool.cpp).
 #include <tpmkit/haptics.h>
 
-#include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <functional>
 #include <memory>
@@ -32,9 +30,6 @@ class TissueNode : public rclcpp::Node {
         TPM_HAPTICS_OK) {
       throw std::runtime_error(why);
     }
-    tpm_haptics_info info = TPM_HAPTICS_INFO_INIT;
-    tpm_haptics_get_info(tissue_, &info);
-    period_s_ = info.period_s;
     force_ = create_publisher<geometry_msgs::msg::WrenchStamped>("tool_force", 1);
     position_ = create_subscription<geometry_msgs::msg::PointStamped>(
         "tool_position", 1, std::bind(&TissueNode::moved, this, std::placeholders::_1));
@@ -47,13 +42,9 @@ class TissueNode : public rclcpp::Node {
   void moved(const geometry_msgs::msg::PointStamped::SharedPtr message) {
     const double time_s = static_cast<double>(message->header.stamp.sec) +
                           1e-9 * static_cast<double>(message->header.stamp.nanosec);
-    const double periods = begun_ ? std::round((time_s - last_s_) / period_s_) : 1.0;
-    last_s_ = time_s;
-    begun_ = true;
-    const auto missed = periods > 1.0 ? static_cast<std::uint32_t>(periods - 1.0) : 0U;
     const double position_m[3] = {message->point.x, message->point.y, message->point.z};
     double force_N[3];
-    tpm_haptics_step_after(tissue_, missed, position_m, force_N);
+    tpm_haptics_step_at(tissue_, time_s, position_m, force_N);
     geometry_msgs::msg::WrenchStamped wrench;
     wrench.header = message->header;
     wrench.wrench.force.x = force_N[0];
@@ -63,8 +54,6 @@ class TissueNode : public rclcpp::Node {
   }
 
   tpm_haptics_contact* tissue_ = nullptr;
-  double period_s_ = 1e-3, last_s_ = 0.0;
-  bool begun_ = false;
   rclcpp::Publisher<geometry_msgs::msg::WrenchStamped>::SharedPtr force_;
   rclcpp::Subscription<geometry_msgs::msg::PointStamped>::SharedPtr position_;
 };

@@ -7,6 +7,7 @@
 // scenes are often in mm: pass metres, as here, or scale where it says so.
 #include <tpmkit/haptics.h>
 
+#include <chrono>
 #include <cstdio>
 #include <stdexcept>
 #include <string>
@@ -36,13 +37,24 @@ class TpmForceFeedback : public sofa::component::haptics::ForceFeedback {
                     double& fy, double& fz) override {
     const double position_m[3] = {x, y, z};  // a scene in mm: times 1e-3
     double force_N[3];
-    tpm_haptics_step(tissue_, position_m, force_N);  // zero force once the contact has stopped
+    tpm_haptics_step_at(tissue_, now_s(), position_m, force_N);  // zero once it has stopped
     fx = force_N[0];
     fy = force_N[1];
     fz = force_N[2];
   }
 
  private:
+#ifdef TPM_WITH_SOFA
+  static double now_s() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+  }
+#else
+  static double now_s() {
+    return scripted_time_s();
+  }
+#endif
+
   tpm_haptics_contact* tissue_ = nullptr;
 };
 

@@ -55,8 +55,8 @@ struct DeviceIdentity {
   std::string library_version;  ///< empty if none
   DeviceLink link = DeviceLink::none;
   bool left_handed = false;
-  /// True if motors and encoders exist. False if the device is simulated or replayed, or if its
-  /// link may lead to a simulator.
+  /// True if motors and encoders exist, or may exist: an unknown link counts. False if the device
+  /// is simulated or replayed, or if its link leads to a simulator or a network.
   bool hardware = false;
   std::vector<std::string> assumptions;  ///< numbers that nobody has measured, one line each
 };
@@ -76,6 +76,9 @@ struct DevicePreparation {
   double watchdog_s = 0.008;  ///< time without a command after which forces are cut; 0.004 to 0.016
   bool may_move = false;      ///< the device may move by itself to initialise
   bool take_as_ready = false;  ///< treat it as initialised if the device cannot tell
+  /// The loop keeps the clock. If false, cycles follow each other without waiting, and a simulated
+  /// device does not count the time of the clock.
+  bool real_time = false;
   /// Called while the device initialises itself; true stops it.
   std::function<bool()> interrupted;
 };
@@ -108,8 +111,13 @@ class HapticDevice {
 
   /// Throws Error(environment) with the reason and what would help.
   virtual const DeviceIdentity& open() = 0;
-  /// Initialises, sets limits and switches forces on at zero. Throws Error(environment).
+  /// Initialises and sets limits; forces stay off. Throws Error(environment).
   virtual void prepare(const DevicePreparation& preparation) = 0;
+  /// Switches forces on and sends a zero force. The loop calls this from its own thread, as the
+  /// last thing before its first cycle: the watchdog of a device counts from here, and whatever
+  /// takes time (threads, locked memory, files) comes before. A device without motors keeps the
+  /// default. Throws Error(environment).
+  virtual void enable_forces() {}
   /// @param position_m in the coordinates of the device; unchanged if `failed`
   virtual DeviceAnswer read(Eigen::Vector3d& position_m) noexcept = 0;
   /// @param force_N on the hand, in the coordinates of the device

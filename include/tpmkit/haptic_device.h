@@ -59,7 +59,7 @@ typedef struct tpm_device_limits {
   double damping_N_s_per_m;  /**< largest that may be rendered, >= 0 */
   double slew_N_per_s;       /**< largest rise of the force, > 0 */
   double least_ramp_in_s;    /**< forces grow to their limit over at least so long, >= 0.1 */
-  double friction_N_s_per_m; /**< least viscous friction of the device, >= 0; passivity relies on it */
+  double friction_N_s_per_m; /**< least viscous friction of the device, 0 to 10; passivity relies on it */
   int32_t delay_periods;     /**< from a command to its force, >= 0 */
 } tpm_device_limits;
 
@@ -84,6 +84,8 @@ typedef struct tpm_device_preparation {
   double max_force_N;  /**< the device must never be asked for more */
   double watchdog_s;   /**< cut the forces after this time without a command */
   uint32_t may_move;   /**< 1: the device may move by itself to initialise */
+  uint32_t real_time;  /**< 1: the loop keeps the clock; 0: its cycles follow each other without waiting, and
+                            a simulated device must not count the time of the clock */
 } tpm_device_preparation;
 
 typedef struct tpm_device_status {
@@ -101,7 +103,8 @@ typedef struct tpm_device_hand {
   uint32_t buttons;  /**< a bit for each that is pressed */
 } tpm_device_hand;
 
-/** The functions of a plugin. All are required except hand. */
+/** The functions of a plugin. All are required except hand and enable_forces. Members are added at
+ * the end only; a plugin that was compiled before one was added states a smaller size. */
 typedef struct tpm_device_plugin {
   uint32_t size;
   uint32_t version;
@@ -112,7 +115,8 @@ typedef struct tpm_device_plugin {
   int (*describe)(int index, tpm_device_description *description, char *message);
   /** Opens one of them; forces are off. */
   int (*open)(int index, void **device, char *message);
-  /** Initialises it and switches forces on, at zero. */
+  /** Initialises it; forces stay off. A plugin without enable_forces switches them on here, at zero, and is
+   * then prepared as the last thing before the loop. */
   int (*prepare)(void *device, const tpm_device_preparation *preparation, char *message);
   int (*read)(void *device, double position_m[3]);
   int (*write)(void *device, const double force_N[3]);
@@ -124,6 +128,9 @@ typedef struct tpm_device_plugin {
   void (*cut_forces)(void *device);
   /** Releases the device; called once, after stop. */
   void (*close)(void *device);
+  /** Switches forces on, at zero. Called from the thread of the loop as the last thing before its first
+   * cycle: start the watchdog here. NULL, or a `size` that ends before it: prepare does this. */
+  int (*enable_forces)(void *device, char *message);
 } tpm_device_plugin;
 
 /** What a plugin exports. The struct lives as long as the library is loaded. */

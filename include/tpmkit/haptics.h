@@ -7,8 +7,8 @@
  *     char why[TPM_HAPTICS_MESSAGE];
  *     if (tpm_haptics_open("session.json", NULL, &contact, why, sizeof why) != TPM_HAPTICS_OK) ...
  *     for (;;) {
- *       ...read position_m from your device...
- *       tpm_haptics_step(contact, position_m, force_N);
+ *       ...read position_m from your device, and the time t_s from your clock...
+ *       tpm_haptics_step_at(contact, t_s, position_m, force_N);
  *       ...send force_N to your device...
  *     }
  *     tpm_haptics_close(contact);
@@ -19,14 +19,15 @@
  * Threads: one thread steps. One other may call tpm_haptics_get_state and tpm_haptics_positions. Make
  * all other calls outside these loops. Contacts are independent of each other.
  *
- * tpm_haptics_step neither allocates nor locks nor throws. It includes what `tpm hil run` does for
+ * A step neither allocates nor locks nor throws. It includes what `tpm hil run` does for
  * safety: one-sided contact, limits of the force and of its rise, passivity control, and a stop if the
  * rendering delivers energy to the hand or oscillates. It does not know the limits of your device and
  * does not replace them.
  *
  * Binary interface: every struct begins with its size and the version it was compiled for; the library
  * reads and writes no more than that size. Members are added at the end only. Symbols carry the version
- * TPMKIT_HAPTICS_1; one that changes its meaning gets a new version and keeps the old one.
+ * TPMKIT_HAPTICS_1, later ones TPMKIT_HAPTICS_2; one that changes its meaning gets a new version and keeps
+ * the old one.
  */
 #ifndef TPMKIT_HAPTICS_H
 #define TPMKIT_HAPTICS_H
@@ -73,7 +74,8 @@ enum tpm_haptics_cause {
   TPM_HAPTICS_UNTRUSTED = 7,            /**< deprecated, until 0.3: TPM_HAPTICS_OUTSIDE_VALIDITY */
   TPM_HAPTICS_ENERGY = 8,               /**< the rendering delivered energy to the hand */
   TPM_HAPTICS_OSCILLATION = 9,
-  TPM_HAPTICS_OTHER = 10
+  TPM_HAPTICS_OTHER = 10,
+  TPM_HAPTICS_TOO_MUCH_DAMPING = 11     /**< damping had to be added in too many steps */
 };
 
 /** What happened in a step, bits of tpm_haptics_state.flags. */
@@ -101,10 +103,13 @@ typedef struct tpm_haptics_options {
   uint32_t no_start_gate;    /**< 1: forces do not wait until the tool is in free air and at rest */
   uint32_t accept_unstable;  /**< 1: open what would be unstable; not for a device with motors */
   char device[32];           /**< whose limits apply, as `tpm hil run --device`; "": omega7 */
+  const char *device_file;   /**< limits, delay and friction measured on your device (`tpm hil identify`,
+                                  schemas/device.schema.json); NULL: one period of delay and the friction
+                                  that is assumed of the kind, which nobody checks */
 } tpm_haptics_options;
 
 #define TPM_HAPTICS_OPTIONS_INIT \
-  { (uint32_t)sizeof(tpm_haptics_options), TPM_HAPTICS_VERSION, 0.0, 600.0, 0u, 0u, {0} }
+  { (uint32_t)sizeof(tpm_haptics_options), TPM_HAPTICS_VERSION, 0.0, 600.0, 0u, 0u, {0}, NULL }
 
 /** Properties that do not change while a contact is open. */
 typedef struct tpm_haptics_info {
@@ -123,11 +128,13 @@ typedef struct tpm_haptics_info {
   uint64_t spheres;            /**< that tpm_haptics_positions writes, 1 or more */
   uint64_t contact_sphere;     /**< the one that the tool meets, from 0 */
   char model[128];             /**< description of the model */
+  double hands_N_per_m;        /**< largest stiffness that is safe in six hands (docs/safety.md) */
+  double delay_s;              /**< of your device, that counts */
 } tpm_haptics_info;
 
 #define TPM_HAPTICS_INFO_INIT \
   { (uint32_t)sizeof(tpm_haptics_info), TPM_HAPTICS_VERSION, 0.0, 0.0, 0.0, 0.0, 0.0, \
-    {0.0}, {0.0}, {0.0}, 0.0, 0.0, 0u, 0u, {0} }
+    {0.0}, {0.0}, {0.0}, 0.0, 0.0, 0u, 0u, {0}, 0.0, 0.0 }
 
 /** The newest step. */
 typedef struct tpm_haptics_state {
@@ -142,11 +149,12 @@ typedef struct tpm_haptics_state {
   double model_error_N;    /**< estimate of how far that is from the full network's */
   uint32_t flags;          /**< tpm_haptics_flag */
   int32_t cause;           /**< tpm_haptics_cause */
+  uint64_t missed;         /**< periods without a step so far */
 } tpm_haptics_state;
 
 #define TPM_HAPTICS_STATE_INIT \
   { (uint32_t)sizeof(tpm_haptics_state), TPM_HAPTICS_VERSION, 0.0, {0.0}, {0.0}, 0.0, 0.0, 0.0, 0.0, \
-    0u, 0 }
+    0u, 0, 0u }
 
 /** Version of the library, such as "0.1.0". */
 TPM_HAPTICS_API const char *tpm_haptics_version(void);
@@ -173,6 +181,18 @@ TPM_HAPTICS_API int tpm_haptics_step(tpm_haptics_contact *contact, const double 
 /** The same after `missed` periods without a step; the tissue is advanced through them too. */
 TPM_HAPTICS_API int tpm_haptics_step_after(tpm_haptics_contact *contact, uint32_t missed,
                                            const double position_m[3], double force_N[3]);
+
+/** One call of your loop at the time `t_s` of your clock. The number of periods since the last call follows
+ * from the time: a loop that runs at another rate than the contact, or that is late, lives through the same
+ * time as the tissue. A faster loop receives the force of the last period in between; a slower one misses
+ * periods, and is stopped with TPM_HAPTICS_LATE if they are too many. Use either this or the two above.
+ * @param t_s seconds of a clock that does not jump (CLOCK_MONOTONIC), rising from call to call; its origin
+ *        does not matter
+ * @returns as tpm_haptics_step; TPM_HAPTICS_USAGE with a zero force for a time that is not finite or lies
+ *          before that of the last call
+ */
+TPM_HAPTICS_API int tpm_haptics_step_at(tpm_haptics_contact *contact, double t_s,
+                                        const double position_m[3], double force_N[3]);
 
 /** Returns to rest; a stopped contact runs again. It allocates, so do not call it in the loop. No other
  * thread may use the contact meanwhile. */

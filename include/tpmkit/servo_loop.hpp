@@ -115,7 +115,8 @@ struct ServoOutcome {
 /// the cause `exception`.
 using RecordSink = std::function<void(const ServoRecord&)>;
 
-/// Runs a session in virtual time, as fast as possible, with the same bits on each run.
+/// Runs a session in virtual time, as fast as possible, with the same bits on each run. Switches
+/// the forces of the device on before its first cycle; the device is prepared.
 /// @param interrupted called regularly; true ends the session with the cause `signal`
 [[nodiscard]] ServoOutcome run_in_virtual_time(HapticDevice& device, ContactModel& model,
                                                const ServoSettings& settings,
@@ -132,13 +133,20 @@ struct RealTimeOptions {
   RealTimeWish wish = RealTimeWish::ignore;
   double cycle_timeout_s = 0.008;  ///< a longer cycle ends the session
   std::function<bool()> interrupted;
+  /// Prepares the device; called once threads, memory and scheduling are in place. Empty: it is
+  /// prepared.
+  std::function<void()> prepare;
   std::function<void()> idle;  ///< called regularly on the thread of the records
 };
 
 /// Runs a session in real time. Deadlines are absolute; missed ones are counted, and time is never
 /// slowed down. A second thread watches for a cycle that does not end. It then cuts the forces and
 /// abandons the stuck thread, which keeps device and model alive; therefore they are shared.
-/// Throws Error(environment) if real-time scheduling is enforced and refused.
+///
+/// Order: threads, locked memory and scheduling; `options.prepare`; then, in the thread of the
+/// loop, HapticDevice::enable_forces() and the first cycle. A watchdog of milliseconds allows
+/// nothing else between the last two. Throws Error(environment) if real-time scheduling is enforced
+/// and refused, and what `options.prepare` and enable_forces() throw; forces are off then.
 [[nodiscard]] ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
                                             const std::shared_ptr<ContactModel>& model,
                                             const ServoSettings& settings, const RecordSink& sink,

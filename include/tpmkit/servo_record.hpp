@@ -29,6 +29,7 @@ enum class StopCause : std::int32_t {
   energy,            ///< the rendering delivered energy to the hand that the tissue did not store
   oscillation,       ///< the force oscillated without motion of the hand
   position_jump,     ///< the device reported a motion faster than any hand
+  damping,           ///< damping had to be added in too many cycles
   hang [[deprecated("use cycle_timeout")]] = cycle_timeout,
   untrusted [[deprecated("use outside_validity")]] = outside_validity,
 };

@@ -23,6 +23,9 @@ struct SessionRequest {
   RealTimeWish wish = RealTimeWish::ignore;
   /// Device kind whose limits of force, stiffness and delay apply (`tpm hil devices` lists them).
   std::string limits = "omega7";
+  /// What was measured of the device (schemas/device.schema.json, `tpm hil identify`). Without it
+  /// hardware counts as 20 ms late and free of friction, and stiff tissues are refused.
+  std::filesystem::path device_file;
   bool may_move = false;              ///< the device may move by itself to initialise
   std::function<bool()> interrupted;  ///< true ends the session with the cause `signal`
   /// Called with every record, on the thread that writes them.

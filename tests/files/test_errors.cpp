@@ -697,6 +697,30 @@ std::vector<ErrorCase> session_cases() {
   };
 }
 
+std::vector<ErrorCase> device_file_cases() {
+  const std::string type = "device file";
+  const std::string run_session = "hil run {}/h.json --device-file {}/d.json -o {}/out";
+  const auto device = [](std::string text) {
+    return with_files({{"h.json", kSession}, {"d.json", std::move(text)}});
+  };
+  return {
+      {type, "missing", run_session, with_files({{"h.json", kSession}})},
+      {type, "binary garbage", run_session, device(kGarbage)},
+      {type, "no device", run_session, device("{}")},
+      {type, "delay without provenance", run_session,
+       device(R"({"device": "omega7", "delay": {"largest_s": 0.001}})")},
+      {type, "negative delay", run_session,
+       device(R"({"device": "omega7", "delay": {"provenance": "measured", "largest_s": -1}})")},
+      {type, "another device", run_session, device(R"({"device": "falcon"})")},
+      {type, "limit above that of the device", run_session,
+       device(R"({"device": "omega7", "limits": {"force_N": 40}})")},
+      {type, "duration of an identification", "hil identify --duration '1 s' -o {}/out",
+       with_files({})},
+      {type, "identification of a recording", "hil identify --device replay -o {}/out",
+       with_files({})},
+  };
+}
+
 std::vector<ErrorCase> session_recording_cases() {
   const std::string type = "recording of a session";
   const std::string to_hdf5 = "hil export {}/r.tpmrec -o {}/out.h5";
@@ -759,6 +783,7 @@ std::vector<ErrorCase> all_cases() {
                             scene_cases(),
                             table_option_cases(),
                             session_cases(),
+                            device_file_cases(),
                             session_recording_cases(),
                             view_cases(),
                             test::simulation_error_cases(),

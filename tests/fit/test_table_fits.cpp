@@ -1,4 +1,4 @@
-// What tpm fit answers to tables as people have them; tests/curve/test_table_kinds.cpp holds how
+// What tpm fit answers to tables as people have them; tests/files/test_table_kinds.cpp holds how
 // they are read. The parameters are those the tables were made with. Tables that are read right and
 // need a better fit belong to other tests: a drifting zero and a clipped force, a compliance in
 // parallel form, a ramped creep, strips with a slack length, units that change verdicts (issue 47),

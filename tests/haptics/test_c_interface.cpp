@@ -190,8 +190,14 @@ TEST_CASE("What is wrong with a file is a code and one line in C") {
 TEST_CASE("Structs of C keep to the size that the caller has") {
   const Opened contact(test::short_session());
   tpm_haptics_state state = TPM_HAPTICS_STATE_INIT;
-  state.size -= 8;
+  state.size = offsetof(tpm_haptics_state, missed) - 8;
   CHECK(tpm_haptics_get_state(contact, &state) == TPM_HAPTICS_USAGE);
+  // A caller of the first version, whose struct is shorter.
+  state = TPM_HAPTICS_STATE_INIT;
+  state.size = offsetof(tpm_haptics_state, missed);
+  state.missed = 17;
+  CHECK(tpm_haptics_get_state(contact, &state) == TPM_HAPTICS_OK);
+  CHECK(state.missed == 17);
   state = TPM_HAPTICS_STATE_INIT;
   state.version = 0;
   CHECK(tpm_haptics_get_state(contact, &state) == TPM_HAPTICS_USAGE);
@@ -269,6 +275,82 @@ TEST_CASE("Periods that the caller missed are lived through") {
   CHECK(some.state().time_s == Approx(every.state().time_s));
 }
 
+/// Forces at whole milliseconds of a push to 2 mm, of a loop that calls at another rate.
+std::vector<double> forces_at_rate(double rate_Hz, double off = 0.0) {
+  const Opened contact(test::short_session());
+  std::vector<double> forces_N;
+  const int calls = static_cast<int>(1.2 * rate_Hz);
+  for (int i = 0; i <= calls; ++i) {
+    const double time_s = i / rate_Hz;
+    const double jitter_s = off * std::sin(1.7 * i) / rate_Hz;
+    const double position_m[3] = {0.0, 0.0, 2e-3 - 4e-3 * time_s};
+    double force_N[3] = {};
+    REQUIRE(tpm_haptics_step_at(contact, 100.0 + time_s + jitter_s, position_m, force_N) ==
+            TPM_HAPTICS_OK);
+    if (std::abs(1e3 * time_s - std::round(1e3 * time_s)) < 1e-6) forces_N.push_back(force_N[2]);
+  }
+  CHECK(contact.state().time_s == Approx(1.2).margin(2e-3));
+  return forces_N;
+}
+
+TEST_CASE("A loop of another rate in C, told the time, gives the forces of the right one") {
+  const std::vector<double> right_N = forces_at_rate(1000.0);
+  REQUIRE(right_N.back() > 0.3);
+  for (const double rate_Hz : {2000.0, 4000.0}) {
+    CAPTURE(rate_Hz);
+    const std::vector<double> forces_N = forces_at_rate(rate_Hz);
+    REQUIRE(forces_N.size() == right_N.size());
+    for (std::size_t i = 0; i < right_N.size(); ++i) {
+      REQUIRE(forces_N[i] == Approx(right_N[i]).margin(1e-9));
+    }
+  }
+  // Calls that jitter by a fifth of a period are no missed periods.
+  const std::vector<double> jittered_N = forces_at_rate(1000.0, 0.2);
+  CHECK(jittered_N.back() == Approx(right_N.back()).epsilon(1e-3));
+}
+
+TEST_CASE("A loop in C that is too slow is stopped, and one whose clock goes back is told") {
+  const Opened slow(test::short_session());
+  double force_N[3] = {};
+  const double air_m[3] = {0.0, 0.0, 2e-3};
+  int answer = TPM_HAPTICS_OK;
+  for (int i = 0; i < 1000 && answer == TPM_HAPTICS_OK; ++i) {
+    answer = tpm_haptics_step_at(slow, 2e-3 * i, air_m, force_N);
+  }
+  CHECK(answer == TPM_HAPTICS_STOPPED);
+  CHECK(slow.state().cause == TPM_HAPTICS_LATE);
+  CHECK(slow.state().missed >= 100);
+  const Opened contact(test::short_session());
+  CHECK(tpm_haptics_step_at(contact, 5.0, air_m, force_N) == TPM_HAPTICS_OK);
+  CHECK(tpm_haptics_step_at(contact, 4.999, air_m, force_N) == TPM_HAPTICS_USAGE);
+  CHECK(tpm_haptics_step_at(contact, std::numeric_limits<double>::quiet_NaN(), air_m, force_N) ==
+        TPM_HAPTICS_USAGE);
+  CHECK(tpm_haptics_step_at(contact, 5.001, air_m, force_N) == TPM_HAPTICS_OK);
+}
+
+TEST_CASE("A device file in C brings the measured delay, and what it allows") {
+  const test::TempFolder folder;
+  write_file(folder / "session.json", to_text(test::short_session()));
+  const auto with_delay = [&](double largest_s) {
+    write_file(folder / "device.json",
+               to_text(Json{{"device", "omega7"},
+                            {"delay", {{"provenance", "measured"}, {"largest_s", largest_s}}}}));
+  };
+  tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+  const std::string file = folder / "device.json";
+  options.device_file = file.c_str();
+  with_delay(0.002);
+  const Opened contact(test::short_session(), options);
+  CHECK(contact.info().delay_s == Approx(0.003));
+  CHECK(contact.info().hands_N_per_m == Approx(1.0 / 0.0035));
+  with_delay(0.010);  // 1 N s/m over 11.5 ms: 87 N/m, and the star has 151
+  CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_REFUSED, options),
+             Contains("at most 87 N/m keep six hands below 5 mJ"));
+  write_file(folder / "device.json", R"({"device": "falcon"})");
+  CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_BAD_INPUT, options),
+             Contains("is of 'falcon', not of 'omega7'"));
+}
+
 TEST_CASE("Spheres are drawn where the contact pushes them") {
   const Opened contact(test::network_session("condensed"));
   const tpm_haptics_info info = contact.info();
@@ -329,8 +411,9 @@ TEST_CASE("The library shows the calls of its header, versioned, and nothing els
   std::vector<std::string> calls;
   while (std::getline(lines, line)) {
     const std::string name = line.substr(line.rfind(' ') + 1);
-    if (name.rfind("TPMKIT_HAPTICS_1", 0) == 0) continue;  // the version itself
-    CHECK(name.substr(name.find('@')) == "@@TPMKIT_HAPTICS_1");
+    if (name.rfind("TPMKIT_HAPTICS_", 0) == 0) continue;  // the version itself
+    const bool later = name.rfind("tpm_haptics_step_at@", 0) == 0;
+    CHECK(name.substr(name.find('@')) == (later ? "@@TPMKIT_HAPTICS_2" : "@@TPMKIT_HAPTICS_1"));
     calls.push_back(name.substr(0, name.find('@')));
   }
   const std::string header = read_file(TPM_TEST_SOURCE_DIR "/include/tpmkit/haptics.h");

@@ -106,6 +106,7 @@ TEST_CASE("The simulated device clips, watches for commands and for speed, and s
   DevicePreparation preparation;
   preparation.watchdog_s = 0.004;
   device.prepare(preparation);
+  device.enable_forces();
   CHECK(device.write({13.0, 0.0, 0.0}) == DeviceAnswer::saturated);
   CHECK(device.write({1.0, 0.0, 0.0}) == DeviceAnswer::ok);
   CHECK(device.status().saturations == 1);
@@ -115,6 +116,7 @@ TEST_CASE("The simulated device clips, watches for commands and for speed, and s
   CHECK(device.status().forces_off == ForcesOff::watchdog);
 
   device.prepare(preparation);
+  device.enable_forces();
   for (int i = 0; i < 2000 && device.status().forces_off == ForcesOff::none; ++i) {
     (void)device.write({12.0 * std::sin(12.0 * 1e-3 * i), 0.0, 0.0});
     device.advance(1e-3);
@@ -123,6 +125,7 @@ TEST_CASE("The simulated device clips, watches for commands and for speed, and s
   s.velocity_limit_m_per_s = 0.1;
   VirtualOmega7 fast(s, still());
   fast.prepare(preparation);
+  fast.enable_forces();
   for (int i = 0; i < 100; ++i) {
     (void)fast.write({12.0, 0.0, 0.0});
     fast.advance(1e-3);
@@ -138,6 +141,7 @@ TEST_CASE("A simulated watchdog can be told to forgive, and names that among its
   DevicePreparation preparation;
   preparation.watchdog_s = 0.004;
   device.prepare(preparation);
+  device.enable_forces();
   CHECK(device.write({1.0, 0.0, 0.0}) == DeviceAnswer::ok);
   for (int i = 0; i < 10; ++i) device.advance(1e-3);
   CHECK(device.status().forces_off == ForcesOff::none);

@@ -68,6 +68,7 @@ TEST_CASE("No model of the loop takes from the heap or gives back while it is st
   const LoopModel model = make_loop_model(parsed);
   VirtualOmega7 device(parsed.plant, parsed.operator_script());
   device.prepare(parsed.preparation);
+  device.enable_forces();
   ServoSettings settings{parsed.servo};
   settings.model_push = model.push;
   settings.to_model = model.to_model;

@@ -69,6 +69,7 @@ TEST_CASE("A step with a device of a plugin takes nothing from the heap") {
   PluginDevice device(TPM_TEST_DEVICE_PLUGIN);
   (void)device.open();
   device.prepare(session.preparation);
+  device.enable_forces();
   ServoSettings settings{session.servo};
   settings.gate.reset();
   settings.model_push = loop.push;

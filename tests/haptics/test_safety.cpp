@@ -6,6 +6,7 @@
 
 #include "counted_allocations.hpp"
 #include "hil_scenes.hpp"
+#include "late_hand.hpp"
 #include "shaken_contact.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
@@ -222,10 +223,14 @@ TEST_CASE("The borders of a set-up are those of the theory") {
   CHECK(check.spectral_radius < 1.0);
   // A plain spring of friction b and arm B: about 2 (b + B) / T.
   CHECK_THAT(check.stable_N_per_m, WithinRel(2.0 * (0.3 + 6.45) / 1e-3, 0.02));
-  // Hardware: its friction and delay are assumed, to the worse side.
-  const RenderingCheck omega = check_rendering(session, *loop.model, loop, "omega7");
-  CHECK(omega.delay_periods == 1);
-  CHECK_THAT(omega.passive_N_per_m, WithinRel(0.1 / 1.5e-3, 1e-9));
+  // Hardware that was measured: the largest delay seen and a period more.
+  DeviceLimits measured = limits_of("omega7");
+  measured.measured_delay_s = 0.3e-3;
+  measured.measured_friction_N_s_per_m = 0.1;
+  const RenderingCheck omega = check_rendering(session, *loop.model, loop, measured);
+  CHECK_THAT(omega.delay_s, WithinRel(1.3e-3, 1e-9));
+  CHECK(omega.delay_periods == 2);
+  CHECK_THAT(omega.passive_N_per_m, WithinRel(0.1 / 1.8e-3, 1e-9));
   CHECK_FALSE(omega.passive());
   CHECK(omega.acceptable());
 }
@@ -398,6 +403,34 @@ TEST_CASE("A slip takes energy and never gives any: a stiff spring, limits that 
     CHECK(work > 1e-3);
     CHECK(least > -1e-4);
   }
+}
+
+TEST_CASE("Damping never pulls the hand, and rises no faster than a force may") {
+  // A loop that gives energy away by its delay, which the controller takes back.
+  test::LateHandSettings hand;
+  hand.stiffness_N_per_m = 300.0;
+  hand.delay_s = 5e-3;
+  test::LateHand device(hand);
+  test::LinearSpring spring(600.0, 1e-3);
+  ServoSettings settings = guarded(5000);
+  settings.friction_N_s_per_m = 0.0;
+  settings.delay_periods = 5;
+  settings.most_damping_N_s_per_m = 30.0;
+  settings.energy_allowance_J = 1.0e-2;
+  settings.watch_oscillation = false;
+  ServoStep step(device, spring, settings);
+  ServoRecord row;
+  double before_N = 0.0;
+  int damped = 0;
+  while (step.cycle(0, row) == StopCause::none) {
+    device.advance(1e-3);
+    const double push_N = -row.commanded_N[2];
+    damped += (row.flags & kDamped) != 0 ? 1 : 0;
+    REQUIRE(push_N >= 0.0);
+    REQUIRE(push_N <= before_N + 400.0 * 1e-3 + 1e-9);
+    before_N = push_N;
+  }
+  CHECK(damped > 10);
 }
 
 // --- validity -------------------------------------------------------------------------------

@@ -56,6 +56,7 @@ TEST_CASE("No motion of a million of passive set-ups is stopped") {
     VirtualOmega7 device(plant, script);
     (void)device.open();
     device.prepare({});
+    device.enable_forces();
     ServoSettings settings;
     settings.period_s = period_s;
     settings.push = Eigen::Vector3d::UnitZ();

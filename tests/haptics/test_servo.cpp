@@ -58,6 +58,7 @@ TEST_CASE("A step neither allocates nor frees") {
   const HilSession session = test::parsed(test::short_session());
   VirtualOmega7 device(session.plant, session.operator_script());
   device.prepare(session.preparation);
+  device.enable_forces();
   ElementContact model(slow_liver(), session.servo.period_s);
   ServoSettings settings{session.servo};
   ServoStep step(device, model, settings);

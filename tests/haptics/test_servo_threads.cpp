@@ -117,6 +117,7 @@ TEST_CASE(
     DeviceChoice device;
     device.kind = "omega7";
     device.library = TPM_STAND_IN_DHD;
+    device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
     const auto start = std::chrono::steady_clock::now();
     const SessionRun run = run_session(session, device, on_the_clock(folder / "r"));
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
@@ -140,17 +141,74 @@ TEST_CASE(
   CHECK(best_ms <= test::allowed_cost("servo.forces_off_after_hang"));
 }
 
+/// A session on the stand-in, interrupted soon.
+SessionRun short_run_on_stand_in(const test::TempFolder& folder, const std::string& lines) {
+  write_file(folder / "script",
+             hand_in_place(folder) + lines + "events " + (folder / "events") + "\n");
+  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+  DeviceChoice device;
+  device.kind = "omega7";
+  device.library = TPM_STAND_IN_DHD;
+  device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
+  SessionRunOptions options = on_the_clock(folder / "r");
+  const auto start = std::chrono::steady_clock::now();
+  options.interrupted = [start] { return std::chrono::steady_clock::now() - start > 300ms; };
+  SessionRun run = run_session(patient_session(), device, options);
+  (void)unsetenv("TPM_STAND_IN_SCRIPT");
+  return run;
+}
+
+TEST_CASE(
+    "The device is prepared when all threads are there, and the loop's thread enables forces") {
+  const test::TempFolder folder;
+  (void)short_run_on_stand_in(folder, "watchdog_by_clock 0\n");
+  const std::string events = folder / "events";
+  // The caller's, the loop's and that of the records.
+  CHECK(event_ns(events, "threads_when_prepared") >= 3);
+  CHECK(event_ns(events, "thread_of_forces_on") > 0);
+  CHECK(event_ns(events, "thread_of_forces_on") == event_ns(events, "thread_of_first_read"));
+}
+
+TEST_CASE("A device whose watchdog counts by the clock lets a session begin") {
+  // A machine that stalls for 8 ms ends a session; the start does not.
+  bool begun = false;
+  for (int attempt = 0; attempt < 10 && !begun; ++attempt) {
+    const test::TempFolder folder;
+    begun = short_run_on_stand_in(folder, "").outcome.cause == StopCause::signal;
+  }
+  CHECK(begun);
+}
+
+TEST_CASE("In real time the watchdog of the simulated device counts by the clock") {
+  const HilSession session = patient_session();
+  VirtualOmega7 device(session.plant, session.operator_script());
+  DevicePreparation preparation = session.preparation;
+  const auto cause_after_20_ms = [&] {
+    device.prepare(preparation);
+    std::this_thread::sleep_for(20ms);  // forces are off: nothing counts
+    CHECK(device.status().forces_off == ForcesOff::software);
+    device.enable_forces();
+    std::this_thread::sleep_for(20ms);
+    (void)device.write(Eigen::Vector3d::Zero());
+    return device.status().forces_off;
+  };
+  CHECK(cause_after_20_ms() == ForcesOff::none);
+  preparation.real_time = true;
+  CHECK(cause_after_20_ms() == ForcesOff::watchdog);
+}
+
 TEST_CASE(
     "A stall stands in the record with its whole length, and agrees with the missed periods") {
   const test::TempFolder folder;
-  write_file(folder / "script",
-             hand_in_place(folder) + "events " + (folder / "events") + "\nfault hang 350 30\n");
+  write_file(folder / "script", hand_in_place(folder) + "watchdog_by_clock 0\nevents " +
+                                    (folder / "events") + "\nfault hang 350 30\n");
   (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
   HilSession session = patient_session();
   session.cycle_timeout_s = 1.0;
   DeviceChoice device;
   device.kind = "omega7";
   device.library = TPM_STAND_IN_DHD;
+  device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
   SessionRunOptions options = on_the_clock(folder / "r");
   const auto start = std::chrono::steady_clock::now();
   options.interrupted = [start] { return std::chrono::steady_clock::now() - start > 1500ms; };
@@ -173,14 +231,15 @@ TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as
   for (int attempt = 0; attempt < 10 && best_ms > 10.0; ++attempt) {
     const test::TempFolder folder;
     const std::string events = folder / "events";
-    write_file(folder / "script",
-               hand_in_place(folder) + "events " + events + "\nfault slow 350 100000\n");
+    write_file(folder / "script", hand_in_place(folder) + "watchdog_by_clock 0\nevents " + events +
+                                      "\nfault slow 350 100000\n");
     (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
     HilSession session = patient_session();
     session.servo.most_late = 20;
     DeviceChoice device;
     device.kind = "omega7";
     device.library = TPM_STAND_IN_DHD;
+    device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
     const SessionRun run = run_session(session, device, on_the_clock(folder / "r"));
     (void)unsetenv("TPM_STAND_IN_SCRIPT");
     REQUIRE(run.outcome.cause == StopCause::overrun_storm);

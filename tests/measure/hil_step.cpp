@@ -36,6 +36,7 @@ std::vector<double> times_of(const HilSession& session, ContactModel& model,
   VirtualOmega7 device(session.plant, session.operator_script());
   (void)device.open();
   device.prepare(session.preparation);
+  device.enable_forces();
   ServoStep step(device, model, settings);
   RowLogWriter log(path, "{}", sizeof(ServoRecord));
   std::vector<double> times;

@@ -8,18 +8,25 @@
 //   wait NUMBER       forces set before the operator begins
 //   init_ms NUMBER    that drdAutoInit takes; drdStop ends it, unless stubborn NUMBER is not 0
 //   max_force         is an event with the limit in mN behind its name
+//   watchdog_by_clock 0   commands need not come in time by the clock: for loops in virtual time,
+//   and
+//                         for tests about something else on a machine that stalls
+//   thread_of_forces_on, thread_of_first_read, threads_when_prepared are events with a number, the
+//                     thread or how many there are, in place of a time
 //   operator FILE     pieces as written by to_lines(OperatorScript)
 //   events FILE       what happened, with the time of the clock: "NAME NANOSECONDS"
 //   fault NAME FIRST COUNT   at the calls of dhdGetPosition (dhdSetForce for saturated) numbered
 //                            FIRST to FIRST + COUNT - 1, from 0
 // Faults: status, time_guard, saturated, communication, not_available, nan; those that stay:
 // watchdog, velocity, unplugged; hang sleeps COUNT milliseconds; each slow call takes 3 ms.
+#include <unistd.h>
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -54,6 +61,8 @@ struct StandIn {
   int init_ms = 0;
   bool stubborn = false;
   std::atomic<int> cause{0};
+  bool by_clock = true;
+  std::atomic<long long> last_command_ns{0};  // 0: forces are off
 };
 
 std::atomic<bool> a_call_hung{false};
@@ -82,15 +91,31 @@ StandIn& here() {
   return *device;
 }
 
-void event(const char* name) {
-  if (here().events_file.empty()) return;
+long long clock_ns() {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<long long>(now.tv_sec) * 1'000'000'000LL + now.tv_nsec;
+}
+
+void event(const char* name, long long number) {
+  if (here().events_file.empty()) return;
   if (std::FILE* file = std::fopen(here().events_file.c_str(), "a")) {
-    (void)std::fprintf(file, "%s %lld\n", name,
-                       static_cast<long long>(now.tv_sec) * 1'000'000'000LL + now.tv_nsec);
+    (void)std::fprintf(file, "%s %lld\n", name, number);
     (void)std::fclose(file);
   }
+}
+
+void event(const char* name) {
+  event(name, clock_ns());
+}
+
+long long threads_of_process() {
+  long long threads = 0;
+  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+    (void)task;
+    ++threads;
+  }
+  return threads;
 }
 
 void read_line(StandIn& s, std::istringstream& words, const std::string& key) {
@@ -116,6 +141,7 @@ void read_line(StandIn& s, std::istringstream& words, const std::string& key) {
     if (key == "type") s.type = whole;
     if (key == "initialised") s.initialised = whole != 0;
     if (key == "init_ms") s.init_ms = whole;
+    if (key == "watchdog_by_clock") s.by_clock = whole != 0;
     if (key == "stubborn") s.stubborn = whole != 0;
     if (key == "gripper") s.gripper_m = value;
     if (key == "buttons") s.buttons = static_cast<unsigned>(whole);
@@ -153,6 +179,16 @@ int failed(int error) {
 
 void fall(int cause, const char* name) {
   if (here().cause.exchange(cause) == 0) event(name);
+}
+
+/// As the electronics of a device do: forces go off when no command came in time by the clock.
+void look_at_watchdog(StandIn& s) {
+  constexpr long long kTick_ns = 125'000;
+  const long long last = s.last_command_ns;
+  if (!s.by_clock || s.watchdog_ticks == 0 || last == 0) return;
+  if (clock_ns() - last < s.watchdog_ticks * kTick_ns) return;
+  s.last_command_ns = 0;
+  fall(3, "watchdog");
 }
 
 void hang_if_due(long call) {
@@ -267,11 +303,14 @@ int dhdSetMaxForce(double newton, char) {
   return 0;
 }
 int dhdSetBrakes(int, char) {
+  event("threads_when_prepared", threads_of_process());
   return 0;
 }
 
 int dhdEnableForce(unsigned char on, char) {
   if (on == 0) event("forces_off");
+  here().last_command_ns = on != 0 ? clock_ns() : 0;
+  if (on != 0) event("thread_of_forces_on", ::gettid());
   if (here().unplugged) return failed(5);
   here().plant->forces(on != 0);
   return 0;
@@ -295,7 +334,9 @@ int dhdSetWatchdog(unsigned char ticks, char) {
 
 int dhdGetPosition(double* x, double* y, double* z, char) {
   StandIn& s = here();
+  look_at_watchdog(s);
   const long call = s.reads++;
+  if (!s.read_once) event("thread_of_first_read", ::gettid());
   s.read_once = true;
   hang_if_due(call);
   dawdle_if_due(call);
@@ -322,6 +363,8 @@ int dhdGetPosition(double* x, double* y, double* z, char) {
 int dhdSetForce(double x, double y, double z, char) {
   StandIn& s = here();
   if (s.unplugged) return failed(5);
+  look_at_watchdog(s);
+  if (s.last_command_ns != 0) s.last_command_ns = clock_ns();
   const bool clipped = s.plant->command({x, y, z});
   if (!s.read_once) return 0;  // still being prepared
   const long call = s.writes++;
@@ -334,6 +377,7 @@ int dhdSetForce(double x, double y, double z, char) {
 int dhdGetStatus(int* status, char) {
   StandIn& s = here();
   if (s.unplugged) return failed(5);
+  look_at_watchdog(s);
   if (due("status", s.reads - 1) || due("status", s.reads - 2)) return failed(2);  // every second
   std::fill(status, status + s.entries, 0);
   if (s.entries > 14) status[14] = s.cause;

@@ -108,6 +108,7 @@ void run_impact(const RenderedContact& contact, const PlantSettings& plant, Rise
                                        {OperatorPiece::Aim::place, 1e9, kDepth_m, kDepth_m}}));
   DevicePreparation preparation;
   device.prepare(preparation);
+  device.enable_forces();
   ElementContact model = contact.model();
   ServoStep step(device, model, servo);
   double low_m = std::numeric_limits<double>::infinity(), high_m = -low_m;

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,11 @@ struct DeviceLimits {
   double encoder_step_m = 1e-5;  ///< assumed: the data sheet of the Omega.7 says less
   bool plant = false;            ///< it is VirtualOmega7 with these limits, not a device
   bool simulated = false;        ///< of a plugin: it says that it has no motors
+  /// Largest delay of both paths and least viscous friction that were measured on this device
+  /// (device_file.hpp). Hardware without them has the longest delay and no friction
+  /// (haptics/session/rendering_check.hpp), whatever is assumed above.
+  std::optional<double> measured_delay_s = std::nullopt;
+  std::optional<double> measured_friction_N_s_per_m = std::nullopt;
 
   /// Its motors may move: it is neither simulated nor a replay.
   [[nodiscard]] bool hardware() const { return kind != "replay" && !plant && !simulated; }

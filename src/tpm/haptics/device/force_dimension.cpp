@@ -197,8 +197,9 @@ void ForceDimension::identify() {
   identity_.library_version = library_->version();
   identity_.link = link_of(call_.get_com_mode(id_));
   identity_.left_handed = call_.is_left_handed(id_);
+  // A link that is not known may lead to motors.
   identity_.hardware =
-      identity_.link == DeviceLink::synchronous || identity_.link == DeviceLink::asynchronous;
+      identity_.link != DeviceLink::simulated && identity_.link != DeviceLink::network;
   gripper_ = call_.has_gripper != nullptr && call_.has_gripper(id_);
   if (!limits_.tried) {
     identity_.assumptions.push_back(fmt::format(
@@ -219,7 +220,9 @@ void ForceDimension::require_initialised(const DevicePreparation& preparation) {
     throw fault("is not initialised, for which it moves by itself",
                 "--may-move with free space around the device");
   }
+  moves_itself_ = true;
   initialise(preparation.interrupted);
+  moves_itself_ = false;
   require(call_.drd_stop(true, id_), "drdStop");
 }
 
@@ -311,9 +314,12 @@ void ForceDimension::prepare(const DevicePreparation& preparation) {
   require(call_.set_max_force(preparation.max_force_N, id_), "dhdSetMaxForce");
   require(call_.set_gravity_compensation(1, id_), "dhdSetGravityCompensation");
   require(call_.set_brakes(0, id_), "dhdSetBrakes");
+  status_ = {};
+}
+
+void ForceDimension::enable_forces() {
   require(call_.enable_force(1, id_), "dhdEnableForce");
   require(call_.set_force(0.0, 0.0, 0.0, id_), "dhdSetForce");
-  status_ = {};
 }
 
 void ForceDimension::note_error() noexcept {
@@ -389,6 +395,8 @@ void ForceDimension::stop() noexcept {
 
 void ForceDimension::cut_forces() noexcept {
   cut_ = true;
+  if (!open_) return;
+  if (moves_itself_) (void)call_.drd_stop(false, id_);
   (void)call_.stop(id_);
   (void)call_.enable_force(0, id_);
 }

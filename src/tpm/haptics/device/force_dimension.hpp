@@ -40,6 +40,7 @@ class ForceDimension final : public HapticDevice {
 
   const DeviceIdentity& open() override;
   void prepare(const DevicePreparation& preparation) override;
+  void enable_forces() override;
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override;
   DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
   DeviceStatus status() noexcept override;
@@ -69,8 +70,8 @@ class ForceDimension final : public HapticDevice {
   DeviceIdentity identity_;
   DeviceStatus status_;
   char id_ = -1;
-  bool open_ = false, prepared_ = false, gripper_ = false;
-  std::atomic<bool> cut_{false};
+  bool prepared_ = false, gripper_ = false;
+  std::atomic<bool> open_{false}, moves_itself_{false}, cut_{false};
 };
 
 /// What the library sees: each device is opened and closed again, none moves.

@@ -50,6 +50,8 @@ void require_limit(const std::string& file, const char* name, double value, doub
 void require_sound(const std::string& file, const tpm_device_limits& limits) {
   constexpr double kMostForce_N = 50.0, kMostReach_m = 1.0, kAny = 1e9, kLeastRampIn_s = 0.1;
   constexpr double kMostRampIn_s = 60.0;
+  constexpr double kMostFriction =
+      10.0;  // no handle that a hand moves has more, and a gate trusts it
   constexpr int kMostDelay = 1000;
   require_limit(file, "force_N", limits.force_N, 0.0, kMostForce_N, false);
   require_limit(file, "reach_m", limits.reach_m, 0.0, kMostReach_m, false);
@@ -58,7 +60,7 @@ void require_sound(const std::string& file, const tpm_device_limits& limits) {
   require_limit(file, "slew_N_per_s", limits.slew_N_per_s, 0.0, kAny, false);
   require_limit(file, "least_ramp_in_s", limits.least_ramp_in_s, kLeastRampIn_s, kMostRampIn_s,
                 true);
-  require_limit(file, "friction_N_s_per_m", limits.friction_N_s_per_m, 0.0, kAny, true);
+  require_limit(file, "friction_N_s_per_m", limits.friction_N_s_per_m, 0.0, kMostFriction, true);
   require_limit(file, "delay_periods", limits.delay_periods, 0.0, kMostDelay, true);
 }
 
@@ -133,12 +135,12 @@ void DevicePlugin::load() {
   plugin_ = entry();
   if (plugin_ == nullptr)
     throw plugin_fault(file_, fmt::format("{} answers nothing", kPluginEntry));
-  if (plugin_->version != TPM_DEVICE_PLUGIN_VERSION || plugin_->size < sizeof(tpm_device_plugin)) {
+  constexpr std::size_t kFirst = offsetof(tpm_device_plugin, enable_forces);
+  if (plugin_->version != TPM_DEVICE_PLUGIN_VERSION || plugin_->size < kFirst) {
     throw plugin_fault(
         file_,
         fmt::format("is a plugin of version {} and {} bytes", plugin_->version, plugin_->size),
-        fmt::format("version {} and {} bytes", TPM_DEVICE_PLUGIN_VERSION,
-                    sizeof(tpm_device_plugin)));
+        fmt::format("version {} and at least {} bytes", TPM_DEVICE_PLUGIN_VERSION, kFirst));
   }
   std::vector<std::string> missing;
   const auto look = [&missing](bool there, const char* name) {
@@ -157,7 +159,13 @@ void DevicePlugin::load() {
   look(plugin_->close != nullptr, "close");
   if (missing.empty()) return;
   throw plugin_fault(file_, fmt::format("has no {}", fmt::join(missing, ", ")),
-                     "every function of tpm_device_plugin but hand");
+                     "every function of tpm_device_plugin but hand and enable_forces");
+}
+
+bool DevicePlugin::enables_forces() const {
+  constexpr std::size_t kEnd =
+      offsetof(tpm_device_plugin, enable_forces) + sizeof plugin_->enable_forces;
+  return plugin_->size >= kEnd && plugin_->enable_forces != nullptr;
 }
 
 std::string DevicePlugin::name() const {
@@ -248,16 +256,36 @@ void PluginDevice::prepare(const DevicePreparation& preparation) {
     throw plugin_fault(plugin_->file(), "a plugin is not told how its device is mounted",
                        "a session without 'mounting'");
   }
+  preparation_ = {};
+  preparation_.size = sizeof preparation_;
+  preparation_.version = TPM_DEVICE_PLUGIN_VERSION;
+  preparation_.period_s = preparation.period_s;
+  preparation_.max_force_N = preparation.max_force_N;
+  preparation_.watchdog_s = preparation.watchdog_s;
+  preparation_.may_move = preparation.may_move ? 1 : 0;
+  preparation_.real_time = preparation.real_time ? 1 : 0;
+  // One that switches forces on here is prepared in enable_forces().
+  if (plugin_->enables_forces()) prepare_plugin();
+}
+
+void PluginDevice::prepare_plugin() {
   PluginMessage message;
-  tpm_device_preparation given{};
-  given.size = sizeof given;
-  given.version = TPM_DEVICE_PLUGIN_VERSION;
-  given.period_s = preparation.period_s;
-  given.max_force_N = preparation.max_force_N;
-  given.watchdog_s = preparation.watchdog_s;
-  given.may_move = preparation.may_move ? 1 : 0;
-  if (call_.prepare(device_, &given, message.text) == TPM_DEVICE_OK) return;
+  if (call_.prepare(device_, &preparation_, message.text) == TPM_DEVICE_OK) return;
   throw plugin_fault(plugin_->file(), "cannot prepare the device: " + message.words());
+}
+
+void PluginDevice::enable_forces() {
+  if (plugin_->enables_forces()) {
+    PluginMessage message;
+    if (call_.enable_forces(device_, message.text) != TPM_DEVICE_OK) {
+      throw plugin_fault(plugin_->file(), "cannot switch forces on: " + message.words());
+    }
+  } else {
+    prepare_plugin();
+  }
+  if (write(Eigen::Vector3d::Zero()) == DeviceAnswer::failed) {
+    throw plugin_fault(plugin_->file(), "the first force, which is zero, cannot be sent");
+  }
 }
 
 DeviceAnswer PluginDevice::read(Eigen::Vector3d& position_m) noexcept {

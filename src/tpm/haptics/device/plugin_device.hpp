@@ -26,6 +26,8 @@ class DevicePlugin {
   [[nodiscard]] const tpm_device_plugin& calls() const { return *plugin_; }
   [[nodiscard]] const std::string& file() const { return file_; }
   [[nodiscard]] std::string name() const;
+  /// It switches forces on in a call of its own, not in prepare().
+  [[nodiscard]] bool enables_forces() const;
   /// Throws Error(environment) with the plugin's own words.
   [[nodiscard]] int count() const;
   /// What a device says of itself, its limits checked. Throws Error(environment).
@@ -51,6 +53,7 @@ class PluginDevice final : public HapticDevice {
   [[nodiscard]] DeviceLimits limits() const;
   const DeviceIdentity& open() override;
   void prepare(const DevicePreparation& preparation) override;
+  void enable_forces() override;
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override;
   DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
   DeviceStatus status() noexcept override;
@@ -59,10 +62,13 @@ class PluginDevice final : public HapticDevice {
   void cut_forces() noexcept override;
 
  private:
+  void prepare_plugin();
+
   std::shared_ptr<const DevicePlugin> plugin_;  ///< shared with a call that is stuck in it
   const tpm_device_plugin& call_;
   int index_ = 0;
   tpm_device_description description_{};
+  tpm_device_preparation preparation_{};
   DeviceIdentity identity_;
   DeviceStatus status_;
   void* device_ = nullptr;

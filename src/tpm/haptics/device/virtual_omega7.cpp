@@ -31,7 +31,22 @@ void VirtualOmega7::prepare(const DevicePreparation& preparation) {
   plant_ = VirtualPlant(settings_, script_);
   saturations_ = 0;
   owed_s_ = 0.0;
+  forces_on_ = false;
+  on_the_clock_ = preparation.real_time;
+  clock_ran_out_ = false;
+}
+
+void VirtualOmega7::enable_forces() {
+  last_command_ = Clock::now();
   forces_on_ = true;
+  (void)plant_.command(Eigen::Vector3d::Zero());
+}
+
+/// Whether a command came too late by the clock; forces are off from then on.
+void VirtualOmega7::look_at_clock() noexcept {
+  if (!on_the_clock_ || !forces_on_) return;
+  const std::chrono::duration<double> without_command = Clock::now() - last_command_;
+  if (without_command.count() >= settings_.watchdog_s) clock_ran_out_ = true;
 }
 
 DeviceAnswer VirtualOmega7::read(Eigen::Vector3d& position_m) noexcept {
@@ -40,17 +55,20 @@ DeviceAnswer VirtualOmega7::read(Eigen::Vector3d& position_m) noexcept {
 }
 
 DeviceAnswer VirtualOmega7::write(const Eigen::Vector3d& force_N) noexcept {
+  look_at_clock();
+  if (on_the_clock_) last_command_ = Clock::now();
   if (!plant_.command(force_N)) return DeviceAnswer::ok;
   ++saturations_;
   return DeviceAnswer::saturated;
 }
 
 DeviceStatus VirtualOmega7::status() noexcept {
+  look_at_clock();
   DeviceStatus status;
   status.saturations = saturations_;
   if (plant_.too_fast()) {
     status.forces_off = ForcesOff::velocity;
-  } else if (plant_.watchdog_tripped()) {
+  } else if (plant_.watchdog_tripped() || clock_ran_out_) {
     status.forces_off = ForcesOff::watchdog;
   } else if (!forces_on_) {
     status.forces_off = ForcesOff::software;
@@ -66,7 +84,7 @@ HandState VirtualOmega7::hand() noexcept {
 
 void VirtualOmega7::advance(double seconds) noexcept {
   owed_s_ += seconds;
-  plant_.forces(forces_on_);
+  plant_.forces(forces_on_ && !clock_ran_out_);
   // Half a period of tolerance: sums of periods are not exact.
   while (owed_s_ > 0.5 * settings_.period_s) {
     plant_.advance();

@@ -1,5 +1,6 @@
 #pragma once
 #include <atomic>
+#include <chrono>
 
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/device/virtual_plant.hpp"
@@ -8,7 +9,8 @@
 namespace tpm::haptics {
 
 /// A simulated Omega.7 held by a simulated arm, or another device of the list whose row says
-/// `plant`. Its time passes in advance() only.
+/// `plant`. Its time passes in advance() only; in real time its watchdog counts by the clock too,
+/// from enable_forces() on, as that of a device does.
 class VirtualOmega7 final : public HapticDevice {
  public:
   /// @param limits the motors are no stronger, the encoders no finer
@@ -17,6 +19,7 @@ class VirtualOmega7 final : public HapticDevice {
 
   const DeviceIdentity& open() override;
   void prepare(const DevicePreparation& preparation) override;
+  void enable_forces() override;
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override;
   DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
   DeviceStatus status() noexcept override;
@@ -36,6 +39,10 @@ class VirtualOmega7 final : public HapticDevice {
   double owed_s_ = 0.0;  ///< time that has passed and is no whole period yet
   std::uint64_t saturations_ = 0;
   std::atomic<bool> forces_on_{false};
+  using Clock = std::chrono::steady_clock;
+  void look_at_clock() noexcept;
+  bool on_the_clock_ = false, clock_ran_out_ = false;
+  Clock::time_point last_command_;
 };
 
 }  // namespace tpm::haptics

@@ -69,6 +69,7 @@ class SlowDevice final : public HapticDevice {
 
   const DeviceIdentity& open() override { return device_.open(); }
   void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
+  void enable_forces() override { device_.enable_forces(); }
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
     if (begun_) ++period_;
     const bool once = hazard_.kind == ClockFaultKind::read_hangs && period_ == hazard_.at;
@@ -199,7 +200,6 @@ ClockRun run_once(const ClockHazard& hazard, HilSession session) {
   const auto device = std::make_shared<SlowDevice>(session, hazard, moments);
   const auto model = std::make_shared<SlowModel>(std::move(loop.model), hazard, moments);
   device->open();
-  device->prepare(session.preparation);
   ClockRun run;
   std::atomic<std::uint64_t> seen{0};
   const RecordSink sink = [&](const ServoRecord& row) {
@@ -212,6 +212,12 @@ ClockRun run_once(const ClockHazard& hazard, HilSession session) {
   };
   RealTimeOptions options;
   options.cycle_timeout_s = session.cycle_timeout_s;
+  options.prepare = [&] {
+    DevicePreparation preparation = session.preparation;
+    preparation.period_s = session.servo.period_s;
+    preparation.real_time = true;
+    device->prepare(preparation);
+  };
   options.interrupted = [&] {
     if (hazard.kind != ClockFaultKind::interrupted || seen < hazard.at) return false;
     moments->begin_fault();

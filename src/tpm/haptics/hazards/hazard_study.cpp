@@ -54,6 +54,7 @@ class FaultyDevice final : public HapticDevice {
 
   const DeviceIdentity& open() override { return device_.open(); }
   void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
+  void enable_forces() override { device_.enable_forces(); }
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
     constexpr double kJump_m = 0.05;
     if (begun_) ++period_;
@@ -420,7 +421,7 @@ void serve(ServoStep& step, FaultyDevice& device, const Fault& fault, double per
 bool is_within(const HazardRow& row, const Hazard& hazard, const HazardBounds& b) {
   if (!row.refused.empty()) return !row.passive;
   const bool force = row.largest_force_N <= b.force_N * (1.0 + 1e-12);
-  const bool rise = row.damped || row.largest_rise_N <= b.rise_N * (1.0 + 1e-9);
+  const bool rise = row.largest_rise_N <= b.rise_N * (1.0 + 1e-9);
   if (row.cause == StopCause::finished) return force && rise && row.delivered_J <= b.delivered_J;
   const bool injected = hazard.fault.kind != FaultKind::none;
   const double stall_s = hazard.fault.kind == FaultKind::stall
@@ -450,6 +451,7 @@ HazardRow row_of(const Hazard& hazard, bool accepted, const HazardBounds& bounds
     FaultyDevice device(simulated, hazard.fault);
     device.open();
     device.prepare(session.preparation);
+    device.enable_forces();
     DoubtfulModel doubtful(
         *model.model, hazard.doubt,
         hazard.doubt == Doubt::none ? std::numeric_limits<std::uint64_t>::max() : hazard.fault.at);

@@ -7,6 +7,7 @@
 #include <exception>
 #include <thread>
 
+#include "tpm/haptics/device/forces_off_guard.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
 #include "tpmkit/error.hpp"
@@ -23,7 +24,9 @@ constexpr std::size_t kRingRows = 1U << 16U;  // 16 s at 4 kHz
 /// alive.
 struct Shared {
   Shared(std::shared_ptr<HapticDevice> d, std::shared_ptr<ContactModel> m, const ServoSettings& s)
-      : device(std::move(d)), model(std::move(m)), settings(s), step(*device, *model, s) {}
+      : device(std::move(d)), model(std::move(m)), settings(s), step(*device, *model, s) {
+    touch_ring();
+  }
 
   std::shared_ptr<HapticDevice> device;
   std::shared_ptr<ContactModel> model;
@@ -37,9 +40,19 @@ struct Shared {
   std::atomic<bool> scheduled{false}, begin{false}, over{false};
   // Written by the loop before `over`, read after it.
   std::string scheduling;
-  std::exception_ptr refused;
+  std::exception_ptr refused;  ///< by the system, or forces that could not be switched on
   TimeHistogram woke_late, busy;
   std::int64_t stop_took_ns = 0;
+
+ private:
+  /// Every page of the ring is there before the loop begins, also where memory cannot be locked.
+  void touch_ring() {
+    ServoRecord row;
+    while (ring.push(row)) {
+    }
+    while (ring.pop(row)) {
+    }
+  }
 };
 
 /// The loop proper: nothing in here allocates, locks or throws.
@@ -76,6 +89,18 @@ void serve(Shared& s) noexcept {
     s.busy_since_ns.store(0, std::memory_order_release);
     deadline += period_ns;
   }
+}
+
+/// Forces on and the loop, with nothing in between.
+void forces_on_and_serve(Shared& s) noexcept {
+  try {
+    s.device->enable_forces();
+  } catch (...) {
+    s.device->stop();
+    s.refused = std::current_exception();
+    return;
+  }
+  serve(s);
 }
 
 /// Takes what the loop has written; ends when told so and the ring is empty.
@@ -137,6 +162,7 @@ class LoopThread {
  public:
   LoopThread(std::shared_ptr<Shared> shared, RealTimeWish wish)
       : shared_(std::move(shared)), thread_([s = shared_, wish] {
+          const SignalStack signal_stack;
           try {
             s->scheduling = become_real_time(wish);
           } catch (...) {
@@ -144,7 +170,12 @@ class LoopThread {
           }
           s->scheduled.store(true, std::memory_order_release);
           while (!s->begin.load(std::memory_order_acquire)) std::this_thread::sleep_for(100us);
-          if (!s->refused) serve(*s);
+          const StopCause wanted = s->wanted.load(std::memory_order_acquire);
+          if (wanted != StopCause::none) {
+            s->step.stop(wanted);
+          } else if (!s->refused) {
+            forces_on_and_serve(*s);
+          }
           s->over.store(true, std::memory_order_release);
         }) {}
   ~LoopThread() {
@@ -179,7 +210,7 @@ bool watch(const std::shared_ptr<Shared>& s, const RealTimeOptions& options,
   const auto limit_ns = static_cast<std::int64_t>(options.cycle_timeout_s * 1e9);
   while (!s->over.load(std::memory_order_acquire)) {
     std::this_thread::sleep_for(500us);
-    if (options.interrupted && options.interrupted()) {
+    if (ForcesOffGuard::ended_by_signal() || (options.interrupted && options.interrupted())) {
       s->wanted.store(StopCause::signal, std::memory_order_release);
     }
     const std::int64_t since = s->busy_since_ns.load(std::memory_order_acquire);
@@ -210,6 +241,7 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
                               const std::shared_ptr<ContactModel>& model,
                               const ServoSettings& settings, const RecordSink& sink,
                               const RealTimeOptions& options) {
+  const ForcesOffGuard guard(*device);
   auto shared = std::make_shared<Shared>(device, model, settings);
   RecordThread records(shared, sink, options.idle);
   LoopThread loop(shared, options.wish);
@@ -218,10 +250,11 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
   ServoOutcome outcome;
   outcome.real_time = true;
   outcome.scheduling = shared->scheduling;
-  shared->begin.store(true, std::memory_order_release);
   std::int64_t stop_took_ns = 0;
+  if (!shared->refused && options.prepare) options.prepare();
   const bool timed_out = [&] {
     const AboveRealTime watching;
+    shared->begin.store(true, std::memory_order_release);
     return watch(shared, options, stop_took_ns);
   }();
   if (timed_out) {

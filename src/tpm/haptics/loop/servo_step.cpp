@@ -10,6 +10,8 @@ namespace tpm::haptics {
 namespace {
 
 constexpr std::size_t kLateWindow = 1000;
+/// Positions of earlier calls are used for so long; a jump is judged over no more either.
+constexpr double kMostStale_s = 0.020;
 
 StopCause cause_of(ForcesOff off) {
   switch (off) {
@@ -39,6 +41,12 @@ double stiffness_of(const ContactModel& model, const ServoSettings& settings) {
   const Eigen::Matrix3d k = model.instantaneous_stiffness();
   const Eigen::Vector3d push = settings.model_push.normalized();
   return std::max(kLeast_N_per_m, settings.to_model ? k.norm() : push.dot(k * push));
+}
+
+/// With what is known of the device: K (T/2 + delay) <= b.
+bool is_passive(const ContactModel& model, const ServoSettings& settings) {
+  const double late_s = (0.5 + settings.delay_periods) * settings.period_s;
+  return stiffness_of(model, settings) * late_s <= settings.friction_N_s_per_m;
 }
 
 /// The vendor's number for "no device". 6, "not available", is said of calls that a device does not
@@ -72,6 +80,7 @@ std::string_view word_of(StopCause cause) {
       {StopCause::energy, "energy given to the hand"},
       {StopCause::oscillation, "oscillation"},
       {StopCause::position_jump, "position jumped"},
+      {StopCause::damping, "damped for too long"},
   });
   return word_for(kNames, cause, "unknown");
 }
@@ -87,10 +96,12 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
                .delay_periods = settings_.delay_periods,
                .allowance_J = settings_.energy_allowance_J}),
       oscillation_({.period_s = settings_.period_s}),
+      late_({.period_s = settings_.period_s}),
+      watch_late_(!is_passive(model, settings_)),
       outside_validity_periods_(settings_.outside_validity_limit_s / settings_.period_s),
       stiffness_N_per_m_(stiffness_of(model, settings_)),
       least_stiffness_N_per_m_(stiffness_N_per_m_),
-      late_(kLateWindow, 0) {
+      late_cycles_(kLateWindow, 0) {
   contact_.reset();
   if (!settings_.gate) return;
   gate_.emplace(*settings_.gate, settings_.period_s);
@@ -114,9 +125,14 @@ StopCause ServoStep::read(int missed, ServoRecord& row) noexcept {
   if (!position_m_.allFinite()) return StopCause::position_not_finite;
   moved_m_ = begun_ ? Eigen::Vector3d(position_m_ - before) : Eigen::Vector3d::Zero();
   stale_ += 1 + missed;
-  const double reach_m = settings_.most_speed_m_per_s * stale_ * settings_.period_s;
+  const double since_s = stale_ * settings_.period_s;
+  const double reach_m = settings_.most_speed_m_per_s * std::min(since_s, kMostStale_s);
   if (moved_m_.squaredNorm() > reach_m * reach_m) return StopCause::position_jump;
-  if (answer != DeviceAnswer::time_guard) stale_ = 0;
+  if (answer != DeviceAnswer::time_guard) {
+    stale_ = 0;
+  } else if (since_s > kMostStale_s) {
+    return StopCause::communication;
+  }
   return StopCause::none;
 }
 
@@ -269,21 +285,30 @@ void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
   if (!force_N.isZero(0.0)) row.flags |= kTouching;
 }
 
-/// The tissue's force and, once energy has been given away, damping; never above the limit.
+/// The tissue's force and, once energy has been given away, damping. It never pulls, and rises no
+/// faster than a force may, nor does the tissue's where damping had made it smaller.
 Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
   constexpr double kTolerated = 0.1;  // of what ends the session
+  const double most_N = std::min(settings_.force_limit_N,
+                                 sent_size_N_ + settings_.slew_limit_N_per_s * settings_.period_s);
+  Eigen::Vector3d force_N = tissue_N_;
   sent_size_N_ = tissue_size_N_;
   const double delivered_J = energy_.delivered_J() - kTolerated * settings_.energy_allowance_J;
-  if (!(delivered_J > 0.0)) return tissue_N_;
-  const Eigen::Vector3d damping = passivity_.damping_N(moved_m_, delivered_J);
-  if (damping.isZero(0.0)) return tissue_N_;
-  row.flags |= kDamped;
-  Eigen::Vector3d force_N = tissue_N_ + damping;
-  sent_size_N_ = force_N.norm();
-  if (sent_size_N_ <= settings_.force_limit_N) return force_N;
+  if (delivered_J > 0.0 && tissue_size_N_ > 0.0) {
+    const Eigen::Vector3d damping = passivity_.damping_N(moved_m_, delivered_J);
+    if (!damping.isZero(0.0)) {
+      row.flags |= kDamped;
+      const Eigen::Vector3d out = tissue_N_ / tissue_size_N_;
+      force_N += damping;
+      const double push_N = force_N.dot(out);
+      if (push_N < 0.0) force_N -= push_N * out;
+      sent_size_N_ = force_N.norm();
+    }
+  }
+  if (sent_size_N_ <= most_N * (1.0 + 1e-12)) return force_N;
   row.flags |= kForceLimited;
-  force_N *= settings_.force_limit_N / sent_size_N_;
-  sent_size_N_ = settings_.force_limit_N;
+  force_N *= most_N / sent_size_N_;
+  sent_size_N_ = most_N;
   return force_N;
 }
 
@@ -291,7 +316,11 @@ StopCause ServoStep::check_rendering(int periods) noexcept {
   energy_.observe(sent_N_, moved_m_, tissue_work_J_, periods);
   if (settings_.watch_oscillation) oscillation_.observe(sent_size_N_, periods);
   if (energy_.too_much()) return StopCause::energy;
-  if (settings_.watch_oscillation && oscillation_.found()) return StopCause::oscillation;
+  if (settings_.watch_oscillation) {
+    late_.observe(sent_N_, tool_m_, moved_m_, tissue_work_J_, periods);
+    if (oscillation_.found() || (watch_late_ && late_.found())) return StopCause::oscillation;
+    if (damped_share_ > kMostDamped) return StopCause::damping;
+  }
   return doubted_ > outside_validity_periods_ ? StopCause::outside_validity : StopCause::none;
 }
 
@@ -319,7 +348,7 @@ StopCause ServoStep::look_at_status() noexcept {
 }
 
 bool ServoStep::storm(int missed) noexcept {
-  char& slot = late_[served_++ % kLateWindow];
+  char& slot = late_cycles_[served_++ % kLateWindow];
   const char late = missed > 0 ? 1 : 0;
   late_now_ += late - slot;
   slot = late;
@@ -357,6 +386,8 @@ StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   cause = check_rendering(missed + 1);
   if (cause != StopCause::none) return cause;
   cause = write(with_damping(row), row);
+  damped_share_ += (((row.flags & kDamped) != 0 ? 1.0 : 0.0) - damped_share_) * settings_.period_s /
+                   kDampedWindow_s;
   count_limits(row.flags);
   if (cause != StopCause::none) return cause;
   if (--to_status_ > 0) return StopCause::none;

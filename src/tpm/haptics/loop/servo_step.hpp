@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "tpm/haptics/loop/energy_watch.hpp"
+#include "tpm/haptics/loop/late_energy_watch.hpp"
 #include "tpm/haptics/loop/one_sided_contact.hpp"
 #include "tpm/haptics/loop/oscillation_watch.hpp"
 #include "tpm/haptics/loop/passivity.hpp"
@@ -25,6 +26,11 @@ namespace tpm::haptics {
 /// F d >= 0: a slip takes energy and never gives any (exact where F <= C; where the tissue is
 /// stiffer than foretold, F - C lasts one period). While the force is zero the model's tool
 /// recovers towards the hand, which costs nothing.
+///
+/// **Damping.** Once the rendering has given energy away, the passivity controller adds damping.
+/// The sum never pulls the hand towards the tissue, rises no faster than the limit of the rise
+/// allows, and is zero where the tissue's force is. A rendering that needs damping in more than
+/// kMostDamped of its cycles is not what the session asked for, and ends.
 ///
 /// **Validity.** A force outside the validity of the model is not sent. The last valid force
 /// stays, fades with `fade_s`, falls as the hand withdraws (by K dx, so that no more than F^2/2K
@@ -50,6 +56,8 @@ class ServoStep {
 
   /// Periods of the model in one cycle, at most.
   static constexpr int kMostSteps = 8;
+  /// Share of the cycles in which damping may act, with the time constant over which it is counted.
+  static constexpr double kMostDamped = 0.05, kDampedWindow_s = 5.0;
 
  private:
   /// A force of the model and how it came about.
@@ -88,6 +96,8 @@ class ServoStep {
   PassivityControl passivity_;
   EnergyWatch energy_;
   OscillationWatch oscillation_;
+  LateEnergyWatch late_;
+  bool watch_late_;  ///< a rendering that is passive with the friction of the device is not watched
   double outside_validity_periods_;  ///< after which the session ends
   std::optional<StartGate> gate_;
   ServoCounts counts_;
@@ -109,14 +119,15 @@ class ServoStep {
   Eigen::Vector3d model_tool_m_ = Eigen::Vector3d::Zero();   ///< in space, from surface_m
   Eigen::Vector3d model_force_N_ = Eigen::Vector3d::Zero();  ///< on it, device coordinates
   double tissue_work_J_ = 0.0;                               ///< on the surface in this cycle
-  double doubted_ = 0.0;  ///< periods outside validity, forgotten ten times as slowly
+  double damped_share_ = 0.0;  ///< of the cycles of the last kDampedWindow_s
+  double doubted_ = 0.0;       ///< periods outside validity, forgotten ten times as slowly
   bool doubted_before_ = false;
   int owed_ = 0;     ///< periods that the model has not lived through yet
   int stale_ = 0;    ///< periods for which the position is that of an earlier call
   ServoRecord row_;  ///< of this cycle; what it does not know anew is from the one before
   std::uint64_t cycle_ = 0;
   std::size_t phase_ = 0;
-  std::vector<char> late_;  ///< of the last cycles served, a ring
+  std::vector<char> late_cycles_;  ///< of the last cycles served, a ring
   std::size_t served_ = 0;
   int late_now_ = 0;
   bool begun_ = false;

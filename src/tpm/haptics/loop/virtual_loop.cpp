@@ -1,6 +1,7 @@
 // Declared in tpmkit/servo_loop.hpp.
 #include <exception>
 
+#include "tpm/haptics/device/forces_off_guard.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
 #include "tpmkit/servo_loop.hpp"
 
@@ -14,13 +15,22 @@ constexpr std::uint64_t kAskEvery = 1024;
 ServoOutcome run_in_virtual_time(HapticDevice& device, ContactModel& model,
                                  const ServoSettings& settings, const RecordSink& sink,
                                  const std::function<bool()>& interrupted) {
+  const ForcesOffGuard guard(device);
+  const SignalStack signal_stack;
   ServoOutcome outcome;
   ServoStep step(device, model, settings);
   ServoRecord row;
   try {
+    device.enable_forces();
+  } catch (...) {
+    device.stop();
+    throw;
+  }
+  try {
     StopCause cause = StopCause::none;
     for (std::uint64_t i = 0; cause == StopCause::none; ++i) {
-      if (i % kAskEvery == 0 && interrupted && interrupted()) {
+      const bool asked = i % kAskEvery == 0;
+      if (asked && (ForcesOffGuard::ended_by_signal() || (interrupted && interrupted()))) {
         step.stop(StopCause::signal);
         break;
       }

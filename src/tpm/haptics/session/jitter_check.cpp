@@ -136,6 +136,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
   preparation.period_s = session.servo.period_s;
   preparation.may_move = choice.may_move;
   preparation.take_as_ready = choice.take_as_ready;
+  preparation.real_time = true;
   preparation.interrupted = interrupted;
   RealTimeOptions options;
   options.wish = wish;
@@ -144,7 +145,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
   options.interrupted = interrupted;
   try {
     check.device = device->open();
-    device->prepare(preparation);
+    options.prepare = [&] { device->prepare(preparation); };
     check.outcome = run_in_real_time(
         device, std::make_shared<EmptySpace>(session.servo.period_s), ServoSettings{session.servo},
         [](const ServoRecord&) {}, options);

@@ -8,6 +8,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
+#include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/loop/triple_buffer.hpp"
 #include "tpm/haptics/session/session_run.hpp"
@@ -94,15 +95,26 @@ struct LoopContact::Stepped {
   bool begun = false;
   TripleBuffer<LoopContactState> newest;
   StopCause cause = StopCause::none;
+  // Of step_at(): periods of the contact, counted by the caller's clock.
+  bool timed = false;
+  double begun_s = 0.0, last_s = 0.0, periods = 0.0;
 };
 
 LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOptions& options)
     : session_(session_of(file, options)), loop_(make_loop_model(session_, true)) {
-  require_within(session_, limits_of(options.device));
-  rendering_ = check_rendering(session_, *loop_.model, loop_, options.device);
+  DeviceLimits limits = limits_of(options.device);
+  if (!options.device_file.empty()) {
+    limits = limits_by_file(limits, read_device_file(options.device_file));
+  } else if (limits.hardware()) {
+    // The loop is the caller's, and so is the device: what is assumed of its kind counts.
+    limits.measured_delay_s = 0.0;
+    limits.measured_friction_N_s_per_m = limits.friction_N_s_per_m;
+  }
+  require_within(session_, limits);
+  rendering_ = check_rendering(session_, *loop_.model, loop_, limits);
   if (!rendering_.acceptable() && !options.accept_unstable) {
     throw Error(ExitCode::answer_is_no, file.string(), rendering_.verdict(),
-                "a softer tissue or a higher rate");
+                "a softer tissue, a higher rate, or a device file with a measured delay");
   }
   settings_ = loop_settings(endless(session_, options), loop_, rendering_, true);
   displacement_m_ = Eigen::Matrix3Xd::Zero(3, spheres());
@@ -137,7 +149,38 @@ StopCause LoopContact::step(const Eigen::Vector3d& position_m, Eigen::Vector3d& 
   }
   state.surface_m = s.surface_m;
   state.time_s = static_cast<double>(s.step.cycles()) * settings_.period_s;
+  state.missed = s.step.counts().missed;
   s.newest.write(state);
+  return s.cause;
+}
+
+StopCause LoopContact::step_at(double time_s, const Eigen::Vector3d& position_m,
+                               Eigen::Vector3d& force_N) noexcept {
+  Stepped& s = *stepped_;
+  force_N.setZero();
+  if (!std::isfinite(time_s) || (s.timed && time_s < s.last_s)) return kBadTime;
+  const double since = (time_s - s.last_s) / settings_.period_s;
+  s.last_s = time_s;
+  if (!s.timed) {
+    s.timed = true;
+    s.begun_s = time_s;
+    return step(position_m, force_N, 0);
+  }
+  constexpr double kOff = 0.75, kMost = 1e6;
+  const double ahead = (time_s - s.begun_s) / settings_.period_s - s.periods;
+  double lived = 1.0;
+  if (since < kOff) {
+    // A faster loop: the call nearest to the end of a period.
+    lived = ahead + 0.5 * since >= 1.0 ? 1.0 : 0.0;
+  } else {
+    // One period a call as long as that keeps within three quarters of one of the clock: jitter and
+    // a rate that is a little off do not make a period missed now and one too many then.
+    if (ahead - lived > kOff) lived = std::min(std::round(ahead), kMost);
+    if (ahead - lived < -kOff) lived = 0.0;
+  }
+  s.periods += lived;
+  if (lived > 0.0) return step(position_m, force_N, static_cast<int>(lived) - 1);
+  if (s.cause == StopCause::none) force_N = s.device.force_N();
   return s.cause;
 }
 

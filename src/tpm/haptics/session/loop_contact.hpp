@@ -15,7 +15,10 @@ namespace tpm::haptics {
 struct LoopContactOptions {
   double rate_Hz = 0.0;  ///< of the caller's loop, 500 to 4000; 0: that of the file, or 1 kHz
   std::string device = "omega7";  ///< whose limits apply, as limits_of() takes it
-  bool start_gate = true;         ///< forces wait until the tool is in free air and at rest
+  /// What was measured of it (schemas/device.schema.json). Empty: forces are taken to come one
+  /// period late, with the friction that is assumed of the device; nobody checks that.
+  std::filesystem::path device_file;
+  bool start_gate = true;    ///< forces wait until the tool is in free air and at rest
   double longest_s = 600.0;  ///< of a law file: for how long spring-pots keep their history, > 0
   bool accept_unstable = false;  ///< do not refuse a rendering that check_rendering() refuses
 };
@@ -24,6 +27,7 @@ struct LoopContactOptions {
 struct LoopContactState {
   ServoRecord row;
   double time_s = 0.0;                                  ///< of the contact, missed periods included
+  std::uint64_t missed = 0;                             ///< periods without a step so far
   Eigen::Vector3d surface_m = Eigen::Vector3d::Zero();  ///< where the tissue begins
 };
 
@@ -52,6 +56,15 @@ class LoopContact {
   /// @returns none, or why the contact has stopped; it then stays so until reset()
   StopCause step(const Eigen::Vector3d& position_m, Eigen::Vector3d& force_N,
                  int missed = 0) noexcept;
+  /// The same by the caller's clock: the number of periods since the last step follows from the
+  /// time, so that a loop at another rate lives through the same time as the contact. Between two
+  /// periods of the contact the force of the last one is held.
+  /// @param time_s of any clock that does not jump; rising from call to call
+  /// @returns as step(); kBadTime, with a zero force and without a step, for a time that is not
+  ///          finite or lies before that of the last call
+  StopCause step_at(double time_s, const Eigen::Vector3d& position_m,
+                    Eigen::Vector3d& force_N) noexcept;
+  static constexpr StopCause kBadTime = StopCause::exception;
   /// Back to rest. Allocates: not for the loop.
   void reset();
 

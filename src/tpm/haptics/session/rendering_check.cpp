@@ -8,11 +8,13 @@
 #include "tpm/base/text.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/session/rendering_border.hpp"
+#include "tpm/haptics/session/six_hands.hpp"
 
 namespace tpm::haptics {
 namespace {
 
 constexpr double kAtLoads_m = 0.010;
+constexpr double kNever_s = 1e6;  ///< a spring that never relaxes may be worse than one that does
 
 /// Stiffness along the push within one period at a depth, 0 outside the validity of the model.
 double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth_m) {
@@ -57,6 +59,30 @@ RenderedContact contact_of(const RenderingCheck& check, double relaxation_time_s
   return contact;
 }
 
+/// Delay and friction that count.
+void count_device(RenderingCheck& check, const HilSession& session, const DeviceLimits& limits) {
+  const double period_s = session.servo.period_s;
+  const double stated_s = session.plant.delay_periods * period_s;
+  if (limits.hardware()) {
+    check.delay_measured = limits.measured_delay_s.has_value();
+    const double known_s =
+        check.delay_measured ? *limits.measured_delay_s + period_s : kUnmeasuredDelay_s;
+    check.delay_s = std::max(known_s, stated_s);
+    check.friction_N_s_per_m = limits.measured_friction_N_s_per_m.value_or(0.0);
+    if (session.stated_friction_N_s_per_m) {
+      check.friction_N_s_per_m =
+          std::min(check.friction_N_s_per_m, *session.stated_friction_N_s_per_m);
+    }
+  } else {
+    // The simulated Omega.7 is what the session says; a simulated plugin speaks for itself.
+    check.delay_s = limits.simulated ? limits.delay_periods * period_s : stated_s;
+    check.friction_N_s_per_m =
+        limits.simulated ? limits.friction_N_s_per_m : session.plant.damping_N_s_per_m;
+  }
+  constexpr double kRounding = 1e-9;
+  check.delay_periods = static_cast<int>(std::ceil(check.delay_s / period_s - kRounding));
+}
+
 /// Rests that are too short for what comes after them.
 void warn_of_rests(RenderingCheck& check, const HilSession& session) {
   constexpr double kLeft = 0.01;
@@ -81,10 +107,11 @@ void warn_of_rests(RenderingCheck& check, const HilSession& session) {
 }  // namespace
 
 std::string RenderingCheck::verdict() const {
-  const std::string what =
-      fmt::format("stiffness {} N/m at {} Hz, {} periods of delay, friction {} N s/m",
-                  significant(stiffness_N_per_m, 3), significant(rate_Hz, 4), delay_periods,
-                  significant(friction_N_s_per_m, 2));
+  const std::string what = fmt::format(
+      "stiffness {} N/m at {} Hz, {} periods of delay{}, friction {} N s/m",
+      significant(stiffness_N_per_m, 3), significant(rate_Hz, 4), delay_periods,
+      delay_measured ? "" : " (not measured on this device: 20 ms and no friction count)",
+      significant(friction_N_s_per_m, 2));
   if (!stable()) {
     return fmt::format(
         "unstable: {}; stable with the operator's arm up to {} N/m, of which {} are allowed", what,
@@ -102,11 +129,18 @@ std::string RenderingCheck::verdict() const {
         significant(stiffness_N_per_m * encoder_step_m, 3), significant(rise_N, 3),
         significant(stiffness_N_per_m * encoder_step_m * rate_Hz, 3));
   }
+  if (!safe_in_hands()) {
+    return fmt::format(
+        "a weakly damped hand would receive energy: {}; at most {} N/m keep six hands below {} "
+        "mJ{}",
+        what, significant(hands_N_per_m, 3), significant(1e3 * kMostIntoHand_J, 2),
+        delay_measured ? "" : "; tpm hil identify measures the delay");
+  }
   if (!passive()) {
     return fmt::format(
         "stable with the operator's arm (up to {} N/m), not passive: {}; passive with every "
-        "operator up to {} N/m",
-        significant(stable_N_per_m, 3), what, significant(passive_N_per_m, 3));
+        "operator up to {} N/m; of six hands stable with: {}",
+        significant(stable_N_per_m, 3), what, significant(passive_N_per_m, 3), stable_hands);
   }
   return fmt::format("passive: {}; the border is {} N/m, that of stability {} N/m", what,
                      significant(passive_N_per_m, 3), significant(stable_N_per_m, 3));
@@ -119,12 +153,10 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
 
 RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
                                const LoopModel& loop, const DeviceLimits& limits) {
-  // The simulated Omega.7 is what the session says; a plugin speaks for itself, simulated or not.
   const bool own = limits.hardware() || limits.simulated;
   RenderingCheck check;
   check.rate_Hz = 1.0 / session.servo.period_s;
-  check.delay_periods = own ? limits.delay_periods : session.plant.delay_periods;
-  check.friction_N_s_per_m = own ? limits.friction_N_s_per_m : session.plant.damping_N_s_per_m;
+  count_device(check, session, limits);
   check.largest_N_per_m = limits.stiffness_N_per_m;
   check.encoder_step_m = own ? limits.encoder_step_m
                          : limits.plant
@@ -134,17 +166,18 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
   find_stiffness(check, session, model, loop.push);
 
   const double period_s = session.servo.period_s;
-  const double late_s = (0.5 + check.delay_periods) * period_s;
+  const double late_s = 0.5 * period_s + check.delay_s;
   check.passive_friction_N_s_per_m = check.stiffness_N_per_m * late_s;
   check.passive_N_per_m = check.friction_N_s_per_m / late_s;
+  check.hands_N_per_m =
+      largest_stiffness_for_hands(check.delay_s, check.friction_N_s_per_m, period_s);
+  check.stable_hands = hands_that_are_stable(contact_of(check, kNever_s), check.friction_N_s_per_m);
 
   check.recovery_s = loop.relaxation_times_s.empty()
                          ? 0.0
                          : loop.relaxation_times_s.back() / std::max(check.equilibrium_share, 1e-3);
   PlantSettings plant = session.plant;
   plant.damping_N_s_per_m = check.friction_N_s_per_m;
-  // A spring that never relaxes may be worse than one that does.
-  constexpr double kNever_s = 1e6;
   check.stable_N_per_m = 1e300;
   std::vector<double> times_s = loop.relaxation_times_s;
   times_s.push_back(kNever_s);
@@ -166,6 +199,9 @@ Json to_json(const RenderingCheck& check) {
           {"within_device", check.within_device()},
           {"follows_encoder", check.follows_encoder()},
           {"rate_Hz", rounded(check.rate_Hz, kDigits)},
+          {"safe_in_hands", check.safe_in_hands()},
+          {"delay_measured", check.delay_measured},
+          {"delay_s", rounded(check.delay_s, kDigits)},
           {"delay_periods", check.delay_periods},
           {"friction_N_s_per_m", rounded(check.friction_N_s_per_m, kDigits)},
           {"stiffness_N_per_m", rounded(check.stiffness_N_per_m, kDigits)},
@@ -175,6 +211,8 @@ Json to_json(const RenderingCheck& check) {
           {"stable_border_N_per_m", rounded(check.stable_N_per_m, kDigits)},
           {"spectral_radius", rounded(check.spectral_radius, kDigits)},
           {"device_border_N_per_m", rounded(check.largest_N_per_m, kDigits)},
+          {"hands_border_N_per_m", rounded(check.hands_N_per_m, kDigits)},
+          {"stable_hands", check.stable_hands},
           {"warnings", check.warnings}};
 }
 

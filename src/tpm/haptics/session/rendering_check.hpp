@@ -10,8 +10,10 @@ namespace tpm::haptics {
 /// Can this tissue be rendered on this device? Found before a session begins.
 struct RenderingCheck {
   double rate_Hz = 0.0;
-  int delay_periods = 0;                    ///< of the device, known or assumed
-  double friction_N_s_per_m = 0.0;          ///< of the device, known or assumed
+  double delay_s = 0.0;                     ///< that counts, both paths of the device
+  int delay_periods = 0;                    ///< the same in whole periods, rounded up
+  bool delay_measured = true;               ///< false: hardware that nobody has measured
+  double friction_N_s_per_m = 0.0;          ///< of the device that counts
   double stiffness_N_per_m = 0.0;           ///< largest instantaneous one up to the session's depth
   double equilibrium_share = 1.0;           ///< of it, of the equilibrium
   double depth_m = 0.0;                     ///< where that stiffness was found
@@ -20,6 +22,8 @@ struct RenderingCheck {
   double stable_N_per_m = 0.0;   ///< largest that is stable with the arm of the operator
   double spectral_radius = 0.0;  ///< of device, arm and contact over a period; stable below 1
   double largest_N_per_m = 0.0;  ///< that the device's maker recommends
+  double hands_N_per_m = 0.0;    ///< largest that is safe in six hands, see six_hands.hpp
+  std::string stable_hands;      ///< of those six, with which the linear loop is stable
   double recovery_s = 0.0;       ///< time constant in which a free surface recovers
   double encoder_step_m = 0.0;   ///< of the device, known or assumed
   double rise_N = 0.0;           ///< by which the session lets a force rise within a period
@@ -37,7 +41,11 @@ struct RenderingCheck {
   [[nodiscard]] bool follows_encoder() const {
     return stiffness_N_per_m * encoder_step_m <= rise_N * (1.0 + 1e-12);
   }
-  [[nodiscard]] bool acceptable() const { return stable() && within_device() && follows_encoder(); }
+  /// None of six hands receives more energy than it may, also if the rendering is not passive.
+  [[nodiscard]] bool safe_in_hands() const { return stiffness_N_per_m <= hands_N_per_m; }
+  [[nodiscard]] bool acceptable() const {
+    return stable() && within_device() && follows_encoder() && safe_in_hands();
+  }
   static constexpr double kRoom = 0.8;
   /// One line: passive, stable, or why not.
   [[nodiscard]] std::string verdict() const;
@@ -47,6 +55,13 @@ struct RenderingCheck {
 /// deepest, then a little further within one period. Stability is that of the linear, two-sided
 /// loop with the arm of the session's simulated operator; the slip element only ever takes energy
 /// and is left out. The model is at rest afterwards.
+///
+/// Delay and friction that count:
+///   - hardware: what was measured on it (device_file.hpp), the largest delay seen plus a period;
+///   if
+///     nobody measured it, 20 ms and no friction; and in either case the larger delay and the
+///     smaller friction of these and of what the session states;
+///   - the simulated device: what the session states; a simulated plugin: what it says.
 /// @param limits of the device
 [[nodiscard]] RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
                                              const LoopModel& loop, const DeviceLimits& limits);

@@ -387,6 +387,9 @@ HilSession parse_session(const Json& written, std::string_view where,
   session.plant.origin_m = session.servo.surface_m;
   parse_plant(session.plant, json.value("virtual_device", Json::object()),
               place.key("virtual_device"));
+  if (json.contains("virtual_device") && json.at("virtual_device").contains("damping_N_s_per_m")) {
+    session.stated_friction_N_s_per_m = session.plant.damping_N_s_per_m;
+  }
   return session;
 }
 

@@ -72,6 +72,8 @@ struct HilSession {
   SessionServo servo;
   DevicePreparation preparation;
   PlantSettings plant;
+  /// What the file itself says of the device's friction; its delay is in `plant`, 0 if not said.
+  std::optional<double> stated_friction_N_s_per_m;
   double cycle_timeout_s = 0.008;
   std::string text;  ///< of the file, for the record
 

@@ -1,10 +1,14 @@
 #include "tpm/haptics/session/session_run.hpp"
 
+#include <fmt/format.h>
+
 #include <limits>
 
 #include "tpm/files/row_log.hpp"
+#include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
+#include "tpm/haptics/device/forces_off_guard.hpp"
 #include "tpm/haptics/device/plugin_device.hpp"
 #include "tpm/haptics/device/replay_device.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"
@@ -36,21 +40,25 @@ Eigen::Matrix3Xd asked_motion(const HilSession& session) {
   return motion;
 }
 
+/// @param prepare prepares the device and lets the recording appear
 ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
                       const std::shared_ptr<ContactModel>& stepped, const ServoSettings& servo,
-                      const SessionRunOptions& options, RowLogWriter& log) {
+                      const SessionRunOptions& options, RowLogWriter& log,
+                      const std::function<void()>& prepare) {
   const RecordSink sink = [&](const ServoRecord& row) {
     const bool waits = row.phase < 0 && row.stop == StopCause::none;
     if (!waits) log.append(&row);
     if (options.watcher) options.watcher(row);
   };
   if (!options.real_time) {
+    prepare();
     return run_in_virtual_time(*device, *stepped, servo, sink, options.interrupted);
   }
   RealTimeOptions real;
   real.wish = options.wish;
   real.cycle_timeout_s = session.cycle_timeout_s;
   real.interrupted = options.interrupted;
+  real.prepare = prepare;
   std::int64_t passed_on_ns = now_ns();
   real.idle = [&log, &passed_on_ns] {
     if (now_ns() - passed_on_ns < kPassOnEvery_ns) return;
@@ -69,7 +77,7 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
   if (rendering.acceptable() || options.accept_unstable || choice.kind == "replay") return;
   throw Error(ExitCode::answer_is_no, "stability", rendering.verdict(),
               "a softer tissue, a higher rate, a shorter delay or a faster rise; "
-              "--accept-unstable with --device virtual");
+              "--device-file with a measured delay; --accept-unstable with --device virtual");
 }
 
 std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
@@ -78,6 +86,17 @@ std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
                 "--plugin FILE, a shared library after tpmkit/haptic_device.h");
   }
   return std::make_shared<PluginDevice>(choice.plugin, choice.which);
+}
+
+/// A file that was measured on another device says nothing of this one.
+void require_same_device(const DeviceChoice& choice, const DeviceIdentity& device) {
+  if (choice.file.empty() || choice.kind == "virtual") return;
+  const DeviceFile file = read_device_file(choice.file);
+  if (file.serial.empty() || file.serial == device.serial) return;
+  throw Error(ExitCode::environment, file.where + ": key /serial",
+              fmt::format("was measured on the device '{}', and this is '{}'",
+                          printable(file.serial), printable(device.serial)),
+              "the file of this device (tpm hil identify)");
 }
 
 /// A session from its model to the end of its recording.
@@ -90,25 +109,34 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
   run.model = make_loop_model(session, options.real_time, options.planning);
   const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
   run.rendering = check_rendering(session, *stepped, run.model, limits);
+  if (choice.kind == "virtual") {
+    DeviceLimits real = limits_of("omega7");
+    if (!choice.file.empty()) real = limits_by_file(real, read_device_file(choice.file));
+    run.on_hardware = check_rendering(session, *stepped, run.model, real);
+  }
   require_acceptable(run.rendering, choice, limits, options);
   const std::shared_ptr<HapticDevice> device = make();
+  const ForcesOffGuard guard(*device);
   DevicePreparation preparation = session.preparation;
   preparation.period_s = session.servo.period_s;
   preparation.may_move = choice.may_move;
   preparation.take_as_ready = choice.take_as_ready;
+  preparation.real_time = options.real_time;
   preparation.interrupted = options.interrupted;
   try {
     run.device = device->open();
+    require_same_device(choice, run.device);
     if (options.opened) options.opened(run.device, run.model);
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time,
                                               options.notes, to_json(run.rendering))),
                      sizeof(ServoRecord), RowLogWriter::Name::later);
-    device->prepare(preparation);
-    log.appear();
     const ServoSettings servo =
         loop_settings(session, run.model, run.rendering, choice.kind != "replay");
-    run.outcome = run_loop(session, device, stepped, servo, options, log);
+    run.outcome = run_loop(session, device, stepped, servo, options, log, [&] {
+      device->prepare(preparation);
+      log.appear();
+    });
     log.close(to_text(recording_closing(run.outcome)));
   } catch (...) {
     device->stop();
@@ -120,7 +148,10 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
 }  // namespace
 
 DeviceLimits limits_of(const DeviceChoice& choice) {
-  return choice.kind == "plugin" ? plugin_of(choice)->limits() : limits_of(choice.kind);
+  const DeviceLimits limits =
+      choice.kind == "plugin" ? plugin_of(choice)->limits() : limits_of(choice.kind);
+  if (choice.file.empty() || limits.plant) return limits;
+  return limits_by_file(limits, read_device_file(choice.file));
 }
 
 std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilSession& session) {

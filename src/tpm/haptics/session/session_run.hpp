@@ -1,6 +1,7 @@
 #pragma once
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/session/recording.hpp"
@@ -14,12 +15,16 @@ struct DeviceChoice {
   std::filesystem::path library;  ///< of the vendor; empty: looked for
   std::filesystem::path replay;   ///< recording to be replayed
   std::filesystem::path plugin;   ///< of the kind "plugin": its shared library
+  /// What was measured of it (device_file.hpp); empty: nothing. Of the kind "virtual" that of the
+  /// Omega.7 which it stands for.
+  std::filesystem::path file;
   DeviceSelection which;
   bool may_move = false;
   bool take_as_ready = false;
 };
 
-/// What may be asked of it; a plugin is loaded and asked. Throws as make_device().
+/// What may be asked of it; a plugin is loaded and asked, a device file is read. Throws as
+/// make_device() and read_device_file().
 [[nodiscard]] DeviceLimits limits_of(const DeviceChoice& choice);
 
 /// Throws Error(usage) for an unknown kind, Error(environment) if it cannot be had.
@@ -44,6 +49,9 @@ struct SessionRun {
   DeviceIdentity device;
   LoopModel model;  ///< its `model` is with the run
   RenderingCheck rendering;
+  /// Of a rehearsal on the simulated Omega.7: the check of the same session on the real one, with
+  /// the device file if there is one.
+  std::optional<RenderingCheck> on_hardware = std::nullopt;
   ServoOutcome outcome;
 };
 

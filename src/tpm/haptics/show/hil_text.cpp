@@ -126,6 +126,7 @@ Json run_json(const HilSession& session, const SessionRun& run) {
             {"error_bound", run.model.error_bound},
             {"plan", run.model.plan}}},
           {"rendering", to_json(run.rendering)},
+          {"rendering_on_omega7", run.on_hardware ? to_json(*run.on_hardware) : Json()},
           {"rate_Hz", rounded(1.0 / session.servo.period_s, kHilDigits)},
           {"duration_s", rounded(session.duration_s(), kHilDigits)},
           {"phases", session.phases.size()},
@@ -142,6 +143,11 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
       run.model.error_bound, significant(lived_s, 6), significant(session.duration_s(), 6),
       significant(1.0 / session.servo.period_s, 4), o.real_time ? "real" : "virtual",
       session.phases.size());
+  if (run.on_hardware) {
+    text += fmt::format("on an omega7 it would be {}: {}\n",
+                        run.on_hardware->acceptable() ? "accepted" : "refused",
+                        run.on_hardware->verdict());
+  }
   if (o.real_time) {
     text += o.scheduling + "\n" + times_text("woke after the deadline", o.woke_late) +
             times_text("work of a cycle", o.busy);

@@ -1,4 +1,5 @@
 // Declared in tpmkit/session.hpp.
+#include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/verify/verify.hpp"
@@ -38,8 +39,12 @@ SessionSummary Session::run(const std::shared_ptr<HapticDevice>& device,
   options.recording = request.recording;
   options.interrupted = request.interrupted;
   options.watcher = request.watcher;
-  const SessionRun run = run_session_on(*session_, device, limits_of(request.limits),
-                                        {.may_move = request.may_move}, options);
+  DeviceLimits limits = limits_of(request.limits);
+  if (!request.device_file.empty()) {
+    limits = limits_by_file(limits, read_device_file(request.device_file));
+  }
+  const SessionRun run =
+      run_session_on(*session_, device, limits, {.may_move = request.may_move}, options);
   return {.device = run.device,
           .model = run.model.name,
           .rendering = run.rendering.verdict(),

@@ -1,0 +1,144 @@
+// tpm hil identify: delay, friction and mass of a device, measured with small forces.
+#include <fmt/format.h>
+
+#include <ctime>
+#include <memory>
+#include <string>
+
+#include "command.hpp"
+#include "hil_options.hpp"
+#include "interrupt_watch.hpp"
+#include "out_of_memory.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/session/identify_run.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct IdentifyChoice {
+  DeviceOptions device;
+  std::string session, rate, duration = "20 s", time, output = "device.json";
+};
+
+std::string date_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  char text[32];
+  return std::string(text, std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc));
+}
+
+double between(const std::string& text, Dimension dimension, const char* option, double least,
+               double most) {
+  const double value = parse_quantity(text, dimension, option);
+  if (value >= least && value <= most) return value;
+  throw Error(ExitCode::usage, option, text,
+              fmt::format("{} to {} {}", shortest(least), shortest(most), si_symbol(dimension)));
+}
+
+std::string identified_text(const IdentifyRun& run) {
+  const DeviceIdentification& f = run.found;
+  std::string text =
+      fmt::format("{}{}\n", run.device.name, run.device.hardware ? "" : ", SIMULATED DEVICE");
+  if (f.delay_mean_s) {
+    text += fmt::format(
+        "delay       {} ms in the mean, {} ms at most, spread {} ms, known to {} ms ({} edges of "
+        "the force); both paths together, without the hold of a command\n",
+        significant(1e3 * *f.delay_mean_s, 3), significant(1e3 * *f.delay_largest_s, 3),
+        significant(1e3 * *f.delay_jitter_s, 2), significant(1e3 * f.resolution_s, 2), f.edges);
+  }
+  if (f.viscous_lower_95_N_s_per_m) {
+    text += fmt::format(
+        "friction    viscous above {} N s/m with 95 % (estimate {}), Coulomb {} to {} N\n",
+        significant(*f.viscous_lower_95_N_s_per_m, 3), significant(*f.viscous_N_s_per_m, 3),
+        significant(*f.coulomb_low_N, 2), significant(*f.coulomb_high_N, 2));
+  }
+  if (f.mass_kg) {
+    text += f.mass_certain
+                ? fmt::format("mass        {} kg\n", significant(*f.mass_kg, 3))
+                : fmt::format(
+                      "mass        {} to {} kg (a hand holds the handle, friction or the "
+                      "encoder does not allow more)\n",
+                      significant(*f.mass_low_kg, 3), significant(*f.mass_high_kg, 3));
+  }
+  if (f.encoder_step_m) {
+    text += fmt::format("encoder     step {} um, noise {} um\n",
+                        significant(1e6 * *f.encoder_step_m, 3), significant(1e6 * f.noise_m, 2));
+  }
+  for (const std::string& line : f.not_identified) {
+    text += fmt::format("not identified: {}\n", line);
+  }
+  return text;
+}
+
+int identify_hil(const IdentifyChoice& choice, const Session& session) {
+  constexpr double kSlowest_Hz = 500.0, kFastest_Hz = 4000.0, kLeast_s = 5.0, kMost_s = 600.0;
+  HilSession hil;
+  if (!choice.session.empty()) hil = read_session(choice.session);
+  if (!choice.rate.empty()) {
+    hil.servo.period_s =
+        1.0 / between(choice.rate, Dimension::frequency, "--rate", kSlowest_Hz, kFastest_Hz);
+  }
+  const DeviceChoice device = chosen_device(choice.device);
+  const bool hardware = limits_of(device).hardware();
+  IdentifyOptions options;
+  options.duration_s = between(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);
+  options.real_time = choice.time.empty() ? hardware : choice.time == "real";
+  options.wish = chosen_wish(choice.device);
+  const InterruptWatch interrupts(InterruptWatch::Of::motors);
+  options.interrupted = InterruptWatch::seen;
+  if (hardware) {
+    tell_user(
+        "tpm: let go of the handle in the middle of its workspace, with 3 cm of free space around "
+        "it: it moves by itself for {} with at most 0.3 N\n",
+        choice.duration);
+  }
+  const OutOfMemoryIsThrown while_the_device_is_open;
+  const IdentifyRun run = run_identification(device, hil, options);
+  if (run.outcome.cause == StopCause::signal && InterruptWatch::seen()) {
+    tell_user("tpm: interrupted; nothing was written\n");
+    return InterruptWatch::exit_code();
+  }
+  const Json json = device_file_json(run, hardware ? date_now() : std::string());
+  write_file(choice.output, to_text(json));
+  if (session.json()) {
+    say("{}", to_text(json));
+  } else {
+    say("{}wrote {}\n", identified_text(run), choice.output);
+  }
+  return exit_code(run.found.delay_mean_s.has_value());
+}
+
+}  // namespace
+
+void add_hil_identify_command(CLI::App& hil, Session& session) {
+  CLI::App* command =
+      hil.add_subcommand("identify", "Measure delay, friction and mass of a device");
+  auto choice = std::make_shared<IdentifyChoice>();
+  command->add_option("SESSION", choice->session,
+                      "With the rate, the push and the simulated device of this session");
+  add_device_options(*command, choice->device);
+  command->add_option("--rate", choice->rate,
+                      "Of the loop, 500 Hz to 4 kHz (default: the session's, 1 kHz)");
+  command->add_option("--duration", choice->duration, "Of the measurement, 5 s to 10 min")
+      ->capture_default_str();
+  command
+      ->add_option("--time", choice->time,
+                   "real: on the clock; virtual: as fast as it goes; default: real with a real "
+                   "device, else virtual")
+      ->check(CLI::IsMember({"real", "virtual"}));
+  command
+      ->add_option("-o,--output", choice->output,
+                   "Device file (schemas/device.schema.json), for --device-file")
+      ->capture_default_str();
+  add_format_option(*command, session);
+  command->footer(
+      "Examples:\n  tpm hil identify --device omega7 -o device.json\n"
+      "  tpm hil run configs/hil_omega7.json --device omega7 --device-file device.json");
+  set_run(*command, session, [choice, &session] { return identify_hil(*choice, session); });
+}
+
+}  // namespace tpm::app

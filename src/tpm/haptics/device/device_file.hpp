@@ -1,0 +1,35 @@
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/haptics/device/device_limits.hpp"
+
+namespace tpm::haptics {
+
+/// What a file says of one device (schemas/device.schema.json): its kind, limits in place of those
+/// of the list, and what was measured (`tpm hil identify` writes it).
+struct DeviceFile {
+  std::string where;   ///< the file, for messages
+  std::string kind;    ///< as limits_of() takes it, or "plugin"
+  std::string serial;  ///< of the device that was measured; empty: any of the kind
+  std::optional<double> force_N, reach_m, stiffness_N_per_m, damping_N_s_per_m, slew_N_per_s,
+      least_ramp_in_s, encoder_step_m;
+  /// Largest delay from a position to its force, both paths together and without the hold of a
+  /// command, s. Empty unless it was measured: an assumed one is not counted.
+  std::optional<double> measured_delay_s;
+  /// What the viscous friction exceeds with 95 %, N s/m. Empty unless it was measured.
+  std::optional<double> measured_friction_N_s_per_m;
+};
+
+/// Throws Error(bad_input) with file and key.
+[[nodiscard]] DeviceFile read_device_file(const std::filesystem::path& file);
+[[nodiscard]] DeviceFile parse_device_file(const Json& json, const std::string& where);
+
+/// Limits of a kind of device as far as a file says others. Throws Error(bad_input) if the file is
+/// of another kind, or a limit is above that of the kind.
+[[nodiscard]] DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file);
+
+}  // namespace tpm::haptics

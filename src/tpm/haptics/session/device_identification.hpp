@@ -1,0 +1,68 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/files/json.hpp"
+
+namespace tpm::haptics {
+
+/// What a device was told and where it was, in one period.
+struct IdentificationSample {
+  double at_m = 0.0;     ///< along the direction of the forces, as the device reads it
+  double force_N = 0.0;  ///< sent in this period, held until the next one
+  int missed = 0;        ///< periods without a cycle before this one
+};
+
+/// What was found of a device. Values that could not be identified are empty.
+struct DeviceIdentification {
+  /// From a position to the force that answers it, both paths together: only their sum can be
+  /// measured. Without the hold of a command, whose half period comes in addition.
+  std::optional<double> delay_mean_s, delay_largest_s, delay_jitter_s;
+  double resolution_s = 0.0;  ///< of the delay: half a period
+  int edges = 0;              ///< of the force, each a measurement of the delay
+  std::optional<double> encoder_step_m;
+  double noise_m = 0.0;  ///< of positions, the step's rounding included
+  /// Device and whatever holds it. `mass_certain`: to 10 %; else only the interval is known.
+  std::optional<double> mass_kg, mass_low_kg, mass_high_kg;
+  bool mass_certain = false;
+  std::optional<double> viscous_N_s_per_m, viscous_lower_95_N_s_per_m;
+  std::optional<double> coulomb_low_N, coulomb_high_N;
+  double held_N_per_m = 0.0;  ///< stiffness of whatever holds the handle
+  double stroke_m = 0.0;
+  std::vector<std::string> not_identified;  ///< what, and why, one line each
+};
+
+/// Finds delay, friction and mass from the motion under known forces.
+///
+/// The motion of a device obeys m x'' + b x' + c sgn x' + k (x - x0) = F(t - d). Multiplied by a
+/// smooth function w of time that ends with its derivatives at zero, and integrated by parts, this
+/// needs no derivative of the rounded positions:
+///
+///     int w F(t - d) dt = m int w'' x - b int w' x + c int w sgn x' + k int w x - f int w.
+///
+/// w is (1 - s^2)^4. Windows of 64 ms give one equation each; for every delay d they are solved by
+/// least squares, and the delay with the smallest residual is taken. Each edge of the force is then
+/// a measurement of its own delay. Coulomb friction is an unknown of its own and never a part of b.
+/// @param period_s of the samples
+[[nodiscard]] DeviceIdentification identify_device(const std::vector<IdentificationSample>& samples,
+                                                   double period_s);
+
+/// Forces for the identification, one a period: edges of +-0.2 N in irregular order, and a weak
+/// spring towards the start; never above kMostIdentifyingForce_N.
+class IdentifyingForce {
+ public:
+  IdentifyingForce(double period_s, std::uint64_t seed) noexcept;
+  /// @param at_m of the device, from where it began
+  [[nodiscard]] double next_N(double at_m) noexcept;
+
+ private:
+  double period_s_;
+  std::uint64_t state_;
+  int left_ = 0;  ///< periods until the next edge
+  double sign_ = 1.0;
+};
+inline constexpr double kMostIdentifyingForce_N = 0.29;
+
+}  // namespace tpm::haptics

@@ -1,0 +1,189 @@
+#include "tpm/haptics/session/identify_run.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/text.hpp"
+#include "tpm/haptics/device/forces_off_guard.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+constexpr double kFurthest_m = 0.020;  ///< from the start, beyond which no force is sent
+
+/// Answers with the forces of the identification, whatever the motion.
+class IdentifyingModel final : public ContactModel {
+ public:
+  IdentifyingModel(const Eigen::Vector3d& push, double period_s, std::uint64_t seed)
+      : push_(push), period_s_(period_s), seed_(seed), force_(period_s, seed) {}
+  void reset() noexcept override { force_ = IdentifyingForce(period_s_, seed_); }
+  ContactAnswer step(const ToolPose& tool) noexcept override {
+    const double at_m = push_.dot(tool.displacement_m);
+    const double force_N = force_.next_N(at_m);
+    ContactAnswer answer;
+    answer.force_N = std::abs(at_m) > kFurthest_m ? Eigen::Vector3d(Eigen::Vector3d::Zero())
+                                                  : Eigen::Vector3d(force_N * push_);
+    return answer;
+  }
+  [[nodiscard]] double period_s() const noexcept override { return period_s_; }
+  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
+    return Eigen::Matrix3d::Identity();
+  }
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return Eigen::Matrix3d::Identity();
+  }
+
+ private:
+  Eigen::Vector3d push_;
+  double period_s_;
+  std::uint64_t seed_;
+  IdentifyingForce force_;
+};
+
+ServoSettings identifying_settings(const HilSession& like, const DeviceLimits& limits,
+                                   double duration_s) {
+  ServoSettings servo;
+  servo.period_s = like.servo.period_s;
+  servo.push = like.servo.push;
+  servo.phase_ends = {static_cast<std::uint64_t>(std::llround(duration_s / servo.period_s))};
+  servo.force_limit_N = kMostIdentifyingForce_N;
+  servo.slew_limit_N_per_s = limits.slew_N_per_s;
+  servo.ramp_in_s = 0.0;
+  servo.most_damping_N_s_per_m = 0.0;
+  servo.to_model = Eigen::Matrix3d::Identity();
+  servo.surface_before_hand_m = 0.0;
+  // The forces are small and not a tissue's: there is nothing to watch but the device.
+  servo.energy_allowance_J = std::numeric_limits<double>::infinity();
+  servo.watch_oscillation = false;
+  StartGateSettings gate;
+  gate.reach_m = limits.reach_m - kFurthest_m;
+  servo.gate = gate;
+  return servo;
+}
+
+Json interval(double low, double high, int digits) {
+  return Json::array({rounded(low, digits), rounded(high, digits)});
+}
+
+}  // namespace
+
+IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
+                                  const DeviceChoice& choice, const HilSession& like,
+                                  const IdentifyOptions& options) {
+  IdentifyRun run;
+  run.period_s = like.servo.period_s;
+  run.duration_s = options.duration_s;
+  run.real_time = options.real_time;
+  const DeviceLimits limits = limits_of(choice);
+  const ServoSettings servo = identifying_settings(like, limits, options.duration_s);
+  const auto model = std::make_shared<IdentifyingModel>(servo.push, servo.period_s, options.seed);
+  std::vector<IdentificationSample> samples;
+  samples.reserve(servo.phase_ends.back() + 1);
+  const RecordSink sink = [&](const ServoRecord& row) {
+    if (row.phase < 0 || row.stop != StopCause::none) return;
+    samples.push_back({servo.push.dot(Eigen::Map<const Eigen::Vector3d>(row.position_m)),
+                       servo.push.dot(Eigen::Map<const Eigen::Vector3d>(row.commanded_N)),
+                       row.missed});
+  };
+  DevicePreparation preparation = like.preparation;
+  preparation.period_s = servo.period_s;
+  preparation.max_force_N = servo.force_limit_N;
+  preparation.may_move = choice.may_move;
+  preparation.take_as_ready = choice.take_as_ready;
+  preparation.real_time = options.real_time;
+  preparation.interrupted = options.interrupted;
+  const ForcesOffGuard guard(*device);
+  try {
+    run.device = device->open();
+    if (options.real_time) {
+      RealTimeOptions real;
+      real.wish = options.wish;
+      real.cycle_timeout_s = like.cycle_timeout_s;
+      real.interrupted = options.interrupted;
+      real.prepare = [&] { device->prepare(preparation); };
+      run.outcome = run_in_real_time(device, model, servo, sink, real);
+    } else {
+      device->prepare(preparation);
+      run.outcome = run_in_virtual_time(*device, *model, servo, sink, options.interrupted);
+    }
+  } catch (...) {
+    device->stop();
+    throw;
+  }
+  if (run.outcome.cause == StopCause::finished) {
+    run.found = identify_device(samples, servo.period_s);
+  } else {
+    run.found.not_identified.push_back("everything: the measurement ended early: " +
+                                       std::string(word_of(run.outcome.cause)));
+  }
+  return run;
+}
+
+IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& like,
+                               const IdentifyOptions& options) {
+  if (choice.kind == "replay") {
+    throw Error(ExitCode::usage, "--device replay", "does not answer to forces",
+                "a device, or virtual");
+  }
+  HilSession session = like;  // a simulated operator stays where he is
+  session.plant.period_s = like.servo.period_s;
+  session.plant.push = like.servo.push;
+  session.phases = {
+      {SessionPhaseKind::rest, "identification", options.duration_s, 0.0, 0.0, 0.0, 0.0}};
+  return run_identification_on(make_device(choice, session), choice, session, options);
+}
+
+Json device_file_json(const IdentifyRun& run, const std::string& date) {
+  constexpr int kDigits = 4;
+  const DeviceIdentification& f = run.found;
+  Json json{{"device", run.device.kind}, {"name", run.device.name}};
+  if (!run.device.serial.empty()) json["serial"] = run.device.serial;
+  if (f.delay_largest_s) {
+    json["delay"] = {{"provenance", "measured"},
+                     {"mean_s", rounded(*f.delay_mean_s, kDigits)},
+                     {"largest_s", rounded(*f.delay_largest_s, kDigits)},
+                     {"jitter_s", rounded(*f.delay_jitter_s, kDigits)},
+                     {"resolution_s", rounded(f.resolution_s, kDigits)},
+                     {"tries", f.edges}};
+  }
+  if (f.viscous_lower_95_N_s_per_m) {
+    json["viscous_friction"] = {
+        {"provenance", "measured"},
+        {"lower_95_N_s_per_m", rounded(*f.viscous_lower_95_N_s_per_m, kDigits)},
+        {"estimate_N_s_per_m", rounded(*f.viscous_N_s_per_m, kDigits)}};
+    json["coulomb_friction"] = {
+        {"provenance", "measured"},
+        {"interval_N", interval(*f.coulomb_low_N, *f.coulomb_high_N, kDigits)}};
+  }
+  if (f.encoder_step_m) {
+    json["encoder_step"] = {{"provenance", "measured"},
+                            {"step_m", rounded(*f.encoder_step_m, kDigits)},
+                            {"noise_m", rounded(f.noise_m, kDigits)}};
+  }
+  if (f.mass_kg) {
+    json["moving_mass"] = {{"provenance", "measured"},
+                           {"interval_kg", interval(*f.mass_low_kg, *f.mass_high_kg, kDigits)}};
+    if (f.mass_certain) json["moving_mass"]["mass_kg"] = rounded(*f.mass_kg, kDigits);
+  }
+  if (!f.not_identified.empty()) json["not_identified"] = f.not_identified;
+  Json measurement{{"version", version()},
+                   {"simulated_device", !run.device.hardware},
+                   {"time", run.real_time ? "real" : "virtual"},
+                   {"rate_Hz", rounded(1.0 / run.period_s, kDigits)},
+                   {"duration_s", rounded(run.duration_s, kDigits)},
+                   {"missed_periods", run.outcome.counts.missed},
+                   {"ended", word_of(run.outcome.cause)},
+                   {"stroke_m", rounded(f.stroke_m, kDigits)}};
+  if (!date.empty()) measurement["date"] = date;
+  if (run.real_time) {
+    measurement["host"] = host_line();
+    measurement["scheduling"] = run.outcome.scheduling;
+  }
+  json["measurement"] = std::move(measurement);
+  return json;
+}
+
+}  // namespace tpm::haptics

@@ -1,0 +1,39 @@
+#pragma once
+#include "tpm/haptics/session/device_identification.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+
+namespace tpm::haptics {
+
+struct IdentifyOptions {
+  double duration_s = 20.0;
+  bool real_time = false;
+  RealTimeWish wish = RealTimeWish::ignore;
+  std::uint64_t seed = 1;  ///< of the edges of the force
+  std::function<bool()> interrupted;
+};
+
+/// What `tpm hil identify` measured.
+struct IdentifyRun {
+  DeviceIdentity device;
+  DeviceIdentification found;
+  ServoOutcome outcome;
+  double period_s = 0.0, duration_s = 0.0;
+  bool real_time = false;
+};
+
+/// Moves the handle of a device with forces below 0.3 N along the push of a session, and finds what
+/// device_identification.hpp lists. Nothing is taken from what the device or its simulation says of
+/// itself. The handle has to be free, or at most lightly held; forces begin when it is at rest.
+/// @param like rate, push and watchdog; of the simulated device also its numbers
+/// Throws Error(environment) as a session does; an early end is in the outcome.
+[[nodiscard]] IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& like,
+                                             const IdentifyOptions& options);
+/// The same on a device that the caller has made.
+[[nodiscard]] IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
+                                                const DeviceChoice& choice, const HilSession& like,
+                                                const IdentifyOptions& options);
+
+/// A device file (schemas/device.schema.json). @param date of the measurement; may be empty
+[[nodiscard]] Json device_file_json(const IdentifyRun& run, const std::string& date);
+
+}  // namespace tpm::haptics

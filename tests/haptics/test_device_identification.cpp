@@ -1,0 +1,127 @@
+// tpm hil identify finds what was put into a device, without being told.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "hil_scenes.hpp"
+#include "identified_handle.hpp"
+#include "tpm/haptics/device/device_file.hpp"
+#include "tpm/haptics/session/identify_run.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+using test::Handle;
+using test::moved;
+
+TEST_CASE("A delay of 0 to 10 ms on either path is found to half a period") {
+  for (const double late_s : {0.0, 1e-3, 2.5e-3, 6.3e-3, 10e-3}) {
+    for (const bool of_positions : {false, true}) {
+      Handle h;
+      (of_positions ? h.position_late_s : h.force_late_s) = late_s;
+      const DeviceIdentification found = identify_device(moved(h), h.period_s);
+      CAPTURE(late_s, of_positions, found.edges);
+      REQUIRE(found.delay_mean_s);
+      CHECK_THAT(*found.delay_mean_s, WithinAbs(late_s, 0.5 * h.period_s));
+      CHECK_THAT(*found.delay_largest_s, WithinAbs(late_s, h.period_s));
+      CHECK(*found.delay_largest_s >= late_s - 1e-4);
+    }
+  }
+}
+
+TEST_CASE("The largest of delays that jitter is found, and their spread") {
+  Handle h;
+  h.force_late_s = 3e-3;
+  h.jitter_s = 1.5e-3;
+  const DeviceIdentification found = identify_device(moved(h), h.period_s);
+  REQUIRE(found.delay_largest_s);
+  CHECK(*found.delay_largest_s > 3.9e-3);
+  CHECK(*found.delay_largest_s < 5.5e-3);
+  CHECK(*found.delay_jitter_s > 0.4e-3);
+}
+
+TEST_CASE("The mass of a free handle is found to 10 %") {
+  for (const double mass_kg : {0.2, 0.3, 0.6}) {
+    for (const double coulomb_N : {0.0, 0.03}) {
+      Handle h;
+      h.mass_kg = mass_kg;
+      h.coulomb_N = coulomb_N;
+      h.force_late_s = 2e-3;
+      const DeviceIdentification found = identify_device(moved(h), h.period_s);
+      CAPTURE(mass_kg, coulomb_N, found.coulomb_low_N.value_or(-1),
+              found.coulomb_high_N.value_or(-1));
+      REQUIRE(found.mass_kg);
+      CHECK_THAT(*found.mass_kg, WithinRel(mass_kg, 0.1));
+      CHECK(found.mass_certain);
+      REQUIRE(found.encoder_step_m);
+      CHECK_THAT(*found.encoder_step_m, WithinRel(1e-5, 1e-6));
+    }
+  }
+}
+
+TEST_CASE("A handle that is held has an interval of mass and no number") {
+  Handle h;
+  h.mass_kg = 0.85;
+  h.viscous_N_s_per_m = 6.5;
+  h.held_N_per_m = 135.0;
+  const DeviceIdentification found = identify_device(moved(h), h.period_s);
+  REQUIRE(found.mass_kg);
+  CHECK_FALSE(found.mass_certain);
+  CHECK(*found.mass_low_kg < 0.85);
+  CHECK(*found.mass_high_kg > 0.85);
+}
+
+TEST_CASE("The lower limit of viscous friction is above the truth in at most 5 % of devices") {
+  int above = 0, tries = 0;
+  double far = 0.0;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    Handle h;
+    h.viscous_N_s_per_m = seed % 3 == 0 ? 0.1 : seed % 3 == 1 ? 0.5 : 1.0;
+    h.coulomb_N = seed % 2 == 0 ? 0.03 : 0.0;
+    h.force_late_s = 1e-3 * static_cast<double>(seed % 5);
+    h.jitter_s = seed % 4 == 0 ? 0.5e-3 : 0.0;
+    const DeviceIdentification found = identify_device(moved(h, seed), h.period_s);
+    REQUIRE(found.viscous_lower_95_N_s_per_m);
+    ++tries;
+    if (*found.viscous_lower_95_N_s_per_m > h.viscous_N_s_per_m) {
+      ++above;
+      far = std::max(far, *found.viscous_lower_95_N_s_per_m - h.viscous_N_s_per_m);
+    }
+  }
+  CAPTURE(above, tries, far);
+  CHECK(above <= 3);
+}
+
+TEST_CASE("A handle that hardly moves is not identified") {
+  Handle h;
+  h.coulomb_N = 1.0;  // no force of the identification moves it
+  const DeviceIdentification found = identify_device(moved(h), h.period_s);
+  CHECK_FALSE(found.delay_mean_s);
+  CHECK_FALSE(found.viscous_lower_95_N_s_per_m);
+  REQUIRE_FALSE(found.not_identified.empty());
+}
+
+TEST_CASE("The simulated device is identified, and its file is one that a session takes") {
+  HilSession like = test::parsed(test::short_session());
+  like.plant.delay_periods = 4;
+  like.plant.mass_kg = 0.4;
+  like.plant.damping_N_s_per_m = 0.7;
+  like.plant.arm = {1e-9, 0.0, 0.0, 0.0};  // nobody holds it
+  IdentifyOptions options;
+  const IdentifyRun run = run_identification({}, like, options);
+  CHECK(run.outcome.cause == StopCause::finished);
+  REQUIRE(run.found.delay_mean_s);
+  CHECK_THAT(*run.found.delay_mean_s, WithinAbs(4e-3, 0.5e-3));
+  CHECK_THAT(*run.found.mass_kg, WithinRel(0.4, 0.1));
+  CHECK(*run.found.viscous_lower_95_N_s_per_m <= 0.7);
+  CHECK(*run.found.viscous_lower_95_N_s_per_m > 0.5);
+  const DeviceFile file = parse_device_file(device_file_json(run, ""), "device.json");
+  CHECK(file.kind == "virtual");
+  REQUIRE(file.measured_delay_s);
+  CHECK_THAT(*file.measured_delay_s, WithinAbs(4e-3, 1e-3));
+}
+
+}  // namespace
+}  // namespace tpm::haptics
