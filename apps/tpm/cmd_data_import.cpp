@@ -41,7 +41,7 @@ struct ImportArguments {
 };
 
 int parse_count(const std::string& text, int least, const std::string& option) {
-  const double value = parse_number(text, option);
+  const double value = option_number(text, option);
   constexpr double kMost = 1e6;
   if (value != static_cast<int>(std::min(value, kMost)) || value < least) {
     throw Error(ExitCode::usage, option, fmt::format("'{}' is no such count", printable(text)),
@@ -51,7 +51,7 @@ int parse_count(const std::string& text, int least, const std::string& option) {
 }
 
 double positive(const std::string& text, Dimension dimension, const std::string& option) {
-  const double value = parse_quantity(text, dimension, option);
+  const double value = option_quantity(text, dimension, option);
   if (value <= 0.0) throw Error(ExitCode::usage, option, "is not positive", "a value above 0");
   return value;
 }
@@ -84,17 +84,21 @@ ImportOptions options_of(const ImportArguments& arguments) {
     options.spring_constant_N_per_m =
         positive(arguments.spring_constant, Dimension::stiffness, "--spring-constant");
   }
-  if (!arguments.x.empty()) options.x = parse_axis(arguments.x, "--x");
-  if (!arguments.y.empty()) options.y = parse_axis(arguments.y, "--y");
+  if (!arguments.x.empty())
+    options.x = reading_options([&] { return parse_axis(arguments.x, "--x"); });
+  if (!arguments.y.empty())
+    options.y = reading_options([&] { return parse_axis(arguments.y, "--y"); });
   if (!arguments.depth.empty()) {
     options.depth_m = positive(arguments.depth, Dimension::length, "--depth");
   }
   if (!arguments.load.empty()) {
     options.load_N = positive(arguments.load, Dimension::force, "--load");
   }
-  options.time_origin = parse_time_origin(arguments.time_origin, "--time-origin");
+  options.time_origin =
+      reading_options([&] { return parse_time_origin(arguments.time_origin, "--time-origin"); });
   if (!arguments.provenance.empty()) {
-    options.provenance = parse_provenance(arguments.provenance, "--provenance");
+    options.provenance =
+        reading_options([&] { return parse_provenance(arguments.provenance, "--provenance"); });
   }
   ProbeShape& probe = options.header.probe;
   if (!arguments.probe_diameter.empty()) {
@@ -175,7 +179,8 @@ void require_free(const std::vector<Target>& targets) {
   for (const Target& target : targets) {
     for (const fs::path& path : {target.csv, fs::path(target.csv).replace_extension(".json")}) {
       if (fs::exists(path)) {
-        throw bad_input(path.string(), "the file exists", "another --output, or --force");
+        throw Error(ExitCode::usage, path.string(), "the file exists",
+                    "another --output, or --force");
       }
     }
   }

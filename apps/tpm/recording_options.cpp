@@ -13,19 +13,21 @@ namespace tpm::app {
 
 void set_quantities(ImportOptions& import, const std::string& drive, const std::string& response,
                     const std::vector<std::string>& units) {
-  if (!drive.empty()) import.drive_quantity = parse_quantity_name(drive, "--drive-quantity");
-  if (!response.empty()) {
-    import.response_quantity = parse_quantity_name(response, "--response-quantity");
+  if (!drive.empty()) import.drive_quantity = reading_options([&] { return parse_quantity_name(drive, "--drive-quantity");
+});
+if (!response.empty()) {
+    import.response_quantity = reading_options([&] { return parse_quantity_name(response, "--response-quantity");
+});
+}  // namespace tpm::app
+for (const std::string& pair : units) {
+  const auto equals = pair.rfind('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw Error(ExitCode::usage, "--unit", fmt::format("'{}' has no '='", printable(pair)),
+                "COLUMN=UNIT, such as \"Force=N\"");
   }
-  for (const std::string& pair : units) {
-    const auto equals = pair.rfind('=');
-    if (equals == std::string::npos || equals == 0) {
-      throw Error(ExitCode::usage, "--unit", fmt::format("'{}' has no '='", printable(pair)),
-                  "COLUMN=UNIT, such as \"Force=N\"");
-    }
-    static_cast<void>(parse_unit(pair.substr(equals + 1), "--unit"));
-    import.units[pair.substr(0, equals)] = pair.substr(equals + 1);
-  }
+  reading_options([&] { return parse_unit(pair.substr(equals + 1), "--unit"); });
+  import.units[pair.substr(0, equals)] = pair.substr(equals + 1);
+}
 }
 
 void add_recording_options(CLI::App& command, RecordingOptions& options) {
@@ -72,7 +74,7 @@ ImportOptions import_options(const RecordingOptions& options) {
   const auto size = [](const std::string& text, Dimension dimension,
                        const char* option) -> std::optional<double> {
     if (text.empty()) return std::nullopt;
-    const double value = parse_quantity(text, dimension, option);
+    const double value = option_quantity(text, dimension, option);
     if (value > 0.0) return value;
     throw Error(ExitCode::usage, option, fmt::format("'{}'", printable(text)), "a size above 0");
   };
@@ -87,7 +89,7 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
   PhaseOptions phases;
   if (!options.contact_response.empty()) {
     phases.contact_response =
-        parse_quantity(options.contact_response, Dimension::force, "--contact-force");
+        option_quantity(options.contact_response, Dimension::force, "--contact-force");
   }
   const ImportOptions import = import_options(options);
   std::vector<PreparedRecording> recordings;
@@ -117,7 +119,8 @@ void add_family_option(CLI::App& command, std::string& family) {
 std::vector<LawSpec> chosen_laws(const std::vector<std::string>& names, const std::string& family) {
   std::vector<LawSpec> laws;
   laws.reserve(names.size());
-  for (const std::string& name : names) laws.push_back(parse_law_name(name, "--laws"));
+  for (const std::string& name : names)
+    laws.push_back(reading_options([&] { return parse_law_name(name, "--laws"); }));
   if (!laws.empty()) return laws;
   if (family != "fractional") laws = classical_family();
   if (family == "classical") return laws;
