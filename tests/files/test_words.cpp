@@ -13,11 +13,11 @@
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/nearest_word.hpp"
+#include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/files/renamed_names.hpp"
 #include "tpmkit/error.hpp"
-#include "tpmkit/law_file.hpp"
 #include "tpmkit/version.hpp"
 
 namespace tpm {

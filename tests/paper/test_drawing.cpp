@@ -15,8 +15,6 @@
 namespace tpm::report {
 namespace {
 
-using Catch::Matchers::Contains;
-
 /// A variable of the environment for as long as this lives.
 class Variable {
  public:
@@ -57,11 +55,16 @@ Figure figure_of(const std::string& name) {
   return {figure_id("fit", name), name, name, {std::move(panel)}, name};
 }
 
-/// Whether Python's parser reads it.
-bool is_well_formed(const std::string& file) {
-  const std::string command =
-      "/usr/bin/python3 -c 'import sys, xml.dom.minidom; xml.dom.minidom.parse(sys.argv[1])' '" +
-      file + "' 2> /dev/null";
+/// Whether it is well-formed XML in which nothing runs.
+bool is_harmless(const test::TempFolder& folder, const std::string& svg) {
+  write_file(folder / "check.py", R"(
+import sys
+import xml.etree.ElementTree as tree
+for element in tree.parse(sys.argv[1]).iter():
+    if element.tag.endswith("script") or any(name.lower().startswith("on") for name in element.keys()):
+        sys.exit(1)
+)");
+  const std::string command = "/usr/bin/python3 '" + (folder / "check.py") + "' '" + svg + "'";
   return std::system(command.c_str()) == 0;
 }
 
@@ -69,7 +72,7 @@ bool is_well_formed(const std::string& file) {
 
 TEST_CASE("a figure's id is a safe name, its own for each name") {
   CHECK(figure_id("fit", "liver_4mm") == "fit_liver_4mm");
-  const std::string harmful = R"(R&D" onload="alert(1)" x = "/../)";
+  const std::string harmful = "R&D\" onload=\"alert(1)\" x=\"/../";
   const std::string id = figure_id("fit", harmful);
   CHECK(id.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.") ==
         std::string::npos);
@@ -81,23 +84,20 @@ TEST_CASE("a figure's id is a safe name, its own for each name") {
 TEST_CASE("names with markup, quotes, dollars or 255 bytes are drawn as they stand") {
   const test::TempFolder folder;
   std::vector<Figure> figures;
-  for (const std::string& name : {std::string("R&D"), std::string(R"("a" onload="alert(1)" b = ")"),
+  for (const std::string& name : {std::string("R&D"), std::string("\"a\" onload=\"alert(1)\" b="),
                                   std::string("it's"), std::string("<script>alert(1)</script>"),
                                   std::string("5 $\\frac$ of -- $"), std::string(251, 'n')}) {
     figures.push_back(figure_of(name));
   }
   // One that another program wrote, with an id that is not safe in XML.
   figures.push_back(figure_of("plain"));
-  figures.back().id = R"(a" onload="alert(1)&)";
+  figures.back().id = "a\" onload=\"alert(1)&";
   const auto files = write_figures(folder.path(), figures);
   CHECK(files.size() == 1 + 2 * figures.size());
   for (const Figure& figure : figures) {
     const std::string file = folder / (figure.id + ".svg");
     CAPTURE(file);
-    CHECK(is_well_formed(file));
-    const std::string svg = read_file(file);
-    CHECK_THAT(svg, !Contains("<script"));
-    CHECK_THAT(svg, !Contains("onload=\"") && !Contains("onload=&quot;alert(1)\""));
+    CHECK(is_harmless(folder, file));
   }
 }
 
