@@ -17,6 +17,7 @@ import draw_network as net
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
+from drawing_files import literal, save_drawing
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
@@ -321,15 +322,15 @@ def main():
     parser.add_argument("folder", type=Path, help="where the drawings go")
     arguments = parser.parse_args()
     try:
-        picture = json.loads(arguments.pictures.read_text(encoding="utf-8"))
+        picture = literal(json.loads(arguments.pictures.read_text(encoding="utf-8")))
     except (OSError, ValueError) as error:
         sys.exit(f"draw_deformation.py: {arguments.pictures}: {error}; expected pictures of tpm simulate")
     matplotlib.rcdefaults()  # not what a matplotlibrc of this machine says
     matplotlib.rcParams.update(net.STYLE)
     picture["normal"][picture["contact"]] = [-d for d in picture["direction"]]  # the arrow comes along the push
     for name, page in pages(picture):
-        page.savefig(arguments.folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
-        page.savefig(arguments.folder / f"{name}.png", dpi=110, metadata={"Software": None})
+        save_drawing(page, arguments.folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
+        save_drawing(page, arguments.folder / f"{name}.png", dpi=110, metadata={"Software": None})
         plt.close(page)
 
 

@@ -21,6 +21,7 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
+from drawing_files import literal, save_drawing  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
@@ -342,8 +343,9 @@ def draw_figure(figure):
     return page
 
 
-def with_own_ids(svg, prefix):
-    """Several figures stand in one page: their ids must not meet."""
+def with_own_ids(svg, name):
+    """Several figures stand in one page: their ids must not meet. What XML or a style could misread is left out."""
+    prefix = re.sub(r"[^A-Za-z0-9_.-]", "_", name)
     svg = re.sub(r'\bid="', f'id="{prefix}-', svg)
     svg = re.sub(r'href="#', f'href="#{prefix}-', svg)
     return re.sub(r"url\(#", f"url(#{prefix}-", svg)
@@ -351,11 +353,10 @@ def with_own_ids(svg, prefix):
 
 def save(figure, folder, png):
     page = draw_figure(figure)
-    path = folder / f"{figure['id']}.svg"
-    page.savefig(path, metadata={"Date": None, "Creator": None})
-    path.write_text(with_own_ids(path.read_text(encoding="utf-8"), figure["id"]), encoding="utf-8")
+    save_drawing(page, folder / f"{figure['id']}.svg", lambda svg: with_own_ids(svg, figure["id"]),
+                 metadata={"Date": None, "Creator": None})
     if png:
-        page.savefig(folder / f"{figure['id']}.png", dpi=130, metadata={"Software": None})
+        save_drawing(page, folder / f"{figure['id']}.png", dpi=130, metadata={"Software": None})
     plt.close(page)
 
 
@@ -366,7 +367,7 @@ def main():
     parser.add_argument("--png", action="store_true", help="write a PNG beside each SVG")
     arguments = parser.parse_args()
     try:
-        figures = json.loads(arguments.figures.read_text(encoding="utf-8"))["figures"]
+        figures = literal(json.loads(arguments.figures.read_text(encoding="utf-8"))["figures"])
         arguments.folder.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError, KeyError) as error:
         sys.exit(f"draw_figures.py: {arguments.figures}: {error}; expected a figures.json of tpm and a folder to write to")

@@ -11,6 +11,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from drawing_files import save_drawing
 
 NAMES = {"condensed": "condensed", "condensed_field": "condensed, all positions", "zone": "zone",
          "full_network": "full network of 424 spheres"}
@@ -58,7 +59,7 @@ def main():
                 size=12, weight="bold")
     figure.text(0.635, 0.9, "largest over relaxation times of 0.2 ms to 100 s, against a converged reference", size=9,
                 color="0.3")
-    figure.savefig(picture)
+    save_drawing(figure, picture)
 
 
 if __name__ == "__main__":

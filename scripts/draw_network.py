@@ -19,6 +19,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
 import numpy as np  # noqa: E402
+from drawing_files import literal, save_drawing  # noqa: E402
 from matplotlib.collections import EllipseCollection, LineCollection  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
@@ -169,14 +170,14 @@ def main():
     parser.add_argument("stem", help="path of the drawings without an ending")
     arguments = parser.parse_args()
     try:
-        picture = json.loads(arguments.picture.read_text(encoding="utf-8"))
+        picture = literal(json.loads(arguments.picture.read_text(encoding="utf-8")))
     except (OSError, ValueError) as error:
         sys.exit(f"draw_network.py: {arguments.picture}: {error}; expected a picture of tpm network show")
     matplotlib.rcdefaults()  # not what a matplotlibrc of this machine says
     matplotlib.rcParams.update(STYLE)
     page = draw(picture)
-    page.savefig(f"{arguments.stem}.svg", metadata={"Date": None, "Creator": None})
-    page.savefig(f"{arguments.stem}.png", dpi=130, metadata={"Software": None})
+    save_drawing(page, f"{arguments.stem}.svg", metadata={"Date": None, "Creator": None})
+    save_drawing(page, f"{arguments.stem}.png", dpi=130, metadata={"Software": None})
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import pathlib
 import sys
 
 import draw_figures
+from drawing_files import save_drawing
 
 SOFA = "implicit Euler, 20 gradients (SOFA's)"
 BEST = "velocity Verlet, 6 a step"
@@ -40,7 +41,7 @@ def main(source, target):
     figure.text(0.01, 0.005, "simulated: SOFA's benchmark MeshSpringForceField_beam10x10x40 rebuilt by tpmkit "
                 "(tests/measure/spring_beam.cpp); nothing measured on tissue", fontsize=6)
     figure.tight_layout(rect=(0, 0.03, 1, 1))
-    figure.savefig(target, metadata={"Date": None, "Creator": None})
+    save_drawing(figure, target, metadata={"Date": None, "Creator": None})
 
 
 if __name__ == "__main__":

@@ -139,6 +139,7 @@ def print_tables(cases):
 def draw(options):
     sys.path.insert(0, str(HERE))
     import draw_figures  # its style, and a backend without a screen
+    from drawing_files import save_drawing
     import matplotlib.pyplot as plt
     cases = [json.loads(line) for line in pathlib.Path(options.record).read_text().splitlines()]
     print_tables(cases)
@@ -160,7 +161,7 @@ def draw(options):
         axis.set_ylabel(label)
     figure.legend(handles.values(), [NAMES[s] for s in handles], loc="lower center", ncols=3, frameon=False)
     figure.subplots_adjust(left=0.07, right=0.99, top=0.92, bottom=0.3, wspace=0.3)
-    figure.savefig(options.figure, metadata={"Date": None})
+    save_drawing(figure, options.figure, metadata={"Date": None})
 
 
 def main():

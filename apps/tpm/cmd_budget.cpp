@@ -27,13 +27,13 @@ struct BudgetCommand {
 
 BudgetOptions budget_options(const BudgetCommand& command) {
   BudgetOptions options;
-  const double rate = parse_quantity(command.loop_rate, Dimension::frequency, "--loop-rate");
+  const double rate = option_quantity(command.loop_rate, Dimension::frequency, "--loop-rate");
   if (!(rate >= 1.0 && rate <= 1e6)) {
     throw Error(ExitCode::usage, "--loop-rate", "'" + printable(command.loop_rate) + "'",
                 "1 Hz to 1 MHz");
   }
   options.device.period_s = 1.0 / rate;
-  options.device.encoder_step_m = parse_quantity(command.encoder, Dimension::length, "--encoder");
+  options.device.encoder_step_m = option_quantity(command.encoder, Dimension::length, "--encoder");
   if (!(options.device.encoder_step_m >= 0.0)) {
     throw Error(ExitCode::usage, "--encoder", "'" + printable(command.encoder) + "'", "0 or more");
   }

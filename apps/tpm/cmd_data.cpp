@@ -91,7 +91,7 @@ int check(const Session& session, const std::vector<std::string>& files) {
 int pack(const Session& session, const std::vector<std::string>& arguments,
          const std::string& output, bool force) {
   if (!force && fs::exists(output)) {
-    throw bad_input(output, "the file exists", "another --output, or --force");
+    throw Error(ExitCode::usage, "-o " + output, "the file exists", "another --output, or --force");
   }
   std::vector<Curve> curves;
   for (const std::string& argument : arguments) {

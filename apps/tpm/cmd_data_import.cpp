@@ -35,7 +35,7 @@ struct ImportArguments {
 };
 
 int parse_count(const std::string& text, int least, const std::string& option) {
-  const double value = parse_number(text, option);
+  const double value = option_number(text, option);
   constexpr double kMost = 1e6;
   if (value != static_cast<int>(std::min(value, kMost)) || value < least) {
     throw Error(ExitCode::usage, option, fmt::format("'{}' is no such count", printable(text)),
@@ -45,7 +45,7 @@ int parse_count(const std::string& text, int least, const std::string& option) {
 }
 
 double positive(const std::string& text, Dimension dimension, const std::string& option) {
-  const double value = parse_quantity(text, dimension, option);
+  const double value = option_quantity(text, dimension, option);
   if (value <= 0.0) throw Error(ExitCode::usage, option, "is not positive", "a value above 0");
   return value;
 }
@@ -62,17 +62,19 @@ ImportOptions options_of(const ImportArguments& arguments) {
         positive(arguments.contact_force, Dimension::force, "--contact-force");
   }
   options.contact_samples = parse_count(arguments.contact_samples, 1, "--contact-samples");
-  if (!arguments.x.empty()) options.x = parse_axis(arguments.x, "--x");
-  if (!arguments.y.empty()) options.y = parse_axis(arguments.y, "--y");
+  if (!arguments.x.empty()) options.x = of_option([&] { return parse_axis(arguments.x, "--x"); });
+  if (!arguments.y.empty()) options.y = of_option([&] { return parse_axis(arguments.y, "--y"); });
   if (!arguments.depth.empty()) {
     options.depth_m = positive(arguments.depth, Dimension::length, "--depth");
   }
   if (!arguments.load.empty()) {
     options.load_N = positive(arguments.load, Dimension::force, "--load");
   }
-  options.time_origin = parse_time_origin(arguments.time_origin, "--time-origin");
+  options.time_origin =
+      of_option([&] { return parse_time_origin(arguments.time_origin, "--time-origin"); });
   if (!arguments.provenance.empty()) {
-    options.provenance = parse_provenance(arguments.provenance, "--provenance");
+    options.provenance =
+        of_option([&] { return parse_provenance(arguments.provenance, "--provenance"); });
   }
   ProbeShape& probe = options.header.probe;
   if (!arguments.probe_diameter.empty()) {
@@ -153,7 +155,8 @@ void require_free(const std::vector<Target>& targets) {
   for (const Target& target : targets) {
     for (const fs::path& path : {target.csv, fs::path(target.csv).replace_extension(".json")}) {
       if (fs::exists(path)) {
-        throw bad_input(path.string(), "the file exists", "another --output, or --force");
+        throw Error(ExitCode::usage, path.string(), "the file exists",
+                    "another --output, or --force");
       }
     }
   }

@@ -25,12 +25,12 @@ struct ExportTexts {
 
 void set_quantity(std::optional<double>& target, const std::optional<std::string>& text,
                   Dimension dimension, std::string_view option) {
-  if (text) target = parse_quantity(*text, dimension, option);
+  if (text) target = option_quantity(*text, dimension, option);
 }
 
 ExportOptions options_of(const ExportTexts& texts) {
   ExportOptions options;
-  options.target = parse_export_target(texts.to, "--to");
+  options.target = of_option([&] { return parse_export_target(texts.to, "--to"); });
   if (texts.density || texts.instantaneous) {
     throw Error(ExitCode::usage, texts.density ? "--density" : "--instantaneous", "with a law",
                 "--to sofa or mjcf, and a scene");
@@ -42,10 +42,10 @@ ExportOptions options_of(const ExportTexts& texts) {
   set_quantity(geometry.punch_radius_m, texts.punch, Dimension::length, "--punch-radius");
   set_quantity(geometry.area_m2, texts.area, Dimension::area, "--area");
   set_quantity(geometry.length_m, texts.length, Dimension::length, "--length");
-  if (texts.poisson) geometry.poisson_ratio = parse_number(*texts.poisson, "--poisson");
+  if (texts.poisson) geometry.poisson_ratio = option_number(*texts.poisson, "--poisson");
   PronyWindow& window = options.window;
-  if (texts.from) window.from_s = parse_quantity(*texts.from, Dimension::time, "--from");
-  if (texts.until) window.to_s = parse_quantity(*texts.until, Dimension::time, "--until");
+  if (texts.from) window.from_s = option_quantity(*texts.from, Dimension::time, "--from");
+  if (texts.until) window.to_s = option_quantity(*texts.until, Dimension::time, "--until");
   if (texts.terms) window.times = static_cast<int>(parse_whole_number(*texts.terms, "--terms", 1));
   return options;
 }
@@ -73,7 +73,7 @@ int export_scene(const ExportTexts& texts, OrganTarget target) {
   options.instantaneous = texts.instantaneous;
   options.source = std::filesystem::path(texts.law).filename().string();
   if (texts.density) {
-    options.density_kg_m3 = parse_number(*texts.density, "--density");
+    options.density_kg_m3 = option_number(*texts.density, "--density");
   }
   const Json scene = read_json(texts.law);
   const Tissue tissue =

@@ -50,14 +50,14 @@ std::optional<ContactGeometry> probe_of(const FitOptions& options) {
   ContactGeometry probe;
   const auto set = [](std::optional<double>& size, const std::string& text, Dimension dimension,
                       const char* option) {
-    if (!text.empty()) size = parse_quantity(text, dimension, option);
+    if (!text.empty()) size = option_quantity(text, dimension, option);
   };
   set(probe.sphere_radius_m, options.radius, Dimension::length, "--radius");
   set(probe.cone_half_angle_rad, options.cone_angle, Dimension::angle, "--cone-angle");
   set(probe.punch_radius_m, options.punch_radius, Dimension::length, "--punch-radius");
-  if (!options.poisson.empty()) probe.poisson_ratio = parse_number(options.poisson, "--poisson");
+  if (!options.poisson.empty()) probe.poisson_ratio = option_number(options.poisson, "--poisson");
   if (probe.is_given()) {
-    static_cast<void>(modulus_Pa(LawSpec{}, 1.0, probe));  // refuses sizes that cannot be
+    of_option([&] { return modulus_Pa(LawSpec{}, 1.0, probe); });  // refuses what cannot be
     return probe;
   }
   if (options.poisson.empty()) return std::nullopt;
@@ -81,7 +81,8 @@ void configure_bootstrap(const FitOptions& options, FitConfig& config) {
   if (!config.bootstrap) {
     throw Error(ExitCode::usage, "--resample", "without a bootstrap", "--bootstrap N");
   }
-  config.bootstrap->resampling = parse_resampling(options.resample, "--resample");
+  config.bootstrap->resampling =
+      of_option([&] { return parse_resampling(options.resample, "--resample"); });
 }
 
 FitProblem configured(const FitOptions& options) {
@@ -92,12 +93,12 @@ FitProblem configured(const FitOptions& options) {
   configure_bootstrap(options, config);
   for (DataChoice& data : config.data) {
     if (!options.rate.empty() && data.protocol.kind == ProtocolChoice::Kind::ramp_hold) {
-      data.protocol.rate_m_per_s = parse_quantity(options.rate, Dimension::speed, "--rate");
+      data.protocol.rate_m_per_s = option_quantity(options.rate, Dimension::speed, "--rate");
       data.protocol.rate_provenance = Provenance::assumed;
     }
     if (!options.hold_out_depth.empty()) {
       Selector selector;
-      selector.depth_m = parse_quantity(options.hold_out_depth, Dimension::length, "--hold-out");
+      selector.depth_m = option_quantity(options.hold_out_depth, Dimension::length, "--hold-out");
       data.hold_out.push_back(selector);
     }
   }
@@ -116,7 +117,8 @@ bool is_configuration(const std::vector<std::string>& files) {
 
 SelectionOptions selection_options(const FitOptions& options) {
   SelectionOptions selection;
-  if (!options.law.empty()) selection.laws = {parse_law_name(options.law, "--law")};
+  if (!options.law.empty())
+    selection.laws = {of_option([&] { return parse_law_name(options.law, "--law"); })};
   selection.only_listed = !options.law.empty();
   if (const auto probe = probe_of(options)) {
     selection.setup.exponent = probe_exponent(*probe);
@@ -134,7 +136,7 @@ void set_reference(const FitOptions& options, const std::vector<PreparedRecordin
                    SelectionOptions& selection) {
   if (options.reference.empty()) return;
   const Dimension drive = quantity_dimension(recordings.front().recording.drive_quantity);
-  selection.setup.reference = parse_quantity(options.reference, drive, "--reference");
+  selection.setup.reference = option_quantity(options.reference, drive, "--reference");
   if (*selection.setup.reference > 0.0) return;
   throw Error(ExitCode::usage, "--reference", fmt::format("'{}'", printable(options.reference)),
               "a depth above 0, such as \"4 mm\"");

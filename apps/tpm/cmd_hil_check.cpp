@@ -22,7 +22,7 @@ struct CheckChoice {
 
 double within(const std::string& text, Dimension dimension, const char* option, double least,
               double most) {
-  const double value = parse_quantity(text, dimension, option);
+  const double value = option_quantity(text, dimension, option);
   if (value >= least && value <= most) return value;
   throw Error(ExitCode::usage, option, text,
               fmt::format("{} to {} {}", shortest(least), shortest(most), si_symbol(dimension)));

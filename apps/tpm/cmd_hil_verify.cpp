@@ -20,9 +20,9 @@ struct VerifyChoice {
 VerifyOptions options_of(const VerifyChoice& choice) {
   VerifyOptions options;
   options.motion_tolerance_m =
-      parse_quantity(choice.motion_tolerance, Dimension::length, "--motion-tolerance");
-  options.spacing_s = parse_quantity(choice.spacing, Dimension::time, "--spacing");
-  options.window_s = parse_quantity(choice.window, Dimension::time, "--window");
+      option_quantity(choice.motion_tolerance, Dimension::length, "--motion-tolerance");
+  options.spacing_s = option_quantity(choice.spacing, Dimension::time, "--spacing");
+  options.window_s = option_quantity(choice.window, Dimension::time, "--window");
   if (options.motion_tolerance_m > 0.0 && options.spacing_s > 0.0 && options.window_s >= 0.0) {
     return options;
   }

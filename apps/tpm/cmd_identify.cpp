@@ -25,14 +25,15 @@ struct IdentifyCommand {
 IdentifyOptions identify_options(const IdentifyCommand& command, Quantity drive) {
   IdentifyOptions options;
   for (const std::string& name : command.laws) {
-    options.laws.push_back(parse_law_name(name, "--laws"));
+    options.laws.push_back(of_option([&] { return parse_law_name(name, "--laws"); }));
   }
   options.target = parse_share(command.target, "--target");
-  options.patience = parse_number(command.patience, "--patience");
+  options.patience = option_number(command.patience, "--patience");
   options.level = parse_share(command.level, "--level");
   options.seed = parse_whole_number(command.seed, "--seed", 0);
   if (!command.reference.empty()) {
-    options.reference = parse_quantity(command.reference, quantity_dimension(drive), "--reference");
+    options.reference =
+        option_quantity(command.reference, quantity_dimension(drive), "--reference");
   }
   return options;
 }

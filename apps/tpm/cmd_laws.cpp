@@ -85,7 +85,7 @@ std::string family_text() {
 
 std::string answer(const std::string& name, const Session& session) {
   if (!name.empty()) {
-    const LawSpec spec = parse_law_name(name, "laws");
+    const LawSpec spec = of_option([&] { return parse_law_name(name, "laws"); });
     return session.json() ? to_text(law_json(spec, true)) : one_law_text(spec);
   }
   if (!session.json()) return family_text();

@@ -33,7 +33,7 @@ OrganMaterialOptions material_options(const MaterialCommand& command) {
   options.fit_times = command.fit_times;
   if (command.stiffening != "automatic") options.stiffens = command.stiffening != "none";
   options.branches_stiffen = command.stiffening == "all";
-  options.intervals = parse_intervals(command.intervals, "--intervals");
+  options.intervals = of_option([&] { return parse_intervals(command.intervals, "--intervals"); });
   return options;
 }
 

@@ -41,7 +41,9 @@ Json scene_of_options(const NetworkChoice& choice) {
 
 Tissue tissue_of(const NetworkChoice& choice) {
   const Json from_options = scene_of_options(choice);
-  if (choice.scene.empty()) return parse_tissue(from_options, "options", {});
+  if (choice.scene.empty()) {
+    return of_option([&] { return parse_tissue(from_options, "options", {}); });
+  }
   if (from_options.at("organ").size() > 1) {
     throw Error(ExitCode::usage, choice.scene, "beside options of the organ",
                 "either a scene or options");

@@ -75,7 +75,9 @@ PlanRequest plan_request(const PlanChoice& choice) {
     }
     request.budget.rate_Hz = rate;
   }
-  if (!choice.wall.empty()) request.budget.wall_s_per_s = parse_wall_budget(choice.wall);
+  if (!choice.wall.empty()) {
+    request.budget.wall_s_per_s = of_option([&] { return parse_wall_budget(choice.wall); });
+  }
   if (choice.costs.empty()) {
     const fs::path usual = usual_costs_file();
     if (!usual.empty() && fs::exists(usual)) request.costs = read_costs(usual);

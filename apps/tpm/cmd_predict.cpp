@@ -32,7 +32,7 @@ PredictionOptions prediction_options(const PredictOptions& options) {
   PredictionOptions chosen;
   if (!options.level.empty()) chosen.level = parse_share(options.level, "--level");
   if (!options.placement.empty()) {
-    chosen.placement = parse_placement(options.placement, "--placement");
+    chosen.placement = of_option([&] { return parse_placement(options.placement, "--placement"); });
   }
   if (!options.samples.empty()) {
     constexpr std::uint64_t kFewest = 100;

@@ -24,14 +24,14 @@ struct RecoveryCommandOptions {
 };
 
 double parse_noise(const std::string& text) {
-  const double noise = parse_number(text, "--noise");
+  const double noise = option_number(text, "--noise");
   if (noise > 0.0 && noise < 1.0) return noise;
   throw Error(ExitCode::usage, "--noise", fmt::format("'{}'", printable(text)),
               "a part of the peak above 0 and below 1");
 }
 
 double parse_order(const std::string& text) {
-  const double order = parse_number(text, "--order");
+  const double order = option_number(text, "--order");
   if (order > 0.0 && order < 1.0) return order;
   throw Error(ExitCode::usage, "--order", fmt::format("'{}'", printable(text)),
               "an order of a fractional element above 0 and below 1");
@@ -48,7 +48,7 @@ int recovery(const RecoveryCommandOptions& options, const Session& session) {
   study.trials = static_cast<int>(parse_whole_number(options.trials, "--trials", 1));
   study.seed = parse_whole_number(options.seed, "--seed", 0);
   for (const std::string& margin : options.margins) {
-    study.margins.push_back(parse_number(margin, "--margin"));
+    study.margins.push_back(option_number(margin, "--margin"));
   }
   study.selection.laws = chosen_laws({}, options.family);
   const double order = parse_order(options.order);

@@ -24,7 +24,7 @@ int select(const SelectOptions& options, const Session& session) {
   SelectionOptions selection;
   selection.laws = chosen_laws(options.laws, options.family);
   selection.only_listed = !options.laws.empty();
-  selection.margin = parse_number(options.margin, "--margin");
+  selection.margin = option_number(options.margin, "--margin");
   selection.held_out = !options.no_held_out;
   selection.setup.profiles = !options.no_profiles;
   selection.setup.seed = parse_whole_number(options.seed, "--seed", 0);

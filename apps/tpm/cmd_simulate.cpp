@@ -50,7 +50,7 @@ struct Simulated {
 
 double checkpoint_interval_s(const SimulateChoice& choice) {
   const double every =
-      parse_quantity(choice.checkpoint_every, Dimension::time, "--checkpoint-every");
+      option_quantity(choice.checkpoint_every, Dimension::time, "--checkpoint-every");
   if (every >= 0.0) return every;
   throw Error(ExitCode::usage, "--checkpoint-every", choice.checkpoint_every, "0 s or more");
 }

@@ -27,8 +27,8 @@ struct SpectrumTexts {
 };
 
 std::vector<double> frequencies(const SpectrumTexts& texts) {
-  const double from = parse_quantity(texts.from, Dimension::frequency, "--from");
-  const double to = parse_quantity(texts.to, Dimension::frequency, "--to");
+  const double from = option_quantity(texts.from, Dimension::frequency, "--from");
+  const double to = option_quantity(texts.to, Dimension::frequency, "--to");
   const auto points = parse_whole_number(texts.points, "--points", 2);
   if (!(from > 0.0 && to > from && std::isfinite(to / from)) || points > 100000) {
     throw Error(ExitCode::usage, "spectrum", "no range of frequencies",
@@ -40,8 +40,8 @@ std::vector<double> frequencies(const SpectrumTexts& texts) {
 std::optional<double> operating_depth(const SpectrumTexts& texts, const LawSpec& spec) {
   if (texts.depth.empty()) return std::nullopt;
   const bool strip = is_answered_by_stress(spec.drive);
-  return parse_quantity(texts.depth, strip ? Dimension::dimensionless : Dimension::length,
-                        "--depth");
+  return option_quantity(texts.depth, strip ? Dimension::dimensionless : Dimension::length,
+                         "--depth");
 }
 
 std::string text_of(const LawFile& law, const std::vector<double>& frequency_Hz,

@@ -285,7 +285,9 @@ int run_command(const SweepChoice& choice, const Session& session) {
   require_replaceable(output);
   SweepControls controls;
   if (!choice.workers.empty()) {
-    controls.workers = static_cast<int>(parse_whole_number(choice.workers, "--workers", 1));
+    constexpr std::uint64_t kMostWorkers = 1024;
+    controls.workers =
+        static_cast<int>(parse_whole_number(choice.workers, "--workers", 1, kMostWorkers));
   }
   if (!choice.shard.empty()) {
     if (ranks) {
@@ -312,7 +314,7 @@ void add_sweep_command(CLI::App& app, Session& session) {
   command->add_option("SWEEP", choice->sweep, "JSON sweep (schemas/sweep.schema.json)");
   command->add_option("-o,--output", choice->output, "HDF5 file; CSV and times go beside it")
       ->capture_default_str();
-  command->add_option("--workers", choice->workers, "Threads (default: all processors)");
+  command->add_option("--workers", choice->workers, "Threads, 1 to 1024 (default: all processors)");
   command->add_option("--shard", choice->shard,
                       "I/N: compute the I-th of N parts, into a file of its own for merge");
   add_format_option(*command, session);

@@ -47,7 +47,7 @@ std::pair<std::string, std::uint64_t> parse_fixed(const std::string& text,
   const ReadAxis& axis = sweep.axes()[sweep.axis(name)];
   const Dimension dimension =
       axis.unit.empty() ? Dimension::dimensionless : parse_unit(axis.unit, "--at").dimension;
-  const double wished = parse_quantity(text.substr(equals + 1), dimension, "--at " + name);
+  const double wished = option_quantity(text.substr(equals + 1), dimension, "--at " + name);
   const auto [least, largest] = std::minmax_element(axis.places.begin(), axis.places.end());
   constexpr double kRounding = 1e-9;
   const double slack = kRounding * std::max(std::abs(*least), std::abs(*largest));

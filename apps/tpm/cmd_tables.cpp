@@ -31,8 +31,8 @@ struct TableOptions {
 double in_unit(const std::string& text, std::string_view usual_unit, std::string_view option) {
   const Unit unit = parse_unit(usual_unit, option);
   const bool plain = text.find_first_not_of("0123456789.+-eE") == std::string::npos;
-  return plain ? parse_number(text, option) * unit.to_si
-               : parse_quantity(text, unit.dimension, option);
+  return plain ? option_number(text, option) * unit.to_si
+               : option_quantity(text, unit.dimension, option);
 }
 
 void set(double& target, const std::optional<std::string>& text, std::string_view usual_unit,
@@ -54,7 +54,7 @@ std::vector<double> lengths(const std::string& text, std::string_view option) {
   }
   const std::string_view last = split_quantity(parts.back()).unit;
   const std::string unit(last.empty() ? "mm" : last);
-  static_cast<void>(parse_unit(unit, Dimension::length, option));
+  of_option([&] { return parse_unit(unit, Dimension::length, option); });
   return mapped<double>(parts,
                         [&](const std::string& part) { return in_unit(part, unit, option); });
 }

@@ -15,6 +15,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 
@@ -67,11 +68,29 @@ void deliver_csv(const std::string& csv, const std::filesystem::path& file);
 /// the folder is empty.
 void will_write_into(const std::filesystem::path& folder, std::initializer_list<const char*> names);
 
-/// Reads a whole number from `smallest` to 1e9. Throws Error(usage) naming the option.
+/// Reads a whole number from `smallest` to `largest`. Throws Error(usage) naming the option.
 [[nodiscard]] std::uint64_t parse_whole_number(const std::string& text, const char* option,
-                                               std::uint64_t smallest);
+                                               std::uint64_t smallest,
+                                               std::uint64_t largest = 1'000'000'000);
 
-/// A share such as "10%" or "0.1". Throws Error(bad_input) naming the option.
+/// Reads options of a command, no files: what they refuse (Error(bad_input)) is a usage error,
+/// because the value stands on the command line.
+template <class Read>
+decltype(auto) of_option(Read&& read) {
+  try {
+    return std::forward<Read>(read)();
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::bad_input) throw;
+    throw error.with_code(ExitCode::usage);
+  }
+}
+
+/// The value of an option: parse_quantity() and parse_number() as usage errors.
+[[nodiscard]] double option_quantity(std::string_view text, Dimension dimension,
+                                     std::string_view option);
+[[nodiscard]] double option_number(std::string_view text, std::string_view option);
+
+/// A share such as "10%" or "0.1". Throws Error(usage) naming the option.
 [[nodiscard]] double parse_share(std::string_view text, const char* option);
 
 /// Writes to standard output, control characters from names and titles escaped (for_terminal()).

@@ -14,7 +14,7 @@ namespace {
 
 double page_time_s(const std::string& text, const char* option) {
   constexpr double kLongest_s = 3600.0;
-  const double time_s = parse_quantity(text, Dimension::time, option);
+  const double time_s = option_quantity(text, Dimension::time, option);
   if (time_s >= 0.0 && time_s <= kLongest_s) return time_s;
   throw Error(ExitCode::usage, option, text, "0 to 3600 s");
 }

@@ -4,6 +4,7 @@
 #include <malloc.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <csignal>
@@ -15,9 +16,11 @@
 #include <new>
 #include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "command.hpp"
+#include "command_words.hpp"
 #include "out_of_memory.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
@@ -26,6 +29,7 @@
 #include "tpm/haptics/device/forces_off_guard.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm::app {
 
@@ -99,20 +103,28 @@ void will_write_into(const std::filesystem::path& folder,
   will_write(files);
 }
 
+double option_quantity(std::string_view text, Dimension dimension, std::string_view option) {
+  return of_option([&] { return parse_quantity(text, dimension, option); });
+}
+
+double option_number(std::string_view text, std::string_view option) {
+  return of_option([&] { return parse_number(text, option); });
+}
+
 double parse_share(std::string_view text, const char* option) {
   if (const auto share = find_share(text)) return *share;
-  throw bad_input(option, fmt::format("'{}'", printable(text)), "a share such as 10% or 0.1");
+  throw Error(ExitCode::usage, option, fmt::format("'{}'", printable(text)),
+              "a share such as 10% or 0.1");
 }
 
 std::uint64_t parse_whole_number(const std::string& text, const char* option,
-                                 std::uint64_t smallest) {
-  constexpr std::uint64_t kLargest = 1'000'000'000;
+                                 std::uint64_t smallest, std::uint64_t largest) {
   std::uint64_t value = 0;
   const auto [stop, status] = std::from_chars(text.data(), text.data() + text.size(), value);
   const bool whole = status == std::errc{} && stop == text.data() + text.size();
-  if (whole && value >= smallest && value <= kLargest) return value;
+  if (whole && value >= smallest && value <= largest) return value;
   throw Error(ExitCode::usage, option, fmt::format("'{}'", printable(text)),
-              fmt::format("a whole number from {} to {}", smallest, kLargest));
+              fmt::format("a whole number from {} to {}", smallest, largest));
 }
 
 namespace {
@@ -165,17 +177,23 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35\n"
-      "Each command explains itself: tpm COMMAND --help");
+      "Each command explains itself: tpm COMMAND --help, or tpm help COMMAND");
+  app.set_version_flag("-V,--version", fmt::format("tpm {}", version()), "Print the version");
   Session session;
   const FileRoles roles;
   add_commands(app, session);
 
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& wanted) {  // --help
-    return app.exit(wanted);
+    std::vector<std::string> words = command_words(argc, argv);
+    std::reverse(words.begin(), words.end());  // CLI11 takes them from the back
+    app.parse(std::move(words));
+  } catch (const CLI::Success& wanted) {  // --help, --version
+    const std::string unknown = unknown_command(app);
+    if (unknown.empty()) return app.exit(wanted);
+    tell_user("tpm: {}\n", unknown);
+    return static_cast<int>(ExitCode::usage);
   } catch (const CLI::ParseError& error) {
-    tell_user("tpm: {}; see tpm --help\n", error.what());
+    tell_user("tpm: {}\n", refusal(app, error));
     return static_cast<int>(ExitCode::usage);
   }
   announce_output(app);

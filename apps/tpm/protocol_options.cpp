@@ -1,5 +1,6 @@
 #include "protocol_options.hpp"
 
+#include "command.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -9,7 +10,7 @@ namespace {
 constexpr std::size_t kRampTimes = 121;
 
 double above_zero(const std::string& text, Dimension dimension, const char* option) {
-  const double value = parse_quantity(text, dimension, option);
+  const double value = option_quantity(text, dimension, option);
   if (value > 0.0) return value;
   throw Error(ExitCode::usage, option, "'" + printable(text) + "'", "above 0");
 }
@@ -19,9 +20,11 @@ ProtocolFile ramp_of(const RampOptions& options) {
     throw Error(ExitCode::usage, "--depth, --rate, --hold", "not all of them are given",
                 "all three, or a file with a protocol");
   }
-  Protocol protocol = ramp_and_hold(above_zero(options.depth, Dimension::length, "--depth"),
-                                    above_zero(options.rate, Dimension::speed, "--rate"),
-                                    above_zero(options.hold, Dimension::time, "--hold"));
+  Protocol protocol = of_option([&] {
+    return ramp_and_hold(above_zero(options.depth, Dimension::length, "--depth"),
+                         above_zero(options.rate, Dimension::speed, "--rate"),
+                         above_zero(options.hold, Dimension::time, "--hold"));
+  });
   std::vector<double> times = times_over(protocol, kRampTimes);
   return {std::move(protocol), std::move(times)};
 }

@@ -49,7 +49,7 @@ void add_reading_options(CLI::App& command, ReadingArguments& arguments, const c
 ImportOptions reading_of(const ReadingArguments& arguments) {
   ImportOptions import;
   for (const auto& [key, text] : arguments.texts) {
-    if (!text.empty()) set_reading_option(import, key, text, option_name(key));
+    if (!text.empty()) of_option([&] { set_reading_option(import, key, text, option_name(key)); });
   }
   for (const std::string& pair : arguments.units) {
     const auto equals = pair.rfind('=');
@@ -57,7 +57,9 @@ ImportOptions reading_of(const ReadingArguments& arguments) {
       throw Error(ExitCode::usage, "--unit", fmt::format("'{}' has no '='", printable(pair)),
                   "COLUMN=UNIT, such as \"Force=N\"");
     }
-    set_reading_unit(import, pair.substr(0, equals), pair.substr(equals + 1), "--unit");
+    of_option([&] {
+      set_reading_unit(import, pair.substr(0, equals), pair.substr(equals + 1), "--unit");
+    });
   }
   return import;
 }
@@ -79,7 +81,7 @@ PreparedRecording prepared(const std::string& name, RecordingFile file,
   PhaseOptions phases;
   if (!options.contact_response.empty()) {
     phases.contact_response =
-        parse_quantity(options.contact_response, Dimension::force, "--contact-force");
+        option_quantity(options.contact_response, Dimension::force, "--contact-force");
   }
   std::string read_as = columns_words(file.findings);
   PreparedRecording recording = prepare_recording(name, std::move(file.recording), phases);
@@ -113,7 +115,8 @@ void add_family_option(CLI::App& command, std::string& family) {
 std::vector<LawSpec> chosen_laws(const std::vector<std::string>& names, const std::string& family) {
   std::vector<LawSpec> laws;
   laws.reserve(names.size());
-  for (const std::string& name : names) laws.push_back(parse_law_name(name, "--laws"));
+  for (const std::string& name : names)
+    laws.push_back(of_option([&] { return parse_law_name(name, "--laws"); }));
   if (!laws.empty()) return laws;
   if (family != "fractional") laws = classical_family();
   if (family == "classical") return laws;

@@ -16,6 +16,13 @@ enum class ExitCode : int {
   environment = 5,  ///< something outside: cannot write, missing helper program
 };
 
+/// Why a solver gave up, for code that decides what to do about it: a message is for people.
+enum class ErrorCause : int {
+  unspecified = 0,
+  buckled,          ///< the tangent stiffness is no longer positive definite
+  snapped_through,  ///< no equilibrium was found near the last one
+};
+
 /// An error, printed as one line: "WHERE: WHAT; expected EXPECTED". It may repeat names and titles
 /// from files, so control characters and line ends are escaped (for_terminal()).
 class Error : public std::runtime_error {
@@ -25,15 +32,23 @@ class Error : public std::runtime_error {
   /// @param expected what would have been right; may be empty
   Error(ExitCode code, std::string_view where, std::string_view what,
         std::string_view expected = {});
+  Error(ExitCode code, ErrorCause cause, std::string_view where, std::string_view what,
+        std::string_view expected = {});
 
   [[nodiscard]] ExitCode code() const noexcept { return code_; }
+  [[nodiscard]] ErrorCause cause() const noexcept { return cause_; }
 
   /// Adds an outer place in front ("fit.json" before "key 'E'"), for an inner function that does
   /// not know its file.
   [[nodiscard]] Error within(std::string_view outer) const;
 
+  /// The same error with another exit code: a value that a file must not have is a usage error
+  /// where it stands on the command line.
+  [[nodiscard]] Error with_code(ExitCode code) const;
+
  private:
   ExitCode code_;
+  ErrorCause cause_ = ErrorCause::unspecified;
 };
 
 /// Shorthand for an Error(bad_input).

@@ -22,8 +22,8 @@ struct Knot {
 /// Two knots at one time are a jump; a first knot with value other than 0 is a jump from rest.
 class Protocol {
  public:
-  /// Throws Error(bad_input) unless there is at least one knot, all finite, times not decreasing
-  /// and no more than two knots at one time.
+  /// Throws Error(bad_input) unless there is at least one knot, all finite, times within 1e15 s
+  /// of 0 and not decreasing, and no more than two knots at one time.
   /// @param holds_forever the last value remains for ever. Times up to and including infinity are
   ///        allowed; infinity means full relaxation
   Protocol(Drive drive, std::vector<Knot> knots, std::string name = "history",

@@ -851,7 +851,9 @@ TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md 
       "Written by `tests/files/test_errors.cpp`, which runs the program on each of these files; "
       "after a\n"
       "wanted change run it with `TPM_UPDATE_DOCS=1`. Exit codes: 1 the answer is no, 2 command\n"
-      "line, 3 bad input, 4 numerical failure, 5 environment.\n\n"
+      "line, also a bad value of an option or an output that exists, 3 bad input, 4 numerical "
+      "failure,\n"
+      "5 environment.\n\n"
       "| file type | fault | exit code | message |\n| --- | --- | --- | --- |\n";
   for (const ErrorCase& error_case : all_cases()) {
     INFO(error_case.file_type << ": " << error_case.what);
@@ -891,10 +893,10 @@ TEST_CASE("tpm data import and pack do not replace files without --force") {
   with_files({{"m.csv", "Time (s),Force (N)\n0,0\n1,1\n"}})(folder);
   CHECK(run("data import {}/m.csv -o {}/out", folder).exit_code == 0);
   const std::string first = read_file(folder / "out.csv");
-  CHECK(run("data import {}/m.csv -o {}/out", folder).exit_code == 3);
+  CHECK(run("data import {}/m.csv -o {}/out", folder).exit_code == 2);
   CHECK(run("data import {}/m.csv -o {}/out --force", folder).exit_code == 0);
   CHECK(read_file(folder / "out.csv") == first);
   CHECK(run("data pack {}/out.csv -o {}/p.h5", folder).exit_code == 0);
-  CHECK(run("data pack {}/out.csv -o {}/p.h5", folder).exit_code == 3);
+  CHECK(run("data pack {}/out.csv -o {}/p.h5", folder).exit_code == 2);
   CHECK(run("data show {}/p.h5 --format json", folder).exit_code == 0);
 }

@@ -90,7 +90,7 @@ Eigen::Vector3d BalancedContact::go_to(const Eigen::Vector3d& displacement_m,
     if (!factorised_ || iteration % kSlow == kSlow - 1) {
       factorised_ = equilibrium_.factorise(position_, viscous_state);
       if (!factorised_ || !equilibrium_.is_stable()) {
-        throw Error(ExitCode::numerical, "contact", "the tissue buckles");
+        throw Error(ExitCode::numerical, ErrorCause::buckled, "contact", "the tissue buckles");
       }
     }
     equilibrium_.displace(left);

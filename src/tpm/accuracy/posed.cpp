@@ -121,10 +121,9 @@ namespace {
 /// What a formulation throws where it cannot go on is an outcome here.
 MethodRun failed_run(const Error& error) {
   MethodRun run;
-  const std::string_view words = error.what();
-  const bool buckled = words.find("buckle") != std::string_view::npos ||
-                       words.find("snap") != std::string_view::npos;
-  run.end = buckled ? MethodEnd::buckled : MethodEnd::newton_failed;
+  const bool lost =
+      error.cause() == ErrorCause::buckled || error.cause() == ErrorCause::snapped_through;
+  run.end = lost ? MethodEnd::buckled : MethodEnd::newton_failed;
   run.reason = error.what();
   return run;
 }

@@ -25,8 +25,18 @@ Error::Error(ExitCode code, std::string_view where, std::string_view what,
              std::string_view expected)
     : std::runtime_error(one_line(where, what, expected)), code_(code) {}
 
+Error::Error(ExitCode code, ErrorCause cause, std::string_view where, std::string_view what,
+             std::string_view expected)
+    : std::runtime_error(one_line(where, what, expected)), code_(code), cause_(cause) {}
+
 Error Error::within(std::string_view outer) const {
-  return {code_, outer, what()};
+  return {code_, cause_, outer, what()};
+}
+
+Error Error::with_code(ExitCode code) const {
+  Error other = *this;
+  other.code_ = code;
+  return other;
 }
 
 Error bad_input(std::string_view where, std::string_view what, std::string_view expected) {

@@ -8,6 +8,7 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/base/time_range.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -38,6 +39,11 @@ Protocol::Protocol(Drive drive, std::vector<Knot> knots, std::string name, bool 
   for (std::size_t i = 0; i < knots_.size(); ++i) {
     if (!std::isfinite(knots_[i].time_s) || !std::isfinite(knots_[i].value)) {
       throw bad_input("protocol", fmt::format("knot {} is not finite", i + 1));
+    }
+    if (!is_time_in_range(knots_[i].time_s)) {
+      throw bad_input("protocol",
+                      fmt::format("knot {} is at {} s", i + 1, shortest(knots_[i].time_s)),
+                      kTimeRange);
     }
     if (i > 0 && knots_[i].time_s < knots_[i - 1].time_s) {
       throw bad_input("protocol", fmt::format("time goes back at knot {}", i + 1),

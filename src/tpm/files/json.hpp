@@ -29,6 +29,9 @@ template <class Items, class Convert>
 /// if a number is not finite, instead of writing null.
 [[nodiscard]] std::string to_text(const Json& value);
 
+/// Names the schema of a file for an editor. It may stand at the top of every file that has one.
+inline constexpr const char* kSchemaKey = "$schema";
+
 /// Checks `value` against the JSON Schema `schemas/NAME.schema.json` of share_dir(). Throws
 /// Error(bad_input): "where: key /a/b: what", the first violation.
 void check_schema(const Json& value, std::string_view schema_name, std::string_view where);

@@ -245,6 +245,7 @@ Json with_current_names(Json document, std::string_view schema, std::string_view
 Json checked(Json document, std::string_view schema, std::string_view where) {
   Json current = with_current_names(std::move(document), schema, where);
   check_schema(current, schema, where);
+  if (current.is_object()) current.erase(kSchemaKey);
   return current;
 }
 

@@ -31,7 +31,8 @@ enum class FormerNames { told, silent };
                                       std::string_view where,
                                       FormerNames former = FormerNames::told);
 
-/// with_current_names() and check_schema(): how every file that users write is read.
+/// with_current_names() and check_schema(): how every file that users write is read. The answer is
+/// without "$schema", which is for editors and would mean another file where the answer is written.
 [[nodiscard]] Json checked(Json document, std::string_view schema, std::string_view where);
 
 }  // namespace tpm::files

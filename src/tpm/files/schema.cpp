@@ -16,6 +16,7 @@
 
 #include "tpm/base/memory_reserve.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
@@ -119,13 +120,21 @@ std::string joined(const Json& words) {
   return text;
 }
 
-/// The keys that a file may have, without former names.
-std::string key_list(const Json& properties) {
-  std::string text;
+/// The keys that a file may have, without former names and "$schema", which only editors read.
+std::vector<std::string> keys_of(const Json& properties) {
+  std::vector<std::string> keys;
   for (const auto& [key, value] : properties.items()) {
-    if (!value.value("deprecated", false)) text += (text.empty() ? "" : ", ") + key;
+    if (!value.value("deprecated", false) && key != kSchemaKey) keys.push_back(key);
   }
-  return text;
+  return keys;
+}
+
+/// @param place of the key, the last part of it
+Error unknown_key(const std::string& at, const Path& place, const Json& rules) {
+  if (!rules.contains("properties")) return bad_input(at, "unknown key", "no such key");
+  const std::vector<std::string> known = keys_of(rules.at("properties"));
+  return bad_input(at, "unknown key" + did_you_mean(place.back(), known),
+                   fmt::format("one of {}", fmt::join(known, ", ")));
 }
 
 std::string type_words(const Json& type) {
@@ -176,9 +185,7 @@ Error in_plain_words(const Violation& violation, const Json& root, std::string_v
   };
   if (said.starts_with(kUnknown)) {
     path.push_back(quoted_word(said));
-    return bad_input(at(path), "unknown key",
-                     rules.contains("properties") ? "one of " + key_list(rules.at("properties"))
-                                                  : std::string("no such key"));
+    return unknown_key(at(path), path, rules);
   }
   if (said.starts_with(kMissing)) {
     path.push_back(quoted_word(said));

@@ -6,10 +6,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <sstream>
 #include <string_view>
 #include <vector>
@@ -46,25 +48,49 @@ int wait_for(pid_t child) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-/// The environment for a Python: PYTHONPATH without empty and relative parts, which would stand for
-/// the current folder. Nothing that lies where the user stands may be imported.
+/// The folders of a list such as $PATH, without its empty and relative parts, which would stand for
+/// the current folder.
+std::vector<std::string> absolute_parts(std::string_view list) {
+  std::vector<std::string> kept;
+  std::istringstream parts{std::string(list)};
+  for (std::string part; std::getline(parts, part, ':');) {
+    if (part.starts_with('/')) kept.push_back(part);
+  }
+  return kept;
+}
+
+/// The environment for a Python: lists of folders without empty and relative parts. Nothing that
+/// lies where the user stands may be run, loaded or imported.
 std::vector<std::string> safe_environment() {
-  constexpr std::string_view kKey = "PYTHONPATH=";
+  constexpr std::array<std::string_view, 3> kLists{"PATH=", "PYTHONPATH=", "LD_LIBRARY_PATH="};
   std::vector<std::string> variables;
   for (char** variable = environ; *variable != nullptr; ++variable) {
     const std::string_view text(*variable);
-    if (!text.starts_with(kKey)) {
+    const auto list = std::find_if(kLists.begin(), kLists.end(),
+                                   [&](std::string_view key) { return text.starts_with(key); });
+    if (list == kLists.end()) {
       variables.emplace_back(text);
       continue;
     }
-    std::string kept;
-    std::istringstream parts{std::string(text.substr(kKey.size()))};
-    for (std::string part; std::getline(parts, part, ':');) {
-      if (part.starts_with('/')) kept += (kept.empty() ? "" : ":") + part;
-    }
-    if (!kept.empty()) variables.push_back(std::string(kKey) + kept);
+    const auto kept = absolute_parts(text.substr(list->size()));
+    if (!kept.empty()) variables.push_back(fmt::format("{}{}", *list, fmt::join(kept, ":")));
   }
   return variables;
+}
+
+/// The file of a program: one with a slash is beside the caller, a bare name is searched for in the
+/// absolute parts of $PATH. Empty if there is none.
+std::string program_file(const std::string& program) {
+  if (program.find('/') != std::string::npos) return std::filesystem::absolute(program).string();
+  const char* path = std::getenv("PATH");
+  for (const std::string& folder : absolute_parts(path == nullptr ? "/usr/bin:/bin" : path)) {
+    const std::filesystem::path file = std::filesystem::path(folder) / program;
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(file, ignored) && ::access(file.c_str(), X_OK) == 0) {
+      return file.string();
+    }
+  }
+  return {};
 }
 
 /// Pointers to the words, with a null at the end, as the system takes them.
@@ -76,8 +102,10 @@ std::vector<char*> pointers_to(const std::vector<std::string>& words) {
   return pointers;
 }
 
-/// Runs a program (searched for on the path) without a shell, its standard output discarded.
+/// Runs a program (program_file()) from `/` and without a shell, its standard output discarded.
 Outcome run(const std::vector<std::string>& words) {
+  const std::string file = program_file(words.front());
+  if (file.empty()) return {127, std::strerror(ENOENT)};
   const std::vector<std::string> variables = safe_environment();
   const std::vector<char*> arguments = pointers_to(words);
   const std::vector<char*> environment = pointers_to(variables);
@@ -91,9 +119,10 @@ Outcome run(const std::vector<std::string>& words) {
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
+  posix_spawn_file_actions_addchdir_np(&actions, "/");
   pid_t child = 0;
   const int failed =
-      ::posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environment.data());
+      ::posix_spawn(&child, file.c_str(), &actions, nullptr, arguments.data(), environment.data());
   posix_spawn_file_actions_destroy(&actions);
   ::close(ends[1]);
   Outcome outcome;
@@ -113,10 +142,11 @@ std::string last_line(std::string text) {
   return start == std::string::npos ? text : text.substr(start + 1);
 }
 
-/// Runs a script of the project; throws if it fails.
+/// Runs a script of the project; throws if it fails. It starts in another folder: files are named
+/// by absolute paths.
 void run_script(const std::string& python, const char* name,
                 const std::vector<std::string>& arguments) {
-  const std::string script = (share_dir() / "scripts" / name).string();
+  const std::string script = std::filesystem::absolute(share_dir() / "scripts" / name).string();
   std::vector<std::string> words{python, script};
   words.insert(words.end(), arguments.begin(), arguments.end());
   const Outcome outcome = run(words);
@@ -147,7 +177,8 @@ std::string find_drawing_python() {
 
 void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
                   const std::filesystem::path& folder, Drawings drawings) {
-  std::vector<std::string> words{figures_json.string(), folder.string()};
+  std::vector<std::string> words{std::filesystem::absolute(figures_json).string(),
+                                 std::filesystem::absolute(folder).string()};
   if (drawings == Drawings::svg_and_png) words.emplace_back("--png");
   run_script(python, "draw_figures.py", words);
 }
@@ -179,13 +210,17 @@ void write_report(const std::filesystem::path& folder, const Document& document,
 
 void draw_network(const std::string& python, const std::filesystem::path& picture_json,
                   const std::filesystem::path& stem) {
-  run_script(python, "draw_network.py", {picture_json.string(), stem.string()});
+  run_script(
+      python, "draw_network.py",
+      {std::filesystem::absolute(picture_json).string(), std::filesystem::absolute(stem).string()});
 }
 
 std::vector<std::string> draw_deformation(const std::string& python,
                                           const std::filesystem::path& pictures_json,
                                           const std::filesystem::path& folder, bool two) {
-  run_script(python, "draw_deformation.py", {pictures_json.string(), folder.string()});
+  run_script(python, "draw_deformation.py",
+             {std::filesystem::absolute(pictures_json).string(),
+              std::filesystem::absolute(folder).string()});
   std::vector<std::string> files;
   for (const char* name :
        {"undeformed", "deformed", "displacement", "force", "validity", "side_by_side"}) {

@@ -9,6 +9,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::show {
@@ -110,6 +111,20 @@ Json panel_json(const Panel& panel, const std::string& where) {
 }
 
 }  // namespace
+
+std::string figure_id(std::string_view beginning, std::string_view name) {
+  constexpr std::size_t kLongest = 64, kCheckSum = 8;
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
+  std::string id = fmt::format("{}_{}", beginning, name);
+  if (id.size() <= kLongest && id.find_first_not_of(kPlain) == std::string::npos) return id;
+  const std::string check_sum = sha256_hex(name).substr(0, kCheckSum);
+  id = id.substr(0, kLongest - kCheckSum - 1);
+  for (char& c : id) {
+    if (kPlain.find(c) == std::string_view::npos) c = '_';
+  }
+  return fmt::format("{}_{}", id, check_sum);
+}
 
 Json to_json(const std::vector<Figure>& figures) {
   Json list = Json::array();

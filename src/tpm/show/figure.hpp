@@ -64,12 +64,18 @@ struct Panel {
 
 /// A figure as data: scripts/draw_figures.py draws it, and it can be redrawn without recomputing.
 struct Figure {
-  std::string id;  ///< name of the file it is drawn into, without ending
+  /// Name of the file it is drawn into, without ending; figure_id() where it holds a user's name.
+  std::string id;
   std::string title;
   std::string caption;
   std::vector<Panel> panels{};
   std::string note{};  ///< one line drawn below the panels: what the numbers depend on
 };
+
+/// "BEGINNING_NAME" for Figure::id, of a name such as that of a data file: letters, digits, `-`,
+/// `_` and `.` alone, at most 64 bytes, since it becomes a file name, an XML id and part of a
+/// style. A name that is not so already ends in a check sum of it, so that two names give two ids.
+[[nodiscard]] std::string figure_id(std::string_view beginning, std::string_view name);
 
 /// The content of figures.json. Throws Error(numerical) if the arrays of a series differ in length
 /// or hold a number that is not finite.

@@ -1,8 +1,12 @@
 #include "tpm/sweep/cell_block.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
+#include "tpm/base/text.hpp"
 #include "tpm/fit/expression/expression.hpp"
 #include "tpmkit/error.hpp"
 
@@ -109,6 +113,7 @@ void CellRunner::run_cell(std::size_t cell, CellBlock& block) {
     }
     block.error_estimate[cell] = answer.error_estimate;
     if (!block.model.empty()) block.model[cell] = answer.model;
+    require_finite();
   } catch (const Error& error) {
     // What is outside (no memory for a mesh, no file) is not the cell's own.
     if (error.code() == ExitCode::environment) throw;
@@ -121,6 +126,19 @@ void CellRunner::run_cell(std::size_t cell, CellBlock& block) {
     std::copy_n(values_.begin() + static_cast<std::ptrdiff_t>(at), width,
                 block.values[v].begin() + static_cast<std::ptrdiff_t>(cell * width));
     at += width;
+  }
+}
+
+/// A number that overflowed is no result: what follows would take it for one.
+void CellRunner::require_finite() const {
+  std::size_t at = 0;
+  for (const SweepVariable& variable : sweep_.variables) {
+    for (std::size_t i = 0; i < variable.width(); ++i, ++at) {
+      if (std::isfinite(values_[at])) continue;
+      throw Error(ExitCode::numerical, variable.name,
+                  fmt::format("{} is no finite number", significant(values_[at], 3)),
+                  "parameters within the range of the model");
+    }
   }
 }
 

@@ -10,7 +10,7 @@
 
 namespace tpm::sweep {
 
-/// What became of a cell.
+/// What became of a cell. One that is done has finite values only.
 enum class CellStatus : std::uint8_t { done, skipped, failed };
 
 /// The model of a cell that ran on none.
@@ -54,6 +54,7 @@ class CellRunner {
  private:
   struct Expressions;
   void run_cell(std::size_t cell, CellBlock& block);
+  void require_finite() const;
   void set_aside(std::size_t cell, CellStatus status, const std::string& reason, CellBlock& block);
 
   const Sweep& sweep_;

@@ -23,8 +23,9 @@ std::vector<double> sizes_along(const SweepReader& sweep, const ReadAxis& axis,
                                 const std::string& formula) {
   if (formula.empty()) {
     if (axis.parameters == std::vector{axis.name}) return axis.places;
-    throw bad_input("--size", fmt::format("axis '{}' has no parameter of its name", axis.name),
-                    fmt::format("a formula of {}", fmt::join(axis.parameters, ", ")));
+    throw Error(ExitCode::usage, "--size",
+                fmt::format("axis '{}' has no parameter of its name", axis.name),
+                fmt::format("a formula of {}", fmt::join(axis.parameters, ", ")));
   }
   const Evaluator evaluator;
   std::vector<std::vector<double>> along;
@@ -35,7 +36,11 @@ std::vector<double> sizes_along(const SweepReader& sweep, const ReadAxis& axis,
     for (std::size_t p = 0; p < along.size(); ++p) {
       scope.values[axis.parameters[p]] = along[p][place];
     }
-    sizes.push_back(evaluator.evaluate(formula, scope, "--size"));
+    try {
+      sizes.push_back(evaluator.evaluate(formula, scope, "--size"));
+    } catch (const Error& error) {
+      throw error.with_code(ExitCode::usage);  // the formula stands on the command line
+    }
   }
   return sizes;
 }

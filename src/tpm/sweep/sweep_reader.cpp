@@ -169,8 +169,8 @@ std::vector<FixedValue> other_places(const SweepReader& sweep, const ReadAxis& a
       const std::uint64_t place = named == fixed.end() ? 0 : named->second;
       others.push_back({axis.name, axis.places[place], axis.unit});
     } else if (named != fixed.end()) {
-      throw bad_input("--at", fmt::format("'{}' is the axis that is looked along", axis.name),
-                      "another axis");
+      throw Error(ExitCode::usage, "--at",
+                  fmt::format("'{}' is the axis that is looked along", axis.name), "another axis");
     }
   }
   return others;

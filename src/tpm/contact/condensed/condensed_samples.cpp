@@ -39,7 +39,7 @@ CondensedSampler::CondensedSampler(const BondSystem& bonds, Positions rest,
 void CondensedSampler::find_moves(State& state, const ViscousState& viscous_state) {
   ++factorisations_;
   if (!equilibrium_.factorise(state.position, viscous_state) || !equilibrium_.is_stable()) {
-    throw Error(ExitCode::numerical, "condensed model",
+    throw Error(ExitCode::numerical, ErrorCause::buckled, "condensed model",
                 fmt::format("with the contact at {} mm the tissue buckles: its stiffness is not "
                             "positive; expected a smaller depth",
                             significant(1e3 * state.contact.norm(), 4)));
@@ -114,7 +114,9 @@ void CondensedSampler::move(State& state, const Eigen::Vector3d& contact,
     }
     stride *= 0.5;
     if (stride < kLeastStride * stride_m_) {
-      throw Error(ExitCode::numerical, "condensed model",
+      throw Error(ExitCode::numerical,
+                  search.stable ? ErrorCause::snapped_through : ErrorCause::buckled,
+                  "condensed model",
                   fmt::format("with the contact at {} mm the tissue {}; expected a smaller depth",
                               significant(1e3 * state.contact.norm(), 4),
                               search.stable ? "snaps through" : "buckles"));

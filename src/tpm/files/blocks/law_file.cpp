@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/renamed_names.hpp"
@@ -12,6 +14,9 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm {
+using namespace base;
+using namespace files;
+
 using namespace files;
 
 namespace {
@@ -42,8 +47,9 @@ void require_known_keys(const Json& values, const std::vector<LawParameter>& par
   for (const LawParameter& p : parameters) known.push_back(law_key(p));
   for (const auto& [key, value] : values.items()) {
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-    throw bad_input(where, fmt::format("unknown parameter '{}'", printable(key)),
-                    fmt::format("one of {}", fmt::join(known, ", ")));
+    throw bad_input(
+        where, fmt::format("unknown parameter '{}'{}", printable(key), did_you_mean(key, known)),
+        fmt::format("one of {}", fmt::join(known, ", ")));
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/base/time_range.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -47,9 +48,15 @@ std::string place(const ImportedSeries& series, const std::string& file, std::si
   return series.name.empty() ? file : fmt::format("{}: dataset '{}'", file, printable(series.name));
 }
 
-void require_increasing(const ImportedSeries& series, const std::string& file) {
+void require_times(const ImportedSeries& series, const std::string& file) {
   const ImportedColumn* time = find(series, Quantity::time);
   if (time == nullptr) return;
+  for (std::size_t i = 0; i < time->values.size(); ++i) {
+    if (is_time_in_range(time->values[i] * time->unit.to_si)) continue;
+    throw bad_input(place(series, file, i),
+                    fmt::format("time {} {}", shortest(time->values[i]), time->unit.symbol),
+                    kTimeRange);
+  }
   for (std::size_t i = 1; i < time->values.size(); ++i) {
     if (time->values[i] > time->values[i - 1]) continue;
     throw bad_input(
@@ -196,7 +203,7 @@ void check_and_measure(ImportedSeries& series, const std::string& file) {
     add_spectrum_measures(series);
     return;
   }
-  require_increasing(series, file);
+  require_times(series, file);
   require_not_negative(series, file, observed(series).quantity, Bound::sd);
   add_measures(series);
 }

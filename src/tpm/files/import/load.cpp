@@ -7,6 +7,9 @@
 #include <set>
 #include <utility>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/base/time_range.hpp"
 #include "tpm/files/delimited.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/description.hpp"
@@ -14,6 +17,9 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace base;
+using namespace files;
+
 using namespace files;
 
 namespace fs = std::filesystem;
@@ -131,7 +137,12 @@ std::optional<Quantity> find_drive(const CurveDescription& description, const st
   return *others.begin();
 }
 
-void require_increasing(const CurveRows& rows, const std::vector<double>& time_s) {
+void require_times(const CurveRows& rows, const std::vector<double>& time_s) {
+  for (std::size_t i = 0; i < time_s.size(); ++i) {
+    if (is_time_in_range(time_s[i])) continue;
+    throw bad_input(rows.place(i, Quantity::time, Bound::value),
+                    fmt::format("time {} s", shortest(time_s[i])), kTimeRange);
+  }
   for (std::size_t i = 1; i < time_s.size(); ++i) {
     if (time_s[i] <= time_s[i - 1]) {
       throw bad_input(rows.place(i, Quantity::time, Bound::value),
@@ -168,7 +179,7 @@ Recording read_recording(const CurveDescription& description, const CurveRows& r
   recording.response = rows.full_column(recording.response_quantity, Bound::value);
   if (rows.has(Quantity::time)) {
     recording.time_s = rows.full_column(Quantity::time, Bound::value);
-    require_increasing(rows, recording.time_s);
+    require_times(rows, recording.time_s);
   }
   if (const auto drive = find_drive(description, description_file)) {
     recording.drive_quantity = *drive;

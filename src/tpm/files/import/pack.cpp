@@ -11,6 +11,7 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/base/time_range.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpmkit/error.hpp"
 
@@ -297,6 +298,11 @@ Recording read_recording(GroupReader& group, CurveHeader header) {
   require_finite(group, "drive", recording.drive);
   require_finite(group, "response_sd", recording.response_sd, false);
   if (recording.response.empty()) throw bad_input(group.where(), "has no rows", "one at least");
+  for (std::size_t i = 0; i < recording.time_s.size(); ++i) {
+    if (is_time_in_range(recording.time_s[i])) continue;
+    throw bad_row(group, i,
+                  {"time", fmt::format("time {} s", recording.time_s[i]), std::string(kTimeRange)});
+  }
   for (std::size_t i = 1; i < recording.time_s.size(); ++i) {
     if (recording.time_s[i] > recording.time_s[i - 1]) continue;
     throw bad_row(group, i,

@@ -118,8 +118,8 @@ std::vector<double> neighbour_correlations(const DesignProblem& problem,
 DesignCheck check_design(const DesignProblem& problem, const PlannedExperiment& experiment,
                          int sets, std::uint64_t seed) {
   if (sets < kFewestSets) {
-    throw bad_input("--check", fmt::format("{} simulated data sets", sets),
-                    fmt::format("{} or more", kFewestSets));
+    throw Error(ExitCode::usage, "--check", fmt::format("{} simulated data sets", sets),
+                fmt::format("{} or more", kFewestSets));
   }
   std::vector<PlannedExperiment> experiments = problem.previous;
   experiments.push_back(experiment);

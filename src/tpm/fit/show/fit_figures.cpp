@@ -116,7 +116,7 @@ Figure profile_figure(const FitStudy& study) {
 }
 
 Figure sensitivity_figure(const FitStudy& study, const std::string& parameter, double stated) {
-  Figure figure{fmt::format("fit_sensitivity_{}", parameter),
+  Figure figure{figure_id("fit_sensitivity", parameter),
                 fmt::format("What {} depends on", parameter),
                 "The ramp rate and the kind of noise are not stated in the paper. Each bar is the "
                 "interval of one fit; a bar that ends at the edge of the searched range is open "

@@ -156,8 +156,7 @@ Figure spectrum_figure(const FitResult& fit, std::size_t choice) {
   const auto hidden = std::count_if(readings.begin(), readings.end(),
                                     [](const FittedDatum* d) { return !(*d->datum.value > 0.0); });
   Figure figure{
-      fmt::format("spectrum_{}", name),
-      fmt::format("{}: {}", name, law_name(fit.config.law.value())),
+      figure_id("spectrum", name), fmt::format("{}: {}", name, law_name(fit.config.law.value())),
       fmt::format(
           "Storage and loss of small oscillations over their frequency, and the fitted law {}; "
           "bars "

@@ -42,7 +42,7 @@ Figure step_response_figure(const FitResult& fit, std::size_t choice) {
   const std::string name =
       std::filesystem::path(fit.config.data.at(choice).dataset).stem().string();
   return {
-      fmt::format("fit_{}", name),
+      figure_id("fit", name),
       fmt::format("{}: {}", name, law_name(fit.config.law.value())),
       fmt::format(
           "{} after a unit step at time 0, and the fitted law {}; bars are standard deviations.",

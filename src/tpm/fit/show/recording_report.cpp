@@ -144,7 +144,7 @@ Figure recording_figure(const FitResult& fit, std::size_t recording) {
   const RecordingFit& r = fit.recordings.at(recording);
   const std::string name = std::filesystem::path(fit.config.data[r.choice].dataset).stem().string();
   const std::string law = fit.config.law ? law_name(*fit.config.law) : fit.config.model;
-  Figure figure{fmt::format("fit_{}", name), fmt::format("{}: {}", name, law),
+  Figure figure{figure_id("fit", name), fmt::format("{}: {}", name, law),
                 fmt::format("{} and the law {}, driven by the measured {}; rms residual {} % of "
                             "the peak where fitted.",
                             spaced(quantity_name(r.response_quantity)), law,

@@ -444,6 +444,7 @@ HazardRow row_of(const Hazard& hazard, bool accepted, const HazardBounds& bounds
     row.passive = rendering.passive() && rendering.within_device() && rendering.follows_encoder();
     if (!rendering.acceptable() && !accepted) {
       row.refused = rendering.verdict();
+      row.refused_by_check = true;
       return;
     }
     const ServoSettings servo = loop_settings(session, model, rendering, true);
@@ -483,9 +484,8 @@ HazardStudy study_hazards(const std::function<void()>& told) {
   for (const Hazard& hazard : hazards()) {
     if (told) told();
     study.rows.push_back(row_of(hazard, false, study.bounds));
-    const HazardRow& row = study.rows.back();
-    const bool unstable = !row.refused.empty() && row.refused.find("session") == std::string::npos;
-    if (unstable) study.rows.push_back(row_of(hazard, true, study.bounds));
+    if (study.rows.back().refused_by_check)
+      study.rows.push_back(row_of(hazard, true, study.bounds));
   }
   return study;
 }

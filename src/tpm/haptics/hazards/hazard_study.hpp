@@ -13,6 +13,9 @@ struct HazardRow {
   bool accepted = false;  ///< run with --accept-unstable after a refusal, in the row before
   bool passive = false;   ///< by the check before the session
   std::string refused;    ///< in words; empty: it ran
+  /// The check before the session refused it, which --accept-unstable overrules; a session that
+  /// cannot be read stays refused.
+  bool refused_by_check = false;
   StopCause cause = StopCause::none;
   double largest_force_N = 0.0;  ///< sent
   double largest_rise_N = 0.0;   ///< of the size of the force, from a period to the next

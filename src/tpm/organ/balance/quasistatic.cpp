@@ -78,13 +78,21 @@ class Run {
   }
 
  private:
-  [[nodiscard]] Error failed(double imposed, std::string_view what) const {
+  [[nodiscard]] Error failed(double imposed, std::string_view what,
+                             ErrorCause cause = ErrorCause::unspecified) const {
     const bool depth = protocol_.drive() == Drive::displacement;
     return Error(
-        ExitCode::numerical, "network",
+        ExitCode::numerical, cause, "network",
         fmt::format("at t = {} s and {} of {} {} {}", significant(state_.time_s, 5),
                     depth ? "a depth" : "a load", significant(depth ? 1e3 * imposed : imposed, 4),
                     depth ? "mm" : "N", what));
+  }
+
+  [[nodiscard]] Error lost(double imposed, bool unstable, std::string_view otherwise) const {
+    return unstable ? failed(imposed, "the tissue buckles: its stiffness is no longer positive",
+                             ErrorCause::buckled)
+                    : failed(imposed, fmt::format("{}: it may snap through", otherwise),
+                             ErrorCause::snapped_through);
   }
 
   /// Puts the tissue at rest and sets what tolerances refer to.
@@ -190,9 +198,7 @@ class Run {
       }
       stride *= 0.5;
       if (stride > kLeastMove) continue;
-      throw failed(imposed, move == TissueMove::unstable
-                                ? "the tissue buckles: its stiffness is no longer positive"
-                                : "no equilibrium is found: it may snap through");
+      throw lost(imposed, move == TissueMove::unstable, "no equilibrium is found");
     }
     response_.reset();
     stages_.see(response_now());
@@ -222,9 +228,7 @@ class Run {
         landing_.reset();
         h *= outcome.balanced ? std::clamp(factor, 0.05, 0.9) : 0.25;
         if (h > kLeastStep * length) continue;
-        throw failed(state_.imposed, outcome.unstable
-                                         ? "the tissue buckles: its stiffness is no longer positive"
-                                         : "the forces cannot be balanced: it may snap through");
+        throw lost(state_.imposed, outcome.unstable, "the forces cannot be balanced");
       }
       if (!lands_on_contact(h, length)) continue;
       if (tangents_) tangents_->follow_step(h);

@@ -79,7 +79,8 @@ QuasiStaticState StaticPath::move_to(double imposed, double time_s) {
     if (stride > std::max(least, kLeastStart)) continue;
     const bool depth = tissue_.depth_driven();
     throw Error(
-        ExitCode::numerical, "network",
+        ExitCode::numerical, unstable_ ? ErrorCause::buckled : ErrorCause::snapped_through,
+        "network",
         fmt::format("on the way to t = {} s, at {} of {} {}, the tissue {}", significant(time_s, 5),
                     depth ? "a depth" : "a load",
                     significant((depth ? 1e3 : 1.0) * state_.imposed, 4), depth ? "mm" : "N",

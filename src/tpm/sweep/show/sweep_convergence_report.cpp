@@ -57,7 +57,7 @@ std::string verdict(const SweepConvergence& c) {
 Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
   const Unit unit = shown_unit_of(c.unit), unit_size = shown_unit_of(c.size_unit);
   const GridConvergence& finest = c.threes.back();
-  Figure figure{fmt::format("convergence_{}", c.variable), c.variable,
+  Figure figure{figure_id("convergence", c.variable), c.variable,
                 fmt::format("{}: {} over {}{}: {}.", title, c.variable, c.size_text,
                             fixed_words(c.fixed, 5), verdict(c))};
   const Axis size_axis{c.size_text, unit_size.symbol, true};

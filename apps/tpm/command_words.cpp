@@ -1,0 +1,132 @@
+#include "command_words.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+
+#include "tpm/base/nearest_word.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::app {
+namespace {
+
+/// The command that was named last, the program itself if none was.
+const CLI::App& innermost(const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
+  return *command;
+}
+
+/// "tpm hil run"
+std::string full_name(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  return parent == nullptr ? command.get_name() : full_name(*parent) + " " + command.get_name();
+}
+
+/// "hil run: " for the beginning of a message, "" for the program itself.
+std::string place(const CLI::App& command) {
+  if (command.get_parent() == nullptr) return {};
+  const std::string name = full_name(command);
+  return name.substr(name.find(' ') + 1) + ": ";
+}
+
+std::vector<std::string> commands_of(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::App* one : command.get_subcommands({})) names.push_back(one->get_name());
+  return names;
+}
+
+/// With their dashes, without positional arguments.
+std::vector<std::string> options_of(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+  }
+  return names;
+}
+
+bool is_option(std::string_view word) {
+  return word.size() > 1 && word.front() == '-';
+}
+
+/// Of "--option=value" what stands before the value.
+std::string_view name_of(std::string_view word) {
+  return word.substr(0, word.find('='));
+}
+
+std::string unknown_command(const CLI::App& command, const std::string& word) {
+  const std::vector<std::string> known = commands_of(command);
+  const std::string nearest = nearest_word(word, known);
+  const std::string name = full_name(command);
+  if (nearest.empty()) {
+    return fmt::format("{}no command '{}'; expected one of {}; see {} --help", place(command),
+                       printable(word), fmt::join(known, ", "), name);
+  }
+  return fmt::format("{}no command '{}'; did you mean '{}'? See {} {} --help, or {} --help",
+                     place(command), printable(word), nearest, name, nearest, name);
+}
+
+std::string unknown_option(const CLI::App& command, std::string_view word) {
+  const std::string name(name_of(word));
+  const std::string nearest = nearest_word(name, options_of(command));
+  return fmt::format("{}no option '{}'; {}see {} --help", place(command), printable(name),
+                     nearest.empty() ? "" : fmt::format("did you mean '{}'? ", nearest),
+                     full_name(command));
+}
+
+/// A word beside a command's own arguments that was likely meant as one of its commands
+/// (`tpm sweep polt FILE`).
+std::string misspelt_command(const CLI::App& command, const std::vector<std::string>& left) {
+  if (left.empty()) return {};
+  const std::vector<std::string> known = commands_of(command);
+  for (const CLI::Option* option : command.get_options()) {
+    if (!option->get_positional() || option->count() == 0) continue;
+    const std::string word = option->results().front();
+    if (!nearest_word(word, known).empty()) return word;
+  }
+  return nearest_word(left.front(), known).empty() ? std::string{} : left.front();
+}
+
+}  // namespace
+
+std::vector<std::string> command_words(int argc, const char* const* argv) {
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (words.empty()) return {"--help"};
+  if (words.front() != "help") return words;
+  std::erase(words, "help");
+  words.emplace_back("--help");
+  return words;
+}
+
+std::string unknown_command(const CLI::App& app) {
+  const CLI::App& command = innermost(app);
+  if (command.get_require_subcommand_min() == 0) return {};
+  for (const std::string& word : command.remaining()) {
+    if (!is_option(word)) return unknown_command(command, word);
+  }
+  return {};
+}
+
+std::string refusal(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& command = innermost(app);
+  if (const std::string unknown = unknown_command(app); !unknown.empty()) return unknown;
+  const std::vector<std::string> left = command.remaining();
+  const auto option = std::find_if(left.begin(), left.end(), is_option);
+  if (option != left.end()) return unknown_option(command, *option);
+  if (command.get_require_subcommand_min() > 0) {
+    return fmt::format("{}no command; expected one of {}; see {} --help", place(command),
+                       fmt::join(commands_of(command), ", "), full_name(command));
+  }
+  if (const std::string word = misspelt_command(command, left); !word.empty()) {
+    return unknown_command(command, word);
+  }
+  if (!left.empty()) {
+    return fmt::format("{}'{}' is one argument too many; see {} --help", place(command),
+                       printable(left.front()), full_name(command));
+  }
+  return fmt::format("{}{}; see {} --help", place(command), error.what(), full_name(command));
+}
+
+}  // namespace tpm::app
