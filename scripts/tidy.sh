@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Sourced by check.sh: clang-tidy on the sources that changed since a base commit.
+# Sourced by check.sh: clang-tidy on the sources that changed since a base commit, in more than includes and namespaces.
 
 # The commit to compare with: $TPM_TIDY_BASE, else the merge base with origin's branch, else the
 # commit before. Prints nothing if there is none, or for `all`.
@@ -46,6 +46,35 @@ source_that_includes() {
   [ -z "$includer" ] || source_that_includes "$includer"
 }
 
+# Lines that say what a file does: without includes, namespaces and blanks, which a move changes.
+lines_that_count() {
+  grep -vE '^(#include |(using )?namespace |\}+  // namespace|// Declared in |$)' || true
+}
+
+# changed_since BASE PATTERN...: files that are new or differ in more than lines_that_count() leaves out.
+changed_since() {
+  local base=$1 status old new
+  shift
+  git -c diff.renameLimit=20000 diff --name-status -M50 --diff-filter=d "$base" -- src apps tests include |
+    while IFS=$'\t' read -r status old new; do
+      case $status in
+        R*) ;;
+        A*) new=$old old= ;;
+        *) new=$old ;;
+      esac
+      # shellcheck disable=SC2254
+      for pattern in "$@"; do
+        case $new in
+          $pattern)
+            if [ -z "$old" ] || ! cmp -s <(git show "$base:$old" | lines_that_count) <(lines_that_count <"$new"); then
+              echo "$new"
+            fi
+            ;;
+        esac
+      done
+    done
+}
+
 # tidy_changed BUILD_FOLDER: the folder of a build that compiles each file alone
 tidy_changed() {
   local build=$1 base file
@@ -54,8 +83,8 @@ tidy_changed() {
     if [ -z "$base" ]; then
       git ls-files 'src/*.cpp' 'apps/*.cpp'
     else
-      git diff --name-only --diff-filter=d "$base" -- 'src/*.cpp' 'apps/*.cpp' 'tests/*.cpp'
-      git diff --name-only --diff-filter=d "$base" -- 'src/*.hpp' 'apps/*.hpp' 'tests/*.hpp' |
+      changed_since "$base" 'src/*.cpp' 'apps/*.cpp' 'tests/*.cpp'
+      changed_since "$base" 'src/*.hpp' 'apps/*.hpp' 'tests/*.hpp' |
         while read -r file; do source_that_includes "$file"; done
     fi
   } | sed -e "s|^$PWD/||" -e '/^tests\/consumer\//d' -e '/^apps\/peers\//d' | sort -u |
