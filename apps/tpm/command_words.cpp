@@ -56,7 +56,7 @@ std::string_view name_of(std::string_view word) {
   return word.substr(0, word.find('='));
 }
 
-std::string unknown_command(const CLI::App& command, const std::string& word) {
+std::string no_such_command(const CLI::App& command, const std::string& word) {
   const std::vector<std::string> known = commands_of(command);
   const std::string nearest = nearest_word(word, known);
   const std::string name = full_name(command);
@@ -68,7 +68,7 @@ std::string unknown_command(const CLI::App& command, const std::string& word) {
                      place(command), printable(word), nearest, name, nearest, name);
 }
 
-std::string unknown_option(const CLI::App& command, std::string_view word) {
+std::string no_such_option(const CLI::App& command, std::string_view word) {
   const std::string name(name_of(word));
   const std::string nearest = nearest_word(name, options_of(command));
   return fmt::format("{}no option '{}'; {}see {} --help", place(command), printable(name),
@@ -104,7 +104,7 @@ std::string unknown_command(const CLI::App& app) {
   const CLI::App& command = innermost(app);
   if (command.get_require_subcommand_min() == 0) return {};
   for (const std::string& word : command.remaining()) {
-    if (!is_option(word)) return unknown_command(command, word);
+    if (!is_option(word)) return no_such_command(command, word);
   }
   return {};
 }
@@ -114,13 +114,13 @@ std::string refusal(const CLI::App& app, const CLI::ParseError& error) {
   if (const std::string unknown = unknown_command(app); !unknown.empty()) return unknown;
   const std::vector<std::string> left = command.remaining();
   const auto option = std::find_if(left.begin(), left.end(), is_option);
-  if (option != left.end()) return unknown_option(command, *option);
+  if (option != left.end()) return no_such_option(command, *option);
   if (command.get_require_subcommand_min() > 0) {
     return fmt::format("{}no command; expected one of {}; see {} --help", place(command),
                        fmt::join(commands_of(command), ", "), full_name(command));
   }
   if (const std::string word = misspelt_command(command, left); !word.empty()) {
-    return unknown_command(command, word);
+    return no_such_command(command, word);
   }
   if (!left.empty()) {
     return fmt::format("{}'{}' is one argument too many; see {} --help", place(command),
