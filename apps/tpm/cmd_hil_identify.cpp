@@ -84,7 +84,7 @@ int identify_hil(const IdentifyChoice& choice, const Session& session) {
   }
   const DeviceChoice device = chosen_device(choice.device);
   const bool hardware = limits_of(device).hardware();
-  IdentifyOptions options;
+  DeviceIdentifyOptions options;
   options.duration_s = between(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);
   options.real_time = choice.time.empty() ? hardware : choice.time == "real";
   options.wish = chosen_wish(choice.device);

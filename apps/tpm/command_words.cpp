@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
 #include "tpmkit/error.hpp"
 

@@ -6,6 +6,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
 using namespace tpm::files;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinRel;

@@ -12,6 +12,7 @@
 
 #include "refusal.hpp"
 #include "temp_folder.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"

@@ -109,7 +109,7 @@ TEST_CASE("The simulated device is identified, and its file is one that a sessio
   like.plant.mass_kg = 0.4;
   like.plant.damping_N_s_per_m = 0.7;
   like.plant.arm = {1e-9, 0.0, 0.0, 0.0};  // nobody holds it
-  IdentifyOptions options;
+  DeviceIdentifyOptions options;
   const IdentifyRun run = run_identification({}, like, options);
   CHECK(run.outcome.cause == StopCause::finished);
   REQUIRE(run.found.delay_mean_s);

@@ -13,6 +13,7 @@
 #include <memory>
 
 #include "temp_folder.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/device/forces_off_guard.hpp"

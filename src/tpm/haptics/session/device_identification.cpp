@@ -14,7 +14,7 @@
 namespace tpm::haptics {
 namespace {
 
-constexpr double kWindow_s = 0.064, kLongestDelay_s = 0.050;
+constexpr double kVelocityWindow_s = 0.064, kLongestDelay_s = 0.050;
 constexpr double kEdge_N = 0.2, kCentring_N_per_m = 15.0;
 constexpr double kShortestBit_s = 0.040, kLongestBit_s = 0.120;
 constexpr int kUnknowns = 5;  // m, b, c, k, f
@@ -186,7 +186,7 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
                                      double period_s) {
   DeviceIdentification found;
   found.resolution_s = 0.5 * period_s;
-  const auto half = static_cast<std::size_t>(std::lround(0.5 * kWindow_s / period_s));
+  const auto half = static_cast<std::size_t>(std::lround(0.5 * kVelocityWindow_s / period_s));
   const auto longest = static_cast<std::size_t>(std::lround(kLongestDelay_s / period_s));
   const std::size_t margin = half + longest + 16;
   if (samples.size() < 2 * margin + half) {

@@ -72,7 +72,7 @@ Json interval(double low, double high, int digits) {
 
 IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
                                   const DeviceChoice& choice, const HilSession& like,
-                                  const IdentifyOptions& options) {
+                                  const DeviceIdentifyOptions& options) {
   IdentifyRun run;
   run.period_s = like.servo.period_s;
   run.duration_s = options.duration_s;
@@ -123,7 +123,7 @@ IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
 }
 
 IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& like,
-                               const IdentifyOptions& options) {
+                               const DeviceIdentifyOptions& options) {
   if (choice.kind == "replay") {
     throw Error(ExitCode::usage, "--device replay", "does not answer to forces",
                 "a device, or virtual");

@@ -4,7 +4,7 @@
 
 namespace tpm::haptics {
 
-struct IdentifyOptions {
+struct DeviceIdentifyOptions {
   double duration_s = 20.0;
   bool real_time = false;
   RealTimeWish wish = RealTimeWish::ignore;
@@ -27,11 +27,11 @@ struct IdentifyRun {
 /// @param like rate, push and watchdog; of the simulated device also its numbers
 /// Throws Error(environment) as a session does; an early end is in the outcome.
 [[nodiscard]] IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& like,
-                                             const IdentifyOptions& options);
+                                             const DeviceIdentifyOptions& options);
 /// The same on a device that the caller has made.
 [[nodiscard]] IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
                                                 const DeviceChoice& choice, const HilSession& like,
-                                                const IdentifyOptions& options);
+                                                const DeviceIdentifyOptions& options);
 
 /// A device file (schemas/device.schema.json). @param date of the measurement; may be empty
 [[nodiscard]] Json device_file_json(const IdentifyRun& run, const std::string& date);
