@@ -17,7 +17,7 @@
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/recording_export.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
-#include "tpm/show/view_parts.hpp"
+#include "tpm/haptics/show/view_recording.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
