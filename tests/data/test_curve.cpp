@@ -166,11 +166,15 @@ TEST_CASE("each fault of a description is told with its key") {
   CHECK_THAT(fault(with("/kind", "curve")),
              Catch::StartsWith("c.json: key /kind: is none of the known words; expected one of "
                                "points, recording, spectrum, values"));
-  CHECK_THAT(fault(with("/colums", 1)),
-             Catch::StartsWith("c.json: key /colums: unknown key; expected one of id, title"));
-  CHECK_THAT(fault(with("/columns/depth_mm/unti", "mm")),
-             Catch::StartsWith("c.json: key /columns/depth_mm/unti: unknown key; expected one of "
-                               "quantity, unit"));
+  CHECK_THAT(
+      fault(with("/colums", 1)),
+      Catch::StartsWith(
+          "c.json: key /colums: unknown key (did you mean 'columns'?); expected one of id, title"));
+  CHECK_THAT(
+      fault(with("/columns/depth_mm/unti", "mm")),
+      Catch::StartsWith(
+          "c.json: key /columns/depth_mm/unti: unknown key (did you mean 'unit'?); expected one of "
+          "quantity, unit"));
   CHECK_THAT(fault(with("/columns/depth_mm", Json::object())),
              Catch::StartsWith("c.json: key /columns/depth_mm/quantity: is missing; expected one "
                                "of time, indentation_depth"));

@@ -170,7 +170,7 @@ TEST_CASE("fields that are only cut up are those that the rules of quoting give"
     REQUIRE(cut.size() == expected.size());
     CHECK(std::equal(cut.begin(), cut.end() - 1, expected.begin()));
   }
-  for (const char* line : {"\"a\"b,c", "a\"b,c", "\"a,c", "\"a\" \"b\",c"}) {
+  for (const char* line : {"\"a\"b,c", "\"a,c", "\"a\" \"b\",c"}) {
     CHECK_THROWS_WITH(parse_delimited(std::string("t,u\n") + line + "\n", "t", {}),
                       Contains("quote"));
   }

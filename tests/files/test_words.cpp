@@ -6,6 +6,8 @@
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -27,6 +29,12 @@ namespace {
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 
+/// What stands in a file, nothing too.
+std::string contents(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
 struct Answer {
   int exit_code;
   std::string output, error;
@@ -38,7 +46,7 @@ Answer answer_to(const std::string& arguments) {
   const int status = std::system(
       ("'" TPM_TEST_PROGRAM "' " + arguments + " > '" + output + "' 2> '" + error + "'").c_str());
   REQUIRE(WIFEXITED(status));
-  return {WEXITSTATUS(status), read_file(output), read_file(error)};
+  return {WEXITSTATUS(status), contents(output), contents(error)};
 }
 
 }  // namespace

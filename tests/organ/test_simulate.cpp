@@ -426,7 +426,8 @@ TEST_CASE("every file with a protocol takes it from the one schema") {
   CHECK_THAT(scene_with(R"({"kind": "knots", "knots": [{"depth": "1 mm"}, {"time": "1 s"}]})"),
              Contains("key /protocol/knots/0/time: is missing"));
   CHECK_THAT(scene_with(R"({"kind": "creep", "lode": "1 N"})"),
-             Contains("key /protocol/lode: unknown key; expected one of kind, depth, rate, hold"));
+             Contains("key /protocol/lode: unknown key (did you mean 'load'?); expected one of "
+                      "kind, depth, rate, hold"));
 }
 
 TEST_CASE("one table says what protocols need, for scenes and for what sets the open numbers") {

@@ -35,7 +35,7 @@ TEST_CASE("a cell whose number overflowed has failed and says which") {
   CHECK(block.status[1] == CellStatus::failed);
   CHECK(std::isnan(block.values[0][1]));
   REQUIRE(block.reason[1] > 0);
-  CHECK_THAT(block.reasons[block.reason[1] - 1U], Contains("lambda1: inf is no finite number"));
+  CHECK_THAT(block.reasons[block.reason[1] - 1U], Contains("lambda1: nan is no finite number"));
 }
 
 TEST_CASE("times that nobody measures are refused") {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string_view>
 
 #include "tpm/base/text.hpp"
 #include "tpm/fit/expression/expression.hpp"
@@ -14,6 +15,11 @@ namespace tpm::sweep {
 namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+
+/// A value that is no finite number, the same on every machine: a NaN has no sign.
+std::string_view not_finite(double value) {
+  return std::isnan(value) ? "nan" : value > 0.0 ? "inf" : "-inf";
+}
 
 }  // namespace
 
@@ -136,7 +142,7 @@ void CellRunner::require_finite() const {
     for (std::size_t i = 0; i < variable.width(); ++i, ++at) {
       if (std::isfinite(values_[at])) continue;
       throw Error(ExitCode::numerical, variable.name,
-                  fmt::format("{} is no finite number", significant(values_[at], 3)),
+                  fmt::format("{} is no finite number", not_finite(values_[at])),
                   "parameters within the range of the model");
     }
   }

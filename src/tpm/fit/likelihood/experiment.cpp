@@ -117,7 +117,8 @@ double sample_sigma(const DataChoice& data, double value, std::optional<double> 
 }
 
 std::string data_path(const FitConfig& config, const std::string& dataset) {
-  const bool is_file = dataset.ends_with(".csv") || dataset.ends_with(".json");
+  // Ids of shipped curves hold letters, digits and '_'; recordings end as their instruments like.
+  const bool is_file = dataset.find_first_of("./") != std::string::npos;
   if (!is_file || std::filesystem::path(dataset).is_absolute()) return dataset;
   return (config.folder / dataset).string();
 }
