@@ -1,0 +1,310 @@
+#include "tpm/fit/select/adequacy.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <cmath>
+#include <numeric>
+
+#include "tpm/base/enum_names.hpp"
+#include "tpm/base/text.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::study {
+namespace {
+
+constexpr std::size_t kFewestAtRest = 8;
+constexpr double kFewestDegrees = 4.0;  // of the noise at rest
+constexpr double kConfidence = 2.0;     // standard errors of a correlation
+constexpr double kMostCorrelation = 0.98;
+
+void require_alike(const AdequacyData& data) {
+  const auto finite = [](std::span<const double> values) {
+    return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
+  };
+  if (data.rest.size() != data.rest_time_s.size() || data.reading.size() != data.time_s.size() ||
+      data.residual.size() != data.time_s.size()) {
+    throw bad_input("adequacy", "times, readings and residuals of unequal number", "one of each");
+  }
+  if (finite(data.rest) && finite(data.reading) && finite(data.residual)) return;
+  throw bad_input("adequacy", "a reading or residual that is not finite", "finite numbers");
+}
+
+double mean_of(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double squares_about(std::span<const double> values, double centre) {
+  double sum = 0.0;
+  for (const double v : values) sum += (v - centre) * (v - centre);
+  return sum;
+}
+
+/// Lag-1 correlation about a centre; none if all values are the same.
+std::optional<double> lag1_about(std::span<const double> values, double centre) {
+  const double squares = squares_about(values, centre);
+  if (!(squares > 0.0)) return std::nullopt;
+  double products = 0.0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    products += (values[i - 1] - centre) * (values[i] - centre);
+  }
+  return products / squares;
+}
+
+/// The straight line of least squares through readings at rest.
+struct RestLine {
+  double per_s = 0.0;
+  double spread = 0.0;      ///< sum of squares of the times about their mean
+  std::vector<double> off;  ///< readings less the line
+};
+
+RestLine line_through(std::span<const double> time_s, std::span<const double> rest) {
+  RestLine line;
+  const double mean_time = mean_of(time_s);
+  const double mean = mean_of(rest);
+  line.spread = squares_about(time_s, mean_time);
+  double products = 0.0;
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    products += (time_s[i] - mean_time) * (rest[i] - mean);
+  }
+  if (line.spread > 0.0) line.per_s = products / line.spread;
+  line.off.reserve(rest.size());
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    line.off.push_back(rest[i] - mean - line.per_s * (time_s[i] - mean_time));
+  }
+  return line;
+}
+
+/// Upper confidence bound of a lag-1 correlation r of n values, 0 .. kMostCorrelation.
+double upper_correlation(double r, std::size_t n, bool about_line) {
+  const auto count = static_cast<double>(n);
+  // Bias of a correlation about an estimated line (about a mean: Kendall's (1 + 3 rho) / n).
+  if (about_line) r += (2.0 + 4.0 * std::max(r, 0.0)) / count;
+  const double error = std::sqrt(std::max(1.0 - r * r, 0.05) / count);
+  return std::clamp(r + kConfidence * error, 0.0, kMostCorrelation);
+}
+
+/// First two moments of the sum of squares about a straight line of n values of unit variance with
+/// correlation rho^|i-j|, as its expectation and its degrees of freedom.
+struct SquaresAboutLine {
+  double expectation = 0.0, degrees = 0.0;
+};
+
+SquaresAboutLine squares_about_line(std::size_t n, double rho) {
+  constexpr std::size_t kMost = 300;  // beyond, both grow with the number
+  const auto m = static_cast<Eigen::Index>(std::min(n, kMost));
+  Eigen::MatrixXd c(m, m);
+  Eigen::MatrixXd line(m, 2);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      c(i, j) = c(j, i) = std::pow(rho, static_cast<double>(i - j));
+    }
+    line(i, 0) = 1.0;
+    line(i, 1) = static_cast<double>(i) - 0.5 * static_cast<double>(m - 1);
+  }
+  line.colwise().normalize();
+  // M C M with the projection M = 1 - line line'.
+  const Eigen::MatrixXd taken = c * line;
+  const Eigen::MatrixXd left = c - taken * line.transpose() - line * taken.transpose() +
+                               line * (line.transpose() * taken) * line.transpose();
+  const double more = static_cast<double>(n) / static_cast<double>(m);
+  const double trace = left.trace();
+  return {trace * more, trace * trace / left.squaredNorm() * more};
+}
+
+/// The noise as the rest and, if the law is right, the residuals tell it.
+struct Noise {
+  double variance = 0.0, degrees = 0.0, correlation = 0.0;
+};
+
+Noise noise_of(const AdequacyData& data) {
+  Noise noise;
+  const RestLine line = line_through(data.rest_time_s, data.rest);
+  const auto of_rest = lag1_about(line.off, 0.0);
+  const auto of_residual = lag1_about(data.residual, 0.0);
+  noise.correlation = kMostCorrelation;
+  if (of_rest) noise.correlation = upper_correlation(*of_rest, data.rest.size(), true);
+  if (of_residual) {
+    noise.correlation =
+        std::min(noise.correlation, upper_correlation(*of_residual, data.residual.size(), false));
+  }
+  // About a line: a drift is no noise.
+  const SquaresAboutLine at_rest = squares_about_line(data.rest.size(), noise.correlation);
+  noise.degrees = at_rest.degrees;
+  noise.variance = squares_about(line.off, 0.0) / at_rest.expectation;
+  std::vector<double> all(data.rest.begin(), data.rest.end());
+  all.insert(all.end(), data.reading.begin(), data.reading.end());
+  const double quantum = quantum_of(all);
+  noise.variance += quantum * quantum / 12.0;
+  return noise;
+}
+
+/// p of the mean square of residuals against the noise.
+double p_of(std::span<const double> residual, int parameters, const Noise& noise) {
+  const auto n = static_cast<double>(residual.size());
+  const double square = squares_about(residual, 0.0) / std::max(n - parameters, 1.0);
+  if (!(noise.variance > 0.0)) return square > 0.0 ? 0.0 : 1.0;
+  const double r2 = noise.correlation * noise.correlation;
+  const double degrees = std::max(n * (1.0 - r2) / (1.0 + r2) - parameters, 1.0);
+  const boost::math::fisher_f f(degrees, noise.degrees);
+  return boost::math::cdf(boost::math::complement(f, square / noise.variance));
+}
+
+std::size_t longest_equal(std::span<const double> values, std::size_t first, std::size_t last,
+                          double but) {
+  std::size_t longest = 0;
+  std::size_t length = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    length = i > first && values[i] == values[i - 1] ? length + 1 : 1;
+    if (values[i] != but) longest = std::max(longest, length);
+  }
+  return longest;
+}
+
+/// The longest run at one value.
+EqualRun run_at(std::span<const double> values, double value, bool largest) {
+  EqualRun run{0, 0, value, largest};
+  std::size_t length = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    length = values[i] == value ? length + 1 : 0;
+    if (length > run.length) run = {i + 1 - length, length, value, largest};
+  }
+  return run;
+}
+
+/// Readings that are back at the level of the rest while the law expects a load.
+std::optional<double> signal_lost_at_s(const AdequacyData& data, const Noise& noise) {
+  constexpr int kInARow = 3;
+  constexpr double kAtRest = 4.0, kFarOff = 20.0;  // standard deviations of the noise
+  const double level = mean_of(data.rest);
+  const double sd = std::sqrt(noise.variance);
+  int count = 0;
+  for (std::size_t i = 0; i < data.reading.size(); ++i) {
+    const bool lost = std::abs(data.reading[i] - level) <= kAtRest * sd &&
+                      std::abs(data.residual[i]) > kFarOff * sd;
+    count = lost ? count + 1 : 0;
+    if (count == kInARow) return data.time_s[i + 1 - kInARow];
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> causes_of(const AdequacyData& data, const Noise& noise, double level) {
+  std::vector<std::string> causes;
+  const double sd = std::sqrt(noise.variance);
+  if (const auto run = clipped_run(data.reading, data.rest)) {
+    causes.push_back(fmt::format(
+        "clipping: {} readings in a row from {} s on are all the {}, longer than rounding makes",
+        run->length, significant(data.time_s[run->first], 4),
+        run->largest ? "largest" : "smallest"));
+  }
+  if (const auto lost = signal_lost_at_s(data, noise)) {
+    causes.push_back(fmt::format(
+        "lost signal: from {} s on readings are back at the level of the rest under a load",
+        significant(*lost, 4)));
+  }
+  if (const auto trend = rest_trend(data.rest_time_s, data.rest)) {
+    constexpr double kSeen = 4.0, kMatters = 1.0;
+    const double moved = std::abs(trend->per_s) * (data.time_s.back() - data.time_s.front());
+    if (std::abs(trend->per_s) > kSeen * trend->standard_error && moved > kMatters * sd) {
+      causes.push_back(fmt::format(
+          "drift: at rest the readings change by {} noises over as long as the fitted part lasts",
+          significant(moved / sd, 2)));
+    }
+  }
+  const std::size_t early = std::max<std::size_t>(data.residual.size() / 10, 5);
+  if (causes.empty() && data.residual.size() > 3 * early &&
+      p_of(data.residual.subspan(early), data.parameters, noise) >= level) {
+    causes.push_back(fmt::format("transient: without the first {} samples, to {} s, it would",
+                                 early, significant(data.time_s[early], 4)));
+  }
+  return causes;
+}
+
+}  // namespace
+
+std::string_view described_name(Described described) noexcept {
+  static constexpr auto kNames =
+      std::to_array<Word<Described>>({{Described::adequate, "adequate"},
+                                      {Described::not_described, "not_described"},
+                                      {Described::not_judged, "not_judged"}});
+  return word_for(kNames, described);
+}
+
+double quantum_of(std::span<const double> readings) {
+  constexpr double kSame = 1e-9;    // of the range: one level, written with rounding
+  constexpr double kOnGrid = 0.02;  // of the step
+  constexpr double kShareOnGrid = 0.99;
+  if (readings.size() < 2) return 0.0;
+  std::vector<double> levels(readings.begin(), readings.end());
+  std::ranges::sort(levels);
+  const double range = levels.back() - levels.front();
+  double step = range;
+  for (std::size_t i = 1; i < levels.size(); ++i) {
+    const double gap = levels[i] - levels[i - 1];
+    if (gap > kSame * range) step = std::min(step, gap);
+  }
+  if (!(step > 0.0)) return 0.0;
+  std::size_t on_grid = 0;
+  std::size_t gaps = 0;
+  for (std::size_t i = 1; i < levels.size(); ++i) {
+    const double gap = (levels[i] - levels[i - 1]) / step;
+    if (gap * step <= kSame * range) continue;
+    ++gaps;
+    on_grid += std::abs(gap - std::round(gap)) <= kOnGrid * gap;
+  }
+  const bool grid = static_cast<double>(on_grid) >= kShareOnGrid * static_cast<double>(gaps);
+  return grid ? step : 0.0;
+}
+
+std::optional<EqualRun> clipped_run(std::span<const double> readings,
+                                    std::span<const double> rest) {
+  constexpr std::size_t kLeast = 4, kTimes = 3;
+  if (readings.size() < kLeast) return std::nullopt;
+  const auto [low, high] = std::ranges::minmax_element(readings);
+  const std::size_t resting = longest_equal(rest, 0, rest.size(), HUGE_VAL);
+  const bool rests_on_one_level = resting > 1 && 2 * resting >= rest.size();
+  std::optional<EqualRun> longest;
+  for (const EqualRun& run : {run_at(readings, *high, true), run_at(readings, *low, false)}) {
+    // Rounded readings repeat where the response turns; their neighbours repeat, too.
+    const std::size_t reach = kTimes * run.length;
+    const std::size_t first = run.first > reach ? run.first - reach : 0;
+    const std::size_t last = std::min(run.first + run.length + reach, readings.size());
+    std::size_t elsewhere = longest_equal(readings, first, last, run.value);
+    if (rests_on_one_level) elsewhere = std::max(elsewhere, resting);
+    if (run.length < kLeast || run.length <= kTimes * elsewhere) continue;
+    if (!longest || run.length > longest->length) longest = run;
+  }
+  return longest;
+}
+
+std::optional<RestTrend> rest_trend(std::span<const double> time_s, std::span<const double> rest) {
+  if (rest.size() < kFewestAtRest) return std::nullopt;
+  const RestLine line = line_through(time_s, rest);
+  const double squares = squares_about(line.off, 0.0);
+  if (!(line.spread > 0.0 && squares > 0.0)) return std::nullopt;
+  const double rho = std::clamp(lag1_about(line.off, 0.0).value_or(0.0), 0.0, kMostCorrelation);
+  const double variance = squares / static_cast<double>(rest.size() - 2);
+  return RestTrend{line.per_s, std::sqrt(variance / line.spread * (1.0 + rho) / (1.0 - rho))};
+}
+
+Adequacy judge_adequacy(const AdequacyData& data, double level) {
+  require_alike(data);
+  Adequacy result;
+  const auto n = static_cast<double>(data.residual.size());
+  if (data.rest.size() < kFewestAtRest || !(n > data.parameters)) return result;
+  const Noise noise = noise_of(data);
+  result.noise_sd = std::sqrt(noise.variance);
+  result.rest_degrees = noise.degrees;
+  if (noise.degrees < kFewestDegrees || !(noise.variance > 0.0)) return result;
+  const double square = squares_about(data.residual, 0.0) / (n - data.parameters);
+  result.residual_over_noise = std::sqrt(square / noise.variance);
+  result.p_value = p_of(data.residual, data.parameters, noise);
+  result.described = result.p_value < level ? Described::not_described : Described::adequate;
+  if (result.described == Described::not_described) result.causes = causes_of(data, noise, level);
+  return result;
+}
+
+}  // namespace tpm::study

@@ -1,0 +1,82 @@
+#pragma once
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tpm::study {
+
+/// Whether a law describes a recording.
+enum class Described {
+  adequate,       ///< the residuals are no larger than the noise
+  not_described,  ///< they are, at the level of the test
+  not_judged,     ///< the rest is too short to tell the noise
+};
+
+/// "adequate", "not_described", "not_judged": as files say it.
+[[nodiscard]] std::string_view described_name(Described described) noexcept;
+
+/// What an adequacy test looks at. Responses in one unit, times in s, both in the order of time.
+struct AdequacyData {
+  std::span<const double> rest_time_s;  ///< samples in which nothing moves and nothing touches
+  std::span<const double> rest;         ///< their readings, as many
+  std::span<const double> time_s;       ///< of the fitted samples
+  std::span<const double> reading;      ///< fitted readings
+  std::span<const double> residual;     ///< reading less prediction, or the negative
+  int parameters = 0;                   ///< fitted, 0 or more
+};
+
+/// Straight trend of the readings at rest.
+struct RestTrend {
+  double per_s = 0.0;
+  double standard_error = 0.0;  ///< counts the correlation of the readings
+};
+
+/// Readings in a row that are all equal.
+struct EqualRun {
+  std::size_t first = 0, length = 0;
+  double value = 0.0;
+  bool largest = true;  ///< at the largest reading, else at the smallest
+};
+
+/// Result of a test of the residual against the noise at rest.
+struct Adequacy {
+  Described described = Described::not_judged;
+  double residual_over_noise = 0.0;  ///< ratio of standard deviations; 0 if not judged
+  double noise_sd = 0.0;             ///< at rest, with the rounding of the readings
+  double rest_degrees = 0.0;         ///< degrees of freedom of its square
+  double p_value = 1.0;              ///< of a ratio at least this large if the law is right
+  std::vector<std::string> causes;   ///< likely ones, if not described
+};
+
+/// Step between neighbouring levels of readings that were rounded to a grid; 0 if there is none.
+[[nodiscard]] double quantum_of(std::span<const double> readings);
+
+/// The longest run of equal readings at the largest or smallest value that is longer than rounding
+/// makes: at least 4, and more than 3 times the longest run at other values near it (where readings
+/// at rest stay on one level, also 3 times the longest run there).
+[[nodiscard]] std::optional<EqualRun> clipped_run(std::span<const double> readings,
+                                                  std::span<const double> rest);
+
+/// None below 8 samples or for readings that are all equal.
+[[nodiscard]] std::optional<RestTrend> rest_trend(std::span<const double> time_s,
+                                                  std::span<const double> rest);
+
+/// Tests whether residuals have a larger variance than readings at rest. With autoregressive noise
+/// of first order and lag-1 correlation rho,
+///
+///     F = (sum of squared residuals / (N - parameters)) / s^2
+///
+/// is compared with the F distribution. s^2 is the variance of the rest about a straight line (a
+/// drift is no noise), corrected for what the line takes, plus q^2/12 of readings that are rounded
+/// to steps q. The degrees of freedom of both are those of the chi-square with the same first two
+/// moments (Satterthwaite), 2 E^2 / Var, at the upper confidence bound of rho: the smaller one of
+/// what the rest and the residuals tell, since under the hypothesis both are the same noise.
+///
+/// @param level probability of calling a law that is right not described, in (0, 1)
+/// Throws Error(bad_input) for readings that are not finite or spans of unequal lengths.
+[[nodiscard]] Adequacy judge_adequacy(const AdequacyData& data, double level = 0.01);
+
+}  // namespace tpm::study

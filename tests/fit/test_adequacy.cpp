@@ -1,0 +1,219 @@
+// The residual of a law against the noise where nothing moves: how often a law that is right is
+// called wrong, and how often a defect of a given size is found. Recordings are simulated from
+// closed forms; each is fitted by linear least squares, with the noise of every recording of its
+// own seed.
+#include <Eigen/Dense>
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tpm/base/random.hpp"
+#include "tpm/fit/select/adequacy.hpp"
+#include "tpmkit/error.hpp"
+
+using namespace tpm;
+using namespace tpm::study;
+
+namespace {
+
+constexpr double kStep_s = 0.1;
+constexpr int kLoaded = 240;
+
+/// Force of a parallel branch k, tau under a ramp of 1 per second for 2 s and a hold.
+double branch_force(double t, double tau) {
+  const double ramp = std::min(t, 2.0);
+  return tau * (1.0 - std::exp(-ramp / tau)) * std::exp(-(t - ramp) / tau);
+}
+
+/// Correlated noise of unit variance.
+class UnitNoise {
+ public:
+  UnitNoise(double rho, std::uint64_t seed) : rho_(rho), random_(seed), last_(random_.normal()) {}
+  double next() {
+    last_ = rho_ * last_ + std::sqrt(1.0 - rho_ * rho_) * random_.normal();
+    return last_;
+  }
+
+ private:
+  double rho_;
+  Random random_;
+  double last_;
+};
+
+struct Simulated {
+  std::vector<double> rest_time_s, rest, time_s, reading, residual;
+
+  [[nodiscard]] AdequacyData data() const {
+    return {rest_time_s, rest, time_s, reading, residual, 3};
+  }
+};
+
+enum class Defect { none, slow_branch, drift, ringing };
+
+/// The defect's force where the recording is loaded; before, only drift is there.
+double defect_force(Defect defect, double t) {
+  switch (defect) {
+    case Defect::none:
+      return 0.0;
+    case Defect::slow_branch:
+      return t < 0.0 ? 0.0 : branch_force(t, 12.0);
+    case Defect::drift:
+      return 0.1 * t;
+    case Defect::ringing:
+      return t < 0.0 ? 0.0 : std::exp(-t / 3.0) * std::sin(9.0 * t);
+  }
+  return 0.0;
+}
+
+/// Columns of the law that is fitted: an offset, the ramp and hold, a branch of 2 s.
+Eigen::MatrixXd law_columns() {
+  Eigen::MatrixXd a(kLoaded, 3);
+  for (int i = 0; i < kLoaded; ++i) {
+    const double t = kStep_s * i;
+    a.row(i) << 1.0, std::min(t, 2.0), branch_force(t, 2.0);
+  }
+  return a;
+}
+
+Eigen::VectorXd left_by_law(const Eigen::VectorXd& y) {
+  static const Eigen::MatrixXd a = law_columns();
+  static const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
+  return y - a * qr.solve(y);
+}
+
+/// @param noises rms of the residual that the best fit leaves without noise, in standard
+///        deviations of the noise
+/// @param quantum to which readings are rounded, in the same unit; 0 for none
+Simulated simulated(int at_rest, double rho, Defect defect, double noises, double quantum,
+                    std::uint64_t seed) {
+  double factor = 0.0;
+  if (defect != Defect::none) {
+    Eigen::VectorXd shape(kLoaded);
+    for (int i = 0; i < kLoaded; ++i) shape[i] = defect_force(defect, kStep_s * i);
+    factor = noises / (left_by_law(shape).norm() / std::sqrt(1.0 * kLoaded));
+  }
+  UnitNoise noise(rho, seed);
+  const auto read = [&](double force) {
+    const double y = force + noise.next();
+    return quantum > 0.0 ? quantum * std::round(y / quantum) : y;
+  };
+  Simulated s;
+  for (int i = -at_rest; i < 0; ++i) {
+    s.rest_time_s.push_back(kStep_s * i);
+    s.rest.push_back(read(factor * defect_force(defect, kStep_s * i)));
+  }
+  Eigen::VectorXd y(kLoaded);
+  for (int i = 0; i < kLoaded; ++i) {
+    const double t = kStep_s * i;
+    const double law = 60.0 * std::min(t, 2.0) + 45.0 * branch_force(t, 2.0);
+    s.time_s.push_back(t);
+    y[i] = read(5.0 * law + factor * defect_force(defect, t));
+    s.reading.push_back(y[i]);
+  }
+  const Eigen::VectorXd off = left_by_law(y);
+  s.residual.assign(off.begin(), off.end());
+  return s;
+}
+
+constexpr int kRests[] = {10, 14, 20, 30, 50, 80, 120, 200};
+
+}  // namespace
+
+TEST_CASE("a law that is right is called wrong in no more than a test at 1 % allows",
+          "[adequacy]") {
+  int wrong = 0;
+  int judged = 0;
+  Random pick(5);
+  for (int i = 0; i < 1000; ++i) {
+    const int rest = kRests[i % 8];
+    const int kind = i % 3;
+    const double rho = kind == 1 ? 0.9 : 0.0;
+    const double quantum =
+        kind == 2 ? std::exp(std::log(0.3) + pick.uniform() * std::log(20.0)) : 0.0;
+    const Simulated s = simulated(rest, rho, Defect::none, 0.0, quantum, 1000 + i);
+    const Adequacy a = judge_adequacy(s.data());
+    wrong += a.described == Described::not_described;
+    judged += a.described != Described::not_judged;
+  }
+  CAPTURE(wrong, judged);
+  CHECK(wrong <= 35);
+  CHECK(judged >= 700);  // the rest is AR(1) with too few effective samples
+}
+
+TEST_CASE("a law that leaves three times the noise is found", "[adequacy]") {
+  int found = 0;
+  Random pick(6);
+  constexpr Defect kDefects[] = {Defect::slow_branch, Defect::drift, Defect::ringing};
+  for (int i = 0; i < 1000; ++i) {
+    // At least 20 effective samples: n (1 - rho) / (1 + rho).
+    const double rho = i % 2 == 0 ? 0.0 : 0.6;
+    const int rest =
+        static_cast<int>(std::ceil((20.0 + 30.0 * pick.uniform()) * (1.0 + rho) / (1.0 - rho)));
+    const double noises = 3.0 * std::exp(pick.uniform() * std::log(10.0));
+    const Simulated s = simulated(rest, rho, kDefects[i % 3], noises, 0.0, 5000 + i);
+    const Adequacy a = judge_adequacy(s.data());
+    found += a.described == Described::not_described;
+  }
+  CHECK(found >= 927);
+}
+
+TEST_CASE("a clipped force cell is named", "[adequacy]") {
+  int named = 0;
+  Random pick(7);
+  for (int i = 0; i < 500; ++i) {
+    Simulated s = simulated(20, 0.0, Defect::none, 0.0, i % 2 == 0 ? 0.0 : 1.0, 9000 + i);
+    const double peak = *std::ranges::max_element(s.reading);
+    const double limit = (0.6 + 0.35 * pick.uniform()) * peak;
+    for (double& y : s.reading) y = std::min(y, limit);
+    const auto run = clipped_run(s.reading, s.rest);
+    named += run && run->largest;
+  }
+  CHECK(named >= 495);
+  int healthy = 0;
+  for (int i = 0; i < 500; ++i) {
+    const double quantum = i % 2 == 0 ? 0.0 : 0.3 * (1.0 + i % 20);
+    const Simulated s = simulated(20, 0.0, Defect::none, 0.0, quantum, 20000 + i);
+    healthy += clipped_run(s.reading, s.rest).has_value();
+  }
+  CHECK(healthy <= 5);
+}
+
+TEST_CASE("the causes of a misfit are told apart", "[adequacy]") {
+  const auto first_word = [](const Simulated& s) {
+    const Adequacy a = judge_adequacy(s.data());
+    REQUIRE(a.described == Described::not_described);
+    return a.causes.empty() ? std::string("none") : a.causes.front().substr(0, 5);
+  };
+  CHECK(first_word(simulated(60, 0.0, Defect::drift, 10.0, 0.0, 3)) == "drift");
+  CHECK(first_word(simulated(60, 0.0, Defect::slow_branch, 10.0, 0.0, 3)) == "none");
+  Simulated early = simulated(60, 0.0, Defect::none, 0.0, 0.0, 4);
+  for (int i = 0; i < 5; ++i) early.residual[i] += 60.0;
+  CHECK(first_word(early) == "trans");
+  Simulated lost = simulated(60, 0.0, Defect::none, 0.0, 0.0, 5);
+  for (int i = 100; i < 110; ++i) {
+    lost.residual[i] -= lost.reading[i];
+    lost.reading[i] = 0.3 * (i % 3 - 1);
+  }
+  CHECK(first_word(lost) == "lost ");
+}
+
+TEST_CASE("too short a rest gives no verdict", "[adequacy]") {
+  const Simulated s = simulated(7, 0.0, Defect::slow_branch, 50.0, 0.0, 1);
+  CHECK(judge_adequacy(s.data()).described == Described::not_judged);
+  const Simulated none = simulated(0, 0.0, Defect::slow_branch, 50.0, 0.0, 1);
+  CHECK(judge_adequacy(none.data()).described == Described::not_judged);
+  Simulated short_by_one = simulated(20, 0.0, Defect::none, 0.0, 0.0, 1);
+  short_by_one.rest.pop_back();
+  CHECK_THROWS_AS(judge_adequacy(short_by_one.data()), Error);
+}
+
+TEST_CASE("the grid of rounded readings is found", "[adequacy]") {
+  const std::vector<double> rounded{0.25, 0.5, 0.5, 1.25, 2.0, 0.75};
+  CHECK(quantum_of(rounded) == Approx(0.25));
+  const std::vector<double> smooth{0.1003, 0.2711, 0.4321, 0.9, 1.37, 2.012};
+  CHECK(quantum_of(smooth) == 0.0);
+  const std::vector<double> same{1.0, 1.0, 1.0};
+  CHECK(quantum_of(same) == 0.0);
+}
