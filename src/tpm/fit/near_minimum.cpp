@@ -208,7 +208,11 @@ void NearSearch::learn_curvature(const ThetaPoint& before) {
   if (told > seen) known *= seen / told;
   const Eigen::VectorXd off = wanted - known * step;
   const double along = off.dot(step);
-  if (std::abs(along) > kUndefined * off.norm() * step.norm()) {
+  // Each parameter in units of what it does to the residuals: the test knows no units.
+  Eigen::VectorXd length = here_.gram.diagonal()(curved_).cwiseSqrt();
+  length = (length.array() > 0.0).select(length.array(), 1.0).matrix();
+  const double off_norm = off.cwiseQuotient(length).norm();
+  if (std::abs(along) > kUndefined * off_norm * step.cwiseProduct(length).norm()) {
     known += off * off.transpose() / along;
   }
   missing_(curved_, curved_) = known;

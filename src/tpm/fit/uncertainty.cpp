@@ -110,13 +110,15 @@ namespace {
 class ProfileWalk {
  public:
   ProfileWalk(const ResidualFunction& function, std::span<const FitParameter> parameters,
-              const Minimum& minimum, double best_deviance, std::size_t index, double rise)
+              const Minimum& minimum, double best_deviance, std::size_t index, double rise,
+              double rounding)
       : function_(function),
         parameters_(parameters),
         minimum_(minimum),
         best_deviance_(best_deviance),
         index_(index),
         rise_(rise),
+        rounding_(rounding),
         accuracy_(function.surrogate() == nullptr ? kLimitAccuracy : kCostlyLimitAccuracy),
         fixed_(parameters.size(), false) {
     fixed_[index] = true;
@@ -137,10 +139,9 @@ class ProfileWalk {
     last_ = {p.theta(minimum_.natural[index_]), minimum_.deviance - best_deviance_,
              minimum_.natural};
     before_ = last_;
-    const double rounding = kRounding * std::max(1.0, std::abs(last_.theta));
     constexpr int kMostMoves = 400;
     for (int steps = 0; (bound - last_.theta) * direction > 0.0; ++steps) {
-      if (step < rounding) return End{ProfileEnd::rounding, last_.theta};
+      if (!(step > rounding_)) return End{ProfileEnd::rounding, last_.theta};
       if (steps == kMostMoves) return End{ProfileEnd::steps, last_.theta};
       double next = last_.theta + direction * step;
       if ((bound - next) * direction < 1e-3 * step) next = bound;
@@ -184,7 +185,6 @@ class ProfileWalk {
  private:
   static constexpr double kBetterBy = 1e-7;
   static constexpr double kLeastStep = 1e-3;  ///< of the first one, towards where the model ends
-  static constexpr double kRounding = 1e-13;  ///< shorter steps in theta are no steps
 
   /// A point of the profile.
   struct Place {
@@ -294,6 +294,7 @@ class ProfileWalk {
   double best_deviance_;
   std::size_t index_;
   double rise_;
+  double rounding_;  ///< shorter steps in theta are no steps
   double accuracy_;  ///< of a limit, in parts of its distance from the minimum
   FixedMask fixed_;
   Place last_, before_;  ///< between which, or beyond which, the next point is looked for
@@ -309,6 +310,39 @@ double first_step(const FitParameter& p, std::size_t index, const Covariance& co
   const double sd = covariance.theta_sd[place - covariance.free.begin()];
   const double from_sd = 0.3 * sd * std::sqrt(rise);
   return std::isfinite(width) ? std::min(from_sd, width / 10.0) : from_sd;
+}
+
+/// Size of a step in theta that is of the order of the parameter itself.
+double own_size(const FitParameter& p, double natural) {
+  return p.scale == Scale::linear ? std::abs(natural) : 1.0;
+}
+
+/// Steps in theta below this one change the residuals by no more than rounding does, whatever the
+/// parameter's unit: the residuals are differences of numbers about as large as the largest effect
+/// that a parameter has on them.
+double rounding_step(const ResidualFunction& function, std::span<const FitParameter> parameters,
+                     const Minimum& minimum, std::size_t index) {
+  constexpr double kRounding = 1e-13;
+  constexpr double kOfBounds = 1e-3;
+  const FitParameter& p = parameters[index];
+  const double own = own_size(p, minimum.natural[index]);
+  const auto length = [&](const RowMatrix& jacobian, std::size_t i) {
+    const FitParameter& q = parameters[i];
+    return jacobian.col(static_cast<Eigen::Index>(i)).norm() *
+           std::abs(q.natural_slope(q.theta(minimum.natural[i])));
+  };
+  RowMatrix jacobian;
+  if (function.information_root(minimum.natural, jacobian) && length(jacobian, index) > 0.0) {
+    double effect = 0.0;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      const double size = own_size(parameters[i], minimum.natural[i]);
+      if (size > 0.0) effect = std::max(effect, size * length(jacobian, i));
+    }
+    return kRounding * std::max(own, effect / length(jacobian, index));
+  }
+  // Without an effect of its own: what its bounds say of its size.
+  const double width = p.theta_upper() - p.theta_lower();
+  return kRounding * std::max(own, std::isfinite(width) ? kOfBounds * width : 0.0);
 }
 
 /// A range of natural values, open where a bound was reached.
@@ -337,12 +371,13 @@ Profile profile_likelihood(const ResidualFunction& function,
   const double best = minima.front().deviance;
   const double rise = threshold.rise(best);
   const double step = first_step(p, index, covariance, rise);
+  const double rounding = rounding_step(function, parameters, minima.front(), index);
   Profile profile;
   std::optional<Range> all;
   for (const Minimum& minimum : minima) {
     if (minimum.deviance - best >= rise) continue;
     profile.points.push_back({minimum.natural[index], minimum.deviance});
-    ProfileWalk walk(function, parameters, minimum, best, index, rise);
+    ProfileWalk walk(function, parameters, minimum, best, index, rise, rounding);
     Range range;
     for (const int direction : {-1, +1}) {
       const auto end = walk.run(direction, step, profile);
