@@ -1,5 +1,7 @@
 // Error budgets: sums that telescope, lines against closed forms, the random part against the
 // prediction, and what a file that is no budget says.
+#include <sys/resource.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -48,6 +50,32 @@ double force_of(const LawFile& law, const Protocol& motion, double time_s) {
 }
 
 }  // namespace
+
+TEST_CASE("the memory of a budget does not grow with the length of the motion") {
+  const auto peak_kib = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const auto stepped = [](double end_s, double period_s) {
+    const Protocol motion(Drive::displacement, {{0.0, 0.0}, {1.0, 1e-3}, {end_s, 1e-3}});
+    const std::vector<double> times{end_s, 0.5, 1.0 + 0.25 * period_s};
+    return stepped_forces(
+        motion, period_s, 0.0, [](double depth) { return 2.0 * depth; }, times,
+        std::vector{0.0, period_s});
+  };
+  const auto few = stepped(10.0, 1e-3);
+  const long before = peak_kib();
+  const auto many = stepped(1e4, 1e-3);
+  CHECK(peak_kib() - before < 8192);  // a force for each of 1e7 periods is 80 MB
+  for (const auto& forces : {few, many}) {
+    REQUIRE(forces.size() == 2);
+    CHECK(forces[0][0] == Approx(2e-3));
+    CHECK(forces[0][1] == Approx(1e-3));
+    CHECK(forces[0][2] == Approx(2e-3));
+    CHECK(forces[1][1] == Approx(2.0 * 0.499e-3));
+  }
+}
 
 TEST_CASE("the lines of any stages add up to the ends' difference") {
   Random random(1);

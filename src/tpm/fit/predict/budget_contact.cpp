@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
+#include <numeric>
+#include <utility>
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
@@ -20,31 +24,75 @@ std::vector<double> to_vector(const Eigen::VectorXd& values) {
   return {values.begin(), values.end()};
 }
 
-/// Linear between periods; before the first the first.
-double force_at(const SteppedForces& forces, double time_s) {
-  const double place = std::max((time_s - forces.start_s) / forces.period_s, 0.0);
-  const std::size_t last = forces.force_N.size() - 1;
-  const auto k = std::min(static_cast<std::size_t>(place), last);
-  if (k == last) return forces.force_N[last];
-  const double along = place - static_cast<double>(k);
-  return forces.force_N[k] + along * (forces.force_N[k + 1] - forces.force_N[k]);
-}
+/// Depths along a motion, asked for in rising times.
+class DepthAlong {
+ public:
+  explicit DepthAlong(const Protocol& motion) : knots_(motion.knots()) {}
+
+  double at(double time_s) {
+    while (knot_ + 1 < knots_.size() && knots_[knot_ + 1].time_s <= time_s) ++knot_;
+    const Knot& a = knots_[knot_];
+    if (knot_ + 1 == knots_.size()) return a.value;
+    const Knot& b = knots_[knot_ + 1];
+    return a.value + (b.value - a.value) * (time_s - a.time_s) / (b.time_s - a.time_s);
+  }
+
+ private:
+  std::span<const Knot> knots_;
+  std::size_t knot_ = 0;
+};
+
+/// Reads forces at wanted times as they come, one period after another.
+class LateReader {
+ public:
+  /// @param order places of the times, rising
+  LateReader(std::span<const double> times_s, std::span<const std::size_t> order, double begin_s,
+             double period_s)
+      : times_s_(times_s),
+        order_(order),
+        begin_s_(begin_s),
+        period_s_(period_s),
+        read_(times_s.size()) {}
+
+  /// Told the forces of the periods k - 1 and k, k from 1.
+  void between(std::size_t k, double before, double now) {
+    const auto left = static_cast<double>(k - 1);
+    for (; next_ < order_.size() && place() < left + 1.0; ++next_) {
+      read_[order_[next_]] = before + (place() - left) * (now - before);
+    }
+  }
+  std::vector<double> finish(double last) {
+    for (; next_ < order_.size(); ++next_) read_[order_[next_]] = last;
+    return std::move(read_);
+  }
+
+ private:
+  [[nodiscard]] double place() const {
+    return std::max((times_s_[order_[next_]] - begin_s_) / period_s_, 0.0);
+  }
+
+  std::span<const double> times_s_;
+  std::span<const std::size_t> order_;
+  double begin_s_, period_s_;
+  std::vector<double> read_;
+  std::size_t next_ = 0;
+};
 
 /// The law in the loop; it begins relaxed under its first depth, as a fit takes a recording.
-SteppedForces law_forces(const LawFile& law, const Protocol& motion, double period_s,
-                         double encoder_step_m) {
-  LawContact contact(law, {.period_s = period_s,
-                           .longest_s = motion.end_s() - motion.start_s(),
-                           .deepest_m = motion.peak(),
-                           .deepest_valid_m = valid_depth_m(law, motion.peak())});
+PeriodStep law_in_loop(const LawFile& law, const Protocol& motion, double period_s) {
+  const auto contact = std::make_shared<LawContact>(
+      law, LawContactSettings{.period_s = period_s,
+                              .longest_s = motion.end_s() - motion.start_s(),
+                              .deepest_m = motion.peak(),
+                              .deepest_valid_m = valid_depth_m(law, motion.peak())});
   if (motion.equilibrium_at_start()) {
     const double depth = motion.knots().front().value;
     const LawModel model(law.spec);
-    contact.take_over(depth, model.at(law.values, nullptr).kernel.value(std::max(depth, 0.0)));
+    contact->take_over(depth, model.at(law.values, nullptr).kernel.value(std::max(depth, 0.0)));
   }
-  return stepped_forces(motion, period_s, encoder_step_m, [&](double depth) {
-    return std::max(-contact.step(Eigen::Vector3d(0.0, 0.0, depth)).force_N.z(), 0.0);
-  });
+  return [contact](double depth) {
+    return std::max(-contact->step(Eigen::Vector3d(0.0, 0.0, depth)).force_N.z(), 0.0);
+  };
 }
 
 }  // namespace
@@ -66,9 +114,8 @@ std::vector<BudgetStage> loop_stages(const LawFile& law, const Protocol& motion,
                                      const BudgetDevice& device) {
   require_possible(device);
   std::vector<BudgetStage> stages;
-  add_device_stages(stages, law_forces(law, motion, device.period_s, 0.0),
-                    law_forces(law, motion, device.period_s, device.encoder_step_m), times_s,
-                    device,
+  add_device_stages(stages, motion, law_in_loop(law, motion, device.period_s),
+                    law_in_loop(law, motion, device.period_s), times_s, device,
                     {"loop",
                      fmt::format("the update of {} ms", significant(1e3 * device.period_s, 3)),
                      "integration",
@@ -118,44 +165,56 @@ BudgetStage law_stage(const LawFile& law, const Protocol& motion,
           to_vector(LawModel(law.spec).respond(motion, times_s, law.values, Want::values).value)};
 }
 
-SteppedForces stepped_forces(const Protocol& motion, double period_s, double encoder_step_m,
-                             const std::function<double(double)>& step) {
-  SteppedForces forces{motion.start_s(), period_s, {}};
+std::vector<std::vector<double>> stepped_forces(const Protocol& motion, double period_s,
+                                                double encoder_step_m, const PeriodStep& step,
+                                                std::span<const double> times_s,
+                                                std::span<const double> late_s) {
+  std::vector<std::size_t> order(times_s.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return times_s[i]; });
+  std::vector<LateReader> readers;
+  readers.reserve(late_s.size());
+  for (const double late : late_s) {
+    readers.emplace_back(times_s, order, motion.start_s() + late, period_s);
+  }
   const double length_s = motion.end_s() - motion.start_s();
   const auto count = static_cast<std::size_t>(std::ceil(length_s / period_s * (1.0 - 1e-12))) + 1;
-  const auto knots = motion.knots();
-  std::size_t knot = 0;
+  DepthAlong along(motion);
+  double before = 0.0;
   for (std::size_t k = 0; k < count; ++k) {
-    const double t = std::min(motion.start_s() + static_cast<double>(k) * period_s, motion.end_s());
-    while (knot + 1 < knots.size() && knots[knot + 1].time_s <= t) ++knot;
-    double depth = knots[knot].value;
-    if (knot + 1 < knots.size()) {
-      const Knot &a = knots[knot], &b = knots[knot + 1];
-      depth += (b.value - a.value) * (t - a.time_s) / (b.time_s - a.time_s);
-    }
+    double depth =
+        along.at(std::min(motion.start_s() + static_cast<double>(k) * period_s, motion.end_s()));
     if (encoder_step_m > 0.0) depth = encoder_step_m * std::round(depth / encoder_step_m);
-    forces.force_N.push_back(step(depth));
+    const double now = step(depth);
+    if (k > 0) {
+      for (LateReader& reader : readers) reader.between(k, before, now);
+    }
+    before = now;
   }
-  return forces;
+  return mapped<std::vector<double>>(
+      readers, [before](LateReader& reader) { return reader.finish(before); });
 }
 
-void add_device_stages(std::vector<BudgetStage>& stages, const SteppedForces& smooth,
-                       const SteppedForces& quantised, const std::vector<double>& times_s,
-                       const BudgetDevice& device, const BudgetStage& loop) {
-  const auto late = [&](const SteppedForces& forces, double late_s) {
-    return mapped<double>(times_s, [&](double t) { return force_at(forces, t - late_s); });
-  };
+void add_device_stages(std::vector<BudgetStage>& stages, const Protocol& motion,
+                       const PeriodStep& smooth, const PeriodStep& quantised,
+                       const std::vector<double>& times_s, const BudgetDevice& device,
+                       const BudgetStage& loop) {
   const double late_s = device.delay_periods * device.period_s;
+  const std::array<double, 3> late{0.0, late_s, late_s + device.period_s};
   stages.push_back(loop);
-  stages.back().force_N = late(smooth, 0.0);
+  stages.back().force_N = std::move(
+      stepped_forces(motion, device.period_s, 0.0, smooth, times_s, std::span(late).first(1))
+          .front());
+  auto forces =
+      stepped_forces(motion, device.period_s, device.encoder_step_m, quantised, times_s, late);
   stages.push_back(
       {"encoder",
        fmt::format("positions in steps of {} um", significant(1e6 * device.encoder_step_m, 3)),
-       "quantisation", BudgetKind::device, late(quantised, 0.0)});
+       "quantisation", BudgetKind::device, std::move(forces[0])});
   stages.push_back({"delayed", fmt::format("forces {} periods late", device.delay_periods), "delay",
-                    BudgetKind::device, late(quantised, late_s)});
+                    BudgetKind::device, std::move(forces[1])});
   stages.push_back({"hand", "each force kept until the next, at the end of its period", "period",
-                    BudgetKind::device, late(quantised, late_s + device.period_s)});
+                    BudgetKind::device, std::move(forces[2])});
 }
 
 void require_possible(const BudgetDevice& device) {

@@ -125,14 +125,14 @@ void add_planned_stages(std::vector<BudgetStage>& stages, const ExperimentScene&
   }
   const auto contacts = planned_contacts(plan, scene, std::array{device.period_s, device.period_s});
   const Eigen::Vector3d push = scene.probe().direction;
-  const auto forces = [&](ContactModel& contact, double encoder_step_m) {
-    return stepped_forces(scene.protocol, device.period_s, encoder_step_m, [&](double depth) {
+  const auto in_loop = [&push](ContactModel& contact) {
+    return [&push, &contact](double depth) {
       return std::max(-push.dot(contact.step(depth * push).force_N), 0.0);
-    });
+    };
   };
   add_device_stages(
-      stages, forces(*contacts.front(), 0.0), forces(*contacts.back(), device.encoder_step_m),
-      times_s, device,
+      stages, scene.protocol, in_loop(*contacts.front()), in_loop(*contacts.back()), times_s,
+      device,
       {"loop",
        fmt::format("{}, which tpm plan picks within {}, each {} ms", plan.chosen().name, tolerance,
                    significant(1e3 * device.period_s, 3)),
