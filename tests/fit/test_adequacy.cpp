@@ -14,7 +14,10 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
-using namespace tpm::study;
+using namespace tpm::base;
+using namespace tpm::data;
+using namespace tpm::files;
+using namespace tpm::fit;
 
 namespace {
 

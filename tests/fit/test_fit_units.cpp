@@ -11,8 +11,10 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::data;
+using namespace tpm::files;
 using namespace tpm::fit;
-using namespace tpm::study;
 
 namespace {
 

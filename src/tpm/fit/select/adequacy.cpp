@@ -5,15 +5,16 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 #include <numeric>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm::study {
+namespace tpm::fit {
 namespace {
 
 constexpr std::size_t kFewestAtRest = 8;
@@ -149,8 +150,7 @@ double p_of(std::span<const double> residual, int parameters, const Noise& noise
   if (!(noise.variance > 0.0)) return square > 0.0 ? 0.0 : 1.0;
   const double r2 = noise.correlation * noise.correlation;
   const double degrees = std::max(n * (1.0 - r2) / (1.0 + r2) - parameters, 1.0);
-  const boost::math::fisher_f f(degrees, noise.degrees);
-  return boost::math::cdf(boost::math::complement(f, square / noise.variance));
+  return fisher_tail(square / noise.variance, degrees, noise.degrees);
 }
 
 std::size_t longest_equal(std::span<const double> values, std::size_t first, std::size_t last,
@@ -307,4 +307,4 @@ Adequacy judge_adequacy(const AdequacyData& data, double level) {
   return result;
 }
 
-}  // namespace tpm::study
+}  // namespace tpm::fit

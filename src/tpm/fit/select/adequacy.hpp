@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm::study {
+namespace tpm::fit {
 
 /// Whether a law describes a recording.
 enum class Described {
@@ -79,4 +79,4 @@ struct Adequacy {
 /// Throws Error(bad_input) for readings that are not finite or spans of unequal lengths.
 [[nodiscard]] Adequacy judge_adequacy(const AdequacyData& data, double level = 0.01);
 
-}  // namespace tpm::study
+}  // namespace tpm::fit
