@@ -15,8 +15,6 @@
 
 using namespace tpm;
 using namespace tpm::base;
-using namespace tpm::data;
-using namespace tpm::files;
 using namespace tpm::fit;
 
 namespace {

@@ -117,12 +117,12 @@ SquaresAboutLine squares_about_line(std::size_t n, double rho) {
 }
 
 /// The noise as the rest and, if the law is right, the residuals tell it.
-struct Noise {
+struct RestNoise {
   double variance = 0.0, degrees = 0.0, correlation = 0.0;
 };
 
-Noise noise_of(const AdequacyData& data) {
-  Noise noise;
+RestNoise noise_of(const AdequacyData& data) {
+  RestNoise noise;
   const RestLine line = line_through(data.rest_time_s, data.rest);
   const auto of_rest = lag1_about(line.off, 0.0);
   const auto of_residual = lag1_about(data.residual, 0.0);
@@ -144,7 +144,7 @@ Noise noise_of(const AdequacyData& data) {
 }
 
 /// p of the mean square of residuals against the noise.
-double p_of(std::span<const double> residual, int parameters, const Noise& noise) {
+double p_of(std::span<const double> residual, int parameters, const RestNoise& noise) {
   const auto n = static_cast<double>(residual.size());
   const double square = squares_about(residual, 0.0) / std::max(n - parameters, 1.0);
   if (!(noise.variance > 0.0)) return square > 0.0 ? 0.0 : 1.0;
@@ -176,7 +176,7 @@ EqualRun run_at(std::span<const double> values, double value, bool largest) {
 }
 
 /// Readings that are back at the level of the rest while the law expects a load.
-std::optional<double> signal_lost_at_s(const AdequacyData& data, const Noise& noise) {
+std::optional<double> signal_lost_at_s(const AdequacyData& data, const RestNoise& noise) {
   constexpr int kInARow = 3;
   constexpr double kAtRest = 4.0, kFarOff = 20.0;  // standard deviations of the noise
   const double level = mean_of(data.rest);
@@ -191,7 +191,7 @@ std::optional<double> signal_lost_at_s(const AdequacyData& data, const Noise& no
   return std::nullopt;
 }
 
-std::vector<std::string> causes_of(const AdequacyData& data, const Noise& noise, double level) {
+std::vector<std::string> causes_of(const AdequacyData& data, const RestNoise& noise, double level) {
   std::vector<std::string> causes;
   const double sd = std::sqrt(noise.variance);
   if (const auto run = clipped_run(data.reading, data.rest)) {
@@ -295,7 +295,7 @@ Adequacy judge_adequacy(const AdequacyData& data, double level) {
   Adequacy result;
   const auto n = static_cast<double>(data.residual.size());
   if (data.rest.size() < kFewestAtRest || !(n > data.parameters)) return result;
-  const Noise noise = noise_of(data);
+  const RestNoise noise = noise_of(data);
   result.noise_sd = std::sqrt(noise.variance);
   result.rest_degrees = noise.degrees;
   if (noise.degrees < kFewestDegrees || !(noise.variance > 0.0)) return result;
