@@ -57,14 +57,15 @@ class LawModel final : public Model {
   /// The law at given parameters, branches in parallel form, as time steppers use it.
   /// @param rates of a fractional law, else unused
   [[nodiscard]] law::LawAtParameters at(std::span<const double> values,
-                                   const law::ExponentialSum* rates) const;
+                                        const law::ExponentialSum* rates) const;
   [[nodiscard]] bool linear_in(std::size_t parameter) const override;
   [[nodiscard]] std::pair<double, double> range(std::size_t parameter) const override;
 
  private:
   struct Prepared;
   /// @param rates of a fractional law, else unused
-  [[nodiscard]] Prepared prepare(std::span<const double> values, const law::ExponentialSum* rates) const;
+  [[nodiscard]] Prepared prepare(std::span<const double> values,
+                                 const law::ExponentialSum* rates) const;
   void require_no_jump(const Protocol& protocol, double contact) const;
 
   LawSpec spec_;
