@@ -8,7 +8,7 @@
 #include <tpmkit/version.hpp>
 
 int main() {
-  const auto model = tpm::fit::make_model("closed_form");
+  const auto model = tpm::make_model("closed_form");
   const double at_start = 0.0;
   const tpm::TpmVector paper = tpm::to_vector(tpm::TpmParameters{});
   const tpm::Response response =
