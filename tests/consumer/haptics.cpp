@@ -15,6 +15,7 @@ int main() {
   const tpm::haptics::Session session("session.json");
   tpm::haptics::SessionRequest request;
   request.recording = "session.tpmrec";
+  request.limits = "virtual";  // what is not measured of an Omega.7 would refuse this law
   const tpm::haptics::SessionSummary run = session.run(session.simulated_device(), request);
   const tpm::haptics::SessionCheck check = tpm::haptics::verify_session(request.recording);
   std::printf("%s, %.1e N of %.3f N\n", run.model.c_str(), check.rms_N, check.peak_N);

@@ -23,7 +23,7 @@ TEST_CASE("kill -9 at random moments: every recording opens and verifies up to t
   const test::TempFolder folder;
   // What a kill leaves behind is tried, not what a busy machine does to the device's watchdog.
   Json session = test::short_session();
-  session["virtual"] = {{"least_watchdog", "10 s"}};
+  session["virtual_device"] = {{"least_watchdog", "10 s"}};
   write_file(folder / "session.json", session.dump());
   int verified = 0, written_late = 0;
   Random random(0);
@@ -39,7 +39,14 @@ TEST_CASE("kill -9 at random moments: every recording opens and verifies up to t
       _exit(127);
     }
     // A busy machine may take seconds to begin; what is random is the moment after that.
-    for (int wait = 0; wait < 2000 && !std::filesystem::exists(file); ++wait) {
+    // The header stands in the file before threads and memory are prepared, rows from the first
+    // cycle on.
+    std::uintmax_t header = 0;
+    for (int wait = 0; wait < 2000; ++wait) {
+      const std::uintmax_t size =
+          std::filesystem::exists(file) ? std::filesystem::file_size(file) : 0;
+      if (header > 0 && size > header) break;
+      if (header == 0) header = size;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
     std::this_thread::sleep_for(std::chrono::duration<double>(0.65 * random.uniform()));
