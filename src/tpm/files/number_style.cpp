@@ -103,17 +103,6 @@ std::optional<WrittenNumber> take_apart(std::string_view field) {
   return number;
 }
 
-/// True for digits with a point, a sign and an exponent at most: it cannot hold any other mark.
-bool is_plainly_written(std::string_view field) noexcept {
-  bool point = false;
-  for (const char c : field) {
-    if (c == '.' && point) return false;
-    point |= c == '.';
-    if (!is_digit(c) && c != '.' && c != '-' && c != '+' && c != 'e' && c != 'E') return false;
-  }
-  return true;
-}
-
 /// "-12.5": a sign, digits and a point between them at most.
 bool is_plain_decimal(std::string_view field) noexcept {
   if (!field.empty() && field.front() == '-') field.remove_prefix(1);

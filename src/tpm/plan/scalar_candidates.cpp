@@ -31,10 +31,10 @@ class ScalarCandidate : public PlanModel {
   [[nodiscard]] bool for_loop() const override { return true; }
   [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> contacts(
       const PlanSurrogate& surrogate, std::span<const double> periods_s) const override {
-    constexpr double kRange = 1.05;  // as of other contact models
+    constexpr double kBuiltRange = 1.05;  // as of other contact models
     const ContactSpectrum& spectrum = surrogate.spectrum();
     const ScalarContact::Range range{spectrum.instantaneous(), spectrum.equilibrium(),
-                                     kRange * surrogate.scene().protocol().peak()};
+                                     kBuiltRange * surrogate.scene().protocol().peak()};
     std::vector<std::unique_ptr<ContactModel>> models;
     for (const double period_s : periods_s) {
       models.push_back(std::make_unique<ScalarContact>(

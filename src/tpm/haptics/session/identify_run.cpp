@@ -12,7 +12,7 @@
 namespace tpm::haptics {
 namespace {
 
-constexpr double kFurthest_m = 0.020;  ///< from the start, beyond which no force is sent
+constexpr double kLongestStroke_m = 0.020;  ///< from the start, beyond which no force is sent
 
 /// Answers with the forces of the identification, whatever the motion.
 class IdentifyingModel final : public ContactModel {
@@ -24,8 +24,8 @@ class IdentifyingModel final : public ContactModel {
     const double at_m = push_.dot(tool.displacement_m);
     const double force_N = force_.next_N(at_m);
     ContactAnswer answer;
-    answer.force_N = std::abs(at_m) > kFurthest_m ? Eigen::Vector3d(Eigen::Vector3d::Zero())
-                                                  : Eigen::Vector3d(force_N * push_);
+    answer.force_N = std::abs(at_m) > kLongestStroke_m ? Eigen::Vector3d(Eigen::Vector3d::Zero())
+                                                       : Eigen::Vector3d(force_N * push_);
     return answer;
   }
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
@@ -59,7 +59,7 @@ ServoSettings identifying_settings(const HilSession& like, const DeviceLimits& l
   servo.energy_allowance_J = std::numeric_limits<double>::infinity();
   servo.watch_oscillation = false;
   StartGateSettings gate;
-  gate.reach_m = limits.reach_m - kFurthest_m;
+  gate.reach_m = limits.reach_m - kLongestStroke_m;
   servo.gate = gate;
   return servo;
 }
