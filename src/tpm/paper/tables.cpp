@@ -23,9 +23,9 @@ struct Forces {
 /// Forces at the two instants of the table, with lambda1 given.
 Forces forces(const TableRequest& request, const TpmParameters& p, double depth_m, double lambda1) {
   if (request.mode == TableMode::as_printed) {
-    constexpr double kForever = std::numeric_limits<double>::infinity();
+    constexpr double kAfterAll_s = std::numeric_limits<double>::infinity();
     return {step_relaxation_force_N(p, lambda1, depth_m, 0.0),
-            step_relaxation_force_N(p, lambda1, depth_m, kForever)};
+            step_relaxation_force_N(p, lambda1, depth_m, kAfterAll_s)};
   }
   // Frozen or not makes no difference here: both instants have the full depth.
   ModelOptions options;
