@@ -136,7 +136,9 @@ TEST_CASE("blanks separate where they make the most rows of numbers") {
   CHECK(fields(table.rows[2]) == Fields{"0.5", "2"});
   std::string preamble;
   for (int i = 0; i < 300; ++i) preamble += "a setting, with a comma\n";
-  CHECK(parse_delimited(preamble + "0;1\n1;2\n2;3\n", "f", {.ragged = true}).separator == ';');
+  DelimitedOptions ragged;
+  ragged.ragged = true;
+  CHECK(parse_delimited(preamble + "0;1\n1;2\n2;3\n", "f", ragged).separator == ';');
 }
 
 TEST_CASE("a field quoted by quoted_field is read back") {

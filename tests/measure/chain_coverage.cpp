@@ -34,7 +34,7 @@ void predict(int simulations, std::uint64_t seed) {
   }
 }
 
-void contact(int simulations, std::uint64_t seed) {
+void contact_coverage(int simulations, std::uint64_t seed) {
   fmt::print(
       "| contact | parameter | interval holds the true value | exact p of 95 % |\n"
       "| --- | --- | --- | --- |\n");
@@ -87,7 +87,7 @@ int main(int argc, char** argv) {
   if (std::string(argv[1]) == "predict") {
     predict(simulations, seed);
   } else if (std::string(argv[1]) == "contact") {
-    contact(simulations, seed);
+    contact_coverage(simulations, seed);
   } else {
     identify(simulations, seed, argc > 4 ? std::atof(argv[4]) : -1.0);
   }
