@@ -188,3 +188,63 @@ TEST_CASE("a force cell at its limit is told", "[tables][!shouldfail]") {
   const std::string said = fit_of_seen([](double, double force) { return std::min(force, 0.30); });
   CHECK_THAT(said, Contains("clipp"));
 }
+
+TEST_CASE("a stress that was ramped and held is what was imposed", "[tables][!shouldfail]") {
+  // 2 kPa beside 3 kPa that relax in 5 s: q' = E1 strain' - q / tau, stress = E0 strain + q.
+  Random random(23);
+  std::string text = "time [s],strain [%],stress [Pa]\n";
+  double strain = 0.0, q = 0.0;
+  constexpr double kStep_s = 1e-3;
+  for (int i = 0; i <= 30000; ++i) {
+    const double t = kStep_s * i;
+    if (i % 100 == 0) {
+      text += fmt::format("{:.1f},{:.6f},{:.4f}\n", t, 100.0 * strain + 0.06 * random.normal(),
+                          50.0 * std::min(t, 2.0));
+    }
+    const double rate = ((t < 2.0 ? 50.0 : 0.0) + q / 5.0) / 5000.0;
+    q += kStep_s * (3000.0 * rate - q / 5.0);
+    strain += kStep_s * rate;
+  }
+  const test::TempFolder folder;
+  write_file(folder / "r.csv", text);
+  const Answer answer = answer_in(folder, "fit r.csv --law linear-1 --no-draw --format json");
+  REQUIRE(answer.code == 0);
+  CHECK_THAT(estimate_in(answer.said, "k1"), WithinRel(3000.0, 0.04));
+}
+
+TEST_CASE("strips that were fitted together keep their slack length", "[tables][!shouldfail]") {
+  const test::TempFolder folder;
+  for (const int speed : {1, 2}) {
+    std::string text = "time [s],length [-],stress [kPa]\n";
+    double q = 0.0;
+    for (int i = 0; i <= 400; ++i) {
+      const double t = 0.05 * i, rate = 0.05 * speed;
+      const double length = 0.95 + std::min(rate * t, 0.25);
+      const bool stretched = length > 1.0 && rate * t < 0.25;
+      // Exact over a sample of constant rate: 20 kPa beside 30 kPa that relax in 2 s.
+      const double decay = std::exp(-0.05 / 2.0);
+      q = q * decay + (stretched ? 30.0 * rate * 2.0 * (1.0 - decay) : 0.0);
+      text +=
+          fmt::format("{:.2f},{:.5f},{:.6f}\n", t, length, 20.0 * std::max(length - 1.0, 0.0) + q);
+    }
+    write_file(folder / fmt::format("s{}.csv", speed), text);
+  }
+  const Answer answer = answer_in(folder, "fit s1.csv s2.csv --law linear-1");
+  REQUIRE(answer.code == 0);
+  const Json law = parse_json(read_file(folder / "s1_fit/law.json"), "law.json");
+  CHECK_THAT(law.at("parameters").at("contact").get<double>(), WithinAbs(1.0, 0.01));
+}
+
+// "Validated, in the words of the standards": there is no command yet that judges a recording of
+// another specimen.
+TEST_CASE("a recording of a stiffer material is judged by its error and uncertainty",
+          "[tables][!shouldfail]") {
+  const test::TempFolder folder;
+  write_file(folder / "fitted.csv", recording_seen([](double, double force) { return force; }));
+  write_file(folder / "stiffer.csv",
+             recording_seen([](double, double force) { return 1.05 * force; }));
+  REQUIRE(answer_in(folder, "fit fitted.csv --law linear-1").code == 0);
+  const Answer judged = answer_in(folder, "validate fitted_fit/law.json stiffer.csv");
+  CHECK(judged.code <= 1);
+  CHECK_THAT(judged.said, Contains("a model error of"));
+}
