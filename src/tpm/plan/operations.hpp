@@ -7,6 +7,8 @@
 
 #include "tpmkit/operation_count.hpp"
 
+#include "tpm/base/namespaces.hpp"
+
 namespace tpm::plan {
 
 /// A kind of work in words and figures.
