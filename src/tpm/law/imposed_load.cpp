@@ -14,6 +14,21 @@ constexpr double kLeastShare = 1e-12;
 /// Eigenvalues this close, relative to the larger, count as one in a divided difference.
 constexpr double kConfluent = 1e-5;
 
+constexpr std::size_t kTerms = 20;
+
+/// (-1)^j / (j! (a + 1 + j)): the coefficients of z^j in int_0^1 exp(-z x) x^a dx.
+constexpr std::array<std::array<double, kTerms>, 3> moment_series() {
+  std::array<std::array<double, kTerms>, 3> series{};
+  double power = 1.0;  // (-1)^j / j!
+  for (std::size_t j = 0; j < kTerms; ++j) {
+    for (std::size_t a = 0; a < 3; ++a) series[a][j] = power / static_cast<double>(a + 1 + j);
+    power /= -static_cast<double>(j + 1);
+  }
+  return series;
+}
+
+constexpr auto kMomentSeries = moment_series();
+
 /// int_0^1 exp(-z x) x^a dx for a = 0, 1, 2.
 std::array<double, 3> exponential_moments(double z, double decay) {
   std::array<double, 3> moments{};
@@ -26,11 +41,11 @@ std::array<double, 3> exponential_moments(double z, double decay) {
     }
     return moments;
   }
-  constexpr int kTerms = 20;
-  double power = 1.0;  // (-z)^j / j!
-  for (int j = 0; j < kTerms; ++j) {
-    for (std::size_t a = 0; a < 3; ++a) moments[a] += power / static_cast<double>(a + 1 + j);
-    power *= -z / (j + 1);
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::array<double, kTerms>& c = kMomentSeries[a];
+    double sum = c[kTerms - 1];
+    for (std::size_t j = kTerms - 1; j-- > 0;) sum = sum * z + c[j];
+    moments[a] = sum;
   }
   return moments;
 }

@@ -80,8 +80,9 @@ std::optional<Response> respond_to_step(const LawSpec& spec, const std::vector<L
     return std::nullopt;
   }
   const double start = protocol.start_s();
-  if (!std::all_of(times_s.begin(), times_s.end(),
-                   [start](double t) { return t > start && std::isfinite(t); })) {
+  if (!std::all_of(times_s.begin(), times_s.end(), [=](double t) {
+        return (depth ? t > start : t >= start) && std::isfinite(t);
+      })) {
     return std::nullopt;
   }
   if (!depth && !has_stiffness(table, parameters)) {
@@ -100,14 +101,18 @@ std::optional<Response> respond_to_step(const LawSpec& spec, const std::vector<L
   const StepResponse function(spec, parameters);
   for (Eigen::Index i = 0; i < response.value.size(); ++i) {
     const double since = times_s[static_cast<std::size_t>(i)] - start;
-    const SlopedNumber f = depth ? function.relaxation(since) : function.creep(since);
+    const SlopedNumber f = depth         ? function.relaxation(since)
+                           : since > 0.0 ? function.creep(since)
+                                         : function.creep_at_once();
     const double v = step * f.value;  // a force, or V(u)
     const double u = depth ? v : at.kernel.inverse(v);
     response.value[i] = (depth ? at.offset : at.contact) + u;
     if (!want_slopes) continue;
     Eigen::VectorXd by = step * f.by;
     by[moved] -= f.value;
-    if (!depth) {
+    if (!depth && v == 0.0) {
+      by.setZero();  // nothing has moved yet, whatever the kernel
+    } else if (!depth) {
       const KernelShape::Values k = at.kernel.at(u);
       if (at.place.exponent >= 0) by[at.place.exponent] -= k.d_exponent;
       if (at.place.tension_share >= 0) {

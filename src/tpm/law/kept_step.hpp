@@ -24,9 +24,10 @@ struct KernelAtParameters {
                                                            Want want);
 
 /// A step of the depth or of the load on a law with spring-pots: G(t) V(u) and V(u) = J(t) F,
-/// exact at any time after the step. Nothing for other laws and histories, for elastic tension, for
-/// a depth on a curved kernel (its slope by the contact depth has no closed form there), at the
-/// step itself, or where the step leaves the probe out of contact.
+/// exact at any time after the step, and under a load at the step itself. Nothing for other laws
+/// and histories, for elastic tension, for a depth on a curved kernel (its slope by the contact
+/// depth has no closed form there), for a depth at the step itself, or where the step leaves the
+/// probe out of contact.
 [[nodiscard]] std::optional<Response> respond_to_step(const LawSpec& spec,
                                                       const std::vector<LawParameter>& table,
                                                       std::span<const double> parameters,

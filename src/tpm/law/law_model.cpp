@@ -13,6 +13,7 @@
 #include "tpm/law/imposed_depth.hpp"
 #include "tpm/law/imposed_load.hpp"
 #include "tpm/law/kelvin_chain.hpp"
+#include "tpm/law/kept_load_table.hpp"
 #include "tpm/law/kept_step.hpp"
 #include "tpm/law/relaxation/exponential_sum.hpp"
 #include "tpmkit/error.hpp"
@@ -401,6 +402,9 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
                            std::span<const double> parameters, Want want) const {
   require_times_within(protocol, times_s);
   require_in_range(parameters);
+  if (const auto table = KeptLoadTable::covering(protocol, times_s)) {
+    return table->at_asked(respond(protocol, table->times_s(), parameters, want));
+  }
   if (auto stepped = respond_to_step(spec_, parameters_, parameters, protocol, times_s, want)) {
     return *std::move(stepped);
   }

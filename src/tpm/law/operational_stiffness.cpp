@@ -1,5 +1,6 @@
 #include "tpm/law/operational_stiffness.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "tpm/law/kelvin_chain.hpp"
@@ -123,6 +124,36 @@ void OperationalStiffness::fractional(const Powers& powers, ComplexStiffness& g)
   g.by[place + 1] = (alpha * by_alpha + beta * by_beta) / tau;
   g.by[at_alpha] = by_alpha * powers.log;
   if (pair) g.by[at_alpha + 1] = by_beta * powers.log;
+}
+
+std::optional<ComplexStiffness> OperationalStiffness::instant() const {
+  const Fractional law = spec_.fractional;
+  ComplexStiffness g{0.0, Eigen::RowVectorXcd::Zero(std::ssize(values_))};
+  std::size_t place = 0;
+  if (has_lasting_spring(law)) {
+    g.value = values_[0];
+    g.by[0] = 1.0;
+    place = 1;
+  }
+  const auto add = [&](std::size_t i, double share) {
+    g.value += values_[i] * share;
+    g.by[static_cast<Eigen::Index>(i)] = share;
+  };
+  if (has_relaxation_time(law)) {
+    const double alpha = values_[place + 2];
+    const double beta = has_two_springpots(law) ? values_[place + 3] : 0.0;
+    if (values_[place] > 0.0 && std::min(alpha, beta) > 0.0) return std::nullopt;
+    // The softer of two in series counts; two springs of equal stiffness share.
+    if (std::min(alpha, beta) == 0.0) add(place, std::max(alpha, beta) > 0.0 ? 1.0 : 0.5);
+    return g;
+  }
+  const std::size_t springpots = law == Fractional::kelvin_voigt_pair ? 2 : 1;
+  for (std::size_t i = place; i < place + springpots; ++i) {
+    const double order = values_[i + springpots];
+    if (values_[i] > 0.0 && order > 0.0) return std::nullopt;
+    if (order == 0.0) add(i, 1.0);
+  }
+  return g;
 }
 
 }  // namespace tpm::law

@@ -54,10 +54,23 @@ struct WithSlope {
   std::complex<double> value, slope;
 };
 
+Error no_compliance(const LawSpec& spec) {
+  return bad_input(fmt::format("law {}", law_name(spec)), "no stiffness, so no compliance",
+                   "a stiffness above 0");
+}
+
 }  // namespace
 
 SlopedNumber StepResponse::relaxation(double t_s) const {
   return inverse_over_s(t_s, [](std::complex<double> g) { return WithSlope{g, 1.0}; });
+}
+
+SlopedNumber StepResponse::creep_at_once() const {
+  const std::optional<ComplexStiffness> g = stiffness_.instant();
+  if (!g) return {0.0, Eigen::VectorXd::Zero(count_)};
+  const double compliance = 1.0 / g->value.real();
+  if (!std::isfinite(compliance)) throw no_compliance(spec_);
+  return {compliance, -compliance * compliance * g->by.real().transpose()};
 }
 
 SlopedNumber StepResponse::creep(double t_s) const {
@@ -66,8 +79,7 @@ SlopedNumber StepResponse::creep(double t_s) const {
     return WithSlope{compliance, -compliance * compliance};
   });
   if (std::isfinite(j.value)) return j;
-  throw bad_input(fmt::format("law {}", law_name(spec_)), "no stiffness, so no compliance",
-                  "a stiffness above 0");
+  throw no_compliance(spec_);
 }
 
 SlopedNumber law_relaxation(const LawSpec& spec, std::span<const double> values, double t_s) {

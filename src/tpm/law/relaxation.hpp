@@ -39,6 +39,8 @@ class StepResponse {
   /// Throws Error(bad_input) as the functions above, for the time and for a law without stiffness.
   [[nodiscard]] SlopedNumber relaxation(double t_s) const;
   [[nodiscard]] SlopedNumber creep(double t_s) const;
+  /// J just after the step, of a fractional law: 0 where a spring-pot stands in no spring's series.
+  [[nodiscard]] SlopedNumber creep_at_once() const;
 
  private:
   /// 1/s times the transform to be inverted, and its derivative by the operational stiffness.
