@@ -107,6 +107,48 @@ TEST_CASE("A creep compliance is fitted from its file alone") {
   CHECK_THAT(estimate(fit, "tau1"), WithinRel(T * k / (k0 + k), 1e-5));
 }
 
+TEST_CASE("All laws are fitted to a creep compliance that begins at 0 s") {
+  // Times are equidistant and begin with the step itself, as exported by rheometers.
+  constexpr double k0 = 3000.0, ka = 1500.0, Ta = 0.5, kb = 2500.0, Tb = 20.0;
+  const test::TempFolder folder;
+  std::string text = "time [s],compliance [1/Pa]\n";
+  for (int i = 0; i < 600; ++i) {
+    const double t = 0.1 * i;
+    text += fmt::format("{:.17g},{:.17g}\n", t,
+                        1.0 / k0 + (1.0 - std::exp(-t / Ta)) / ka + (1.0 - std::exp(-t / Tb)) / kb);
+  }
+  write_file(folder / "j.csv", text);
+  const Selection s = select_law(read(folder / "j.csv"), quick());
+  const FitResult& fit = chosen(s);
+  CHECK(law_name(fit.config.law.value()) == "linear-2");
+  const KelvinChain chain = to_series({estimate(fit, "k_inf"),
+                                       {estimate(fit, "k1"), estimate(fit, "k2")},
+                                       {estimate(fit, "tau1"), estimate(fit, "tau2")}});
+  CHECK_THAT(chain.k0, WithinRel(k0, 1e-6));
+  CHECK_THAT(chain.k.front(), WithinRel(ka, 1e-6));
+  CHECK_THAT(chain.T_s.front(), WithinRel(Ta, 1e-6));
+  CHECK_THAT(chain.k.back(), WithinRel(kb, 1e-6));
+  CHECK_THAT(chain.T_s.back(), WithinRel(Tb, 1e-6));
+}
+
+TEST_CASE("A relaxation modulus that falls by more decades than an instrument reads is fitted") {
+  const test::TempFolder folder;
+  std::string text = "time [s],G(t) [Pa]\n";
+  for (const double t : decades_of(1e-4, 100.0, 121)) {
+    text += fmt::format("{:.9g},{:.9g}\n", t, std::exp(-t));
+  }
+  write_file(folder / "g.csv", text);
+  const Selection s = select_law(read(folder / "g.csv"), quick());
+  CHECK(law_name(chosen(s).config.law.value()) == "linear-1-fluid");
+  CHECK_THAT(estimate(chosen(s), "k1"), WithinRel(1.0, 1e-6));
+  CHECK_THAT(estimate(chosen(s), "tau1"), WithinRel(1.0, 1e-6));
+  REQUIRE_FALSE(s.warnings.empty());
+  CHECK(s.warnings.front().find("43 decades") != std::string::npos);
+  // The written configuration says the same.
+  const FitConfig again = parse_fit_config(config_json(chosen(s).config), "config.json");
+  CHECK_THAT(estimate(run_fit(again), "tau1"), WithinRel(1.0, 1e-6));
+}
+
 TEST_CASE("A relaxation modulus that falls by a power of time is fitted by a spring-pot") {
   constexpr double kSize = 500.0, kOrder = 0.3;
   const test::TempFolder folder;

@@ -170,7 +170,9 @@ void profile_all(const ResidualFunction& function, FitResult& result,
     widen_profiles(function, result, parameters, candidates, threshold);
     return;
   }
-  throw Error(ExitCode::numerical, "profiles", "a deeper minimum was met again and again");
+  throw Error(ExitCode::numerical, "profiles",
+              "a deeper minimum was met again and again; expected one that stays: a law of fewer "
+              "parameters (--law), or more starts (--starts 200)");
 }
 
 void describe_parameters(FitResult& result, double level, bool profiles) {

@@ -117,6 +117,9 @@ struct FitConfig {
   /// Intervals count correlated neighbours of a recording as fewer readings.
   bool adjust_correlation = true;
   std::size_t starts = 50;
+  /// Where the search begins, each in the order of `parameters`, if that was found from the data
+  /// beforehand. Followed besides starts with solved linear parameters, instead of those anywhere.
+  std::vector<std::vector<double>> given_starts;
   std::uint64_t seed = 0;
   double level = 0.95;
   bool profiles = true;

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace tpm::fit {
@@ -172,7 +173,7 @@ std::vector<bool> linear_parameters(const ExperimentResiduals& function) {
 StartKind start_kind(const ExperimentResiduals& function) {
   const std::vector<bool> linear = linear_parameters(function);
   const bool any = std::find(linear.begin(), linear.end(), true) != linear.end();
-  return any ? StartKind::solved : StartKind::anywhere;
+  return any || !function.config().given_starts.empty() ? StartKind::solved : StartKind::anywhere;
 }
 
 std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
@@ -182,8 +183,12 @@ std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
   if (start_kind(function) == StartKind::anywhere) {
     return latin_hypercube_starts(parameters, count, config.seed);
   }
-  auto starts = projected_starts(function, parameters, linear_parameters(function), count,
-                                 kFollowed, config.seed);
+  std::vector<std::vector<double>> starts = config.given_starts;
+  const std::vector<bool> linear = linear_parameters(function);
+  if (std::ranges::find(linear, true) != linear.end()) {
+    std::ranges::move(projected_starts(function, parameters, linear, count, kFollowed, config.seed),
+                      std::back_inserter(starts));
+  }
   // Sorted, so that equal laws are seen to be equal.
   for (auto& start : starts) function.exchange_order().sort(start);
   return starts;

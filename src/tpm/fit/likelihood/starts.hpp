@@ -10,7 +10,7 @@ namespace tpm::fit {
 /// Where starts come from, which decides how they are followed.
 enum class StartKind {
   anywhere,  ///< spread over the bounds: the general search, with a bold and a cautious first step
-  solved,    ///< their linear parameters were solved for: the search from nearby
+  solved,    ///< found from the data: the search from nearby
 };
 
 /// Minimum of x' G x / 2 - g' x with lower <= x <= upper by an active set of bounds; x is as near
@@ -28,11 +28,12 @@ enum class StartKind {
     const ResidualFunction& function, std::span<const FitParameter> parameters,
     const std::vector<bool>& linear, std::size_t count, std::size_t keep, std::uint64_t seed);
 
-/// Whether fit_starts() gives projected starts.
+/// Whether fit_starts() gives projected or given starts.
 [[nodiscard]] StartKind start_kind(const ExperimentResiduals& function);
 
 /// The starts of a configuration: a Latin hypercube of all parameters, or, where the model is
-/// linear in some and the noise does not depend on it, projected starts.
+/// linear in some and the noise does not depend on it, projected starts; FitConfig::given_starts
+/// come before the latter and instead of the former.
 [[nodiscard]] std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
                                                           std::span<const FitParameter> parameters);
 

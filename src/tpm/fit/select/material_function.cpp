@@ -9,6 +9,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/select/function_starts.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
@@ -23,10 +24,18 @@ struct FunctionSizes {
   double longest_s = 0.0;
   bool all_positive = true;
   double largest = 0.0;  ///< reading
+  bool compliance = false;
+  double least = std::numeric_limits<double>::infinity();
 
   void see(double reading) {
     all_positive = all_positive && reading > 0.0;
     largest = std::max(largest, std::abs(reading));
+    least = std::min(least, reading);
+  }
+  /// No instrument reads more decades at once: below, a reading's noise is that of this share.
+  static constexpr double kSmallestShare = 1e-6;
+  [[nodiscard]] bool beyond_instruments() const {
+    return all_positive && !compliance && least < kSmallestShare * largest;
   }
   void see_time(double time_s) {
     if (!(time_s > 0.0)) return;
@@ -48,14 +57,14 @@ FunctionSizes sizes_of_spectrum(const Spectrum& spectrum) {
 
 FunctionSizes sizes_of_step(const Recording& recording) {
   FunctionSizes sizes;
-  double least = std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();  // above 0
   for (std::size_t i = 0; i < recording.response.size(); ++i) {
     sizes.see(recording.response[i]);
     if (recording.response[i] > 0.0) least = std::min(least, recording.response[i]);
     sizes.see_time(recording.time_s[i]);
   }
-  const bool compliance = recording.response_quantity == Quantity::creep_compliance;
-  sizes.stiffness = compliance ? 1.0 / least : sizes.largest;
+  sizes.compliance = recording.response_quantity == Quantity::creep_compliance;
+  sizes.stiffness = sizes.compliance ? 1.0 / least : sizes.largest;
   return sizes;
 }
 
@@ -110,8 +119,11 @@ Noise noise_of_function(const MaterialFunction& function, const FunctionSizes& s
   if (per_row) {
     noise.kind = NoiseKind::per_row;
   } else if (sizes.all_positive) {
-    noise.kind = NoiseKind::relative_to_datum;
+    noise.kind = sizes.beyond_instruments() ? NoiseKind::combined : NoiseKind::relative_to_datum;
     noise.relative = kShare;
+    if (sizes.beyond_instruments()) {
+      noise.absolute = kShare * FunctionSizes::kSmallestShare * sizes.largest;
+    }
   } else {
     noise.kind = NoiseKind::absolute;
     noise.absolute = kShare * sizes.largest;
@@ -148,9 +160,18 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
   return candidate;
 }
 
-/// Relaxation times that lie outside what was measured, in words.
+/// What was assumed of small readings, and relaxation times that lie outside what was measured.
 std::vector<std::string> range_warnings(const FitResult& fit, const FunctionSizes& sizes) {
   std::vector<std::string> warnings;
+  if (fit.config.data.front().noise.kind == NoiseKind::combined) {
+    warnings.push_back(fmt::format(
+        "the readings span {} decades: those below {} of the largest are taken to scatter as if "
+        "they "
+        "had that size, for no instrument reads more decades at once; a column of standard "
+        "deviations says otherwise (--sd COLUMN)",
+        significant(std::log10(sizes.largest / sizes.least), 2),
+        significant(FunctionSizes::kSmallestShare, 1)));
+  }
   for (const ParameterResult& p : fit.parameters) {
     if (p.parameter.unit.dimension != Dimension::time) continue;
     const bool early = p.estimate < sizes.shortest_s;
@@ -248,6 +269,9 @@ FitConfig function_config(LawSpec law, const MaterialFunction& function,
   data.noise = noise_of_function(function, sizes);
   data.import = function.import;
   config.data.push_back(std::move(data));
+  if (const auto* step = std::get_if<Recording>(&function.data)) {
+    config.given_starts = function_starts(config, *step);
+  }
   return config;
 }
 

@@ -417,11 +417,11 @@ Json config_json(const FitConfig& config) {
     Json entry{{"dataset", d.dataset}};
     entry["protocol"] = {{"kind", protocol_kind_name(d.protocol.kind)}};
     entry["noise"] = {{"kind", noise_kind_name(d.noise.kind)}};
-    if (d.noise.kind == NoiseKind::absolute) {
+    if (uses_absolute(d.noise.kind)) {
       const Dimension response = quantity_dimension(config.law->response);
       entry["noise"]["absolute"] = text(d.noise.absolute, shown_unit(response));
     }
-    if (d.noise.kind == NoiseKind::relative_to_datum) entry["noise"]["relative"] = d.noise.relative;
+    if (uses_relative(d.noise.kind)) entry["noise"]["relative"] = d.noise.relative;
     entry["noise"]["scale"] = d.noise.scale_known ? "known" : "estimated";
     if (const Json import = import_json(d.import); !import.empty()) entry["import"] = import;
     if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, shown_unit(Dimension::time));
