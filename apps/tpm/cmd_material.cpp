@@ -8,10 +8,10 @@
 #include "recording_options.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/files/json.hpp"
-#include "tpm/files/renamed_names.hpp"
 #include "tpm/fit/predict/organ_material.hpp"
 #include "tpm/fit/show/organ_material_report.hpp"
 #include "tpm/organ/scene/protocol_file.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
 
@@ -66,7 +66,7 @@ int run_material(const MaterialCommand& command, const Session& session) {
     will_write_into(command.folder, {"material_profiles.svg", "material_profiles.png"});
   }
   const LawFile law = read_law(command.law);
-  const Json scene = checked(read_json(command.scene), "scene", command.scene);
+  const Json scene = checked(read_json(command.scene), scene_kind(), command.scene);
   const OrganMaterial result =
       put_on_organ(law, chosen_motions(command, law, scene), scene, command.scene,
                    std::filesystem::path(command.scene).parent_path(), material_options(command));

@@ -118,6 +118,7 @@ void say_with_files(const Session& session, Json json, std::string_view text,
                     const std::vector<std::string>& files);
 
 // One function per file cmd_*.cpp.
+void add_schema_command(CLI::App& app, Session& session);
 void add_version_command(CLI::App& app, Session& session);
 void add_view_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);

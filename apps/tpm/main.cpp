@@ -160,7 +160,7 @@ void add_commands(CLI::App& app, Session& session) {
       {"Evidence: the paper, and tpm itself",
        {add_report_command, add_tables_command, add_audit_command, add_experiments_command,
         add_benchmark_command, add_stability_command, add_recovery_command, add_coverage_command,
-        add_check_gradient_command, add_version_command}}};
+        add_check_gradient_command, add_schema_command, add_version_command}}};
   for (const Group& group : groups) {
     for (const Adder add : group.commands) {
       const std::size_t before = app.get_subcommands({}).size();

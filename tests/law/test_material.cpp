@@ -533,7 +533,7 @@ TEST_CASE("what a material cannot be is said with its key") {
              Catch::Contains("formula '1 + q'"));
   CHECK_THAT(refusal_of(block_scene(R"({"Einf": "1 kPa", "regions": [{"kind": "box",
                                         "radius": "1 mm", "factor": 2}]})")),
-             Catch::Contains("/material/regions/0/radius: is no key of a region of kind box"));
+             Catch::Contains("/material/regions/0/radius: is no key of the kind 'box'"));
   CHECK_THAT(refusal_of(block_scene(R"({"Einf": "1 kPa", "fractional": {"g": "1 kPa", "order": 0.3,
                "tau": "1 s", "shortest": "1 us", "longest": "1000 s", "error": 1e-6}})")),
              Catch::Contains("/material/fractional: fractional branch: an error of 1e-06 takes"));

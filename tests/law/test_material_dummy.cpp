@@ -75,7 +75,7 @@ TEST_CASE("a shape in one file runs in scenes, and is refused in one line") {
   missing.replace(missing.find(R"(, "uncrimped": "2 mm")"), 21, "");
   CHECK_THAT(run(missing).text,
              Catch::Contains("/material/potential/uncrimped: is missing; expected elongation s at "
-                             "which collagen pulls of the shape 'dummy', in m"));
+                             "which collagen pulls: a text of a number and a unit of length"));
 }
 
 TEST_CASE("a sweep sets the parameters of a shape in one file by their names") {

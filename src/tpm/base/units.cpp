@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/quantity_pattern.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -331,7 +332,69 @@ constexpr auto kDimensionWords = std::to_array<DimensionWord>({
     {Dimension::compliance, "compliance", "1/Pa"},
 });
 
+/// The names of units with the same powers, as a regular expression.
+struct NamePattern {
+  Powers powers;
+  std::string names;
+};
+
+std::vector<NamePattern> name_patterns() {
+  std::string letters;
+  for (const Prefix& prefix : kPrefixes) letters += prefix.letter;
+  std::vector<NamePattern> patterns;
+  for (const BaseUnit& base : kBases) {
+    auto same = std::find_if(patterns.begin(), patterns.end(),
+                             [&](const NamePattern& p) { return p.powers == base.powers; });
+    if (same == patterns.end()) same = patterns.insert(same, {base.powers, ""});
+    if (!same->names.empty()) same->names += '|';
+    if (base.prefixed) same->names += fmt::format("[{}]?", letters);
+    same->names += base.name;
+  }
+  return patterns;
+}
+
+Powers quotient(const Powers& above, const Powers& below) {
+  Powers powers = above;
+  for (std::size_t i = 0; i < powers.size(); ++i) powers[i] -= below[i];
+  return powers;
+}
+
+/// A unit of a dimension by one name or as a quotient of two, as a regular expression.
+std::string unit_pattern(Dimension dimension) {
+  static const std::vector<NamePattern> all = name_patterns();
+  std::string pattern;
+  const auto add = [&](const std::string& more) {
+    pattern += fmt::format("{}{}", pattern.empty() ? "" : "|", more);
+  };
+  for (const PhysicalDimension& known : kDimensions) {
+    if (known.dimension != dimension) continue;
+    for (const NamePattern& above : all) {
+      if (above.powers == known.powers) add(above.names);
+      for (const NamePattern& below : all) {
+        if (quotient(above.powers, below.powers) != known.powers) continue;
+        add(fmt::format("(?:{})/(?:{})", above.names, below.names));
+      }
+    }
+  }
+  return pattern;
+}
+
 }  // namespace
+
+std::string base::quantity_pattern(Dimension dimension, int sign) {
+  constexpr std::string_view kDigits = "(?:[0-9]+\\.?[0-9]*|\\.[0-9]+)(?:[eE][-+]?[0-9]+)?";
+  constexpr std::string_view kSpace = "[ \\t\\r\\n]*", kNotZero = "(?=[0.]*[1-9])";
+  const std::string number =
+      fmt::format("{}{}{}", sign < 0 ? "-?" : "", sign > 0 ? kNotZero : "", kDigits);
+  // The unit begins with what is no digit; powers, points, blanks and letters of other alphabets
+  // are left to the reader.
+  const std::string unit = fmt::format(
+      "(?:(?:{})|[A-Za-z%\"][^\\t\\r\\n]*[^-A-Za-z%\"/\\t\\r\\n][^\\t\\r\\n]*|[^ "
+      "-~\\t\\r\\n][^\\t\\r\\n]*)",
+      unit_pattern(dimension));
+  return fmt::format("^{0}(?:[+]?{1}[ \\t]+{2}|{1}{2}{3}){0}$", kSpace, number, unit,
+                     dimension == Dimension::dimensionless ? fmt::format("|[+]?{}", number) : "");
+}
 
 std::string_view dimension_name(Dimension dimension) noexcept {
   return entry_of(kDimensionWords, dimension).text;

@@ -19,6 +19,7 @@
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
+#include "tpm/files/other_kind.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -239,6 +240,7 @@ std::optional<Violation> innermost_violation(const nlohmann::json& rules,
 }  // namespace
 
 void check_schema(const Json& value, std::string_view schema_name, std::string_view where) {
+  require_not_other_kind(value, schema_name, where);
   require_signed_range(value, "", where);
   const Json root = read_schema(schema_name);
   const nlohmann::json schema_document = root;

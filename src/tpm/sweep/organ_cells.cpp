@@ -11,8 +11,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/organ/scene/blocks.hpp"
-#include "tpm/organ/scene/experiment_blocks.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/plan/shared_plan.hpp"
 #include "tpm/sweep/scene_field.hpp"
@@ -305,7 +304,7 @@ class OrganCell final : public CellModel {
       return bases_.front().second;
     }
     if (bases_.size() == kKept) bases_.pop_back();
-    check_schema(texts, "scene", "scene");
+    (void)checked(texts, scene_kind(), "scene");
     bases_.emplace(bases_.begin(), key,
                    parse_checked_experiment(structure, "scene", setup_.folder));
     return bases_.front().second;

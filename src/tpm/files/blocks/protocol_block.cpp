@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
 
 #include "tpm/base/text.hpp"
@@ -12,118 +11,184 @@
 namespace tpm::files {
 namespace {
 
-constexpr ProtocolKey kDepthKey{"depth", Dimension::length, &ProtocolBlock::depth_m, false};
-constexpr ProtocolKey kRateKey{"rate", Dimension::speed, &ProtocolBlock::rate_m_per_s, false};
-constexpr ProtocolKey kHoldKey{"hold", Dimension::time, &ProtocolBlock::hold_s, true};
-constexpr ProtocolKey kStepHoldKey{"hold", Dimension::time, &ProtocolBlock::hold_s, false};
-constexpr ProtocolKey kLoadKey{"load", Dimension::force, &ProtocolBlock::load_N, false};
-constexpr ProtocolKey kDurationKey{"duration", Dimension::time, &ProtocolBlock::duration_s, false};
+using Number = std::optional<double> ProtocolBlock::*;
 
-void read_knots(const Json& list, const DocumentPlace& place, ProtocolBlock& block) {
-  const bool by_depth = list.front().contains("depth");
-  const char* key = by_depth ? "depth" : "load";
-  std::vector<Knot>& knots = block.knots;
-  block.drive = by_depth ? Drive::displacement : Drive::force;
-  for (const Json& entry : list) {
-    const DocumentPlace here = place.key(std::to_string(knots.size()));
-    if (entry.size() != 2 || !entry.contains(key)) {
-      throw bad_input(here.where, "is another thing than the first",
-                      fmt::format("a time and a {}, as in the first", key));
-    }
-    knots.push_back(
-        {quantity_at(entry, "time", Dimension::time, here),
-         quantity_at(entry, key, by_depth ? Dimension::length : Dimension::force, here)});
-  }
-}
+/// A number of a protocol.
+struct NumberKey {
+  const char* name;
+  Dimension dimension;
+  Range range;
+  Number value;
+  const char* sentence;
+  const char* example;
+};
 
-double in_range(double value, const ProtocolKey& key, const DocumentPlace& at_key) {
-  if (key.may_be_zero ? value >= 0.0 : value > 0.0) return value;
-  throw bad_input(
-      at_key.where, fmt::format("{} {}", shortest(value), si_symbol(key.dimension)),
-      key.may_be_zero ? fmt::format("0 {} or more", si_symbol(key.dimension)) : "a value above 0");
-}
+constexpr NumberKey kDepth{"depth",
+                           Dimension::length,
+                           kAboveZero,
+                           &ProtocolBlock::depth_m,
+                           "how deep the tissue is indented",
+                           "8 mm"};
+constexpr NumberKey kRate{
+    "rate",  Dimension::speed, kAboveZero, &ProtocolBlock::rate_m_per_s, "speed of the ramp",
+    "4 mm/s"};
+constexpr NumberKey kHold{
+    "hold", Dimension::time, kZeroOrMore, &ProtocolBlock::hold_s, "how long the depth is held",
+    "30 s"};
+constexpr NumberKey kStepHold{
+    "hold", Dimension::time, kAboveZero, &ProtocolBlock::hold_s, "how long the depth is held",
+    "30 s"};
+constexpr NumberKey kLoad{"load",      Dimension::force, kAboveZero, &ProtocolBlock::load_N,
+                          "the force", "0.1 N"};
+constexpr NumberKey kDuration{"duration",
+                              Dimension::time,
+                              kAboveZero,
+                              &ProtocolBlock::duration_s,
+                              "how long the load is kept",
+                              "30 s"};
 
-/// Throws unless a number is there and in range.
-double number_of(const ProtocolBlock& block, const ProtocolKey& key, const DocumentPlace& place) {
-  const std::optional<double>& value = block.*key.value;
-  if (value) return in_range(*value, key, place.key(key.text));
-  throw bad_input(
-      place.key(key.text).where, "is missing",
-      fmt::format("a {} for '{}'", key.text, entry_of(kProtocolKindWords, block.kind).text));
-}
-
-/// Of a list of quantities, or of one.
-std::vector<double> numbers_of(const Json& list, const ProtocolKey& key, const DocumentPlace& at) {
-  if (!list.is_array()) {
-    return {in_range(quantity_of(list, key.dimension, at.where), key, at)};
-  }
-  std::vector<double> values;
-  values.reserve(list.size());
-  for (const Json& entry : list) {
-    const DocumentPlace here = at.key(std::to_string(values.size()));
-    values.push_back(in_range(quantity_of(entry, key.dimension, here.where), key, here));
-  }
-  return values;
-}
-
-void require_known_keys(const Json& block, const DocumentPlace& place, ProtocolKind kind,
-                        Openness openness, std::vector<std::string_view> names,
-                        std::vector<std::string_view> others) {
-  if (openness == Openness::open) {
-    others.insert(others.begin(), names.begin(), names.end());
-    names.clear();
-  }
-  require_keys_of(block, entry_of(kProtocolKindWords, kind).text, names, others, place);
-}
-
-Protocol protocol_of_knots(const std::vector<Knot>& knots, Drive drive,
-                           const DocumentPlace& place) {
-  for (std::size_t i = 1; i < knots.size(); ++i) {
-    if (knots[i].time_s >= knots[i - 1].time_s) continue;
-    throw bad_input(place.key(std::to_string(i)).where, "is earlier than the one before",
-                    "times that do not fall");
-  }
-  if (!(knots.back().time_s > knots.front().time_s)) {
-    throw bad_input(place.where, "take no time", "a last knot later than the first");
-  }
-  return {drive, knots, place.where};
-}
-
-}  // namespace
-
-std::vector<ProtocolKey> protocol_keys(ProtocolKind kind) {
+std::vector<NumberKey> numbers_of(ProtocolKind kind) {
   switch (kind) {
     case ProtocolKind::ramp_hold:
-      return {kDepthKey, kRateKey, kHoldKey};
+      return {kDepth, kRate, kHold};
     case ProtocolKind::step_hold:
-      return {kDepthKey, kStepHoldKey};
+      return {kDepth, kStepHold};
     case ProtocolKind::creep:
-      return {kLoadKey, kDurationKey};
+      return {kLoad, kDuration};
     case ProtocolKind::knots:
       break;
   }
   return {};
 }
 
+constexpr const char* kAlike = "a time and a depth each, or a time and a load each";
+constexpr const char* kNoFall = "times that do not fall";
+constexpr const char* kTakesTime = "a last knot later than the first";
+
+/// A corner as a file says it.
+struct KnotKeys {
+  double time_s = 0.0;
+  std::optional<double> depth_m, load_N;
+};
+
+const Block<KnotKeys>& knot_block() {
+  static const Block<KnotKeys> block(
+      "knot", "a corner of the history",
+      {required(key("time", &KnotKeys::time_s, quantity(Dimension::time), "when")),
+       key("depth", &KnotKeys::depth_m, quantity(Dimension::length), "how deep"),
+       key("load", &KnotKeys::load_N, quantity(Dimension::force), "the force")});
+  return block;
+}
+
+/// The corners, which set the block's drive, too.
+Key<ProtocolBlock> knots_key() {
+  constexpr std::size_t kMost = 100'000;
+  const auto corners = list(knot_block().type(), {.fewest = 2, .most = kMost});
+  Form form = *corners.form;
+  form.rules = {kAlike, kNoFall, kTakesTime};
+  const auto read = [corners](ProtocolBlock& block, const Json& value, const DocumentPlace& place) {
+    const std::vector<KnotKeys> all = corners.read(value, place);
+    const bool by_depth = all.front().depth_m.has_value();
+    block.drive = by_depth ? Drive::displacement : Drive::force;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const KnotKeys& one = all[i];
+      if (one.depth_m.has_value() != by_depth || one.load_N.has_value() == by_depth) {
+        throw bad_input(place.key(std::to_string(i)).where, "is another thing than the first",
+                        kAlike);
+      }
+      block.knots.push_back({one.time_s, by_depth ? *one.depth_m : *one.load_N});
+    }
+  };
+  const auto write = [corners](const ProtocolBlock& block) {
+    return corners.write(mapped<KnotKeys>(block.knots, [&](const Knot& knot) {
+      return block.drive == Drive::displacement ? KnotKeys{knot.time_s, knot.value, {}}
+                                                : KnotKeys{knot.time_s, {}, knot.value};
+    }));
+  };
+  return required(Key<ProtocolBlock>{
+      {.name = "knots",
+       .form = shared(std::move(form)),
+       .sentence = "corners of a history that is linear between them; two at one time are a jump"},
+      read,
+      write});
+}
+
+std::vector<Key<ProtocolBlock>> keys_of(ProtocolKind kind) {
+  std::vector<Key<ProtocolBlock>> keys;
+  for (const NumberKey& n : numbers_of(kind)) {
+    keys.push_back(required(
+        with_example(key(n.name, n.value, quantity(n.dimension, n.range), n.sentence), n.example)));
+  }
+  if (kind == ProtocolKind::knots) keys.push_back(knots_key());
+  return keys;
+}
+
+double in_range(const ProtocolBlock& block, const NumberKey& key, const DocumentPlace& place) {
+  const std::optional<double>& value = block.*key.value;
+  const std::string_view unit = si_symbol(key.dimension);
+  if (!value) {
+    throw bad_input(
+        place.key(key.name).where, "is missing",
+        fmt::format("a {} for '{}'", key.name, entry_of(kProtocolKindWords, block.kind).text));
+  }
+  if (key.range.holds(*value)) return *value;
+  throw bad_input(place.key(key.name).where, fmt::format("{} {}", shortest(*value), unit),
+                  key.range.words(unit));
+}
+
+Protocol protocol_of_knots(const std::vector<Knot>& knots, Drive drive,
+                           const DocumentPlace& place) {
+  for (std::size_t i = 1; i < knots.size(); ++i) {
+    if (knots[i].time_s >= knots[i - 1].time_s) continue;
+    throw bad_input(place.key(std::to_string(i)).where, "is earlier than the one before", kNoFall);
+  }
+  if (!(knots.back().time_s > knots.front().time_s)) {
+    throw bad_input(place.where, "take no time", kTakesTime);
+  }
+  return {drive, knots, place.where};
+}
+
+/// The form of a block whose place in the file says its kind.
+Form form_of_kind(ProtocolKind kind, Openness openness) {
+  Form form{.type = Form::Type::block};
+  form.keys = mapped<KeyForm>(keys_of(kind), &Key<ProtocolBlock>::form);
+  return openness == Openness::open ? with_open_keys(std::move(form)) : form;
+}
+
+}  // namespace
+
+const Kinds<ProtocolBlock, ProtocolKind>& protocol_kinds() {
+  const auto kind = [](ProtocolKind meaning, const char* sentence) {
+    return Kind<ProtocolBlock, ProtocolKind>{
+        meaning, std::string(entry_of(kProtocolKindWords, meaning).text), sentence,
+        keys_of(meaning)};
+  };
+  static const Kinds<ProtocolBlock, ProtocolKind> kinds(
+      {.name = "protocol", .sentence = "what is imposed, from rest on"}, &ProtocolBlock::kind,
+      {kind(ProtocolKind::ramp_hold, "a ramp to a depth, which is then held"),
+       kind(ProtocolKind::step_hold, "a jump to a depth, which is then held"),
+       kind(ProtocolKind::creep, "a load, applied as a step and kept"),
+       kind(ProtocolKind::knots, "a history that is linear between corners")});
+  return kinds;
+}
+
 std::optional<double>* ProtocolBlock::find(std::string_view key) {
-  for (const ProtocolKey& known : protocol_keys(kind)) {
-    if (known.text == key) return &(this->*known.value);
+  for (const NumberKey& known : numbers_of(kind)) {
+    if (known.name == key) return &(this->*known.value);
   }
   return nullptr;
 }
 
 double ProtocolBlock::number(std::string_view key, const DocumentPlace& place) const {
-  for (const ProtocolKey& known : protocol_keys(kind)) {
-    if (known.text == key) return number_of(*this, known, place);
+  for (const NumberKey& known : numbers_of(kind)) {
+    if (known.name == key) return in_range(*this, known, place);
   }
   throw std::logic_error("no such key of a protocol");
 }
 
 Protocol ProtocolBlock::protocol(const DocumentPlace& place) const {
-  std::array<double, 3> number{};  // in the order of the keys
-  std::size_t count = 0;
-  for (const ProtocolKey& key : protocol_keys(kind))
-    number.at(count++) = number_of(*this, key, place);
+  std::vector<double> number;  // in the order of the keys
+  for (const NumberKey& key : numbers_of(kind)) number.push_back(in_range(*this, key, place));
   switch (kind) {
     case ProtocolKind::ramp_hold:
       return ramp_and_hold(number[0], number[1], number[2]);
@@ -139,22 +204,16 @@ Protocol ProtocolBlock::protocol(const DocumentPlace& place) const {
 
 ProtocolBlock parse_protocol_block(const Json& block, const DocumentPlace& place, Openness openness,
                                    std::optional<ProtocolKind> kind) {
-  ProtocolBlock parsed;
-  parsed.kind = kind ? *kind
-                     : parse_word(kProtocolKindWords, "protocol", block.value("kind", ""),
-                                  place.key("kind").where);
-  const bool by_knots = parsed.kind == ProtocolKind::knots;
-  const std::vector<ProtocolKey> keys = protocol_keys(parsed.kind);
-  std::vector<std::string_view> names;
-  for (const ProtocolKey& key : keys) names.push_back(key.text);
-  if (by_knots) names.emplace_back("knots");
-  require_known_keys(block, place, parsed.kind, openness, std::move(names), {});
-  for (const ProtocolKey& key : keys) {
-    if (!block.contains(key.text)) continue;
-    parsed.*key.value = quantity_at(block, key.text, key.dimension, place);
+  if (!kind) {
+    const Form& form = *protocol_kinds().form();
+    require_form(block, openness == Openness::open ? with_open_keys(form) : form, place,
+                 Numbers::also_si);
+    return protocol_kinds().made(block, place);
   }
-  if (by_knots && block.contains("knots"))
-    read_knots(block.at("knots"), place.key("knots"), parsed);
+  require_form(block, form_of_kind(*kind, openness), place, Numbers::also_si);
+  ProtocolBlock parsed;
+  parsed.kind = *kind;
+  read_keys(protocol_kinds().keys(*kind), block, place, parsed);
   return parsed;
 }
 
@@ -163,20 +222,26 @@ std::vector<ProtocolBlock> parse_protocol_lists(const Json& block, const Documen
                                                 std::initializer_list<ProtocolKeyName> renamed,
                                                 const std::vector<std::string_view>& others) {
   constexpr std::size_t kMost = 100'000;
-  const std::vector<ProtocolKey> keys = protocol_keys(kind);
-  std::vector<std::string_view> names;
-  for (const ProtocolKey& key : keys) {
-    const auto* other = std::find_if(renamed.begin(), renamed.end(),
-                                     [&](const ProtocolKeyName& n) { return n.key == key.text; });
-    names.push_back(other == renamed.end() ? key.text : other->in_file);
+  const std::vector<Key<ProtocolBlock>>& keys = protocol_kinds().keys(kind);
+  Form form = form_of_kind(kind, openness);
+  for (KeyForm& key : form.keys) {
+    for (const ProtocolKeyName& name : renamed) {
+      if (name.key == key.name) key.name = name.in_file;
+    }
+    key.form = shared(
+        {.type = Form::Type::list, .fewest = 1, .one_too = true, .item = std::move(key.form)});
   }
-  require_known_keys(block, place, kind, openness, names, others);
+  const std::vector<KeyForm> numbers = form.keys;
+  const FormPtr unread = any("").form;
+  for (const std::string_view other : others) form.keys.push_back({std::string(other), unread, ""});
+  if (block.contains("kind")) form.keys.push_back({"kind", unread, ""});
+  require_form(block, form, place, Numbers::also_si);
   std::vector<ProtocolBlock> all(1);
   all.front().kind = kind;
   for (std::size_t k = 0; k < keys.size(); ++k) {
-    if (!block.contains(names[k])) continue;
-    const std::vector<double> values =
-        numbers_of(block.at(std::string(names[k])), keys[k], place.key(names[k]));
+    const auto found = block.find(numbers[k].name);
+    if (found == block.end()) continue;
+    const Json values = found->is_array() ? *found : Json::array({*found});
     if (values.size() > kMost / std::max<std::size_t>(1, all.size())) {
       throw bad_input(place.where,
                       fmt::format("{} times {} experiments", all.size(), values.size()),
@@ -185,9 +250,9 @@ std::vector<ProtocolBlock> parse_protocol_lists(const Json& block, const Documen
     std::vector<ProtocolBlock> longer;
     longer.reserve(all.size() * values.size());
     for (const ProtocolBlock& one : all) {
-      for (const double value : values) {
+      for (const Json& value : values) {
         longer.push_back(one);
-        longer.back().*keys[k].value = value;
+        keys[k].read(longer.back(), value, place.key(numbers[k].name));
       }
     }
     all = std::move(longer);

@@ -1,5 +1,5 @@
 #pragma once
-// Protocols in files: one table of kinds and keys, one parser, one place where they are made.
+// Protocols in files: one declaration of kinds and keys, one place where they are made.
 #include <array>
 #include <initializer_list>
 #include <optional>
@@ -9,6 +9,7 @@
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/document_place.hpp"
+#include "tpm/files/keys/block.hpp"
 #include "tpmkit/protocol.hpp"
 #include "tpmkit/units.hpp"
 
@@ -45,15 +46,8 @@ struct ProtocolBlock {
   [[nodiscard]] Protocol protocol(const DocumentPlace& place) const;
 };
 
-/// A key of a block with what it means.
-struct ProtocolKey {
-  std::string_view text;
-  Dimension dimension;
-  std::optional<double> ProtocolBlock::*value;
-  bool may_be_zero;
-};
-/// The keys of a kind, in their order; none of `knots`.
-[[nodiscard]] std::vector<ProtocolKey> protocol_keys(ProtocolKind kind);
+/// Their declaration.
+[[nodiscard]] const Kinds<ProtocolBlock, ProtocolKind>& protocol_kinds();
 
 enum class Openness {
   complete,  ///< every key has to be there
@@ -70,6 +64,7 @@ enum class Openness {
 struct ProtocolKeyName {
   std::string_view key, in_file;
 };
+
 
 /// All combinations of the numbers in a block that has a list of quantities, or one quantity, under
 /// each key: several indentations of a session, the candidates of a design. The first key of the

@@ -218,15 +218,23 @@ double reach_along(const LiverFunction& liver, const Vector3d& direction, double
 
 const std::array<LiverMeasure, 9>& liver_measures() noexcept {
   static constexpr std::array<LiverMeasure, 9> kMeasures{{
-      {"width", &LiverShape::width, 1e-6, 1e3, nullptr},
-      {"height", &LiverShape::height, 0.5, 1.2, &LiverShape::width},
-      {"depth", &LiverShape::depth, 0.35, 0.9, &LiverShape::width},
-      {"right_share", &LiverShape::right_share, 0.5, 0.75, nullptr},
-      {"left_height", &LiverShape::left_height, 0.4, 0.6, nullptr},
-      {"left_depth", &LiverShape::left_depth, 0.45, 0.8, nullptr},
-      {"notch_depth", &LiverShape::notch_depth, 0.1, 0.2, nullptr},
-      {"notch_width", &LiverShape::notch_width, 0.08, 0.14, nullptr},
-      {"visceral_hollow", &LiverShape::visceral_hollow, 0.0, 0.3, nullptr},
+      {"width", &LiverShape::width, 1e-6, 1e3, nullptr, "right to left"},
+      {"height", &LiverShape::height, 0.5, 1.2, &LiverShape::width,
+       "of the right lobe, top to bottom; 0.5 to 1.2 widths"},
+      {"depth", &LiverShape::depth, 0.35, 0.9, &LiverShape::width,
+       "of the right lobe, front to back; 0.35 to 0.9 widths"},
+      {"right_share", &LiverShape::right_share, 0.5, 0.75, nullptr,
+       "of the width that is right lobe"},
+      {"left_height", &LiverShape::left_height, 0.4, 0.6, nullptr,
+       "of the left lobe, in heights of the right one"},
+      {"left_depth", &LiverShape::left_depth, 0.45, 0.8, nullptr,
+       "of the left lobe, in depths of the right one"},
+      {"notch_depth", &LiverShape::notch_depth, 0.1, 0.2, nullptr,
+       "between the lobes, from below, in heights"},
+      {"notch_width", &LiverShape::notch_width, 0.08, 0.14, nullptr,
+       "half width of the notch, in widths"},
+      {"visceral_hollow", &LiverShape::visceral_hollow, 0.0, 0.3, nullptr,
+       "of the face towards the bowel, in heights"},
   }};
   return kMeasures;
 }

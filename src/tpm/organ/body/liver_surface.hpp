@@ -28,6 +28,7 @@ struct LiverMeasure {
   double LiverShape::*value;
   double least, most;        ///< valid range
   double LiverShape::*unit;  ///< the range is in multiples of this measure; null: as it stands
+  std::string_view meaning;  ///< one phrase
 };
 
 /// All measures with their valid ranges.

@@ -14,25 +14,13 @@
 namespace tpm::organ {
 namespace {
 
-const std::array<KindKeys<ContactKind>, 4>& contact_kinds() {
-  static const std::array<KindKeys<ContactKind>, 4> kinds{{
-      {ContactKind::sphere, "sphere", {}, {"number", "at", "direction", "share"}},
-      {ContactKind::patch, "patch", {"radius"}, {"number", "at", "direction", "share"}},
-      {ContactKind::ball,
-       "ball",
-       {"radius"},
-       {"number", "at", "direction", "share", "stiffness", "mass_kg"}},
-      {ContactKind::punch,
-       "punch",
-       {"radius"},
-       {"number", "at", "direction", "share", "stiffness", "mass_kg"}},
-  }};
-  return kinds;
-}
+constexpr auto kContactWords = std::to_array<Word<ContactKind>>({{ContactKind::sphere, "sphere"},
+                                                                 {ContactKind::patch, "patch"},
+                                                                 {ContactKind::ball, "ball"},
+                                                                 {ContactKind::punch, "punch"}});
 
 /// The sphere nearest to a point that lies on or in the organ.
-std::size_t sphere_at(const Json& point, const Organ& organ, const DocumentPlace& place) {
-  const Eigen::Vector3d at = parse_point(point, place);
+std::size_t sphere_at(const Eigen::Vector3d& at, const Organ& organ, const DocumentPlace& place) {
   std::size_t nearest = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < organ.size(); ++i) {
@@ -49,43 +37,22 @@ std::size_t sphere_at(const Json& point, const Organ& organ, const DocumentPlace
                               significant(1e3 * organ.spacing, 4)));
 }
 
-std::size_t driven_sphere(const Json& contact, const Organ& organ, const DocumentPlace& place) {
-  if (contact.contains("number") && contact.contains("at")) {
-    throw bad_input(place.where, "says where twice", "either 'number' or 'at'");
-  }
-  if (contact.contains("number")) {
-    return parse_sphere(contact.at("number"), organ, place.key("number"));
-  }
-  if (contact.contains("at")) return sphere_at(contact.at("at"), organ, place.key("at"));
+std::size_t driven_sphere(const ContactKeys& contact, const Organ& organ,
+                          const DocumentPlace& place) {
+  if (contact.number) return sphere_of(*contact.number, organ, place.key("number"));
+  if (contact.at) return sphere_at(vector_of(*contact.at), organ, place.key("at"));
   if (organ.contact) return *organ.contact;
   throw bad_input(place.where, "names no sphere, and the organ has no contact",
                   "a key 'number', such as 71");
 }
 
-Eigen::Vector3d direction_of(const Json& contact, const Organ& organ, std::size_t sphere,
-                             const DocumentPlace& place) {
-  if (!contact.contains("direction")) {
-    return -organ.normal.col(static_cast<Eigen::Index>(sphere));
-  }
-  const auto d = contact.at("direction").get<std::array<double, 3>>();
-  Eigen::Vector3d direction = Eigen::Vector3d(d[0], d[1], d[2]).stableNormalized();
-  if (direction.norm() < 0.5) {
-    throw bad_input(place.key("direction").where, "has no length", "a direction");
-  }
-  return direction;
-}
-
-double share_of(const Json& contact, bool tool, const DocumentPlace& place) {
-  const double share = contact.value("share", 1.0);
-  if (share > 0.0 && share <= 1e3) return share;
-  if (tool && share == 0.0) return share;
-  throw bad_input(place.key("share").where, shortest(share),
-                  tool ? "0 (a tool that stands still) to 1000" : "above 0, at most 1000");
+Eigen::Vector3d direction_of(const ContactKeys& contact, const Organ& organ, std::size_t sphere) {
+  if (contact.direction) return vector_of(*contact.direction).stableNormalized();
+  return -organ.normal.col(static_cast<Eigen::Index>(sphere));
 }
 
 /// What is wider than the organ acts like what is as wide: such a size is a slip of the unit.
-double radius_of(const Json& contact, const Organ& organ, const DocumentPlace& place) {
-  const double radius = positive_at(contact, "radius", Dimension::length, place);
+double radius_of(double radius, const Organ& organ, const DocumentPlace& place) {
   const double extent =
       (organ.position.rowwise().maxCoeff() - organ.position.rowwise().minCoeff()).norm() +
       2.0 * organ.radius;
@@ -110,42 +77,80 @@ void require_patch_free(const SceneContact& patch, const Tissue& tissue,
 
 }  // namespace
 
-std::string_view word_of(ContactKind kind) {
-  return entry_of(contact_kinds(), kind).text;
+const Kinds<ContactKeys, ContactKind>& contact_kinds() {
+  using K = ContactKeys;
+  const Range driven{.least = 0.0, .most = 1e3, .above = true};
+  const auto common = [](const Range& share) {
+    return std::vector<Key<K>>{
+        key("number", &K::number, sphere_type(),
+            "the sphere driven or aimed at; default: the organ's contact sphere"),
+        key("at", &K::at, point_type(), "instead: the sphere nearest to this point"),
+        key("direction", &K::direction, direction(),
+            "into the tissue; default: against the sphere's outward normal"),
+        key("share", &K::share, number(share),
+            "of the depth, or of the load against those of the others")};
+  };
+  const auto radius = required(
+      key("radius", &K::radius_m, quantity(Dimension::length, kAboveZero), "of what touches"));
+  std::vector<Key<K>> patch = common(driven);
+  patch.push_back(radius);
+  std::vector<Key<K>> tool = common({.least = 0.0, .most = 1e3});
+  tool.push_back(radius);
+  tool.push_back(key("stiffness", &K::stiffness_N_per_m, quantity(Dimension::stiffness, kAboveZero),
+                     "of each contact; default: 10000 times the stiffest bond"));
+  tool.push_back(key("mass_kg", &K::mass_kg, number(kAboveZero),
+                     "of the tool, where the formulation has mass"));
+  const auto word = [](ContactKind kind) { return std::string(word_of(kind)); };
+  static const Kinds<K, ContactKind> kinds(
+      {.name = "contact", .sentence = "what meets the tissue, driven by the protocol"}, &K::kind,
+      {{ContactKind::sphere, word(ContactKind::sphere), "one sphere is driven, as in the paper",
+        common(driven)},
+       {ContactKind::patch, word(ContactKind::patch),
+        "the spheres of its layer within the radius are driven together", patch},
+       {ContactKind::ball, word(ContactKind::ball),
+        "a rigid ball without friction pushes spheres and does not hold them", tool},
+       {ContactKind::punch, word(ContactKind::punch),
+        "a rigid flat punch without friction pushes spheres and does not hold them", tool}},
+      {{"either 'number' or 'at'", [](const K& contact) -> std::optional<Fault> {
+          if (!contact.number || !contact.at) return std::nullopt;
+          return Fault{"", "says where twice"};
+        }}});
+  return kinds;
 }
 
-SceneContact parse_contact(const Json& block, const Tissue& tissue, const DocumentPlace& place) {
+std::string_view word_of(ContactKind kind) {
+  return entry_of(kContactWords, kind).text;
+}
+
+namespace {
+
+SceneContact contact_of(const ContactKeys& block, const Tissue& tissue,
+                        const DocumentPlace& place) {
   const Organ& organ = tissue.network.organ;
-  const auto name = block.at("kind").get<std::string>();
-  const KindKeys<ContactKind>& kind = *find_entry(contact_kinds(), name);  // the schema knows it
-  require_keys_of(block, kind.text, kind.needed, kind.allowed, place);
   SceneContact contact;
-  contact.kind = kind.meaning;
+  contact.kind = block.kind;
   contact.probe.sphere = driven_sphere(block, organ, place);
-  contact.probe.direction = direction_of(block, organ, contact.probe.sphere, place);
-  contact.probe.share = share_of(block, contact.is_tool(), place);
-  if (block.contains("radius")) {
-    contact.radius_m = radius_of(block, organ, place);
-  }
-  if (block.contains("stiffness")) {
-    contact.stiffness_N_per_m = positive_at(block, "stiffness", Dimension::stiffness, place);
-  }
-  if (block.contains("mass_kg")) {
-    contact.mass_kg = block.at("mass_kg").get<double>();
-    if (!(*contact.mass_kg > 0.0)) {
-      throw bad_input(place.key("mass_kg").where, shortest(*contact.mass_kg), "a mass above 0");
-    }
-  }
+  contact.probe.direction = direction_of(block, organ, contact.probe.sphere);
+  contact.probe.share = block.share;
+  if (block.kind != ContactKind::sphere) contact.radius_m = radius_of(block.radius_m, organ, place);
+  contact.stiffness_N_per_m = block.stiffness_N_per_m;
+  contact.mass_kg = block.mass_kg;
   require_loadable(tissue, contact.probe.sphere, contact.probe.direction, place.where);
   if (contact.kind == ContactKind::patch) require_patch_free(contact, tissue, place);
   return contact;
 }
 
-std::vector<SceneContact> parse_contacts(const Json& contacts, const Tissue& tissue,
-                                         const DocumentPlace& place) {
+}  // namespace
+
+SceneContact parse_contact(const Json& block, const Tissue& tissue, const DocumentPlace& place) {
+  return contact_of(contact_kinds().read(block, place, Numbers::also_si), tissue, place);
+}
+
+std::vector<SceneContact> contacts_of(const std::vector<ContactKeys>& contacts,
+                                      const Tissue& tissue, const DocumentPlace& place) {
   std::vector<SceneContact> all;
-  for (const Json& block : contacts) {
-    all.push_back(parse_contact(block, tissue, place.key(std::to_string(all.size()))));
+  for (const ContactKeys& block : contacts) {
+    all.push_back(contact_of(block, tissue, place.key(std::to_string(all.size()))));
   }
   if (all.front().probe.share > 0.0) return all;
   throw bad_input(place.key("0").key("share").where, "the first contact stands still",
@@ -153,8 +158,7 @@ std::vector<SceneContact> parse_contacts(const Json& contacts, const Tissue& tis
 }
 
 SceneContact usual_contact(const Tissue& tissue, const DocumentPlace& place) {
-  const Json block{{"kind", word_of(ContactKind::sphere)}};
-  return parse_contact(block, tissue, place);
+  return contact_of({}, tissue, place);
 }
 
 std::vector<std::size_t> spheres_of(const SceneContact& contact, const Organ& organ) {

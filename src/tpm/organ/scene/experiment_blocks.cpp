@@ -18,7 +18,8 @@ constexpr auto kSpringWords = std::to_array<Word<SpringRule>>(
     {{SpringRule::like_the_bonds, "like_the_bonds"}, {SpringRule::equal, "equal"}});
 
 constexpr int kUsualOutputs = 61;
-constexpr double kMostOutputs = 100'000;
+constexpr std::size_t kMostTimes = 100'000;
+constexpr double kMostOutputs = kMostTimes;
 
 std::vector<double> even_times(double begin, double end, int count) {
   std::vector<double> times;
@@ -30,12 +31,12 @@ std::vector<double> even_times(double begin, double end, int count) {
   return times;
 }
 
-std::vector<double> listed_times(const Json& list, const Protocol& protocol,
+std::vector<double> listed_times(const std::vector<double>& list, const Protocol& protocol,
                                  const DocumentPlace& place) {
   std::vector<double> times;
-  for (const Json& entry : list) {
+  for (const double time : list) {
     const DocumentPlace here = place.key(std::to_string(times.size()));
-    times.push_back(quantity_of(entry, Dimension::time, here.where));
+    times.push_back(time);
     if (times.back() >= protocol.start_s() && times.back() <= protocol.end_s()) continue;
     throw bad_input(here.where, fmt::format("{} s", shortest(times.back())),
                     fmt::format("a time within the protocol, {} to {} s",
@@ -64,21 +65,81 @@ std::vector<double> spaced_times(double spacing, const Protocol& protocol,
   return times;
 }
 
-/// Refuses keys of other formulations than the one chosen.
-void require_keys_taken(const Json& block, const Formulation& entry, const DocumentPlace& place) {
-  for (const auto& [key, value] : block.items()) {
-    const bool common = key == "kind" || key == "comparison" || key == "springs";
-    if (common || entry.takes(key)) continue;
-    throw bad_input(
-        place.key(key).where, fmt::format("in the formulation '{}'", entry.name()),
-        "it only with \"kind\": " +
-            formulations_that([&, &name = key](const Formulation& f) { return f.takes(name); }));
-  }
-  if (block.value("masses", true)) return;
-  for (const char* key : {"damping_ratio", "density_kg_per_m3"}) {
-    if (!block.contains(key)) continue;
-    throw bad_input(place.key(key).where, "without masses", "\"masses\": true beside it");
-  }
+constexpr const char* kSpringsOnly = "springs only with \"comparison\": \"mass_spring\"";
+constexpr const char* kMassesOnly = "\"masses\": true beside damping_ratio and density_kg_per_m3";
+
+std::optional<Fault> springs_fault(const FormulationKeys& block) {
+  if (!block.springs || block.mass_spring) return std::nullopt;
+  return Fault{"springs", "without a comparison"};
+}
+
+std::optional<Fault> masses_fault(const FormulationKeys& block) {
+  if (block.masses.value_or(true)) return std::nullopt;
+  if (block.damping_ratio) return Fault{"damping_ratio", "without masses"};
+  if (block.density_kg_m3) return Fault{"density_kg_per_m3", "without masses"};
+  return std::nullopt;
+}
+
+/// The keys that formulations take.
+std::vector<Key<FormulationKeys>> settings() {
+  using K = FormulationKeys;
+  const FormulationChoice usual;
+  return {with_default(key("masses", &K::masses, flag(), "spheres have mass"), false),
+          with_default(key("damping_ratio", &K::damping_ratio, number({.least = 0.0, .most = 10.0}),
+                           "with masses: of the lowest mode"),
+                       usual.damping_ratio),
+          with_default(key("density_kg_per_m3", &K::density_kg_m3, number(kAboveZero),
+                           "with masses: of the spheres"),
+                       usual.density_kg_m3),
+          with_default(key("step", &K::step_s, quantity(Dimension::time, kAboveZero), "of time"),
+                       "1 ms"),
+          with_default(key("sweeps", &K::sweeps, whole<int>(1, 1e6), "over the bonds, a step"),
+                       usual.sweeps),
+          with_default(key("exponentials", &K::exponentials, whole<int>(1, 3), "of the contact"),
+                       usual.exponentials),
+          with_default(key("rings", &K::rings, whole<int>(1, 3), "of bonds that are kept"),
+                       usual.rings),
+          with_default(key("solver", &K::solver, word(kStiffnessSolverWords),
+                           "how linear systems are solved: by a factorisation, or by conjugate "
+                           "gradients with multigrid; automatic counts what the factor takes"),
+                       "automatic")};
+}
+
+/// The keys that all take: a comparison runs another model on the same spheres.
+std::vector<Key<FormulationKeys>> comparison() {
+  using K = FormulationKeys;
+  static constexpr auto kComparisonWords = std::to_array<Word<bool>>({{true, "mass_spring"}});
+  return {key("comparison", &K::mass_spring, word(kComparisonWords),
+              "run the mass-spring model on the same spheres instead of the tissue"),
+          with_default(key("springs", &K::springs, word(kSpringWords),
+                           "mass_spring: how stiff its springs are to each other"),
+                       "like_the_bonds")};
+}
+
+const Kinds<FormulationKeys, std::string>& formulation_kinds() {
+  using K = FormulationKeys;
+  static const Kinds<K, std::string> kinds = [] {
+    std::vector<Kind<K, std::string>> all;
+    const std::vector<Key<K>> known = settings();
+    for (const Formulation* f : linked_formulations()) {
+      Kind<K, std::string> kind{
+          std::string(f->name()), std::string(f->name()), std::string(f->meaning()), {}};
+      for (const Key<K>& key : known) {
+        if (f->takes(key.form.name)) kind.keys.push_back(key);
+      }
+      for (const Key<K>& key : comparison()) kind.keys.push_back(key);
+      if (!f->also().empty()) {
+        all.push_back(kind);
+        all.back().word = f->also();
+        all.back().sentence = fmt::format("former name of {}", f->name());
+      }
+      all.push_back(std::move(kind));
+    }
+    return Kinds<K, std::string>(
+        {.name = "formulation", .sentence = "how the response is computed", .may_be_missing = true},
+        &K::kind, std::move(all), {{kSpringsOnly, springs_fault}, {kMassesOnly, masses_fault}});
+  }();
+  return kinds;
 }
 
 }  // namespace
@@ -90,74 +151,77 @@ const Formulation& FormulationChoice::entry() const {
                      formulations_that([](const Formulation&) { return true; }));
 }
 
-FormulationChoice parse_formulation(const Json& block, const DocumentPlace& place) {
+ValueType<FormulationKeys> formulation_type() {
+  return {shared({.type = Form::Type::later, .made = [] { return formulation_kinds().form(); }}),
+          [](const Json& value, const DocumentPlace& place) {
+            return formulation_kinds().made(value, place);
+          },
+          [](const FormulationKeys& block) { return formulation_kinds().write(block); }};
+}
+
+FormulationChoice formulation_of(const FormulationKeys& block, const DocumentPlace& place) {
   FormulationChoice choice;
   choice.where = place.where;
-  choice.kind = block.value("kind", choice.kind);
-  const Formulation* entry = find_formulation(choice.kind);
-  if (entry == nullptr) {
-    refuse_formulation(choice.kind, "formulation", place.key("kind").where,
-                       formulations_that([](const Formulation&) { return true; }));
-  }
-  choice.kind = entry->name();
-  if (block.contains("solver")) {
-    choice.solver = parse_word(kStiffnessSolverWords, "solver",
-                               block.at("solver").get<std::string>(), place.key("solver").where);
-  }
-  choice.mass_spring = block.contains("comparison");
-  if (block.contains("springs") && !choice.mass_spring) {
-    throw bad_input(place.key("springs").where, "without a comparison",
-                    "springs only with \"comparison\": \"mass_spring\"");
-  }
-  if (block.contains("springs")) {
-    choice.springs = parse_word(kSpringWords, "springs", block.at("springs").get<std::string>(),
-                                place.key("springs").where);
-  }
-  if (block.contains("solver")) {
-    choice.solver = parse_word(kStiffnessSolverWords, "solver",
-                               block.at("solver").get<std::string>(), place.key("solver").where);
-  }
-  require_keys_taken(block, *entry, place);
-  choice.masses = entry->can().masses && block.value("masses", !entry->takes("masses"));
-  const auto number = [&](const char* key, auto& value, double least, double most,
-                          const char* expected) {
-    value = block.value(key, value);
-    if (value >= least && value <= most) return;
-    throw bad_input(place.key(key).where, shortest(static_cast<double>(value)), expected);
-  };
-  number("damping_ratio", choice.damping_ratio, 0.0, 10.0, "0 to 10");
-  number("density_kg_per_m3", choice.density_kg_m3, std::numeric_limits<double>::min(),
-         std::numeric_limits<double>::max(), "a density above 0");
-  number("sweeps", choice.sweeps, 1, 1e6, "1 to 1000000");
-  number("exponentials", choice.exponentials, 1, 3, "1 to 3");
-  number("rings", choice.rings, 1, 3, "1 to 3");
-  if (block.contains("step")) choice.step_s = positive_at(block, "step", Dimension::time, place);
+  choice.kind = block.kind;
+  const Formulation& entry = choice.entry();
+  choice.mass_spring = block.mass_spring.has_value();
+  choice.springs = block.springs.value_or(choice.springs);
+  choice.solver = block.solver.value_or(choice.solver);
+  choice.masses = entry.can().masses && block.masses.value_or(!entry.takes("masses"));
+  choice.damping_ratio = block.damping_ratio.value_or(choice.damping_ratio);
+  choice.density_kg_m3 = block.density_kg_m3.value_or(choice.density_kg_m3);
+  choice.sweeps = block.sweeps.value_or(choice.sweeps);
+  choice.exponentials = block.exponentials.value_or(choice.exponentials);
+  choice.rings = block.rings.value_or(choice.rings);
+  choice.step_s = block.step_s;
   return choice;
 }
 
-Outputs parse_outputs(const Json& block, const Protocol& protocol, const DocumentPlace& place) {
-  const int ways = static_cast<int>(block.contains("times")) +
-                   static_cast<int>(block.contains("count")) +
-                   static_cast<int>(block.contains("spacing"));
-  if (ways > 1) throw bad_input(place.where, "says when more than once", "times, count or spacing");
+const Block<OutputKeys>& outputs_block() {
+  using K = OutputKeys;
+  static constexpr auto kFieldWords =
+      std::to_array<Word<OutputField>>({{OutputField::force, "force"},
+                                        {OutputField::bond_force, "bond_force"},
+                                        {OutputField::viscous, "viscous"}});
+  static const Block<K> block(
+      "outputs", "when the response is written",
+      {key("times", &K::times_s, list(quantity(Dimension::time), {.fewest = 1, .most = kMostTimes}),
+           "these times"),
+       with_default(key("count", &K::count, whole<int>(1, kMostOutputs),
+                        "that many times, evenly, the first and the last instant among them"),
+                    kUsualOutputs),
+       key("spacing", &K::spacing_s, quantity(Dimension::time, kAboveZero),
+           "a time every so often, and the last instant"),
+       with_default(key("fields", &K::fields, list(word(kFieldWords), {.distinct = true}),
+                        "of the whole network, besides position and displacement"),
+                    {"force", "bond_force"})},
+      {{"times, count or spacing", [](const K& outputs) -> std::optional<Fault> {
+          const int ways = static_cast<int>(outputs.times_s.has_value()) +
+                           static_cast<int>(outputs.count.has_value()) +
+                           static_cast<int>(outputs.spacing_s.has_value());
+          if (ways <= 1) return std::nullopt;
+          return Fault{"", "says when more than once"};
+        }}});
+  return block;
+}
+
+Outputs outputs_of(const OutputKeys& block, const Protocol& protocol, const DocumentPlace& place) {
   Outputs outputs;
-  if (block.contains("times")) {
-    outputs.times_s = listed_times(block.at("times"), protocol, place.key("times"));
-  } else if (block.contains("spacing")) {
-    const double spacing = positive_at(block, "spacing", Dimension::time, place);
-    outputs.times_s = spaced_times(spacing, protocol, place.key("spacing"));
+  if (block.times_s) {
+    outputs.times_s = listed_times(*block.times_s, protocol, place.key("times"));
+  } else if (block.spacing_s) {
+    outputs.times_s = spaced_times(*block.spacing_s, protocol, place.key("spacing"));
   } else {
     outputs.times_s =
-        even_times(protocol.start_s(), protocol.end_s(), block.value("count", kUsualOutputs));
+        even_times(protocol.start_s(), protocol.end_s(), block.count.value_or(kUsualOutputs));
   }
-  if (!block.contains("fields")) return outputs;
-  const auto fields = block.at("fields").get<std::vector<std::string>>();
-  const auto wanted = [&](const char* name) {
-    return std::find(fields.begin(), fields.end(), name) != fields.end();
+  if (!block.fields) return outputs;
+  const auto wanted = [&](OutputField field) {
+    return std::find(block.fields->begin(), block.fields->end(), field) != block.fields->end();
   };
-  outputs.force = wanted("force");
-  outputs.bond_force = wanted("bond_force");
-  outputs.viscous = wanted("viscous");
+  outputs.force = wanted(OutputField::force);
+  outputs.bond_force = wanted(OutputField::bond_force);
+  outputs.viscous = wanted(OutputField::viscous);
   return outputs;
 }
 

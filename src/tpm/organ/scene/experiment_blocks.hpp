@@ -1,25 +1,29 @@
 #pragma once
-// Parts of parse_experiment, one per block of a scene that says what is done to the tissue.
-// All throw Error(bad_input) with the key; all are given blocks that the schema has accepted.
+// The blocks of a scene that say what is done to the tissue: the declaration of their keys, and
+// what they lead to. All throw Error(bad_input) with the key.
 #include "tpm/base/namespaces.hpp"
-#include "tpm/files/document_place.hpp"
+#include "tpm/organ/scene/blocks.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
 
 namespace tpm::organ {
 
-/// A kind of block, and the keys that go with it.
-template <class Kind>
-struct KindKeys {
-  Kind meaning;
-  std::string_view text;
-  std::vector<std::string_view> needed, allowed;
+/// An entry of `contacts` as a file says it.
+struct ContactKeys {
+  ContactKind kind = ContactKind::sphere;
+  std::optional<std::size_t> number;
+  std::optional<PointKeys> at;
+  std::optional<std::array<double, 3>> direction;
+  double share = 1.0, radius_m = 0.0;
+  std::optional<double> stiffness_N_per_m, mass_kg;
 };
+[[nodiscard]] const Kinds<ContactKeys, ContactKind>& contact_kinds();
 
-/// Block `contacts`. At least one of them is driven.
-[[nodiscard]] std::vector<SceneContact> parse_contacts(const Json& contacts, const Tissue& tissue,
-                                                       const DocumentPlace& place);
+/// The contacts of a scene. At least one of them is driven.
+[[nodiscard]] std::vector<SceneContact> contacts_of(const std::vector<ContactKeys>& contacts,
+                                                    const Tissue& tissue,
+                                                    const DocumentPlace& place);
 
-/// One of them.
+/// One of them, as a session says it.
 [[nodiscard]] SceneContact parse_contact(const Json& block, const Tissue& tissue,
                                          const DocumentPlace& place);
 
@@ -31,11 +35,32 @@ struct KindKeys {
 void require_possible(const Protocol& protocol, const std::vector<SceneContact>& contacts,
                       const Tissue& tissue, const DocumentPlace& place);
 
-/// Block `formulation`, without the tolerance.
-[[nodiscard]] FormulationChoice parse_formulation(const Json& block, const DocumentPlace& place);
+/// Block `formulation` as a file says it.
+struct FormulationKeys {
+  std::string kind = FormulationChoice{}.kind;  ///< the current name
+  std::optional<bool> masses, mass_spring;
+  std::optional<SpringRule> springs;
+  std::optional<double> damping_ratio, density_kg_m3, step_s;
+  std::optional<int> sweeps, exponentials, rings;
+  std::optional<StiffnessSolver> solver;
+};
+/// Its kinds are the formulations that the program links, each with the keys that it takes.
+[[nodiscard]] ValueType<FormulationKeys> formulation_type();
+/// Without the tolerance.
+[[nodiscard]] FormulationChoice formulation_of(const FormulationKeys& block,
+                                               const DocumentPlace& place);
 
-/// Block `outputs`.
-[[nodiscard]] Outputs parse_outputs(const Json& block, const Protocol& protocol,
-                                    const DocumentPlace& place);
+enum class OutputField { force, bond_force, viscous };
+
+/// Block `outputs` as a file says it.
+struct OutputKeys {
+  std::optional<std::vector<double>> times_s;
+  std::optional<int> count;
+  std::optional<double> spacing_s;
+  std::optional<std::vector<OutputField>> fields;
+};
+[[nodiscard]] const Block<OutputKeys>& outputs_block();
+[[nodiscard]] Outputs outputs_of(const OutputKeys& block, const Protocol& protocol,
+                                 const DocumentPlace& place);
 
 }  // namespace tpm::organ

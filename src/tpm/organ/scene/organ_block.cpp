@@ -21,77 +21,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum class OrganKind { liver, mesh, block, star, listed };
+constexpr double kUsualSpacing_m = 0.020;
 
-/// A kind of organ and the keys that speak of it.
-struct KindKeys {
-  OrganKind meaning;
-  std::string_view text;
-  std::array<std::string_view, 10> keys;
-};
-
-constexpr std::array<KindKeys, 5> kKinds{{
-    {OrganKind::liver,
-     "liver",
-     {"count", "layers", "spacing", "seed", "shape", "filling", "lattice"}},
-    {OrganKind::mesh,
-     "mesh",
-     {"mesh", "unit", "landing", "count", "layers", "spacing", "seed", "filling", "lattice"}},
-    {OrganKind::block, "block", {"cells", "spacing", "lattice", "contact"}},
-    {OrganKind::star, "star", {"spacing", "length"}},
-    {OrganKind::listed, "listed", {"spheres", "unit", "spacing", "contact"}},
-}};
-
-void require_keys_of(const Json& block, const KindKeys& kind, const DocumentPlace& place) {
-  for (const auto& [key, value] : block.items()) {
-    if (key == "kind" || std::find(kind.keys.begin(), kind.keys.end(), key) != kind.keys.end()) {
-      continue;
-    }
-    std::string known;
-    for (const std::string_view name : kind.keys) {
-      if (!name.empty()) known += fmt::format("{}{}", known.empty() ? "" : ", ", name);
-    }
-    throw bad_input(place.key(key).where, fmt::format("is no key of the kind '{}'", kind.text),
-                    fmt::format("one of {}", known));
-  }
-}
-
-void require_key(const Json& block, const char* key, const DocumentPlace& place,
-                 std::string_view expected) {
-  if (!block.contains(key)) throw bad_input(place.key(key).where, "is missing", expected);
-}
-
-std::optional<double> length_at(const Json& block, const char* key, const DocumentPlace& place) {
-  if (!block.contains(key)) return std::nullopt;
-  const double length = quantity_at(block, key, Dimension::length, place);
-  if (length > 0.0) return length;
-  throw bad_input(place.key(key).where, fmt::format("{} m", length), "a length above 0");
-}
-
-std::optional<std::size_t> count_at(const Json& block) {
-  if (!block.contains("count")) return std::nullopt;
-  return block.at("count").get<std::size_t>();
-}
-
-bool is_solid(const Json& block, const DocumentPlace& place) {
-  const bool solid = block.value("filling", "shell") == "solid";
-  const auto refuse = [&](const char* key, const char* filling) {
-    if (!block.contains(key)) return;
-    throw bad_input(place.key(key).where, fmt::format("in a {} filling", filling), "no such key");
-  };
-  if (solid) {
-    refuse("layers", "solid");
-  } else {
-    refuse("lattice", "shell");
-  }
-  return solid;
-}
-
-Lattice lattice_of(const Json& block, Lattice usual, const DocumentPlace& place) {
-  if (!block.contains("lattice")) return usual;
-  return parse_word(kLatticeWords, "lattice", block.at("lattice").get<std::string>(),
-                    place.key("lattice").where);
-}
+constexpr auto kFillingWords =
+    std::to_array<Word<Filling>>({{Filling::shell, "shell"}, {Filling::solid, "solid"}});
 
 /// What a function of the folder `network` returns; its errors get the place of the block.
 template <class Make>
@@ -103,48 +36,71 @@ Organ made(const DocumentPlace& place, Make&& make) {
   }
 }
 
-LiverShape parse_shape(const Json& block, const DocumentPlace& place) {
-  LiverShape shape;
-  for (const LiverMeasure& measure : liver_measures()) {
-    const std::string key(measure.name);
-    if (!block.contains(key)) continue;
-    const bool length = measure.value == &LiverShape::width ||
-                        measure.value == &LiverShape::height || measure.value == &LiverShape::depth;
-    const Json& value = block.at(key);
-    if (length != value.is_string()) {
-      throw bad_input(place.key(key).where, fmt::format("{}", value.dump()),
-                      length ? "a length, such as \"210 mm\"" : "a number");
+const Block<ShapeKeys>& shape_block() {
+  static const Block<ShapeKeys> block = [] {
+    std::vector<Key<ShapeKeys>> keys;
+    for (const LiverMeasure& measure : liver_measures()) {
+      const bool length = measure.value == &LiverShape::width ||
+                          measure.value == &LiverShape::height ||
+                          measure.value == &LiverShape::depth;
+      const ValueType<double> type = length
+                                         ? quantity(Dimension::length, kAboveZero)
+                                         : number({.least = measure.least, .most = measure.most});
+      keys.push_back(within(&ShapeKeys::shape, key(std::string(measure.name), measure.value, type,
+                                                   std::string(measure.meaning))));
+      if (measure.value != &LiverShape::width) continue;
+      keys.back().read = [read = keys.back().read](ShapeKeys& into, const Json& value,
+                                                   const DocumentPlace& place) {
+        read(into, value, place);
+        into.has_width = true;
+      };
     }
-    shape.*measure.value =
-        length ? quantity_at(block, key, Dimension::length, place) : value.get<double>();
-  }
-  require_valid(shape, place.where);
-  return shape;
+    return Block<ShapeKeys>(
+        "shape", "measures of the liver; with a width the count decides the spacing", keys);
+  }();
+  return block;
+}
+
+const Block<ListedSphere>& listed_sphere_block() {
+  static const Block<ListedSphere> block(
+      "listed_sphere", "a sphere of the tissue",
+      {required(
+           key("at", &ListedSphere::at, three(number()), "three coordinates in the organ's unit")),
+       key("layer", &ListedSphere::layer, whole<int>(1, 1000), "1: outermost"),
+       key("normal", &ListedSphere::normal, three(number()), "outward; default: along z")});
+  return block;
+}
+
+LiverShape shape_of(const OrganKeys& block, const DocumentPlace& place) {
+  if (!block.shape) return {};
+  require_valid(block.shape->shape, place.key("shape").where);
+  return block.shape->shape;
+}
+
+bool is_solid(const OrganKeys& block) {
+  return block.filling == Filling::solid;
 }
 
 /// A surface filled throughout; the contact is the sphere of the outer layer nearest to a place.
-Organ solid_filling(const Surface& surface, const Json& block,
+Organ solid_filling(const Surface& surface, const OrganKeys& block,
                     const std::optional<Eigen::Vector3d>& landing, const DocumentPlace& place) {
   SolidRequest request;
-  request.count = count_at(block);
-  request.spacing = length_at(block, "spacing", place);
-  request.lattice = lattice_of(block, request.lattice, place);
-  request.seed = block.value("seed", request.seed);
+  request.count = block.count;
+  request.spacing = block.spacing_m;
+  request.lattice = block.lattice.value_or(request.lattice);
+  request.seed = block.seed.value_or(request.seed);
   Organ organ = made(place, [&] { return fill_solid(surface, request); });
   if (!landing) return organ;
   organ.contact = nearest_outer_sphere(organ, *landing);
   return organ;
 }
 
-Organ parse_liver(const Json& block, const DocumentPlace& place) {
+Organ parse_liver(const OrganKeys& block, const DocumentPlace& place) {
   LiverRequest request;
-  if (block.contains("shape")) {
-    request.shape = parse_shape(block.at("shape"), place.key("shape"));
-    // A width that is named is meant: the count then decides the spacing.
-    if (block.at("shape").contains("width")) request.spacing.reset();
-  }
-  const bool solid = is_solid(block, place);
-  if (solid) {
+  request.shape = shape_of(block, place);
+  // A width that is named is meant: the count then decides the spacing.
+  if (block.shape && block.shape->has_width) request.spacing.reset();
+  if (is_solid(block)) {
     const MeshSurface surface = liver_surface(request.shape);
     Organ organ =
         solid_filling(surface, block, front_of_right_lobe(request.shape, surface).position, place);
@@ -154,16 +110,10 @@ Organ parse_liver(const Json& block, const DocumentPlace& place) {
                              "front of the right lobe");
     return organ;
   }
-  if (const auto spacing = length_at(block, "spacing", place)) {
-    if (!request.spacing) {
-      throw bad_input(place.key("spacing").where, "beside a width of the shape",
-                      "one of the two: the count and either of them decide the other");
-    }
-    request.spacing = spacing;
-  }
-  request.count = count_at(block).value_or(request.count);
-  request.layers = block.value("layers", request.layers);
-  request.seed = block.value("seed", request.seed);
+  if (block.spacing_m) request.spacing = block.spacing_m;
+  request.count = block.count.value_or(request.count);
+  request.layers = block.layers.value_or(request.layers);
+  request.seed = block.seed.value_or(request.seed);
   return made(place, [&] { return fill_liver(request); });
 }
 
@@ -180,27 +130,24 @@ void require_near(const Surface& surface, const Eigen::Vector3d& landing,
                   fmt::format("a point on it, or within {} mm", significant(1e3 * most_m, 3)));
 }
 
-Organ parse_mesh(const Json& block, const DocumentPlace& place, const fs::path& folder) {
-  require_key(block, "mesh", place, "a path of an STL or OBJ file");
-  require_key(block, "unit", place, "the length that a coordinate of 1 means, such as \"mm\"");
-  const Unit unit =
-      parse_unit(block.at("unit").get<std::string>(), Dimension::length, place.key("unit").where);
-  const ClosedMesh closed = read_closed_mesh(folder / block.at("mesh").get<std::string>(), unit);
+Organ parse_mesh(const OrganKeys& block, const DocumentPlace& place, const fs::path& folder) {
+  const Unit unit = parse_unit(block.unit, Dimension::length, place.key("unit").where);
+  const ClosedMesh closed = read_closed_mesh(folder / block.mesh, unit);
   const MeshSurface surface(closed.mesh);
   std::optional<Eigen::Vector3d> landing;
-  if (block.contains("landing")) {
-    landing = parse_point(block.at("landing"), place.key("landing"));
+  if (block.landing) {
+    landing = vector_of(*block.landing);
     require_near(surface, *landing, place.key("landing"));
   }
   Organ organ;
-  if (is_solid(block, place)) {
+  if (is_solid(block)) {
     organ = solid_filling(surface, block, landing, place);
   } else {
     ShellRequest request;
-    request.count = count_at(block);
-    request.spacing = length_at(block, "spacing", place);
-    request.layers = block.value("layers", request.layers);
-    request.seed = block.value("seed", request.seed);
+    request.count = block.count;
+    request.spacing = block.spacing_m;
+    request.layers = block.layers.value_or(request.layers);
+    request.seed = block.seed.value_or(request.seed);
     request.landing = landing;
     organ = made(place, [&] { return fill_shell(surface, request); });
   }
@@ -208,49 +155,40 @@ Organ parse_mesh(const Json& block, const DocumentPlace& place, const fs::path& 
   return organ;
 }
 
-Organ parse_block(const Json& block, const DocumentPlace& place) {
-  require_key(block, "cells", place, "three numbers of cells, such as [8, 8, 4]");
-  const auto cells = block.at("cells").get<std::array<int, 3>>();
-  const double spacing = length_at(block, "spacing", place).value_or(0.020);
-  const Lattice lattice = lattice_of(block, Lattice::fcc, place);
+Organ parse_block(const OrganKeys& block, const DocumentPlace& place) {
+  const auto [x, y, z] = block.cells;
+  const double spacing = block.spacing_m.value_or(kUsualSpacing_m);
+  const Lattice lattice = block.lattice.value_or(Lattice::fcc);
   return made(place,
-              [&] { return tpm::organ::block(cells[0], cells[1], cells[2], spacing, lattice); });
+              [&, x = x, y = y, z = z] { return tpm::organ::block(x, y, z, spacing, lattice); });
 }
 
-Organ parse_star(const Json& block, const DocumentPlace& place) {
-  const double spacing = length_at(block, "spacing", place).value_or(BondElement{}.spacing_m);
-  const double length = length_at(block, "length", place).value_or(0.020);
+Organ parse_star(const OrganKeys& block, const DocumentPlace& place) {
+  const double spacing = block.spacing_m.value_or(BondElement{}.spacing_m);
+  const double length = block.length_m.value_or(kUsualSpacing_m);
   return made(place, [&] { return star(spacing, length); });
 }
 
-Organ parse_listed(const Json& block, const DocumentPlace& place) {
-  require_key(block, "spheres", place, "a list of spheres");
-  require_key(block, "unit", place, "the length that a coordinate of 1 means, such as \"mm\"");
-  require_key(block, "spacing", place, "the nominal distance between neighbours");
-  const Unit unit =
-      parse_unit(block.at("unit").get<std::string>(), Dimension::length, place.key("unit").where);
-  const Json& spheres = block.at("spheres");
+Organ parse_listed(const OrganKeys& block, const DocumentPlace& place) {
+  const Unit unit = parse_unit(block.unit, Dimension::length, place.key("unit").where);
   Organ organ;
-  organ.name = fmt::format("{} listed spheres", spheres.size());
-  organ.position.resize(3, static_cast<Eigen::Index>(spheres.size()));
+  organ.name = fmt::format("{} listed spheres", block.spheres.size());
+  organ.position.resize(3, static_cast<Eigen::Index>(block.spheres.size()));
   organ.normal = Eigen::Vector3d::UnitZ().replicate(1, organ.position.cols());
-  for (std::size_t i = 0; i < spheres.size(); ++i) {
+  for (std::size_t i = 0; i < block.spheres.size(); ++i) {
     const auto column = static_cast<Eigen::Index>(i);
-    const auto at = spheres[i].at("at").get<std::array<double, 3>>();
-    organ.position.col(column) = unit.to_si * Eigen::Vector3d(at[0], at[1], at[2]);
-    organ.layer.push_back(spheres[i].value("layer", 1) - 1);
-    if (!spheres[i].contains("normal")) continue;
-    const auto normal = spheres[i].at("normal").get<std::array<double, 3>>();
-    organ.normal.col(column) = Eigen::Vector3d(normal[0], normal[1], normal[2]).stableNormalized();
+    const ListedSphere& sphere = block.spheres[i];
+    organ.position.col(column) = unit.to_si * vector_of(sphere.at);
+    organ.layer.push_back(sphere.layer - 1);
+    if (sphere.normal) organ.normal.col(column) = vector_of(*sphere.normal).stableNormalized();
   }
-  organ.spacing = *length_at(block, "spacing", place);
+  organ.spacing = block.spacing_m.value();
   organ.radius = 0.5 * organ.spacing;
   return organ;
 }
 
-Organ organ_of(OrganKind kind, const Json& block, const DocumentPlace& place,
-               const fs::path& folder) {
-  switch (kind) {
+Organ spheres_of(const OrganKeys& block, const DocumentPlace& place, const fs::path& folder) {
+  switch (block.kind) {
     case OrganKind::liver:
       return parse_liver(block, place);
     case OrganKind::mesh:
@@ -265,7 +203,101 @@ Organ organ_of(OrganKind kind, const Json& block, const DocumentPlace& place,
   throw Error(ExitCode::numerical, place.where, "a kind of organ without a reader");
 }
 
+/// The keys of a body that is filled with spheres.
+std::vector<Key<OrganKeys>> filling_keys(Json usual_count) {
+  using K = OrganKeys;
+  const LiverRequest usual;
+  return {with_default(key("count", &K::count, whole<std::size_t>(2, 1e6), "number of spheres"),
+                       std::move(usual_count)),
+          with_default(key("layers", &K::layers, whole<int>(1, 100), "layers of a shell"),
+                       usual.layers),
+          key("spacing", &K::spacing_m, quantity(Dimension::length, kAboveZero),
+              "distance of neighbours, centre to centre"),
+          with_default(key("seed", &K::seed, whole<std::uint64_t>(0, 9007199254740991),
+                           "of the places from which the outer layer starts"),
+                       usual.seed),
+          key("filling", &K::filling, word(kFillingWords),
+              "layers below the surface, or spheres throughout"),
+          with_default(key("lattice", &K::lattice, word(kLatticeWords), "inside a solid filling"),
+                       "fcc")};
+}
+
+std::vector<Key<OrganKeys>> with_more(std::vector<Key<OrganKeys>> keys,
+                                      std::vector<Key<OrganKeys>> more) {
+  keys.insert(keys.end(), more.begin(), more.end());
+  return keys;
+}
+
+std::optional<Fault> filling_fault(const OrganKeys& block) {
+  const bool filled = block.kind == OrganKind::liver || block.kind == OrganKind::mesh;
+  if (filled && is_solid(block) && block.layers) return Fault{"layers", "in a solid filling"};
+  if (filled && !is_solid(block) && block.lattice) return Fault{"lattice", "in a shell filling"};
+  return std::nullopt;
+}
+
+std::optional<Fault> width_fault(const OrganKeys& block) {
+  const bool has_width = block.shape && block.shape->has_width;
+  if (is_solid(block) || !has_width || !block.spacing_m) return std::nullopt;
+  return Fault{"spacing", "beside a width of the shape"};
+}
+
 }  // namespace
+
+ValueType<std::size_t> sphere_type() {
+  return whole<std::size_t>(1, 1e6).named("sphere", "number of a sphere, from 1");
+}
+
+ValueType<PointKeys> point_type() {
+  return three(quantity(Dimension::length))
+      .named("point", "three lengths, such as [\"2 mm\", \"136 mm\", \"57 mm\"]");
+}
+
+const Kinds<OrganKeys, OrganKind>& organ_kinds() {
+  using K = OrganKeys;
+  const ValueType<double> length = quantity(Dimension::length, kAboveZero);
+  const auto spacing =
+      key("spacing", &K::spacing_m, length, "distance of neighbours, centre to centre");
+  const auto contact =
+      key("contact", &K::contact, sphere_type(), "the sphere that the probe meets");
+  const auto unit = required(with_example(
+      key("unit", &K::unit, text(1), "the length that a coordinate of 1 means: mm, cm, m"), "mm"));
+  static const Kinds<K, OrganKind> kinds(
+      {.name = "organ", .sentence = "the spheres of the tissue"}, &K::kind,
+      {{OrganKind::liver, "liver", "a liver, filled with spheres",
+        with_more({key("shape", &K::shape, shape_block().type(), "measures of the liver")},
+                  filling_keys(LiverRequest{}.count))},
+       {OrganKind::mesh, "mesh", "a closed surface, filled with spheres",
+        with_more({required(key("mesh", &K::mesh, text(1),
+                                "path of an STL or OBJ file, relative to the scene")),
+                   unit,
+                   key("landing", &K::landing, point_type(),
+                       "where the probe lands: the nearest outer sphere is the contact")},
+                  filling_keys(nullptr))},
+       {OrganKind::block,
+        "block",
+        "a block of spheres on a lattice",
+        {required(with_example(key("cells", &K::cells, three(whole<int>(1, 1e6)),
+                                   "numbers of cells along x, y and z"),
+                               {8, 8, 4})),
+         with_default(spacing, length.write(kUsualSpacing_m)),
+         with_default(key("lattice", &K::lattice, word(kLatticeWords), "of the spheres"), "fcc"),
+         contact}},
+       {OrganKind::star,
+        "star",
+        "the four spheres of the paper's element",
+        {with_default(spacing, length.write(BondElement{}.spacing_m)),
+         with_default(key("length", &K::length_m, length, "of the inter-layer bond"),
+                      length.write(kUsualSpacing_m))}},
+       {OrganKind::listed,
+        "listed",
+        "spheres that are given one by one",
+        {required(key("spheres", &K::spheres, list(listed_sphere_block().type(), {.fewest = 2}),
+                      "the spheres")),
+         unit, required(spacing), contact}}},
+      {{"layers in a shell only, lattice in a solid filling only", filling_fault},
+       {"one of the two: the count and either of them decide the other", width_fault}});
+  return kinds;
+}
 
 std::size_t nearest_outer_sphere(const Organ& organ, const Eigen::Vector3d& place) {
   const auto outer = std::count(organ.layer.begin(), organ.layer.end(), 0);  // numbered first
@@ -316,7 +348,7 @@ Refilled refilled_block(Json block, const Organ& organ, double finer) {
 /// The measures that a liver has by its count and spacing, stated.
 Json stated_shape(const Json& block, const Organ& organ, bool solid, const DocumentPlace& place) {
   Json stated = block.value("shape", Json::object());
-  LiverShape shape = parse_shape(stated, place.key("shape"));
+  LiverShape shape = shape_of(organ_kinds().made(block, place), place);
   if (!solid) {
     const auto outer =
         static_cast<std::size_t>(std::count(organ.layer.begin(), organ.layer.end(), 0));
@@ -332,13 +364,14 @@ Json stated_shape(const Json& block, const Organ& organ, bool solid, const Docum
 
 Refilled refilled_organ(const Json& block, const Organ& organ, double finer,
                         const DocumentPlace& place) {
-  const OrganKind kind = find_entry(kKinds, block.at("kind").get<std::string>())->meaning;
+  const OrganKeys keys = organ_kinds().made(block, place);
+  const OrganKind kind = keys.kind;
   if (kind == OrganKind::star || kind == OrganKind::listed) {
     throw bad_input(place.key("kind").where, "spheres that are given one by one",
                     "a body that can be filled with more of them: liver, mesh or block");
   }
   if (kind == OrganKind::block) return refilled_block(block, organ, finer);
-  const bool solid = is_solid(block, place);
+  const bool solid = is_solid(keys);
   Json refilled = block;
   if (!solid) {
     const auto layers = whole(organ.layer_count() * finer, 1);
@@ -355,35 +388,25 @@ Refilled refilled_organ(const Json& block, const Organ& organ, double finer,
   return std::pair{std::move(refilled), count};
 }
 
-std::size_t parse_sphere(const Json& number, const Organ& organ, const DocumentPlace& place) {
-  const auto value = number.get<std::int64_t>();
-  if (value >= 1 && static_cast<std::size_t>(value) <= organ.size()) {
-    return static_cast<std::size_t>(value) - 1;
-  }
-  throw bad_input(place.where, fmt::format("no sphere {}", value),
+std::size_t sphere_of(std::size_t number, const Organ& organ, const DocumentPlace& place) {
+  if (number <= organ.size()) return number - 1;
+  throw bad_input(place.where, fmt::format("no sphere {}", number),
                   fmt::format("1 to {}", organ.size()));
 }
 
 Eigen::Vector3d parse_point(const Json& list, const DocumentPlace& place) {
-  Eigen::Vector3d point;
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    point(i) = quantity_of(list.at(at), Dimension::length, place.key(std::to_string(at)).where);
-  }
-  return point;
+  return vector_of(point_type().read(list, place));
 }
 
-OrganBlock parse_organ(const Json& block, const DocumentPlace& place, const fs::path& folder) {
-  const auto& kind = *find_entry(kKinds, block.at("kind").get<std::string>());  // of the schema
-  require_keys_of(block, kind, place);
+OrganBlock organ_of(const OrganKeys& block, const DocumentPlace& place, const fs::path& folder) {
   OrganBlock result;
-  result.organ = organ_of(kind.meaning, block, place, folder);
-  if (block.contains("contact")) {
-    result.organ.contact = parse_sphere(block.at("contact"), result.organ, place.key("contact"));
+  result.organ = spheres_of(block, place, folder);
+  if (block.contact) {
+    result.organ.contact = sphere_of(*block.contact, result.organ, place.key("contact"));
   }
   require_valid(result.organ, place.where);
-  result.star = kind.meaning == OrganKind::star;
-  result.liver = kind.meaning == OrganKind::liver;
+  result.star = block.kind == OrganKind::star;
+  result.liver = block.kind == OrganKind::liver;
   return result;
 }
 

@@ -4,13 +4,36 @@
 #include <utility>
 
 #include "tpm/files/blocks/protocol_block.hpp"
-#include "tpm/files/renamed_names.hpp"
 #include "tpm/organ/scene/experiment_blocks.hpp"
 
 namespace tpm::organ {
+namespace {
+
+struct ProtocolFileKeys {
+  ProtocolBlock protocol;
+  OutputKeys outputs;
+};
+
+}  // namespace
 
 bool has_protocol(const Json& document) {
   return document.is_object() && document.contains("protocol");
+}
+
+const FileKind& protocol_kind() {
+  static const Block<ProtocolFileKeys> block(
+      "protocol_file", "what is done to a tissue, and when its response is asked for",
+      {required(key("protocol", &ProtocolFileKeys::protocol, protocol_kinds().type(),
+                    "what is imposed")),
+       key("outputs", &ProtocolFileKeys::outputs, outputs_block().type(),
+           "when the response is told; default 61 times, evenly; fields are of a scene and not "
+           "used")});
+  static const FileKind kind{
+      "protocol", "What is done to a tissue",
+      "The blocks protocol and outputs of a scene, as tpm predict reads them from any file that "
+      "has them. Quantities are texts of a number and a unit, such as \"4 mm/s\"",
+      block.form()};
+  return kind;
 }
 
 ProtocolFile parse_protocol_file(const Json& document, std::string_view where) {
@@ -18,13 +41,14 @@ ProtocolFile parse_protocol_file(const Json& document, std::string_view where) {
   for (const char* key : {"protocol", "outputs"}) {
     if (document.is_object() && document.contains(key)) blocks[key] = document.at(key);
   }
-  blocks = checked(std::move(blocks), "protocol", where);
+  blocks = checked(std::move(blocks), protocol_kind(), where);
   const DocumentPlace place{std::string(where)};
   const DocumentPlace at = place.key("protocol");
-  Protocol protocol =
-      parse_protocol_block(blocks.at("protocol"), at, Openness::complete).protocol(at);
-  const Json outputs = blocks.value("outputs", Json::object());
-  std::vector<double> times = parse_outputs(outputs, protocol, place.key("outputs")).times_s;
+  Protocol protocol = protocol_kinds().made(blocks.at("protocol"), at).protocol(at);
+  const DocumentPlace at_outputs = place.key("outputs");
+  const OutputKeys outputs =
+      outputs_block().made(blocks.value("outputs", Json::object()), at_outputs);
+  std::vector<double> times = outputs_of(outputs, protocol, at_outputs).times_s;
   return {std::move(protocol), std::move(times)};
 }
 

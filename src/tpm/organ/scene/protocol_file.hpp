@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
-#include "tpm/files/json.hpp"
+#include "tpm/files/keys/file_kind.hpp"
 #include "tpmkit/protocol.hpp"
 
 namespace tpm::organ {
@@ -16,6 +16,9 @@ struct ProtocolFile {
 
 /// Whether a document says what is done to a tissue: it has a block `protocol`.
 [[nodiscard]] bool has_protocol(const Json& document);
+
+/// The declaration of a file with these blocks.
+[[nodiscard]] const FileKind& protocol_kind();
 
 /// The blocks `protocol` and `outputs` of a document, of a scene for example; its other blocks are
 /// not looked at (schemas/protocol.schema.json). Throws Error(bad_input) with the key.

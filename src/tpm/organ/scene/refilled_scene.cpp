@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "tpm/files/renamed_names.hpp"
-#include "tpm/organ/scene/blocks.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -53,7 +52,7 @@ void require_limit(const Json& scene, const ExperimentScene& own, const Document
 
 RefilledScene::RefilledScene(Json document, std::string where, std::filesystem::path folder)
     : where_(std::move(where)),
-      document_(checked(std::move(document), "scene", where_)),
+      document_(checked(std::move(document), scene_kind(), where_)),
       folder_(std::move(folder)),
       own_(parse_checked_experiment(document_, where_, folder_)) {
   require_limit(document_, own_, DocumentPlace{where_});
@@ -91,7 +90,9 @@ Json RefilledScene::document(const Filling& filling) const {
       contact.erase("at");
       continue;  // the organ's own contact
     }
-    if (!organ) organ = parse_organ(scene.at("organ"), place, folder_).organ;
+    if (!organ) {
+      organ = organ_of(organ_kinds().made(scene.at("organ"), place), place, folder_).organ;
+    }
     contact.erase("at");
     contact["number"] =
         nearest_outer_sphere(*organ, own.position.col(static_cast<Eigen::Index>(probe.sphere))) + 1;

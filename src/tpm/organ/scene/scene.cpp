@@ -7,19 +7,14 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/files/renamed_names.hpp"
 #include "tpm/organ/bonds/local_support.hpp"
 #include "tpm/organ/bonds/material_refusal.hpp"
 #include "tpm/organ/bonds/rigidity.hpp"
-#include "tpm/organ/scene/blocks.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
 namespace {
-
-/// Blocks of a scene that say what is done to the tissue, not what it is.
-constexpr std::array<const char*, 5> kOtherBlocks{"contacts", "protocol", "formulation", "outputs",
-                                                  "tolerance"};
 
 Network joined(OrganBlock block, const NetworkOptions& options, const std::string& where) {
   if (!block.star) return build_network(std::move(block.organ), options, where);
@@ -29,17 +24,17 @@ Network joined(OrganBlock block, const NetworkOptions& options, const std::strin
 }
 
 /// What is fixed if the scene does not say.
-Json usual_anchors(bool star, bool liver) {
-  if (star) return Json::array({{{"kind", "spheres"}, {"spheres", {1, 3, 4}}}});
-  if (liver) return Json::array({{{"kind", "far_side"}}});
-  return Json::array();
+std::vector<AnchorKeys> usual_anchors(bool star, bool liver) {
+  if (star) return {{.kind = AnchorKind::spheres, .spheres = {1, 3, 4}}};
+  if (liver) return {{.kind = AnchorKind::far_side}};
+  return {};
 }
 
-void read_anchors(const Json& entries, Tissue& tissue, const DocumentPlace& place) {
+void add_anchors(const std::vector<AnchorKeys>& entries, Tissue& tissue,
+                 const DocumentPlace& place) {
   std::size_t index = 0;
-  for (const Json& entry : entries) {
-    AnchorBlock block =
-        parse_anchor(entry, tissue.network.organ, place.key(std::to_string(index++)));
+  for (const AnchorKeys& entry : entries) {
+    AnchorBlock block = anchor_of(entry, tissue.network.organ, place.key(std::to_string(index++)));
     tissue.anchor_words.push_back(std::move(block.words));
     tissue.anchors.insert(tissue.anchors.end(), block.spheres.begin(), block.spheres.end());
   }
@@ -52,12 +47,13 @@ bool is_anchored(const Tissue& tissue, std::size_t sphere) {
   return std::binary_search(tissue.anchors.begin(), tissue.anchors.end(), sphere);
 }
 
-void read_sliders(const Json& numbers, Tissue& tissue, const DocumentPlace& place) {
+void add_sliders(const std::vector<std::size_t>& numbers, Tissue& tissue,
+                 const DocumentPlace& place) {
   const Organ& organ = tissue.network.organ;
   std::size_t index = 0;
-  for (const Json& number : numbers) {
+  for (const std::size_t number : numbers) {
     const DocumentPlace entry = place.key(std::to_string(index++));
-    const std::size_t sphere = parse_sphere(number, organ, entry);
+    const std::size_t sphere = sphere_of(number, organ, entry);
     if (is_anchored(tissue, sphere)) {
       throw bad_input(entry.where, fmt::format("sphere {} is anchored", sphere + 1),
                       "a sphere that may move");
@@ -97,40 +93,44 @@ Constraints Tissue::constraints() const {
   return constraints;
 }
 
-Tissue parse_tissue(const Json& scene, std::string_view where,
-                    const std::filesystem::path& folder) {
-  return parse_checked_tissue(checked(scene, "scene", where), where, folder);
-}
-
-Tissue parse_checked_tissue(const Json& scene, std::string_view where,
-                            const std::filesystem::path& folder) {
+Tissue tissue_of(const SceneKeys& scene, std::string_view where,
+                 const std::filesystem::path& folder) {
   const DocumentPlace place{std::string(where)};
-  const auto block = [&](const char* key) { return scene.value(key, Json::object()); };
-  OrganBlock organ = parse_organ(scene.at("organ"), place.key("organ"), folder);
-  const Json anchors = scene.value("anchors", usual_anchors(organ.star, organ.liver));
-  const Json sliders = scene.value("sliders", organ.star ? Json::array({2}) : Json::array());
+  OrganBlock organ = organ_of(scene.organ, place.key("organ"), folder);
+  const bool star = organ.star;
   Tissue tissue;
   tissue.liver = organ.liver;
-  tissue.star = organ.star;
-  tissue.title = scene.value("title", organ.organ.name);
-  const LateralBond lateral = parse_lateral(block("bonds"), place.key("bonds"));
-  const Json material = block("material");
-  tissue.network =
-      joined(std::move(organ), parse_bonds(block("bonds"), place.key("bonds")), place.where);
-  MaterialBlock read =
-      parse_material(material, lateral, tissue.network.organ, place.key("material"));
-  tissue.materials = std::move(read.materials);
-  tissue.by_constants = read.by_constants;
-  read_anchors(anchors, tissue, place.key("anchors"));
-  read_sliders(sliders, tissue, place.key("sliders"));
-  for (const char* key : kOtherBlocks) {
-    if (scene.contains(key)) tissue.unused_blocks.emplace_back(key);
-  }
+  tissue.star = star;
+  tissue.title = scene.title.value_or(organ.organ.name);
+  tissue.network = joined(std::move(organ), scene.bonds.options, place.where);
+  MaterialBlock material =
+      material_of(scene.material, scene.bonds.lateral, tissue.network.organ, place.key("material"));
+  tissue.materials = std::move(material.materials);
+  tissue.by_constants = material.by_constants;
+  add_anchors(scene.anchors.value_or(usual_anchors(star, tissue.liver)), tissue,
+              place.key("anchors"));
+  add_sliders(
+      scene.sliders.value_or(star ? std::vector<std::size_t>{2} : std::vector<std::size_t>{}),
+      tissue, place.key("sliders"));
+  const auto unused = [&](bool there, const char* key) {
+    if (there) tissue.unused_blocks.emplace_back(key);
+  };
+  unused(scene.contacts.has_value(), "contacts");
+  unused(scene.protocol.has_value(), "protocol");
+  unused(scene.formulation.has_value(), "formulation");
+  unused(scene.outputs.has_value(), "outputs");
+  unused(scene.tolerance.has_value(), "tolerance");
   return tissue;
 }
 
+Tissue parse_tissue(const Json& scene, std::string_view where,
+                    const std::filesystem::path& folder) {
+  const Json document = checked(scene, scene_kind(), where);
+  return tissue_of(scene_block().made(document, DocumentPlace{std::string(where)}), where, folder);
+}
+
 Json with_mesh_listed(Json scene, std::string_view where, const std::filesystem::path& folder) {
-  scene = checked(std::move(scene), "scene", where);
+  scene = checked(std::move(scene), scene_kind(), where);
   if (scene.at("organ").at("kind") != "mesh") return scene;
   const Organ organ = parse_tissue(scene, where, folder).network.organ;
   Json spheres = Json::array();

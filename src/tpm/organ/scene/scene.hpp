@@ -53,9 +53,6 @@ struct Tissue {
 /// Throws Error(bad_input) with the key.
 [[nodiscard]] Tissue parse_tissue(const Json& scene, std::string_view where,
                                   const std::filesystem::path& folder);
-/// The same of a scene that the schema has seen with texts where numbers stand now (quantity_of).
-[[nodiscard]] Tissue parse_checked_tissue(const Json& scene, std::string_view where,
-                                          const std::filesystem::path& folder);
 
 /// The scene with the spheres that fill a mesh listed in the mesh's place, its name and SHA-256 in
 /// the description: it needs no file beside it any more. Other scenes are returned as they are.

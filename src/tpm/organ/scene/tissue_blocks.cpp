@@ -19,16 +19,6 @@ constexpr std::array<Word<LateralBond>, 3> kLateralWords{{{LateralBond::elastic,
                                                           {LateralBond::tension_only, "rope"},
                                                           {LateralBond::relaxing, "relaxing"}}};
 
-/// The part of the organ's depth along the probe's axis that is fixed at its far side.
-constexpr double kFarSide = 0.3;
-
-template <class Words, class Value>
-void read_word(const Json& block, const char* key, const Words& words, const DocumentPlace& place,
-               Value& value) {
-  if (!block.contains(key)) return;
-  value = parse_word(words, key, block.at(key).get<std::string>(), place.key(key).where);
-}
-
 /// The spheres on the side of a plane that its normal points to.
 std::vector<std::size_t> beyond(const Organ& organ, const Eigen::Vector3d& normal, double height) {
   std::vector<std::size_t> spheres;
@@ -40,16 +30,12 @@ std::vector<std::size_t> beyond(const Organ& organ, const Eigen::Vector3d& norma
   return spheres;
 }
 
-AnchorBlock far_side(const Json& entry, const Organ& organ, const DocumentPlace& place) {
+AnchorBlock far_side(double fraction, const Organ& organ, const DocumentPlace& place) {
   if (!organ.contact) {
     throw bad_input(
         place.where, "far_side of an organ without a contact sphere",
         "a key landing in the organ, which says where the probe lands, or another kind of "
         "anchor");
-  }
-  const double fraction = entry.value("fraction", kFarSide);
-  if (!(fraction > 0.0) || fraction > 1.0) {
-    throw bad_input(place.key("fraction").where, shortest(fraction), "above 0, at most 1");
   }
   const Eigen::Vector3d axis = -organ.normal.col(static_cast<Eigen::Index>(*organ.contact));
   const Eigen::RowVectorXd depth = axis.transpose() * organ.position;
@@ -68,86 +54,83 @@ AnchorBlock inner_layer(const Organ& organ) {
   return block;
 }
 
-AnchorBlock named_spheres(const Json& entry, const Organ& organ, const DocumentPlace& place) {
+AnchorBlock named_spheres(const AnchorKeys& entry, const Organ& organ, const DocumentPlace& place) {
   AnchorBlock block;
   const DocumentPlace list = place.key("spheres");
-  if (!entry.contains("spheres")) throw bad_input(list.where, "is missing", "a list of numbers");
-  std::size_t index = 0;
-  for (const Json& number : entry.at("spheres")) {
-    block.spheres.push_back(parse_sphere(number, organ, list.key(std::to_string(index++))));
+  for (const std::size_t number : entry.spheres) {
+    block.spheres.push_back(
+        sphere_of(number, organ, list.key(std::to_string(block.spheres.size()))));
   }
-  block.words = fmt::format("{} named sphere{}", index, index == 1 ? "" : "s");
+  const std::size_t count = entry.spheres.size();
+  block.words = fmt::format("{} named sphere{}", count, count == 1 ? "" : "s");
   return block;
 }
 
-AnchorBlock half_space(const Json& entry, const Organ& organ, const DocumentPlace& place) {
-  for (const char* key : {"point", "normal"}) {
-    if (entry.contains(key)) continue;
-    throw bad_input(place.key(key).where, "is missing", "a point of the plane and its normal");
-  }
-  const Eigen::Vector3d point = parse_point(entry.at("point"), place.key("point"));
-  const auto n = entry.at("normal").get<std::array<double, 3>>();
-  const Eigen::Vector3d normal = Eigen::Vector3d(n[0], n[1], n[2]).stableNormalized();
-  if (normal.norm() < 0.5) {
-    throw bad_input(place.key("normal").where, "has no length", "a direction");
-  }
-  return {beyond(organ, normal, normal.dot(point)), "a half-space"};
+AnchorBlock half_space(const AnchorKeys& entry, const Organ& organ) {
+  const Eigen::Vector3d normal = vector_of(entry.normal).stableNormalized();
+  return {beyond(organ, normal, normal.dot(vector_of(entry.point))), "a half-space"};
 }
 
-void require_keys(const Json& entry, const std::vector<std::string_view>& keys,
-                  const DocumentPlace& place) {
-  for (const auto& [key, value] : entry.items()) {
-    if (key == "kind" || std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
-    throw bad_input(place.key(key).where, "is no key of this kind of anchor",
-                    keys.empty() ? "no key but kind" : fmt::format("{}", fmt::join(keys, ", ")));
+AnchorBlock spheres_of(const AnchorKeys& entry, const Organ& organ, const DocumentPlace& place) {
+  switch (entry.kind) {
+    case AnchorKind::far_side:
+      return far_side(entry.fraction, organ, place);
+    case AnchorKind::inner_layer:
+      return inner_layer(organ);
+    case AnchorKind::spheres:
+      return named_spheres(entry, organ, place);
+    case AnchorKind::half_space:
+      break;
   }
+  return half_space(entry, organ);
 }
 
 }  // namespace
 
-NetworkOptions parse_bonds(const Json& block, const DocumentPlace& place) {
-  NetworkOptions options;
-  options.support = block.value("support", options.support);
-  if (!(options.support > 1.0 && options.support <= 4.0)) {
-    throw bad_input(place.key("support").where, shortest(options.support),
-                    "a number of spacings above 1, at most 4");
-  }
-  options.diagonals = block.value("diagonals", options.diagonals);
-  read_word(block, "rule", kRuleWords, place, options.rule);
-  read_word(block, "spacing_law", kSpacingLawWords, place, options.spacing_law);
-  if (block.contains("reference_spacing")) {
-    options.reference_spacing_m = quantity_at(block, "reference_spacing", Dimension::length, place);
-    if (!(options.reference_spacing_m > 0.0)) {
-      throw bad_input(place.key("reference_spacing").where,
-                      fmt::format("{} m", shortest(options.reference_spacing_m)),
-                      "a length above 0");
-    }
-  }
-  return options;
+const Block<BondKeys>& bonds_block() {
+  using O = NetworkOptions;
+  const auto of_options = [](const Key<O>& key) { return within(&BondKeys::options, key); };
+  static const Block<BondKeys> block(
+      "bonds", "which spheres are joined, and how stiff their bonds are",
+      {of_options(key("support", &O::support, number({.least = 1.0, .most = 4.0, .above = true}),
+                      "neighbours are within this many spacings")),
+       of_options(key("diagonals", &O::diagonals, flag(), "false: one radial bond per sphere")),
+       of_options(key("rule", &O::rule, word(kRuleWords), "stiffness of a bond")),
+       of_options(key("spacing_law", &O::spacing_law, word(kSpacingLawWords),
+                      "how stiffness follows the spacing")),
+       of_options(key("reference_spacing", &O::reference_spacing_m,
+                      quantity(Dimension::length, kAboveZero),
+                      "where the continuum law has the paper's stiffness")),
+       key("lateral", &BondKeys::lateral, word(kLateralWords),
+           "lateral bonds pull and push, or only pull, or relax as the radial ones do")});
+  return block;
 }
 
-LateralBond parse_lateral(const Json& block, const DocumentPlace& place) {
-  LateralBond lateral = LateralBond::elastic;
-  read_word(block, "lateral", kLateralWords, place, lateral);
-  return lateral;
+const Kinds<AnchorKeys, AnchorKind>& anchor_kinds() {
+  using K = AnchorKeys;
+  static const Kinds<K, AnchorKind> kinds(
+      {.name = "anchor", .sentence = "spheres that are fixed"}, &K::kind,
+      {{AnchorKind::far_side,
+        "far_side",
+        "the side away from the probe",
+        {key("fraction", &K::fraction, number({.least = 0.0, .most = 1.0, .above = true}),
+             "of the organ's depth along the probe's axis")}},
+       {AnchorKind::inner_layer, "inner_layer", "the innermost layer", {}},
+       {AnchorKind::spheres,
+        "spheres",
+        "spheres by their numbers",
+        {required(key("spheres", &K::spheres, list(sphere_type(), {.fewest = 1}),
+                      "numbers of spheres"))}},
+       {AnchorKind::half_space,
+        "half_space",
+        "the side of a plane that its normal points to",
+        {required(key("point", &K::point, point_type(), "a point of the plane")),
+         required(key("normal", &K::normal, direction(), "of the plane, to the fixed side"))}}});
+  return kinds;
 }
 
-AnchorBlock parse_anchor(const Json& entry, const Organ& organ, const DocumentPlace& place) {
-  const auto kind = entry.at("kind").get<std::string>();  // one of the schema's four
-  AnchorBlock block;
-  if (kind == "far_side") {
-    require_keys(entry, {"fraction"}, place);
-    block = far_side(entry, organ, place);
-  } else if (kind == "inner_layer") {
-    require_keys(entry, {}, place);
-    block = inner_layer(organ);
-  } else if (kind == "spheres") {
-    require_keys(entry, {"spheres"}, place);
-    block = named_spheres(entry, organ, place);
-  } else {
-    require_keys(entry, {"point", "normal"}, place);
-    block = half_space(entry, organ, place);
-  }
+AnchorBlock anchor_of(const AnchorKeys& entry, const Organ& organ, const DocumentPlace& place) {
+  AnchorBlock block = spheres_of(entry, organ, place);
   if (block.spheres.empty()) {
     throw bad_input(place.where, "holds no sphere", "at least one sphere");
   }

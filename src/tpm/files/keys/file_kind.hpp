@@ -1,0 +1,36 @@
+#pragma once
+// The kinds of files that users write, each with its form.
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/files/keys/form.hpp"
+
+namespace tpm::files {
+
+/// A kind of file with its declared form.
+struct FileKind {
+  std::string name;      ///< "scene" for schemas/scene.schema.json
+  std::string title;     ///< what a file of it is, and of which commands
+  std::string sentence;  ///< how its values are written
+  FormPtr form;
+};
+
+/// The document under its current names, without "$schema", which is for editors. Throws
+/// Error(bad_input), at the key, for what has not the form; what is a file of another kind is
+/// called so.
+[[nodiscard]] Json checked(Json document, const FileKind& kind, std::string_view where,
+                           Numbers numbers = Numbers::texts_alone);
+
+/// The JSON Schema (draft 7) of a kind, as it stands in schemas/. Rules about several keys stand in
+/// descriptions.
+[[nodiscard]] Json json_schema(const FileKind& kind);
+
+/// A small file of the kind: the required keys, and those whose declaration has an example.
+[[nodiscard]] Json example_of(const FileKind& kind);
+
+/// All keys of a kind as a section of the page of keys, Markdown.
+[[nodiscard]] std::string keys_section(const FileKind& kind);
+
+}  // namespace tpm::files

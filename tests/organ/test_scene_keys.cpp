@@ -1,0 +1,377 @@
+// The declaration of a scene's keys (files/keys): reader and JSON Schema say the same.
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <map>
+#include <random>
+#include <set>
+
+#include "refusal.hpp"
+#include "temp_folder.hpp"
+#include "tpm/base/lists.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/organ/scene/protocol_file.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
+
+using namespace tpm;
+using namespace tpm::files;
+using namespace tpm::organ;
+using Catch::Matchers::Contains;
+using Catch::Matchers::EndsWith;
+using Catch::Matchers::StartsWith;
+
+namespace {
+
+Json poke() {
+  return read_json(TPM_TEST_SOURCE_DIR "/configs/liver_poke.json");
+}
+
+/// The scene with one part replaced, which a JSON pointer names.
+Json poke_with(const char* pointer, Json value) {
+  Json scene = poke();
+  scene[Json::json_pointer(pointer)] = std::move(value);
+  return scene;
+}
+
+Json poke_without(const char* key) {
+  Json scene = poke();
+  scene.erase(key);
+  return scene;
+}
+
+std::string form_refusal(const Json& document) {
+  return test::refusal_of([&] { (void)checked(document, scene_kind(), "s.json"); });
+}
+
+std::string reader_refusal(const Json& document) {
+  return test::refusal_of([&] {
+    (void)scene_block().made(checked(document, scene_kind(), "s.json"), DocumentPlace{"s.json"});
+  });
+}
+
+/// Whether python3-jsonschema accepts each of the documents; none if no Python has it.
+std::optional<std::vector<bool>> schema_verdicts(const Json& schema, const Json& documents) {
+  const test::TempFolder folder;
+  write_file(folder / "schema.json", to_text(schema));
+  write_file(folder / "documents.json", documents.dump());
+  const std::string out = folder / "verdicts.txt";
+  const std::string command =
+      "sh '" TPM_TEST_SOURCE_DIR "/tests/with_python.sh' jsonschema '" TPM_TEST_SOURCE_DIR
+      "/tests/programs/schema_verdicts.py' '" +
+      (folder / "schema.json") + "' '" + (folder / "documents.json") + "' > '" + out + "'";
+  if (std::system(command.c_str()) != 0) return std::nullopt;
+  std::vector<bool> verdicts;
+  for (const char c : read_file(out)) {
+    if (c == '0' || c == '1') verdicts.push_back(c == '1');
+  }
+  return verdicts;
+}
+
+/// Every rule that a form or one within it has.
+void add_rules(const Form& form, std::set<std::string>& rules, std::set<std::string>& ranges) {
+  rules.insert(form.rules.begin(), form.rules.end());
+  if (form.type == Form::Type::quantity) {
+    ranges.insert(form.range.words(si_symbol(form.dimension)));
+  }
+  if (form.made) add_rules(*form.made(), rules, ranges);
+  if (form.item) add_rules(*form.item, rules, ranges);
+  for (const FormPtr& one : form.forms) add_rules(*one, rules, ranges);
+  for (const KeyForm& key : form.keys) add_rules(*key.form, rules, ranges);
+  for (const KindForm& kind : form.kinds) {
+    for (const KeyForm& key : kind.keys) add_rules(*key.form, rules, ranges);
+  }
+}
+
+/// Values that stand where others belong.
+const std::vector<Json>& odd_values() {
+  static const std::vector<Json> values{nullptr,
+                                        true,
+                                        0,
+                                        1,
+                                        3,
+                                        -1,
+                                        71.0,
+                                        424.5,
+                                        70000,
+                                        1e7,
+                                        "",
+                                        "hello",
+                                        "12",
+                                        "12 mm",
+                                        "-12 mm",
+                                        "0 mm",
+                                        "12 kPa",
+                                        "12kPa",
+                                        "-12 kPa",
+                                        "0.012 MPa",
+                                        "12 kpa",
+                                        "12,5 kPa",
+                                        "1e400 kPa",
+                                        "4 s",
+                                        "1 N",
+                                        "4 mm/s",
+                                        "4 mm/min",
+                                        "2 mm^2",
+                                        "3 N/m^2",
+                                        "1 Pa s",
+                                        "5 N/mm",
+                                        "shell",
+                                        "solid",
+                                        "fcc",
+                                        "sphere",
+                                        "ball",
+                                        "liver",
+                                        "mesh",
+                                        "star",
+                                        "ramp_hold",
+                                        "creep",
+                                        "rk4",
+                                        "linear",
+                                        Json::array(),
+                                        Json::array({1}),
+                                        Json::array({0, 0, 0}),
+                                        Json::array({0, 0, 1}),
+                                        Json::array({"1 mm", "2 mm", "3 mm"}),
+                                        Json::array({1, 1}),
+                                        Json::object(),
+                                        Json{{"kind", "sphere"}},
+                                        Json{{"kind", "layer"}, {"layer", 1}, {"factor", 2}},
+                                        Json{{"shape", "cubic"}, {"stiffening", "5 mm"}},
+                                        Json{{"time", "1 s"}, {"load", "1 N"}}};
+  return values;
+}
+
+void collect(const Json& part, const std::string& at, std::vector<std::string>& pointers) {
+  pointers.push_back(at);
+  if (!part.is_structured()) return;
+  for (const auto& item : part.items()) collect(item.value(), at + "/" + item.key(), pointers);
+}
+
+/// Scenes with one to three odd changes, the same in every run.
+class OddScenes {
+  template <class List>
+  const auto& one_of(const List& list) {
+    return list[random_() % list.size()];
+  }
+
+ public:
+  explicit OddScenes(std::vector<Json> scenes) : scenes_(std::move(scenes)) {
+    for (const Json& scene : scenes_) {
+      std::vector<std::string> pointers;
+      collect(scene, "", pointers);
+      for (const std::string& pointer : pointers) {
+        const std::size_t slash = pointer.rfind('/');
+        if (slash == std::string::npos) continue;
+        const std::string name = pointer.substr(slash + 1);
+        if (name.find_first_not_of("0123456789") != std::string::npos) keys_.push_back(name);
+      }
+    }
+    for (const char* more : {"shape", "filling", "lattice", "radius", "load", "hold", "step",
+                             "masses", "springs", "comparison", "at", "point", "normal", "fraction",
+                             "solver", "materal", "spacing", "seed"}) {
+      keys_.emplace_back(more);
+    }
+  }
+
+  Json next() {
+    Json scene = one_of(scenes_);
+    for (std::size_t changes = 1 + random_() % 3; changes > 0; --changes) change(scene);
+    return scene;
+  }
+
+ private:
+  void change(Json& scene) {
+    std::vector<std::string> pointers;
+    collect(scene, "", pointers);
+    const std::string pointer = one_of(pointers);
+    Json& part = scene[Json::json_pointer(pointer)];
+    switch (random_() % 4) {
+      case 0:
+        if (part.is_object() && !part.empty()) {
+          auto item = part.begin();
+          std::advance(item, static_cast<std::ptrdiff_t>(random_() % part.size()));
+          part.erase(item);
+        }
+        break;
+      case 1:
+        if (part.is_object()) part[one_of(keys_)] = one_of(odd_values());
+        break;
+      case 2:
+        if (part.is_array()) part.push_back(one_of(odd_values()));
+        break;
+      default:
+        part = one_of(odd_values());
+    }
+  }
+
+  std::vector<Json> scenes_;
+  std::vector<std::string> keys_;
+  std::mt19937 random_{20};  // NOLINT(cert-msc51-cpp): the same scenes in every run
+};
+
+}  // namespace
+
+TEST_CASE("odd scenes: what a schema can say the reader refuses as the schema does", "[keys]") {
+  struct Case {
+    const char* called;
+    Json scene;
+    bool form;  ///< what schema and reader say
+  };
+  const Json liver{{"kind", "liver"}};
+  Json comment = poke();
+  comment["_comment"] = "x";
+  Json misspelt = poke_without("material");
+  misspelt["materal"] = Json::object();
+  const std::vector<Case> cases{
+      {"number 71.0", poke_with("/contacts/0/number", 71.0), true},
+      {"number 70000", poke_with("/contacts/0/number", 70000), true},
+      {"number 0", poke_with("/contacts/0/number", 0), false},
+      {"E1 12", poke_with("/material/E1", "12"), false},
+      {"E1 12 mm", poke_with("/material/E1", "12 mm"), false},
+      {"E1 hello", poke_with("/material/E1", "hello"), false},
+      {"E1 -12 kPa", poke_with("/material/E1", "-12 kPa"), false},
+      {"E1 12000", poke_with("/material/E1", 12000), false},
+      {"E1 12 kpa", poke_with("/material/E1", "12 kpa"), false},
+      {"E1 12kPa", poke_with("/material/E1", "12kPa"), true},
+      {"E1 12,5 kPa", poke_with("/material/E1", "12,5 kPa"), false},
+      {"E1 0.012 MPa", poke_with("/material/E1", "0.012 MPa"), true},
+      {"contacts missing", poke_without("contacts"), true},
+      {"protocol missing", poke_without("protocol"), true},  // tpm network needs none
+      {"material missing", poke_without("material"), true},
+      {"anchors missing", poke_without("anchors"), true},
+      {"formulation quasi_statc", poke_with("/formulation", {{"kind", "quasi_statc"}}), false},
+      {"tolerance 5", poke_with("/tolerance", 5), false},
+      {"tolerance -1", poke_with("/tolerance", -1), false},
+      {"tolerance 1%", poke_with("/tolerance", "1%"), false},
+      {"title empty", poke_with("/title", ""), true},
+      {"title 5", poke_with("/title", 5), false},
+      {"title null", poke_with("/title", nullptr), false},
+      {"fraction 7", poke_with("/anchors/0/fraction", 7), false},
+      {"normal on far_side", poke_with("/anchors/0/normal", {0, 0, 1}), false},
+      {"anchors []", poke_with("/anchors", Json::array()), true},
+      {"contacts []", poke_with("/contacts", Json::array()), false},
+      {"outputs foo", poke_with("/outputs", {{"foo", 1}}), false},
+      {"direction 0", poke_with("/contacts/0/direction", {0, 0, 0}), false},
+      {"materal", misspelt, false},
+      {"_comment", comment, false},
+      {"count 424.5", poke_with("/organ/count", 424.5), false},
+      {"count 3", poke_with("/organ/count", 3), true},
+      {"unchanged", poke(), true},
+  };
+  Json documents = Json::array();
+  for (const Case& c : cases) {
+    CAPTURE(c.called);
+    const std::string refusal = form_refusal(c.scene);
+    CAPTURE(refusal);
+    CHECK(refusal.empty() == c.form);
+    documents.push_back(c.scene);
+  }
+  const auto verdicts = schema_verdicts(json_schema(scene_kind()), documents);
+  if (!verdicts) {
+    WARN("no Python has jsonschema: the schema was not asked");
+    return;
+  }
+  REQUIRE(verdicts->size() == cases.size());
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    CAPTURE(cases[i].called);
+    CHECK((*verdicts)[i] == cases[i].form);
+  }
+}
+
+TEST_CASE("schema and reader of scenes agree on 2,000 odd scenes, but for rules that are listed",
+          "[keys]") {
+  std::vector<Json> bases{poke(), example_of(scene_kind())};
+  for (const char* name : {"liver_tumour", "liver_fig3", "liver_indentation", "budget_liver"}) {
+    bases.push_back(read_json(std::string(TPM_TEST_SOURCE_DIR "/configs/") + name + ".json"));
+  }
+  bases.push_back(parse_json(R"({"organ": {"kind": "block", "cells": [4, 4, 2]},
+    "bonds": {"support": 1.6, "rule": "per_bond", "lateral": "rope"},
+    "material": {"Einf": "2 kPa", "branches": [{"g": "1 kPa", "tau": "2 s"}],
+      "potential": {"shape": "cubic", "stiffening": "5 mm"},
+      "regions": [{"kind": "ball", "centre": ["1 mm", "2 mm", "3 mm"], "radius": "4 mm", "factor": 3},
+                  {"kind": "function", "factor": "1 + x"}], "between": "series"},
+    "anchors": [{"kind": "inner_layer"}, {"kind": "half_space", "point": ["0 mm", "0 mm", "1 mm"],
+      "normal": [0, 0, 1]}, {"kind": "spheres", "spheres": [1, 2]}], "sliders": [3],
+    "contacts": [{"kind": "patch", "number": 5, "radius": "9 mm", "direction": [0, 0, 1], "share": 1}],
+    "protocol": {"kind": "creep", "load": "0.1 N", "duration": "4 s"},
+    "formulation": {"kind": "inertial", "damping_ratio": 0.2, "density_kg_per_m3": 1000},
+    "outputs": {"times": ["1 s", "2 s"], "fields": ["force"]}, "tolerance": 1e-5})",
+                             "base"));
+  OddScenes odd(bases);
+  Json documents = Json::array();
+  constexpr std::size_t kCount = 2000;
+  while (documents.size() < kCount) documents.push_back(odd.next());
+  const auto verdicts = schema_verdicts(json_schema(scene_kind()), documents);
+  if (!verdicts) {
+    WARN("no Python has jsonschema: the schema was not asked");
+    return;
+  }
+  REQUIRE(verdicts->size() == kCount);
+  std::set<std::string> rules, ranges;
+  add_rules(*scene_block().form(), rules, ranges);
+  std::size_t accepted = 0;
+  std::map<std::string, int> by_rule;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const std::string refusal = reader_refusal(documents[i]);
+    if (refusal.empty()) {
+      INFO(documents[i].dump());
+      CHECK((*verdicts)[i]);
+      ++accepted;
+      continue;
+    }
+    if (!(*verdicts)[i]) continue;
+    // The schema accepts what the reader refuses: a rule about several keys, or a quantity that a
+    // pattern does not weigh.
+    const std::size_t at = refusal.rfind("; expected ");
+    const std::string expected = at == std::string::npos ? "" : refusal.substr(at + 11);
+    const bool by_unit = refusal.find("a unit of ") != std::string::npos;
+    const bool listed_rule = rules.contains(expected) || ranges.contains(expected) || by_unit ||
+                             refusal.find("finite number") != std::string::npos;
+    INFO(documents[i].dump());
+    CAPTURE(refusal);
+    CHECK(listed_rule);
+    ++by_rule[by_unit ? "a unit" : expected];
+  }
+  CHECK(accepted > kCount / 20);
+  CHECK(accepted < kCount / 2);
+  for (const auto& [rule, count] : by_rule) {
+    INFO(rule);
+    CHECK(count > 0);
+  }
+}
+
+TEST_CASE("the committed schemas of scenes and protocols are those of the declaration", "[keys]") {
+  for (const FileKind* kind : {&scene_kind(), &protocol_kind()}) {
+    CAPTURE(kind->name);
+    CHECK(read_file(share_dir() / "schemas" / (kind->name + ".schema.json")) ==
+          to_text(json_schema(*kind)));
+  }
+}
+
+TEST_CASE("the examples of scenes and protocols are read", "[keys]") {
+  CHECK(reader_refusal(example_of(scene_kind())).empty());
+  CHECK_NOTHROW(parse_protocol_file(example_of(protocol_kind()), "example"));
+  CHECK_NOTHROW(parse_experiment(example_of(scene_kind()), "example", {}));
+}
+
+TEST_CASE("a file of another kind is called by its name", "[keys]") {
+  CHECK_THAT(form_refusal(read_json(TPM_TEST_SOURCE_DIR "/configs/hil_law.json")),
+             StartsWith("s.json: this is a session; use tpm hil run"));
+  CHECK_THAT(form_refusal(read_json(TPM_TEST_SOURCE_DIR "/configs/sweep_x_depth.json")),
+             Contains("this is a sweep; use tpm sweep"));
+  CHECK_THAT(test::refusal_of([] { check_schema(poke(), "hil", "s.json"); }),
+             StartsWith("s.json: this is a scene; use tpm simulate"));
+}
+
+TEST_CASE("what is written of a declaration is read again", "[keys]") {
+  for (
+      const char* text :
+      {R"({"kind": "ramp_hold", "depth": "8 mm", "rate": "4 mm/s", "hold": "30 s"})",
+       R"({"kind": "knots", "knots": [{"time": "0 s", "load": "0 N"}, {"time": "1 s", "load": "2 N"}]})"}) {
+    const DocumentPlace place{"p"};
+    const ProtocolBlock block = protocol_kinds().read(parse_json(text, "p"), place);
+    const Json written = protocol_kinds().write(block);
+    const ProtocolBlock again = protocol_kinds().read(written, place);
+    CHECK(protocol_kinds().write(again) == written);
+    CHECK(again.protocol(place).peak() == block.protocol(place).peak());
+  }
+}
