@@ -5,6 +5,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/base/warning.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 #include "tpmkit/version.hpp"
@@ -55,6 +56,8 @@ PYBIND11_MODULE(_core, module) {
   module.attr("__version__") = std::string(tpm::version());
   bind_errors(module);
   bind_warnings();
+  // What was read once is not written over, as in the program (docs/python.md).
+  static const tpm::files::FileRoles roles("another name for the result");
   module.def(
       "parse_quantity",
       [](const std::string& text, const std::string& dimension) {

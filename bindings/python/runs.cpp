@@ -1,6 +1,7 @@
 // Scenes run and sweeps computed.
 #include "binding.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/organ/run/recorder.hpp"
@@ -62,7 +63,10 @@ py::dict run_scene(const std::string& text, const std::string& where, const fs::
                    const std::string& output, py::object progress) {
   ExperimentScene scene = parse_experiment(parse_json(text, where), where, folder);
   scene.text = text;
-  if (!output.empty()) (void)Hdf5Writer(output);  // before a long run: can the result be written?
+  if (!output.empty()) {
+    will_update({output + ".checkpoint"});
+    (void)Hdf5Writer(output);  // before a long run: can the result be written?
+  }
   const LongCall call(std::move(progress));
   SimulationControls controls;
   controls.interrupted = call.interrupted();
@@ -85,6 +89,8 @@ py::dict compute_sweep(const fs::path& file, const fs::path& output, int workers
                        py::object progress) {
   const Sweep sweep = read_sweep(file);
   const fs::path log_file = log_path(output);
+  require_not_read(output);
+  will_update({output});  // a result that stands already is asked which sweep it holds
   if (fs::exists(log_file) || fingerprint_of(output) != sweep.fingerprint) {
     require_replaceable(output);
     const LongCall call(std::move(progress));

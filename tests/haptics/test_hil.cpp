@@ -46,7 +46,7 @@ TEST_CASE("Bad sessions: one line each, with the key") {
       Case{"/rate", "5 kHz", "key /rate: 5000 Hz; expected 500 to 4000 Hz"},
       Case{"/rate", "1 kg", "key /rate"}, Case{"/limits/force", "20 N", "key /limits/force: 20 N"},
       Case{"/limits/watchdog", "32 ms", "expected 0.004 to 0.016 s"},
-      Case{"/push", Json::array({0, 0, 0}), "has no direction"},
+      Case{"/push", Json::array({0, 0, 0}), "key /push: has no length"},
       Case{"/indentations/depths", Json::array({"0 mm"}), "key /indentations/depths/0"},
       Case{"/indentations/hold", "13 h", "takes 4.681e+04 s; expected 12 hours"},
       Case{"/model/kind", "magic", "/model/kind"},

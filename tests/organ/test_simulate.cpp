@@ -379,7 +379,7 @@ TEST_CASE("lists of a session and of a design's candidates are protocols of the 
   const DocumentPlace place{"f.json"};
   const auto parsed = [&](const std::string& text) {
     return parse_protocol_lists(parse_json(text, "f.json"), place, ProtocolKind::ramp_hold,
-                                Openness::complete, {{"rate", "rates"}}, {"rest"});
+                                {{"rate", "rates"}}, {"rest"});
   };
   const std::vector<ProtocolBlock> all = parsed(
       R"({"depth": ["1 mm", "2 mm"], "rates": ["1 mm/s", "4 mm/s"], "hold": "3 s", "rest": "1 s"})");

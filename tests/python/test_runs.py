@@ -58,6 +58,17 @@ class Runs(unittest.TestCase):
         np.testing.assert_allclose(again.position_m, data.position_m)
         np.testing.assert_allclose(again.output_s, data.output_s)
 
+    def test_an_input_is_never_written_over(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene = Path(folder) / "scene.json"
+            scene.write_text(json.dumps(SCENE))
+            link = Path(folder) / "link.h5"
+            link.symlink_to(scene)
+            for output in (scene, link):
+                with self.assertRaisesRegex(tpmkit.Error, "would write over it; expected another name"):
+                    tpmkit.simulate(scene, output=output)
+                self.assertEqual(json.loads(scene.read_text()), SCENE)
+
     def test_what_a_progress_raises_ends_the_run(self):
         def refuse(done, total):
             raise ValueError("enough")

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
+#include <system_error>
 #include <utility>
 
 #include "tpm/files/file.hpp"
@@ -32,14 +34,20 @@ std::optional<FileIdentity> identity_of(const fs::path& path) {
 }
 
 struct Roles {
-  std::set<FileIdentity> read;
-  std::set<FileIdentity> written;  ///< by this command
-  std::vector<fs::path> results;   ///< announced, not yet written
+  std::string instead;
+  std::map<FileIdentity, fs::path> read;  ///< with the name under which it was read
+  std::set<FileIdentity> written;         ///< by this command
+  std::vector<fs::path> results;          ///< announced, not yet written
   std::vector<fs::path> states;
 
   [[nodiscard]] bool is_state(const FileIdentity& file) const {
     return std::any_of(states.begin(), states.end(),
                        [&](const fs::path& state) { return identity_of(state) == file; });
+  }
+  /// A file that was deleted leaves its inode to others: it has to be there still.
+  [[nodiscard]] bool was_read(const std::optional<FileIdentity>& file) const {
+    const auto found = file ? read.find(*file) : read.end();
+    return found != read.end() && identity_of(found->second) == file;
   }
 };
 
@@ -48,7 +56,7 @@ std::optional<Roles> roles;
 
 Error both_read_and_written(const fs::path& path) {
   return {ExitCode::usage, path.string(), "this command reads it and would write over it",
-          "another --output"};
+          roles->instead};
 }
 
 /// Before the work, not after it.
@@ -63,16 +71,17 @@ void announce(const std::vector<fs::path>& files, std::vector<fs::path> Roles::*
   if (!roles) return;
   for (const fs::path& file : files) {
     const auto identity = identity_of(file);
-    if (identity && roles->read.count(*identity) > 0) throw both_read_and_written(file);
+    if (roles->was_read(identity)) throw both_read_and_written(file);
     ((*roles).*list).push_back(file);
   }
 }
 
 }  // namespace
 
-FileRoles::FileRoles() {
+FileRoles::FileRoles(std::string instead) {
   const std::lock_guard lock(roles_mutex);
   roles.emplace();
+  roles->instead = std::move(instead);
 }
 
 FileRoles::~FileRoles() {
@@ -97,14 +106,15 @@ void note_reading(const fs::path& path, int descriptor) {
   for (const fs::path& result : roles->results) {
     if (identity_of(result) == file) throw both_read_and_written(path);
   }
-  roles->read.insert(*file);
+  std::error_code no_folder;  // the working folder is gone: nothing relative was read from it
+  const fs::path name = fs::absolute(path, no_folder);
+  roles->read[*file] = no_folder ? path : name;
 }
 
 void require_not_read(const fs::path& path) {
   const std::lock_guard lock(roles_mutex);
   if (!roles) return;
-  const auto file = identity_of(path);
-  if (file && roles->read.count(*file) > 0) throw both_read_and_written(path);
+  if (roles->was_read(identity_of(path))) throw both_read_and_written(path);
 }
 
 void note_written(const fs::path& path) {

@@ -1,16 +1,19 @@
 #pragma once
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace tpm::files {
 
-/// Keeps the files that a command reads apart from those that it writes. While a FileRoles lives,
-/// the readers and writers of store/ report every file to it, and a file is known by its device and
-/// inode, so that links and other spellings of a name are the same file. Without a FileRoles (in a
-/// program that uses the library) nothing is watched. At most one lives at a time.
+/// Keeps the files that a program reads apart from those that it writes: a command of tpm for as
+/// long as it runs, the Python module for as long as it is loaded. While a FileRoles lives, readers
+/// and writers report every file to it, and a file is known by its device and inode, so that links
+/// and other spellings of a name are the same file. Without a FileRoles (in a program that uses the
+/// library) nothing is watched. At most one lives at a time.
 class FileRoles {
  public:
-  FileRoles();
+  /// @param instead what a refusal expects in place of a name that was read
+  explicit FileRoles(std::string instead = "another --output");
   ~FileRoles();
   FileRoles(const FileRoles&) = delete;
   FileRoles& operator=(const FileRoles&) = delete;

@@ -19,6 +19,7 @@ struct NumberKey {
   Dimension dimension;
   Range range;
   Number value;
+  std::vector<double> ProtocolLists::*list;
   const char* sentence;
   const char* example;
 };
@@ -27,23 +28,38 @@ constexpr NumberKey kDepth{"depth",
                            Dimension::length,
                            kAboveZero,
                            &ProtocolBlock::depth_m,
+                           &ProtocolLists::depths_m,
                            "how deep the tissue is indented",
                            "8 mm"};
-constexpr NumberKey kRate{
-    "rate",  Dimension::speed, kAboveZero, &ProtocolBlock::rate_m_per_s, "speed of the ramp",
-    "4 mm/s"};
-constexpr NumberKey kHold{
-    "hold", Dimension::time, kZeroOrMore, &ProtocolBlock::hold_s, "how long the depth is held",
-    "30 s"};
-constexpr NumberKey kStepHold{
-    "hold", Dimension::time, kAboveZero, &ProtocolBlock::hold_s, "how long the depth is held",
-    "30 s"};
-constexpr NumberKey kLoad{"load",      Dimension::force, kAboveZero, &ProtocolBlock::load_N,
-                          "the force", "0.1 N"};
+constexpr NumberKey kRate{"rate",
+                          Dimension::speed,
+                          kAboveZero,
+                          &ProtocolBlock::rate_m_per_s,
+                          &ProtocolLists::rates_m_per_s,
+                          "speed of the ramp",
+                          "4 mm/s"};
+constexpr NumberKey kHold{"hold",
+                          Dimension::time,
+                          kZeroOrMore,
+                          &ProtocolBlock::hold_s,
+                          &ProtocolLists::holds_s,
+                          "how long the depth is held",
+                          "30 s"};
+constexpr NumberKey kStepHold{"hold",
+                              Dimension::time,
+                              kAboveZero,
+                              &ProtocolBlock::hold_s,
+                              &ProtocolLists::holds_s,
+                              "how long the depth is held",
+                              "30 s"};
+constexpr NumberKey kLoad{
+    "load",      Dimension::force, kAboveZero, &ProtocolBlock::load_N, &ProtocolLists::loads_N,
+    "the force", "0.1 N"};
 constexpr NumberKey kDuration{"duration",
                               Dimension::time,
                               kAboveZero,
                               &ProtocolBlock::duration_s,
+                              &ProtocolLists::durations_s,
                               "how long the load is kept",
                               "30 s"};
 
@@ -217,32 +233,29 @@ ProtocolBlock parse_protocol_block(const Json& block, const DocumentPlace& place
   return parsed;
 }
 
-std::vector<ProtocolBlock> parse_protocol_lists(const Json& block, const DocumentPlace& place,
-                                                ProtocolKind kind, Openness openness,
-                                                std::initializer_list<ProtocolKeyName> renamed,
-                                                const std::vector<std::string_view>& others) {
-  constexpr std::size_t kMost = 100'000;
-  const std::vector<Key<ProtocolBlock>>& keys = protocol_kinds().keys(kind);
-  Form form = form_of_kind(kind, openness);
-  for (KeyForm& key : form.keys) {
-    for (const ProtocolKeyName& name : renamed) {
-      if (name.key == key.name) key.name = name.in_file;
-    }
-    key.form = shared(
-        {.type = Form::Type::list, .fewest = 1, .one_too = true, .item = std::move(key.form)});
+std::vector<Key<ProtocolLists>> protocol_list_keys(ProtocolKind kind,
+                                                   std::initializer_list<ProtocolKeyName> renamed) {
+  std::vector<Key<ProtocolLists>> keys;
+  for (const NumberKey& n : numbers_of(kind)) {
+    const auto* other = std::find_if(renamed.begin(), renamed.end(), [&](const ProtocolKeyName& r) {
+      return r.key == std::string_view(n.name);
+    });
+    const std::string name(other == renamed.end() ? n.name : other->in_file);
+    const auto values = list(quantity(n.dimension, n.range), {.fewest = 1, .one_too = true});
+    keys.push_back(required(with_example(key(name, n.list, values, n.sentence), n.example)));
   }
-  const std::vector<KeyForm> numbers = form.keys;
-  const FormPtr unread = any("").form;
-  for (const std::string_view other : others) form.keys.push_back({std::string(other), unread, ""});
-  if (block.contains("kind")) form.keys.push_back({"kind", unread, ""});
-  require_form(block, form, place, Numbers::also_si);
+  return keys;
+}
+
+std::vector<ProtocolBlock> combinations(ProtocolKind kind, const ProtocolLists& lists,
+                                        const DocumentPlace& place) {
+  constexpr std::size_t kMost = 100'000;
   std::vector<ProtocolBlock> all(1);
   all.front().kind = kind;
-  for (std::size_t k = 0; k < keys.size(); ++k) {
-    const auto found = block.find(numbers[k].name);
-    if (found == block.end()) continue;
-    const Json values = found->is_array() ? *found : Json::array({*found});
-    if (values.size() > kMost / std::max<std::size_t>(1, all.size())) {
+  for (const NumberKey& n : numbers_of(kind)) {
+    const std::vector<double>& values = lists.*n.list;
+    if (values.empty()) continue;
+    if (values.size() > kMost / all.size()) {
       throw bad_input(place.where,
                       fmt::format("{} times {} experiments", all.size(), values.size()),
                       fmt::format("at most {}", kMost));
@@ -250,14 +263,29 @@ std::vector<ProtocolBlock> parse_protocol_lists(const Json& block, const Documen
     std::vector<ProtocolBlock> longer;
     longer.reserve(all.size() * values.size());
     for (const ProtocolBlock& one : all) {
-      for (const Json& value : values) {
+      for (const double value : values) {
         longer.push_back(one);
-        keys[k].read(longer.back(), value, place.key(numbers[k].name));
+        longer.back().*n.value = value;
       }
     }
     all = std::move(longer);
   }
   return all;
+}
+
+std::vector<ProtocolBlock> parse_protocol_lists(const Json& block, const DocumentPlace& place,
+                                                ProtocolKind kind,
+                                                std::initializer_list<ProtocolKeyName> renamed,
+                                                const std::vector<std::string_view>& others) {
+  const std::vector<Key<ProtocolLists>> keys = protocol_list_keys(kind, renamed);
+  Form form{.type = Form::Type::block, .keys = mapped<KeyForm>(keys, &Key<ProtocolLists>::form)};
+  const FormPtr unread = any("").form;
+  for (const std::string_view other : others) form.keys.push_back({std::string(other), unread, ""});
+  if (block.contains("kind")) form.keys.push_back({"kind", unread, ""});
+  require_form(block, form, place, Numbers::also_si);
+  ProtocolLists lists;
+  read_keys(keys, block, place, lists);
+  return combinations(kind, lists, place);
 }
 
 }  // namespace tpm::files

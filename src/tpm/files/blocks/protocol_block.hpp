@@ -65,16 +65,30 @@ struct ProtocolKeyName {
   std::string_view key, in_file;
 };
 
+/// Numbers of several protocols of one kind, SI; an empty list leaves the number open.
+struct ProtocolLists {
+  std::vector<double> depths_m, rates_m_per_s, holds_s, loads_N, durations_s;
+};
+
+/// The keys of a kind with one quantity or a list of them each, all required.
+/// @param renamed the keys that have another name in this block
+[[nodiscard]] std::vector<Key<ProtocolLists>> protocol_list_keys(
+    ProtocolKind kind, std::initializer_list<ProtocolKeyName> renamed = {});
+
+/// All combinations: the first key of the kind varies most slowly. Throws Error(bad_input) for more
+/// than 100,000.
+[[nodiscard]] std::vector<ProtocolBlock> combinations(ProtocolKind kind, const ProtocolLists& lists,
+                                                      const DocumentPlace& place);
 
 /// All combinations of the numbers in a block that has a list of quantities, or one quantity, under
-/// each key: several indentations of a session, the candidates of a design. The first key of the
+/// each key: the candidates of a design. The first key of the
 /// kind varies most slowly; every number is in range.
 /// @param renamed the keys that have another name in this block
 /// @param others keys of the block that say nothing of the protocol
 /// Throws Error(bad_input) as parse_protocol_block() does, for numbers out of range, and for more
 /// than 100,000 combinations.
 [[nodiscard]] std::vector<ProtocolBlock> parse_protocol_lists(
-    const Json& block, const DocumentPlace& place, ProtocolKind kind, Openness openness,
+    const Json& block, const DocumentPlace& place, ProtocolKind kind,
     std::initializer_list<ProtocolKeyName> renamed, const std::vector<std::string_view>& others);
 
 }  // namespace tpm::files

@@ -45,10 +45,10 @@ PlannedExperiment planned(const ProtocolBlock& block) {
 void add_grid(const Json& grid, const DocumentPlace& place, std::vector<PlannedExperiment>& list) {
   const bool creep = grid.at("kind") == "creep";
   const std::vector<ProtocolBlock> protocols =
-      creep ? parse_protocol_lists(grid, place, ProtocolKind::creep, Openness::complete,
-                                   {{"duration", "hold"}}, {"interval", "repeats"})
-            : parse_protocol_lists(grid, place, ProtocolKind::ramp_hold, Openness::complete, {},
-                                   {"interval", "repeats"});
+      creep
+          ? parse_protocol_lists(grid, place, ProtocolKind::creep, {{"duration", "hold"}},
+                                 {"interval", "repeats"})
+          : parse_protocol_lists(grid, place, ProtocolKind::ramp_hold, {}, {"interval", "repeats"});
   const auto intervals = intervals_of(grid, place);
   const auto repeats = grid.value("repeats", std::vector<int>{1});
   const std::size_t count = protocols.size() * intervals.size() * repeats.size();

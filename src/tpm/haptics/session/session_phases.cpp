@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "tpm/base/text.hpp"
-#include "tpm/files/blocks/protocol_block.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpmkit/error.hpp"
 
@@ -16,7 +15,6 @@ namespace {
 constexpr double kClearance_m = 0.002;  // in the air, before and after each touch
 constexpr double kApproach_s = 1.0;
 constexpr double kLoading_s = 1.0;
-constexpr double kUsualRest_s = 5.0;
 constexpr double kLongest_s = 12.0 * 3600.0;
 
 /// Puts phases behind each other.
@@ -42,10 +40,6 @@ class PhaseList {
   double time_s_ = 0.0;
 };
 
-double rest_of(const Json& block, const DocumentPlace& place) {
-  return block.contains("rest") ? positive_at(block, "rest", Dimension::time, place) : kUsualRest_s;
-}
-
 void add_approach(PhaseList& list) {
   list.add(SessionPhaseKind::approach, "approach", kApproach_s, -kClearance_m, 0.0);
 }
@@ -57,16 +51,9 @@ void add_release(PhaseList& list, std::string name, double depth_m, double rest_
   list.add(SessionPhaseKind::rest, "rest", rest_s, -kClearance_m, -kClearance_m);
 }
 
-void add_indentations(PhaseList& list, const Json& block, const DocumentPlace& place) {
-  const double rest = rest_of(block, place);
-  for (const ProtocolBlock& one :
-       parse_protocol_lists(block, place, ProtocolKind::ramp_hold, Openness::complete,
-                            {{"depth", "depths"}, {"rate", "rates"}}, {"rest"})) {
+void add_indentations(PhaseList& list, const TouchKeys& block, const DocumentPlace& place) {
+  for (const ProtocolBlock& one : combinations(ProtocolKind::ramp_hold, block.protocol, place)) {
     const double depth = *one.depth_m, rate = *one.rate_m_per_s;
-    if (!(*one.hold_s > 0.0)) {
-      throw bad_input(place.key("hold").where, "0 s",
-                      "a value above 0: a session holds every depth before the release");
-    }
     const std::string mm = significant(1e3 * depth, 4), speed = significant(1e3 * rate, 4);
     list.depth_m = depth;
     list.rate_m_per_s = rate;
@@ -75,22 +62,16 @@ void add_indentations(PhaseList& list, const Json& block, const DocumentPlace& p
              depth / rate, 0.0, depth);
     list.add(SessionPhaseKind::hold, fmt::format("hold {} mm after {} mm/s", mm, speed),
              *one.hold_s, depth, depth);
-    add_release(list, fmt::format("release from {} mm at {} mm/s", mm, speed), depth, rest);
+    add_release(list, fmt::format("release from {} mm at {} mm/s", mm, speed), depth, block.rest_s);
   }
   list.depth_m = list.rate_m_per_s = 0.0;
 }
 
-void add_slides(PhaseList& list, const Json& block, const DocumentPlace& place) {
-  constexpr double kUsualPress_m_per_s = 4e-3;
-  const double rest = rest_of(block, place);
-  const double distance = positive_at(block, "distance", Dimension::length, place);
-  const double rate = positive_at(block, "rate", Dimension::speed, place);
+void add_slides(PhaseList& list, const SlideKeys& block) {
+  const double distance = block.distance_m, rate = block.rate_m_per_s;
+  const double press = block.press_m_per_s;
   const std::string far = significant(1e3 * distance, 4), speed = significant(1e3 * rate, 4);
-  for (const ProtocolBlock& one : parse_protocol_lists(
-           block, place, ProtocolKind::ramp_hold, Openness::open,
-           {{"depth", "depths"}, {"rate", "press"}}, {"direction", "distance", "rate", "rest"})) {
-    const double depth = one.number("depth", place);
-    const double press = one.rate_m_per_s.value_or(kUsualPress_m_per_s);
+  for (const double depth : block.depths_m) {
     const std::string mm = significant(1e3 * depth, 4), pressed = significant(1e3 * press, 4);
     list.depth_m = depth;
     list.rate_m_per_s = press;
@@ -105,34 +86,31 @@ void add_slides(PhaseList& list, const Json& block, const DocumentPlace& place) 
                fmt::format("slide back {} mm at {} mm/s, {} mm deep", far, speed, mm),
                distance / rate, depth, depth, distance, 0.0);
     list.rate_m_per_s = press;
-    add_release(list, fmt::format("release from {} mm at {} mm/s", mm, pressed), depth, rest);
+    add_release(list, fmt::format("release from {} mm at {} mm/s", mm, pressed), depth,
+                block.rest_s);
   }
   list.depth_m = list.rate_m_per_s = 0.0;
 }
 
-void add_creep(PhaseList& list, const Json& block, const DocumentPlace& place) {
-  const double rest = rest_of(block, place);
-  for (const ProtocolBlock& one :
-       parse_protocol_lists(block, place, ProtocolKind::creep, Openness::complete,
-                            {{"load", "loads"}, {"duration", "hold"}}, {"rest"})) {
+void add_creep(PhaseList& list, const TouchKeys& block, const DocumentPlace& place) {
+  for (const ProtocolBlock& one : combinations(ProtocolKind::creep, block.protocol, place)) {
     const double load = *one.load_N;
     const std::string newton = significant(load, 4);
     add_approach(list);
     list.add(SessionPhaseKind::load, fmt::format("load to {} N", newton), kLoading_s, 0.0, load);
     list.add(SessionPhaseKind::creep, fmt::format("creep under {} N", newton), *one.duration_s,
              load, load);
-    list.add(SessionPhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
+    list.add(SessionPhaseKind::rest, "rest", block.rest_s, -kClearance_m, -kClearance_m);
   }
 }
 
 /// The block as embed_motion() leaves it.
-void add_motion(PhaseList& list, const Json& block, const DocumentPlace& place) {
-  if (!block.contains("depths_m")) {
+void add_motion(PhaseList& list, const MotionKeys& block, const DocumentPlace& place) {
+  const std::vector<double>& depths = block.depths_m;
+  if (depths.empty()) {
     throw bad_input(place.where, "no key 'depths_m'", "a motion, or a recording of one");
   }
-  const auto depths = block.at("depths_m").get<std::vector<double>>();
-  const double length_s =
-      block.at("spacing_s").get<double>() * static_cast<double>(depths.size() - 1);
+  const double length_s = block.spacing_s.value() * static_cast<double>(depths.size() - 1);
   constexpr double kUsualRate_m_per_s = 1e-3;
   const double first = depths.front();
   list.add(SessionPhaseKind::approach, "approach", kApproach_s, -kClearance_m,
@@ -144,9 +122,9 @@ void add_motion(PhaseList& list, const Json& block, const DocumentPlace& place) 
     list.add(SessionPhaseKind::indent, fmt::format("indent to {} mm, where the motion begins", mm),
              first / kUsualRate_m_per_s, 0.0, first);
     list.add(SessionPhaseKind::hold, fmt::format("hold {} mm until equilibrium", mm),
-             block.value("initial_hold_s", 0.0), first, first);
+             block.initial_hold_s, first, first);
   }
-  list.add(SessionPhaseKind::motion, block.at("name").get<std::string>(), length_s, 0.0, 0.0);
+  list.add(SessionPhaseKind::motion, block.name.value(), length_s, 0.0, 0.0);
   list.follow(depths);
   list.depth_m = list.rate_m_per_s = 0.0;
 }
@@ -204,17 +182,14 @@ void embed_motion(Json& session, const LawFile& law, double period_s,
                        {"measured_N", std::move(measured)}};
 }
 
-std::vector<SessionPhase> parse_phases(const Json& session, const DocumentPlace& place) {
+std::vector<SessionPhase> phases_of(const SessionKeys& session, const DocumentPlace& place) {
   PhaseList list;
-  if (session.contains("indentations")) {
-    add_indentations(list, session.at("indentations"), place.key("indentations"));
+  if (session.indentations) {
+    add_indentations(list, *session.indentations, place.key("indentations"));
   }
-  if (session.contains("slides")) add_slides(list, session.at("slides"), place.key("slides"));
-  if (session.contains("creep")) add_creep(list, session.at("creep"), place.key("creep"));
-  if (session.contains("motion")) add_motion(list, session.at("motion"), place.key("motion"));
-  if (list.time_s() == 0.0) {
-    throw bad_input(place.where, "nothing is done in it", "indentations, slides, creep or motion");
-  }
+  if (session.slides) add_slides(list, *session.slides);
+  if (session.creep) add_creep(list, *session.creep, place.key("creep"));
+  if (session.motion) add_motion(list, *session.motion, place.key("motion"));
   if (list.time_s() > kLongest_s) {
     throw bad_input(place.where + ": keys /indentations, /slides and /creep",
                     fmt::format("the session takes {} s", significant(list.time_s(), 4)),

@@ -1,7 +1,6 @@
 #pragma once
 #include "tpm/base/namespaces.hpp"
-#include "tpm/files/document_place.hpp"
-#include "tpm/haptics/session/session.hpp"
+#include "tpm/haptics/session/session_keys.hpp"
 
 namespace tpm::haptics {
 
@@ -14,7 +13,7 @@ void embed_motion(Json& session, const LawFile& law, double period_s,
 
 /// The phases that the blocks `indentations`, `slides`, `creep` and `motion` lead to. Throws
 /// Error(bad_input).
-[[nodiscard]] std::vector<SessionPhase> parse_phases(const Json& session,
-                                                     const DocumentPlace& place);
+[[nodiscard]] std::vector<SessionPhase> phases_of(const SessionKeys& session,
+                                                  const DocumentPlace& place);
 
 }  // namespace tpm::haptics
