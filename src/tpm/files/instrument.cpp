@@ -14,7 +14,7 @@
 namespace tpm::files {
 namespace {
 
-constexpr const char* kExpected =
+constexpr const char* kLimitExpected =
     "a limit such as \"0.5 % of reading\", \"0.1 % of range\" or an amount with its unit, and "
     "\"(standard)\" or \"(k = 2)\" if it is an uncertainty";
 
@@ -29,7 +29,7 @@ double divisor_of(std::string_view& text, std::string_view where) {
   text = trimmed(text);
   if (!text.ends_with(')')) return std::numbers::sqrt3;
   const auto open = text.rfind('(');
-  if (open == std::string_view::npos) throw bad_input(where, "an unopened bracket", kExpected);
+  if (open == std::string_view::npos) throw bad_input(where, "an unopened bracket", kLimitExpected);
   const std::string_view inside = trimmed(text.substr(open + 1, text.size() - open - 2));
   text = trimmed(text.substr(0, open));
   if (inside == "standard" || inside == "standard uncertainty" || inside == "k = 1" ||
@@ -37,7 +37,7 @@ double divisor_of(std::string_view& text, std::string_view where) {
     return 1.0;
   }
   if (inside == "k = 2" || inside == "k=2") return 2.0;
-  throw bad_input(where, fmt::format("'({})'", printable(inside)), kExpected);
+  throw bad_input(where, fmt::format("'({})'", printable(inside)), kLimitExpected);
 }
 
 void add_part(ChannelUncertainty& u, std::string_view text, Dimension dimension,
@@ -47,7 +47,7 @@ void add_part(ChannelUncertainty& u, std::string_view text, Dimension dimension,
   const bool of_reading = text.ends_with(kReading), of_range = text.ends_with(kRange);
   if (!of_reading && !of_range) {
     if (text.find('%') != std::string_view::npos) {
-      throw bad_input(where, fmt::format("'{}' says a share of what", printable(text)), kExpected);
+      throw bad_input(where, fmt::format("'{}' says a share of what", printable(text)), kLimitExpected);
     }
     const double limit = parse_quantity(text, dimension, where) / divisor;
     if (limit < 0.0) throw bad_input(where, "is negative", "0 or more");
@@ -60,7 +60,7 @@ void add_part(ChannelUncertainty& u, std::string_view text, Dimension dimension,
   std::erase(packed, ' ');
   const std::optional<double> share = find_share(packed);
   if (!share || !packed.ends_with('%') || *share < 0.0) {
-    throw bad_input(where, fmt::format("'{}'", printable(text)), kExpected);
+    throw bad_input(where, fmt::format("'{}'", printable(text)), kLimitExpected);
   }
   if (of_reading) {
     u.relative = std::hypot(u.relative, *share / divisor);
@@ -104,7 +104,7 @@ Instrument read_instrument(const Json& block, Dimension response, Dimension driv
       throw bad_input(here, "unknown key",
                       "one of id, force, depth, time, zero, force_range, depth_range");
     }
-    if (!value.is_string()) throw bad_input(here, "is no text", kExpected);
+    if (!value.is_string()) throw bad_input(here, "is no text", kLimitExpected);
     instrument.stated[key] = value.get<std::string>();
   }
   const auto text = [&](const char* key) {
