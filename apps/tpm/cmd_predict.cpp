@@ -24,7 +24,6 @@ struct PredictOptions {
   RecordingOptions recordings;  ///< its file may also hold a protocol
   RampOptions ramp;
   std::string level, placement, samples, seed = "0";
-  bool verdict = false;
   std::string folder, output;
 };
 
@@ -64,16 +63,8 @@ int predict(const PredictOptions& options, const Session& session) {
   std::optional<PreparedRecording> recording;
   if (!file) recording = read_recordings(options.recordings).front();
   const LawPrediction prediction = answer_of(options.law, file, recording, chosen);
-  Json json = to_json(prediction);
+  const Json json = to_json(prediction);
   std::string text = session.json() ? "" : to_terminal_text(prediction);
-  if (options.verdict) {
-    if (!recording) {
-      throw Error(ExitCode::usage, "--verdict", "without a recording", "it only with one");
-    }
-    const PredictionVerdict verdict = compare_prediction(prediction, *recording, chosen.seed);
-    json["verdict"] = to_json(verdict, prediction.response_dimension());
-    if (!session.json()) text += verdict_words(verdict, prediction.recording->peak);
-  }
   if (session.json()) text = to_text(json);
   if (!options.folder.empty()) {
     text +=
@@ -113,8 +104,6 @@ void add_predict_command(CLI::App& app, Session& session) {
                       "from derivatives");
   command->add_option("--seed", options->seed, "Of what is drawn, 0 or more")
       ->capture_default_str();
-  command->add_flag("--verdict", options->verdict,
-                    "Say whether the law predicts the recording, by the rule of tpm select");
   command->add_option("--folder", options->folder,
                       "Write prediction.csv, prediction.json and the figure into this folder");
   add_output_option(*command, options->output);
@@ -123,8 +112,9 @@ void add_predict_command(CLI::App& app, Session& session) {
   command->footer(
       "Example:\n  tpm fit recording.csv --folder fitted\n"
       "  tpm predict fitted/law.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"\n"
-      "  tpm predict fitted/law.json other.csv --verdict --folder predicted\n"
-      "  tpm predict on_liver/scene.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"");
+      "  tpm predict fitted/law.json other.csv --folder predicted\n"
+      "  tpm predict on_liver/scene.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"\n"
+      "Whether the law is right for a recording: tpm validate");
   set_run(*command, session, [options, &session] { return predict(*options, session); });
 }
 

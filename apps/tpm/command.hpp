@@ -127,6 +127,7 @@ void add_budget_command(CLI::App& app, Session& session);
 void add_material_command(CLI::App& app, Session& session);
 void add_identify_command(CLI::App& app, Session& session);
 void add_predict_command(CLI::App& app, Session& session);
+void add_validate_command(CLI::App& app, Session& session);
 void add_recovery_command(CLI::App& app, Session& session);
 void add_check_gradient_command(CLI::App& app, Session& session);
 void add_design_command(CLI::App& app, Session& session);

@@ -175,6 +175,7 @@ CurveDescription read_description(const std::filesystem::path& path) {
     }
   }
   if (json.contains("segments")) description.segments = read_segments(json.at("segments"));
+  if (json.contains("instrument")) description.instrument = json.at("instrument");
   require_keys_of_kind(description, file);
   return description;
 }
@@ -199,6 +200,7 @@ Json description_json(const CurveDescription& description) {
     }
   }
   if (!description.segments.empty()) json["segments"] = segments_json(description.segments);
+  if (!description.instrument.is_null()) json["instrument"] = description.instrument;
   put(json, "note", header.note);
   return json;
 }

@@ -46,6 +46,7 @@ struct CurveDescription {
   std::map<std::string, ColumnDescription> columns;
   /// Of a recording, in order; together they hold all of its samples. Empty if not known.
   std::vector<RecordedSegment> segments;
+  Json instrument;  ///< the block "instrument" as it stands there (read_instrument); else null
 };
 
 /// Reads and checks a description; header.sha256 stays empty. Throws Error(bad_input) naming the

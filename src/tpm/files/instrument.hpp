@@ -1,0 +1,48 @@
+#pragma once
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "tpm/files/json.hpp"
+#include "tpmkit/units.hpp"
+
+namespace tpm::files {
+
+/// How well an instrument knows one of its channels, as standard uncertainties: of a reading x
+/// relative |x| and, independent of it, absolute.
+struct ChannelUncertainty {
+  double relative = 0.0;
+  double absolute = 0.0;  ///< SI of the channel
+};
+
+/// What is stated of the instrument of a recording: the block "instrument" of a curve's
+/// description (docs/data_formats.md).
+struct Instrument {
+  std::string id;  ///< equal in two recordings: their errors are the same
+  std::optional<ChannelUncertainty> force, depth, time;
+  std::optional<double> zero;  ///< of the response before contact, standard uncertainty, SI
+  std::map<std::string, std::string> stated;  ///< keys and texts of the block, for writing it again
+};
+
+/// "0.5 % of reading", "0.1 % of range", "10 um": limits of a rectangular distribution, whose
+/// standard uncertainty is the limit over sqrt 3; with "(standard)" behind it the standard
+/// uncertainty itself, with "(k = 2)" twice that. Two parts may be joined by '+'.
+/// @param range of the channel, for a share of it, SI
+/// Throws Error(bad_input).
+[[nodiscard]] ChannelUncertainty parse_channel_uncertainty(std::string_view text,
+                                                           Dimension dimension,
+                                                           std::optional<double> range,
+                                                           std::string_view where);
+
+/// Reads the block. `force` and `zero` are quantities of the response, `depth` of the drive.
+/// Throws Error(bad_input) naming the key.
+[[nodiscard]] Instrument read_instrument(const Json& block, Dimension response, Dimension drive,
+                                         std::string_view where);
+
+/// That of a file that was given as a recording: of the description beside it. None if there is no
+/// description or it does not state one.
+[[nodiscard]] std::optional<Json> instrument_beside(const std::filesystem::path& recording);
+
+}  // namespace tpm::files

@@ -1,0 +1,478 @@
+#include "tpm/fit/validate/comparison.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/distributions.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/fit/autoregressive.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Of the value: the closed forms err by less (LawModel).
+constexpr double kNumericalError = 1e-9;
+
+bool is_of_response(QuantityKind kind) {
+  return kind == QuantityKind::peak || kind == QuantityKind::end_of_hold ||
+         kind == QuantityKind::at_time || kind == QuantityKind::at_depth;
+}
+
+/// One error of an instrument: how E follows from it in the validation and in the calibration.
+struct InstrumentEffect {
+  const char* name;
+  double validation = 0.0, calibration = 0.0;  ///< d E / d error
+  double u_validation = 0.0, u_calibration = 0.0;
+};
+
+/// What all quantities of a recording are computed from.
+class Comparer {
+ public:
+  Comparer(const LawFile& law, const PreparedRecording& recording, const ComparisonOptions& options)
+      : options_(options),
+        prepared_(recording),
+        r_(recording.recording),
+        along_(law, recording),
+        degrees_of_law_(law.uncertainty->degrees_of_freedom.value_or(kInfinity)) {}
+
+  RecordingComparison compare() {
+    result_.name = prepared_.name;
+    result_.sha256 = r_.header.sha256;
+    result_.calibration = options_.calibration_data;
+    result_.instrument = options_.instrument;
+    const auto& ours = options_.instrument;
+    const auto& theirs = options_.calibration_instrument;
+    result_.same_instrument = ours && theirs && ours->id == theirs->id;
+    result_.parts = parts_of(prepared_);
+    result_.scatter = scatter_of(prepared_, result_.parts);
+    result_.placement = place_for_validation(along_, prepared_, result_.parts, result_.scatter,
+                                             options_.placement, options_.contact_by_threshold);
+    at_ = along_.at(result_.placement.contact);
+    const auto n = static_cast<Eigen::Index>(r_.response.size());
+    measured_ = Eigen::VectorXd::Map(r_.response.data(), n).array() - result_.placement.zero;
+    if (ours || theirs) follow_instrument();
+    const bool chosen = !options_.quantities.empty();
+    for (const QuantityOfInterest& q :
+         chosen ? options_.quantities : default_quantities(result_.parts)) {
+      add(q);
+    }
+    if (result_.quantities.empty()) {
+      throw bad_input(fmt::format("recording '{}'", prepared_.name),
+                      fmt::format("no quantity can be read ({})", result_.without.front()),
+                      "--quantity with one that both the recording and the law have");
+    }
+    judge();
+    set_joint();
+    set_curve();
+    return std::move(result_);
+  }
+
+ private:
+  void follow_instrument() {
+    const double contact = result_.placement.contact;
+    depth_scale_ = along_.by_depth_scale(contact);
+    time_scale_ = along_.by_time_scale(contact);
+    time_shift_ = along_.by_time_shift(contact);
+  }
+
+  [[nodiscard]] static double times(const Eigen::VectorXd& weight, const Eigen::VectorXd& slope) {
+    // Samples that the law does not predict have no weight.
+    return (weight.array() != 0.0).select(weight.array() * slope.array(), 0.0).sum();
+  }
+  [[nodiscard]] static Eigen::RowVectorXd times(const Eigen::VectorXd& weight,
+                                                const Eigen::MatrixXd& slope) {
+    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(slope.cols());
+    for (Eigen::Index i = 0; i < weight.size(); ++i) {
+      if (weight[i] != 0.0) sum += weight[i] * slope.row(i);
+    }
+    return sum;
+  }
+
+  [[nodiscard]] std::vector<InstrumentEffect> effects_of(const Functional& s,
+                                                         const Functional& d) const {
+    std::vector<InstrumentEffect> effects;
+    const auto add = [&](const char* name, double by_s, double by_d, auto uncertainty) {
+      const double ours = options_.instrument ? uncertainty(*options_.instrument) : 0.0;
+      const double theirs =
+          options_.calibration_instrument ? uncertainty(*options_.calibration_instrument) : 0.0;
+      if (ours > 0.0 || theirs > 0.0) effects.push_back({name, by_d, by_s, ours, theirs});
+    };
+    const auto relative = [](const std::optional<ChannelUncertainty>& c) {
+      return c ? c->relative : 0.0;
+    };
+    const auto absolute = [](const std::optional<ChannelUncertainty>& c) {
+      return c ? c->absolute : 0.0;
+    };
+    // A scale error of the force is in the law as it is in the readings; one of the depth is in the
+    // law with the other sign than where the law is asked.
+    const double by_depth = times(s.weight, depth_scale_);
+    const double by_time = times(s.weight, time_scale_);
+    const double by_shift = times(s.weight, time_shift_);
+    const double by_travel = -times(s.weight, at_.by_contact);
+    add("scale of the force", times(s.weight, at_.value), -times(d.weight, measured_),
+        [&](const Instrument& i) { return relative(i.force); });
+    add("force channel", s.weight.sum(), -d.weight.sum(),
+        [&](const Instrument& i) { return absolute(i.force); });
+    add("scale of the depth", -by_depth, by_depth,
+        [&](const Instrument& i) { return relative(i.depth); });
+    add("depth channel", -by_travel, by_travel,
+        [&](const Instrument& i) { return absolute(i.depth); });
+    add("scale of the time", -by_time, by_time,
+        [&](const Instrument& i) { return relative(i.time); });
+    add("time between channels", -by_shift, by_shift,
+        [&](const Instrument& i) { return absolute(i.time); });
+    return effects;
+  }
+
+  void add(const QuantityOfInterest& quantity) {
+    const double contact = result_.placement.contact;
+    const std::string name = quantity_words(quantity, r_.drive_quantity, r_.response_quantity);
+    const auto s = read_quantity(quantity, result_.parts, r_, contact, at_.value);
+    const auto d = read_quantity(quantity, result_.parts, r_, contact, measured_);
+    if (!s || !d) {
+      result_.without.push_back(
+          fmt::format("{}: {}", name,
+                      d ? "the law does not predict it here" : "the recording does not have it"));
+      return;
+    }
+    QuantityComparison q;
+    q.quantity = quantity;
+    q.name = name;
+    q.unit = quantity_unit(quantity, r_.drive_quantity, r_.response_quantity);
+    q.simulated = s->value;
+    q.measured = d->value;
+    q.e.error = s->value - d->value;
+    set_uncertainty(q, *s, *d);
+    constexpr double kFirstOrder = 0.25;  // a time follows the readings to first order below this
+    if (quantity.kind == QuantityKind::half_time && q.u_D > kFirstOrder * std::abs(s->value)) {
+      weights_.pop_back();
+      result_.without.push_back(
+          fmt::format("{}: the readings scatter too much to tell it (u_D = {} s)", name,
+                      significant(q.u_D, 2)));
+      return;
+    }
+    result_.quantities.push_back(std::move(q));
+  }
+
+  void set_uncertainty(QuantityComparison& q, const Functional& s, Functional d) {
+    const ValidationPlacement& p = result_.placement;
+    // A time read from scattered readings may lie where they happen to be steep.
+    if (q.quantity.kind == QuantityKind::half_time &&
+        result_.scatter.of(r_.time_s, s.weight) > result_.scatter.of(r_.time_s, d.weight)) {
+      d.weight = s.weight;
+    }
+    const double by_contact = times(s.weight, at_.by_contact);
+    const double by_zero = d.weight.sum();
+    const Eigen::VectorXd from_contact = by_contact * p.contact_by_reading;
+    const Eigen::VectorXd from_zero = by_zero * p.zero_by_reading;
+    const Eigen::VectorXd weight = from_contact + from_zero - d.weight;
+    weights_.push_back(weight);
+    const auto u_of = [&](const Eigen::VectorXd& w) { return result_.scatter.of(r_.time_s, w); };
+    const double u_readings = u_of(weight);
+    q.parts = {{"the scatter of the readings", u_of(d.weight)},
+               {"the zero of the force", u_of(from_zero)},
+               {"the contact point", u_of(from_contact)}};
+    const Eigen::RowVectorXd by_law =
+        times(s.weight, at_.by_law) + by_contact * p.contact_by_law + by_zero * p.zero_by_law;
+    q.shared = by_law * along_.root();
+    q.u_input = q.shared.norm();
+    q.parts.push_back({"the law's parameters", q.u_input});
+    q.u_num = kNumericalError * std::abs(s.value);
+    q.parts.push_back({"numerical errors", q.u_num});
+    double own_instrument = 0.0;
+    double stated_zero = 0.0;
+    if (p.zero_readings == 0 && std::abs(by_zero) > 1e-9 * d.weight.cwiseAbs().sum()) {
+      if (options_.instrument && options_.instrument->zero) {
+        stated_zero = std::abs(by_zero) * *options_.instrument->zero;
+        q.parts.push_back({"the zero of the force", stated_zero});
+      } else {
+        q.remark =
+            "depends on the zero of the force, which nothing before contact and no instrument "
+            "tells";
+      }
+    }
+    add_instrument(q, s, d);
+    own_instrument = q.of_instrument.norm();
+    q.u_D = std::sqrt(u_readings * u_readings + own_instrument * own_instrument +
+                      stated_zero * stated_zero);
+    q.u_own = std::sqrt(u_readings * u_readings + stated_zero * stated_zero + q.u_num * q.u_num);
+    CombinedUncertainty sum;
+    sum.add(u_readings, result_.scatter.degrees);
+    sum.add(q.u_input, degrees_of_law_);
+    sum.add(q.u_num, kInfinity);
+    sum.add(own_instrument, kInfinity);
+    sum.add(stated_zero, kInfinity);
+    const double of_law = q.u_input;
+    const double shared = q.shared.norm();
+    sum.add(std::sqrt(std::max(shared * shared - of_law * of_law, 0.0)), kInfinity);
+    q.u_input = shared;
+    q.e.u_val = sum.u();
+    q.e.degrees = sum.degrees();
+    q.e.coverage = coverage_factor(q.e.degrees);
+    std::erase_if(q.parts, [](const UncertaintyPart& part) { return !(part.u > 0.0); });
+    std::stable_sort(q.parts.begin(), q.parts.end(),
+                     [](const auto& a, const auto& b) { return a.u > b.u; });
+  }
+
+  /// Effects of the same instrument add with their sign before they are squared.
+  void add_instrument(QuantityComparison& q, const Functional& s, const Functional& d) const {
+    if (!options_.instrument && !options_.calibration_instrument) return;
+    for (const InstrumentEffect& effect : effects_of(s, d)) {
+      double ours = effect.validation * effect.u_validation;
+      double theirs = effect.calibration * effect.u_calibration;
+      if (result_.same_instrument) {
+        ours += theirs;
+        theirs = 0.0;
+      }
+      q.parts.push_back({fmt::format("{} of the instrument", effect.name), std::abs(ours)});
+      if (theirs != 0.0) {
+        q.parts.push_back(
+            {fmt::format("{} of the calibration's instrument", effect.name), std::abs(theirs)});
+      }
+      extend(q.of_instrument, ours);
+      extend(q.shared, theirs);
+    }
+  }
+
+  static void extend(Eigen::RowVectorXd& row, double value) {
+    row.conservativeResize(row.size() + 1);
+    row[row.size() - 1] = value;
+  }
+
+  void judge() {
+    double peak = 0.0;
+    for (const QuantityComparison& q : result_.quantities) {
+      if (is_of_response(q.quantity.kind)) peak = std::max(peak, std::abs(q.measured));
+    }
+    if (const auto f = read_quantity({QuantityKind::peak}, result_.parts, r_,
+                                     result_.placement.contact, measured_)) {
+      peak = std::max(peak, std::abs(f->value));
+    }
+    std::vector<double> p_values;
+    for (QuantityComparison& q : result_.quantities) {
+      if (options_.requirement) {
+        q.limit =
+            limit_of(*options_.requirement, q, quantity_dimension(r_.response_quantity), peak);
+      }
+      q.verdict = judge_error(q.e, q.limit);
+      q.p_value = error_p_value(q.e, q.limit);
+      if (options_.requirement && !q.limit) q.verdict = ModelVerdict::no_requirement;
+      if (!q.remark.empty()) {
+        q.verdict = ModelVerdict::undetermined;
+        q.p_value = 1.0;
+      } else if (q.verdict == ModelVerdict::undetermined) {
+        q.remark =
+            what_must_shrink(q.e, *q.limit, q.parts,
+                             scaled_unit(q.unit, std::max(std::abs(q.measured), q.e.expanded())));
+      }
+      if (result_.calibration) q.verdict = ModelVerdict::residual;
+      p_values.push_back(q.verdict == ModelVerdict::no_requirement ? 1.0 : q.p_value);
+    }
+    const std::vector<bool> rejected = holm_rejects(p_values);
+    for (std::size_t i = 0; i < rejected.size(); ++i) result_.quantities[i].rejected = rejected[i];
+    result_.verdict = verdict_of_all(result_.quantities);
+  }
+
+  void set_joint() {
+    const auto count = static_cast<Eigen::Index>(result_.quantities.size());
+    Eigen::MatrixXd weights(static_cast<Eigen::Index>(r_.response.size()), count);
+    Eigen::VectorXd error(count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      weights.col(i) = weights_[static_cast<std::size_t>(i)];
+      error[i] = result_.quantities[static_cast<std::size_t>(i)].e.error;
+    }
+    Eigen::MatrixXd covariance = result_.scatter.covariance(r_.time_s, weights);
+    double degrees = kInfinity;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const QuantityComparison& a = result_.quantities[static_cast<std::size_t>(i)];
+      degrees = std::min(degrees, a.e.degrees);
+      for (Eigen::Index j = 0; j < count; ++j) {
+        const QuantityComparison& b = result_.quantities[static_cast<std::size_t>(j)];
+        covariance(i, j) += a.shared.dot(b.shared) + a.of_instrument.dot(b.of_instrument);
+      }
+      // What only this quantity has: numerical errors, and a zero that was stated.
+      const double own = a.e.u_val * a.e.u_val - covariance(i, i);
+      if (own > 0.0) covariance(i, i) += own;
+    }
+    const auto has = [&](QuantityKind kind) {
+      return std::ranges::any_of(result_.quantities,
+                                 [kind](const auto& q) { return q.quantity.kind == kind; });
+    };
+    const bool ratio_follows = has(QuantityKind::peak) && has(QuantityKind::end_of_hold);
+    std::vector<Eigen::Index> kept;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const QuantityComparison& q = result_.quantities[static_cast<std::size_t>(i)];
+      const bool follows = q.quantity.kind == QuantityKind::relaxation_ratio && ratio_follows;
+      if (follows || !adds_to(covariance, kept, i)) {
+        result_.joint.dependent.push_back(q.name);
+      } else {
+        kept.push_back(i);
+      }
+    }
+    JointTest& joint = result_.joint;
+    joint.rank = static_cast<int>(kept.size());
+    if (kept.empty()) return;
+    const Eigen::MatrixXd c = covariance(kept, kept);
+    const Eigen::VectorXd e = error(kept);
+    joint.t_squared = e.dot(Eigen::VectorXd(solve_symmetric(c, e)));
+    const double p = static_cast<double>(joint.rank);
+    constexpr double kMany = 1e7;
+    if (degrees < kMany && degrees - p + 1.0 > 0.0) {
+      joint.degrees = degrees - p + 1.0;
+      joint.f = joint.t_squared * joint.degrees / (degrees * p);
+      joint.p_value = fisher_tail(std::max(joint.f, 0.0), p, joint.degrees);
+    } else if (degrees >= kMany) {
+      joint.degrees = kInfinity;
+      joint.f = joint.t_squared / p;
+      joint.p_value = chi_squared_tail(std::max(joint.t_squared, 0.0), p);
+    } else {
+      joint.rank = 0;
+    }
+  }
+
+  /// Whether a quantity varies by itself: a share of its variance is not explained by the others.
+  static bool adds_to(const Eigen::MatrixXd& c, const std::vector<Eigen::Index>& kept,
+                      Eigen::Index i) {
+    if (!(c(i, i) > 0.0)) return false;
+    if (kept.empty()) return true;
+    constexpr double kLeast = 1e-4;
+    const Eigen::MatrixXd among = c(kept, kept);
+    const Eigen::VectorXd with = c(kept, i);
+    const Eigen::VectorXd scale = among.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd scaled = scale.asDiagonal() * among * scale.asDiagonal();
+    const Eigen::VectorXd right = scale.cwiseProduct(with);
+    const double explained = right.dot(Eigen::VectorXd(solve_symmetric(scaled, right)));
+    return c(i, i) - explained > kLeast * c(i, i);
+  }
+
+  void set_curve() {
+    const RecordingParts& parts = result_.parts;
+    const ValidationPlacement& p = result_.placement;
+    const std::size_t last = parts.hold_last.value_or(parts.ramp_last);
+    CurveComparison& curve = result_.curve;
+    std::vector<double> times;
+    std::vector<double> errors;
+    const double sigma = result_.scatter.sigma;
+    for (std::size_t i = parts.ramp_first; i <= last; ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      if (!std::isfinite(at_.value[k])) continue;
+      const double e = at_.value[k] - measured_[k];
+      const double contact = at_.by_contact[k] * p.contact_u;
+      times.push_back(r_.time_s[i]);
+      errors.push_back(e);
+      curve.mean_square_error += e * e;
+      curve.mean_square_u += sigma * sigma + contact * contact + p.zero_u * p.zero_u +
+                             (at_.by_law.row(k) * along_.root()).squaredNorm();
+    }
+    curve.samples = times.size();
+    if (times.empty()) return;
+    curve.mean_square_error /= static_cast<double>(times.size());
+    curve.mean_square_u /= static_cast<double>(times.size());
+    if (!(sigma > 0.0)) return;
+    Eigen::VectorXd whitened =
+        Eigen::VectorXd::Map(errors.data(), static_cast<Eigen::Index>(errors.size()));
+    AutoregressiveNoise(result_.scatter.phi, result_.scatter.step_s).whiten(times, whitened);
+    curve.chi_squared = whitened.squaredNorm() / (sigma * sigma);
+  }
+
+  const ComparisonOptions& options_;
+  const PreparedRecording& prepared_;
+  const Recording& r_;
+  LawAlong along_;
+  double degrees_of_law_;
+  LawAlong::At at_;
+  Eigen::VectorXd measured_, depth_scale_, time_scale_, time_shift_;
+  std::vector<Eigen::VectorXd> weights_;
+  RecordingComparison result_;
+};
+
+}  // namespace
+
+RecordingComparison compare_with_recording(const LawFile& law, const PreparedRecording& recording,
+                                           const ComparisonOptions& options) {
+  return Comparer(law, recording, options).compare();
+}
+
+Unit quantity_unit(const QuantityOfInterest& quantity, Quantity drive, Quantity response) {
+  switch (quantity.kind) {
+    case QuantityKind::relaxation_ratio:
+      return {"", Dimension::dimensionless, 1.0};
+    case QuantityKind::half_time:
+      return {"s", Dimension::time, 1.0};
+    case QuantityKind::work: {
+      const bool indents = drive == Quantity::indentation_depth;
+      return {indents ? "J" : "J/m^3", Dimension::dimensionless, 1.0};
+    }
+    default:
+      break;
+  }
+  const Dimension d = quantity_dimension(response);
+  return {std::string(si_symbol(d)), d, 1.0};
+}
+
+Unit scaled_unit(const Unit& unit, double size) {
+  if (unit.symbol.empty() || !(size > 0.0) || !std::isfinite(size)) return unit;
+  struct Prefix {
+    double factor;
+    const char* text;
+  };
+  constexpr auto kPrefixes = std::to_array<Prefix>({{1e6, "M"},
+                                                    {1e3, "k"},
+                                                    {1.0, ""},
+                                                    {1e-3, "m"},
+                                                    {1e-6, "u"},
+                                                    {1e-9, "n"},
+                                                    {1e-12, "p"},
+                                                    {1e-15, "f"}});
+  for (const Prefix& prefix : kPrefixes) {
+    if (size / unit.to_si < prefix.factor) continue;
+    if (prefix.factor > 1.0 && unit.dimension == Dimension::time) continue;
+    return {prefix.text + unit.symbol, unit.dimension, unit.to_si * prefix.factor};
+  }
+  return unit;
+}
+
+std::optional<double> limit_of(const Requirement& requirement, const QuantityComparison& quantity,
+                               Dimension response, double peak) {
+  if (!requirement.share) {
+    const bool of_response = is_of_response(quantity.quantity.kind);
+    const Dimension own = of_response ? response : quantity.unit.dimension;
+    const bool has_dimension = quantity.quantity.kind != QuantityKind::work;
+    if (!has_dimension || own != requirement.dimension) return std::nullopt;
+    return requirement.value;
+  }
+  constexpr double kTold = 5.0;
+  const double size = std::abs(quantity.measured);
+  if (size >= kTold * quantity.u_D) return requirement.value * size;
+  if (quantity.quantity.kind == QuantityKind::relaxation_ratio) return requirement.value;
+  return requirement.value * (is_of_response(quantity.quantity.kind) ? std::max(peak, size) : size);
+}
+
+ModelVerdict verdict_of_all(const std::vector<QuantityComparison>& quantities) {
+  bool required = false, all_adequate = true, rejected = false, unknown = false;
+  for (const QuantityComparison& q : quantities) {
+    if (q.verdict == ModelVerdict::residual) return ModelVerdict::residual;
+    if (q.verdict == ModelVerdict::no_requirement) continue;
+    rejected = rejected || q.rejected;
+    unknown = unknown || q.verdict == ModelVerdict::undetermined;
+    if (q.limit) {
+      required = true;
+    }
+    all_adequate = all_adequate && q.verdict == ModelVerdict::adequate;
+  }
+  if (required) {
+    if (rejected) return ModelVerdict::not_adequate;
+    return all_adequate ? ModelVerdict::adequate : ModelVerdict::undetermined;
+  }
+  if (rejected) return ModelVerdict::seen;
+  return unknown ? ModelVerdict::undetermined : ModelVerdict::not_seen;
+}
+
+}  // namespace tpm::fit

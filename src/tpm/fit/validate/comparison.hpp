@@ -1,0 +1,110 @@
+#pragma once
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/files/instrument.hpp"
+#include "tpm/fit/validate/placement_of_recording.hpp"
+#include "tpm/fit/validate/requirement.hpp"
+
+namespace tpm::fit {
+
+/// One quantity of one recording. SI throughout; E, u and U in the unit of the quantity.
+struct QuantityComparison {
+  QuantityOfInterest quantity;
+  std::string name;
+  Unit unit;                               ///< in which it is shown
+  double simulated = 0.0, measured = 0.0;  ///< S, D
+  ErrorWithUncertainty e;
+  double u_num = 0.0, u_input = 0.0, u_D = 0.0;  ///< of u_val^2 = u_num^2 + u_input^2 + u_D^2
+  std::vector<UncertaintyPart> parts;            ///< what these consist of, the largest first
+  std::optional<double> limit;                   ///< R in this unit
+  ModelVerdict verdict = ModelVerdict::not_seen;
+  double p_value = 1.0;   ///< before Holm
+  bool rejected = false;  ///< beyond R (or 0) after Holm over the recording's quantities
+  std::string remark;     ///< what must shrink, or why there is no verdict
+  /// Root of the covariance of what recordings of one calibration share (law, common instrument):
+  /// one a direction; its norm is part of u_val.
+  Eigen::RowVectorXd shared;
+  Eigen::RowVectorXd
+      of_instrument;   ///< effects of its errors, shared by recordings of one instrument
+  double u_own = 0.0;  ///< the rest of u_val
+};
+
+/// Hotelling's T^2 over the quantities that are independent.
+struct JointTest {
+  int rank = 0;
+  double t_squared = 0.0, f = 0.0, p_value = 1.0;
+  double degrees = 0.0;                ///< of the denominator
+  std::vector<std::string> dependent;  ///< quantities that follow from the others
+};
+
+/// The difference of the whole curve, which gets no verdict.
+struct CurveComparison {
+  std::size_t samples = 0;
+  double mean_square_error = 0.0, mean_square_u = 0.0;  ///< of E and of u, SI squared
+  double chi_squared = 0.0;  ///< of whitened E over sigma; 0 without noise
+};
+
+/// Whether the motion lies inside what the law was fitted to.
+struct Applicability {
+  double depth = 0.0, duration_s = 0.0, rate = 0.0;  ///< of the recording
+  std::optional<double> fitted_depth, fitted_duration_s;
+  std::optional<double> slowest, fastest;  ///< rates of the calibration, where its files were found
+  std::vector<std::string> outside;        ///< sentences; empty: inside as far as known
+  std::vector<std::string> unknown;
+};
+
+struct RecordingComparison {
+  std::string name, sha256;
+  bool calibration = false;  ///< the law was fitted to these data
+  RecordingParts parts;
+  ReadingScatter scatter;
+  ValidationPlacement placement;
+  std::optional<Instrument> instrument;
+  bool same_instrument = false;  ///< as the calibration's
+  std::vector<QuantityComparison> quantities;
+  std::vector<std::string> without;  ///< quantities that were asked for and cannot be read, and why
+  JointTest joint;
+  CurveComparison curve;
+  ModelVerdict verdict = ModelVerdict::not_seen;  ///< of all quantities
+};
+
+struct ComparisonOptions {
+  std::vector<QuantityOfInterest> quantities;  ///< empty: default_quantities()
+  std::optional<Requirement> requirement;
+  PlacementRule placement = PlacementRule::held;
+  bool contact_by_threshold = false;
+  std::optional<Instrument> instrument, calibration_instrument;
+  bool calibration_data = false;
+};
+
+/// Compares a law with one recording (docs/validate.md):
+///
+///     E = Q(S) - Q(readings less zero),   u_val^2 = u_num^2 + u_input^2 + u_D^2,   U = k u_val,
+///
+/// Q the same functional at the same samples. u_input^2 = g' C g with the law's covariance; u_D
+/// from the scatter of the readings, through zero and contact as well, and from the instrument.
+[[nodiscard]] RecordingComparison compare_with_recording(const LawFile& law,
+                                                         const PreparedRecording& recording,
+                                                         const ComparisonOptions& options);
+
+/// The unit in which a quantity is shown.
+[[nodiscard]] Unit quantity_unit(const QuantityOfInterest& quantity, Quantity drive,
+                                 Quantity response);
+
+/// A unit with the prefix under which a number of that size has one to three digits before the
+/// point.
+[[nodiscard]] Unit scaled_unit(const Unit& unit, double size);
+
+/// R in the unit of a quantity; none if the requirement is an amount of another dimension.
+[[nodiscard]] std::optional<double> limit_of(const Requirement& requirement,
+                                             const QuantityComparison& quantity, Dimension response,
+                                             double peak);
+
+/// That of several: adequate only if all are, not adequate (or seen) if Holm's procedure rejects
+/// one.
+[[nodiscard]] ModelVerdict verdict_of_all(const std::vector<QuantityComparison>& quantities);
+
+}  // namespace tpm::fit

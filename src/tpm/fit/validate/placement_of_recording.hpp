@@ -1,0 +1,52 @@
+#pragma once
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "tpm/fit/validate/law_along.hpp"
+#include "tpm/fit/validate/reading_scatter.hpp"
+
+namespace tpm::fit {
+
+/// How contact and zero of a recording are found before it is compared.
+enum class PlacementRule {
+  held,    ///< the depth's own zero where contact begins there, else the onset; zero from before
+  onset,   ///< always the onset
+  fitted,  ///< both by least squares of the whole prediction: what is judged has then been fitted
+};
+/// "held", "onset", "fitted".
+[[nodiscard]] std::string_view placement_rule_name(PlacementRule rule) noexcept;
+[[nodiscard]] PlacementRule parse_placement_rule(std::string_view text, std::string_view where);
+
+/// Contact and zero of one recording, and how they follow readings and law to first order.
+struct ValidationPlacement {
+  double contact = 0.0;  ///< drive, SI
+  double zero = 0.0;     ///< response before contact, SI; 0 where nothing tells it
+  Eigen::VectorXd contact_by_reading, zero_by_reading;  ///< one a sample
+  Eigen::RowVectorXd contact_by_law, zero_by_law;       ///< one a coordinate of the law
+  std::size_t zero_readings = 0;  ///< before contact; 0: the recording does not tell the zero
+  double contact_u = 0.0, zero_u = 0.0;  ///< standard uncertainties from the readings, SI
+  std::optional<double> onset, onset_u;  ///< where the onset was found, whatever is used
+  std::string contact_words;             ///< what it rests on
+  /// Of a fitted placement: how far it lies from the held one, in standard uncertainties of both.
+  std::optional<double> contact_moved, zero_moved;
+};
+
+/// Held placement. The zero is the mean before contact, with the weights of a plain mean. Contact
+/// is where the law's own first loading, its size free, meets that zero:
+///
+///     reading = zero + A S(t; contact)   on the ramp up to three quarters of its travel,
+///
+/// so that the stiffness that is judged does not move it. Where the drive starts at 0 with the
+/// ramp, and the onset agrees with that within two of its standard uncertainties, contact is at 0
+/// as the recording says.
+/// @param threshold contact was defined by a response (--contact-force): it is where the recording
+///        passes that, and is not found here
+[[nodiscard]] ValidationPlacement place_for_validation(const LawAlong& law,
+                                                      const PreparedRecording& recording,
+                                                      const RecordingParts& parts,
+                                                      const ReadingScatter& scatter,
+                                                      PlacementRule rule, bool threshold);
+
+}  // namespace tpm::fit

@@ -1,0 +1,214 @@
+#include "tpm/fit/validate/pooled.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/text.hpp"
+#include "tpm/fit/select/random_effects.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::fit {
+namespace {
+
+/// A quantity of one recording as it is pooled.
+struct Member {
+  const RecordingComparison* recording;
+  const QuantityComparison* quantity;
+  double scale = 1.0;  ///< that its E is divided by
+};
+
+bool one_instrument(const std::vector<Member>& members) {
+  const auto& first = members.front().recording->instrument;
+  return first && std::ranges::all_of(members, [&](const Member& m) {
+           const auto& own = m.recording->instrument;
+           return own && own->id == first->id &&
+                  m.quantity->of_instrument.size() ==
+                      members.front().quantity->of_instrument.size();
+         });
+}
+
+/// One row a recording: the effects of what they share.
+Eigen::MatrixXd shared_of(const std::vector<Member>& members, bool instrument) {
+  Eigen::Index columns = 0, of_instrument = 0;
+  for (const Member& m : members) {
+    columns = std::max(columns, m.quantity->shared.size());
+    if (instrument) of_instrument = std::max(of_instrument, m.quantity->of_instrument.size());
+  }
+  Eigen::MatrixXd shared =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(members.size()), columns + of_instrument);
+  for (std::size_t j = 0; j < members.size(); ++j) {
+    const Member& m = members[j];
+    const auto row = static_cast<Eigen::Index>(j);
+    shared.row(row).head(m.quantity->shared.size()) = m.quantity->shared / m.scale;
+    if (instrument) shared.row(row).tail(of_instrument) = m.quantity->of_instrument / m.scale;
+  }
+  return shared;
+}
+
+double own_of(const Member& m, bool instrument) {
+  const double apart = instrument ? 0.0 : m.quantity->of_instrument.norm();
+  return std::hypot(m.quantity->u_own, apart) / m.scale;
+}
+
+void set_mean(PooledQuantity& pooled, const std::vector<Member>& members,
+              const Eigen::MatrixXd& shared, const std::vector<double>& own,
+              double degrees_of_law) {
+  std::vector<SpecimenEstimate> estimates;
+  const double tiny = 1e-12 * std::abs(members.front().quantity->simulated / members.front().scale);
+  for (std::size_t j = 0; j < members.size(); ++j) {
+    const Member& m = members[j];
+    estimates.push_back({m.recording->name, m.quantity->e.error / m.scale,
+                         std::max({own[j], tiny, std::numeric_limits<double>::min()})});
+  }
+  const RandomEffects effects = random_effects(estimates);
+  const double spread = effects.tau_squared.value_or(0.0);
+  Eigen::RowVectorXd mean_shared = Eigen::RowVectorXd::Zero(shared.cols());
+  double weights = 0.0;
+  for (std::size_t j = 0; j < members.size(); ++j) {
+    const double s = estimates[j].standard_error;
+    const double weight = 1.0 / (s * s + spread);
+    mean_shared += weight * shared.row(static_cast<Eigen::Index>(j));
+    weights += weight;
+  }
+  pooled.between = std::sqrt(spread);
+  pooled.u_shared = mean_shared.norm() / weights;
+  CombinedUncertainty sum;
+  sum.add(effects.standard_error, static_cast<double>(members.size() - 1));
+  sum.add(pooled.u_shared, degrees_of_law);
+  pooled.e = {effects.mean, sum.u(), sum.degrees(), coverage_factor(sum.degrees())};
+}
+
+void set_area(PooledQuantity& pooled, const std::vector<Member>& members,
+              const Eigen::MatrixXd& shared, const std::vector<double>& own,
+              const std::optional<std::string>& at) {
+  std::vector<double> z;
+  for (std::size_t j = 0; j < members.size(); ++j) {
+    const double u = std::hypot(shared.row(static_cast<Eigen::Index>(j)).norm(), own[j]);
+    if (!(u > 0.0)) return;
+    z.push_back(-members[j].quantity->e.error / members[j].scale / u);
+  }
+  AreaMetric area = standard_area(z, shared, own);
+  double scale = 1.0;
+  if (!pooled.relative) {
+    double sum = 0.0;
+    for (std::size_t j = 0; j < members.size(); ++j) {
+      sum += std::hypot(shared.row(static_cast<Eigen::Index>(j)).norm(), own[j]);
+    }
+    scale = sum / static_cast<double>(members.size());
+  } else if (at) {
+    const auto named =
+        std::ranges::find_if(members, [&](const Member& m) { return m.recording->name == *at; });
+    if (named == members.end()) return;
+    scale = named->quantity->e.u_val;
+    pooled.area_at = at;
+    pooled.simulated = named->quantity->simulated;
+    pooled.measured = named->quantity->measured;
+  }
+  area.area *= scale;
+  area.null_mean *= scale;
+  area.null_95 *= scale;
+  if (area.lower) *area.lower *= scale;
+  if (area.upper) *area.upper *= scale;
+  pooled.area = area;
+}
+
+void judge_pooled(PooledQuantity& pooled, const std::vector<Member>& members,
+                  const PooledOptions& options) {
+  const bool residual =
+      std::ranges::any_of(members, [](const Member& m) { return m.recording->calibration; });
+  const bool unknown = std::ranges::any_of(members, [](const Member& m) {
+    return m.quantity->verdict == ModelVerdict::undetermined && !m.quantity->limit;
+  });
+  if (options.requirement) {
+    if (options.requirement->share && pooled.relative) {
+      pooled.limit = options.requirement->value;
+    } else if (!pooled.relative) {
+      QuantityComparison mean = *members.front().quantity;
+      mean.measured = pooled.measured;
+      mean.u_D = pooled.e.u_val;
+      pooled.limit = limit_of(*options.requirement, mean, options.response, 0.0);
+    }
+  }
+  pooled.verdict = judge_error(pooled.e, pooled.limit);
+  pooled.p_value = error_p_value(pooled.e, pooled.limit);
+  if (options.requirement && !pooled.limit) pooled.verdict = ModelVerdict::no_requirement;
+  if (unknown) {
+    pooled.verdict = ModelVerdict::undetermined;
+    pooled.remark = "depends on the zero of the force, which one recording at least does not tell";
+    pooled.p_value = 1.0;
+  } else if (pooled.verdict == ModelVerdict::undetermined) {
+    const double own = std::sqrt(
+        std::max(pooled.e.u_val * pooled.e.u_val - pooled.u_shared * pooled.u_shared, 0.0));
+    pooled.remark = what_must_shrink(
+        pooled.e, *pooled.limit,
+        {{"the law's parameters and the instrument, which all share,", pooled.u_shared},
+         {fmt::format("the mean over {} recordings", pooled.recordings), own}},
+        pooled.relative
+            ? Unit{"%", Dimension::dimensionless, 0.01}
+            : scaled_unit(pooled.unit, std::max(std::abs(pooled.measured), pooled.e.expanded())));
+  }
+  if (residual) pooled.verdict = ModelVerdict::residual;
+}
+
+}  // namespace
+
+bool equal_protocols(std::span<const Applicability> motions) {
+  constexpr double kEqual = 0.02;
+  const auto agree = [&](double Applicability::*member) {
+    const double first = motions.front().*member;
+    return std::ranges::all_of(motions, [&](const Applicability& m) {
+      return std::abs(m.*member - first) <= kEqual * std::abs(first);
+    });
+  };
+  return agree(&Applicability::depth) && agree(&Applicability::rate) &&
+         agree(&Applicability::duration_s);
+}
+
+std::vector<PooledQuantity> pool_recordings(std::span<const RecordingComparison> recordings,
+                                            std::span<const Applicability> motions,
+                                            double degrees_of_law, const PooledOptions& options) {
+  std::vector<PooledQuantity> all;
+  if (recordings.size() < 2) return all;
+  const bool equal = equal_protocols(motions);
+  for (const QuantityComparison& of_first : recordings.front().quantities) {
+    std::vector<Member> members;
+    for (const RecordingComparison& r : recordings) {
+      const auto found =
+          std::ranges::find(r.quantities, of_first.quantity, &QuantityComparison::quantity);
+      if (found == r.quantities.end()) continue;
+      members.push_back({&r, &*found, equal ? 1.0 : std::abs(found->simulated)});
+    }
+    if (members.size() < 2) continue;
+    PooledQuantity pooled;
+    pooled.name = of_first.name;
+    pooled.unit = of_first.unit;
+    pooled.recordings = static_cast<int>(members.size());
+    pooled.relative = !equal;
+    if (equal) {
+      for (const Member& m : members) {
+        pooled.simulated += m.quantity->simulated / static_cast<double>(members.size());
+        pooled.measured += m.quantity->measured / static_cast<double>(members.size());
+      }
+    }
+    const bool instrument = one_instrument(members);
+    const Eigen::MatrixXd shared = shared_of(members, instrument);
+    std::vector<double> own;
+    for (const Member& m : members) own.push_back(own_of(m, instrument));
+    set_mean(pooled, members, shared, own, degrees_of_law);
+    set_area(pooled, members, shared, own, options.at);
+    judge_pooled(pooled, members, options);
+    all.push_back(std::move(pooled));
+  }
+  std::vector<double> p_values;
+  for (const PooledQuantity& p : all) {
+    p_values.push_back(p.verdict == ModelVerdict::no_requirement ? 1.0 : p.p_value);
+  }
+  const std::vector<bool> rejected = holm_rejects(p_values);
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].rejected = rejected[i];
+  return all;
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,226 @@
+#include "tpm/fit/validate/validation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/fit/validate/calibration_covariance.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::fit {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<fs::path> found_file(const std::string& name, const std::string& sha256,
+                                   const fs::path& law_file) {
+  const fs::path folder = law_file.parent_path();
+  for (const fs::path& place :
+       {fs::path(name), folder / name, folder / ".." / name, folder / fs::path(name).filename(),
+        folder / ".." / fs::path(name).filename()}) {
+    for (fs::path file : {place, fs::path(place).replace_extension(".csv")}) {
+      std::error_code none;
+      if (!fs::is_regular_file(file, none)) continue;
+      if (sha256_hex(read_file(file)) == sha256) return file.lexically_normal();
+    }
+  }
+  return std::nullopt;
+}
+
+Applicability motion_of(const PreparedRecording& recording, const RecordingParts& parts,
+                        double contact) {
+  const Recording& r = recording.recording;
+  Applicability a;
+  const std::size_t last = std::max(parts.hold_last.value_or(parts.ramp_last), parts.loop_last);
+  for (std::size_t i = parts.ramp_first; i <= last; ++i) {
+    a.depth = std::max(a.depth, r.drive[i] - contact);
+  }
+  a.duration_s = r.time_s[last] - r.time_s[parts.ramp_first];
+  const double time = r.time_s[parts.ramp_last] - r.time_s[parts.ramp_first];
+  if (time > 0.0) a.rate = (r.drive[parts.ramp_last] - r.drive[parts.ramp_first]) / time;
+  return a;
+}
+
+std::string drive_text(double value, const LawSpec& spec) {
+  const Unit unit = shown_unit(quantity_dimension(spec.drive));
+  return with_unit(significant(value / unit.to_si, 3), unit);
+}
+
+void compare_with_calibration(Applicability& a, const ValidationRequest& request) {
+  const LawFile& law = request.law;
+  a.fitted_depth = law.fitted_to;
+  if (law.uncertainty->duration_s > 0.0) a.fitted_duration_s = law.uncertainty->duration_s;
+  for (const CalibrationData::File& file : request.calibration.files) {
+    if (!file.recording) continue;
+    const double rate = motion_of(*file.recording, parts_of(*file.recording), 0.0).rate;
+    a.slowest = std::min(a.slowest.value_or(rate), rate);
+    a.fastest = std::max(a.fastest.value_or(rate), rate);
+  }
+  constexpr double kSlack = 1.02;  // a depth is not known better
+  if (!a.fitted_depth) {
+    a.unknown.push_back("depth");
+  } else if (a.depth > kSlack * *a.fitted_depth) {
+    a.outside.push_back(fmt::format(
+        "{} deep, {} times the {} of the calibration", drive_text(a.depth, law.spec),
+        significant(a.depth / *a.fitted_depth, 2), drive_text(*a.fitted_depth, law.spec)));
+  }
+  if (!a.fitted_duration_s) {
+    a.unknown.push_back("duration");
+  } else if (a.duration_s > kSlack * *a.fitted_duration_s) {
+    a.outside.push_back(fmt::format(
+        "lasts {} s, {} times the {} s of the calibration", significant(a.duration_s, 3),
+        significant(a.duration_s / *a.fitted_duration_s, 2), significant(*a.fitted_duration_s, 3)));
+  }
+  if (!a.fastest) {
+    a.unknown.push_back("rate");
+  } else if (a.rate > kSlack * *a.fastest || a.rate * kSlack < *a.slowest) {
+    const bool fast = a.rate > *a.fastest;
+    const double nearest = fast ? *a.fastest : *a.slowest;
+    a.outside.push_back(fmt::format("ramp of {}/s, {} times the {} of the calibration",
+                                    drive_text(a.rate, law.spec), significant(a.rate / nearest, 2),
+                                    fast ? "fastest" : "slowest"));
+  }
+}
+
+bool same_samples(const Recording& a, const Recording& b) {
+  return a.time_s == b.time_s && a.drive == b.drive && a.response == b.response;
+}
+
+bool was_fitted(const ValidationRequest& request, const PreparedRecording& recording) {
+  const std::string& sha256 = recording.recording.header.sha256;
+  return std::ranges::any_of(request.calibration.files, [&](const CalibrationData::File& file) {
+    return (!sha256.empty() && file.sha256 == sha256) ||
+           (file.recording && same_samples(file.recording->recording, recording.recording));
+  });
+}
+
+/// All of them, or none.
+std::vector<PreparedRecording> found_recordings(const CalibrationData& calibration) {
+  std::vector<PreparedRecording> found;
+  for (const CalibrationData::File& file : calibration.files) {
+    if (!file.recording) return {};
+    found.push_back(*file.recording);
+  }
+  return found;
+}
+
+ModelVerdict verdict_of_pooled(const std::vector<PooledQuantity>& pooled) {
+  std::vector<QuantityComparison> each;
+  for (const PooledQuantity& p : pooled) {
+    QuantityComparison q;
+    q.verdict = p.verdict;
+    q.limit = p.limit;
+    q.rejected = p.rejected;
+    each.push_back(std::move(q));
+  }
+  return verdict_of_all(each);
+}
+
+}  // namespace
+
+CalibrationData find_calibration(const LawFile& law, const fs::path& law_file,
+                                 const std::function<PreparedRecording(const std::string&)>& read) {
+  CalibrationData data;
+  if (!law.uncertainty) return data;
+  bool one = true;
+  for (const FittedFile& fitted : law.uncertainty->data) {
+    CalibrationData::File file{fitted.name, fitted.sha256, std::nullopt};
+    const auto path =
+        fitted.sha256.empty() ? std::nullopt : found_file(fitted.name, fitted.sha256, law_file);
+    if (!path) {
+      data.remarks.push_back(
+          fmt::format("the calibration's {} was not found with its SHA-256", fitted.name));
+      one = false;
+    } else {
+      try {
+        file.recording = read(path->string());
+      } catch (const Error& error) {
+        if (error.code() != ExitCode::bad_input) throw;
+        data.remarks.push_back(
+            fmt::format("the calibration's file was not read: {}", error.what()));
+      }
+      const auto block = instrument_beside(*path);
+      std::optional<Instrument> instrument;
+      if (block) {
+        instrument = read_instrument(*block, quantity_dimension(law.spec.response),
+                                     quantity_dimension(law.spec.drive),
+                                     fmt::format("{}: instrument", path->string()));
+      }
+      if (!instrument || (data.instrument && data.instrument->id != instrument->id)) one = false;
+      if (instrument && !data.instrument) data.instrument = instrument;
+    }
+    data.files.push_back(std::move(file));
+  }
+  if (!one) data.instrument.reset();
+  return data;
+}
+
+Validation validate(const ValidationRequest& request) {
+  if (!request.law.uncertainty) {
+    throw bad_input(request.law_file, "carries no uncertainty of a fit",
+                    "a law.json that tpm fit has written; data that determine all parameters");
+  }
+  Validation v;
+  const std::optional<LawFile> again =
+      with_calibration_covariance(request.law, found_recordings(request.calibration));
+  const LawFile& law = again ? *again : request.law;
+  v.u_input_from = again ? "the scatter of the calibration's recordings (sandwich)"
+                         : "the covariance in the law file";
+  v.spec = law.spec;
+  v.law_file = request.law_file;
+  v.law_sha256 = request.law_sha256;
+  v.placement = request.placement;
+  if (request.requirement) v.requirement = request.requirement->stated;
+  for (const CalibrationData::File& file : request.calibration.files) {
+    v.calibration.push_back({file.name, file.sha256, file.recording});
+  }
+  v.remarks = request.calibration.remarks;
+  std::vector<RecordingComparison> unseen;
+  std::vector<Applicability> unseen_motions;
+  for (std::size_t i = 0; i < request.recordings.size(); ++i) {
+    const PreparedRecording& recording = request.recordings[i];
+    ComparisonOptions options;
+    options.quantities = request.quantities;
+    options.requirement = request.requirement;
+    options.placement = request.placement;
+    options.contact_by_threshold = request.contact_by_threshold;
+    if (i < request.instruments.size()) options.instrument = request.instruments[i];
+    options.calibration_instrument = request.calibration.instrument;
+    options.calibration_data = was_fitted(request, recording);
+    RecordingComparison comparison = compare_with_recording(law, recording, options);
+    Applicability motion = motion_of(recording, comparison.parts, comparison.placement.contact);
+    compare_with_calibration(motion, request);
+    if (!comparison.calibration) {
+      unseen.push_back(comparison);
+      unseen_motions.push_back(motion);
+    }
+    v.recordings.push_back(std::move(comparison));
+    v.applicability.push_back(std::move(motion));
+  }
+  for (const std::string& name : law.uncertainty->at_bound) {
+    v.remarks.push_back(
+        fmt::format("{} stood on a bound of the fit: its uncertainty is not in u_input", name));
+  }
+  if (unseen.empty()) {
+    v.verdict = ModelVerdict::residual;
+    return v;
+  }
+  PooledOptions pooling{request.requirement, request.at, quantity_dimension(law.spec.response)};
+  v.pooled = pool_recordings(
+      unseen, unseen_motions,
+      law.uncertainty->degrees_of_freedom.value_or(std::numeric_limits<double>::infinity()),
+      pooling);
+  v.verdict = v.pooled.empty() ? unseen.front().verdict : verdict_of_pooled(v.pooled);
+  if (unseen.size() > 1 && v.pooled.empty()) {
+    v.remarks.push_back(
+        "the recordings have no quantity in common: the verdict is the first one's");
+  }
+  return v;
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,77 @@
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/files/json.hpp"
+#include "tpm/fit/validate/pooled.hpp"
+
+namespace tpm::fit {
+
+/// What is known of the recordings that a law was fitted to.
+struct CalibrationData {
+  struct File {
+    std::string name, sha256;
+    std::optional<PreparedRecording> recording;  ///< if the file was found with its SHA-256
+  };
+  std::vector<File> files;
+  std::optional<Instrument> instrument;  ///< of all of them
+  std::vector<std::string> remarks;      ///< what is not known, and why
+};
+
+/// Looks for the files that a law names, beside the law and in the current folder; a file counts if
+/// its SHA-256 is the one in the law.
+/// @param law_file path of the law
+/// @param read reads and prepares a file as a recording; its errors are told in remarks
+[[nodiscard]] CalibrationData find_calibration(
+    const LawFile& law, const std::filesystem::path& law_file,
+    const std::function<PreparedRecording(const std::string&)>& read);
+
+/// What is asked: see docs/validate.md.
+struct ValidationRequest {
+  LawFile law;
+  std::string law_file, law_sha256;
+  std::vector<PreparedRecording> recordings;           ///< one or more
+  std::vector<std::optional<Instrument>> instruments;  ///< of each
+  CalibrationData calibration;
+  std::vector<QuantityOfInterest> quantities;  ///< empty: the defaults of each recording
+  std::optional<Requirement> requirement;
+  PlacementRule placement = PlacementRule::held;
+  bool contact_by_threshold = false;
+  std::optional<std::string> at;  ///< see PooledOptions::at
+};
+
+struct Validation {
+  LawSpec spec;
+  std::string law_file, law_sha256, requirement;
+  PlacementRule placement = PlacementRule::held;
+  std::string u_input_from;  ///< where the covariance of the law's parameters comes from
+  std::vector<RecordingComparison> recordings;
+  std::vector<Applicability> applicability;  ///< one a recording
+  std::vector<PooledQuantity> pooled;        ///< over those that the law was not fitted to
+  std::vector<CalibrationData::File> calibration;
+  ModelVerdict verdict = ModelVerdict::not_seen;
+  std::vector<std::string> remarks;
+
+  /// Exit code of a program that asked: no only where a requirement is not shown to be met.
+  [[nodiscard]] bool answers_yes() const {
+    return requirement.empty() || verdict == ModelVerdict::adequate;
+  }
+};
+
+/// u_input from with_calibration_covariance() where all recordings of the calibration were found,
+/// else from the law's covariance. Throws Error(bad_input) for a law without uncertainty or
+/// recordings of other quantities.
+[[nodiscard]] Validation validate(const ValidationRequest& request);
+
+/// "no model error is seen above the uncertainty", "a model error: peak force -14.2 +- 2.3 mN", ...
+[[nodiscard]] std::string conclusion_words(const Validation& validation);
+
+[[nodiscard]] std::string to_terminal_text(const Validation& validation);
+[[nodiscard]] Json to_json(const Validation& validation);
+/// One row a recording and quantity, then one a pooled quantity; SI.
+[[nodiscard]] std::string to_csv(const Validation& validation);
+
+}  // namespace tpm::fit

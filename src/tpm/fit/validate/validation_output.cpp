@@ -1,0 +1,478 @@
+// Declared in tpm/fit/validate/validation.hpp.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/lists.hpp"
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/fit/validate/validation.hpp"
+#include "tpm/show/table_document.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr int kStoredDigits = 6;
+constexpr std::size_t kWidth = 118;
+
+double stored(double value) {
+  return rounded(value, kStoredDigits);
+}
+
+std::string number(double value, const Unit& unit, int digits = 3) {
+  return significant(value / unit.to_si, digits);
+}
+
+/// "-9.37 +- 1.48 mN"
+std::string error_text(const ErrorWithUncertainty& e, const Unit& unit) {
+  return with_unit(fmt::format("{} +- {}", number(e.error, unit), number(e.expanded(), unit)),
+                   unit);
+}
+
+std::string cell_words(ModelVerdict verdict) {
+  if (verdict == ModelVerdict::not_seen) return "no model error seen";
+  return std::string(verdict_words(verdict));
+}
+
+Unit unit_of(const QuantityComparison& q) {
+  return scaled_unit(q.unit, std::max(std::abs(q.measured), q.e.expanded()));
+}
+
+Unit unit_of(const PooledQuantity& p) {
+  if (p.relative) return {"%", Dimension::dimensionless, 0.01};
+  return scaled_unit(p.unit, std::max(std::abs(p.measured), p.e.expanded()));
+}
+
+std::string titled(const std::string& name, const Unit& unit) {
+  return unit.symbol.empty() ? name : fmt::format("{}, {}", name, unit.symbol);
+}
+
+std::vector<std::string> budget_row(const QuantityComparison& q) {
+  const Unit unit = unit_of(q);
+  const auto two = [&](double u) { return number(u, unit, 2); };
+  return {titled(q.name, unit),
+          number(q.simulated, unit, 4),
+          number(q.measured, unit, 4),
+          number(q.e.error, unit),
+          number(q.e.expanded(), unit),
+          significant(q.u_num / unit.to_si, 1),
+          two(q.u_input),
+          two(q.u_D),
+          significant(q.e.coverage, 3),
+          q.limit ? two(*q.limit) : "-",
+          cell_words(q.verdict)};
+}
+
+std::string table_text(TableSection section) {
+  section.right_aligned.assign(section.columns.size(), true);
+  section.right_aligned.front() = section.right_aligned.back() = false;
+  TableDocument document;
+  document.sections.push_back(std::move(section));
+  std::string text = render(document, TableStyle::text);
+  while (!text.empty() && text.front() == '\n') text.erase(0, 1);
+  return text;
+}
+
+std::string line(std::string_view title, const std::string& words) {
+  constexpr std::size_t kIndent = 15;
+  return wrapped(fmt::format("{:<15}{}", title, words), kWidth, kIndent) + "\n";
+}
+
+std::string joint_text(const JointTest& joint) {
+  if (joint.rank == 0) return "not possible: too few degrees of freedom";
+  std::string text = fmt::format(
+      "T^2 = {}, rank {}, p = {} (F with {} and {} degrees of freedom)",
+      significant(joint.t_squared, 3), joint.rank, significant(joint.p_value, 2), joint.rank,
+      std::isfinite(joint.degrees) ? significant(joint.degrees, 3) : "infinitely many");
+  if (!joint.dependent.empty()) {
+    text += fmt::format("; {} follows from these", fmt::join(joint.dependent, ", "));
+  }
+  return text;
+}
+
+std::string curve_text(const CurveComparison& c, const Unit& unit) {
+  const double model = c.mean_square_error - c.mean_square_u;
+  const std::string size = model > 0.0 ? with_unit(number(std::sqrt(model), unit, 2), unit) + " rms"
+                                       : std::string("nothing");
+  std::string text = fmt::format("rms E {}, expected {}: {} beyond the uncertainty",
+                                 number(std::sqrt(c.mean_square_error), unit),
+                                 with_unit(number(std::sqrt(c.mean_square_u), unit), unit), size);
+  if (c.chi_squared > 0.0) {
+    text += fmt::format("; chi^2 of the scatter alone {} over {} samples",
+                        significant(c.chi_squared, 3), c.samples);
+  }
+  return text;
+}
+
+std::string placement_text(const RecordingComparison& r, const Unit& unit, Dimension drive) {
+  const ValidationPlacement& p = r.placement;
+  const Unit shown = scaled_unit({std::string(si_symbol(drive)), drive, 1.0},
+                                 std::max(std::abs(p.contact), p.contact_u));
+  std::string text = fmt::format(
+      "contact {}{}: {}", with_unit(number(p.contact, shown), shown),
+      p.contact_u > 0.0 ? fmt::format(", u {}", with_unit(number(p.contact_u, shown, 2), shown))
+                        : "",
+      p.contact_words);
+  if (p.zero_readings == 0) return text + "; nothing before contact tells the zero of the force";
+  text += fmt::format("; zero {}, u {}, from {} readings", with_unit(number(p.zero, unit), unit),
+                      with_unit(number(p.zero_u, unit, 2), unit), p.zero_readings);
+  if (p.zero_moved) {
+    text += fmt::format("; the fit moved the zero by {} of its u", significant(*p.zero_moved, 2));
+  }
+  if (p.contact_moved) {
+    text += fmt::format(", contact by {}", significant(*p.contact_moved, 2));
+  }
+  return text;
+}
+
+std::string scatter_text(const ReadingScatter& s, const Unit& unit) {
+  return fmt::format(
+      "{} (standard deviation), correlation of neighbours {}, {} degrees of freedom, from {}",
+      with_unit(number(s.sigma, unit, 3), unit), significant(s.phi, 2), significant(s.degrees, 3),
+      s.told_by);
+}
+
+std::string instrument_text(const RecordingComparison& r) {
+  if (!r.instrument) return "not stated: its errors are not in u_D";
+  if (!r.same_instrument)
+    return fmt::format("{}, not known to be that of the calibration", r.instrument->id);
+  return fmt::format(
+      "{}, that of the calibration: a scale error that both share cannot be seen here",
+      r.instrument->id);
+}
+
+std::string applicability_text(const Applicability& a) {
+  std::string text = a.outside.empty()
+                         ? std::string("inside the calibration")
+                         : fmt::format("outside the calibration: {}", fmt::join(a.outside, "; "));
+  if (!a.unknown.empty()) {
+    text += fmt::format(" (not known: {})", fmt::join(a.unknown, ", "));
+  }
+  return text;
+}
+
+Unit response_unit(const RecordingComparison& r) {
+  for (const QuantityComparison& q : r.quantities) {
+    if (q.quantity.kind == QuantityKind::peak || q.quantity.kind == QuantityKind::end_of_hold) {
+      return unit_of(q);
+    }
+  }
+  return r.quantities.front().unit;
+}
+
+std::string header_text(const Validation& v) {
+  std::string text = fmt::format("{}: {}\n", v.law_file, law_words(v.spec));
+  const std::string fitted =
+      v.calibration.empty()
+          ? std::string("files that the law does not name")
+          : listed(v.calibration, [](const CalibrationData::File& f) { return f.name; });
+  const bool residual = v.verdict == ModelVerdict::residual;
+  text +=
+      wrapped(fmt::format("{} with {}, fitted to {}; {}",
+                          residual ? "compared (calibration residual, no validation)" : "validated",
+                          listed(v.recordings, [](const auto& r) { return r.name; }), fitted,
+                          v.requirement.empty() ? std::string("no requirement")
+                                                : fmt::format("requirement: {}", v.requirement)),
+              kWidth, 2) +
+      "\n\n";
+  return text;
+}
+
+std::string remarks_of(const RecordingComparison& r) {
+  std::string text;
+  for (const QuantityComparison& q : r.quantities) {
+    if (q.remark.empty()) continue;
+    const bool shrink = q.limit && q.verdict == ModelVerdict::undetermined &&
+                        q.remark.find(" from u = ") != std::string::npos;
+    text += line(shrink ? "must shrink" : "undetermined", fmt::format("{}: {}", q.name, q.remark));
+  }
+  for (const std::string& words : r.without) text += line("not compared", words);
+  return text;
+}
+
+std::string recording_text(const Validation& v, std::size_t index) {
+  const RecordingComparison& r = v.recordings[index];
+  TableSection section;
+  section.columns = {"quantity", "S",   "D", "E", "U",      "u_num",
+                     "u_input",  "u_D", "k", "R", "verdict"};
+  for (const QuantityComparison& q : r.quantities) section.rows.push_back(budget_row(q));
+  std::string text = table_text(std::move(section)) + "\n" + remarks_of(r);
+  const Unit unit = response_unit(r);
+  text += line("together", joint_text(r.joint));
+  text += line("whole curve", curve_text(r.curve, unit));
+  text += line("placement", placement_text(r, unit, quantity_dimension(v.spec.drive)));
+  text += line("scatter", scatter_text(r.scatter, unit));
+  text += line("instrument", instrument_text(r));
+  text += line("applicability", applicability_text(v.applicability[index]));
+  return text;
+}
+
+std::string area_text(const PooledQuantity& p) {
+  if (!p.area) return "-";
+  const Unit unit = p.relative && !p.area_at ? Unit{"", Dimension::dimensionless, 1.0}
+                    : p.area_at              ? scaled_unit(p.unit, std::abs(p.measured))
+                                             : unit_of(p);
+  std::string text =
+      fmt::format("{} (of draws {}, 95 % {})", number(p.area->area, unit, 3),
+                  number(p.area->null_mean, unit, 3), number(p.area->null_95, unit, 3));
+  if (p.relative && !p.area_at) text += " u";
+  if (p.area_at) text += fmt::format(" {}", unit.symbol);
+  return text;
+}
+
+std::string pooled_text(const Validation& v) {
+  TableSection section;
+  section.columns = {"mean over recordings", "n",      "S", "D", "E", "U", "shared u", "R",
+                     "area metric",          "verdict"};
+  for (const PooledQuantity& p : v.pooled) {
+    const Unit unit = unit_of(p);
+    section.rows.push_back({titled(p.name, unit), std::to_string(p.recordings),
+                            p.relative ? "-" : number(p.simulated, unit, 4),
+                            p.relative ? "-" : number(p.measured, unit, 4), number(p.e.error, unit),
+                            number(p.e.expanded(), unit), number(p.u_shared, unit, 2),
+                            p.limit ? number(*p.limit, unit, 2) : "-", area_text(p),
+                            cell_words(p.verdict)});
+  }
+  std::string text = table_text(std::move(section)) + "\n";
+  for (const PooledQuantity& p : v.pooled) {
+    if (!p.remark.empty()) text += line("must shrink", fmt::format("{}: {}", p.name, p.remark));
+  }
+  return text;
+}
+
+std::string each_recording_text(const Validation& v) {
+  TableSection section;
+  section.columns = {"recording"};
+  const std::vector<QuantityComparison>& quantities = v.recordings.front().quantities;
+  for (const QuantityComparison& q : quantities) section.columns.push_back(q.name);
+  section.columns.push_back("verdict");
+  for (const RecordingComparison& r : v.recordings) {
+    std::vector<std::string> row{r.name};
+    for (const QuantityComparison& q : quantities) {
+      const auto own = std::ranges::find(r.quantities, q.quantity, &QuantityComparison::quantity);
+      row.push_back(own == r.quantities.end() ? "-" : error_text(own->e, unit_of(*own)));
+    }
+    row.push_back(cell_words(r.verdict));
+    section.rows.push_back(std::move(row));
+  }
+  std::string text = table_text(std::move(section)) + "\n";
+  for (std::size_t i = 0; i < v.recordings.size(); ++i) {
+    if (v.applicability[i].outside.empty()) continue;
+    text += line("applicability", fmt::format("{}: {}", v.recordings[i].name,
+                                              applicability_text(v.applicability[i])));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string conclusion_words(const Validation& v) {
+  if (v.verdict == ModelVerdict::residual) {
+    return "calibration residual: the law was fitted to these data, so this validates nothing";
+  }
+  std::vector<std::string> named;
+  const auto add = [&](const std::string& name, const ErrorWithUncertainty& e, const Unit& unit,
+                       bool rejected, ModelVerdict verdict) {
+    const bool wanted =
+        v.verdict == ModelVerdict::undetermined ? verdict == ModelVerdict::undetermined : rejected;
+    if (wanted) named.push_back(fmt::format("{} {}", name, error_text(e, unit)));
+  };
+  for (const PooledQuantity& p : v.pooled) add(p.name, p.e, unit_of(p), p.rejected, p.verdict);
+  if (v.pooled.empty()) {
+    for (const RecordingComparison& r : v.recordings) {
+      if (r.calibration) continue;
+      for (const QuantityComparison& q : r.quantities) {
+        add(q.name, q.e, unit_of(q), q.rejected, q.verdict);
+      }
+    }
+  }
+  const std::string list = fmt::format("{}", fmt::join(named, ", "));
+  switch (v.verdict) {
+    case ModelVerdict::adequate:
+      return fmt::format("adequate for {}", v.requirement);
+    case ModelVerdict::not_adequate:
+      return fmt::format("not adequate for {}: model error {}", v.requirement, list);
+    case ModelVerdict::undetermined:
+      return list.empty()
+                 ? fmt::format("undetermined for {}: beyond it before Holm's correction only",
+                               v.requirement)
+                 : fmt::format("undetermined{}: {}",
+                               v.requirement.empty() ? "" : " for " + v.requirement, list);
+    case ModelVerdict::seen:
+      return fmt::format("a model error of E +- U: {}", list);
+    case ModelVerdict::no_requirement:
+      return "the requirement has the unit of no quantity that was compared";
+    default:
+      break;
+  }
+  return std::string(verdict_words(ModelVerdict::not_seen));
+}
+
+std::string to_terminal_text(const Validation& v) {
+  std::string text = header_text(v);
+  if (v.recordings.size() == 1) {
+    text += recording_text(v, 0);
+  } else {
+    if (!v.pooled.empty()) text += pooled_text(v);
+    text += each_recording_text(v);
+  }
+  text += line("u_input", "from " + v.u_input_from);
+  for (const std::string& remark : v.remarks) text += line("note", remark);
+  return text + line("verdict", conclusion_words(v));
+}
+
+namespace {
+
+void put_error(Json& j, const ErrorWithUncertainty& e) {
+  j["E"] = stored(e.error);
+  j["u_val"] = stored(e.u_val);
+  if (std::isfinite(e.degrees)) j["degrees_of_freedom"] = stored(e.degrees);
+  j["k"] = stored(e.coverage);
+  j["U"] = stored(e.expanded());
+}
+
+Json quantity_json(const QuantityComparison& q) {
+  Json j{{"quantity", q.name},
+         {"unit", q.unit.symbol},
+         {"S", stored(q.simulated)},
+         {"D", stored(q.measured)}};
+  put_error(j, q.e);
+  j["u_num"] = stored(q.u_num);
+  j["u_input"] = stored(q.u_input);
+  j["u_D"] = stored(q.u_D);
+  j["parts"] = array_json(q.parts, [](const UncertaintyPart& part) {
+    return Json{{"name", part.name}, {"u", stored(part.u)}};
+  });
+  if (q.limit) j["R"] = stored(*q.limit);
+  j["verdict"] = verdict_key(q.verdict);
+  j["p_value"] = stored(q.p_value);
+  j["rejected_by_holm"] = q.rejected;
+  if (!q.remark.empty()) j["remark"] = q.remark;
+  return j;
+}
+
+Json applicability_json(const Applicability& a) {
+  Json j{{"depth_SI", stored(a.depth)},
+         {"duration_s", stored(a.duration_s)},
+         {"rate_SI_per_s", stored(a.rate)}};
+  if (a.fitted_depth) j["calibration_depth_SI"] = stored(*a.fitted_depth);
+  if (a.fitted_duration_s) j["calibration_duration_s"] = stored(*a.fitted_duration_s);
+  if (a.slowest) j["calibration_slowest_SI_per_s"] = stored(*a.slowest);
+  if (a.fastest) j["calibration_fastest_SI_per_s"] = stored(*a.fastest);
+  j["outside"] = a.outside;
+  j["unknown"] = a.unknown;
+  return j;
+}
+
+Json recording_json(const RecordingComparison& r, const Applicability& a) {
+  Json j{{"recording", r.name}, {"sha256", r.sha256}, {"fitted", r.calibration}};
+  j["quantities"] = array_json(r.quantities, quantity_json);
+  j["not_compared"] = r.without;
+  Json joint{{"rank", r.joint.rank}};
+  if (r.joint.rank > 0) {
+    joint["T_squared"] = stored(r.joint.t_squared);
+    joint["F"] = stored(r.joint.f);
+    joint["p_value"] = stored(r.joint.p_value);
+    if (std::isfinite(r.joint.degrees)) joint["degrees_of_freedom"] = stored(r.joint.degrees);
+  }
+  joint["dependent"] = r.joint.dependent;
+  j["together"] = joint;
+  j["curve"] = {{"samples", r.curve.samples},
+                {"mean_square_E", stored(r.curve.mean_square_error)},
+                {"mean_square_u", stored(r.curve.mean_square_u)},
+                {"chi_squared", stored(r.curve.chi_squared)}};
+  const ValidationPlacement& p = r.placement;
+  Json placement{{"contact", stored(p.contact)},    {"contact_u", stored(p.contact_u)},
+                 {"contact_from", p.contact_words}, {"zero", stored(p.zero)},
+                 {"zero_u", stored(p.zero_u)},      {"zero_readings", p.zero_readings}};
+  if (p.onset) placement["onset"] = stored(*p.onset);
+  if (p.onset_u) placement["onset_u"] = stored(*p.onset_u);
+  if (p.contact_moved) placement["contact_moved_in_u"] = stored(*p.contact_moved);
+  if (p.zero_moved) placement["zero_moved_in_u"] = stored(*p.zero_moved);
+  j["placement"] = placement;
+  j["scatter"] = {{"sigma", stored(r.scatter.sigma)},
+                  {"phi", stored(r.scatter.phi)},
+                  {"degrees_of_freedom", stored(r.scatter.degrees)},
+                  {"from", r.scatter.told_by}};
+  if (r.instrument) j["instrument"] = r.instrument->stated;
+  j["same_instrument"] = r.same_instrument;
+  j["applicability"] = applicability_json(a);
+  j["verdict"] = verdict_key(r.verdict);
+  return j;
+}
+
+Json pooled_json(const PooledQuantity& p) {
+  Json j{{"quantity", p.name},
+         {"unit", p.relative ? "1" : p.unit.symbol},
+         {"recordings", p.recordings},
+         {"share_of_S", p.relative}};
+  if (!p.relative) {
+    j["S"] = stored(p.simulated);
+    j["D"] = stored(p.measured);
+  }
+  put_error(j, p.e);
+  j["u_shared"] = stored(p.u_shared);
+  j["sd_between"] = stored(p.between);
+  if (p.limit) j["R"] = stored(*p.limit);
+  j["verdict"] = verdict_key(p.verdict);
+  j["p_value"] = stored(p.p_value);
+  j["rejected_by_holm"] = p.rejected;
+  if (!p.remark.empty()) j["remark"] = p.remark;
+  if (p.area) {
+    Json area{{"area", stored(p.area->area)},
+              {"mean_of_draws", stored(p.area->null_mean)},
+              {"upper_95_of_draws", stored(p.area->null_95)},
+              {"p_value", stored(p.area->p_value)}};
+    if (p.area->lower) area["lower"] = stored(*p.area->lower);
+    if (p.area->upper) area["upper"] = stored(*p.area->upper);
+    if (p.area_at) area["at"] = *p.area_at;
+    j["area_metric"] = area;
+  }
+  return j;
+}
+
+}  // namespace
+
+Json to_json(const Validation& v) {
+  Json j{{"law_file", v.law_file}, {"law_sha256", v.law_sha256}, {"law", law_name(v.spec)}};
+  j["calibration"] = array_json(v.calibration, [](const CalibrationData::File& f) {
+    return Json{{"name", f.name}, {"sha256", f.sha256}, {"found", f.recording.has_value()}};
+  });
+  j["requirement"] = v.requirement.empty() ? Json("none") : Json(v.requirement);
+  j["placement"] = placement_rule_name(v.placement);
+  j["u_input_from"] = v.u_input_from;
+  j["recordings"] = Json::array();
+  for (std::size_t i = 0; i < v.recordings.size(); ++i) {
+    j["recordings"].push_back(recording_json(v.recordings[i], v.applicability[i]));
+  }
+  if (!v.pooled.empty()) j["pooled"] = array_json(v.pooled, pooled_json);
+  j["remarks"] = v.remarks;
+  j["verdict"] = verdict_key(v.verdict);
+  j["words"] = conclusion_words(v);
+  return j;
+}
+
+std::string to_csv(const Validation& v) {
+  std::string text = csv_line({"recording", "quantity", "unit", "S", "D", "E", "U", "u_val",
+                               "u_num", "u_input", "u_D", "k", "R", "verdict"});
+  const auto cell = [](double value) { return significant(value, kStoredDigits); };
+  for (const RecordingComparison& r : v.recordings) {
+    for (const QuantityComparison& q : r.quantities) {
+      text += csv_line({r.name, q.name, q.unit.symbol, cell(q.simulated), cell(q.measured),
+                        cell(q.e.error), cell(q.e.expanded()), cell(q.e.u_val), cell(q.u_num),
+                        cell(q.u_input), cell(q.u_D), cell(q.e.coverage),
+                        q.limit ? cell(*q.limit) : "", std::string(verdict_key(q.verdict))});
+    }
+  }
+  for (const PooledQuantity& p : v.pooled) {
+    text += csv_line({"mean", p.name, p.relative ? "1" : p.unit.symbol,
+                      p.relative ? "" : cell(p.simulated), p.relative ? "" : cell(p.measured),
+                      cell(p.e.error), cell(p.e.expanded()), cell(p.e.u_val), "", "", "",
+                      cell(p.e.coverage), p.limit ? cell(*p.limit) : "",
+                      std::string(verdict_key(p.verdict))});
+  }
+  return text;
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,198 @@
+// How often tpm validate is right, by simulation (reports/validation):
+//
+//     measure_validation [EXPERIMENTS] [CASE]
+#include <fmt/format.h>
+
+#include <boost/math/distributions/binomial.hpp>
+
+#include "program.hpp"
+#include "validation_studies.hpp"
+
+namespace tpm::test {
+namespace {
+
+/// Clopper and Pearson's 95 % interval, %.
+std::string rate_text(const Count& c) {
+  using boost::math::binomial_distribution;
+  const double low =
+      c.held == 0 ? 0.0 : binomial_distribution<>::find_lower_bound_on_p(c.trials, c.held, 0.025);
+  const double high = c.held == c.trials
+                          ? 1.0
+                          : binomial_distribution<>::find_upper_bound_on_p(c.trials, c.held, 0.025);
+  return fmt::format("{} of {} ({:.1f} to {:.1f} %)", c.held, c.trials, 100.0 * low, 100.0 * high);
+}
+
+void say(const std::string& what, const std::string& quantity, const Count& count) {
+  fmt::print("| {} | {} | {} |\n", what, quantity, rate_text(count));
+  std::fflush(stdout);
+}
+
+void say(const std::string& what, const StudyCounts& counts) {
+  say(what, "peak", counts.peak);
+  say(what, "end of hold", counts.end);
+}
+
+RecordingComparison compared(const LawFile& law, const StudyTest& test, const StudyNoise& noise,
+                             Random& random, PlacementRule placement, double stiffer = 1.0,
+                             double slow_branch = 0.0,
+                             std::optional<Requirement> requirement = std::nullopt) {
+  ComparisonOptions options;
+  options.placement = placement;
+  options.requirement = std::move(requirement);
+  options.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
+  const PreparedRecording r =
+      prepare_recording("validation", study_recording(test, noise, random, stiffer, slow_branch));
+  return compare_with_recording(law, r, options);
+}
+
+/// |E| <= U without a model error: rests, contact by the depth or the onset, held and fitted.
+void no_model_error(int experiments, int calibrations, double phi) {
+  StudyNoise noise;
+  noise.phi = phi;
+  Random random(51);
+  struct Case {
+    const char* name;
+    int rest;
+    double contact_mm;
+    PlacementRule placement;
+    StudyCounts counts;
+  };
+  std::vector<Case> cases{{"held, rest 10, contact at depth 0", 10, 0.0, PlacementRule::held, {}},
+                          {"held, rest 10, onset", 10, 0.4, PlacementRule::held, {}},
+                          {"held, rest 200, onset", 200, 0.4, PlacementRule::held, {}},
+                          {"fitted, rest 40", 40, 0.4, PlacementRule::fitted, {}}};
+  for (int i = 0; i < experiments; ++i) {
+    const LawFile law = study_calibration(calibrations, noise, random);
+    for (Case& c : cases) {
+      c.counts.add(
+          compared(law, study_validation(c.rest, c.contact_mm), noise, random, c.placement), 0.0,
+          0.0);
+    }
+  }
+  for (const Case& c : cases) {
+    say(fmt::format("no model error, {}, {} calibration recording{}, {}",
+                    phi > 0.0 ? fmt::format("AR(1) {}", phi) : std::string("white noise"),
+                    calibrations, calibrations > 1 ? "s" : "", c.name),
+        c.counts);
+  }
+}
+
+/// 5 % stiffer: [E - U, E + U] contains the model error, and verdicts at R = |delta|.
+void known_error(int experiments) {
+  const StudyNoise noise;
+  const StudyTest test = study_validation(40, 0.4);
+  Random random(52);
+  StudyCounts counts;
+  Count adequate, not_adequate;
+  constexpr double kStiffer = 1.05;
+  LawFile right;
+  right = study_calibration(1, noise, random);
+  right.values = {60.0, 45.0, 2.0, 0.0, 0.0};
+  const TrueErrors delta = true_errors(right, test, kStiffer);
+  Requirement requirement;
+  requirement.share = false;
+  requirement.dimension = Dimension::force;
+  requirement.value = std::abs(delta.end);
+  for (int i = 0; i < experiments; ++i) {
+    const LawFile law = study_calibration(1, noise, random);
+    const RecordingComparison r =
+        compared(law, test, noise, random, PlacementRule::held, kStiffer, 0.0, requirement);
+    counts.add(r, delta.peak, delta.end);
+    const ModelVerdict verdict = study_quantity(r, QuantityKind::end_of_hold).verdict;
+    adequate.add(verdict == ModelVerdict::adequate);
+    not_adequate.add(verdict == ModelVerdict::not_adequate);
+  }
+  say("5 % stiffer, [E - U, E + U] holds delta", counts);
+  say("|delta| = R, called adequate", "end of hold", adequate);
+  say("|delta| = R, called not adequate", "end of hold", not_adequate);
+}
+
+/// A branch of 12 s left out of the law: delta of the law fitted to noise-free data.
+void branch_left_out(int experiments) {
+  const StudyNoise noise;
+  const StudyTest test = study_validation(40, 0.4);
+  constexpr double kBranch = 6.0;
+  Random random(53);
+  StudyNoise clean;
+  clean.sigma_N = 1e-7;
+  clean.zero_N = 0.0;
+  const LawFile limit = study_calibration(1, clean, random, kBranch);
+  const TrueErrors delta = true_errors(limit, test, 1.0, kBranch);
+  StudyCounts counts;
+  for (int i = 0; i < experiments; ++i) {
+    const LawFile law = study_calibration(1, noise, random, kBranch);
+    counts.add(compared(law, test, noise, random, PlacementRule::held, 1.0, kBranch), delta.peak,
+               delta.end);
+  }
+  say("a branch left out, [E - U, E + U] holds delta", counts);
+}
+
+/// Force cells that are off by at most 0.5 %, another one in the validation.
+void instruments(int experiments) {
+  constexpr double kLimit = 0.005;
+  Instrument cell;
+  cell.force = ChannelUncertainty{kLimit / std::numbers::sqrt3, 0.0};
+  Random random(54);
+  StudyCounts other, same;
+  for (int i = 0; i < experiments; ++i) {
+    StudyNoise noise;
+    const LawFile law = study_calibration(1, noise, random, 0.0, kLimit);
+    noise.force_scale = kLimit * (2.0 * random.uniform() - 1.0);
+    ComparisonOptions options;
+    options.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
+    cell.id = "a";
+    options.instrument = cell;
+    cell.id = "b";
+    options.calibration_instrument = cell;
+    const PreparedRecording r =
+        prepare_recording("validation", study_recording(study_validation(40, 0.4), noise, random));
+    other.add(compare_with_recording(law, r, options), 0.0, 0.0);
+  }
+  say("no model error, force cells off by up to 0.5 %, two instruments", other);
+}
+
+/// Five recordings: the mean E, and the area metric beyond the 95 % point of its draws.
+void several(int experiments) {
+  const StudyNoise noise;
+  Random random(55);
+  Count mean, area;
+  for (int i = 0; i < experiments; ++i) {
+    ValidationRequest request;
+    request.law = study_calibration(1, noise, random);
+    request.quantities = {{QuantityKind::peak}};
+    for (int k = 0; k < 5; ++k) {
+      request.recordings.push_back(
+          prepare_recording("validation " + std::to_string(k),
+                            study_recording(study_validation(40, 0.4), noise, random)));
+    }
+    const Validation v = validate(request);
+    const PooledQuantity& p = v.pooled.front();
+    mean.add(std::abs(p.e.error) <= p.e.expanded());
+    area.add(p.area->area > p.area->null_95);
+  }
+  say("no model error, mean over 5 recordings", "peak", mean);
+  say("area metric beyond the 95 % point of its draws, 5 recordings", "peak", area);
+}
+
+}  // namespace
+}  // namespace tpm::test
+
+int main(int argc, char** argv) {
+  using namespace tpm::test;
+  return measured(
+      argc, argv, 0, 2, "usage: measure_validation [EXPERIMENTS] [CASE]",
+      [](const std::vector<std::string>& words) {
+        const int n = words.empty() ? 1000 : std::stoi(words[0]);
+        const std::string only = words.size() > 1 ? words[1] : "";
+        const auto wanted = [&](const char* name) { return only.empty() || only == name; };
+        fmt::print("| what | quantity | how often (exact 95 % interval) |\n|---|---|---|\n");
+        if (wanted("white")) no_model_error(n, 1, 0.0);
+        if (wanted("white5")) no_model_error(n, 5, 0.0);
+        if (wanted("ar")) no_model_error(n, 1, 0.9);
+        if (wanted("ar5")) no_model_error(n, 5, 0.9);
+        if (wanted("stiffer")) known_error(n);
+        if (wanted("branch")) branch_left_out(n);
+        if (wanted("instruments")) instruments(n);
+        if (wanted("several")) several(n);
+      });
+}
