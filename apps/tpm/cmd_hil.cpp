@@ -3,6 +3,7 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <ctime>
 #include <filesystem>
@@ -139,15 +140,17 @@ bool enter_was_pressed() {
   return ::poll(&keys, 1, 0) > 0 && ::read(STDIN_FILENO, line, sizeof line) > 0;
 }
 
-/// Sees a signal, and Enter where a session waits for it.
-std::function<bool()> watched_keys(HilSession& session) {
-  if (!session.servo.gate || !session.servo.gate->confirm || ::isatty(STDIN_FILENO) == 0) {
-    return InterruptWatch::seen;
-  }
-  const auto confirmed = std::make_shared<std::atomic<bool>>(false);
-  session.servo.gate->confirmed = confirmed;
-  return [confirmed] {
-    if (!*confirmed && enter_was_pressed()) *confirmed = true;
+/// Sees a signal, and Enter: where a session waits for it, it begins; after that a marker is set.
+std::function<bool()> watched_keys(HilSession& session, SessionRunOptions& options) {
+  if (!options.real_time || ::isatty(STDIN_FILENO) == 0) return InterruptWatch::seen;
+  const bool waits = session.servo.gate && session.servo.gate->confirm;
+  const auto confirmed = std::make_shared<std::atomic<bool>>(!waits);
+  if (waits) session.servo.gate->confirmed = confirmed;
+  const auto markers = std::make_shared<std::atomic<std::uint32_t>>(0);
+  options.markers = markers;
+  return [confirmed, markers] {
+    if (!enter_was_pressed()) return InterruptWatch::seen();
+    if (confirmed->exchange(true)) markers->fetch_add(1);
     return InterruptWatch::seen();
   };
 }
@@ -234,7 +237,14 @@ int run_hil(const RunChoice& choice, const Session& session) {
   if (!choice.changes.motion.empty() && device.kind == "virtual") device.kind = "replay";
   SessionRunOptions options;
   const bool hardware = limits_of(device).hardware();
-  options.real_time = choice.time.empty() ? hardware : choice.time == "real";
+  // A page is for somebody who watches.
+  options.real_time =
+      choice.time.empty() ? hardware || !choice.page.port.empty() : choice.time == "real";
+  if (device.kind == "virtual" && options.real_time) {
+    // A rehearsal is about the operator: a machine that stalls does not end it by a watchdog.
+    constexpr double kOfRehearsals_s = 1.0;
+    hil.plant.least_watchdog_s = std::max(hil.plant.least_watchdog_s, kOfRehearsals_s);
+  }
   options.notes = choice.notes;
   require_short(choice.notes.date, "--date");
   require_short(choice.notes.operator_code, "--operator");
@@ -245,7 +255,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   options.recording = choice.output;
   options.accept_unstable = choice.accept_unstable;
   const InterruptWatch interrupts(InterruptWatch::Of::motors);
-  options.interrupted = watched_keys(hil);
+  options.interrupted = watched_keys(hil, options);
   std::optional<HilPage> page;
   if (!choice.page.port.empty()) {
     page.emplace(hil, options.real_time, choice.page);
@@ -360,7 +370,7 @@ void add_hil_command(CLI::App& app, Session& session) {
   add_device_options(*run, choice->device);
   run->add_option("--time", choice->time,
                   "real: on the clock; virtual: as fast as it goes, the same bits each time; "
-                  "default: real with a real device, else virtual")
+                  "default: real with a real device or a page, else virtual")
       ->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("-o,--output", choice->output, "Recording")->capture_default_str();
   run->add_option("--law", choice->changes.law,

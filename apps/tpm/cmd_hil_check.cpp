@@ -17,7 +17,7 @@ namespace {
 
 struct CheckChoice {
   DeviceOptions device;
-  std::string session, rate, duration = "5 s";
+  std::string session, rate, duration = "60 s";
 };
 
 double within(const std::string& text, Dimension dimension, const char* option, double least,

@@ -12,7 +12,7 @@ namespace tpm::app {
 /// Options of a session with a page.
 struct PageOptions {
   std::string port;  ///< empty: no page
-  std::string wait = "0 s", keep = "2 s";
+  std::string wait = "60 s", keep = "2 s";
 };
 
 /// The page of a session, from before it begins until a little after its end.

@@ -108,6 +108,8 @@ struct ServoOutcome {
   bool real_time = false;
   std::string scheduling;
   TimeHistogram woke_late, busy;
+  /// CLOCK_MONOTONIC at the deadline of cycle 0, that of cycle n is n periods later; 0: no cycle.
+  std::int64_t first_cycle_monotonic_ns = 0;
   double stop_took_s = 0.0;  ///< from the fault, or the last completed cycle, to forces off
 };
 

@@ -53,6 +53,7 @@ enum ServoFlag : std::uint32_t {
   kInTissue = 1U << 11U,     ///< or too close to it
   kMoving = 1U << 12U,       ///< the tool is not at rest
   kUnconfirmed = 1U << 13U,  ///< everything is in place but not confirmed
+  kMarked = 1U << 14U,       ///< by the operator: a button went down, or a key within 20 ms before
 };
 
 /// One cycle of the servo loop. Plain data, written to the recording as it is. Depths are along the

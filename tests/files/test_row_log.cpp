@@ -103,6 +103,33 @@ TEST_CASE("Four bytes lost between two rows damage both; a damaged closing is co
   CHECK_FALSE(read_row_log(folder / "end").closed);
 }
 
+TEST_CASE("A row that is lost, whole or in part, loses no other") {
+  const test::TempFolder folder;
+  const std::string bytes = read_file(written(folder, 20, true));
+  const std::size_t header = 8 + 4 + 4 + 13 + 4, stride = 4 + sizeof(Row) + 4;
+  for (const std::size_t gone : {stride, std::size_t{1}, std::size_t{5}, stride - 1}) {
+    std::string damaged = bytes;
+    damaged.erase(header + 5 * stride, gone);
+    write_file(folder / "lost", damaged);
+    const RowLog log = read_row_log(folder / "lost");
+    CAPTURE(gone);
+    REQUIRE(log.rows == 19);
+    CHECK(log.damaged == 1);
+    CHECK(log.closed);
+    CHECK(row_of(log, 4).a == 0.1 * 4);
+    CHECK(row_of(log, 5).a == 0.1 * 6);
+  }
+  std::string damaged = bytes;  // bytes of something else between two rows
+  damaged.insert(header + 5 * stride, "XXX");
+  write_file(folder / "more", damaged);
+  CHECK(read_row_log(folder / "more").rows == 20);
+  damaged = bytes;
+  damaged.erase(header + 5 * stride, 3 * stride);
+  write_file(folder / "three", damaged);
+  CHECK(read_row_log(folder / "three").rows == 17);
+  CHECK(read_row_log(folder / "three").damaged == 3);
+}
+
 TEST_CASE("A log that is to appear later leaves nothing, and spares what has its name") {
   const test::TempFolder folder;
   write_file(folder / "rows", "before");

@@ -16,6 +16,48 @@ using Catch::Matchers::WithinRel;
 using test::Handle;
 using test::moved;
 
+TEST_CASE("A second is enough for the delay to half a period, with and without a hand") {
+  for (const double late_s : {0.0, 2.5e-3, 10e-3}) {
+    for (const bool held : {false, true}) {
+      for (const bool positions : {false, true}) {
+        test::Handle h;
+        (positions ? h.position_late_s : h.force_late_s) = late_s;
+        if (held) {
+          h.mass_kg = 0.85;
+          h.viscous_N_s_per_m = 6.5;
+          h.held_N_per_m = 135.0;
+        }
+        std::vector<IdentificationSample> samples = test::moved(h);
+        samples.resize(1000);
+        const std::optional<double> delay_s = checked_delay_s(samples, h.period_s);
+        CAPTURE(late_s, held, positions);
+        REQUIRE(delay_s);
+        CHECK(std::abs(*delay_s - late_s) <= 0.5 * h.period_s);
+      }
+    }
+  }
+  // One that something else holds still.
+  test::Handle stuck;
+  stuck.held_N_per_m = 1e5;
+  std::vector<IdentificationSample> samples = test::moved(stuck);
+  samples.resize(1000);
+  CHECK_FALSE(checked_delay_s(samples, stuck.period_s));
+}
+
+TEST_CASE("The check before a session finds the delay of the simulated device") {
+  for (const int periods : {0, 3, 10}) {
+    HilSession session = test::parsed(test::short_session());
+    session.plant.delay_periods = periods;
+    DeviceIdentifyOptions options;
+    const DelayCheck check =
+        check_delay(make_device(DeviceChoice{}, session), DeviceChoice{}, session, options);
+    CAPTURE(periods, word_of(check.cause));
+    REQUIRE(check.delay_s);
+    CHECK(std::abs(*check.delay_s - periods * session.servo.period_s) <=
+          0.5 * session.servo.period_s + 1e-9);
+  }
+}
+
 TEST_CASE("A delay of 0 to 10 ms on either path is found to half a period") {
   for (const double late_s : {0.0, 1e-3, 2.5e-3, 6.3e-3, 10e-3}) {
     for (const bool of_positions : {false, true}) {

@@ -136,9 +136,52 @@ TEST_CASE("A loop that feeds a hand because its delay grew unseen is stopped") {
     const test::HandRun run = test::run_hand(s, 400.0, settings);
     const test::HandRun before = test::run_hand(s, 400.0, settings, true);
     CAPTURE(hand.name, 1e3 * run.most_given_J, 1e3 * before.most_given_J, word_of(run.cause));
-    CHECK(run.most_given_J < 20e-3);
+    CHECK(run.most_given_J < 1.5 * before.most_given_J + 1e-3);
     if (hand.damping_N_s_per_m < 1.0) CHECK(run.cause != StopCause::finished);
   }
+}
+
+TEST_CASE(
+    "Whatever a delay grows to, forces are off in time and an oracle lets half as much pass") {
+  for (const double grown_s : {5e-3, 10e-3, 20e-3}) {
+    for (const double stiffness : {100.0, 300.0, 600.0}) {
+      for (const SafeHand& hand : kSafeHands) {
+        for (const double push_N : {0.2, 1.0}) {
+          ServoSettings settings;
+          settings.friction_N_s_per_m = 0.0;
+          settings.delay_periods = 1;
+          test::LateHandSettings s;
+          s.mass_kg = hand.mass_kg;
+          s.damping_N_s_per_m = hand.damping_N_s_per_m;
+          s.stiffness_N_per_m = hand.stiffness_N_per_m;
+          s.push_N = push_N;
+          s.later_s = grown_s;
+          s.grows_at_s = 1.0;
+          const test::HandRun run = test::run_hand(s, stiffness, settings);
+          if (run.first_2_mJ_s < 0.0) continue;
+          const test::HandRun oracle = test::run_hand(s, stiffness, settings, true);
+          CAPTURE(grown_s, stiffness, hand.name, push_N, word_of(run.cause));
+          CHECK(run.off_s - run.first_2_mJ_s <= 3.0 * grown_s + 0.02 + 1e-9);
+          CHECK(run.most_given_J <= 1.5 * oracle.most_given_J + 1e-3);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("Slow indentations of a rendering that is not passive come to their end") {
+  // 8 mm at 10 mm/s into 170 N/m, 2 ms told, in the published hand.
+  ServoSettings settings;
+  settings.friction_N_s_per_m = 0.0;
+  settings.delay_periods = 2;
+  test::LateHandSettings s;
+  const SafeHand& hand = kSafeHands.back();
+  s.mass_kg = hand.mass_kg;
+  s.damping_N_s_per_m = hand.damping_N_s_per_m;
+  s.stiffness_N_per_m = hand.stiffness_N_per_m;
+  s.delay_s = 1e-3;
+  s.push_N = 0.6;
+  CHECK(test::run_hand(s, 170.0, settings).cause == StopCause::finished);
 }
 
 TEST_CASE("A rendering that needs damping all the time is ended with that cause") {
@@ -149,8 +192,8 @@ TEST_CASE("A rendering that needs damping all the time is ended with that cause"
   test::LateHandSettings s;
   s.delay_s = 10e-3;
   s.stiffness_N_per_m = 300.0;
+  s.damping_N_s_per_m = 2.0;
   CHECK(test::run_hand(s, 60.0, settings).cause == StopCause::finished);
-  settings.energy_allowance_J = 2e-4;
   settings.energy_allowance_J = 1e-2;
   s.damping_N_s_per_m = 0.5;
   const test::HandRun run = test::run_hand(s, 300.0, settings);

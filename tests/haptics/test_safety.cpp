@@ -111,13 +111,29 @@ TEST_CASE("A steady oscillation is found, at 5 Hz and at 200; a poke, a hold and
   };
   for (const double hertz : {5.0, 12.0, 40.0, 120.0, 200.0}) {
     CAPTURE(hertz);
-    CHECK(taken_for_oscillation(sine(hertz, 0.3), 3.0));
+    CHECK(taken_for_oscillation(sine(hertz, 0.3), 3.5));
     CHECK_FALSE(taken_for_oscillation(sine(hertz, 0.1), 30.0));  // not felt as more than noise
   }
   CHECK_FALSE(taken_for_oscillation(sine(2.0, 2.0), 60.0));  // an operator who rocks
   // Knocked: rings at 20 Hz and dies out.
   CHECK_FALSE(taken_for_oscillation(
       [](double t) { return 4.0 * std::exp(-6.0 * t) * std::sin(2.0 * M_PI * 20.0 * t); }, 5.0));
+}
+
+TEST_CASE("An oscillation is seen by growth and rate, also if no two peaks are equal") {
+  // Grows from 0.05 N by 10 % a stroke at 8 Hz.
+  CHECK(taken_for_oscillation(
+      [](double t) { return 1.0 + 0.05 * std::exp(1.6 * t) * std::sin(2.0 * M_PI * 8.0 * t); },
+      3.0));
+  // A limit cycle whose peaks change by half from one to the next.
+  CHECK(taken_for_oscillation(
+      [](double t) {
+        return 1.0 + (0.6 + 0.3 * std::sin(2.0 * M_PI * 3.1 * t)) * std::sin(2.0 * M_PI * 12.0 * t);
+      },
+      3.0));
+  // A hand that goes in and out ever deeper, slower than 4 Hz.
+  CHECK_FALSE(taken_for_oscillation(
+      [](double t) { return 0.1 * std::exp(t) * (1.0 + std::sin(2.0 * M_PI * 2.0 * t)); }, 4.0));
 }
 
 // --- sessions -------------------------------------------------------------------------------

@@ -80,8 +80,7 @@ void print_gate() {
 void print_grown() {
   fmt::print(
       "stiffness_N_per_m,measured_delay_ms,grown_to_ms,hand,push_N,speed_m_per_s,into_hand_mJ,"
-      "oracle_"
-      "mJ,off_after_2_mJ_ms,allowed_ms,cause\n");
+      "oracle_mJ,reaches_2_mJ,off_after_2_mJ_ms,allowed_ms,off_s,cause\n");
   for (const double delay_s : {0.0, 1e-3, 2e-3}) {
     const double counted_s = delay_s + kPeriod_s;
     for (const double grown_s : {5e-3, 10e-3, 20e-3}) {
@@ -95,13 +94,14 @@ void print_grown() {
               s.later_s = grown_s;
               s.grows_at_s = 1.0;
               const test::HandRun run = test::run_hand(s, stiffness, told(counted_s));
-              if (run.first_2_mJ_s < 0.0) continue;
               const test::HandRun oracle = test::run_hand(s, stiffness, told(counted_s), true);
-              const double after_s = run.off_s - run.first_2_mJ_s;
-              fmt::print("{},{},{},\"{}\",{},{},{:.3f},{:.3f},{:.1f},{:.0f},{}\n", stiffness,
-                         1e3 * delay_s, 1e3 * grown_s, hand.name, push_N, speed,
-                         1e3 * run.most_given_J, 1e3 * oracle.most_given_J, 1e3 * after_s,
-                         1e3 * (3.0 * grown_s + 0.02), word_of(run.cause));
+              const bool reached = run.first_2_mJ_s >= 0.0;
+              const double after_s = reached ? run.off_s - run.first_2_mJ_s : 0.0;
+              fmt::print("{},{},{},\"{}\",{},{},{:.3f},{:.3f},{},{:.1f},{:.0f},{:.3f},{}\n",
+                         stiffness, 1e3 * delay_s, 1e3 * grown_s, hand.name, push_N, speed,
+                         1e3 * run.most_given_J, 1e3 * oracle.most_given_J, reached ? 1 : 0,
+                         1e3 * after_s, 1e3 * (3.0 * grown_s + 0.02), run.off_s,
+                         word_of(run.cause));
             }
           }
         }

@@ -374,6 +374,13 @@ int dhdSetForce(double x, double y, double z, char) {
   return clipped || due("saturated", call) ? 2 : 0;
 }
 
+int dhdSetForceAndTorqueAndGripperForce(double, double, double, double, double, double,
+                                        double gripper, char) {
+  if (here().unplugged) return failed(5);
+  event(("gripper_force_" + std::to_string(std::lround(1e3 * gripper))).c_str());
+  return 0;
+}
+
 int dhdGetStatus(int* status, char) {
   StandIn& s = here();
   if (s.unplugged) return failed(5);

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cerrno>
 #include <cstring>
+#include <optional>
 
 #include "tpm/files/check_sum.hpp"
 #include "tpm/files/file.hpp"
@@ -52,6 +53,9 @@ class Cursor {
     at_ += size;
     return true;
   }
+  [[nodiscard]] std::size_t at() const { return at_; }
+  void go_to(std::size_t at) { at_ = at; }
+  [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
   /// What is left is enough for the text that begins here.
   [[nodiscard]] bool holds_text() const {
     Cursor ahead = *this;
@@ -129,10 +133,43 @@ void RowLogWriter::close(std::string_view closing) {
 
 namespace {
 
+/// The number of the whole row that begins here, if one does.
+std::optional<std::uint32_t> row_number_at(Cursor cursor, std::vector<std::byte>& row) {
+  std::uint32_t number = 0, crc = 0;
+  if (!cursor.take(&number, sizeof number) || number == kClosing ||
+      !cursor.take(row.data(), row.size()) || !cursor.take(&crc, sizeof crc) ||
+      crc != crc_of(row.data(), row.size(), number)) {
+    return std::nullopt;
+  }
+  return number;
+}
+
+/// Where bytes are missing, or too many, the next whole row begins at another place. Leaves the
+/// cursor there; where none is found within a few rows, as it was.
+void find_next_row(Cursor& cursor, std::size_t damaged_at, std::uint32_t expected,
+                   std::size_t row_bytes) {
+  constexpr std::size_t kRowsAhead = 4;
+  std::vector<std::byte> row(row_bytes);
+  const std::size_t slot = row_bytes + 2 * sizeof(std::uint32_t), next = cursor.at();
+  if (cursor.left() < slot || row_number_at(cursor, row)) return;
+  Cursor ahead = cursor;
+  for (std::size_t at = damaged_at + 1; at < damaged_at + kRowsAhead * slot; ++at) {
+    ahead.go_to(at);
+    if (ahead.left() < slot) break;
+    const std::optional<std::uint32_t> number = row_number_at(ahead, row);
+    if (!number || *number < expected) continue;
+    cursor.go_to(at);
+    return;
+  }
+  cursor.go_to(next);
+}
+
 /// A row, or what stands in its place.
 enum class Found { row, closing, damage, end };
 
-Found read_slot(Cursor& cursor, RowLog& log, std::uint32_t expected, std::vector<std::byte>& row) {
+/// @param expected number of the row; larger afterwards if rows before this one are missing
+Found read_slot(Cursor& cursor, RowLog& log, std::uint32_t& expected, std::vector<std::byte>& row) {
+  const std::size_t begin = cursor.at();
   std::uint32_t number = 0, crc = 0;
   if (!cursor.take(&number, sizeof number)) return Found::end;
   if (number == kClosing) {
@@ -143,18 +180,26 @@ Found read_slot(Cursor& cursor, RowLog& log, std::uint32_t expected, std::vector
     return Found::end;
   }
   if (!cursor.take(row.data(), row.size()) || !cursor.take(&crc, sizeof crc)) return Found::end;
-  const bool whole = number == expected && crc == crc_of(row.data(), row.size(), number);
-  return whole ? Found::row : Found::damage;
+  const bool whole = number >= expected && crc == crc_of(row.data(), row.size(), number);
+  if (!whole) {
+    find_next_row(cursor, begin, expected, row.size());
+    return Found::damage;
+  }
+  log.damaged += number - expected;  // rows that are not there
+  expected = number;
+  return Found::row;
 }
 
 void read_rows(Cursor& cursor, RowLog& log) {
   std::vector<std::byte> row(log.row_bytes);
   for (std::uint32_t expected = 0;; ++expected) {
     const Found found = read_slot(cursor, log, expected, row);
-    if (found == Found::damage) ++log.damaged;
+    if (found == Found::damage) {
+      ++log.damaged;
+      continue;
+    }
     if (found == Found::closing) log.closed = true;
     if (found == Found::closing || found == Found::end) return;
-    if (found != Found::row) continue;
     log.bytes.insert(log.bytes.end(), row.begin(), row.end());
     ++log.rows;
   }

@@ -105,6 +105,7 @@ void DhdLibrary::find_symbols() {
   find(handle_, "dhdHasGripper", c.has_gripper, not_needed);
   find(handle_, "dhdGetGripperGap", c.get_gripper_gap, not_needed);
   find(handle_, "dhdGetButtonMask", c.get_button_mask, not_needed);
+  find(handle_, "dhdSetForceAndTorqueAndGripperForce", c.set_force_torque_gripper, not_needed);
   find(handle_, "dhdSetEffectorMass", c.set_effector_mass, not_needed);
   find(handle_, "dhdSetDeviceAngleRad", c.set_device_angle, not_needed);
   find(handle_, "dhdSetBaseAngleXRad", c.set_base_angle_x, not_needed);

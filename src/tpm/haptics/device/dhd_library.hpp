@@ -36,6 +36,8 @@ struct DhdCalls {
   bool (*has_gripper)(char id);
   int (*get_gripper_gap)(double* gap_m, char id);
   unsigned int (*get_button_mask)(char id);
+  int (*set_force_torque_gripper)(double fx, double fy, double fz, double tx, double ty, double tz,
+                                  double gripper, char id);
   int (*set_effector_mass)(double kg, char id);
   int (*set_device_angle)(double rad, char id);
   int (*set_base_angle_x)(double rad, char id);

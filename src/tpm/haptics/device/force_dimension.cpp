@@ -319,6 +319,11 @@ void ForceDimension::prepare(const DevicePreparation& preparation) {
 
 void ForceDimension::enable_forces() {
   require(call_.enable_force(1, id_), "dhdEnableForce");
+  // A gripper keeps the force that it was commanded last, by whomever: 0 from here on.
+  if (gripper_ && call_.set_force_torque_gripper != nullptr) {
+    require(call_.set_force_torque_gripper(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, id_),
+            "dhdSetForceAndTorqueAndGripperForce");
+  }
   require(call_.set_force(0.0, 0.0, 0.0, id_), "dhdSetForce");
 }
 

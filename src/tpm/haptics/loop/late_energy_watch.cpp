@@ -14,57 +14,46 @@ std::size_t whole_periods(double time_s, double period_s) {
 
 LateEnergyWatch::LateEnergyWatch(const LateEnergyWatchSettings& settings)
     : settings_(settings),
-      sent_N_(whole_periods(settings.lateness_s, settings.period_s) + 1, Eigen::Vector3d::Zero()),
-      given_J_(whole_periods(settings.window_s, settings.period_s), 0.0),
-      window_periods_(given_J_.size()),
-      slowest_periods_(whole_periods(settings.slowest_s, settings.period_s)) {}
+      sent_N_(whole_periods(kDelays_s.back(), settings.period_s) + 1, Eigen::Vector3d::Zero()),
+      block_periods_(whole_periods(settings.window_s / double{kBlocks}, settings.period_s)),
+      friction_N_per_m_(settings.friction_N_s_per_m / settings.period_s) {
+  for (std::size_t i = 0; i < kDelays_s.size(); ++i) {
+    supposed_[i].periods = whole_periods(kDelays_s[i], settings.period_s);
+    supposed_[i].counts = kDelays_s[i] > settings.told_s + 0.5 * settings.period_s;
+  }
+}
 
-void LateEnergyWatch::observe(const Eigen::Vector3d& sent_N, double along_m,
-                              const Eigen::Vector3d& moved_m, double tissue_work_J,
-                              int periods) noexcept {
-  Eigen::Vector3d acted_N = sent_N;
+void LateEnergyWatch::observe(const Eigen::Vector3d& sent_N, const Eigen::Vector3d& moved_m,
+                              double tissue_work_J, int periods) noexcept {
   for (int i = 0; i < periods; ++i) {  // a command stays until the next one
-    sent_N_[newest_] = sent_N;
     if (++newest_ == sent_N_.size()) newest_ = 0;
-    acted_N = sent_N_[newest_];
-    energy_J_ -= given_J_[oldest_given_];
-    given_J_[oldest_given_] = 0.0;
-    if (i + 1 < periods && ++oldest_given_ == given_J_.size()) oldest_given_ = 0;
+    sent_N_[newest_] = sent_N;
   }
-  const double given_J = acted_N.dot(moved_m) + tissue_work_J;
-  given_J_[oldest_given_] = given_J;
-  energy_J_ += given_J;
-  if (++oldest_given_ == given_J_.size()) oldest_given_ = 0;
-  now_ += static_cast<std::uint64_t>(periods);
-  turn(along_m);
-  found_ = found_ || (energy_J_ > settings_.allowance_J && grows(along_m));
-}
-
-void LateEnergyWatch::turn(double along_m) noexcept {
-  if (!begun_) {
-    begun_ = true;
-    extreme_m_ = turned_at_m_ = along_m;
-    return;
+  in_block_ += static_cast<std::uint64_t>(periods);
+  const bool next = in_block_ >= block_periods_;
+  if (next) {
+    in_block_ = 0;
+    if (++block_ == kBlocks) block_ = 0;
   }
-  if (into_ ? along_m > extreme_m_ : along_m < extreme_m_) {
-    extreme_m_ = along_m;
-    return;
+  double same_J = tissue_work_J;
+  if (friction_N_per_m_ > 0.0) {
+    same_J -= friction_N_per_m_ * moved_m.squaredNorm() / static_cast<double>(periods);
   }
-  if (std::abs(along_m - extreme_m_) <= settings_.least_m) return;
-  strokes_[count_ % kStrokes] = {now_, std::abs(extreme_m_ - turned_at_m_)};
-  ++count_;
-  turned_at_m_ = extreme_m_;
-  into_ = !into_;
-  extreme_m_ = along_m;
-}
-
-bool LateEnergyWatch::grows(double along_m) const noexcept {
-  if (count_ < kStrokes || now_ - back(kStrokes - 1).end >= window_periods_) return false;
-  if (now_ - back(0).end >= slowest_periods_) return false;
-  const double under_way_m = std::abs(along_m - turned_at_m_);
-  const double latest_m = std::max(under_way_m, back(0).length_m);
-  return latest_m >= settings_.growth * back(1).length_m &&
-         back(0).length_m >= settings_.growth * back(2).length_m;
+  delivered_J_ = 0.0;
+  for (Supposed& s : supposed_) {
+    if (!s.counts) continue;
+    const std::size_t then =
+        newest_ >= s.periods ? newest_ - s.periods : newest_ + sent_N_.size() - s.periods;
+    s.energy_J += sent_N_[then].dot(moved_m) + same_J;
+    if (next) {
+      s.lowest_in_J[block_] = s.energy_J;
+      s.lowest_J = *std::min_element(s.lowest_in_J.begin(), s.lowest_in_J.end());
+    } else {
+      s.lowest_in_J[block_] = std::min(s.lowest_in_J[block_], s.energy_J);
+      s.lowest_J = std::min(s.lowest_J, s.energy_J);
+    }
+    delivered_J_ = std::max(delivered_J_, s.energy_J - s.lowest_J);
+  }
 }
 
 }  // namespace tpm::haptics

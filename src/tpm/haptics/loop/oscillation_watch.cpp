@@ -1,5 +1,6 @@
 #include "tpm/haptics/loop/oscillation_watch.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tpm::haptics {
@@ -12,52 +13,67 @@ void OscillationWatch::observe(double force_N, int periods) noexcept {
     extreme_at_ = now_;
     return;
   }
-  if (std::abs(force_N - extreme_N_) < settings_.swing_N) return;
-  if (rising_) {
-    add({extreme_at_, extreme_N_, extreme_N_ - valley_N_});
-  } else {
-    valley_N_ = extreme_N_;
-  }
+  if (std::abs(force_N - extreme_N_) < settings_.turn_N) return;
+  add({extreme_at_ - turned_at_, std::abs(extreme_N_ - turned_N_)});
+  turned_at_ = extreme_at_;
+  turned_N_ = extreme_N_;
   rising_ = !rising_;
   extreme_N_ = force_N;
   extreme_at_ = now_;
 }
 
-void OscillationWatch::add(const Peak& peak) noexcept {
-  peaks_[count_ % kFast] = peak;
+void OscillationWatch::add(const Stroke& stroke) noexcept {
+  strokes_[count_ % kFast] = stroke;
   ++count_;
-  found_ = found_ || regular() || fast();
+  found_ = found_ || grows(kGrowing) || steady(kSteady) || fast();
 }
 
-bool OscillationWatch::regular() const noexcept {
-  if (count_ < kRegular) return false;
-  const auto length = static_cast<double>(back(0).time - back(kRegular - 1).time);
-  const double mean = length / static_cast<double>(kRegular - 1);
-  if (mean * settings_.period_s * settings_.least_Hz > 1.0) return false;
-  double swing = 0.0;
-  for (std::size_t i = 0; i < kRegular; ++i) swing += back(i).swing_N / double{kRegular};
-  for (std::size_t i = 0; i < kRegular; ++i) {
-    if (std::abs(back(i).swing_N - swing) > settings_.spread_force * swing) return false;
-    if (i + 1 == kRegular) break;
-    const auto apart = static_cast<double>(back(i).time - back(i + 1).time);
-    // A peak is known to a period.
-    if (std::abs(apart - mean) > settings_.spread_time * mean + 1.0) return false;
+bool OscillationWatch::grows(std::size_t strokes) const noexcept {
+  if (count_ < strokes) return false;
+  const double longest = settings_.longest_stroke_s / settings_.period_s;
+  for (std::size_t i = 0; i < strokes; ++i) {
+    if (static_cast<double>(back(i).periods) > longest) return false;
+    if (i + 2 < strokes && back(i).swing_N < settings_.growth * back(i + 2).swing_N) return false;
   }
-  // One that dies out is no danger.
-  return back(0).swing_N + back(1).swing_N >
-         0.9 * (back(kRegular - 2).swing_N + back(kRegular - 1).swing_N);
+  return true;
+}
+
+bool OscillationWatch::steady(std::size_t strokes) const noexcept {
+  if (count_ < strokes) return false;
+  double length = 0.0;
+  for (std::size_t i = 0; i < strokes; ++i) {
+    if (back(i).swing_N < settings_.swing_N) return false;
+    length += static_cast<double>(back(i).periods);
+  }
+  const double mean = 2.0 * length / static_cast<double>(strokes);  // of a cycle
+  if (mean > 2.0 * settings_.longest_stroke_s / settings_.period_s) return false;
+  for (std::size_t i = 0; i + 1 < strokes; ++i) {
+    const auto cycle = static_cast<double>(back(i).periods + back(i + 1).periods);
+    // A peak is known to a period.
+    if (std::abs(cycle - mean) > settings_.spread_time * mean + 1.0) return false;
+  }
+  return stays(strokes);
 }
 
 bool OscillationWatch::fast() const noexcept {
   if (count_ < kFast) return false;
-  const auto length = static_cast<double>(back(0).time - back(kFast - 1).time);
-  if (length * settings_.period_s * settings_.fast_Hz >= double{kFast - 1}) return false;
-  double early_N = 0.0, late_N = 0.0;
-  for (std::size_t i = 0; i < kFast / 2; ++i) {
-    late_N += back(i).swing_N;
-    early_N += back(kFast - 1 - i).swing_N;
+  double length = 0.0;
+  for (std::size_t i = 0; i < kFast; ++i) {
+    if (back(i).swing_N < settings_.swing_N) return false;
+    length += static_cast<double>(back(i).periods);
   }
-  return late_N > 0.7 * early_N;
+  if (2.0 * length * settings_.period_s * settings_.fast_Hz >= double{kFast}) return false;
+  return stays(kFast);
+}
+
+/// The later half of the strokes is not smaller than the earlier one.
+bool OscillationWatch::stays(std::size_t strokes) const noexcept {
+  double early_N = 0.0, late_N = 0.0;
+  for (std::size_t i = 0; i < strokes / 2; ++i) {
+    late_N += back(i).swing_N;
+    early_N += back(strokes - 1 - i).swing_N;
+  }
+  return late_N > settings_.decay * early_N;
 }
 
 }  // namespace tpm::haptics

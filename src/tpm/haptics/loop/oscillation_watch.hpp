@@ -7,19 +7,29 @@ namespace tpm::haptics {
 /// When a force that goes up and down is taken for an oscillation of the loop.
 struct OscillationWatchSettings {
   double period_s = 1e-3;
-  double swing_N = 0.3;        ///< smaller ones are not seen
-  double least_Hz = 4.0;       ///< slower ones are the operator's
-  double fast_Hz = 25.0;       ///< faster ones no hand makes: they need not be regular
-  double spread_time = 0.15;   ///< of the times between peaks, in parts of their mean
-  double spread_force = 0.25;  ///< of the peaks, in parts of their mean swing
+  double turn_N = 0.05;             ///< by which a force turns; smaller ripples are not seen
+  double swing_N = 0.3;             ///< of the strokes of a steady oscillation
+  double longest_stroke_s = 0.125;  ///< slower ones are the operator's: below 4 Hz
+  double growth = 1.1;              ///< of a stroke beyond the one of the same direction before
+  double decay = 0.8;               ///< of the later half beside the earlier one: it dies out
+  double spread_time = 0.15;        ///< of the times of a steady one, in parts of their mean
+  double fast_Hz = 25.0;            ///< faster ones no hand makes: they need not be regular
 };
 
-/// Finds a limit cycle in the force sent: eight peaks in a row that are equally high and equally
-/// far apart, which a hand that moves on purpose does not produce at this rate, or twenty-four
-/// faster than a hand can move. A motion that dies out is none. Neither allocates nor throws.
+/// Finds an oscillation in the force sent by its rate and growth. A stroke is the way from a peak
+/// to the next valley or back. Found are
+///
+///   - growing: kGrowing strokes in a row, each faster than `longest_stroke_s` and larger than the
+///     last one of its direction by `growth`, as of a loop that feeds itself;
+///   - steady: kSteady such strokes that do not die out, at times as regular as a hand does not
+///   make
+///     at this rate, however large each one is;
+///   - fast: kFast strokes faster than a hand can move that do not die out.
+///
+/// Neither allocates nor throws.
 class OscillationWatch {
  public:
-  static constexpr std::size_t kRegular = 8, kFast = 24;
+  static constexpr std::size_t kGrowing = 8, kSteady = 32, kFast = 48;
 
   explicit OscillationWatch(const OscillationWatchSettings& settings) noexcept
       : settings_(settings) {}
@@ -30,22 +40,24 @@ class OscillationWatch {
   [[nodiscard]] bool found() const noexcept { return found_; }
 
  private:
-  struct Peak {
-    std::uint64_t time = 0;  ///< periods
-    double force_N = 0.0, swing_N = 0.0;
+  struct Stroke {
+    std::uint64_t periods = 0;
+    double swing_N = 0.0;
   };
-  void add(const Peak& peak) noexcept;
-  [[nodiscard]] const Peak& back(std::size_t i) const noexcept {
-    return peaks_[(count_ - 1 - i) % kFast];
+  void add(const Stroke& stroke) noexcept;
+  [[nodiscard]] const Stroke& back(std::size_t i) const noexcept {
+    return strokes_[(count_ - 1 - i) % kFast];
   }
-  [[nodiscard]] bool regular() const noexcept;
+  [[nodiscard]] bool grows(std::size_t strokes) const noexcept;
+  [[nodiscard]] bool steady(std::size_t strokes) const noexcept;
   [[nodiscard]] bool fast() const noexcept;
+  [[nodiscard]] bool stays(std::size_t strokes) const noexcept;
 
   OscillationWatchSettings settings_;
-  std::array<Peak, kFast> peaks_{};  ///< the last ones, a ring
+  std::array<Stroke, kFast> strokes_{};  ///< the last ones, a ring
   std::size_t count_ = 0;
-  std::uint64_t now_ = 0, extreme_at_ = 0;
-  double extreme_N_ = 0.0, valley_N_ = 0.0;
+  std::uint64_t now_ = 0, extreme_at_ = 0, turned_at_ = 0;
+  double extreme_N_ = 0.0, turned_N_ = 0.0;
   bool rising_ = true, found_ = false;
 };
 

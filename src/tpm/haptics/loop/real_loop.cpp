@@ -42,7 +42,7 @@ struct Shared {
   std::string scheduling;
   std::exception_ptr refused;  ///< by the system, or forces that could not be switched on
   TimeHistogram woke_late, busy;
-  std::int64_t stop_took_ns = 0;
+  std::int64_t stop_took_ns = 0, first_cycle_ns = 0;
 
  private:
   /// Every page of the ring is there before the loop begins, also where memory cannot be locked.
@@ -82,6 +82,9 @@ void serve(Shared& s) noexcept {
       row.busy_s = static_cast<float>(static_cast<double>(done - woke) * 1e-9);
       s.woke_late.note(late_ns);
       s.busy.note(done - woke);
+      if (s.first_cycle_ns == 0 && row.phase >= 0) {
+        s.first_cycle_ns = deadline - static_cast<std::int64_t>(row.cycle) * period_ns;
+      }
       if (!s.ring.push(row)) s.dropped.fetch_add(1, std::memory_order_relaxed);
       s.cycle.store(row.cycle, std::memory_order_release);
     }
@@ -233,6 +236,7 @@ void fill(ServoOutcome& outcome, const Shared& s) {
   outcome.woke_late = s.woke_late;
   outcome.busy = s.busy;
   outcome.stop_took_s = static_cast<double>(s.stop_took_ns) * 1e-9;
+  outcome.first_cycle_monotonic_ns = s.first_cycle_ns;
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <ctime>
 #include <fstream>
+#include <string_view>
 #include <thread>
 
 #include "tpmkit/error.hpp"
@@ -39,6 +40,21 @@ std::int64_t now_ns() noexcept {
   timespec now{};
   (void)clock_gettime(CLOCK_MONOTONIC, &now);
   return static_cast<std::int64_t>(now.tv_sec) * kSecond_ns + now.tv_nsec;
+}
+
+std::string utc_of(std::int64_t instant_ns) {
+  constexpr std::int64_t kSecond_ns = 1'000'000'000, kMillisecond_ns = 1'000'000;
+  timespec wall{};
+  clock_gettime(CLOCK_REALTIME, &wall);
+  const std::int64_t now = std::int64_t{wall.tv_sec} * kSecond_ns + wall.tv_nsec;
+  const std::int64_t then = now - (now_ns() - instant_ns);
+  const auto seconds = static_cast<std::time_t>(then / kSecond_ns);
+  std::tm utc{};
+  ::gmtime_r(&seconds, &utc);
+  char text[32];
+  const std::size_t length = std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
+  return fmt::format("{}.{:03}Z", std::string_view(text, length),
+                     then % kSecond_ns / kMillisecond_ns);
 }
 
 void sleep_until_ns(std::int64_t instant_ns) noexcept {

@@ -9,6 +9,9 @@ namespace tpm::haptics {
 /// CLOCK_MONOTONIC, ns.
 [[nodiscard]] std::int64_t now_ns() noexcept;
 
+/// UTC of an instant of now_ns(), to a millisecond: "2026-11-27T19:15:00.123Z".
+[[nodiscard]] std::string utc_of(std::int64_t instant_ns);
+
 /// Sleeps until an instant of now_ns().
 void sleep_until_ns(std::int64_t instant_ns) noexcept;
 

@@ -96,7 +96,9 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
                .delay_periods = settings_.delay_periods,
                .allowance_J = settings_.energy_allowance_J}),
       oscillation_({.period_s = settings_.period_s}),
-      late_({.period_s = settings_.period_s}),
+      late_({.period_s = settings_.period_s,
+             .told_s = settings_.delay_periods * settings_.period_s,
+             .friction_N_s_per_m = settings_.friction_N_s_per_m}),
       watch_late_(!is_passive(model, settings_)),
       outside_validity_periods_(settings_.outside_validity_limit_s / settings_.period_s),
       stiffness_N_per_m_(stiffness_of(model, settings_)),
@@ -317,7 +319,7 @@ StopCause ServoStep::check_rendering(int periods) noexcept {
   if (settings_.watch_oscillation) oscillation_.observe(sent_size_N_, periods);
   if (energy_.too_much()) return StopCause::energy;
   if (settings_.watch_oscillation) {
-    late_.observe(sent_N_, tool_m_, moved_m_, tissue_work_J_, periods);
+    late_.observe(sent_N_, moved_m_, tissue_work_J_, periods);
     if (oscillation_.found() || (watch_late_ && late_.found())) return StopCause::oscillation;
     if (damped_share_ > kMostDamped) return StopCause::damping;
   }

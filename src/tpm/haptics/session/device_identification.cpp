@@ -164,7 +164,88 @@ Eigen::VectorXd forces(const std::vector<IdentificationSample>& samples, const W
   return sums;
 }
 
+struct DelayFit {
+  double delay_s = 0.0;
+  Solution solution;
+  double explained = 0.0;  ///< share of the forces that follows from the motion
+};
+constexpr double kLeastExplained = 0.9;
+
+/// The delay with the smallest residual: coarse, then fine.
+DelayFit fit_delay(const std::vector<IdentificationSample>& samples, const Windows& windows,
+                   std::size_t half, double period_s) {
+  DelayFit fit;
+  const auto misfit = [&](double delay_s) {
+    return solve(windows, forces(samples, windows, half, period_s, delay_s)).rms;
+  };
+  double best = std::numeric_limits<double>::infinity();
+  const auto search = [&](double from_s, double to_s, double by_s) {
+    for (double d = from_s; d <= to_s + 1e-12; d += by_s) {
+      if (const double rms = misfit(d); rms < best) {
+        best = rms;
+        fit.delay_s = d;
+      }
+    }
+  };
+  search(0.0, kLongestDelay_s, period_s);
+  const double coarse_s = fit.delay_s;
+  search(std::max(0.0, coarse_s - period_s), coarse_s + period_s, 0.05 * period_s);
+  const Eigen::VectorXd force = forces(samples, windows, half, period_s, fit.delay_s);
+  fit.solution = solve(windows, force);
+  fit.explained = 1.0 - fit.solution.rms * fit.solution.rms * static_cast<double>(force.size()) /
+                            std::max(force.squaredNorm(), 1e-300);
+  return fit;
+}
+
+/// Windows of 2 half + 1 samples, `apart` samples from each other, without missed periods.
+Windows windows_of(const std::vector<IdentificationSample>& samples, std::size_t half,
+                   std::size_t margin, std::size_t apart, double period_s, double least_m) {
+  Windows windows;
+  std::vector<Eigen::RowVectorXd> rows;
+  for (std::size_t c = margin; c + margin < samples.size(); c += apart) {
+    if (!whole(samples, c - margin, c + half)) continue;
+    windows.centre.push_back(c);
+    rows.push_back(motion_around(samples, c, half, period_s, least_m));
+  }
+  windows.motion.resize(static_cast<Eigen::Index>(rows.size()), kUnknowns);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    windows.motion.row(static_cast<Eigen::Index>(i)) = rows[i];
+  }
+  return windows;
+}
+
+struct Lengths {
+  std::size_t half, margin;
+};
+Lengths lengths_of(double period_s) {
+  const auto half = static_cast<std::size_t>(std::lround(0.5 * kVelocityWindow_s / period_s));
+  const auto longest = static_cast<std::size_t>(std::lround(kLongestDelay_s / period_s));
+  return {half, half + longest + 16};
+}
+
+double stroke_of(const std::vector<IdentificationSample>& samples) {
+  const auto [low, high] = std::minmax_element(
+      samples.begin(), samples.end(), [](const auto& a, const auto& b) { return a.at_m < b.at_m; });
+  return high->at_m - low->at_m;
+}
+constexpr double kFewestSteps = 20.0;
+
 }  // namespace
+
+std::optional<double> checked_delay_s(const std::vector<IdentificationSample>& samples,
+                                      double period_s) {
+  const auto [half, margin] = lengths_of(period_s);
+  if (samples.size() < 2 * margin + half) return std::nullopt;
+  const double step_m = step_of(samples).value_or(noise_of(samples) * std::sqrt(12.0));
+  const double stroke_m = stroke_of(samples);
+  if (!(stroke_m >= kFewestSteps * step_m) || stroke_m <= 0.0) return std::nullopt;
+  const Windows windows =
+      windows_of(samples, half, margin, std::max<std::size_t>(1, half / 8), period_s, 2.0 * step_m);
+  if (windows.centre.size() < kFewestWindows) return std::nullopt;
+  const DelayFit fit = fit_delay(samples, windows, half, period_s);
+  if (!(fit.explained > kLeastExplained) || !(fit.solution.value[0] > 0.0)) return std::nullopt;
+  return fit.delay_s;
+}
 
 IdentifyingForce::IdentifyingForce(double period_s, std::uint64_t seed) noexcept
     : period_s_(period_s), state_(seed * 2862933555777941757ULL + 3037000493ULL) {}
@@ -186,23 +267,18 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
                                      double period_s) {
   DeviceIdentification found;
   found.resolution_s = 0.5 * period_s;
-  const auto half = static_cast<std::size_t>(std::lround(0.5 * kVelocityWindow_s / period_s));
-  const auto longest = static_cast<std::size_t>(std::lround(kLongestDelay_s / period_s));
-  const std::size_t margin = half + longest + 16;
+  const auto [half, margin] = lengths_of(period_s);
   if (samples.size() < 2 * margin + half) {
     found.not_identified.emplace_back("everything: the measurement is too short");
     return found;
   }
-  const auto [low, high] = std::minmax_element(
-      samples.begin(), samples.end(), [](const auto& a, const auto& b) { return a.at_m < b.at_m; });
-  found.stroke_m = high->at_m - low->at_m;
+  found.stroke_m = stroke_of(samples);
   found.encoder_step_m = step_of(samples);
   found.noise_m = noise_of(samples);
   const double step_m = found.encoder_step_m.value_or(found.noise_m * std::sqrt(12.0));
   if (!found.encoder_step_m) {
     found.not_identified.emplace_back("encoder step: changes of the position have no common step");
   }
-  constexpr double kFewestSteps = 20.0;
   if (!(found.stroke_m >= kFewestSteps * step_m) || found.stroke_m <= 0.0) {
     found.not_identified.push_back(
         fmt::format("delay, friction, mass: the stroke of {} mm is below {} steps of the encoder",
@@ -210,43 +286,15 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
     return found;
   }
   const double least_m = 2.0 * step_m;
-  Windows windows;
-  std::vector<Eigen::RowVectorXd> rows;
-  for (std::size_t c = margin; c + margin < samples.size(); c += half) {
-    if (!whole(samples, c - margin, c + half)) continue;
-    windows.centre.push_back(c);
-    rows.push_back(motion_around(samples, c, half, period_s, least_m));
-  }
-  if (rows.size() < kFewestWindows) {
+  const Windows windows = windows_of(samples, half, margin, half, period_s, least_m);
+  if (windows.centre.size() < kFewestWindows) {
     found.not_identified.emplace_back(
         "delay, friction, mass: too many periods were missed (tpm hil check)");
     return found;
   }
-  windows.motion.resize(static_cast<Eigen::Index>(rows.size()), kUnknowns);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    windows.motion.row(static_cast<Eigen::Index>(i)) = rows[i];
-  }
-  // The delay of all: coarse, then fine.
-  const auto misfit = [&](double delay_s) {
-    return solve(windows, forces(samples, windows, half, period_s, delay_s)).rms;
-  };
-  double delay_s = 0.0, best = std::numeric_limits<double>::infinity();
-  const auto search = [&](double from_s, double to_s, double by_s) {
-    for (double d = from_s; d <= to_s + 1e-12; d += by_s) {
-      if (const double rms = misfit(d); rms < best) {
-        best = rms;
-        delay_s = d;
-      }
-    }
-  };
-  search(0.0, kLongestDelay_s, period_s);
-  const double coarse_s = delay_s;
-  search(std::max(0.0, coarse_s - period_s), coarse_s + period_s, 0.05 * period_s);
-  const Eigen::VectorXd force = forces(samples, windows, half, period_s, delay_s);
-  const Solution s = solve(windows, force);
-  const double explained = 1.0 - s.rms * s.rms * static_cast<double>(force.size()) /
-                                     std::max(force.squaredNorm(), 1e-300);
-  constexpr double kLeastExplained = 0.9;
+  const DelayFit fit = fit_delay(samples, windows, half, period_s);
+  const double delay_s = fit.delay_s, explained = fit.explained;
+  const Solution& s = fit.solution;
   if (!(explained > kLeastExplained) || !(s.value[0] > 0.0)) {
     found.not_identified.push_back(fmt::format(
         "delay, friction, mass: the motion follows from the forces to {} % only; something else "

@@ -49,6 +49,11 @@ struct DeviceIdentification {
 [[nodiscard]] DeviceIdentification identify_device(const std::vector<IdentificationSample>& samples,
                                                    double period_s);
 
+/// The delay alone, from a measurement of about a second: the mean of all edges, s. Empty if the
+/// motion does not follow from the forces, as when a hand holds the handle still or moves it.
+[[nodiscard]] std::optional<double> checked_delay_s(
+    const std::vector<IdentificationSample>& samples, double period_s);
+
 /// Forces for the identification, one a period: edges of +-0.2 N in irregular order, and a weak
 /// spring towards the start; never above kMostIdentifyingForce_N.
 class IdentifyingForce {

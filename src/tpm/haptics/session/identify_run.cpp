@@ -68,15 +68,11 @@ Json interval(double low, double high, int digits) {
   return Json::array({rounded(low, digits), rounded(high, digits)});
 }
 
-}  // namespace
-
-IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
-                                  const DeviceChoice& choice, const HilSession& like,
-                                  const DeviceIdentifyOptions& options) {
-  IdentifyRun run;
-  run.period_s = like.servo.period_s;
-  run.duration_s = options.duration_s;
-  run.real_time = options.real_time;
+/// Moves the handle; fills the identity and the outcome of the run.
+std::vector<IdentificationSample> moved_samples(IdentifyRun& run,
+                                                const std::shared_ptr<HapticDevice>& device,
+                                                const DeviceChoice& choice, const HilSession& like,
+                                                const DeviceIdentifyOptions& options) {
   const DeviceLimits limits = limits_of(choice);
   const ServoSettings servo = identifying_settings(like, limits, options.duration_s);
   const auto model = std::make_shared<IdentifyingModel>(servo.push, servo.period_s, options.seed);
@@ -113,13 +109,40 @@ IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
     device->stop();
     throw;
   }
+  return samples;
+}
+
+}  // namespace
+
+IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
+                                  const DeviceChoice& choice, const HilSession& like,
+                                  const DeviceIdentifyOptions& options) {
+  IdentifyRun run;
+  run.period_s = like.servo.period_s;
+  run.duration_s = options.duration_s;
+  run.real_time = options.real_time;
+  const auto samples = moved_samples(run, device, choice, like, options);
   if (run.outcome.cause == StopCause::finished) {
-    run.found = identify_device(samples, servo.period_s);
+    run.found = identify_device(samples, run.period_s);
   } else {
     run.found.not_identified.push_back("everything: the measurement ended early: " +
                                        std::string(word_of(run.outcome.cause)));
   }
   return run;
+}
+
+DelayCheck check_delay(const std::shared_ptr<HapticDevice>& device, const DeviceChoice& choice,
+                       const HilSession& like, const DeviceIdentifyOptions& options) {
+  IdentifyRun run;
+  DeviceIdentifyOptions second = options;
+  second.duration_s = kDelayCheck_s;
+  const auto samples = moved_samples(run, device, choice, like, second);
+  DelayCheck check;
+  check.cause = run.outcome.cause;
+  if (check.cause == StopCause::finished) {
+    check.delay_s = checked_delay_s(samples, like.servo.period_s);
+  }
+  return check;
 }
 
 IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& like,

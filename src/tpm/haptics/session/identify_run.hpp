@@ -33,6 +33,19 @@ struct IdentifyRun {
                                                 const DeviceChoice& choice, const HilSession& like,
                                                 const DeviceIdentifyOptions& options);
 
+/// Outcome of the check of one second at the start of a session.
+struct DelayCheck {
+  std::optional<double> delay_s;  ///< mean, both paths together; empty: not found
+  StopCause cause = StopCause::none;
+};
+/// Measures the delay of a device for a second with the forces of the identification, once the
+/// handle is in place and at rest; a hand may hold it, but not move it. The device is closed
+/// afterwards. Throws as run_identification().
+[[nodiscard]] DelayCheck check_delay(const std::shared_ptr<HapticDevice>& device,
+                                     const DeviceChoice& choice, const HilSession& like,
+                                     const DeviceIdentifyOptions& options);
+inline constexpr double kDelayCheck_s = 1.0;
+
 /// A device file (schemas/device.schema.json). @param date of the measurement; may be empty
 [[nodiscard]] Json device_file_json(const IdentifyRun& run, const std::string& date);
 

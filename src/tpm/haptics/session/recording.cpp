@@ -98,7 +98,13 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
   }
   Json surface = Json::array();
   for (const SessionPhase& phase : session.phases) surface.push_back(phase.surface_m);
+  Json clock;  // null in virtual time: the same bytes each time
+  if (real_time) {
+    const std::int64_t opened_ns = now_ns();
+    clock = {{"opened_monotonic_ns", opened_ns}, {"opened_utc", utc_of(opened_ns)}};
+  }
   return {{"format", kFormat},
+          {"clock", clock},
           {"version", version()},
           {"simulated_device", !device.hardware},
           {"device", to_json(device)},
@@ -132,6 +138,10 @@ Json recording_closing(const ServoOutcome& outcome) {
   json["woke_late"] = times_json(outcome.woke_late);
   json["busy"] = times_json(outcome.busy);
   json["stop_took_s"] = outcome.stop_took_s;
+  if (outcome.first_cycle_monotonic_ns != 0) {
+    json["clock"] = {{"first_cycle_monotonic_ns", outcome.first_cycle_monotonic_ns},
+                     {"first_cycle_utc", utc_of(outcome.first_cycle_monotonic_ns)}};
+  }
   return json;
 }
 

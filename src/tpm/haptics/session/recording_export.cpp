@@ -15,15 +15,11 @@ struct FlagWord {
   const char* word;
 };
 
-constexpr FlagWord kFlagWords[] = {{kTouching, "touching"},
-                                   {kTimeGuarded, "time_guarded"},
-                                   {kSaturated, "saturated"},
-                                   {kForceLimited, "force_limited"},
-                                   {kSlipping, "slipped"},
-                                   {kRampingIn, "ramping_in"},
-                                   {kDamped, "damped"},
-                                   {kBeyondModel, "beyond_model"},
-                                   {kLate, "late"}};
+constexpr FlagWord kFlagWords[] = {{kTouching, "touching"},   {kTimeGuarded, "time_guarded"},
+                                   {kSaturated, "saturated"}, {kForceLimited, "force_limited"},
+                                   {kSlipping, "slipped"},    {kRampingIn, "ramping_in"},
+                                   {kDamped, "damped"},       {kBeyondModel, "beyond_model"},
+                                   {kMarked, "marked"},       {kLate, "late"}};
 
 /// Columns of the rows, each a dataset whose name ends in its unit.
 class ColumnWriter {

@@ -110,7 +110,9 @@ std::string RenderingCheck::verdict() const {
   const std::string what = fmt::format(
       "stiffness {} N/m at {} Hz, {} periods of delay{}, friction {} N s/m",
       significant(stiffness_N_per_m, 3), significant(rate_Hz, 4), delay_periods,
-      delay_measured ? "" : " (not measured on this device: 20 ms and no friction count)",
+      delay_measured ? ""
+                     : fmt::format(" ({}: 20 ms and no friction count)",
+                                   delay_note.empty() ? "not measured on this device" : delay_note),
       significant(friction_N_s_per_m, 2));
   if (!stable()) {
     return fmt::format(
@@ -193,27 +195,31 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
 
 Json to_json(const RenderingCheck& check) {
   constexpr int kDigits = 6;
-  return {{"verdict", check.verdict()},
-          {"stable", check.stable()},
-          {"passive", check.passive()},
-          {"within_device", check.within_device()},
-          {"follows_encoder", check.follows_encoder()},
-          {"rate_Hz", rounded(check.rate_Hz, kDigits)},
-          {"safe_in_hands", check.safe_in_hands()},
-          {"delay_measured", check.delay_measured},
-          {"delay_s", rounded(check.delay_s, kDigits)},
-          {"delay_periods", check.delay_periods},
-          {"friction_N_s_per_m", rounded(check.friction_N_s_per_m, kDigits)},
-          {"stiffness_N_per_m", rounded(check.stiffness_N_per_m, kDigits)},
-          {"at_depth_m", rounded(check.depth_m, kDigits)},
-          {"passive_friction_N_s_per_m", rounded(check.passive_friction_N_s_per_m, kDigits)},
-          {"passive_border_N_per_m", rounded(check.passive_N_per_m, kDigits)},
-          {"stable_border_N_per_m", rounded(check.stable_N_per_m, kDigits)},
-          {"spectral_radius", rounded(check.spectral_radius, kDigits)},
-          {"device_border_N_per_m", rounded(check.largest_N_per_m, kDigits)},
-          {"hands_border_N_per_m", rounded(check.hands_N_per_m, kDigits)},
-          {"stable_hands", check.stable_hands},
-          {"warnings", check.warnings}};
+  Json json{{"verdict", check.verdict()},
+            {"stable", check.stable()},
+            {"passive", check.passive()},
+            {"within_device", check.within_device()},
+            {"follows_encoder", check.follows_encoder()},
+            {"rate_Hz", rounded(check.rate_Hz, kDigits)},
+            {"safe_in_hands", check.safe_in_hands()},
+            {"delay_measured", check.delay_measured},
+            {"delay_s", rounded(check.delay_s, kDigits)},
+            {"delay_periods", check.delay_periods},
+            {"friction_N_s_per_m", rounded(check.friction_N_s_per_m, kDigits)},
+            {"stiffness_N_per_m", rounded(check.stiffness_N_per_m, kDigits)},
+            {"at_depth_m", rounded(check.depth_m, kDigits)},
+            {"passive_friction_N_s_per_m", rounded(check.passive_friction_N_s_per_m, kDigits)},
+            {"passive_border_N_per_m", rounded(check.passive_N_per_m, kDigits)},
+            {"stable_border_N_per_m", rounded(check.stable_N_per_m, kDigits)},
+            {"spectral_radius", rounded(check.spectral_radius, kDigits)},
+            {"device_border_N_per_m", rounded(check.largest_N_per_m, kDigits)},
+            {"hands_border_N_per_m", rounded(check.hands_N_per_m, kDigits)},
+            {"stable_hands", check.stable_hands},
+            {"warnings", check.warnings}};
+  if (check.delay_at_start_s) {
+    json["delay_at_start_s"] = rounded(*check.delay_at_start_s, kDigits);
+  }
+  return json;
 }
 
 }  // namespace tpm::haptics

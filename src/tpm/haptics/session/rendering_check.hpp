@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,9 +11,12 @@ namespace tpm::haptics {
 /// Can this tissue be rendered on this device? Found before a session begins.
 struct RenderingCheck {
   double rate_Hz = 0.0;
-  double delay_s = 0.0;                     ///< that counts, both paths of the device
-  int delay_periods = 0;                    ///< the same in whole periods, rounded up
-  bool delay_measured = true;               ///< false: hardware that nobody has measured
+  double delay_s = 0.0;        ///< that counts, both paths of the device
+  int delay_periods = 0;       ///< the same in whole periods, rounded up
+  bool delay_measured = true;  ///< false: hardware that nobody has measured
+  /// Why the delay counts as not measured although a file says it; empty otherwise.
+  std::string delay_note;
+  std::optional<double> delay_at_start_s;   ///< found by the check of one second; empty: none made
   double friction_N_s_per_m = 0.0;          ///< of the device that counts
   double stiffness_N_per_m = 0.0;           ///< largest instantaneous one up to the session's depth
   double equilibrium_share = 1.0;           ///< of it, of the equilibrium

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "tpm/files/row_log.hpp"
@@ -13,6 +14,7 @@
 #include "tpm/haptics/device/replay_device.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
+#include "tpm/haptics/session/identify_run.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
@@ -40,14 +42,45 @@ Eigen::Matrix3Xd asked_motion(const HilSession& session) {
   return motion;
 }
 
+/// Marks rows and lists them: buttons that go down, keys of the operator.
+class Markers {
+ public:
+  explicit Markers(std::shared_ptr<const std::atomic<std::uint32_t>> keys)
+      : keys_(std::move(keys)), seen_(keys_ ? keys_->load() : 0) {}
+  void see(ServoRecord& row) {
+    const std::uint32_t keys = keys_ ? keys_->load() : 0;
+    if (keys != seen_) add(row, "key");
+    if ((row.buttons & ~buttons_) != 0) add(row, "button");
+    seen_ = keys;
+    buttons_ = row.buttons;
+  }
+  [[nodiscard]] const Json& list() const { return list_; }
+
+ private:
+  void add(ServoRecord& row, const char* by) {
+    row.flags |= kMarked;
+    list_.push_back({{"cycle", row.cycle}, {"by", by}});
+  }
+
+  std::shared_ptr<const std::atomic<std::uint32_t>> keys_;
+  std::uint32_t seen_, buttons_ = 0;
+  Json list_ = Json::array();
+};
+
 /// @param prepare prepares the device and lets the recording appear
 ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
                       const std::shared_ptr<ContactModel>& stepped, const ServoSettings& servo,
-                      const SessionRunOptions& options, RowLogWriter& log,
-                      const std::function<void()>& prepare) {
-  const RecordSink sink = [&](const ServoRecord& row) {
+                      const SessionRunOptions& options, RowLogWriter& log, Markers& markers,
+                      double& largest_force_N, const std::function<void()>& prepare) {
+  const RecordSink sink = [&](const ServoRecord& written) {
+    ServoRecord row = written;
     const bool waits = row.phase < 0 && row.stop == StopCause::none;
-    if (!waits) log.append(&row);
+    if (!waits) {
+      markers.see(row);
+      const Eigen::Map<const Eigen::Vector3d> force_N(row.commanded_N);
+      largest_force_N = std::max(largest_force_N, force_N.norm());
+      log.append(&row);
+    }
     if (options.watcher) options.watcher(row);
   };
   if (!options.real_time) {
@@ -99,11 +132,50 @@ void require_same_device(const DeviceChoice& choice, const DeviceIdentity& devic
               "the file of this device (tpm hil identify)");
 }
 
+/// Limits with the delay of the device as it is now: the larger one of file and check counts.
+DeviceLimits checked_limits(const DeviceLimits& limits, const DelayCheck& check) {
+  DeviceLimits now = limits;
+  if (check.delay_s) {
+    now.measured_delay_s = std::max(*limits.measured_delay_s, *check.delay_s);
+  } else {
+    now.measured_delay_s.reset();
+    now.measured_friction_N_s_per_m.reset();
+  }
+  return now;
+}
+
+/// Measures the delay for a second, and the rendering once more with what was found. Throws as
+/// run_session().
+template <class MakeDevice>
+void check_at_start(SessionRun& run, const HilSession& session, const DeviceChoice& choice,
+                    const DeviceLimits& limits, const SessionRunOptions& options,
+                    ContactModel& model, const MakeDevice& make) {
+  DeviceIdentifyOptions second;
+  second.real_time = options.real_time;
+  second.wish = options.wish;
+  second.interrupted = options.interrupted;
+  const DelayCheck check = check_delay(make(), choice, session, second);
+  if (check.cause != StopCause::finished) {
+    throw Error(ExitCode::environment, "delay of the device",
+                "the check of a second before the session ended early: " +
+                    std::string(word_of(check.cause)),
+                "a handle at rest in the middle of its workspace");
+  }
+  run.rendering = check_rendering(session, model, run.model, checked_limits(limits, check));
+  run.rendering.delay_at_start_s = check.delay_s;
+  if (!check.delay_s) {
+    run.rendering.delay_note =
+        "the handle did not follow the forces of the check before the session; let go of it";
+  }
+  require_acceptable(run.rendering, choice, limits, options);
+}
+
 /// A session from its model to the end of its recording.
+/// @param checks the delay before the session
 /// @param make gives the device, once the rendering is known to be acceptable
 template <class MakeDevice>
 SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const DeviceLimits& limits,
-                  const SessionRunOptions& options, const MakeDevice& make) {
+                  const SessionRunOptions& options, bool checks, const MakeDevice& make) {
   require_within(session, limits);
   SessionRun run;
   run.model = make_loop_model(session, options.real_time, options.planning);
@@ -115,6 +187,7 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
     run.on_hardware = check_rendering(session, *stepped, run.model, real);
   }
   require_acceptable(run.rendering, choice, limits, options);
+  if (checks) check_at_start(run, session, choice, limits, options, *stepped, make);
   const std::shared_ptr<HapticDevice> device = make();
   const ForcesOffGuard guard(*device);
   DevicePreparation preparation = session.preparation;
@@ -133,11 +206,15 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
                      sizeof(ServoRecord), RowLogWriter::Name::later);
     const ServoSettings servo =
         loop_settings(session, run.model, run.rendering, choice.kind != "replay");
-    run.outcome = run_loop(session, device, stepped, servo, options, log, [&] {
-      device->prepare(preparation);
-      log.appear();
-    });
-    log.close(to_text(recording_closing(run.outcome)));
+    Markers markers(options.markers);
+    run.outcome =
+        run_loop(session, device, stepped, servo, options, log, markers, run.largest_force_N, [&] {
+          device->prepare(preparation);
+          log.appear();
+        });
+    Json closing = recording_closing(run.outcome);
+    if (!markers.list().empty()) closing["markers"] = markers.list();
+    log.close(to_text(closing));
   } catch (...) {
     device->stop();
     throw;
@@ -192,7 +269,10 @@ ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
 
 SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
                        const SessionRunOptions& options) {
-  return run_on(session, choice, limits_of(choice), options,
+  const DeviceLimits limits = limits_of(choice);
+  const bool checks = options.check_delay && options.real_time && limits.hardware() &&
+                      limits.measured_delay_s.has_value();
+  return run_on(session, choice, limits, options, checks,
                 [&] { return make_device(choice, session); });
 }
 
@@ -203,7 +283,7 @@ SessionRun run_session_on(const HilSession& session, const std::shared_ptr<Hapti
   choice.kind = "the caller's own";
   choice.may_move = permissions.may_move;
   choice.take_as_ready = permissions.take_as_ready;
-  return run_on(session, choice, limits, options, [&] { return device; });
+  return run_on(session, choice, limits, options, false, [&] { return device; });
 }
 
 }  // namespace tpm::haptics

@@ -1,4 +1,5 @@
 #pragma once
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -36,8 +37,14 @@ struct SessionRunOptions {
   RealTimeWish wish = RealTimeWish::ignore;
   std::filesystem::path recording;
   bool accept_unstable = false;  ///< of a simulated device only
+  /// Of hardware whose delay a device file states, in real time: measure it for a second before the
+  /// session (check_delay() in identify_run.hpp). The larger delay counts; without an answer the
+  /// device counts as not measured. A device of the caller (run_session_on) is not checked.
+  bool check_delay = true;
   SessionNotes notes;
   std::function<bool()> interrupted;
+  /// Number of markers that the operator has set by key so far; may be null.
+  std::shared_ptr<const std::atomic<std::uint32_t>> markers;
   /// Sees every record, on the thread that writes them.
   std::function<void(const ServoRecord&)> watcher;
   /// Called when the device is open and its forces are still off.
@@ -53,7 +60,11 @@ struct SessionRun {
   /// the device file if there is one.
   std::optional<RenderingCheck> on_hardware = std::nullopt;
   ServoOutcome outcome;
+  double largest_force_N = 0.0;  ///< that was sent to the device
 };
+
+/// Forces below this are not felt through a handle, N; assumed.
+inline constexpr double kLeastFeltForce_N = 0.01;
 
 /// What the loop of a session is set to: what the session states, with what is known of its model
 /// and device.

@@ -1,6 +1,8 @@
 // Declared in tpm/haptics/show/hil_report.hpp.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <string_view>
 
@@ -55,6 +57,63 @@ std::vector<std::pair<double, std::uint64_t>> octaves(const TimeHistogram& times
   return result;
 }
 
+/// Lateness that is exceeded once an hour if the tail beyond 99.9 % falls as an exponential does; 0
+/// if too few cycles were late to say.
+double once_an_hour_s(const JitterCheck& check) {
+  constexpr double kHour_s = 3600.0, kShare = 1e-3, kFurther = 1e-4;
+  constexpr std::uint64_t kFewest = 20'000;
+  const TimeHistogram& late = check.outcome.woke_late;
+  if (late.count() < kFewest) return 0.0;
+  const double at_s = late.quantile_s(1.0 - kShare), further_s = late.quantile_s(1.0 - kFurther);
+  const double slope_s = (further_s - at_s) / std::log(kShare / kFurther);
+  return further_s + slope_s * std::max(0.0, std::log(kFurther * kHour_s * check.rate_Hz));
+}
+
+/// Seen stalls that the watchdog would have ended a session for.
+std::uint64_t stalls_of(const JitterCheck& check) {
+  const TimeHistogram& late = check.outcome.woke_late;
+  const auto edge = static_cast<std::size_t>(std::ceil(1e6 * check.watchdog_s));
+  std::uint64_t below = 0;
+  for (std::size_t i = 0; i < std::min(edge, late.bins().size()); ++i) below += late.bins()[i];
+  return late.count() - below;
+}
+
+double watched_s(const JitterCheck& check) {
+  return static_cast<double>(check.outcome.cycles) / check.rate_Hz;
+}
+
+Json stalls_json(const JitterCheck& check) {
+  const std::uint64_t stalls = stalls_of(check);
+  const double hour_s = once_an_hour_s(check);
+  Json json{
+      {"beyond_watchdog", stalls},
+      {"p9999_s", rounded(check.outcome.woke_late.quantile_s(0.9999), kHilDigits)},
+      {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
+      {"once_an_hour_extrapolated_s", hour_s > 0.0 ? Json(rounded(hour_s, kHilDigits)) : Json()}};
+  json["upper_95_per_s"] = stalls == 0 && check.outcome.cycles > 0
+                               ? Json(rounded(3.0 / watched_s(check), kHilDigits))
+                               : Json();
+  return json;
+}
+
+std::string stalls_text(const JitterCheck& check) {
+  const std::uint64_t stalls = stalls_of(check);
+  std::string text = fmt::format(
+      "p99.99 of the wake-ups {} us, the watchdog waits for {} us; stalls beyond it: {}",
+      us(check.outcome.woke_late.quantile_s(0.9999)), us(check.watchdog_s), stalls);
+  if (stalls == 0 && check.outcome.cycles > 0) {
+    text += fmt::format(": fewer than {} an hour with 95 % (3/T of {} s)",
+                        significant(3.0 * 3600.0 / watched_s(check), 3),
+                        significant(watched_s(check), 3));
+  }
+  const double hour_s = once_an_hour_s(check);
+  return text + (hour_s > 0.0
+                     ? fmt::format("\nextrapolated, not measured: {} us once an hour, if the tail "
+                                   "beyond 99.9 % falls as an exponential\n",
+                                   us(hour_s))
+                     : std::string("\n"));
+}
+
 Json fidelity_json(const ForceFidelity& f) {
   return {{"instants", f.instants},
           {"rms_N", rounded(f.rms_N, kHilDigits)},
@@ -88,6 +147,7 @@ Json check_json(const JitterCheck& check) {
           {"woke_late", times_json(o.woke_late)},
           {"busy", times_json(o.busy)},
           {"woke_late_histogram", bins},
+          {"stalls", stalls_json(check)},
           {"cause", word_of(o.cause)},
           {"most_consecutive_missed", o.counts.most_consecutive_missed},
           {"most_late_of_1000", o.counts.most_late},
@@ -111,6 +171,7 @@ std::string check_text(const JitterCheck& check) {
   for (const auto& [edge, count] : octaves(o.woke_late)) {
     text += fmt::format("  {:>8} us {:>10}\n", us(edge), count);
   }
+  text += stalls_text(check);
   text += fmt::format(
       "at most {} consecutive periods missed, {} of 1000 cycles late; watchdog {} ms\n",
       o.counts.most_consecutive_missed, o.counts.most_late, significant(1e3 * check.watchdog_s, 3));
@@ -130,6 +191,8 @@ Json run_json(const HilSession& session, const SessionRun& run) {
           {"rate_Hz", rounded(1.0 / session.servo.period_s, kHilDigits)},
           {"duration_s", rounded(session.duration_s(), kHilDigits)},
           {"phases", session.phases.size()},
+          {"largest_force_N", rounded(run.largest_force_N, kHilDigits)},
+          {"felt", run.largest_force_N >= kLeastFeltForce_N},
           {"time", run.outcome.real_time ? "real" : "virtual"},
           {"outcome", recording_closing(run.outcome)}};
 }
@@ -158,6 +221,11 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
       o.counts.late, o.counts.missed, o.counts.time_guards, o.counts.saturations,
       o.counts.force_limited, o.counts.slipped, o.counts.damped, o.counts.beyond_model,
       o.dropped_records);
+  text += fmt::format(
+      "largest force {} N{}\n", significant(run.largest_force_N, 3),
+      run.largest_force_N >= kLeastFeltForce_N
+          ? std::string()
+          : fmt::format(": no hand feels it (less than {} N, assumed)", kLeastFeltForce_N));
   text += fmt::format("end: {}{}{}\n", word_of(o.cause), o.detail.empty() ? "" : ": ", o.detail);
   if (o.device.error != 0) {
     text += fmt::format("the device said: error {} ({})\n", o.device.error, o.device.error_text);

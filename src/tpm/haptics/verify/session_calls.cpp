@@ -1,6 +1,7 @@
 // Declared in tpmkit/session.hpp.
 #include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/verify/verify.hpp"
 #include "tpmkit/session.hpp"
@@ -39,7 +40,9 @@ SessionSummary Session::run(const std::shared_ptr<HapticDevice>& device,
   options.recording = request.recording;
   options.interrupted = request.interrupted;
   options.watcher = request.watcher;
-  DeviceLimits limits = limits_of(request.limits);
+  const bool simulated = dynamic_cast<const VirtualOmega7*>(device.get()) != nullptr;
+  const std::string usual = simulated ? "virtual" : "omega7";
+  DeviceLimits limits = limits_of(request.limits.empty() ? usual : request.limits);
   if (!request.device_file.empty()) {
     limits = limits_by_file(limits, read_device_file(request.device_file));
   }
