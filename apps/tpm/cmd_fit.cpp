@@ -16,6 +16,7 @@
 #include "tpm/fit/likelihood/experiment_refit.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/predict/fitted_scene.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
@@ -246,8 +247,9 @@ void write_scene(const std::filesystem::path& folder, const FitResult& fit,
 int fit_configuration(const FitOptions& options, const Session& session) {
   const auto csv = csv_beside(options.output, session);
   if (!options.no_draw) will_write_into(options.folder, {"figures.json", "law.json"});
-  const FitResult result = run_fit(configured(options));
+  const FitResult result = fit_and_judge(configured(options));
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
+  if (!session.json() && result.adequacy) text = result.adequacy->words + "\n\n" + text;
   if (!options.folder.empty() && !options.no_draw) {
     auto files = write_fit_report(options.folder, result);
     write_scene(options.folder, result, files);
@@ -307,6 +309,7 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
     moduli = young_moduli(best, *probe, options.poisson.empty());
   }
   std::string text;
+  if (best.adequacy && best.adequacy->is_rejected()) text += best.adequacy->words + "\n";
   for (const PreparedRecording& r : recordings) {
     if (!r.read_as.empty()) text += fmt::format("{}\n", r.read_as);
     for (const std::string& words : r.phases.words) text += fmt::format("{}\n", words);

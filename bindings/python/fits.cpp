@@ -10,6 +10,7 @@
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/prediction.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/material_function.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/show/fit_report.hpp"
@@ -72,6 +73,7 @@ class Fit {
                            py::arg("upper") = p.upper,
                            py::arg("unit") = std::string(si_symbol(p.parameter.unit.dimension)),
                            py::arg("verdict") = verdict_text(p), py::arg("nuisance") = p.nuisance,
+                           py::arg("only_if_described") = p.only_if_described,
                            py::arg("words") = p.words));
     }
     return rows;
@@ -167,7 +169,7 @@ Fit fit_configuration(const FitRequest& request, const LongCall& call) {
   if (request.starts) problem.config.starts = *request.starts;
   if (request.seed) problem.config.seed = *request.seed;
   problem.config.interrupted = call.interrupted();
-  return {call.run([&] { return run_fit(problem); }), std::nullopt};
+  return {call.run([&] { return fit_and_judge(problem); }), std::nullopt};
 }
 
 Fit fit_selected(Selection selection, std::optional<MaterialFunction> function) {
@@ -229,6 +231,11 @@ void bind_fits(py::module_& module) {
       .def_property_readonly("recordings", &Fit::recordings)
       .def_property_readonly("law_json", [](const Fit& f) { return to_text(to_json(f.law())); })
       .def_property_readonly("has_law", [](const Fit& f) { return f.fit().config.law.has_value(); })
+      .def_property_readonly("adequacy_json",
+                             [](const Fit& f) {
+                               return f.fit().adequacy ? to_text(files::to_json(*f.fit().adequacy))
+                                                       : std::string("null");
+                             })
       .def_property_readonly("flags", [](const Fit& f) { return f.fit().flags; })
       .def_property_readonly("words",
                              [](const Fit& f) {

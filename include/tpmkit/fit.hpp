@@ -32,7 +32,9 @@ struct FittedParameter {
   std::optional<double> lower, upper;    ///< confidence limits by profile likelihood
   Verdict verdict = Verdict::not_profiled;
   bool nuisance = false;  ///< belongs to the recording or its noise, not to the material
-  std::string words;      ///< the verdict as a sentence
+  /// The law does not describe the data: estimate, limits and verdict hold only if it did.
+  bool only_if_described = false;
+  std::string words;  ///< the verdict as a sentence
 };
 
 /// Result of a fit.
@@ -43,9 +45,10 @@ struct FitSummary {
   int starts_run = 0, starts_failed = 0;
   int starts_agreeing = 0;  ///< that ended in the best minimum
   std::vector<FittedParameter> parameters;
-  std::vector<std::string> flags;  ///< warnings and assumptions, one sentence each
-  std::string text;                ///< for a terminal
-  std::string json;                ///< everything, keys in docs/fit_results.md
+  std::optional<LawAdequacy> adequacy;  ///< whether the law describes the data, if it was tested
+  std::vector<std::string> flags;       ///< warnings and assumptions, one sentence each
+  std::string text;                     ///< for a terminal
+  std::string json;                     ///< everything, keys in docs/fit_results.md
 };
 
 /// Options of a fit.

@@ -20,6 +20,8 @@ struct LawFile {
   std::optional<double> fitted_to = std::nullopt;
   /// Uncertainty of the parameters: the block "fit" of the file.
   std::optional<LawUncertainty> uncertainty = std::nullopt;
+  /// Whether the law describes the data that it was fitted to. None: it was not tested.
+  std::optional<LawAdequacy> adequacy = std::nullopt;
 };
 
 /// The key of a parameter in files: name and SI unit, "k_inf_N_per_m", "tau1_s", "alpha".

@@ -29,6 +29,19 @@ struct FittedFile {
   std::string sha256;                  ///< of its bytes; empty if the data came from no file
   int readings = 0;                    ///< number of fitted readings
   std::optional<double> from_s, to_s;  ///< of a recording: samples outside were not fitted
+  /// Of a recording that was fitted together with others: its own contact (m, or a relative length)
+  /// and offset (N or Pa). Of a single one they stand among the law's parameters.
+  std::optional<double> contact = std::nullopt, offset = std::nullopt;
+  /// Which of the two were not estimated: "contact", "offset".
+  std::vector<std::string> held = {};
+  /// Limits of the force cell: readings at or beyond them were censored, SI.
+  std::optional<double> clipped_above = std::nullopt, clipped_below = std::nullopt;
+
+  /// Whether a reading stands at a limit of the force cell.
+  [[nodiscard]] bool clips(double reading) const {
+    return (clipped_above && reading >= *clipped_above) ||
+           (clipped_below && reading <= *clipped_below);
+  }
 
   /// Whether a sample at this time was fitted.
   [[nodiscard]] bool holds(double time_s) const {
@@ -45,6 +58,18 @@ struct ReadingNoise {
   double relative = 0.0;  ///< b; of `log` the standard deviation of the logarithm
   double column = 1.0;    ///< per_row: factor of the file's own standard deviations
   double lag_1 = 0.0;     ///< correlation of neighbouring residuals
+};
+
+/// Whether a law describes the recordings that it was fitted to: their residuals against the noise
+/// that was measured where nothing moves.
+struct LawAdequacy {
+  std::string verdict;                        ///< adequate, not_described or not_judged
+  std::optional<double> residual_over_noise;  ///< of the worst recording; none if not judged
+  std::string words;                          ///< one sentence, with the likely cause
+  std::vector<std::string> causes = {};       ///< likely ones, if the law does not describe them
+
+  [[nodiscard]] bool is_adequate() const { return verdict == "adequate"; }
+  [[nodiscard]] bool is_rejected() const { return verdict == "not_described"; }
 };
 
 /// Uncertainty of the parameters of a fitted law, sufficient to predict with a band.

@@ -80,6 +80,11 @@ void check_limit(const std::optional<double>& found, const std::optional<double>
   if (found) CHECK(std::abs(*found / factor - *expected) <= 1e-4 * width);
 }
 
+/// What is said of the weakest direction, without its numbers.
+std::string told_of_weakest(const FitResult& fit) {
+  return fit.weakest_words.substr(0, fit.weakest_words.find(" (singular values"));
+}
+
 /// Digits agree to a ten-thousandth of the standard error: bounds and starts are rounded to four
 /// digits, from which the search comes to the minimum another way.
 void check_same(const FitResult& found, const FitResult& expected, const Powers& powers) {
@@ -101,6 +106,7 @@ void check_same(const FitResult& found, const FitResult& expected, const Powers&
     check_limit(p.upper, q.upper, factor, width);
   }
   CHECK(found.flags.size() == expected.flags.size());
+  CHECK(told_of_weakest(found) == told_of_weakest(expected));
 }
 
 }  // namespace

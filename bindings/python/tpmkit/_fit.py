@@ -31,9 +31,11 @@ class Fit:
         """One row per estimated parameter, by name; SI.
 
         Columns: estimate, standard_error (linearised), lower and upper (limits by profile likelihood; NaN
-        where the data give none), unit, verdict, nuisance (belongs to the recording), words.
+        where the data give none), unit, verdict, nuisance (belongs to the recording), only_if_described (the
+        law does not describe the data: the row holds only if it did), words.
         """
-        columns = ["name", "estimate", "standard_error", "lower", "upper", "unit", "verdict", "nuisance", "words"]
+        columns = ["name", "estimate", "standard_error", "lower", "upper", "unit", "verdict", "nuisance",
+                   "only_if_described", "words"]
         table = pd.DataFrame(self._core.parameters, columns=columns).set_index("name")
         numbers = ["estimate", "standard_error", "lower", "upper"]
         table[numbers] = table[numbers].astype(float)
@@ -65,6 +67,12 @@ class Fit:
         return pd.DataFrame(laws, columns=columns).set_index("law")
 
     @property
+    def adequacy(self) -> dict[str, Any] | None:
+        """Whether the law describes the data: `verdict` (adequate, not_described, not_judged), `words`,
+        `residual_over_noise` where it was judged, `causes` where it is not described. None: not tested."""
+        return json.loads(self._core.adequacy_json)
+
+    @property
     def words(self) -> list[str]:
         """The recommendation and its reasons."""
         return self._core.words
@@ -72,7 +80,9 @@ class Fit:
     @property
     def warnings(self) -> list[str]:
         """What the experiment cannot tell, and what a reader must know."""
-        return self._core.warnings + self._core.flags
+        adequacy = self.adequacy
+        first = [adequacy["words"]] if adequacy and adequacy["verdict"] != "adequate" else []
+        return first + self._core.warnings + self._core.flags
 
     @property
     def data(self) -> list[pd.DataFrame]:

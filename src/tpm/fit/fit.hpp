@@ -15,6 +15,7 @@
 #include "tpm/fit/uncertainty.hpp"
 #include "tpm/fit/waterfall.hpp"
 #include "tpmkit/fit.hpp"
+#include "tpmkit/law_uncertainty.hpp"
 
 namespace tpm::fit {
 
@@ -45,6 +46,8 @@ struct ParameterResult {
   std::optional<double> lower, upper;    ///< confidence limits by profile likelihood
   bool at_lower_bound = false, at_upper_bound = false;
   Verdict verdict = Verdict::not_profiled;
+  /// The law does not describe the data: estimate, interval and verdict hold only if it did.
+  bool only_if_described = false;
   std::string words;  ///< one sentence
   Profile profile;
 };
@@ -85,13 +88,15 @@ struct RecordingFit {
   Provenance provenance = Provenance::measured;
   std::vector<double> time_s, drive, observed, predicted;  ///< SI; see Response for NaN
   std::vector<double> standardised;                        ///< residuals in standard deviations
-  std::vector<bool> fitted;                                ///< false: outside the window
-  double peak = 0.0;                                       ///< largest |observed| in the window
-  double rms_residual = 0.0;                               ///< in the window, SI
+  std::vector<bool> fitted;           ///< false: outside the window, or censored
+  std::vector<bool> censored;         ///< at a limit of the force cell, within the window
+  double peak = 0.0;                  ///< largest |observed| in the window
+  double rms_residual = 0.0;          ///< in the window, SI
   std::optional<double> rms_outside;  ///< of the predicted samples outside, if there are any
   std::size_t not_predicted = 0;      ///< samples outside whose `predicted` is NaN
   /// Prediction band, where one new sample falls, SI; empty if the covariance is not of full rank.
   std::vector<double> lower, upper;
+  [[nodiscard]] bool is_censored(std::size_t i) const { return i < censored.size() && censored[i]; }
   std::optional<double> share_inside;      ///< of the fitted samples, within that band
   std::optional<Correlation> correlation;  ///< of the fitted samples' residuals
 };
@@ -118,6 +123,7 @@ struct FitResult {
   std::vector<FittedDatum> data;  ///< separate readings
   std::vector<RecordingFit> recordings;
   std::vector<std::string> data_sha256;  ///< of the files, one for each of config.data
+  std::optional<LawAdequacy> adequacy;   ///< whether the law describes the data, if it was tested
   std::vector<std::string> flags;        ///< what a reader must know (text, one line each)
 };
 

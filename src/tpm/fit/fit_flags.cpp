@@ -73,6 +73,21 @@ void flag_not_predicted(FitResult& result) {
   }
 }
 
+/// Readings at a limit of the force cell.
+int flag_clipping(FitResult& result) {
+  int all = 0;
+  for (const RecordingFit& r : result.recordings) {
+    const auto count = static_cast<int>(std::ranges::count(r.censored, true));
+    if (count == 0) continue;
+    all += count;
+    result.flags.push_back(fmt::format(
+        "clipping: {} samples of '{}' at a limit of the force cell, or between such, are "
+        "censored: nothing is asked of the law there",
+        count, result.config.data[r.choice].dataset));
+  }
+  return all;
+}
+
 /// What an organ follows of a measured motion.
 void flag_motions(FitResult& result, const ExperimentResiduals& function) {
   for (const Experiment& e : function.experiments()) {
@@ -105,6 +120,7 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
         "the model '{}' have",
         result.starts_run - 1, result.config.starts, surrogate->model().name()));
   }
+  result.band_count -= flag_clipping(result);
   if (result.band_count > 0) {
     result.flags.push_back(fmt::format(
         "{} bands are penalised only outside and are not counted as data", result.band_count));

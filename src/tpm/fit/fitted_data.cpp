@@ -49,7 +49,8 @@ std::vector<std::vector<double>> recording_residuals(const ExperimentResiduals& 
     if (!experiment.is_recording) continue;
     std::vector<double>& list = residuals.emplace_back();
     for (const std::size_t i : experiment.data) {
-      if (function.data()[i].held_out) continue;
+      const FitDatum& d = function.data()[i];
+      if (d.held_out || !d.value) continue;  // held out, or censored
       list.push_back(function.standardised(i, answer[static_cast<Eigen::Index>(i)], natural));
     }
   }
@@ -77,6 +78,12 @@ double inflation_at(const ExperimentResiduals& function, std::span<const double>
 
 namespace {
 
+/// What was read, of a censored sample the limit.
+double reading_of(const FitDatum& d) {
+  if (d.value) return *d.value;
+  return std::isfinite(*d.lower) ? *d.lower : *d.upper;
+}
+
 RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment& experiment,
                            const Eigen::VectorXd& predicted) {
   RecordingFit fit;
@@ -89,15 +96,23 @@ RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment
   double inside = 0.0;
   double outside = 0.0;
   std::size_t fitted = 0;
+  std::size_t at_limit = 0;
   const auto knots = course.protocol.knots();
   for (std::size_t k = 0; k < experiment.data.size(); ++k) {
     const FitDatum& d = function.data()[experiment.data[k]];
     const double answer = predicted[static_cast<Eigen::Index>(experiment.data[k])];
     fit.provenance = d.provenance;
     fit.drive.push_back(knots[k].value);
-    fit.observed.push_back(*d.value);
+    const bool censored = !d.value;
+    fit.observed.push_back(reading_of(d));
     fit.predicted.push_back(answer);
-    fit.fitted.push_back(!d.held_out);
+    fit.fitted.push_back(!d.held_out && !censored);
+    fit.censored.push_back(censored);
+    if (censored) {
+      ++at_limit;
+      fit.peak = std::max(fit.peak, std::abs(fit.observed.back()));
+      continue;
+    }
     if (d.held_out && !std::isfinite(answer)) {
       ++fit.not_predicted;
       continue;
@@ -109,7 +124,7 @@ RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment
     fit.peak = std::max(fit.peak, std::abs(*d.value));
   }
   fit.rms_residual = std::sqrt(inside / static_cast<double>(std::max<std::size_t>(fitted, 1)));
-  const std::size_t rest = fit.time_s.size() - fitted - fit.not_predicted;
+  const std::size_t rest = fit.time_s.size() - fitted - at_limit - fit.not_predicted;
   if (rest > 0) fit.rms_outside = std::sqrt(outside / static_cast<double>(rest));
   return fit;
 }

@@ -71,6 +71,12 @@ std::vector<double> values_of_element(const BondElement& p, const LawSpec& spec)
           0.0};
 }
 
+/// Contact and offset belong to one recording; the slack length of a strip to the specimen.
+bool is_of_one_recording(const LawSpec& spec, const LawParameter& parameter) {
+  return parameter.nuisance &&
+         (parameter.name == "offset" || spec.drive != Quantity::relative_length);
+}
+
 /// The law's parameters at values of the fit's, SI.
 std::vector<double> law_values(const FitResult& fit, const LawSpec& spec,
                                std::span<const double> natural) {
@@ -80,7 +86,7 @@ std::vector<double> law_values(const FitResult& fit, const LawSpec& spec,
   if (fit.config.data.size() == 1) return values;
   const std::vector<LawParameter> parameters = law_parameters(spec);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (parameters[i].nuisance) values[i] = 0.0;
+    if (is_of_one_recording(spec, parameters[i])) values[i] = 0.0;
   }
   return values;
 }
@@ -163,15 +169,37 @@ ReadingNoise reading_noise(const FitResult& fit) {
   return noise;
 }
 
+/// Contact and offset of one of several recordings, which stand last in a law's parameters.
+void set_placement(FittedFile& file, const FitConfig& config, std::span<const double> values,
+                   std::size_t choice) {
+  const auto estimated = [&](std::size_t parameter) {
+    return std::ranges::any_of(config.parameters, [&](const EstimatedParameter& p) {
+      return std::ranges::any_of(p.sets, [&](const Target& target) {
+        return target.parameter == parameter && target.applies_to(choice);
+      });
+    });
+  };
+  file.contact = values[values.size() - 2];
+  file.offset = values.back();
+  if (!estimated(values.size() - 2)) file.held.emplace_back("contact");
+  if (!estimated(values.size() - 1)) file.held.emplace_back("offset");
+}
+
 std::vector<FittedFile> fitted_files(const FitResult& fit) {
   std::vector<FittedFile> files;
   for (std::size_t i = 0; i < fit.config.data.size(); ++i) {
-    FittedFile file{fit.config.data[i].dataset, {}, 0, {}, {}};
+    FittedFile file;
+    file.name = fit.config.data[i].dataset;
     if (std::isfinite(fit.config.data[i].from_s)) file.from_s = fit.config.data[i].from_s;
     if (std::isfinite(fit.config.data[i].to_s)) file.to_s = fit.config.data[i].to_s;
+    file.clipped_above = fit.config.data[i].clipped_above;
+    file.clipped_below = fit.config.data[i].clipped_below;
     if (i < fit.data_sha256.size()) file.sha256 = fit.data_sha256[i];
     for (const RecordingFit& r : fit.recordings) {
       if (r.choice != i) continue;
+      if (fit.config.law && fit.config.data.size() > 1) {
+        set_placement(file, fit.config, model_parameters(fit.config, fit.best.natural, i), i);
+      }
       file.readings += static_cast<int>(std::count(r.fitted.begin(), r.fitted.end(), true));
     }
     for (const FittedDatum& d : fit.data) file.readings += d.datum.choice == i && !d.datum.held_out;
@@ -238,6 +266,7 @@ LawFile fitted_law(const FitResult& fit) {
   if (depth > 0.0) law.fitted_to = depth;
   law.note = fmt::format("fitted: {}", fit.config.title);
   law.uncertainty = uncertainty_of(fit, law.spec);
+  law.adequacy = fit.adequacy;
   return law;
 }
 

@@ -89,6 +89,7 @@ Covariance linear_covariance(const ResidualFunction& function,
     if (length[k] > 0.0) weakest[k] /= length[k];
   }
   c.weakest_direction = weakest.normalized();
+  c.weakest_share = v.col(n - 1);
   constexpr double kRankTolerance = 1e-10;
   c.full_rank = length.minCoeff() > 0.0 && c.singular_values[n - 1] > kRankTolerance;
   if (!c.full_rank) return c;

@@ -47,6 +47,7 @@ struct Covariance {
   Eigen::MatrixXd correlation;
   Eigen::VectorXd singular_values;    ///< of the Jacobian in theta, each column scaled to length 1
   Eigen::VectorXd weakest_direction;  ///< unit vector in theta that the data see least
+  Eigen::VectorXd weakest_share;      ///< the same with each column scaled to length 1: no units
   bool full_rank = false;
 };
 

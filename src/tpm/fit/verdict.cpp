@@ -140,6 +140,7 @@ std::string verdict_text(const ParameterResult& p) {
     text += fmt::format("{} {} at its {} bound", i == 0 ? ", conditional on" : " and", c.parameter,
                         c.upper ? "upper" : "lower");
   }
+  if (p.only_if_described) text += "; only if the law described the data";
   if (p.nuisance && (p.at_lower_bound || p.at_upper_bound)) {
     text += fmt::format("; on its {} bound", p.at_lower_bound ? "lower" : "upper");
   }
@@ -221,11 +222,16 @@ struct NamedDirection {
 NamedDirection named_direction(const FitResult& result) {
   const Covariance& c = result.covariance;
   const Eigen::VectorXd& v = c.weakest_direction;
-  // What moves by less than this share of the largest step is not worth a word.
-  const double least = 0.2 * v.cwiseAbs().maxCoeff();
+  // Steps of parameters with a unit cannot be compared; their effects on the residuals can.
+  const bool pure = std::ranges::all_of(c.free, [&](std::size_t i) {
+    return result.parameters[i].parameter.scale != Scale::linear;
+  });
+  const Eigen::VectorXd& weight = pure || c.weakest_share.size() != v.size() ? v : c.weakest_share;
+  // What moves by less than this share of the largest is not worth a word.
+  const double least = 0.2 * weight.cwiseAbs().maxCoeff();
   NamedDirection named;
   for (Eigen::Index k = 0; k < v.size(); ++k) {
-    if (std::abs(v[k]) < least) continue;
+    if (std::abs(weight[k]) < least) continue;
     named.parameters.push_back(result.parameters[c.free[static_cast<std::size_t>(k)]].parameter);
     named.steps.push_back(v[k]);
   }

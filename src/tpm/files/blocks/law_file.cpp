@@ -97,6 +97,16 @@ LawFile files::law_from_json(const Json& written, std::string_view where) {
   if (const char* key = fitted_to_key(law.spec); json.contains(key)) {
     law.fitted_to = json.at(key).get<double>();
   }
+  if (json.contains("adequacy")) {
+    const Json& stated = json.at("adequacy");
+    law.adequacy = LawAdequacy{.verdict = stated.at("verdict").get<std::string>(),
+                               .residual_over_noise = {},
+                               .words = stated.at("words").get<std::string>(),
+                               .causes = stated.value("causes", std::vector<std::string>{})};
+    if (stated.contains("residual_over_noise")) {
+      law.adequacy->residual_over_noise = stated.at("residual_over_noise").get<double>();
+    }
+  }
   if (json.contains("fit")) {
     law.uncertainty =
         uncertainty_from_json(json.at("fit"), law.spec, law.values, fmt::format("{}: fit", where));
@@ -118,6 +128,7 @@ Json files::to_json(const LawFile& law) {
   json["provenance"] = provenance_name(law.provenance);
   if (law.fitted_to) json[fitted_to_key(law.spec)] = *law.fitted_to;
   if (!law.note.empty()) json["note"] = law.note;
+  if (law.adequacy) json["adequacy"] = to_json(*law.adequacy);
   if (law.uncertainty) json["fit"] = to_json(*law.uncertainty, law.spec);
   return json;
 }

@@ -14,6 +14,9 @@ namespace tpm::files {
 /// An infinite spacing, which is its preset, is left out: JSON has no infinity.
 [[nodiscard]] Json to_json(const LawFile& law);
 
+/// The same in fits, law files, answers and predictions.
+[[nodiscard]] Json to_json(const LawAdequacy& adequacy);
+
 /// The block "fit" of a law file. Keys of `parameters` and `covariance` are law_key() names.
 [[nodiscard]] Json to_json(const LawUncertainty& uncertainty, const LawSpec& spec);
 

@@ -9,6 +9,7 @@
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
@@ -121,6 +122,15 @@ double LawUncertainty::quantile(double at_level) const {
   return base::student_quantile(tail, *degrees_of_freedom);
 }
 
+Json files::to_json(const LawAdequacy& adequacy) {
+  Json json{{"verdict", adequacy.verdict}, {"words", adequacy.words}};
+  if (adequacy.residual_over_noise) {
+    json["residual_over_noise"] = rounded(*adequacy.residual_over_noise, 6);
+  }
+  if (!adequacy.causes.empty()) json["causes"] = adequacy.causes;
+  return json;
+}
+
 Json files::to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
   const std::vector<LawParameter> parameters = law_parameters(spec);
   Json names = Json::array(), coordinates = Json::array(), rows = Json::array();
@@ -140,6 +150,11 @@ Json files::to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
     if (!file.sha256.empty()) entry["sha256"] = file.sha256;
     if (file.from_s) entry["from_s"] = *file.from_s;
     if (file.to_s) entry["to_s"] = *file.to_s;
+    if (file.contact) entry["contact"] = *file.contact;
+    if (file.offset) entry["offset"] = *file.offset;
+    if (!file.held.empty()) entry["held"] = file.held;
+    if (file.clipped_above) entry["clipped_above"] = *file.clipped_above;
+    if (file.clipped_below) entry["clipped_below"] = *file.clipped_below;
     data.push_back(std::move(entry));
   }
   Json json{{"parameters", std::move(names)},
@@ -188,13 +203,20 @@ LawUncertainty files::uncertainty_from_json(const Json& block, const LawSpec& sp
   u.duration_s = block.value("duration_s", 0.0);
   u.noise = noise_of_block(block.at("noise"), spec);
   for (const Json& file : block.value("data", Json::array())) {
-    FittedFile entry{file.at("file").get<std::string>(),
-                     file.value("sha256", ""),
-                     file.value("readings", 0),
-                     {},
-                     {}};
-    if (file.contains("from_s")) entry.from_s = file.at("from_s").get<double>();
-    if (file.contains("to_s")) entry.to_s = file.at("to_s").get<double>();
+    FittedFile entry;
+    entry.name = file.at("file").get<std::string>();
+    entry.sha256 = file.value("sha256", "");
+    entry.readings = file.value("readings", 0);
+    const auto set = [&file](std::optional<double>& value, const char* key) {
+      if (file.contains(key)) value = file.at(key).get<double>();
+    };
+    set(entry.from_s, "from_s");
+    set(entry.to_s, "to_s");
+    set(entry.contact, "contact");
+    set(entry.offset, "offset");
+    entry.held = file.value("held", std::vector<std::string>{});
+    set(entry.clipped_above, "clipped_above");
+    set(entry.clipped_below, "clipped_below");
     u.data.push_back(std::move(entry));
   }
   u.at_bound = block.value("at_bound", std::vector<std::string>{});

@@ -61,12 +61,17 @@ struct DataChoice {
   /// Samples of a recording outside [from_s, to_s] are predicted, not fitted.
   double from_s = -std::numeric_limits<double>::infinity();
   double to_s = std::numeric_limits<double>::infinity();
+  /// Limits of the force cell, SI: samples of a recording that stand at them or beyond, or within 20
+  /// samples between such, are censored. Nothing is asked of the model there.
+  std::optional<double> clipped_above, clipped_below;
   /// A0/l0 of a contact, m, > 0: its stiffness over the modulus that a spectrum states.
   std::optional<double> stiffness_per_modulus_m;
   /// Names of the estimated parameters that are a and b of sigma = a + b |model|; empty where the
   /// number of `noise` holds. Data sets that name the same parameter share it.
   std::string sigma_a, sigma_b;
 
+  [[nodiscard]] bool is_clipped_above(double reading) const;
+  [[nodiscard]] bool is_clipped_below(double reading) const;
   /// The size of the noise is estimated along with the model's parameters.
   [[nodiscard]] bool estimates_sigma() const { return !sigma_a.empty() || !sigma_b.empty(); }
 };

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/files/blocks/protocol_block.hpp"
@@ -93,6 +94,20 @@ void parse_stiffness_per_modulus(const Json& j, const FitConfig& config, DataCho
   throw bad_input(here.where, "not above 0", "A0/l0 such as \"12.56 mm\"");
 }
 
+/// Limits of the force cell.
+void parse_clipping(const Json& j, const FitConfig& config, DataChoice& data,
+                    const DocumentPlace& place) {
+  for (const auto& [key, limit] : {std::pair{"clipped_above", &data.clipped_above},
+                                   {"clipped_below", &data.clipped_below}}) {
+    if (!j.contains(key)) continue;
+    if (data.protocol.kind != Kind::measured) {
+      throw bad_input(place.key(key).where, "without a recording",
+                      "it only with the protocol 'measured'");
+    }
+    *limit = quantity_at(j, key, reading_dimension(config, data), place);
+  }
+}
+
 /// How a recording that has no description is read.
 ImportOptions parse_import(const Json& j, const DocumentPlace& place) {
   ImportOptions import;
@@ -123,6 +138,7 @@ DataChoice parse_data(const Json& j, const FitConfig& config, const DocumentPlac
   if (j.contains("import")) data.import = parse_import(j.at("import"), place.key("import"));
   if (j.contains("from")) data.from_s = quantity_at(j, "from", Dimension::time, place);
   if (j.contains("to")) data.to_s = quantity_at(j, "to", Dimension::time, place);
+  parse_clipping(j, config, data, place);
   const bool recording = data.protocol.kind == Kind::measured;
   const bool importable = recording || data.protocol.kind == Kind::oscillation;
   if (!importable && j.contains("import")) {
@@ -144,6 +160,21 @@ DataChoice parse_data(const Json& j, const FitConfig& config, const DocumentPlac
     }
   }
   return data;
+}
+
+namespace {
+
+/// A limit may have gone through a unit and back.
+constexpr double kSameReading = 1e-9;
+
+}  // namespace
+
+bool DataChoice::is_clipped_above(double reading) const {
+  return clipped_above && reading >= *clipped_above - kSameReading * std::abs(*clipped_above);
+}
+
+bool DataChoice::is_clipped_below(double reading) const {
+  return clipped_below && reading <= *clipped_below + kSameReading * std::abs(*clipped_below);
 }
 
 std::string_view protocol_kind_name(Kind kind) noexcept {

@@ -198,6 +198,32 @@ void add_step_response(ExperimentSet& set, const FitConfig& config, std::size_t 
   set.experiments.push_back({std::move(course), std::move(places), choice});
 }
 
+/// Censors the readings of a recording at the limits of the force cell: as bands that are open
+/// towards the outside, and of which nothing is asked. Near a limit the noise decides which
+/// readings stand there, so that those in between would bias the fit: they are censored, too.
+void censor_recording(std::vector<FitDatum>& data, std::span<const std::size_t> places,
+                      const DataChoice& choice) {
+  constexpr std::size_t kGap = 20;
+  constexpr double kOpen = std::numeric_limits<double>::infinity();
+  const auto censor = [&](std::size_t i, bool above) {
+    FitDatum& d = data[places[i]];
+    if (d.held_out || !d.value) return;
+    d.lower = above ? *d.value : -kOpen;
+    d.upper = above ? kOpen : *d.value;
+    d.sigma = kOpen;
+    d.value.reset();
+  };
+  std::optional<std::size_t> last;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const FitDatum& d = data[places[i]];
+    if (d.held_out || !d.value) continue;
+    const bool above = choice.is_clipped_above(*d.value);
+    if (!above && !choice.is_clipped_below(*d.value)) continue;
+    for (std::size_t k = last && i - *last <= kGap ? *last + 1 : i; k <= i; ++k) censor(k, above);
+    last = i;
+  }
+}
+
 void add_recording(ExperimentSet& set, const FitConfig& config, std::size_t choice,
                    const Recording& recording) {
   if (is_step_response(recording.response_quantity)) {
@@ -230,6 +256,7 @@ void add_recording(ExperimentSet& set, const FitConfig& config, std::size_t choi
     experiment.data.push_back(set.data.size());
     set.data.push_back(std::move(datum));
   }
+  if (data.clipped_above || data.clipped_below) censor_recording(set.data, experiment.data, data);
   set.experiments.push_back(std::move(experiment));
 }
 

@@ -23,14 +23,26 @@ void keep_ceres_quiet() {
   std::call_once(once, [] { FLAGS_minloglevel = google::GLOG_FATAL; });
 }
 
-/// The residuals as a function of the free thetas only.
+/// Unit in which the search sees a parameter, a power of 2 so that it adds no rounding: its
+/// tolerances are absolute, or compare parameters with each other. 1 where theta has no unit.
+double search_unit(const FitParameter& p, double theta) {
+  constexpr double kOfBounds = 1e-3;
+  if (p.scale != Scale::linear) return 1.0;
+  const double width = p.theta_upper() - p.theta_lower();
+  const double size = std::max(std::abs(theta), std::isfinite(width) ? kOfBounds * width : 0.0);
+  return size > 0.0 ? std::exp2(std::round(std::log2(size))) : 1.0;
+}
+
+/// The residuals as a function of the free thetas only, each in its unit.
 class FreeThetaCost final : public ceres::CostFunction {
  public:
   FreeThetaCost(const ResidualFunction& function, std::span<const FitParameter> parameters,
-                std::vector<std::size_t> free, std::vector<double> natural)
+                std::vector<std::size_t> free, std::vector<double> units,
+                std::vector<double> natural)
       : function_(function),
         parameters_(parameters),
         free_(std::move(free)),
+        units_(std::move(units)),
         natural_(std::move(natural)) {
     set_num_residuals(static_cast<int>(function.residual_count()));
     mutable_parameter_block_sizes()->push_back(static_cast<int>(free_.size()));
@@ -40,7 +52,7 @@ class FreeThetaCost final : public ceres::CostFunction {
     std::vector<double> natural = natural_;
     for (std::size_t j = 0; j < free_.size(); ++j) {
       const FitParameter& p = parameters_[free_[j]];
-      natural[free_[j]] = std::clamp(p.natural(theta[0][j]), p.lower, p.upper);
+      natural[free_[j]] = std::clamp(p.natural(theta[0][j] * units_[j]), p.lower, p.upper);
     }
     const bool want_jacobian = jacobians != nullptr && jacobians[0] != nullptr;
     Eigen::VectorXd r;
@@ -50,7 +62,8 @@ class FreeThetaCost final : public ceres::CostFunction {
     if (!want_jacobian) return true;
     Eigen::Map<RowMatrix> out(jacobians[0], r.size(), static_cast<Eigen::Index>(free_.size()));
     for (std::size_t j = 0; j < free_.size(); ++j) {
-      const double slope = parameters_[free_[j]].natural_slope(theta[0][j]);
+      const double slope =
+          parameters_[free_[j]].natural_slope(theta[0][j] * units_[j]) * units_[j];
       out.col(static_cast<Eigen::Index>(j)) = d.col(static_cast<Eigen::Index>(free_[j])) * slope;
     }
     return true;
@@ -60,6 +73,7 @@ class FreeThetaCost final : public ceres::CostFunction {
   const ResidualFunction& function_;
   std::span<const FitParameter> parameters_;
   std::vector<std::size_t> free_;
+  std::vector<double> units_;
   std::vector<double> natural_;
 };
 
@@ -124,19 +138,25 @@ namespace {
 void descend(const ResidualFunction& function, std::span<const FitParameter> parameters,
              const std::vector<std::size_t>& free, FirstStep first_step, Minimum& minimum) {
   std::vector<double> theta;
+  std::vector<double> units;
   theta.reserve(free.size());
-  for (const std::size_t i : free) theta.push_back(parameters[i].theta(minimum.natural[i]));
+  units.reserve(free.size());
+  for (const std::size_t i : free) {
+    const double start = parameters[i].theta(minimum.natural[i]);
+    units.push_back(search_unit(parameters[i], start));
+    theta.push_back(start / units.back());
+  }
   ceres::Problem problem;
-  problem.AddResidualBlock(new FreeThetaCost(function, parameters, free, minimum.natural), nullptr,
-                           theta.data());
+  problem.AddResidualBlock(new FreeThetaCost(function, parameters, free, units, minimum.natural),
+                           nullptr, theta.data());
   for (std::size_t j = 0; j < free.size(); ++j) {
     const FitParameter& p = parameters[free[j]];
     const int index = static_cast<int>(j);
     if (std::isfinite(p.theta_lower())) {
-      problem.SetParameterLowerBound(theta.data(), index, p.theta_lower());
+      problem.SetParameterLowerBound(theta.data(), index, p.theta_lower() / units[j]);
     }
     if (std::isfinite(p.theta_upper())) {
-      problem.SetParameterUpperBound(theta.data(), index, p.theta_upper());
+      problem.SetParameterUpperBound(theta.data(), index, p.theta_upper() / units[j]);
     }
   }
   ceres::Solver::Options options = solver_options(first_step);
@@ -146,7 +166,7 @@ void descend(const ResidualFunction& function, std::span<const FitParameter> par
   ceres::Solve(options, &problem, &summary);
   for (std::size_t j = 0; j < free.size(); ++j) {
     const FitParameter& p = parameters[free[j]];
-    minimum.natural[free[j]] = std::clamp(p.natural(theta[j]), p.lower, p.upper);
+    minimum.natural[free[j]] = std::clamp(p.natural(theta[j] * units[j]), p.lower, p.upper);
   }
   minimum.iterations += static_cast<int>(summary.iterations.size());
   minimum.converged = summary.termination_type == ceres::CONVERGENCE;

@@ -188,6 +188,9 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
     p.flags.push_back(fmt::format("extrapolates: lasts {} s, and the law was fitted to {} s",
                                   significant(duration, 3), significant(fitted, 3)));
   }
+  if (law.adequacy && !law.adequacy->is_adequate()) {
+    p.flags.insert(p.flags.begin(), law.adequacy->words);
+  }
   for (const std::string& name : law.uncertainty->at_bound) {
     p.flags.push_back(
         fmt::format("{} stood on a bound of the fit: its uncertainty is not in the bands", name));
@@ -222,7 +225,7 @@ LawFile at_surface(const LawFile& law) {
   LawFile plain = law;
   const std::vector<LawParameter> parameters = law_parameters(law.spec);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (parameters[i].nuisance) plain.values[i] = 0.0;
+    if (belongs_to_recording(law.spec, parameters[i])) plain.values[i] = 0.0;
   }
   return plain;
 }
@@ -234,10 +237,7 @@ UncertainCoordinates fitted_coordinates(const LawFile& law, Placement placement)
   UncertainCoordinates result;
   for (std::size_t i = 0; i < u.place.size(); ++i) {
     const LawParameter& p = parameters[u.place[i]];
-    const bool leave_out = placement == Placement::surface
-                               ? p.nuisance
-                               : placement == Placement::own && belongs_to_recording(law.spec, p);
-    if (leave_out) continue;
+    if (placement != Placement::fitted && belongs_to_recording(law.spec, p)) continue;
     kept.push_back(static_cast<Eigen::Index>(i));
     result.place.push_back(u.place[i]);
     result.coordinate.push_back(u.coordinate[i]);

@@ -15,13 +15,11 @@ namespace {
 
 constexpr std::size_t kMostTimes = 200;  // of a motion, that the forces are compared at
 
-/// The law's own contact and offset if it was fitted to this recording alone; else those that suit
-/// the recording best.
+/// Contact and offset of the fit if the law was fitted to this recording; else those that suit it
+/// best.
 RecordingPlacement placement_of(const LawFile& law, const PreparedRecording& recording) {
-  const std::string& sha256 = recording.recording.header.sha256;
-  const bool own = law.uncertainty && law.uncertainty->data.size() == 1 && !sha256.empty() &&
-                   law.uncertainty->data.front().sha256 == sha256;
-  const std::vector<double> values = own ? law.values : place_recording(law, recording).values;
+  const auto fitted = values_in_fit(law, recording);
+  const std::vector<double> values = fitted ? *fitted : place_recording(law, recording).values;
   return {values[values.size() - 2], values.back()};
 }
 

@@ -56,6 +56,10 @@ struct OwnPlacement {
   std::vector<double> values;      ///< of the whole law
   std::vector<std::size_t> place;  ///< of what was found
 };
+/// All parameters of the law as they were fitted to this recording, told by its SHA-256; none if it
+/// is not among the fitted files, or if the law file does not say where it was placed.
+[[nodiscard]] std::optional<std::vector<double>> values_in_fit(const LawFile& law,
+                                                               const PreparedRecording& recording);
 /// For the law itself, with the starts of a fit.
 [[nodiscard]] OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording);
 

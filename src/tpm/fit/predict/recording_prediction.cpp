@@ -8,6 +8,7 @@
 
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
+#include "tpm/fit/select/clipping.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -25,6 +26,7 @@ void add_own_directions(UncertainCoordinates& u, const OwnPlacement& own, const 
   std::vector<double> sd;
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
     if (r.time_s[i] < recording.from_s || r.time_s[i] > recording.to_s) continue;
+    if (is_clipped(recording, r.response[i])) continue;
     times.push_back(r.time_s[i]);
     if (!r.response_sd.empty()) sd.push_back(r.response_sd[i]);
   }
@@ -58,10 +60,28 @@ void add_own_directions(UncertainCoordinates& u, const OwnPlacement& own, const 
   }
 }
 
-bool has_read(const LawFile& law, const PreparedRecording& recording) {
+/// The file among those that the law was fitted to; none if it was not.
+const FittedFile* fitted_file(const LawFile& law, const PreparedRecording& recording) {
   const std::string& sha256 = recording.recording.header.sha256;
   const auto& data = law.uncertainty->data;
-  return !sha256.empty() && std::ranges::find(data, sha256, &FittedFile::sha256) != data.end();
+  if (sha256.empty()) return nullptr;
+  const auto found = std::ranges::find(data, sha256, &FittedFile::sha256);
+  return found != data.end() ? &*found : nullptr;
+}
+
+/// The placement of one of several recordings that were fitted together.
+std::optional<OwnPlacement> placement_in_fit(const LawFile& law, const FittedFile* file) {
+  if (file == nullptr || !file->contact || !file->offset) return std::nullopt;
+  OwnPlacement own{law.values, {}};
+  const std::vector<LawParameter> parameters = law_parameters(law.spec);
+  for (std::size_t i = parameters.size() - 2; i < parameters.size(); ++i) {
+    if (!belongs_to_recording(law.spec, parameters[i])) continue;
+    own.values[i] = parameters[i].name == "offset" ? *file->offset : *file->contact;
+    if (std::ranges::find(file->held, parameters[i].name) == file->held.end()) {
+      own.place.push_back(i);
+    }
+  }
+  return own;
 }
 
 void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& recording) {
@@ -74,18 +94,27 @@ void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& reco
     int inside = 0;
   };
   Sum sums[3];
+  int clipped = 0;
   PredictionComparison* parts[3] = {&own.fitted, &own.held_out, &own.outside};
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
     const bool window = r.time_s[i] >= recording.from_s && r.time_s[i] <= recording.to_s;
     bool fitted = false;
+    bool at_limit = window && is_clipped(recording, r.response[i]);
     for (const FittedFile& file : law.uncertainty->data) {
-      fitted = fitted ||
-               (!file.sha256.empty() && file.sha256 == r.header.sha256 && file.holds(r.time_s[i]));
+      if (file.sha256.empty() || file.sha256 != r.header.sha256) continue;
+      if (!file.holds(r.time_s[i])) continue;
+      at_limit = at_limit || file.clips(r.response[i]);
+      fitted = true;
     }
+    fitted = fitted && !at_limit;
     own.in_window.push_back(window);
     own.was_fitted.push_back(fitted);
     if (window) own.peak = std::max(own.peak, std::abs(r.response[i]));
     if (!std::isfinite(p.response[i])) continue;
+    if (at_limit) {
+      ++clipped;
+      continue;
+    }
     const std::size_t part = fitted ? 0 : window ? 1 : 2;
     const double off = p.response[i] - r.response[i];
     ++parts[part]->samples;
@@ -100,10 +129,25 @@ void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& reco
     parts[part]->rms = std::sqrt(sums[part].squares / n);
     if (!p.reading_lower.empty()) parts[part]->share_in_reading_band = 1.0 * sums[part].inside / n;
   }
+  if (clipped > 0) {
+    p.flags.push_back(fmt::format(
+        "clipping: {} readings stand at a limit of the force cell and are not compared", clipped));
+  }
   p.recording = std::move(own);
 }
 
 }  // namespace
+
+std::optional<std::vector<double>> values_in_fit(const LawFile& law,
+                                                 const PreparedRecording& recording) {
+  if (!law.uncertainty) return std::nullopt;
+  const FittedFile* file = fitted_file(law, recording);
+  if (file == nullptr) return std::nullopt;
+  const auto of_several = placement_in_fit(law, file);
+  if (of_several) return of_several->values;
+  if (law.uncertainty->data.size() > 1) return std::nullopt;
+  return law.values;
+}
 
 OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording) {
   SetupOptions setup;
@@ -145,11 +189,21 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
   LawPrediction p = begin_prediction(law, options);
   const Recording& r = recording.recording;
   require_quantities_of(law, recording);
-  p.placement =
-      options.placement.value_or(has_read(law, recording) ? Placement::fitted : Placement::own);
-  UncertainCoordinates u = fitted_coordinates(law, p.placement);
+  const bool known = values_in_fit(law, recording).has_value();
+  p.placement = options.placement.value_or(known ? Placement::fitted : Placement::own);
+  if (p.placement == Placement::fitted && !known && law.uncertainty->data.size() > 1) {
+    throw bad_input(fmt::format("recording '{}'", recording.name),
+                    "the law was fitted to several recordings, and this is none of them",
+                    "--placement own or surface");
+  }
+  const auto in_fit = placement_in_fit(law, fitted_file(law, recording));
+  const bool of_several = p.placement == Placement::fitted && in_fit;
+  UncertainCoordinates u = fitted_coordinates(law, of_several ? Placement::own : p.placement);
   std::vector<double> values = law.values;
-  if (p.placement == Placement::own) {
+  if (of_several) {
+    values = in_fit->values;
+    add_own_directions(u, *in_fit, model, law, recording, motion);
+  } else if (p.placement == Placement::own) {
     const OwnPlacement own = place();
     values = own.values;
     add_own_directions(u, own, model, law, recording, motion);

@@ -2,6 +2,7 @@
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/petab.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpmkit/fit.hpp"
 
@@ -25,8 +26,10 @@ FitSummary summary_of(const FitResult& fit) {
                                   .upper = p.upper,
                                   .verdict = p.verdict,
                                   .nuisance = p.nuisance,
+                                  .only_if_described = p.only_if_described,
                                   .words = p.words});
   }
+  summary.adequacy = fit.adequacy;
   summary.flags = fit.flags;
   summary.text = to_terminal_text(fit);
   summary.json = to_text(to_json(fit));
@@ -40,7 +43,7 @@ FitSummary fit_configuration(const std::filesystem::path& file, const FitRequest
   if (request.starts) problem.config.starts = *request.starts;
   if (request.seed) problem.config.seed = *request.seed;
   problem.config.interrupted = request.interrupted;
-  return summary_of(run_fit(problem));
+  return summary_of(fit_and_judge(problem));
 }
 
 FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,

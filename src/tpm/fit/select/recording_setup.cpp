@@ -10,6 +10,8 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/reading_options.hpp"
+#include "tpm/fit/select/clipping.hpp"
+#include "tpm/fit/select/imposed_channel.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -287,6 +289,8 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
     r.to_s = time[phase.first];
     break;
   }
+  find_imposed_channel(r);
+  if (!r.load_imposed) find_clipping(r);
   if (r.to_s > r.from_s) return r;
   throw bad_input(fmt::format("recording '{}'", r.name), "no ramp and hold before the unloading",
                   "a recording that loads before it unloads");
@@ -341,6 +345,8 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
     data.noise = noise_of(r);
     data.from_s = r.from_s;
     data.to_s = r.to_s;
+    data.clipped_above = r.clipped_above;
+    data.clipped_below = r.clipped_below;
     data.import = r.import;
     config.data.push_back(std::move(data));
   }
@@ -424,6 +430,12 @@ Json config_json(const FitConfig& config) {
     if (uses_relative(d.noise.kind)) entry["noise"]["relative"] = d.noise.relative;
     entry["noise"]["scale"] = d.noise.scale_known ? "known" : "estimated";
     if (const Json import = import_json(d.import); !import.empty()) entry["import"] = import;
+    const auto set_limit = [&](const char* key, const std::optional<double>& limit) {
+      if (!limit) return;
+      entry[key] = text(*limit, shown_unit(quantity_dimension(config.law->response)));
+    };
+    set_limit("clipped_above", d.clipped_above);
+    set_limit("clipped_below", d.clipped_below);
     if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, shown_unit(Dimension::time));
     if (std::isfinite(d.to_s)) entry["to"] = text(d.to_s, shown_unit(Dimension::time));
     return entry;

@@ -21,7 +21,11 @@ struct PreparedRecording {
   double to_s = 0.0;          ///< to the end of the first hold (before the drive first falls back)
   ImportOptions import;       ///< with which it was read, for the configuration
   std::string specimen = {};  ///< whose repeat it is, in a folder; empty: a specimen of its own
-  std::string read_as = {};   ///< how its columns and units were understood, in one sentence
+  /// Limits of the force cell: readings that stand there are censored, SI.
+  std::optional<double> clipped_above = std::nullopt, clipped_below = std::nullopt;
+  bool load_imposed = false;  ///< the response was imposed and the drive measured: creep
+  std::vector<std::string> warnings = {};  ///< what the recording cannot tell, one sentence each
+  std::string read_as = {};  ///< how its columns and units were understood, in one sentence
 };
 
 /// Finds the phases and chooses the window. Throws Error(bad_input) if there is nothing to fit.

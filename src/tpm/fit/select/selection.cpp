@@ -7,6 +7,7 @@
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpm/work/progress.hpp"
@@ -172,6 +173,11 @@ void score(Candidate& c, int samples, double effective) {
 std::string least_law_words(const Selection& s, const std::string& data) {
   const Candidate& chosen = s.candidates[s.recommended];
   if (s.candidates.size() == 1) return "the law that was asked for is";
+  if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) {
+    return fmt::format(
+        "of {} laws, none described by {}, the nearest with the fewest parameters is",
+        s.candidates.size(), data);
+  }
   if (chosen.identified) return fmt::format("the least law that {} support is", data);
   return fmt::format("{} identify none of the {} laws; near the best BIC the least{} is", data,
                      s.candidates.size(),
@@ -251,7 +257,7 @@ std::optional<HeldOut> predict_second_half(const Candidate& candidate,
   int count = 0;
   const RecordingFit& whole = candidate.fit.recordings.front();
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-    if (r.time_s[i] <= early.to_s || r.time_s[i] > recording.to_s) continue;
+    if (r.time_s[i] <= early.to_s || r.time_s[i] > recording.to_s || whole.is_censored(i)) continue;
     sum += std::pow(r.predicted[i] - r.observed[i], 2);
     sum_fitted += std::pow(whole.predicted[i] - whole.observed[i], 2);
     ++count;
@@ -323,10 +329,13 @@ void describe_prediction(Selection& s, std::size_t i) {
 void describe(Selection& s) {
   const Candidate& chosen = s.candidates[s.recommended];
   const Candidate& best = s.candidates[s.best_bic];
+  const std::optional<LawAdequacy>& adequacy = chosen.fit.adequacy;
+  if (adequacy && adequacy->is_rejected()) s.words.push_back(adequacy->words);
   s.words.push_back(fmt::format("{} {} ({}): {} parameters, rms residual {} % of the peak",
                                 least_law_words(s, "the data"), law_name(chosen.law),
                                 law_words(chosen.law), chosen.parameters - 1,
                                 significant(100.0 * chosen.rms_over_peak, 3)));
+  if (adequacy && !adequacy->is_rejected()) s.words.push_back(adequacy->words);
   if (s.recommended != s.best_bic) {
     s.words.push_back(fmt::format(
         "{} has the lowest BIC, by {}, {}", law_name(best.law), significant(chosen.delta_bic, 3),
@@ -468,6 +477,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
     reassess(chosen, protocol_spans(recordings));
   }
   std::ranges::move(protocol_warnings(chosen.fit, recordings), std::back_inserter(s.warnings));
+  state_adequacy(s, recordings);
   describe(s);
   return s;
 }

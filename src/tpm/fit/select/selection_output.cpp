@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "tpm/base/text.hpp"
+#include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/select/selection.hpp"
 
 namespace tpm::fit {
@@ -57,6 +58,9 @@ Json to_json(const Selection& s) {
          {"effective_readings", kept_digits(s.effective_count)}};
   Json laws = array_json(s.candidates, candidate_json);
   j["laws"] = std::move(laws);
+  if (const auto& adequacy = s.candidates[s.recommended].fit.adequacy) {
+    j["adequacy"] = files::to_json(*adequacy);
+  }
   j["words"] = s.words;
   j["warnings"] = s.warnings;
   j["fit"] = to_json(s.candidates[s.recommended].fit);

@@ -27,7 +27,7 @@ Outside outside_of(const RecordingFit& r) {
     if (r.fitted[i]) o.last_fitted_s = r.time_s[i];
   }
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-    if (r.time_s[i] <= o.last_fitted_s) continue;
+    if (r.time_s[i] <= o.last_fitted_s || r.is_censored(i)) continue;
     ++o.count;
     if (!std::isfinite(r.predicted[i])) {
       if (o.unknown_s == 0.0) o.unknown_s = r.time_s[i];
@@ -111,6 +111,9 @@ ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings) {
 std::vector<std::string> protocol_warnings(const FitResult& fit,
                                            std::span<const PreparedRecording> recordings) {
   std::vector<std::string> warnings = unit_warnings(recordings);
+  for (const PreparedRecording& r : recordings) {
+    warnings.insert(warnings.end(), r.warnings.begin(), r.warnings.end());
+  }
   const auto [ramp_s, hold_s, step_s] = protocol_spans(recordings);
   if (hold_s == 0.0) {
     warnings.emplace_back("there is no hold: relaxation is seen only through the ramp");

@@ -9,6 +9,8 @@
 #include <tuple>
 
 #include "tpm/base/text.hpp"
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpmkit/error.hpp"
 
@@ -110,6 +112,7 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
   row.specimen = one.front().specimen;
   row.reason = gave_up([&] {
     row.fit = run_fit(recording_config(law, one, setup), data_sets(one));
+    state_adequacy(*row.fit, one);
     row.place = branches_by_time(law, *row.fit);
   });
   return row;
@@ -256,6 +259,23 @@ Json to_json(const SpecimenStudy& study) {
 
 namespace {
 
+/// How many recordings the law does not describe, and of how many that could not be judged.
+std::string adequacy_words(const SpecimenStudy& study) {
+  std::string text;
+  const auto fitted = std::ranges::count_if(study.rows, [](const auto& r) { return !!r.fit; });
+  const auto say = [&](std::string_view verdict, std::string_view words) {
+    const auto count = std::ranges::count_if(study.rows, [&](const SpecimenRow& r) {
+      return r.fit && r.fit->adequacy && r.fit->adequacy->verdict == verdict;
+    });
+    if (count > 0) text += fmt::format("{} of {} recordings: {}\n", count, fitted, words);
+  };
+  say("not_described",
+      "no law tried describes them; what is pooled supposes that the law described them");
+  say("not_judged",
+      "adequacy cannot be judged: too few samples at rest before the load to tell the noise");
+  return text;
+}
+
 std::string shown_name(const SpecimenRow& row) {
   return row.specimen.empty() ? row.name : fmt::format("{} [{}]", row.name, row.specimen);
 }
@@ -263,7 +283,8 @@ std::string shown_name(const SpecimenRow& row) {
 }  // namespace
 
 std::string to_terminal_text(const SpecimenStudy& study) {
-  std::string text = study.why + "\n";
+  std::string text = adequacy_words(study);
+  text += study.why + "\n";
   if (depends_on_reference(study.law)) text += reference_words(study.law) + "\n";
   text += fmt::format("\n{:<32} {:>9}", "recording", "rms/peak");
   const auto first = std::find_if(study.rows.begin(), study.rows.end(),
@@ -293,6 +314,9 @@ std::string to_terminal_text(const SpecimenStudy& study) {
           " {:>22}", p.standard_error ? fmt::format("{} +- {}", significant(p.estimate / unit, 4),
                                                     significant(*p.standard_error / unit, 2))
                                       : significant(p.estimate / unit, 4));
+    }
+    if (row.fit->adequacy && !row.fit->adequacy->is_adequate()) {
+      text += fmt::format("  {}", row.fit->adequacy->words);
     }
     text += "\n";
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/base/text.hpp"
+#include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/likelihood/experiment_refit.hpp"
 #include "tpm/fit/verdict.hpp"
@@ -97,6 +98,7 @@ Json parameter_json(const ParameterResult& p) {
   j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
   j["verdict"] = verdict_text(p);
   if (p.nuisance) j["nuisance"] = true;
+  if (p.only_if_described) j["only_if_described"] = true;
   if (p.first_bounds) {
     j["bounds_widened_from_SI"] = pair_json(p.first_bounds->lower, p.first_bounds->upper);
   }
@@ -181,6 +183,9 @@ Json recordings_json(const FitResult& result) {
     j[tpm::si_key(r.response_quantity, "rms_residual")] = number(r.rms_residual);
     if (r.rms_outside) {
       j[tpm::si_key(r.response_quantity, "rms_residual_outside")] = number(*r.rms_outside);
+    }
+    if (const auto count = std::count(r.censored.begin(), r.censored.end(), true); count > 0) {
+      j["samples_censored"] = count;
     }
     if (r.not_predicted > 0) j["samples_not_predicted"] = r.not_predicted;
     j["share_inside_prediction_band"] = optional_number(r.share_inside);
@@ -299,6 +304,7 @@ Json to_json(const FitResult& result) {
   j["hypotheses"] = hypotheses_json(result);
   j["data"] = data_json(result);
   j["recordings"] = recordings_json(result);
+  if (result.adequacy) j["adequacy"] = files::to_json(*result.adequacy);
   j["flags"] = result.flags;
   return j;
 }

@@ -81,6 +81,9 @@ std::string recording_line(const FitResult& result, const RecordingFit& r) {
     text += fmt::format(" ({} % of the peak)", significant(100.0 * r.rms_residual / r.peak, 3));
   }
   if (r.rms_outside) text += fmt::format(", {} outside the window", shown(*r.rms_outside));
+  if (const auto count = std::ranges::count(r.censored, true); count > 0) {
+    text += fmt::format(", {} at a limit of the force cell (censored)", count);
+  }
   if (r.not_predicted > 0) text += fmt::format(", {} samples not predicted", r.not_predicted);
   if (r.share_inside) {
     text += fmt::format(", {} % within the {:.4g} % prediction band",

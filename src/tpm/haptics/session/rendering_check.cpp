@@ -157,6 +157,9 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
                                const LoopModel& loop, const DeviceLimits& limits) {
   const bool own = limits.hardware() || limits.simulated;
   RenderingCheck check;
+  if (session.law && session.law->adequacy && !session.law->adequacy->is_adequate()) {
+    check.warnings.push_back("law: " + session.law->adequacy->words);
+  }
   check.rate_Hz = 1.0 / session.servo.period_s;
   count_device(check, session, limits);
   check.largest_N_per_m = limits.stiffness_N_per_m;

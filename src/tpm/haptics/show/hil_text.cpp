@@ -8,6 +8,7 @@
 
 #include "tpm/base/printed_number.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/blocks/law_json.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 
@@ -179,12 +180,14 @@ std::string check_text(const JitterCheck& check) {
 }
 
 Json run_json(const HilSession& session, const SessionRun& run) {
+  const bool tested = session.law && session.law->adequacy;
   return {{"simulated_device", !run.device.hardware},
           {"title", session.title},
           {"device", to_json(run.device)},
           {"model",
            {{"name", run.model.name},
             {"error_bound", run.model.error_bound},
+            {"adequacy", tested ? files::to_json(*session.law->adequacy) : Json()},
             {"plan", run.model.plan}}},
           {"rendering", to_json(run.rendering)},
           {"rendering_on_omega7", run.on_hardware ? to_json(*run.on_hardware) : Json()},

@@ -1,0 +1,15 @@
+#pragma once
+#include "tpm/fit/select/recording_setup.hpp"
+
+namespace tpm::fit {
+
+/// Finds readings that stand at a limit of the force cell: a run at the largest or smallest reading
+/// of the ramp and hold that is longer than rounding makes (clipped_run), and that a tissue without
+/// relaxation under a drive at rest would not make. Sets clipped_above or clipped_below, and says
+/// it first among the words of the phases.
+void find_clipping(PreparedRecording& recording);
+
+/// Whether a reading stands at a limit that was found.
+[[nodiscard]] bool is_clipped(const PreparedRecording& recording, double reading);
+
+}  // namespace tpm::fit

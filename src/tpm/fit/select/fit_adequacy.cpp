@@ -1,0 +1,266 @@
+#include "tpm/fit/select/fit_adequacy.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "tpm/base/distributions.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/fit/select/adequacy.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr double kLevel = 0.01;
+
+/// What a verdict is about: one recording's readings at rest, or the noise that was stated.
+struct Judged {
+  Adequacy adequacy;
+  std::optional<std::size_t> choice;  ///< the recording; none: all data together
+  bool noise_was_stated = false;
+};
+
+/// Order of what must be said: rejected before not judged before adequate, then by the ratio.
+std::pair<int, double> rank(const Judged& judged) {
+  const Adequacy& a = judged.adequacy;
+  const int first = a.described == Described::not_described ? 2
+                    : a.described == Described::not_judged  ? 1
+                                                            : 0;
+  return {first, a.residual_over_noise};
+}
+
+/// A recording and where its rest ends.
+struct RestedRecording {
+  const Recording* recording = nullptr;
+  std::size_t at_rest = 0;
+  bool load_imposed = false;
+};
+
+Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int parameters,
+                     double level) {
+  const Recording& r = *rested.recording;
+  const auto end = static_cast<std::ptrdiff_t>(std::min(rested.at_rest, r.time_s.size()));
+  const std::vector<double> rest_time(r.time_s.begin(), r.time_s.begin() + end);
+  const std::vector<double> rest(r.response.begin(), r.response.begin() + end);
+  std::vector<double> time;
+  std::vector<double> reading;
+  std::vector<double> residual;
+  for (std::size_t i = 0; i < fit.time_s.size(); ++i) {
+    if (!fit.fitted[i] || !std::isfinite(fit.predicted[i])) continue;
+    time.push_back(fit.time_s[i]);
+    reading.push_back(fit.observed[i]);
+    residual.push_back(fit.observed[i] - fit.predicted[i]);
+  }
+  return judge_adequacy({rest_time, rest, time, reading, residual, parameters}, level);
+}
+
+/// Parameters that a recording's residuals have to pay for: an equal share of all.
+int parameters_each(const FitResult& fit) {
+  const auto count = static_cast<int>(std::max<std::size_t>(fit.recordings.size(), 1));
+  return (static_cast<int>(fit.parameters.size()) + count - 1) / count;
+}
+
+/// The recording that the law describes worst.
+std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecording> rested) {
+  std::optional<Judged> worst;
+  const double level =
+      kLevel / static_cast<double>(std::max<std::size_t>(fit.recordings.size(), 1));
+  for (const RecordingFit& r : fit.recordings) {
+    if (rested[r.choice].recording == nullptr) continue;
+    Judged one{adequacy_of(r, rested[r.choice], parameters_each(fit), level), r.choice, false};
+    if (!worst || rank(one) > rank(*worst)) worst = std::move(one);
+  }
+  return worst;
+}
+
+std::vector<RestedRecording> rested(std::span<const PreparedRecording> recordings) {
+  std::vector<RestedRecording> list;
+  list.reserve(recordings.size());
+  for (const PreparedRecording& r : recordings) {
+    list.push_back({&r.recording, samples_at_rest(r.phases), r.load_imposed});
+  }
+  return list;
+}
+
+/// Independent samples that correlated ones count as, in a sum of squares: n (1 - r^2) / (1 + r^2),
+/// at the upper confidence bound of their lag-1 correlation.
+double degrees_of(const RecordingFit& fit) {
+  constexpr double kConfidence = 2.0, kMost = 0.98;
+  const auto n = static_cast<double>(std::ranges::count(fit.fitted, true));
+  if (!fit.correlation || n < 2.0) return n;
+  const double r = fit.correlation->lag1;
+  const double error = std::sqrt(std::max(1.0 - r * r, 0.05) / n);
+  const double upper = std::clamp(r + kConfidence * error, 0.0, kMost);
+  return n * (1.0 - upper * upper) / (1.0 + upper * upper);
+}
+
+/// The residuals against noise whose size the configuration states. None if it does not state it
+/// as a normal law, or if nothing is left to test.
+std::optional<Judged> against_stated_noise(const FitResult& fit) {
+  if (!fit.chi_square_p) return std::nullopt;
+  double squares = 0.0;
+  double degrees = 0.0;
+  for (const FittedDatum& d : fit.data) {
+    if (d.datum.held_out || !d.datum.value) continue;
+    squares += d.standardised * d.standardised;
+    degrees += 1.0;
+  }
+  for (const RecordingFit& r : fit.recordings) {
+    for (std::size_t i = 0; i < r.standardised.size(); ++i) {
+      if (r.fitted[i]) squares += r.standardised[i] * r.standardised[i];
+    }
+    degrees += degrees_of(r);
+  }
+  degrees = std::max(degrees - static_cast<double>(fit.parameters.size()), 1.0);
+  Judged judged{{}, std::nullopt, true};
+  Adequacy& a = judged.adequacy;
+  a.residual_over_noise = std::sqrt(squares / fit.degrees_of_freedom);
+  a.noise_sd = 1.0;
+  a.p_value = chi_squared_tail(degrees * squares / fit.degrees_of_freedom, degrees);
+  a.described = a.p_value < kLevel ? Described::not_described : Described::adequate;
+  return judged;
+}
+
+std::string times_the_noise(const Judged& judged) {
+  return fmt::format("residual {} times the noise {}",
+                     significant(judged.adequacy.residual_over_noise, 2),
+                     judged.noise_was_stated ? "that is stated" : "at rest");
+}
+
+/// "this recording", or which of several.
+std::string subject(const FitResult& fit, const Judged& judged) {
+  if (!judged.choice) return "these data";
+  if (fit.config.data.size() == 1) return "this recording";
+  return fmt::format("'{}'", fit.config.data[*judged.choice].dataset);
+}
+
+/// What a fit says of its adequacy.
+/// @param tried how many laws were fitted
+/// @param other one of them that does describe the data
+LawAdequacy stated(const FitResult& fit, const Judged& judged, std::size_t tried,
+                   const std::optional<LawSpec>& other) {
+  LawAdequacy result;
+  const Adequacy& a = judged.adequacy;
+  result.verdict = described_name(a.described);
+  if (a.described == Described::not_judged) {
+    result.words =
+        "adequacy cannot be judged: too few samples at rest before the load to tell the noise";
+    return result;
+  }
+  result.residual_over_noise = a.residual_over_noise;
+  if (a.described == Described::adequate) {
+    result.words =
+        fmt::format("the law describes {}: {}", subject(fit, judged), times_the_noise(judged));
+    return result;
+  }
+  const std::string law = fit.config.law ? law_name(*fit.config.law) : "the model";
+  if (other) {
+    result.words = fmt::format("{} does not describe {}: {}; {} does", law, subject(fit, judged),
+                               times_the_noise(judged), law_name(*other));
+  } else {
+    result.words = fmt::format("no law tried describes {}: {}{}", subject(fit, judged),
+                               times_the_noise(judged),
+                               tried == 1 ? fmt::format(" (only {} was tried)", law) : "");
+  }
+  result.causes = a.causes;
+  if (!a.causes.empty()) {
+    result.words += fmt::format("; likely cause: {}", fmt::join(a.causes, "; and "));
+  }
+  return result;
+}
+
+void add_condition(FitResult& fit, std::string_view words) {
+  for (ParameterResult& p : fit.parameters) {
+    p.only_if_described = true;
+    p.words += words;
+  }
+}
+
+void state(FitResult& fit, LawAdequacy adequacy) {
+  if (adequacy.is_rejected()) {
+    add_condition(fit, "; this supposes that the law describes the data, which it does not");
+  }
+  fit.adequacy = std::move(adequacy);
+}
+
+/// Creep that is fitted as if its strain were exact.
+bool state_creep(FitResult& fit, std::span<const RestedRecording> rests) {
+  if (std::ranges::none_of(rests, &RestedRecording::load_imposed)) return false;
+  add_condition(fit, "; this supposes an exact strain, and the stress was imposed");
+  fit.adequacy =
+      LawAdequacy{"not_judged",
+                  {},
+                  "adequacy cannot be judged: the stress was imposed and the strain measured",
+                  {}};
+  return true;
+}
+
+}  // namespace
+
+std::size_t samples_at_rest(const RecordingPhases& phases) {
+  std::size_t end = 0;
+  if (phases.contact_found && !phases.preloaded) {
+    end = phases.contact_index;
+  } else if (phases.phases.size() > 1 && phases.phases.front().kind == PhaseKind::hold) {
+    end = phases.phases.front().last;
+  }
+  const std::size_t late = end / 10 + 2;
+  return end > late ? end - late : 0;
+}
+
+void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings) {
+  const std::vector<RestedRecording> rests = rested(recordings);
+  if (state_creep(fit, rests)) return;
+  const auto worst = worst_of(fit, rests);
+  if (worst) state(fit, stated(fit, *worst, 1, {}));
+}
+
+void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
+  Candidate& chosen = s.candidates[s.recommended];
+  const std::vector<RestedRecording> rests = rested(recordings);
+  if (state_creep(chosen.fit, rests)) {
+    chosen.identified = false;
+    chosen.reason = "supposes an exact strain, and the stress was imposed";
+    return;
+  }
+  const auto worst = worst_of(chosen.fit, rests);
+  if (!worst) return;
+  const bool rejected = worst->adequacy.described == Described::not_described;
+  std::optional<LawSpec> other;
+  for (const Candidate& c : s.candidates) {
+    if (!rejected || other || c.failed || &c == &chosen) continue;
+    const auto its = worst_of(c.fit, rests);
+    if (its && its->adequacy.described == Described::adequate) other = c.law;
+  }
+  const auto tried = static_cast<std::size_t>(
+      std::ranges::count_if(s.candidates, [](const Candidate& c) { return !c.failed; }));
+  state(chosen.fit, stated(chosen.fit, *worst, tried, other));
+  if (!rejected) return;
+  chosen.identified = false;
+  chosen.reason = "does not describe the data";
+}
+
+void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
+  std::optional<Judged> judged = against_stated_noise(fit);
+  if (!judged && !fit.recordings.empty()) {
+    std::vector<RestedRecording> rests(data.size());
+    for (const RecordingFit& r : fit.recordings) {
+      const auto* recording = std::get_if<Recording>(&data[r.choice]);
+      if (recording == nullptr || is_step_response(recording->response_quantity)) continue;
+      rests[r.choice] = {recording, samples_at_rest(find_phases(*recording)), false};
+    }
+    judged = worst_of(fit, rests);
+  }
+  if (judged) state(fit, stated(fit, *judged, 1, {}));
+}
+
+FitResult fit_and_judge(const FitProblem& problem) {
+  const std::vector<DataSet> data = problem.data.empty() ? load_data(problem.config) : problem.data;
+  FitResult fit = run_fit(problem.config, data);
+  state_adequacy(fit, data);
+  return fit;
+}
+
+}  // namespace tpm::fit

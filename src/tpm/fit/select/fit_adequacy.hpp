@@ -1,0 +1,35 @@
+#pragma once
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "tpm/fit/petab.hpp"
+#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/select/selection.hpp"
+
+namespace tpm::fit {
+
+/// Number of samples from the first on in which nothing is loaded: before contact, or before the
+/// drive first moves. The last tenth and two more are left out, because contact is found a little
+/// late.
+[[nodiscard]] std::size_t samples_at_rest(const RecordingPhases& phases);
+
+/// Tests whether the recommended law describes the recordings (judge_adequacy at 1 %, shared among
+/// them) and states it in its fit: FitResult::adequacy. If it does not, the law counts as not
+/// identified, and each of its parameters as known only if the law described the data.
+void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings);
+
+/// The same for one fit.
+/// @param recordings those that were fitted, in the order of the fit's data
+void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings);
+
+/// The same for a fit whose configuration states the size of the noise, which is then what the
+/// residuals are compared with; for recordings without, by their samples at rest. Says nothing of
+/// separate readings whose noise is not known.
+/// @param data what was fitted, one for each of the configuration's data sets
+void state_adequacy(FitResult& fit, const std::vector<DataSet>& data);
+
+/// run_fit() of the problem, with its adequacy stated.
+[[nodiscard]] FitResult fit_and_judge(const FitProblem& problem);
+
+}  // namespace tpm::fit

@@ -1,0 +1,96 @@
+#include "tpm/fit/select/imposed_channel.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "tpm/base/median.hpp"
+#include "tpm/base/text.hpp"
+
+namespace tpm::fit {
+namespace {
+
+double range_of(std::span<const double> values) {
+  const auto [low, high] = std::ranges::minmax_element(values);
+  return *high - *low;
+}
+
+double average_of(std::span<const double> values) {
+  double sum = 0.0;
+  for (const double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+/// Standard deviation of the noise, from samples against the line between their neighbours.
+double noise_of_channel(std::span<const double> time_s, std::span<const double> values) {
+  constexpr double kNormal = 0.6745;  // the median of |z|
+  std::vector<double> off;
+  for (std::size_t i = 1; i + 1 < values.size(); ++i) {
+    const double share = (time_s[i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);
+    const double line = values[i - 1] + share * (values[i + 1] - values[i - 1]);
+    const double scale = std::sqrt(1.0 + share * share + (1.0 - share) * (1.0 - share));
+    off.push_back(std::abs(values[i] - line) / scale);
+  }
+  return median(std::move(off)) / kNormal;
+}
+
+/// The part of a recording up to where the stress falls back.
+std::size_t end_of_load(std::span<const double> stress) {
+  constexpr double kFallen = 0.1;  // of the range
+  const double range = range_of(stress);
+  const auto peak = std::ranges::max_element(stress);
+  const auto fallen =
+      std::find_if(peak, stress.end(), [&](double s) { return *peak - s > kFallen * range; });
+  return static_cast<std::size_t>(fallen - stress.begin());
+}
+
+/// Whether a channel stays where it is over the last half of the load, while another goes on.
+bool was_held(std::span<const double> held, double held_noise, std::span<const double> other,
+              double other_noise) {
+  constexpr double kStill = 0.005, kSure = 4.0;
+  const std::size_t half = held.size() / 2;
+  const auto late = held.subspan(half);
+  if (range_of(late) > kStill * range_of(held) + 2.0 * kSure * held_noise) return false;
+  const std::size_t quarter = other.size() / 4;
+  const double moved =
+      std::abs(average_of(other.last(quarter)) - average_of(other.subspan(half, quarter)));
+  return moved > kSure * other_noise / std::sqrt(static_cast<double>(quarter));
+}
+
+}  // namespace
+
+void find_imposed_channel(PreparedRecording& recording) {
+  constexpr std::size_t kFewest = 40;
+  constexpr double kMuchLess = 3.0;  // times less noise, in parts of the range
+  constexpr double kNoisy = 2e-3;    // of the range: a channel that is not exact
+  const Recording& r = recording.recording;
+  if (r.drive_quantity != Quantity::strain || r.response_quantity != Quantity::stress) return;
+  const std::size_t end = end_of_load(r.response);
+  if (end < kFewest) return;
+  const auto time = std::span(r.time_s).first(end);
+  const auto strain = std::span(r.drive).first(end);
+  const auto stress = std::span(r.response).first(end);
+  if (!(range_of(strain) > 0.0 && range_of(stress) > 0.0)) return;
+  const double strain_noise = noise_of_channel(time, strain);
+  const double stress_noise = noise_of_channel(time, stress);
+  const double of_strain = strain_noise / range_of(strain);
+  const double of_stress = stress_noise / range_of(stress);
+  const bool imposed =
+      of_strain > kMuchLess * of_stress && was_held(stress, stress_noise, strain, strain_noise);
+  const bool both_noisy = std::min(of_strain, of_stress) > kNoisy;
+  recording.load_imposed = imposed;
+  if (!imposed && !both_noisy) return;
+  recording.warnings.push_back(fmt::format(
+      "{}: {}; noise is {} % of the range of the strain and {} % of that of the stress. The fit "
+      "takes "
+      "the strain as exact: its noise makes fast branches look weaker and intervals too narrow",
+      recording.name,
+      imposed ? "the stress was imposed (it was held while the strain went on: creep)"
+              : "both channels are noisy",
+      significant(100.0 * of_strain, 2), significant(100.0 * of_stress, 2)));
+}
+
+}  // namespace tpm::fit

@@ -1,0 +1,56 @@
+// A part of measure_adequacy (reports/adequacy), with the rates that the whole is held to.
+#include <catch2/catch.hpp>
+
+#include "adequacy_studies.hpp"
+
+using namespace tpm;
+using test::AdequacyOutcome;
+using test::AdequacyTrial;
+using test::Defect;
+
+TEST_CASE("fits of healthy recordings are seldom called wrong", "[adequacy][slow]") {
+  int wrong = 0, intervals = 0, missing = 0;
+  for (int i = 0; i < 120; ++i) {
+    AdequacyTrial trial;
+    trial.seed = 1 + static_cast<std::uint64_t>(i);
+    trial.at_rest = 10 + 40 * (i % 5);
+    if (i % 3 == 1) trial.rho = 0.9;
+    if (i % 3 == 2) trial.quantum = 0.5 * (1 + i % 10);
+    const AdequacyOutcome o = test::fitted(trial);
+    wrong += o.adequacy.is_rejected();
+    intervals += o.intervals;
+    missing += o.missing;
+  }
+  CHECK(wrong <= 5);  // 1.2 expected of a test at 1 %
+  CHECK(missing <= intervals / 7);
+}
+
+TEST_CASE("misfits of three noises are found", "[adequacy][slow]") {
+  int found = 0, all = 0;
+  for (const Defect defect : {Defect::slow_branch, Defect::drift, Defect::ringing}) {
+    AdequacyTrial trial;
+    trial.defect = defect;
+    trial.at_rest = 25;
+    trial.defect_N = test::amplitude_for(trial, 3.0);
+    for (int i = 0; i < 30; ++i) {
+      trial.seed = 100 + static_cast<std::uint64_t>(i);
+      ++all;
+      found += test::fitted(trial).adequacy.is_rejected();
+    }
+  }
+  CHECK(found >= all * 927 / 1000);
+}
+
+TEST_CASE("a clipped force cell is named and its samples censored", "[adequacy][slow]") {
+  int named = 0, adequate = 0;
+  for (int i = 0; i < 60; ++i) {
+    AdequacyTrial trial;
+    trial.seed = 300 + static_cast<std::uint64_t>(i);
+    trial.clip = 0.6 + 0.35 * i / 59.0;
+    const AdequacyOutcome o = test::fitted(trial);
+    named += o.clipped;
+    adequate += o.adequacy.is_adequate();
+  }
+  CHECK(named >= 59);
+  CHECK(adequate >= 55);
+}

@@ -1,0 +1,171 @@
+// What a fit says of its own adequacy, and who repeats it: JSON, law files, predictions, exports.
+#include <catch2/catch.hpp>
+
+#include "adequacy_studies.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/blocks/law_export.hpp"
+#include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/predict/law_prediction.hpp"
+#include "tpm/fit/select/clipping.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/law_model.hpp"
+
+using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::data;
+using namespace tpm::files;
+using namespace tpm::fit;
+using Catch::Contains;
+using Catch::StartsWith;
+using test::AdequacyTrial;
+using test::Defect;
+
+namespace {
+
+Selection selected(const PreparedRecording& recording) {
+  SelectionOptions options;
+  options.laws = {parse_law_name("linear-1", "test")};
+  options.only_listed = true;
+  options.held_out = false;
+  options.setup.starts = 4;
+  options.setup.profiles = false;
+  return select_law(std::span(&recording, 1), options);
+}
+
+const FitResult& best_of(const Selection& s) {
+  return s.candidates[s.recommended].fit;
+}
+
+PreparedRecording prepared(const AdequacyTrial& trial) {
+  Recording r = test::simulated(trial);
+  r.header.sha256 = std::string(64, 'a');
+  return prepare_recording("simulated", std::move(r));
+}
+
+}  // namespace
+
+TEST_CASE("a law that does not describe its recording says so first and everywhere",
+          "[adequacy][wired]") {
+  AdequacyTrial trial;
+  trial.at_rest = 60;
+  trial.defect = Defect::drift;
+  trial.defect_N = 0.1;
+  const PreparedRecording recording = prepared(trial);
+  const Selection s = selected(recording);
+  CHECK_THAT(s.words.front(), StartsWith("no law tried describes this recording: residual "));
+  CHECK_THAT(s.words.front(), Contains("times the noise") && Contains("likely cause: drift"));
+  CHECK_FALSE(s.candidates[s.recommended].identified);
+  const Json json = to_json(s);
+  CHECK(json.at("adequacy").at("verdict") == "not_described");
+  CHECK(json.at("adequacy").at("residual_over_noise") > 3.0);
+  for (const Json& p : json.at("fit").at("parameters")) {
+    CHECK(p.at("only_if_described") == true);
+    CHECK_THAT(p.at("verdict").get<std::string>(), Contains("only if the law described the data"));
+    CHECK_THAT(p.at("words").get<std::string>(), Contains("which it does not"));
+  }
+  const test::TempFolder folder;
+  write_law(folder.path() / "law.json", fitted_law(best_of(s)));
+  const LawFile law = read_law(folder.path() / "law.json");
+  REQUIRE(law.adequacy);
+  CHECK(law.adequacy->is_rejected());
+  CHECK(law.adequacy->words == s.words.front());
+  CHECK(predict_recording(law, recording, {}).flags.front() == s.words.front());
+  CHECK(export_warnings(law, {}).front() == s.words.front());
+}
+
+TEST_CASE("a law that describes its recording says how near it comes", "[adequacy][wired]") {
+  AdequacyTrial trial;
+  trial.at_rest = 60;
+  const Selection s = selected(prepared(trial));
+  const LawAdequacy& adequacy = best_of(s).adequacy.value();
+  CHECK(adequacy.is_adequate());
+  CHECK(adequacy.residual_over_noise.value() == Approx(1.0).margin(0.25));
+  CHECK_THAT(s.words.front(), !Contains("no law tried"));
+  CHECK_FALSE(best_of(s).parameters.front().only_if_described);
+}
+
+TEST_CASE("without a rest adequacy cannot be judged", "[adequacy][wired]") {
+  AdequacyTrial trial;
+  trial.at_rest = 4;
+  trial.defect = Defect::slow_branch;
+  trial.defect_N = 0.1;
+  const Selection s = selected(prepared(trial));
+  const LawAdequacy& adequacy = best_of(s).adequacy.value();
+  CHECK(adequacy.verdict == "not_judged");
+  CHECK_FALSE(adequacy.residual_over_noise);
+  CHECK_THAT(adequacy.words, StartsWith("adequacy cannot be judged"));
+}
+
+TEST_CASE("readings at the limit of a force cell are named and censored", "[adequacy][clipping]") {
+  AdequacyTrial trial;
+  trial.at_rest = 40;
+  trial.clip = 0.75;
+  const PreparedRecording recording = prepared(trial);
+  REQUIRE(recording.clipped_above);
+  CHECK_THAT(recording.phases.words.front(), StartsWith("clipping: "));
+  const Selection s = selected(recording);
+  const FitResult& fit = best_of(s);
+  CHECK(fit.adequacy.value().is_adequate());
+  for (const ParameterResult& p : fit.parameters) {
+    const double truth = p.parameter.name == "k_inf"  ? 60.0
+                         : p.parameter.name == "k1"   ? 45.0
+                         : p.parameter.name == "tau1" ? 2.0
+                                                      : 0.0;
+    if (truth > 0.0) CHECK(std::abs(p.estimate - truth) < 4.0 * p.standard_error.value());
+  }
+  CHECK(std::ranges::any_of(fit.flags, [](const auto& f) { return f.starts_with("clipping"); }));
+  const Json data = config_json(fit.config).at("data").front();
+  CHECK(data.contains("clipped_above"));
+  const LawFile law = fitted_law(fit);
+  CHECK(law.uncertainty.value().data.front().clipped_above == recording.clipped_above);
+  const LawPrediction p = predict_recording(law, recording, {});
+  CHECK(p.recording.value().fitted.rms ==
+        Approx(fit.recordings.front().rms_residual).epsilon(1e-6));
+}
+
+TEST_CASE("what looks like a limit of the force cell and is none", "[adequacy][clipping]") {
+  AdequacyTrial exact;
+  exact.noisy = false;
+  CHECK_FALSE(prepared(exact).clipped_above);
+  Recording elastic;
+  Recording creep;  // 4 N kept from 1 s on, and the depth goes on
+  for (Recording* r : {&elastic, &creep}) {
+    r->drive_quantity = Quantity::indentation_depth;
+    r->response_quantity = Quantity::contact_force;
+  }
+  for (int i = 0; i < 200; ++i) {
+    const double t = 0.1 * i;
+    const double ramp = std::min(t, 1.0);
+    elastic.time_s.push_back(t);
+    elastic.drive.push_back(4e-3 * ramp);
+    elastic.response.push_back(0.24 * ramp);
+    creep.time_s.push_back(t);
+    creep.drive.push_back(2e-3 * ramp + (t > 1.0 ? 2e-3 * (1.0 - std::exp((1.0 - t) / 3.0)) : 0.0));
+    creep.response.push_back(4.0 * ramp);
+  }
+  CHECK_FALSE(prepare_recording("elastic", elastic).clipped_above);
+  CHECK_FALSE(prepare_recording("creep", creep).clipped_above);
+}
+
+TEST_CASE("a stated size of the noise is what residuals are compared with", "[adequacy][wired]") {
+  AdequacyTrial trial;
+  trial.at_rest = 4;
+  const PreparedRecording one = prepared(trial);
+  const std::span<const PreparedRecording> recordings(&one, 1);
+  SetupOptions setup;
+  setup.starts = 4;
+  setup.profiles = false;
+  FitConfig config = recording_config(parse_law_name("linear-1", "test"), recordings, setup);
+  const auto verdict = [&](double sd_N) {
+    config.data.front().noise.absolute = sd_N;
+    config.data.front().noise.scale_known = true;
+    FitResult fit = run_fit(config, data_sets(recordings));
+    state_adequacy(fit, data_sets(recordings));
+    return fit.adequacy.value();
+  };
+  CHECK(verdict(test::kNoise_N).is_adequate());
+  const LawAdequacy wrong = verdict(test::kNoise_N / 3.0);
+  CHECK(wrong.is_rejected());
+  CHECK_THAT(wrong.words, Contains("times the noise that is stated"));
+  CHECK(wrong.residual_over_noise.value() == Approx(3.0).epsilon(0.15));
+}

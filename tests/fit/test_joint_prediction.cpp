@@ -1,0 +1,39 @@
+// A law file holds what is needed to predict the recordings that the law was fitted to: the slack
+// length of the specimen, and contact and offset of each recording.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "joint_recordings.hpp"
+
+using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::data;
+using namespace tpm::files;
+using namespace tpm::fit;
+
+TEST_CASE("a fitted recording is predicted as it was fitted", "[predict][joint]") {
+  const auto drive =
+      GENERATE(Quantity::indentation_depth, Quantity::strain, Quantity::relative_length);
+  const std::string law = GENERATE("linear-1", "power-1");
+  const int count = GENERATE(1, 2, 3);
+  test::check_predicted_as_fitted(law, drive, count);
+}
+
+TEST_CASE("a law of several recordings has no placement for another", "[predict][joint]") {
+  const LawSpec spec = test::spec_of("linear-1", Quantity::indentation_depth);
+  const std::vector<PreparedRecording> two = test::joint_recordings(spec, 2);
+  SetupOptions setup;
+  setup.starts = 5;
+  setup.profiles = false;
+  const FitResult fit = run_fit(recording_config(spec, two, setup), data_sets(two));
+  const LawFile law = fitted_law(fit);
+  const PreparedRecording other = test::joint_recordings(spec, 3).back();
+  CHECK(predict_recording(law, other, {}).placement == Placement::own);
+  PredictionOptions options;
+  options.placement = Placement::fitted;
+  CHECK_THROWS_WITH(predict_recording(law, other, options),
+                    Catch::Contains("this is none of them"));
+}
