@@ -43,6 +43,7 @@ struct FitOptions {
   std::string resample;
   std::string reference;
   std::string group_by;
+  std::string contact, zero;
   std::string radius, cone_angle, punch_radius, poisson;
 };
 
@@ -130,6 +131,29 @@ SelectionOptions selection_options(const FitOptions& options) {
   }
   if (!options.seed.empty()) selection.setup.seed = parse_whole_number(options.seed, "--seed", 0);
   return selection;
+}
+
+/// --contact and --zero hold what is otherwise measured.
+void set_placement(const FitOptions& options, const std::vector<PreparedRecording>& recordings,
+                   SelectionOptions& selection) {
+  const Recording& first = recordings.front().recording;
+  const auto set = [](std::optional<double>& held, const std::string& text, Quantity quantity,
+                      const char* option) {
+    if (!text.empty()) held = option_quantity(text, quantity_dimension(quantity), option);
+  };
+  set(selection.setup.contact, options.contact, first.drive_quantity, "--contact");
+  set(selection.setup.zero, options.zero, first.response_quantity, "--zero");
+  if (!selection.setup.contact) return;
+  if (!options.recordings.contact_response.empty()) {
+    throw Error(ExitCode::usage, "--contact", "beside --contact-force", "one of them");
+  }
+  for (const PreparedRecording& r : recordings) {
+    if (*selection.setup.contact < r.phases.peak_drive) continue;
+    throw Error(ExitCode::usage, "--contact",
+                fmt::format("'{}' is not below the largest depth of '{}'",
+                            printable(options.contact), printable(r.name)),
+                "the depth at which the probe begins to touch");
+  }
 }
 
 /// --reference for recordings: a depth, or a change of relative length.
@@ -274,6 +298,7 @@ int fit_folder(const FitOptions& options, const Session& session) {
   std::vector<PreparedRecording> recordings = read_recordings(input);
   require_indentation(options, recordings);
   set_reference(options, recordings, selection);
+  set_placement(options, recordings, selection);
   set_specimens(options, recordings);
   const SpecimenStudy study = study_specimens(recordings, law, selection);
   std::optional<YoungModuli> moduli;
@@ -302,6 +327,7 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
   SelectionOptions choices = selection_options(options);
   require_indentation(options, recordings);
   set_reference(options, recordings, choices);
+  set_placement(options, recordings, choices);
   const Selection selection = select_law(recordings, choices);
   const FitResult& best = selection.candidates[selection.recommended].fit;
   std::optional<YoungModuli> moduli;
@@ -356,11 +382,14 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
 int fit(const FitOptions& options, const Session& session) {
   const std::vector<std::string>& files = options.recordings.files;
   if (is_configuration(files)) {
-    if (!options.reference.empty() || !options.group_by.empty() || probe_of(options)) {
+    if (!options.reference.empty() || !options.group_by.empty() || !options.contact.empty() ||
+        !options.zero.empty() || probe_of(options)) {
       throw Error(ExitCode::usage,
-                  "--reference, --group-by, --radius, --cone-angle, --punch-radius",
+                  "--reference, --group-by, --contact, --zero, --radius, --cone-angle, "
+                  "--punch-radius",
                   "with a configuration",
-                  "them only with recordings; a configuration has its own reference");
+                  "them only with recordings; a configuration has its own reference and fixed "
+                  "parameters");
     }
     return fit_configuration(options, session);
   }
@@ -416,6 +445,12 @@ void add_fit_command(CLI::App& app, Session& session) {
                           "written for a configuration)");
   command->add_flag("--no-draw", options->no_draw, "Write no figures and files")->excludes(folder);
   add_recording_options(*command, options->recordings);
+  command->add_option("--contact", options->contact,
+                      "Recordings: hold the depth of contact, e.g. \"0.3 mm\" (default: the onset "
+                      "of the force, measured with its uncertainty)");
+  command->add_option("--zero", options->zero,
+                      "Recordings: hold the reading without a load, e.g. \"12 mN\" (default: "
+                      "measured before contact)");
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
   command->add_option("--rate", options->rate, "Assume this ramp rate instead, e.g. \"2 mm/s\"");
   command->add_option("--hold-out", options->hold_out_depth,

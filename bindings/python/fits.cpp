@@ -70,8 +70,7 @@ class Fit {
     for (const ParameterResult& p : fit_.parameters) {
       rows.append(py::dict(py::arg("name") = p.parameter.name, py::arg("estimate") = p.estimate,
                            py::arg("standard_error") = p.standard_error, py::arg("lower") = p.lower,
-                           py::arg("upper") = p.upper,
-                           py::arg("unit") = std::string(si_symbol(p.parameter.unit.dimension)),
+                           py::arg("upper") = p.upper, py::arg("unit") = si_unit(p.parameter),
                            py::arg("verdict") = verdict_text(p), py::arg("nuisance") = p.nuisance,
                            py::arg("only_if_described") = p.only_if_described,
                            py::arg("words") = p.words));

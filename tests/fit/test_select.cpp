@@ -72,14 +72,15 @@ TEST_CASE("select returns the law behind a recording and says what the protocol 
 TEST_CASE("one point of a profile tells whether the interval holds a value", "[select]") {
   const std::vector<PreparedRecording> one{
       prepare_recording("one.csv", simulated("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 5))};
-  const ExperimentResiduals function(recording_config(parse_law_name("linear-1", "test"), one, {}),
-                                     data_sets(one));
+  ExperimentResiduals function(recording_config(parse_law_name("linear-1", "test"), one, {}),
+                               data_sets(one));
   const FitResult fit = fit_experiments(function);
+  function.set_prior_weight(std::sqrt(fit.inflation * fit.variance_factor));
   std::vector<FitParameter> parameters;
   for (const ParameterResult& p : fit.parameters) parameters.push_back(p.parameter);
   Threshold threshold;
   threshold.scale_known = false;
-  threshold.data_count = fit.value_count;
+  threshold.data_count = fit.value_count + prior_count(fit.config);
   threshold.parameter_count = static_cast<int>(parameters.size());
   threshold.inflation = fit.inflation;
   const double rise = threshold.rise(fit.best.deviance);

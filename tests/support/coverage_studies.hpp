@@ -146,7 +146,7 @@ inline FitCoverage fit_coverage(const LawSpec& family, const SimulatedTest& test
     const FitResult fit = run_fit(recording_config(law, one, setup), data_sets(one));
     for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
       const std::string& name = fit.parameters[k].parameter.name;
-      if (name == "offset" || name == "contact") continue;
+      if (name == "offset" || name == "contact" || name == "drift") continue;
       if (k == result.names.size()) {
         result.names.push_back(name);
         result.parameters.emplace_back();

@@ -110,6 +110,7 @@ class Finder {
     found_.peak_drive = *std::max_element(drive_.begin(), drive_.end());
     found_.peak_response = *std::max_element(response_.begin(), response_.end());
     estimate_noise();
+    level_ = without_drift();
     find_contact();
     find_creep();
     find_detachments();
@@ -126,7 +127,7 @@ class Finder {
   [[nodiscard]] TouchSearch search() const {
     // Of a few samples, no more than an eighth can be asked to agree.
     const std::size_t most = std::max<std::size_t>(response_.size() / 8, 1);
-    return {drive_, response_, pieces_, found_.noise_sd_estimate,
+    return {drive_, level_, pieces_, found_.noise_sd_estimate,
             std::clamp<std::size_t>(options_.sustained_samples, 1, most)};
   }
 
@@ -168,6 +169,42 @@ class Finder {
     noise_in_hold_ = long_enough;
     found_.noise_sd_estimate = long_enough ? noise_sd(time_, response_, hold->first, hold->last)
                                            : noise_sd(time_, response_, 0, response_.size() - 1);
+  }
+
+  /// The response without a drift of its zero, for the search of contact: where the probe rests at
+  /// first and the force grows from 0 or away from it, it is no tissue that relaxes.
+  [[nodiscard]] std::vector<double> without_drift() const {
+    constexpr std::size_t kFewest = 8;
+    if (!indentation_ || pieces_.size() < 2 || pieces_.front().motion != Motion::still)
+      return response_;
+    const std::size_t last = pieces_.front().last;
+    if (last + 1 < kFewest) return response_;
+    const auto n = static_cast<double>(last + 1);
+    double mean_time = 0.0, mean = 0.0, covariance = 0.0, spread = 0.0, rest = 0.0;
+    for (std::size_t i = 0; i <= last; ++i) {
+      mean_time += time_[i] / n;
+      mean += response_[i] / n;
+    }
+    for (std::size_t i = 0; i <= last; ++i) {
+      covariance += (time_[i] - mean_time) * (response_[i] - mean);
+      spread += (time_[i] - mean_time) * (time_[i] - mean_time);
+    }
+    const double slope = covariance / spread;
+    for (std::size_t i = 0; i <= last; ++i) {
+      rest += std::pow(response_[i] - mean - slope * (time_[i] - mean_time), 2);
+    }
+    constexpr double kSure = 5.0;  // standard errors of the slope
+    const double start = mean + slope * (time_.front() - mean_time);
+    const auto [low, high] = std::minmax_element(response_.begin(), response_.end());
+    constexpr double kMatters = 2.5e-3;  // of the range: half of what a touch needs
+    const double small = kMatters * (*high - *low);
+    const bool grows = std::abs(start) <= small || start * slope > 0.0;
+    const bool matters = std::abs(slope) * (time_[last] - time_.front()) > small;
+    if (!grows || !matters || slope * slope * spread * (n - 2.0) <= kSure * kSure * rest)
+      return response_;
+    std::vector<double> level = response_;
+    for (std::size_t i = 0; i < level.size(); ++i) level[i] -= slope * (time_[i] - time_.front());
+    return level;
   }
 
   void find_contact() {
@@ -226,12 +263,12 @@ class Finder {
       if (!release) continue;
       found_.detachment_index = release->index;
       const double margin = touch_margin(search());
-      const auto again = first_reaching(response_, release->index, end, release->floor + margin,
+      const auto again = first_reaching(level_, release->index, end, release->floor + margin,
                                         options_.sustained_samples);
       done = again.value_or(piece.last);
       relabel(release->index, done, PhaseKind::detached);
-      const auto rest = response_.begin() + static_cast<std::ptrdiff_t>(done);
-      const double later = *std::max_element(rest, response_.end()) - release->floor;
+      const auto rest = level_.begin() + static_cast<std::ptrdiff_t>(done);
+      const double later = *std::max_element(rest, level_.end()) - release->floor;
       if (later > kSmall * (found_.peak_response - release->floor)) continue;
       relabel(done, end, PhaseKind::recovery);
       return;
@@ -327,6 +364,7 @@ class Finder {
   bool indentation_;
   const PhaseOptions& options_;
   std::vector<DrivePiece> pieces_;
+  std::vector<double> level_;  ///< the response, without a drift of its zero
   bool noise_in_hold_ = false;
   RecordingPhases found_;
 };

@@ -170,6 +170,15 @@ bool widen_pressed_bounds(const FitResult& result, const FitConfig& config,
   return moved;
 }
 
+void mark_not_separable(FitResult& result) {
+  for (std::size_t i = 0; i < result.parameters.size(); ++i) {
+    ParameterResult& p = result.parameters[i];
+    p.not_separable = result.config.parameters[i].not_separable;
+    if (p.not_separable.empty()) continue;
+    p.words += fmt::format("; not identified: {}: not separable", p.not_separable);
+  }
+}
+
 void mark_conditions(FitResult& result, const ResidualFunction& function) {
   std::vector<ParameterResult>& all = result.parameters;
   for (std::size_t i = 0; i < all.size(); ++i) all[i].nuisance = is_nuisance(result.config, i);

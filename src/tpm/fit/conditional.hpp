@@ -22,4 +22,7 @@ namespace tpm::fit {
 /// moved by the width of its bounds (linearised).
 void mark_conditions(FitResult& result, const ResidualFunction& function);
 
+/// Fills ParameterResult::not_separable from the configuration, and says so in words.
+void mark_not_separable(FitResult& result);
+
 }  // namespace tpm::fit

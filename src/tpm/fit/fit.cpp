@@ -1,6 +1,8 @@
 #include "tpm/fit/fit.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <memory>
 
 #include "tpm/fit/conditional.hpp"
 #include "tpm/fit/fit_flags.hpp"
@@ -56,11 +58,15 @@ Approach approach_to(const ExperimentResiduals& function,
   return {{survey(*few, parameters).best.natural}, StartKind::solved};
 }
 
+/// Where a search begins: at minima that are near, or anywhere if there are none.
+using NearMinima = std::vector<std::vector<double>>;
+
 /// Where no start can be evaluated, the reason is said if it lies in the recording.
 FitResult search(const ExperimentResiduals& function, const std::vector<FitParameter>& parameters,
-                 const Threshold& threshold, bool profiles) {
+                 const Threshold& threshold, bool profiles, const NearMinima& near) {
   try {
-    const Approach approach = approach_to(function, parameters);
+    const Approach approach =
+        near.empty() ? approach_to(function, parameters) : Approach{near, StartKind::solved};
     return fit_residuals(
         function, parameters, approach.starts, threshold, profiles, approach.kind,
         [&](std::span<const double> best) { return inflation_at(function, best); });
@@ -74,20 +80,60 @@ FitResult search(const ExperimentResiduals& function, const std::vector<FitParam
 /// The search, with automatic bounds widened until the fit no longer presses on them.
 /// @param parameters their bounds are changed
 FitResult widened_search(const ExperimentResiduals& function, std::vector<FitParameter>& parameters,
-                         const Threshold& threshold) {
+                         const Threshold& threshold, bool profiles, const NearMinima& near) {
   const FitConfig& config = function.config();
   const bool automatic = std::ranges::any_of(
       config.parameters, [](const EstimatedParameter& p) { return p.widest.has_value(); });
   for (;;) {
     // Profiles are walked only from an estimate that stays.
-    if (automatic && config.profiles) {
-      while (widen_pressed_bounds(search(function, parameters, threshold, false), config,
+    if (automatic && profiles) {
+      while (widen_pressed_bounds(search(function, parameters, threshold, false, near), config,
                                   parameters)) {
       }
     }
-    FitResult result = search(function, parameters, threshold, config.profiles);
+    FitResult result = search(function, parameters, threshold, profiles, near);
     if (!automatic || !widen_pressed_bounds(result, config, parameters)) return result;
   }
+}
+
+NearMinima minima_of(const FitResult& result) {
+  NearMinima minima;
+  for (const DistinctMinimum& m : result.minima) {
+    if (minima.size() == kMostSurrogateMinima) break;
+    minima.push_back(m.minimum.natural);
+  }
+  return minima;
+}
+
+/// A prior is stated in absolute terms, the noise of the readings up to a factor s that the fit
+/// finds. The minimum of
+///
+///     n_eff ln(RSS) + sum ((p - mean) / sd)^2
+///
+/// is that of RSS + s^2 sum ((p - mean) / sd)^2 with s^2 = RSS / n_eff, found by repetition. It
+/// begins with priors that hold (s of the declared noise): where a law does not describe the data,
+/// a placement that was measured stays and the residual tells.
+FitResult balanced_search(ExperimentResiduals& function, std::vector<FitParameter>& parameters,
+                          const Threshold& threshold) {
+  constexpr int kMostRounds = 40;
+  constexpr double kSettled = 1e-3, kLeast = 1e-12;
+  const bool profiles = function.config().profiles;
+  FitResult result = widened_search(function, parameters, threshold, false, {});
+  const FitResult survey = result;
+  double weight = 1.0;
+  for (int round = 0; round < kMostRounds; ++round) {
+    const double next = std::max(std::sqrt(result.inflation * result.variance_factor), kLeast);
+    if (std::abs(next - weight) <= kSettled * weight) break;
+    weight = next;
+    function.set_prior_weight(weight);
+    result = search(function, parameters, threshold, false, minima_of(result));
+  }
+  result = widened_search(function, parameters, threshold, profiles, minima_of(result));
+  result.starts_run = survey.starts_run;
+  result.starts_failed = survey.starts_failed;
+  result.starts_agreeing = survey.starts_agreeing;
+  result.waterfall = survey.waterfall;
+  return result;
 }
 
 /// The configuration with the bounds that were used at last.
@@ -115,12 +161,18 @@ FitResult run_fit(const FitConfig& config, const std::vector<DataSet>& data) {
   return result;
 }
 
-FitResult fit_experiments(const ExperimentResiduals& function) {
+namespace {
+
+/// @param weighted the same as `function`, if it has priors
+FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals* weighted) {
   const FitConfig& config = function.config();
   std::vector<FitParameter> parameters = searched_parameters(config);
-  Threshold threshold{config.level, config.scale_known(), function.value_count(),
+  Threshold threshold{config.level, config.scale_known(),
+                      function.value_count() + prior_count(config),
                       static_cast<int>(parameters.size())};
-  FitResult result = widened_search(function, parameters, threshold);
+  FitResult result = weighted != nullptr
+                         ? balanced_search(*weighted, parameters, threshold)
+                         : widened_search(function, parameters, threshold, config.profiles, {});
   threshold.inflation = result.inflation;
   result.config = config;
   keep_bounds(result, parameters);
@@ -137,8 +189,17 @@ FitResult fit_experiments(const ExperimentResiduals& function) {
     result.bootstrap = bootstrap_experiments(function, parameters, result.best, *config.bootstrap);
   }
   mark_conditions(result, function);
+  mark_not_separable(result);
   add_flags(result, function);
   return result;
+}
+
+}  // namespace
+
+FitResult fit_experiments(const ExperimentResiduals& function) {
+  if (prior_count(function.config()) == 0) return fit_searched(function, nullptr);
+  const std::unique_ptr<ExperimentResiduals> weighted = function.copy();
+  return fit_searched(*weighted, weighted.get());
 }
 
 }  // namespace tpm::fit

@@ -41,6 +41,9 @@ struct ParameterResult {
   /// The automatic bounds, where the best fit or an interval pressed on them and they were widened.
   std::optional<Limits> first_bounds;
   std::vector<Condition> conditional_on;
+  /// What the recording cannot tell it from ("drift or a slow branch"); it is then not identified,
+  /// whatever its profile says. See EstimatedParameter.
+  std::string not_separable;
   double estimate = 0.0;
   std::optional<double> standard_error;  ///< linearised, in natural units
   std::optional<double> lower, upper;    ///< confidence limits by profile likelihood

@@ -88,6 +88,20 @@ int flag_clipping(FitResult& result) {
   return all;
 }
 
+/// Where priors put a parameter, and how far the readings moved it.
+void flag_priors(FitResult& result) {
+  for (std::size_t i = 0; i < result.parameters.size(); ++i) {
+    const std::optional<Prior>& prior = result.config.parameters[i].prior;
+    if (!prior) continue;
+    const ParameterResult& p = result.parameters[i];
+    result.flags.push_back(fmt::format(
+        "{} = {} beside {} +- {}{}: {} of this uncertainty away", p.parameter.name,
+        in_unit(p.parameter, p.estimate), in_unit(p.parameter, prior->mean),
+        in_unit(p.parameter, prior->sd), prior->from.empty() ? "" : " (" + prior->from + ")",
+        significant(std::abs(p.estimate - prior->mean) / prior->sd, 2)));
+  }
+}
+
 /// What an organ follows of a measured motion.
 void flag_motions(FitResult& result, const ExperimentResiduals& function) {
   for (const Experiment& e : function.experiments()) {
@@ -106,6 +120,7 @@ void flag_motions(FitResult& result, const ExperimentResiduals& function) {
 void add_flags(FitResult& result, const ExperimentResiduals& function) {
   flag_outliers(result, function);
   flag_noise(result);
+  flag_priors(result);
   flag_not_predicted(result);
   flag_motions(result, function);
   for (const DataChoice& data : result.config.data) {

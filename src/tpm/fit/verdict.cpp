@@ -134,6 +134,9 @@ std::string parameter_words(const ParameterResult& p, double level) {
 }
 
 std::string verdict_text(const ParameterResult& p) {
+  if (!p.not_separable.empty()) {
+    return fmt::format("not identified: {}: not separable", p.not_separable);
+  }
   std::string text(verdict_name(p.verdict));
   for (std::size_t i = 0; i < p.conditional_on.size(); ++i) {
     const Condition& c = p.conditional_on[i];

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/random.hpp"
@@ -104,7 +105,9 @@ ExperimentResiduals generating_residuals(const PreparedRecording& recording, con
 std::vector<double> true_estimates(const FitResult& fit, const Trials& trials) {
   const LawModel model(trials.law);
   return mapped<double>(fit.parameters, [&](const ParameterResult& p) {
-    return trials.true_values[model.index(p.parameter.name)];
+    // A drift of the zero belongs to the test, too, and is no parameter of the law.
+    const bool drift = p.nuisance && p.parameter.name == "drift";
+    return drift ? 0.0 : trials.true_values[model.index(p.parameter.name)];
   });
 }
 
@@ -115,9 +118,12 @@ void count_intervals(const ExperimentResiduals& function, const Trials& trials,
   const auto parameters = mapped<FitParameter>(fit.parameters, &ParameterResult::parameter);
   const std::vector<double> true_values = true_estimates(fit, trials);
   const std::vector<std::vector<double>> starts{fit.best.natural, true_values};
+  // Priors weigh as much as they did in the fit.
+  const std::unique_ptr<ExperimentResiduals> weighted = function.copy();
+  weighted->set_prior_weight(std::max(std::sqrt(fit.inflation * fit.variance_factor), 1e-12));
   std::vector<double> deviance;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    deviance.push_back(profile_deviance(function, parameters, starts, i, true_values[i]));
+    deviance.push_back(profile_deviance(*weighted, parameters, starts, i, true_values[i]));
   }
   const double least = std::min(fit.best.deviance, *std::ranges::min_element(deviance));
   // The search ends within 1e-4 standard deviations of a minimum.

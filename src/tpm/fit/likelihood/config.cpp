@@ -99,6 +99,11 @@ std::vector<FitParameter> searched_parameters(const FitConfig& config) {
   return mapped<FitParameter>(config.parameters, &EstimatedParameter::fit);
 }
 
+int prior_count(const FitConfig& config) {
+  return static_cast<int>(std::ranges::count_if(
+      config.parameters, [](const EstimatedParameter& p) { return p.prior.has_value(); }));
+}
+
 std::vector<double> model_parameters(const FitConfig& config, std::span<const double> natural,
                                      std::size_t choice) {
   std::vector<double> values = config.fixed;

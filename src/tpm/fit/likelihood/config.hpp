@@ -89,15 +89,35 @@ struct WidestBounds {
   double lower = 0.0, upper = 0.0;
 };
 
+/// What a measurement of its own tells about a parameter: a normal distribution, SI.
+struct Prior {
+  double mean = 0.0;
+  double sd = 1.0;        ///< > 0
+  std::string from = {};  ///< what measured it, in words
+};
+
+/// A change of the zero of a recording that is linear in time: slope (t - origin) is added to the
+/// model's answer, the slope being the parameter, in the recording's own response per second.
+struct DriftTerm {
+  std::size_t choice = 0;  ///< place in FitConfig::data
+  double origin_s = 0.0;
+};
+
 /// An estimated parameter and the model parameters that take its value.
 struct EstimatedParameter {
   FitParameter fit;
-  std::vector<Target> sets;  ///< empty for a parameter of the noise
+  std::vector<Target> sets;  ///< empty for a parameter of the noise and for a drift
   /// A noise parameter whose start and bounds follow from the size of the data.
   bool from_data = false;
   /// Set where nobody stated the bounds: run_fit widens them up to these while the best fit or the
   /// limit of an interval presses on them.
-  std::optional<WidestBounds> widest;
+  std::optional<WidestBounds> widest = std::nullopt;
+  /// Adds the residual (value - mean) / sd. The prior is absolute: where the size of the noise is
+  /// estimated, run_fit weighs it against the noise that it finds.
+  std::optional<Prior> prior = std::nullopt;
+  std::optional<DriftTerm> drift = std::nullopt;
+  /// What these data cannot tell the parameter from, in words; it is then not called identified.
+  std::string not_separable = {};
 };
 
 /// A claim about parameters, tested by holding them: "eta1 = 5 Pa s".
@@ -143,6 +163,9 @@ struct FitConfig {
 
 /// What is estimated, without the model parameters that it sets.
 [[nodiscard]] std::vector<FitParameter> searched_parameters(const FitConfig& config);
+
+/// Number of estimated parameters that have a prior.
+[[nodiscard]] int prior_count(const FitConfig& config);
 
 /// All model parameters for a data set, given the estimated ones.
 [[nodiscard]] std::vector<double> model_parameters(const FitConfig& config,

@@ -46,6 +46,60 @@ std::vector<std::size_t> parse_scope(const Json& j, const FitConfig& config,
   return scope;
 }
 
+/// "prior" of a parameter, by what reads a quantity of it under a key.
+template <class Read>
+std::optional<Prior> parse_prior(const Json& j, const DocumentPlace& place, const Read& read) {
+  if (!j.contains("prior")) return std::nullopt;
+  const DocumentPlace here = place.key("prior");
+  const Prior prior{read(j.at("prior"), "mean", here), read(j.at("prior"), "sd", here),
+                    j.at("prior").value("from", "")};
+  if (prior.sd > 0.0) return prior;
+  throw bad_input(here.key("sd").where, "not above 0", "a standard deviation above 0");
+}
+
+/// "1 mN/s" as "1 mN": what changes per second.
+std::string without_second(const Json& j, std::string_view key, const DocumentPlace& place) {
+  constexpr std::string_view kPerSecond = "/s";
+  std::string text = j.at(std::string(key)).get<std::string>();
+  if (text.ends_with(kPerSecond)) return text.substr(0, text.size() - kPerSecond.size());
+  throw bad_input(place.key(key).where, fmt::format("'{}' is no drift", printable(text)),
+                  "the recording's response per second, such as \"1 mN/s\"");
+}
+
+/// A linear drift of the zero of one recording.
+EstimatedParameter parse_drift(const std::string& name, const Json& j, const FitConfig& config,
+                               const DocumentPlace& place) {
+  const DocumentPlace here = place.key("drift");
+  if (j.contains("sets") || j.contains("for")) {
+    throw bad_input(here.where, "beside 'sets' or 'for'", "a drift of one recording alone");
+  }
+  const auto of = j.at("drift").at("of").get<std::string>();
+  const auto found = std::ranges::find(config.data, of, &DataChoice::dataset);
+  if (found == config.data.end() || found->protocol.kind != ProtocolChoice::Kind::measured) {
+    throw bad_input(here.key("of").where,
+                    fmt::format("'{}' is no recording of this fit", printable(of)),
+                    "the name of a recording (protocol 'measured') under /data");
+  }
+  const Dimension dimension = reading_dimension(config, *found);
+  const auto read = [&](const Json& object, std::string_view key, const DocumentPlace& at) {
+    return parse_quantity(without_second(object, key, at), dimension, at.key(key).where);
+  };
+  EstimatedParameter parameter;
+  FitParameter& fit = parameter.fit;
+  fit.name = name;
+  fit.scale = parse_scale(j.value("scale", "linear"), place.key("scale").where);
+  fit.unit = per_second(parse_unit(split_quantity(without_second(j, "start", place)).unit,
+                                   dimension, place.key("start").where));
+  fit.start = read(j, "start", place);
+  fit.lower = read(j, "lower", place);
+  fit.upper = read(j, "upper", place);
+  require_valid(fit, place.where);
+  parameter.prior = parse_prior(j, place, read);
+  parameter.drift = DriftTerm{static_cast<std::size_t>(found - config.data.begin()),
+                              quantity_at(j.at("drift"), "origin", Dimension::time, here)};
+  return parameter;
+}
+
 /// Name, start, bounds and scale of an estimated parameter.
 FitParameter parse_search(const std::string& name, const Json& j, Dimension dimension,
                           const DocumentPlace& place) {
@@ -64,6 +118,7 @@ FitParameter parse_search(const std::string& name, const Json& j, Dimension dime
 
 EstimatedParameter parse_parameter(const std::string& name, const Json& j, const Model& model,
                                    const FitConfig& config, const DocumentPlace& place) {
+  if (j.contains("drift")) return parse_drift(name, j, config, place);
   EstimatedParameter parameter;
   const std::vector<std::size_t> scope = parse_scope(j, config, place);
   if (j.contains("sets")) {
@@ -81,6 +136,11 @@ EstimatedParameter parse_parameter(const std::string& name, const Json& j, const
                     "parameters of one dimension");
   }
   parameter.fit = parse_search(name, j, dimension, place);
+  parameter.prior =
+      parse_prior(j, place, [&](const Json& object, std::string_view key, const DocumentPlace& at) {
+        return quantity_at(object, key, dimension, at);
+      });
+  parameter.not_separable = j.value("not_separable", "");
   const FitParameter& fit = parameter.fit;
   for (const Target& target : parameter.sets) {
     const auto [low, high] = model.range(target.parameter);
@@ -138,8 +198,8 @@ EstimatedParameter parse_noise_parameter(const std::string& name, Dimension dime
     return parameter;
   }
   const Json& j = parameters.at(name);
-  if (j.contains("sets") || j.contains("for")) {
-    throw bad_input(place.key(name).where, "'sets' or 'for' of a parameter of the noise",
+  if (j.contains("sets") || j.contains("for") || j.contains("prior")) {
+    throw bad_input(place.key(name).where, "'sets', 'for' or 'prior' of a parameter of the noise",
                     "data sets that name it under /noise");
   }
   parameter.fit = parse_search(name, j, dimension, place.key(name));

@@ -18,6 +18,7 @@ ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vec
   experiments_ = std::move(set.experiments);
   resolve_noise_parameters();
   count_residuals();
+  find_drifts();
   find_linear();
   set_up_surrogate();
 }
@@ -44,7 +45,8 @@ void ExperimentResiduals::find_linear() {
   linear_.clear();
   linear_.reserve(config_.parameters.size());
   for (const EstimatedParameter& p : config_.parameters) {
-    linear_.push_back(noise_stays && !by_load && p.fit.scale == Scale::linear && !p.sets.empty() &&
+    linear_.push_back(noise_stays && !by_load && p.fit.scale == Scale::linear &&
+                      (p.drift || !p.sets.empty()) &&
                       std::all_of(p.sets.begin(), p.sets.end(), [&](const Target& target) {
                         return model_->linear_in(target.parameter);
                       }));
@@ -88,6 +90,7 @@ void ExperimentResiduals::count_residuals() {
   if (residual_count_ == 0) {
     throw bad_input("fit", "no datum is left to fit", "at least one that is not excluded");
   }
+  residual_count_ += prior_count(config_);
   set_up_plain();
 }
 
@@ -131,6 +134,8 @@ void ExperimentResiduals::evaluate_plain(std::span<const double> natural, Eigen:
     const Response response =
         respond_to(experiment, model_parameters(config_, natural, experiment.choice), want);
     const auto columns = columns_for(experiment.choice);
+    std::vector<Eigen::Index> rows;
+    for (const std::size_t datum : experiment.data) rows.push_back(plain_->row[datum]);
     for (std::size_t k = 0; k < experiment.data.size(); ++k) {
       const Eigen::Index row = plain_->row[experiment.data[k]];
       if (row < 0) continue;
@@ -142,7 +147,9 @@ void ExperimentResiduals::evaluate_plain(std::span<const double> natural, Eigen:
         (*jacobian)(row, target) += factor * response.sensitivity(from, source);
       }
     }
+    add_drifts(experiment, natural, rows, &plain_->factor, residual, jacobian);
   }
+  put_priors(natural, residual, jacobian);
 }
 
 int ExperimentResiduals::value_count() const {
@@ -194,6 +201,8 @@ Eigen::VectorXd ExperimentResiduals::answers(const std::vector<Experiment>& expe
         (*sensitivity)(row, target) += response.sensitivity(from, source);
       }
     }
+    const std::vector<Eigen::Index> rows(experiment.data.begin(), experiment.data.end());
+    add_drifts(experiment, natural, rows, nullptr, answer, sensitivity);
   }
   return answer;
 }
@@ -292,6 +301,7 @@ bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::Vecto
       }
     }
   }
+  put_priors(natural, residual, jacobian);
   return residual.allFinite();
 }
 
@@ -345,6 +355,8 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::thinned(std::size_t mo
   few->moving_sigma_ = moving_sigma_;
   few->linear_ = linear_;
   few->order_ = order_;
+  few->drifts_ = drifts_;
+  few->prior_weight_ = prior_weight_;
   for (Experiment experiment : experiments_) {
     const std::size_t n = experiment.data.size();
     if (experiment.is_recording && n > most) thin(experiment, (n + most - 1) / most);
@@ -371,6 +383,8 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   other->counts_ = counts_;
   other->linear_ = linear_;
   other->order_ = order_;
+  other->drifts_ = drifts_;
+  other->prior_weight_ = prior_weight_;
   other->plain_ = plain_;
   other->residual_count_ = residual_count_;
   other->offset_ = offset_;

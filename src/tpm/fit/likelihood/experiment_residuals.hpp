@@ -44,6 +44,10 @@ class ExperimentResiduals final : public ResidualFunction {
   /// Replaces the value of a fitted datum and its standard deviation (simulation studies).
   void set_value(std::size_t datum, double value);
 
+  /// Factor of the residuals of priors, > 0: the size of a reading's noise in units of the declared
+  /// one, where that is only known up to a factor. 1 at first.
+  void set_prior_weight(double weight);
+
   /// How often each datum counts, in the order of data(); 0 leaves it out.
   void set_counts(std::vector<int> counts);
 
@@ -119,6 +123,16 @@ class ExperimentResiduals final : public ResidualFunction {
     Eigen::VectorXd observed, factor;
     std::vector<Eigen::Index> row;  ///< of each datum; -1 of what is held out
   };
+  void find_drifts();
+  /// Adds the drifts of the zero to the answers of an experiment.
+  /// @param place row of each reading; negative: not wanted
+  /// @param factor of each row, or null for 1
+  void add_drifts(const Experiment& experiment, std::span<const double> natural,
+                  std::span<const Eigen::Index> place, const Eigen::VectorXd* factor,
+                  Eigen::VectorXd& value, RowMatrix* slopes) const;
+  /// The residuals of priors, in the last rows.
+  void put_priors(std::span<const double> natural, Eigen::VectorXd& residual,
+                  RowMatrix* jacobian) const;
   void find_linear();
   void set_up_plain();
   void set_plain_value(std::size_t datum);
@@ -137,7 +151,9 @@ class ExperimentResiduals final : public ResidualFunction {
   std::vector<Experiment> fitted_;  ///< without what is held out; empty if nothing is
   std::vector<std::optional<MovingSigma>> moving_sigma_;  ///< of each data set
   std::vector<int> counts_;                               ///< empty: every datum counts once
-  std::vector<bool> linear_;  ///< of each estimated parameter: linear_in
+  std::vector<bool> linear_;         ///< of each estimated parameter: linear_in
+  std::vector<std::size_t> drifts_;  ///< estimated parameters that are a drift
+  double prior_weight_ = 1.0;
   ExchangeOrder order_;
   std::optional<PlainResiduals> plain_;
   std::unique_ptr<ExperimentResiduals> surrogate_;  ///< the same, asking the model's surrogate

@@ -86,6 +86,17 @@ bool FitParameter::at_upper(double p) const {
   return close_in_theta(*this, p, upper);
 }
 
+Unit per_second(const Unit& unit) {
+  return {unit.symbol + "/s", unit.dimension, unit.to_si};
+}
+
+std::string si_unit(const FitParameter& parameter) {
+  const Dimension dimension = parameter.unit.dimension;
+  const std::string symbol(si_symbol(dimension));
+  const bool drift = dimension != Dimension::speed && parameter.unit.symbol.ends_with("/s");
+  return drift ? symbol + "/s" : symbol;
+}
+
 std::vector<double> start_values(std::span<const FitParameter> parameters) {
   return mapped<double>(parameters, &FitParameter::start);
 }

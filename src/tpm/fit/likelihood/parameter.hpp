@@ -42,6 +42,12 @@ struct FitParameter {
   [[nodiscard]] bool at_upper(double natural) const;
 };
 
+/// "mN" as "mN/s", the unit of a drift: its dimension is that of what changes.
+[[nodiscard]] Unit per_second(const Unit& unit);
+
+/// SI symbol of a parameter, "N/s" of a drift of a force.
+[[nodiscard]] std::string si_unit(const FitParameter& parameter);
+
 [[nodiscard]] std::vector<double> start_values(std::span<const FitParameter> parameters);
 
 /// Throws Error(bad_input) naming the parameter if its bounds, start and scale do not agree.

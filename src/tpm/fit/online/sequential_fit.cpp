@@ -188,8 +188,10 @@ std::optional<SequentialFit::Prefix> SequentialFit::prefix() const {
   SetupOptions setup;
   setup.reference = settings_.reference;
   setup.profiles = false;
+  setup.drift = false;  // of a rest that is over there is nothing to be followed
   try {
     PreparedRecording prepared = prepare_recording("what was recorded so far", recording_);
+    keep_baseline(prepared);
     // Where contact seems to be depends on the noise. To fix it there would take an estimate for
     // known, with intervals of the stiffnesses that are too narrow.
     if (spec_.drive != Quantity::strain && !prepared.phases.preloaded) {

@@ -156,7 +156,8 @@ OwnPlacement place_recording(const LawFile& law, const PreparedRecording& record
   const FitResult fit = fit_placement(law.spec, law.values, recording, setup);
   OwnPlacement result{model_parameters(fit.config, fit.best.natural, 0), {}};
   for (const std::size_t free : fit.covariance.free) {
-    result.place.push_back(fit.config.parameters[free].sets.front().parameter);
+    const std::vector<Target>& sets = fit.config.parameters[free].sets;
+    if (!sets.empty()) result.place.push_back(sets.front().parameter);  // a drift is none of the law
   }
   return result;
 }

@@ -19,7 +19,7 @@ FitSummary summary_of(const FitResult& fit) {
   summary.starts_agreeing = fit.starts_agreeing;
   for (const ParameterResult& p : fit.parameters) {
     summary.parameters.push_back({.name = p.parameter.name,
-                                  .unit = std::string(si_symbol(p.parameter.unit.dimension)),
+                                  .unit = si_unit(p.parameter),
                                   .estimate = p.estimate,
                                   .standard_error = p.standard_error,
                                   .lower = p.lower,

@@ -12,6 +12,8 @@
 #include "tpm/files/import/reading_options.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
+#include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/select/placement_parameters.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -22,8 +24,9 @@ bool is_after_the_test(PhaseKind kind) {
   return kind == PhaseKind::unloading || kind == PhaseKind::detached || kind == PhaseKind::recovery;
 }
 
-/// Samples before contact that are kept, so that the zero of the response is seen.
+/// Samples before contact that are kept where they are too few to measure the zero beforehand.
 constexpr std::size_t kBaseline = 10;
+constexpr std::size_t kFewestAtRest = 3;
 
 /// What the recordings tell about the sizes of a law's parameters.
 struct Sizes {
@@ -32,11 +35,6 @@ struct Sizes {
   double shortest_s = 0.0;
   double longest_s = 0.0;
 };
-
-double start_drive(const PreparedRecording& r) {
-  return r.phases.contact_found && !r.phases.preloaded ? r.phases.contact_drive
-                                                       : r.recording.drive.front();
-}
 
 bool is_only_a_hold(const PreparedRecording& r) {
   return std::all_of(r.phases.phases.begin(), r.phases.phases.end(),
@@ -99,12 +97,6 @@ Sizes sizes_of(std::span<const PreparedRecording> recordings) {
                   "a ramp that is answered by a rising response");
 }
 
-/// Automatic bounds, and how far they may be moved out.
-struct AutomaticBounds {
-  FitParameter fit;
-  WidestBounds widest;
-};
-
 AutomaticBounds law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int branches) {
   constexpr double kFurther = 1e3;  // on a log scale
   const auto linear = [&p](double lower, double start, double upper) {
@@ -136,63 +128,7 @@ AutomaticBounds law_parameter_bounds(const LawParameter& p, const Sizes& sizes, 
     widest = {fit.lower / (p.linear ? 1.0 : kFurther), kFurther * fit.upper};
   }
   fit = readable(std::move(fit));
-  return {fit, {std::min(widest.lower, fit.lower), std::max(widest.upper, fit.upper)}};
-}
-
-bool is_stretch(const LawSpec& law) {
-  return law.drive == Quantity::relative_length;
-}
-
-bool bends(const LawSpec& law) {
-  return law.kernel != Kernel::linear || law.tension != Tension::none;
-}
-
-/// Whether contact and offset can be told apart: by a bend of the kernel, or by a response that
-/// begins to rise within the recording. Where it begins was found in noisy readings; to fix contact
-/// there would take an estimate for known.
-bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
-  if (law.drive == Quantity::strain) return false;  // it counts from the unloaded specimen
-  if (bends(law)) return true;
-  const double contact_s = r.recording.time_s[r.phases.contact_index];
-  return !r.phases.preloaded && r.phases.contact_found && contact_s >= r.from_s;
-}
-
-/// Contact may lie this many times the depth of the recording before its start at most.
-constexpr double kFurthestContact = 2.0;
-
-AutomaticBounds contact_bounds(const LawSpec& law, std::span<const PreparedRecording> recordings,
-                               std::string name) {
-  FitParameter fit;
-  fit.name = std::move(name);
-  fit.scale = Scale::linear;
-  const bool stretch = is_stretch(law);
-  fit.unit = shown_unit(quantity_dimension(law.drive));
-  const PreparedRecording& r = recordings.front();
-  const double begin = start_drive(r);
-  const double range = r.phases.peak_drive - begin;
-  const bool preloaded = r.phases.preloaded || !r.phases.contact_found;
-  fit.start = begin;
-  fit.lower = bends(law) || !stretch ? begin - (stretch ? 0.5 : 0.25) * range : begin;
-  fit.upper = begin + (stretch ? 0.6 : 0.1) * range;
-  if (preloaded && !stretch) fit.start = begin - 0.05 * range;
-  WidestBounds widest{begin - kFurthestContact * range, begin + 0.9 * range};
-  // Under a straight kernel that was in contact from the start, depth and offset say the same.
-  if (!bends(law)) {
-    fit.lower = std::max(fit.lower, r.recording.drive.front());
-    widest.lower = fit.lower;
-  }
-  if (stretch) widest.lower = std::min(fit.lower, std::max(widest.lower, 0.1 * begin));
-  fit.start = std::max(fit.start, fit.lower);
-  fit = readable(std::move(fit));
-  return {fit, {std::min(widest.lower, fit.lower), std::max(widest.upper, fit.upper)}};
-}
-
-AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
-  constexpr double kFurther = 10.0;
-  const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
-  const Unit unit = shown_unit(quantity_dimension(law.response));
-  return {readable({std::move(name), unit, Scale::linear, 0.0, -peak, peak}),
-          {-kFurther * peak, kFurther * peak}};
+  return {fit, WidestBounds{std::min(widest.lower, fit.lower), std::max(widest.upper, fit.upper)}};
 }
 
 Noise noise_of(const PreparedRecording& r) {
@@ -225,38 +161,6 @@ void require_alike(std::span<const PreparedRecording> recordings) {
   }
 }
 
-void add_automatic(FitConfig& config, AutomaticBounds bounds, std::vector<Target> sets) {
-  config.parameters.push_back({std::move(bounds.fit), std::move(sets), false, bounds.widest});
-}
-
-/// Adds the nuisance parameters of all recordings to a configuration.
-void add_nuisance(FitConfig& config, const LawModel& model,
-                  std::span<const PreparedRecording> recordings, Nuisance nuisance) {
-  if (nuisance == Nuisance::none) return;
-  const LawSpec& law = model.spec();
-  const bool several = recordings.size() > 1;
-  const auto named = [&](const char* what, const PreparedRecording& r) {
-    return several ? fmt::format("{} {}", what, r.name) : std::string(what);
-  };
-  const auto scope = [&](std::size_t i) {
-    return several ? std::vector<std::size_t>{i} : std::vector<std::size_t>{};
-  };
-  // The slack length belongs to the specimen; contact depth to each approach.
-  const bool shared_contact = is_stretch(law);
-  for (std::size_t i = 0; i < recordings.size(); ++i) {
-    const PreparedRecording& r = recordings[i];
-    add_automatic(config, offset_bounds(law, r, named("offset", r)),
-                  {{model.index("offset"), scope(i)}});
-    if (nuisance == Nuisance::offset || (shared_contact && i > 0)) continue;
-    if (nuisance == Nuisance::automatic && !shared_contact && !contact_is_seen(law, r)) continue;
-    add_automatic(
-        config,
-        contact_bounds(law, recordings.subspan(i, 1),
-                       shared_contact ? std::string("slack_length") : named("contact", r)),
-        {{model.index("contact"), shared_contact ? std::vector<std::size_t>{} : scope(i)}});
-  }
-}
-
 }  // namespace
 
 double median_step(std::span<const double> time_s) {
@@ -274,13 +178,77 @@ FitParameter readable(FitParameter fit) {
   return fit;
 }
 
+namespace {
+
+/// The hold after a step: a ramp that has no sample between its ends.
+std::optional<Phase> hold_after_step(const PreparedRecording& r) {
+  constexpr std::size_t kAStep = 2;        // samples from end to end
+  constexpr std::size_t kFewestHeld = 30;  // of which some can be spared
+  for (std::size_t i = 0; i + 1 < r.phases.phases.size(); ++i) {
+    const Phase& ramp = r.phases.phases[i];
+    const Phase& hold = r.phases.phases[i + 1];
+    if (ramp.kind != PhaseKind::loading) continue;
+    const bool step = ramp.last - ramp.first <= kAStep;
+    if (!step || hold.kind != PhaseKind::hold || hold.last - hold.first < kFewestHeld) break;
+    return hold;
+  }
+  return std::nullopt;
+}
+
+/// The last sample in the first part of a hold that stands far out of its neighbours: a relaxation
+/// is monotone, and what rings is not.
+std::size_t end_of_ringing(const PreparedRecording& r, const Phase& hold) {
+  constexpr double kPart = 0.2, kFarOut = 6.0;  // of the hold; standard deviations
+  const std::vector<double>& y = r.recording.response;
+  const double far = kFarOut * r.phases.noise_sd_estimate;
+  const auto until =
+      hold.first + static_cast<std::size_t>(kPart * static_cast<double>(hold.last - hold.first));
+  std::size_t end = hold.first;
+  for (std::size_t i = hold.first + 2; i + 2 < until && far > 0.0; ++i) {
+    const double middle = median({y[i - 2], y[i - 1], y[i], y[i + 1], y[i + 2]});
+    if (std::abs(y[i] - middle) > far) end = i + 1;
+  }
+  return end;
+}
+
+void leave_out_start_up(PreparedRecording& r) {
+  constexpr double kTimesOfStep = 2.0;
+  const std::optional<Phase> hold = hold_after_step(r);
+  if (!hold) return;
+  const std::vector<double>& time = r.recording.time_s;
+  const double step_s = time[hold->first] - time[hold->first - 1];
+  const std::size_t ringing = end_of_ringing(r, *hold);
+  const double from_s = std::max(time[hold->first] + kTimesOfStep * step_s, time[ringing]);
+  if (from_s <= r.from_s) return;
+  const auto left_out =
+      std::ranges::count_if(time, [&](double t) { return t >= time[hold->first] && t < from_s; });
+  r.from_s = from_s;
+  r.start_up = fmt::format(
+      "{}: {} samples after the step are left out, to {} s: {} (--from leaves out more)", r.name,
+      left_out, significant(from_s, 4),
+      ringing > hold->first ? "they ring" : "the ramp within the step was not sampled");
+}
+
+}  // namespace
+
+void keep_baseline(PreparedRecording& r) {
+  const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;
+  r.from_s = r.recording.time_s[contact > kBaseline ? contact - kBaseline : 0];
+}
+
 PreparedRecording prepare_recording(std::string name, Recording recording,
                                     const PhaseOptions& options) {
   PreparedRecording r{std::move(name), std::move(recording), {}, 0.0, 0.0, {}};
   r.phases = find_phases(r.recording, options);
   const std::vector<double>& time = r.recording.time_s;
   const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;
-  r.from_s = time[contact > kBaseline ? contact - kBaseline : 0];
+  r.contact_held = options.contact_response && r.phases.contact_found;
+  // Samples that measure the zero are not fitted once more.
+  if (read_rests(r).before >= kFewestAtRest) {
+    r.from_s = time[contact];
+  } else {
+    keep_baseline(r);
+  }
   r.to_s = time.back();
   bool pressed = false;
   for (const Phase& phase : r.phases.phases) {
@@ -291,6 +259,7 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
   }
   find_imposed_channel(r);
   if (!r.load_imposed) find_clipping(r);
+  leave_out_start_up(r);
   if (r.to_s > r.from_s) return r;
   throw bad_input(fmt::format("recording '{}'", r.name), "no ramp and hold before the unloading",
                   "a recording that loads before it unloads");
@@ -351,7 +320,7 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
     config.data.push_back(std::move(data));
   }
   config.fixed[model.index("contact")] = start_drive(recordings.front());
-  add_nuisance(config, model, recordings, options.nuisance);
+  add_placement(config, model, recordings, options);
   return config;
 }
 
@@ -404,11 +373,21 @@ Json config_json(const FitConfig& config) {
       sets.push_back(model->parameters()[target.parameter].name);
       estimated[target.parameter] = true;
     }
-    entry["sets"] = std::move(sets);
-    if (!p.sets.front().data.empty()) {
+    if (!sets.empty()) entry["sets"] = std::move(sets);
+    if (!p.sets.empty() && !p.sets.front().data.empty()) {
       entry["for"] =
           array_json(p.sets.front().data, [&](std::size_t i) { return config.data[i].dataset; });
     }
+    if (p.prior) {
+      entry["prior"] = {{"mean", text(p.prior->mean, p.fit.unit)},
+                        {"sd", text(p.prior->sd, p.fit.unit)}};
+      if (!p.prior->from.empty()) entry["prior"]["from"] = p.prior->from;
+    }
+    if (p.drift) {
+      entry["drift"] = {{"of", config.data[p.drift->choice].dataset},
+                        {"origin", text(p.drift->origin_s, shown_unit(Dimension::time))}};
+    }
+    if (!p.not_separable.empty()) entry["not_separable"] = p.not_separable;
     parameters[p.fit.name] = std::move(entry);
   }
   j["parameters"] = std::move(parameters);
@@ -457,7 +436,8 @@ FitResult fit_placement(const LawSpec& law, std::span<const double> values,
   const std::vector<LawParameter> parameters = law_parameters(law);
   std::erase_if(config.parameters, [&](const EstimatedParameter& p) {
     const bool own =
-        p.sets.size() == 1 && belongs_to_recording(law, parameters[p.sets.front().parameter]);
+        p.drift.has_value() ||
+        (p.sets.size() == 1 && belongs_to_recording(law, parameters[p.sets.front().parameter]));
     return !own;
   });
   for (std::size_t i = 0; i < parameters.size(); ++i) {

@@ -26,11 +26,19 @@ struct PreparedRecording {
   bool load_imposed = false;  ///< the response was imposed and the drive measured: creep
   std::vector<std::string> warnings = {};  ///< what the recording cannot tell, one sentence each
   std::string read_as = {};  ///< how its columns and units were understood, in one sentence
+  bool contact_held = false;  ///< contact is where a stated force is passed: it is not fitted
+  std::string start_up = {};  ///< what is left out after a step, in one sentence; empty: nothing
 };
 
-/// Finds the phases and chooses the window. Throws Error(bad_input) if there is nothing to fit.
+/// Finds the phases and chooses the window. After a step, which the ramp's samples do not show, the
+/// window begins when as much time as twice that of the step has passed and the readings have
+/// stopped ringing. Throws Error(bad_input) if there is nothing to fit.
 [[nodiscard]] PreparedRecording prepare_recording(std::string name, Recording recording,
                                                   const PhaseOptions& options = {});
+
+/// Moves the start of the window to a few samples before contact: for fits that do not take the
+/// zero that the rest measured.
+void keep_baseline(PreparedRecording& recording);
 
 /// What belongs to a recording and not to the material.
 enum class Nuisance {
@@ -52,6 +60,10 @@ struct SetupOptions {
   std::optional<double> reference;
   /// Exponent that power kernels keep, where the probe's shape gives it: 2 of a cone.
   std::optional<double> exponent;
+  std::optional<double> contact;  ///< depth of contact that is held, SI; none: measured
+  std::optional<double> zero;     ///< reading without a load that is held, SI; none: measured
+  /// Whether a drift of the zero that the rests tell is fitted.
+  bool drift = true;
   std::function<bool()> interrupted;  ///< see FitConfig
 };
 

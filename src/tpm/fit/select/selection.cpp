@@ -476,9 +476,14 @@ Selection select_law(std::span<const PreparedRecording> recordings,
     chosen.fit = run_fit(recording_config(chosen.law, recordings, options.setup), data);
     reassess(chosen, protocol_spans(recordings));
   }
+  s.drift = drift_answers(chosen.fit, recordings);
+  if (s.drift) chosen.fit.flags.push_back(drift_words(*s.drift, chosen.fit));
   std::ranges::move(protocol_warnings(chosen.fit, recordings), std::back_inserter(s.warnings));
   state_adequacy(s, recordings);
   describe(s);
+  for (const PreparedRecording& r : recordings) {
+    if (!r.start_up.empty()) s.words.push_back(r.start_up);
+  }
   return s;
 }
 

@@ -39,6 +39,13 @@ struct Candidate {
   std::vector<HeldOut> held_out;
 };
 
+/// Both answers where the recordings do not tell a drift of the zero from a slow branch.
+struct DriftAnswers {
+  double k_inf = 0.0;               ///< without a drift, SI
+  std::optional<double> drifting;   ///< with one of each recording, SI; none if no fit was found
+  std::vector<double> drift_per_s;  ///< of each recording that has one, SI
+};
+
 struct SelectionOptions {
   std::vector<LawSpec> laws;  ///< empty: the classical family
   bool only_listed = false;   ///< do not try laws without plateau besides
@@ -58,6 +65,7 @@ struct Selection {
   int samples = 0;  ///< fitted
   double effective_count = 0.0;
   Correlation correlation;            ///< of the residuals that the law of least deviance leaves
+  std::optional<DriftAnswers> drift;  ///< of the recommended law, if not separable
   std::vector<std::string> words;     ///< the recommendation and its reasons
   std::vector<std::string> warnings;  ///< what the experiment cannot tell
 };
@@ -90,6 +98,13 @@ struct Selection {
 /// @param refusal_counts that it has no answer at a reading (bad input) is one, too
 [[nodiscard]] Candidate fit_candidate(const FitConfig& config, const std::vector<DataSet>& data,
                                       bool refusal_counts = false);
+
+/// Fits a law again with a linear drift of the zero of each recording that holds, within what its
+/// rests tell; nothing if the fit separates the two already.
+[[nodiscard]] std::optional<DriftAnswers> drift_answers(
+    const FitResult& fit, std::span<const PreparedRecording> recordings);
+
+[[nodiscard]] std::string drift_words(const DriftAnswers& answers, const FitResult& fit);
 
 /// The law that select_law recommends with a given margin of BIC.
 /// @param candidates in any order, with their scores

@@ -56,6 +56,14 @@ Json to_json(const Selection& s) {
          {"margin_bic", s.margin},
          {"samples", s.samples},
          {"effective_readings", kept_digits(s.effective_count)}};
+  if (s.drift) {
+    j["drift_or_slow_branch"] = {
+        {"separable", false},
+        {"k_inf_without_drift_SI", kept_digits(s.drift->k_inf)},
+        {"k_inf_with_drift_SI",
+         s.drift->drifting ? Json(kept_digits(*s.drift->drifting)) : Json(nullptr)},
+        {"drift_SI_per_s", array_json(s.drift->drift_per_s, kept_digits)}};
+  }
   Json laws = array_json(s.candidates, candidate_json);
   j["laws"] = std::move(laws);
   if (const auto& adequacy = s.candidates[s.recommended].fit.adequacy) {

@@ -22,10 +22,6 @@ std::string cell(const std::optional<double>& value) {
   return value ? cell(*value) : std::string();
 }
 
-std::string si_unit(const FitParameter& p) {
-  return std::string(si_symbol(p.unit.dimension));
-}
-
 /// The depth at which coefficients are secants; empty where they do not depend on one.
 std::string reference_cell(const std::optional<LawSpec>& law) {
   return law && depends_on_reference(*law) ? cell(law->reference) : std::string();

@@ -86,9 +86,8 @@ Json conditions_json(const ParameterResult& p) {
   });
 }
 
-Json parameter_json(const ParameterResult& p) {
-  const Dimension dimension = p.parameter.unit.dimension;
-  Json j{{"name", p.parameter.name}, {"SI_unit", si_symbol(dimension)}};
+Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimated) {
+  Json j{{"name", p.parameter.name}, {"SI_unit", si_unit(p.parameter)}};
   j["scale"] = scale_name(p.parameter.scale);
   j["bounds_SI"] = {number(p.parameter.lower), number(p.parameter.upper)};
   j["estimate_SI"] = number(p.estimate);
@@ -97,6 +96,13 @@ Json parameter_json(const ParameterResult& p) {
   j["interval_connected"] = p.profile.connected;
   j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
   j["verdict"] = verdict_text(p);
+  if (!p.not_separable.empty()) j["not_separable"] = p.not_separable;
+  if (estimated.prior) {
+    j["prior_SI"] = {{"mean", number(estimated.prior->mean)},
+                     {"sd", number(estimated.prior->sd)},
+                     {"from", estimated.prior->from}};
+  }
+  if (estimated.drift) j["drift_origin_s"] = number(estimated.drift->origin_s);
   if (p.nuisance) j["nuisance"] = true;
   if (p.only_if_described) j["only_if_described"] = true;
   if (p.first_bounds) {
@@ -286,7 +292,7 @@ Json to_json(const FitResult& result) {
   j["confidence_level"] = result.config.level;
   Json parameters = Json::array();
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
-    parameters.push_back(parameter_json(result.parameters[i]));
+    parameters.push_back(parameter_json(result.parameters[i], result.config.parameters[i]));
     if (result.bootstrap) {
       parameters.back()["bootstrap"] = bootstrap_json(result.bootstrap->parameters[i]);
     }

@@ -1,0 +1,275 @@
+#include "tpm/fit/select/placement.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/fit/autoregressive.hpp"
+#include "tpm/fit/select/adequacy.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr std::size_t kMostAtRest = 1000;  // samples, or blocks of them
+constexpr std::size_t kFewestForSlope = 8;
+constexpr std::size_t kFewestForNoise = 4;
+
+/// Readings of the rests, one behind the other.
+struct RestSamples {
+  std::vector<double> time_s, reading;
+  std::size_t before = 0, after = 0;
+};
+
+double travel_of(const PreparedRecording& r) {
+  return r.phases.peak_drive - r.phases.contact_drive;
+}
+
+std::size_t peak_drive_index(const PreparedRecording& r) {
+  const std::vector<double>& drive = r.recording.drive;
+  return static_cast<std::size_t>(std::ranges::max_element(drive) - drive.begin());
+}
+
+/// How far a drive at rest may be off, and how far in the air it has to be while it moves.
+struct Clear {
+  double tolerance = 0.0, far = 0.0;
+};
+
+Clear clear_of(const PreparedRecording& r) {
+  constexpr double kStill = 1e-4, kFar = 0.1;  // of the travel
+  const double travel = travel_of(r);
+  return {std::max(4.0 * r.phases.drive_jitter_sd, kStill * travel),
+          r.phases.contact_drive - kFar * travel};
+}
+
+RestSamples rest_samples(const PreparedRecording& r) {
+  constexpr double kRecoil = 0.1;  // of the rest after withdrawal, which is left out
+  RestSamples rest;
+  const std::vector<double>& drive = r.recording.drive;
+  const Clear clear = clear_of(r);
+  const auto take = [&](std::size_t i) {
+    rest.time_s.push_back(r.recording.time_s[i]);
+    rest.reading.push_back(r.recording.response[i]);
+  };
+  const bool touched = r.phases.contact_found && !r.phases.preloaded;
+  bool resting = touched;
+  for (std::size_t i = 0; touched && i <= r.phases.contact_index; ++i) {
+    resting = resting && std::abs(drive[i] - drive.front()) <= clear.tolerance;
+    if (!resting && drive[i] > clear.far) continue;
+    take(i);
+    ++rest.before;
+  }
+  std::vector<std::size_t> withdrawn;
+  const double back = touched ? std::max(clear.far, drive.front() + clear.tolerance) : clear.far;
+  for (std::size_t i = peak_drive_index(r); i < drive.size(); ++i) {
+    if (drive[i] <= back) withdrawn.push_back(i);
+  }
+  const auto recoil = static_cast<std::size_t>(kRecoil * static_cast<double>(withdrawn.size()));
+  for (std::size_t k = recoil; k < withdrawn.size(); ++k) take(withdrawn[k]);
+  rest.after = withdrawn.size() - recoil;
+  return rest;
+}
+
+/// Means of blocks, where there are many samples.
+RestSamples averaged(RestSamples rest) {
+  const std::size_t n = rest.reading.size();
+  if (n <= kMostAtRest) return rest;
+  const std::size_t block = (n + kMostAtRest - 1) / kMostAtRest;
+  RestSamples few;
+  few.before = rest.before;
+  few.after = rest.after;
+  for (std::size_t i = 0; i + block <= n; i += block) {
+    double time = 0.0, reading = 0.0;
+    for (std::size_t k = i; k < i + block; ++k) {
+      time += rest.time_s[k] / static_cast<double>(block);
+      reading += rest.reading[k] / static_cast<double>(block);
+    }
+    few.time_s.push_back(time);
+    few.reading.push_back(reading);
+  }
+  return few;
+}
+
+double mean_of(std::span<const double> values) {
+  double sum = 0.0;
+  for (const double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+/// Standard deviation of a normal distribution as wide as Student's t.
+double students(double sd, double degrees) {
+  constexpr double kFewest = 2.5;
+  const double f = std::max(degrees, kFewest);
+  return sd * std::sqrt(f / (f - 2.0));
+}
+
+/// Rounding hides what is smaller than a step.
+double rounding_sd(const PreparedRecording& r) {
+  constexpr double kLeast = 1e-9;  // of the peak: rounding of numbers
+  const double quantum = quantum_of(r.recording.response);
+  return std::max(quantum / std::sqrt(12.0), kLeast * std::abs(r.phases.peak_response));
+}
+
+/// The noise of the longest hold, about a straight line and four exponentials: a short rest does
+/// not tell how its readings are correlated.
+struct HoldNoise {
+  double phi = 0.0, variance = 0.0;
+  double step_s = 0.0;  ///< of samples, which phi belongs to
+  std::size_t samples = 0;
+};
+
+std::optional<HoldNoise> hold_noise(const PreparedRecording& r) {
+  constexpr std::size_t kFewest = 50, kMost = 1000;
+  const Phase* longest = nullptr;
+  for (const Phase& phase : r.phases.phases) {
+    if (phase.kind != PhaseKind::hold || phase.first < r.phases.contact_index) continue;
+    if (longest == nullptr || phase.last - phase.first > longest->last - longest->first) {
+      longest = &phase;
+    }
+  }
+  if (longest == nullptr || longest->last - longest->first < kFewest) return std::nullopt;
+  // The fast beginning is left out.
+  const std::size_t held = longest->last - longest->first;
+  const std::size_t n = std::min(held - held / 10, kMost);
+  const std::size_t first = longest->last + 1 - n;
+  const std::span<const double> time(&r.recording.time_s[first], n);
+  Eigen::MatrixXd j(static_cast<Eigen::Index>(n), 6);
+  Eigen::VectorXd y(j.rows());
+  for (std::size_t i = 0; i < n; ++i) {
+    const double x = (time[i] - time.front()) / (time.back() - time.front());
+    const auto row = static_cast<Eigen::Index>(i);
+    j.row(row) << 1.0, x, std::exp(-2.0 * x), std::exp(-6.0 * x), std::exp(-18.0 * x),
+        std::exp(-54.0 * x);
+    y[row] = r.recording.response[first + i] - r.recording.response[longest->last];
+  }
+  if (!(y.cwiseAbs().maxCoeff() > 0.0)) return std::nullopt;
+  const double step_s = median_step(time);
+  const AutoregressionEstimate noise = estimate_autoregression(time, y, j, step_s);
+  return HoldNoise{noise.phi, noise.variance, step_s, n};
+}
+
+/// Generalised least squares of a line (or a level) through readings at rest.
+/// @param hold noise to be taken in place of the rest's own
+void fit_rests(const RestSamples& rest, double rounding, const std::optional<HoldNoise>& hold,
+               RestReadings& result) {
+  const auto n = static_cast<Eigen::Index>(rest.reading.size());
+  const Eigen::Index p = rest.reading.size() >= kFewestForSlope ? 2 : 1;
+  const double middle = mean_of(rest.time_s);
+  const double length = rest.time_s.back() - rest.time_s.front();
+  Eigen::MatrixXd j(n, p);
+  Eigen::VectorXd y(n);
+  const double level = mean_of(rest.reading);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    j(i, 0) = 1.0;
+    if (p > 1) j(i, 1) = (rest.time_s[k] - middle) / length;
+    y[i] = rest.reading[k] - level;
+  }
+  const double step_s = hold ? hold->step_s : median_step(rest.time_s);
+  AutoregressionEstimate noise;
+  if (hold) {
+    noise.phi = hold->phi;
+    noise.variance = hold->variance;
+  } else {
+    noise = estimate_autoregression(rest.time_s, y, j, step_s);
+  }
+  const AutoregressiveNoise whitener(noise.phi, step_s);
+  Eigen::MatrixXd both(n, p + 1);
+  both << j, y;
+  whitener.whiten(rest.time_s, both);
+  const Eigen::MatrixXd gram = both.leftCols(p).transpose() * both.leftCols(p);
+  const Eigen::MatrixXd inverse = gram.llt().solve(Eigen::MatrixXd::Identity(p, p));
+  const Eigen::VectorXd x = inverse * (both.leftCols(p).transpose() * both.col(p));
+  const Eigen::MatrixXd covariance = noise.variance * inverse;
+  result.phi = noise.phi;
+  result.noise_sd = std::sqrt(noise.variance);
+  const auto sd = [&](Eigen::Index column, double variance) {
+    const double degrees =
+        hold ? static_cast<double>(hold->samples) : satterthwaite_degrees(noise, column, n, p);
+    return students(std::sqrt(variance), degrees);
+  };
+  if (p == 1) {
+    result.origin_s = middle;
+    result.zero = Measured{level + x[0], std::hypot(sd(0, covariance(0, 0)), rounding)};
+    return;
+  }
+  const double shift = -covariance(0, 1) / covariance(1, 1);  // of the origin, in lengths
+  result.origin_s = middle + shift * length;
+  const double at_origin =
+      covariance(0, 0) - covariance(0, 1) * covariance(0, 1) / covariance(1, 1);
+  result.zero = Measured{level + x[0] + shift * x[1], std::hypot(sd(0, at_origin), rounding)};
+  result.drift = Measured{x[1] / length, std::hypot(sd(1, covariance(1, 1)), rounding) / length};
+}
+
+}  // namespace
+
+RestReadings read_rests(const PreparedRecording& recording) {
+  constexpr double kShort = 30.0;  // samples, below which a longer hold tells the noise
+  RestReadings result;
+  const RestSamples all = rest_samples(recording);
+  result.before = all.before;
+  result.after = all.after;
+  if (all.reading.empty() || (all.before == 0 && all.after < kFewestForSlope)) return result;
+  const double rounding = rounding_sd(recording);
+  const RestSamples rest = averaged(all);
+  const auto n = static_cast<double>(rest.reading.size());
+  const double level = mean_of(rest.reading);
+  double squares = 0.0;
+  for (const double v : rest.reading) squares += (v - level) * (v - level);
+  const bool constant = rest.reading.size() > 2 && squares <= n * rounding * rounding * 1e-6;
+  const std::optional<HoldNoise> hold =
+      n < kShort && !constant ? hold_noise(recording) : std::nullopt;
+  // A hold that no such curve describes has no noise to be read.
+  constexpr double kAlike = 16.0;  // in variance
+  const bool alike = rest.reading.size() < kFewestForNoise ||
+                     (hold && hold->variance * (n - 1.0) <= kAlike * squares);
+  const bool longer = hold && alike && hold->samples > rest.reading.size();
+  if ((longer || rest.reading.size() >= kFewestForNoise) && !constant) {
+    fit_rests(rest, squares < n * 4.0 * rounding * rounding ? rounding : 0.0,
+              longer ? hold : std::nullopt, result);
+    return result;
+  }
+  const double noise = std::max(recording.phases.noise_sd_estimate, rounding);
+  const double length = rest.time_s.back() - rest.time_s.front();
+  result.origin_s = mean_of(rest.time_s);
+  result.noise_sd = constant ? rounding : noise;
+  result.zero = Measured{level, constant ? rounding : noise / std::sqrt(n)};
+  if (constant && rest.reading.size() >= kFewestForSlope) {
+    result.drift = Measured{0.0, std::sqrt(12.0) * rounding / length};
+  }
+  return result;
+}
+
+DriftFinding drift_finding(const PreparedRecording& r, const RestReadings& rests) {
+  constexpr double kShare = 0.02;  // of the relaxed force
+  const std::vector<double>& time = r.recording.time_s;
+  double hold_s = 0.0;
+  std::size_t end = 0;
+  for (const Phase& phase : r.phases.phases) {
+    const bool fitted = time[phase.last] > r.from_s && time[phase.first] < r.to_s;
+    const bool loaded = phase.first >= r.phases.contact_index;
+    if (phase.kind != PhaseKind::hold || !fitted || !loaded) continue;
+    if (phase.first == 0 && r.phases.phases.size() > 1) continue;  // a preload at rest
+    const double length = time[phase.last] - time[phase.first];
+    if (length > hold_s) end = phase.last;
+    hold_s = std::max(hold_s, length);
+  }
+  // The drift acts from contact on.
+  const double loaded_s = time[end] - time[r.phases.contact_index];
+  if (hold_s == 0.0) return DriftFinding::no_hold;
+  if (!rests.drift || !rests.zero) return DriftFinding::not_separable;
+  const double zero = rests.zero->value + rests.drift->value * (time[end] - rests.origin_s);
+  const double relaxed = std::abs(r.recording.response[end] - zero);
+  return rests.drift->sd * loaded_s <= kShare * relaxed ? DriftFinding::told
+                                                        : DriftFinding::not_separable;
+}
+
+Placement measure_placement(const PreparedRecording& recording, const LawSpec& law,
+                            std::optional<double> exponent) {
+  Placement placement;
+  placement.rests = read_rests(recording);
+  placement.onset = find_onset(recording, placement.rests, first_loading_exponent(law, exponent));
+  placement.drift = drift_finding(recording, placement.rests);
+  return placement;
+}
+
+}  // namespace tpm::fit

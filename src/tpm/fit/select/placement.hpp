@@ -1,0 +1,87 @@
+#pragma once
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/likelihood/config.hpp"
+#include "tpm/fit/select/recording_setup.hpp"
+
+namespace tpm::fit {
+
+/// A value with its standard uncertainty, SI.
+struct Measured {
+  double value = 0.0;
+  double sd = 0.0;
+};
+
+/// What the samples tell in which tissue cannot act: at rest before contact, and after the probe
+/// was withdrawn.
+struct RestReadings {
+  std::size_t before = 0, after = 0;  ///< samples
+  double noise_sd = 0.0;              ///< of one reading, SI
+  double phi = 0.0;                   ///< correlation of neighbouring readings
+  double origin_s = 0.0;              ///< where zero and drift are uncorrelated
+  std::optional<Measured> zero;       ///< of the response, at origin_s; none without samples before
+                                      ///< contact
+  std::optional<Measured> drift;      ///< of the zero, per second; none below 8 samples
+};
+
+/// Zero and drift from the rests of an indentation, by generalised least squares of a straight line
+/// (below 8 samples: of a level) with noise that is an autoregression of first order
+/// (estimate_autoregression). At origin_s the zero is that of a level, with the standard deviation
+///
+///     sigma sqrt((1 + 2 sum_k (1 - k/n) phi^k) / n).
+///
+/// The noise of a rest below 30 samples is that of the longest hold, if that has more.
+/// Both are multiplied by sqrt(f / (f - 2)), f the degrees of freedom of their variance: the
+/// standard deviation of Student's t. A rest of more than 1,000 samples is averaged in blocks.
+[[nodiscard]] RestReadings read_rests(const PreparedRecording& recording);
+
+/// Where a probe met the tissue, extrapolated from the first part of the ramp.
+struct Onset {
+  Measured drive;           ///< SI
+  double part = 0.0;        ///< of the ramp's travel beyond contact that it was extrapolated from
+  std::size_t samples = 0;  ///< in contact, within that part; 0: it was not extrapolated
+  bool from_rest = true;    ///< false: there are no samples before contact, and the rest is stated
+};
+
+/// Contact as the onset of first loading F = zero + A x^m (1 + B x), x = drive - contact >= 0, by
+/// least squares over the first 5 to 30 % of the travel, whichever part has the least uncertainty:
+/// of the noise, the zero, and a quarter of what B moves (how far the loading departs from a power
+/// within the part).
+///
+/// Without samples before contact, a preload is extrapolated back to no force, and the uncertainty
+/// is as large as the way there.
+/// @param exponent m of the law; none: anything from 1 to 3 that fits
+[[nodiscard]] Onset find_onset(const PreparedRecording& recording, const RestReadings& rests,
+                               std::optional<double> exponent);
+
+/// The exponent of a law's first loading; none if the law estimates it.
+[[nodiscard]] std::optional<double> first_loading_exponent(const LawSpec& law,
+                                                           std::optional<double> of_probe);
+
+/// Whether a drift of the zero can be told from a slow relaxation of the tissue.
+enum class DriftFinding {
+  no_hold,        ///< nothing is held: no drift is asked for
+  told,           ///< the rests tell a slope: it is in the fit
+  not_separable,  ///< its uncertainty over loading and hold exceeds 2 % of the relaxed force, or
+                  ///< there is no rest
+};
+
+/// @return told only if the uncertainty of the slope times the time from contact to the end of
+///         the longest hold is at most 2 % of the force there
+[[nodiscard]] DriftFinding drift_finding(const PreparedRecording& recording,
+                                         const RestReadings& rests);
+
+/// What was measured of one recording's placement, for a law.
+struct Placement {
+  RestReadings rests;
+  Onset onset;
+  DriftFinding drift = DriftFinding::no_hold;
+};
+
+[[nodiscard]] Placement measure_placement(const PreparedRecording& recording, const LawSpec& law,
+                                          std::optional<double> exponent);
+
+}  // namespace tpm::fit

@@ -1,0 +1,234 @@
+#include "tpm/fit/select/placement_parameters.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/fit/select/placement.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::fit {
+namespace {
+
+bool is_stretch(const LawSpec& law) {
+  return law.drive == Quantity::relative_length;
+}
+
+bool is_indentation(const LawSpec& law) {
+  return law.drive == Quantity::indentation_depth && law.response == Quantity::contact_force;
+}
+
+bool bends(const LawSpec& law) {
+  return law.kernel != Kernel::linear || law.tension != Tension::none;
+}
+
+/// Whether contact and offset can be told apart: by a bend of the kernel, or by a response that
+/// begins to rise within the recording. Where it begins was found in noisy readings; to fix contact
+/// there would take an estimate for known.
+bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
+  if (law.drive == Quantity::strain) return false;  // it counts from the unloaded specimen
+  if (bends(law)) return true;
+  const double contact_s = r.recording.time_s[r.phases.contact_index];
+  return !r.phases.preloaded && r.phases.contact_found && contact_s >= r.from_s;
+}
+
+/// Contact may lie this many times the depth of the recording before its start at most.
+constexpr double kFurthestContact = 2.0;
+
+/// The slack length of a strip: nothing measures it beforehand.
+AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording& r) {
+  FitParameter fit;
+  fit.name = "slack_length";
+  fit.scale = Scale::linear;
+  fit.unit = shown_unit(quantity_dimension(law.drive));
+  const double begin = start_drive(r);
+  const double range = r.phases.peak_drive - begin;
+  fit.start = begin;
+  fit.lower = bends(law) ? begin - 0.5 * range : begin;
+  fit.upper = begin + 0.6 * range;
+  WidestBounds widest{begin - kFurthestContact * range, begin + 0.9 * range};
+  // Under a straight kernel that was in contact from the start, depth and offset say the same.
+  if (!bends(law)) {
+    fit.lower = std::max(fit.lower, r.recording.drive.front());
+    widest.lower = fit.lower;
+  }
+  widest.lower = std::min(fit.lower, std::max(widest.lower, 0.1 * begin));
+  fit.start = std::max(fit.start, fit.lower);
+  fit = readable(std::move(fit));
+  return {fit, WidestBounds{std::min(widest.lower, fit.lower), std::max(widest.upper, fit.upper)}};
+}
+
+/// Where contact of a depth can lie at all: the probe touches before the force rises, and in a
+/// recording that begins in contact not much further back than it then goes on.
+AutomaticBounds contact_bounds(const LawSpec& law, const PreparedRecording& r, const Onset& onset,
+                               std::string name) {
+  constexpr double kBeforeRise = 0.25, kAfterRise = 0.1;
+  FitParameter fit;
+  fit.name = std::move(name);
+  fit.scale = Scale::linear;
+  fit.unit = shown_unit(quantity_dimension(law.drive));
+  const double begin = start_drive(r);
+  const double range = r.phases.peak_drive - begin;
+  fit.lower = begin - (onset.from_rest ? kBeforeRise : kFurthestContact) * range;
+  fit.upper = begin + kAfterRise * range;
+  // Under a straight kernel that was in contact from the start, depth and offset say the same.
+  if (!bends(law) && !onset.from_rest) {
+    fit.lower = std::max(fit.lower, r.recording.drive.front());
+  }
+  fit.start = std::clamp(onset.drive.value, fit.lower, fit.upper);
+  return {readable(std::move(fit)), std::nullopt};
+}
+
+AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
+  constexpr double kFurther = 10.0;
+  const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
+  const Unit unit = shown_unit(quantity_dimension(law.response));
+  AutomaticBounds bounds{readable({std::move(name), unit, Scale::linear, 0.0, -peak, peak}), {}};
+  if (!is_indentation(law)) bounds.widest = WidestBounds{-kFurther * peak, kFurther * peak};
+  return bounds;
+}
+
+Prior zero_prior(const PreparedRecording& r, const RestReadings& rests) {
+  constexpr double kStated = 0.02;  // of the peak
+  if (rests.zero) {
+    return {rests.zero->value, rests.zero->sd,
+            rests.before > 0 ? fmt::format("{} samples before contact", rests.before)
+                             : fmt::format("{} samples after withdrawal", rests.after)};
+  }
+  const double floor = std::abs(r.phases.floor_response);
+  return {0.0, std::max(floor, kStated * std::abs(r.phases.peak_response)),
+          "stated: no samples before contact tell the zero"};
+}
+
+Prior contact_prior(const Onset& onset) {
+  std::string from;
+  if (!onset.from_rest) {
+    from = "stated: no samples before contact, so its depth is an unknown";
+  } else if (onset.samples == 0) {
+    from = "between two samples: the ramp has too few to be extrapolated";
+  } else {
+    from = fmt::format("onset extrapolated from {} samples, the first {} % of the ramp",
+                       onset.samples, significant(100.0 * onset.part, 2));
+  }
+  return {onset.drive.value, onset.drive.sd, std::move(from)};
+}
+
+/// "mN/s": drifts of a force are small.
+Unit drift_unit_of(const LawSpec& law) {
+  const Dimension response = quantity_dimension(law.response);
+  return per_second(response == Dimension::force ? parse_unit("mN", response, "drift")
+                                                 : shown_unit(response));
+}
+
+void add_drift(FitConfig& config, const LawSpec& law, const PreparedRecording& r, std::size_t i,
+               const RestReadings& rests, std::string name) {
+  constexpr double kWide = 20.0;  // standard deviations
+  const Measured drift = rests.drift.value_or(Measured{});
+  const double duration = r.to_s - r.from_s;
+  const double most = std::max(kWide * drift.sd, std::abs(r.phases.peak_response) / duration);
+  EstimatedParameter p;
+  p.fit = readable({std::move(name), drift_unit_of(law), Scale::linear, drift.value,
+                    drift.value - most, drift.value + most});
+  if (rests.drift) {
+    p.prior = Prior{drift.value, drift.sd,
+                    fmt::format("{} samples before contact and {} after withdrawal", rests.before,
+                                rests.after)};
+  }
+  p.drift = DriftTerm{i, rests.drift ? rests.origin_s : r.from_s};
+  config.parameters.push_back(std::move(p));
+}
+
+/// Zero and contact of recordings that are no indentations: nothing is measured beforehand.
+void add_free_placement(FitConfig& config, const LawModel& model, const PreparedRecording& r,
+                        std::size_t i, std::vector<std::size_t> scope, std::string offset,
+                        Nuisance nuisance) {
+  const LawSpec& law = model.spec();
+  add_automatic(config, offset_bounds(law, r, std::move(offset)), {{model.index("offset"), scope}});
+  // The slack length belongs to the specimen.
+  const bool slack = is_stretch(law) && i == 0 && nuisance != Nuisance::offset;
+  if (slack) add_automatic(config, slack_length_bounds(law, r), {{model.index("contact"), {}}});
+}
+
+/// Contact that is known from a stated force, where each recording has its own.
+AutomaticBounds held_contact(const LawSpec& law, const PreparedRecording& r, std::string name) {
+  constexpr double kHeld = 1e-6;  // of the travel
+  const double at = r.phases.contact_drive;
+  const double range = r.phases.peak_drive - at;
+  return {{std::move(name), shown_unit(quantity_dimension(law.drive)), Scale::linear, at,
+           at - kHeld * range, at + kHeld * range},
+          std::nullopt};
+}
+
+}  // namespace
+
+void add_automatic(FitConfig& config, AutomaticBounds bounds, std::vector<Target> sets) {
+  EstimatedParameter p;
+  p.fit = std::move(bounds.fit);
+  p.sets = std::move(sets);
+  p.widest = bounds.widest;
+  config.parameters.push_back(std::move(p));
+}
+
+double start_drive(const PreparedRecording& r) {
+  return r.phases.contact_found && !r.phases.preloaded ? r.phases.contact_drive
+                                                       : r.recording.drive.front();
+}
+
+void add_possible_drift(FitConfig& config, const PreparedRecording& r, std::size_t place) {
+  const RestReadings rests = read_rests(r);
+  if (drift_finding(r, rests) != DriftFinding::not_separable) return;
+  const bool several = config.data.size() > 1;
+  add_drift(config, config.law.value(), r, place, rests,
+            several ? fmt::format("drift {}", r.name) : std::string("drift"));
+}
+
+void add_placement(FitConfig& config, const LawModel& model,
+                   std::span<const PreparedRecording> recordings, const SetupOptions& options) {
+  const LawSpec& law = model.spec();
+  const std::size_t offset = model.index("offset"), contact = model.index("contact");
+  if (options.zero) config.fixed[offset] = *options.zero;
+  if (options.contact) config.fixed[contact] = *options.contact;
+  if (options.nuisance == Nuisance::none) return;
+  const bool several = recordings.size() > 1;
+  const auto named = [&](const char* what, const PreparedRecording& r) {
+    return several ? fmt::format("{} {}", what, r.name) : std::string(what);
+  };
+  int held = 0, told = 0;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const PreparedRecording& r = recordings[i];
+    const auto scope = several ? std::vector<std::size_t>{i} : std::vector<std::size_t>{};
+    if (!is_indentation(law)) {
+      add_free_placement(config, model, r, i, scope, named("offset", r), options.nuisance);
+      continue;
+    }
+    const Placement placement = measure_placement(r, law, options.exponent);
+    if (!options.zero) {
+      add_automatic(config, offset_bounds(law, r, named("offset", r)), {{offset, scope}});
+      config.parameters.back().prior = zero_prior(r, placement.rests);
+    }
+    const bool free = options.nuisance == Nuisance::offset_and_contact || contact_is_seen(law, r);
+    if (options.contact || options.nuisance == Nuisance::offset) {
+      // fixed
+    } else if (r.contact_held && several) {
+      add_automatic(config, held_contact(law, r, named("contact", r)), {{contact, scope}});
+    } else if (!r.contact_held && free) {
+      add_automatic(config, contact_bounds(law, r, placement.onset, named("contact", r)),
+                    {{contact, scope}});
+      config.parameters.back().prior = contact_prior(placement.onset);
+    }
+    if (!options.drift) continue;
+    held += placement.drift != DriftFinding::no_hold;
+    told += placement.drift == DriftFinding::told;
+    if (placement.drift == DriftFinding::told)
+      add_drift(config, law, r, i, placement.rests, named("drift", r));
+  }
+  if (held == 0 || told > 0) return;
+  for (EstimatedParameter& p : config.parameters) {
+    if (p.fit.name == "k_inf") p.not_separable = "drift or a slow branch";
+  }
+}
+
+}  // namespace tpm::fit
