@@ -89,7 +89,7 @@ RestSamples averaged(RestSamples rest) {
   return few;
 }
 
-double mean_of(std::span<const double> values) {
+double middle_of_rest(std::span<const double> values) {
   double sum = 0.0;
   for (const double v : values) sum += v;
   return sum / static_cast<double>(values.size());
@@ -153,11 +153,11 @@ void fit_rests(const RestSamples& rest, double rounding, const std::optional<Hol
                RestReadings& result) {
   const auto n = static_cast<Eigen::Index>(rest.reading.size());
   const Eigen::Index p = rest.reading.size() >= kFewestForSlope ? 2 : 1;
-  const double middle = mean_of(rest.time_s);
+  const double middle = middle_of_rest(rest.time_s);
   const double length = rest.time_s.back() - rest.time_s.front();
   Eigen::MatrixXd j(n, p);
   Eigen::VectorXd y(n);
-  const double level = mean_of(rest.reading);
+  const double level = middle_of_rest(rest.reading);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto k = static_cast<std::size_t>(i);
     j(i, 0) = 1.0;
@@ -212,7 +212,7 @@ RestReadings read_rests(const PreparedRecording& recording) {
   const double rounding = rounding_sd(recording);
   const RestSamples rest = averaged(all);
   const auto n = static_cast<double>(rest.reading.size());
-  const double level = mean_of(rest.reading);
+  const double level = middle_of_rest(rest.reading);
   double squares = 0.0;
   for (const double v : rest.reading) squares += (v - level) * (v - level);
   const bool constant = rest.reading.size() > 2 && squares <= n * rounding * rounding * 1e-6;
@@ -230,7 +230,7 @@ RestReadings read_rests(const PreparedRecording& recording) {
   }
   const double noise = std::max(recording.phases.noise_sd_estimate, rounding);
   const double length = rest.time_s.back() - rest.time_s.front();
-  result.origin_s = mean_of(rest.time_s);
+  result.origin_s = middle_of_rest(rest.time_s);
   result.noise_sd = constant ? rounding : noise;
   result.zero = Measured{level, constant ? rounding : noise / std::sqrt(n)};
   if (constant && rest.reading.size() >= kFewestForSlope) {

@@ -26,7 +26,7 @@ bool is_after_the_test(PhaseKind kind) {
 
 /// Samples before contact that are kept where they are too few to measure the zero beforehand.
 constexpr std::size_t kBaseline = 10;
-constexpr std::size_t kFewestAtRest = 3;
+constexpr std::size_t kFewestBeforeContact = 3;
 
 /// What the recordings tell about the sizes of a law's parameters.
 struct Sizes {
@@ -244,7 +244,7 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
   const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;
   r.contact_held = options.contact_response && r.phases.contact_found;
   // Samples that measure the zero are not fitted once more.
-  if (read_rests(r).before >= kFewestAtRest) {
+  if (read_rests(r).before >= kFewestBeforeContact) {
     r.from_s = time[contact];
   } else {
     keep_baseline(r);

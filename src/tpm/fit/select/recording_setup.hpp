@@ -25,7 +25,7 @@ struct PreparedRecording {
   std::optional<double> clipped_above = std::nullopt, clipped_below = std::nullopt;
   bool load_imposed = false;  ///< the response was imposed and the drive measured: creep
   std::vector<std::string> warnings = {};  ///< what the recording cannot tell, one sentence each
-  std::string read_as = {};  ///< how its columns and units were understood, in one sentence
+  std::string read_as = {};   ///< how its columns and units were understood, in one sentence
   bool contact_held = false;  ///< contact is where a stated force is passed: it is not fitted
   std::string start_up = {};  ///< what is left out after a step, in one sentence; empty: nothing
 };
