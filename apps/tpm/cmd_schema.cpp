@@ -12,6 +12,7 @@
 #include "tpm/haptics/session/session_keys.hpp"
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
+#include "tpm/paper/organ_study.hpp"
 
 namespace tpm::app {
 namespace {
@@ -23,7 +24,7 @@ struct SchemaOptions {
 
 /// The kinds of files whose keys are declared in the library.
 std::vector<const FileKind*> declared_kinds() {
-  return {&session_kind(), &protocol_kind(), &scene_kind()};
+  return {&session_kind(), &organ_study_kind(), &protocol_kind(), &scene_kind()};
 }
 
 constexpr std::string_view kEnding = ".schema.json";

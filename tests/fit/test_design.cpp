@@ -310,7 +310,7 @@ TEST_CASE("bad designs are named") {
       changed("/criterion", "stiffness"),
       Contains("/criterion: no parameter is called 'stiffness'; expected all, worst, k_inf"));
   CHECK_THAT(changed("/candidates/0/rate", Json::array({"0 mm/s"})),
-             Contains("/candidates/0/rate/0: 0 m/s; expected a value above 0"));
+             Contains("/candidates/0/rate/0: 0 m/s; expected above 0 m/s"));
   CHECK_THAT(changed("/candidates/0/load", Json::array({"1 N"})),
              Contains("/candidates/0/load: is no key of the kind 'ramp_hold'"));
   CHECK_THAT(changed("/candidates/0/kind", "creep"),

@@ -389,7 +389,7 @@ TEST_CASE("mistakes in a configuration are named") {
   refuse("\"0.1 kPa\"", "\"13 kPa\"", "start 12000 (SI) is outside the bounds");
   refuse("\"starts\"", "\"satrts\"", "/satrts: unknown key");
   refuse("\"4 mm/s\"", "\"4 mm\"", "/data/0/protocol/rate");
-  refuse("\"4 mm/s\"", "\"0 mm/s\"", "0 m/s; expected a value above 0");
+  refuse("\"4 mm/s\"", "\"0 mm/s\"", "0 m/s; expected above 0 m/s");
   refuse("\"relative\": 0.1", "\"absolute\": \"0.1 N\"", "needs 'relative'");
   refuse("\"relative\": 0.1", "\"relative\": -0.1", "not above 0");
   refuse("[\"E1\", \"E2\", \"Eprime\"]", "[\"E1\", \"E2\", \"eta1\"]", "different dimensions");

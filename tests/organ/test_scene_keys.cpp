@@ -9,6 +9,7 @@
 #include "temp_folder.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/other_kind.hpp"
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
 
@@ -360,6 +361,17 @@ TEST_CASE("a file of another kind is called by its name", "[keys]") {
              Contains("this is a sweep; use tpm sweep"));
   CHECK_THAT(test::refusal_of([] { check_schema(poke(), "hil", "s.json"); }),
              StartsWith("s.json: this is a scene; use tpm simulate"));
+}
+
+TEST_CASE("a misspelt key makes no other kind of a file", "[keys]") {
+  Json sweep = read_json(TPM_TEST_SOURCE_DIR "/configs/sweep_x_depth.json");
+  sweep["axis"] = sweep.at("axes");
+  sweep.erase("axes");
+  CHECK_THAT(test::refusal_of([&] { check_schema(sweep, "sweep", "s.json"); }),
+             Contains("/axis: unknown key (did you mean 'axes'?)"));
+  Json study = read_json(TPM_TEST_SOURCE_DIR "/configs/organ_experiments.json");
+  study.erase("tissues");
+  CHECK_NOTHROW(require_not_other_kind(study, "organ_experiments", "s.json"));
 }
 
 TEST_CASE("what is written of a declaration is read again", "[keys]") {

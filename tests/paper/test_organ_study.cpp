@@ -111,6 +111,10 @@ TEST_CASE("readings stand where their experiment has them") {
   }
 }
 
+TEST_CASE("the example of a study is read", "[keys]") {
+  CHECK_NOTHROW(parse_organ_study(example_of(organ_study_kind()), "example", {}));
+}
+
 TEST_CASE("a study says which part of its configuration is wrong") {
   Json study = star_only();
   study["fits"]["all"].push_back("nothing");
@@ -135,7 +139,7 @@ TEST_CASE("a study says which part of its configuration is wrong") {
   CHECK_THAT(refused(study), Contains("/conditions/static/readings: deeper than 'depth'"));
   study = star_only();
   study["conditions"]["creep"]["loads"][1] = "0 N";
-  CHECK_THAT(refused(study), Contains("/conditions/creep/loads/1: not above 0"));
+  CHECK_THAT(refused(study), Contains("/conditions/creep/loads/1: 0 N; expected above 0 N"));
   study = star_only();
   study["tissues"][1]["name"] = "star";
   CHECK_THAT(refused(study), Contains("s.json: key /tissues: two tissues 'star'"));

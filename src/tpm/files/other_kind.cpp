@@ -35,23 +35,29 @@ constexpr auto kKindMarks = std::to_array<KindMarks>({
     {"curve", "the description of a curve", "tpm data", {"id", "kind"}},
     {"device", "the description of a device", "tpm hil run --device", {"device", "limits"}},
     {"scene", "a scene", "tpm simulate", {"organ", "organ"}},
-    {"hil", "a session", "tpm hil run", {"model", "model"}},
+    {"hil", "a session", "tpm hil run", {"indentations", "indentations"}},
+    {"hil", "a session", "tpm hil run", {"slides", "slides"}},
+    {"hil", "a session", "tpm hil run", {"motion", "motion"}},
 });
 
 }  // namespace
 
 void require_not_other_kind(const Json& document, std::string_view kind, std::string_view where) {
   if (!document.is_object()) return;
-  const auto marked = [&](const KindMarks& marks) {
+  const auto is_wanted = [kind](const KindMarks& marks) { return marks.kind == kind; };
+  const auto is_marked = [&](const KindMarks& marks) {
     return document.contains(marks.keys[0]) && document.contains(marks.keys[1]);
   };
-  const auto own = std::find_if(kKindMarks.begin(), kKindMarks.end(),
-                                [kind](const KindMarks& marks) { return marks.kind == kind; });
-  if (own == kKindMarks.end() || marked(*own)) return;
-  const auto found = std::find_if(kKindMarks.begin(), kKindMarks.end(), marked);
-  if (found == kKindMarks.end()) return;
+  const auto wanted = std::find_if(kKindMarks.begin(), kKindMarks.end(), is_wanted);
+  const auto found = std::find_if(kKindMarks.begin(), kKindMarks.end(), is_marked);
+  if (wanted == kKindMarks.end() || found == kKindMarks.end()) return;
+  for (const KindMarks& marks : kKindMarks) {
+    // One key of its own is enough: the other may be misspelt.
+    const bool own = document.contains(marks.keys[0]) || document.contains(marks.keys[1]);
+    if (is_wanted(marks) && own) return;
+  }
   throw bad_input(where, fmt::format("this is {}; use {}", found->called, found->command),
-                  fmt::format("{}, for {}", own->called, own->command));
+                  fmt::format("{}, for {}", wanted->called, wanted->command));
 }
 
 }  // namespace tpm::files

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/files/keys/file_kind.hpp"
 #include "tpm/fit/fit.hpp"
 
 namespace tpm::paper {
@@ -49,6 +50,9 @@ struct OrganStudyConfig {
   std::vector<StudyMaterial> materials;
   std::vector<StudyCondition> conditions;
 };
+
+/// The declaration of its keys.
+[[nodiscard]] const FileKind& organ_study_kind();
 
 /// Reads and checks a configuration and the scenes that it names. Throws Error(bad_input) with the
 /// file and the key.

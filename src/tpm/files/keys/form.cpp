@@ -184,7 +184,7 @@ void require_kinds(const Json& object, const Form& form, const DocumentPlace& pl
         fmt::format("{}{}{}",
                     known.empty() ? fmt::format("no key but {}", form.by)
                                   : fmt::format("one of {}", fmt::join(known, ", ")),
-                    others.empty() ? "" : fmt::format("; with it {}: ", form.by), others));
+                    others.empty() ? "" : fmt::format("; {} goes with ", printable(key)), others));
   }
   require_keys(object, kind.keys, place, numbers);
 }

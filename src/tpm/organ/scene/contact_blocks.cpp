@@ -90,8 +90,8 @@ const Kinds<ContactKeys, ContactKind>& contact_kinds() {
         key("share", &K::share, number(share),
             "of the depth, or of the load against those of the others")};
   };
-  const auto radius = required(
-      key("radius", &K::radius_m, quantity(Dimension::length, kAboveZero), "of what touches"));
+  const auto radius = required(key("radius", &K::radius_m, quantity(Dimension::length, kAboveZero),
+                                   "radius of what touches"));
   std::vector<Key<K>> patch = common(driven);
   patch.push_back(radius);
   std::vector<Key<K>> tool = common({.least = 0.0, .most = 1e3});
