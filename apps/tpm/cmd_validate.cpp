@@ -7,9 +7,11 @@
 #include "command.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
 #include "tpm/files/instrument.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/predict/organ_prediction.hpp"
+#include "tpm/fit/show/credibility_page.hpp"
 #include "tpm/fit/show/validation_report.hpp"
 #include "tpm/fit/validate/validation.hpp"
 #include "tpmkit/error.hpp"
@@ -24,6 +26,8 @@ struct ValidateOptions {
   std::vector<std::string> quantities;
   std::string requirement, placement = "held", instrument, calibration_instrument, at;
   std::string folder, output;
+  std::string credibility, recheck;
+  CredibilityWords words;
 };
 
 /// The block of a file that holds it alone or under "instrument".
@@ -54,7 +58,7 @@ LawFile law_to_validate(const std::string& path) {
   return read_law(path);
 }
 
-ValidationRequest request_of(const ValidateOptions& options) {
+ValidationRequest validation_request(const ValidateOptions& options) {
   ValidationRequest request;
   request.law = law_to_validate(options.law);
   request.law_file = options.law;
@@ -87,15 +91,95 @@ ValidationRequest request_of(const ValidateOptions& options) {
   return request;
 }
 
+/// What a credibility page needs to ask again.
+Json invocation_of(const ValidateOptions& o) {
+  return {{"law", o.law},
+          {"recordings", o.recordings.files},
+          {"reading", o.recordings.reading.texts},
+          {"units", o.recordings.reading.units},
+          {"contact_force", o.recordings.contact_response},
+          {"quantities", o.quantities},
+          {"require", o.requirement},
+          {"placement", o.placement},
+          {"instrument", o.instrument},
+          {"calibration_instrument", o.calibration_instrument},
+          {"at", o.at}};
+}
+
+ValidateOptions options_of(const Json& record, const std::string& page) {
+  try {
+    const Json& i = record.at("invocation");
+    ValidateOptions o;
+    o.law = i.at("law");
+    o.recordings.files = i.at("recordings").get<std::vector<std::string>>();
+    o.recordings.reading.texts = i.at("reading").get<std::map<std::string, std::string>>();
+    o.recordings.reading.units = i.at("units").get<std::vector<std::string>>();
+    o.recordings.contact_response = i.at("contact_force");
+    o.quantities = i.at("quantities").get<std::vector<std::string>>();
+    o.requirement = i.at("require");
+    o.placement = i.at("placement");
+    o.instrument = i.at("instrument");
+    o.calibration_instrument = i.at("calibration_instrument");
+    o.at = i.at("at");
+    const Json& words = record.at("words");
+    o.words = {words.at("question"), words.at("context"), words.at("risk")};
+    return o;
+  } catch (const Json::exception&) {
+    throw bad_input(page, "its record is damaged",
+                    "a page that tpm validate --credibility has written");
+  }
+}
+
+/// The page itself stays: no command writes over what it reads.
+int recheck(const std::string& page, const std::string& output, const Session& session) {
+  std::filesystem::path marked = page;
+  marked.replace_filename(marked.stem().string() + "_rechecked" + marked.extension().string());
+  if (!output.empty()) marked = output;
+  will_write({marked});
+  const Json before = read_credibility_record(page);
+  const ValidateOptions options = options_of(before, page);
+  const ValidationRequest request = validation_request(options);
+  const Json now =
+      credibility_record(request, validate(request), options.words, invocation_of(options));
+  const std::vector<CredibilityChange> changes = changes_of(before, now);
+  write_file(marked, credibility_page(before, changes));
+  if (session.json()) {
+    Json list = array_json(changes, [](const CredibilityChange& c) {
+      return Json{{"place", c.place}, {"before", c.before}, {"now", c.now}};
+    });
+    write_output(
+        to_text(Json{{"page", page}, {"marked", marked.string()}, {"changes", std::move(list)}}));
+  } else {
+    std::string text = fmt::format("{}: {} of its values changed\n", page, changes.size());
+    for (const CredibilityChange& c : changes) {
+      text += fmt::format("{}: was {}, now {}\n", c.place, c.before, c.now);
+    }
+    write_output(text + fmt::format("written: {}\n", marked.string()));
+  }
+  return exit_code(changes.empty());
+}
+
 int run_validate(const ValidateOptions& options, const Session& session) {
+  if (!options.recheck.empty()) return recheck(options.recheck, options.output, session);
+  if (options.law.empty() || options.recordings.files.empty()) {
+    throw Error(ExitCode::usage, "validate", "no law and no recording",
+                "LAW RECORDING..., or --recheck FILE");
+  }
+  if (!options.credibility.empty()) will_write({options.credibility});
   will_write_into(options.folder, {"validation.csv", "validation.json", "figures.json"});
   const auto csv = csv_beside(options.output, session);
-  const ValidationRequest request = request_of(options);
+  const ValidationRequest request = validation_request(options);
   const Validation validation = validate(request);
   std::string text = session.json() ? to_text(to_json(validation)) : to_terminal_text(validation);
   if (!options.folder.empty()) {
     text += written(session, options.folder,
                     write_validation_report(options.folder, request, validation));
+  }
+  if (!options.credibility.empty()) {
+    const Json record =
+        credibility_record(request, validation, options.words, invocation_of(options));
+    write_file(options.credibility, credibility_page(record));
+    if (!session.json()) text += fmt::format("written: {}\n", options.credibility);
   }
   deliver(text, options.output);
   deliver_csv(to_csv(validation), csv);
@@ -110,11 +194,9 @@ void add_validate_command(CLI::App& app, Session& session) {
       "Compare a fitted law with recordings that it has not seen: the model error and its "
       "uncertainty (ASME V&V 20)");
   auto options = std::make_shared<ValidateOptions>();
-  command->add_option("LAW", options->law, "law.json that tpm fit has written")->required();
-  command
-      ->add_option("RECORDING", options->recordings.files,
-                   "Recordings that the law was not fitted to, one or more")
-      ->required();
+  command->add_option("LAW", options->law, "law.json that tpm fit has written");
+  command->add_option("RECORDING", options->recordings.files,
+                      "Recordings that the law was not fitted to, one or more");
   command->add_option("--require", options->requirement,
                       "How large a model error may be: a share of the measured value such as 10%, "
                       "an amount such as \"20 mN\", or jnd (what a hand can tell, as in tpm plan)");
@@ -137,6 +219,14 @@ void add_validate_command(CLI::App& app, Session& session) {
   command->add_option("--at", options->at,
                       "Recording to whose protocol the pooled area metric is carried, where "
                       "protocols differ");
+  command->add_option("--credibility", options->credibility,
+                      "Write a page (HTML) with the evidence under the headings of V&V 40");
+  command->add_option("--question", options->words.question, "Of that page: question of interest");
+  command->add_option("--context", options->words.context, "Of that page: context of use");
+  command->add_option("--risk", options->words.risk, "Of that page: model risk");
+  command->add_option("--recheck", options->recheck,
+                      "Compute a page of --credibility again and write beside it one "
+                      "(_rechecked) that marks what changed; exit code 1 if anything did");
   command->add_option("--folder", options->folder,
                       "Write validation.csv, validation.json and the figures into this folder");
   add_output_option(*command, options->output);

@@ -1,9 +1,65 @@
 // A smaller part of tests/measure/validation.cpp: how often tpm validate is right, by simulation.
-#include <catch2/catch.hpp>
+#include <fmt/format.h>
+#include <sys/wait.h>
 
+#include <catch2/catch.hpp>
+#include <cstdlib>
+
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/json.hpp"
 #include "validation_studies.hpp"
 
 namespace tpm::fit {
+namespace {
+
+int run_in(const test::TempFolder& folder, const std::string& arguments) {
+  const int status = std::system(fmt::format("cd '{}' && '" TPM_TEST_PROGRAM "' {} > said 2>&1",
+                                             folder.path().string(), arguments)
+                                     .c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+void write_table(const std::string& file, const Recording& r) {
+  std::string text = "time [s],depth [mm],force [N]\n";
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    text += fmt::format("{:.4f},{:.6f},{:.9f}\n", r.time_s[i], 1e3 * r.drive[i], r.response[i]);
+  }
+  write_file(file, text);
+}
+
+}  // namespace
+
+TEST_CASE("the example of the help runs, and its page finds what changed", "[validate]") {
+  const test::TempFolder folder;
+  Random random(5);
+  test::StudyNoise noise;
+  noise.sigma_N = 5e-4;
+  write_table(folder / "recording.csv", test::study_recording({}, noise, random));
+  const test::StudyTest protocol = test::study_validation(100, 0.0);
+  write_table(folder / "other.csv", test::study_recording(protocol, noise, random));
+  REQUIRE(run_in(folder, "fit recording.csv --folder fitted") == 0);
+  const std::string validate = "validate fitted/law.json other.csv --require 10%";
+  CHECK(run_in(folder, validate + " --folder validated --credibility page.html") == 0);
+  CHECK_THAT(read_file(folder / "said"), Catch::Matchers::Contains("adequate for 10%"));
+  for (const char* file :
+       {"validation.csv", "validation.json", "validation_error.png", "validation_motion.png"}) {
+    CHECK(std::filesystem::exists(folder / (std::string("validated/") + file)));
+  }
+  CHECK(read_json(folder / "validated/validation.json").at("verdict") == "adequate");
+  CHECK(run_in(folder, "validate --recheck page.html") == 0);
+  // Another recording under the same name.
+  write_table(folder / "other.csv", test::study_recording(protocol, noise, random, 1.3));
+  CHECK(run_in(folder, "validate --recheck page.html") == 1);
+  const std::string page = read_file(folder / "page_rechecked.html");
+  CHECK_THAT(page, Catch::Matchers::Contains("Changed since this page was written") &&
+                       Catch::Matchers::Contains("class=\"bad\""));
+  CHECK(run_in(folder, validate) == 1);
+  // The law's own data validate nothing.
+  CHECK(run_in(folder, "validate fitted/law.json recording.csv --require 10%") == 1);
+  CHECK_THAT(read_file(folder / "said"), Catch::Matchers::Contains("calibration residual"));
+  CHECK(run_in(folder, "validate fitted/law.json other.csv --require much") == 2);
+}
 
 TEST_CASE("|E| <= U without a model error, and [E - U, E + U] holds a known one", "[validate]") {
   constexpr int kExperiments = 200;

@@ -47,7 +47,8 @@ void add_part(ChannelUncertainty& u, std::string_view text, Dimension dimension,
   const bool of_reading = text.ends_with(kReading), of_range = text.ends_with(kRange);
   if (!of_reading && !of_range) {
     if (text.find('%') != std::string_view::npos) {
-      throw bad_input(where, fmt::format("'{}' says a share of what", printable(text)), kLimitExpected);
+      throw bad_input(where, fmt::format("'{}' says a share of what", printable(text)),
+                      kLimitExpected);
     }
     const double limit = parse_quantity(text, dimension, where) / divisor;
     if (limit < 0.0) throw bad_input(where, "is negative", "0 or more");

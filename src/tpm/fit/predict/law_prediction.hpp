@@ -98,24 +98,8 @@ struct LawPrediction {
                                               const PreparedRecording& recording,
                                               const PredictionOptions& options);
 
-/// Whether a law that was fitted elsewhere predicts a recording, by the rule of select_law: its rms
-/// error in the window is at most `factor` times the least residual that a law of the family leaves
-/// when it is fitted to this recording.
-struct PredictionVerdict {
-  double rms = 0.0;             ///< of the prediction, SI
-  double least_residual = 0.0;  ///< rms, SI
-  std::string least_law;        ///< that leaves it
-  double factor = 2.0;
-  [[nodiscard]] bool predicts() const { return rms <= factor * least_residual; }
-};
-[[nodiscard]] PredictionVerdict compare_prediction(const LawPrediction& prediction,
-                                                   const PreparedRecording& recording,
-                                                   std::uint64_t seed);
-
 [[nodiscard]] Json to_json(const LawPrediction& prediction);
 [[nodiscard]] std::string to_terminal_text(const LawPrediction& prediction);
-[[nodiscard]] Json to_json(const PredictionVerdict& verdict, Dimension response);
-[[nodiscard]] std::string verdict_words(const PredictionVerdict& verdict, double peak);
 /// Columns time_s, the drive, mean, standard error, both bands and what was observed, SI.
 [[nodiscard]] std::string to_csv(const LawPrediction& prediction);
 

@@ -1,16 +1,14 @@
 // Declared in tpm/fit/predict/law_prediction.hpp.
-// What a prediction says: verdict, JSON, terminal, CSV.
+// What a prediction says: JSON, terminal, CSV.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/delimited.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
-#include "tpm/fit/select/selection.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -165,49 +163,6 @@ std::string to_terminal_text(const LawPrediction& p) {
   }
   for (const std::string& flag : p.flags) text += fmt::format("! {}\n", flag);
   return text;
-}
-
-PredictionVerdict compare_prediction(const LawPrediction& prediction,
-                                     const PreparedRecording& recording, std::uint64_t seed) {
-  SelectionOptions options;
-  options.held_out = false;
-  options.setup.profiles = false;
-  options.setup.seed = seed;
-  const Selection selection = select_law(std::span(&recording, 1), options);
-  PredictionVerdict verdict;
-  verdict.factor = options.prediction_factor;
-  const PredictedRecording& own = prediction.recording.value();
-  const int n = own.fitted.samples + own.held_out.samples;
-  verdict.rms = std::sqrt((own.fitted.samples * own.fitted.rms * own.fitted.rms +
-                           own.held_out.samples * own.held_out.rms * own.held_out.rms) /
-                          std::max(n, 1));
-  verdict.least_residual = std::numeric_limits<double>::infinity();
-  for (const Candidate& c : selection.candidates) {
-    if (c.failed || !(c.fit.recordings.front().rms_residual < verdict.least_residual)) continue;
-    verdict.least_residual = c.fit.recordings.front().rms_residual;
-    verdict.least_law = law_name(c.law);
-  }
-  return verdict;
-}
-
-Json to_json(const PredictionVerdict& verdict, Dimension response) {
-  const std::string suffix = unit_suffix(response);
-  Json json{{"predicts", verdict.predicts()}};
-  json["rms" + suffix] = rounded(verdict.rms, kStored);
-  json["least_residual" + suffix] = rounded(verdict.least_residual, kStored);
-  json["least_law"] = verdict.least_law;
-  json["factor"] = verdict.factor;
-  return json;
-}
-
-std::string verdict_words(const PredictionVerdict& verdict, double peak) {
-  return fmt::format(
-      "{}: rms {} % of the peak; the least residual of a law fitted to this recording is {} % "
-      "({}), and {} times that is allowed\n",
-      verdict.predicts() ? "predicts" : "does not predict",
-      significant(100.0 * verdict.rms / peak, 3),
-      significant(100.0 * verdict.least_residual / peak, 3), verdict.least_law,
-      significant(verdict.factor, 2));
 }
 
 }  // namespace tpm::fit

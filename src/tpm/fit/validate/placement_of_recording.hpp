@@ -44,9 +44,9 @@ struct ValidationPlacement {
 /// @param threshold contact was defined by a response (--contact-force): it is where the recording
 ///        passes that, and is not found here
 [[nodiscard]] ValidationPlacement place_for_validation(const LawAlong& law,
-                                                      const PreparedRecording& recording,
-                                                      const RecordingParts& parts,
-                                                      const ReadingScatter& scatter,
-                                                      PlacementRule rule, bool threshold);
+                                                       const PreparedRecording& recording,
+                                                       const RecordingParts& parts,
+                                                       const ReadingScatter& scatter,
+                                                       PlacementRule rule, bool threshold);
 
 }  // namespace tpm::fit

@@ -202,7 +202,13 @@ Validation validate(const ValidationRequest& request) {
     v.recordings.push_back(std::move(comparison));
     v.applicability.push_back(std::move(motion));
   }
+  const std::vector<LawParameter> parameters = law_parameters(law.spec);
   for (const std::string& name : law.uncertainty->at_bound) {
+    // Contact and offset of a calibration's recording are none of the law's.
+    const bool of_law = std::ranges::any_of(parameters, [&](const LawParameter& p) {
+      return p.name == name && !belongs_to_recording(law.spec, p);
+    });
+    if (!of_law) continue;
     v.remarks.push_back(
         fmt::format("{} stood on a bound of the fit: its uncertainty is not in u_input", name));
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/quantity_text.hpp"
@@ -257,10 +258,18 @@ std::string each_recording_text(const Validation& v) {
     section.rows.push_back(std::move(row));
   }
   std::string text = table_text(std::move(section)) + "\n";
-  for (std::size_t i = 0; i < v.recordings.size(); ++i) {
-    if (v.applicability[i].outside.empty()) continue;
-    text += line("applicability", fmt::format("{}: {}", v.recordings[i].name,
-                                              applicability_text(v.applicability[i])));
+  // Recordings of one protocol say the same.
+  const auto said = [&](std::size_t i) { return applicability_text(v.applicability[i]); };
+  std::vector<std::size_t> places(v.recordings.size());
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  for (const std::string& words : each_once(places, said)) {
+    std::vector<std::string> names;
+    for (const std::size_t i : places) {
+      if (said(i) == words) names.push_back(v.recordings[i].name);
+    }
+    const bool all = names.size() == places.size();
+    text +=
+        line("applicability", all ? words : fmt::format("{}: {}", fmt::join(names, ", "), words));
   }
   return text;
 }

@@ -1,0 +1,278 @@
+#include "tpm/fit/show/credibility_page.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "tpm/base/text.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/show/document.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr std::string_view kRecordOpens =
+    "<script type=\"application/json\" id=\"tpm-credibility\">";
+constexpr std::string_view kRecordCloses = "</script>";
+constexpr const char* kNotStated = "not stated";
+constexpr std::size_t kShortSha = 12;
+
+std::string stated_words(const Json& words, const char* key) {
+  const std::string text = words.at(key).get<std::string>();
+  return text.empty() ? kNotStated : text;
+}
+
+/// Cells of a record turn red if what they show is no longer so.
+class EvidencePage {
+ public:
+  EvidencePage(const Json& record, const std::vector<CredibilityChange>& changes)
+      : record_(record), validation_(record.at("validation")) {
+    for (const CredibilityChange& change : changes) changed_[change.place] = change.now;
+  }
+
+  Document document(const std::vector<CredibilityChange>& changes) {
+    Document d;
+    d.title = fmt::format("Credibility of {}", validation_.at("law_file").get<std::string>());
+    d.subtitle = "Headings after ASME V&V 40 and the FDA's guidance of November 2023";
+    if (!changes.empty()) add_changes(d, changes);
+    const Json& words = record_.at("words");
+    d.heading(2, "Question, context and risk");
+    d.table({"in the words of the user",
+             {{"", false}, {"", false}},
+             {{{"question of interest"}, {stated_words(words, "question")}},
+              {{"context of use"}, {stated_words(words, "context")}},
+              {{"model risk"}, {stated_words(words, "risk")}}}});
+    d.heading(2, "Evidence by category");
+    add_categories(d);
+    d.heading(2, "Validation");
+    add_validation(d);
+    d.heading(2, "Applicability");
+    add_applicability(d);
+    d.heading(2, "Provenance");
+    add_files(d);
+    return d;
+  }
+
+ private:
+  [[nodiscard]] Cell cell(const std::string& place, const std::string& text) const {
+    const auto found = changed_.find(place);
+    if (found == changed_.end()) return {text};
+    return {fmt::format("{} (now {})", text, found->second), Tone::bad};
+  }
+  [[nodiscard]] Cell number_cell(const std::string& place, int digits = 4) const {
+    const Json::json_pointer pointer(place);
+    if (!record_.contains(pointer)) return {"-"};
+    const Json& value = record_.at(pointer);
+    return cell(place, value.is_number() ? significant(value.get<double>(), digits)
+                                         : value.get<std::string>());
+  }
+
+  static void add_changes(Document& d, const std::vector<CredibilityChange>& changes) {
+    d.heading(2, "Changed since this page was written");
+    Table table{"", {{"place"}, {"was"}, {"now"}}};
+    for (const CredibilityChange& c : changes) {
+      table.rows.push_back({{c.place}, {c.before}, {c.now, Tone::bad}});
+    }
+    d.table(std::move(table));
+  }
+
+  void add_categories(Document& d) const {
+    constexpr const char* kEmpty = "empty: nothing was given";
+    std::string calibration = "files that the law does not name";
+    const Json& files = validation_.at("calibration");
+    if (!files.empty()) calibration.clear();
+    for (const Json& file : files) {
+      calibration += fmt::format("{}{} (SHA-256 {})", calibration.empty() ? "" : ", ",
+                                 file.at("name").get<std::string>(),
+                                 file.at("sha256").get<std::string>().substr(0, kShortSha));
+    }
+    double worst = 0.0;
+    bool tested = false;
+    for (const Json& r : validation_.at("recordings")) {
+      tested = tested || !r.at("fitted").get<bool>();
+      for (const Json& q : r.at("quantities")) {
+        const double size = std::abs(q.at("S").get<double>());
+        if (size > 0.0) worst = std::max(worst, q.at("u_num").get<double>() / size);
+      }
+    }
+    d.table({"",
+             {{"category"}, {"evidence"}},
+             {{{"code verification"}, {kEmpty}},
+              {{"calculation verification"},
+               {fmt::format("u_num at most {} of S: closed forms", significant(worst, 1))}},
+              {{"calibration"},
+               {fmt::format("{}, fitted to {}; u_input from {}",
+                            validation_.at("law").get<std::string>(), calibration,
+                            validation_.at("u_input_from").get<std::string>())}},
+              {{"bench-test validation"},
+               tested ? cell("/validation/verdict", validation_.at("words").get<std::string>())
+                      : Cell{kEmpty}},
+              {{"in vivo validation"}, {kEmpty}},
+              {{"population-based validation"}, {kEmpty}},
+              {{"emergent behaviour"}, {kEmpty}},
+              {{"plausibility"}, {kEmpty}}}});
+  }
+
+  void add_validation(Document& d) const {
+    d.paragraph(fmt::format("Requirement: {}. E = S - D, U of 95 %.",
+                            validation_.at("requirement").get<std::string>()));
+    const Json& recordings = validation_.at("recordings");
+    for (std::size_t i = 0; i < recordings.size(); ++i) {
+      Table table{fmt::format("{}, SHA-256 {}", recordings[i].at("recording").get<std::string>(),
+                              recordings[i].at("sha256").get<std::string>()),
+                  {{"quantity"},
+                   {"unit"},
+                   {"S", true},
+                   {"D", true},
+                   {"E", true},
+                   {"U", true},
+                   {"u_num", true},
+                   {"u_input", true},
+                   {"u_D", true},
+                   {"R", true},
+                   {"verdict"}}};
+      const std::size_t count = recordings[i].at("quantities").size();
+      for (std::size_t k = 0; k < count; ++k) {
+        const std::string at = fmt::format("/validation/recordings/{}/quantities/{}/", i, k);
+        std::vector<Cell> row;
+        for (const char* key :
+             {"quantity", "unit", "S", "D", "E", "U", "u_num", "u_input", "u_D", "R", "verdict"}) {
+          row.push_back(number_cell(at + key));
+        }
+        table.rows.push_back(std::move(row));
+      }
+      d.table(std::move(table));
+    }
+    if (!validation_.contains("pooled")) return;
+    Table table{"mean over the recordings",
+                {{"quantity"},
+                 {"unit"},
+                 {"E", true},
+                 {"U", true},
+                 {"R", true},
+                 {"area metric", true},
+                 {"95 % of draws", true},
+                 {"verdict"}}};
+    for (std::size_t k = 0; k < validation_.at("pooled").size(); ++k) {
+      const std::string at = fmt::format("/validation/pooled/{}/", k);
+      std::vector<Cell> row;
+      for (const char* key : {"quantity", "unit", "E", "U", "R", "area_metric/area",
+                              "area_metric/upper_95_of_draws", "verdict"}) {
+        row.push_back(number_cell(at + key));
+      }
+      table.rows.push_back(std::move(row));
+    }
+    d.table(std::move(table));
+  }
+
+  void add_applicability(Document& d) const {
+    std::vector<Cell> items;
+    for (const Json& r : validation_.at("recordings")) {
+      const Json& a = r.at("applicability");
+      std::string text;
+      for (const Json& outside : a.at("outside")) {
+        text += (text.empty() ? "outside the calibration: " : "; ") + outside.get<std::string>();
+      }
+      if (text.empty()) text = "inside the calibration";
+      for (const Json& unknown : a.at("unknown")) {
+        text += fmt::format(" ({} not known)", unknown.get<std::string>());
+      }
+      items.push_back({fmt::format("{}: {}", r.at("recording").get<std::string>(), text)});
+    }
+    d.bullets(std::move(items));
+  }
+
+  void add_files(Document& d) const {
+    Table table{"", {{"file"}, {"SHA-256"}}};
+    for (const auto& [name, sha256] : record_.at("files").items()) {
+      Json::json_pointer place("/files");
+      place /= name;
+      table.rows.push_back({{name}, cell(place.to_string(), sha256.get<std::string>())});
+    }
+    d.table(std::move(table));
+    d.paragraph(fmt::format("Written by tpm {}. tpm validate --recheck computes it again.",
+                            record_.at("tpm").get<std::string>()));
+  }
+
+  const Json& record_;
+  const Json& validation_;
+  std::map<std::string, std::string> changed_;
+};
+
+std::string value_text(const Json& value) {
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+}  // namespace
+
+Json credibility_record(const ValidationRequest& request, const Validation& validation,
+                        const CredibilityWords& words, Json invocation) {
+  Json record{
+      {"tpm", version()},
+      {"words", {{"question", words.question}, {"context", words.context}, {"risk", words.risk}}},
+      {"invocation", std::move(invocation)}};
+  Json files = Json::object();
+  files[validation.law_file] = request.law_sha256;
+  for (const RecordingComparison& r : validation.recordings) files[r.name] = r.sha256;
+  for (const CalibrationData::File& file : validation.calibration) files[file.name] = file.sha256;
+  record["files"] = files;
+  record["validation"] = to_json(validation);
+  return record;
+}
+
+std::vector<CredibilityChange> changes_of(const Json& before, const Json& now) {
+  std::vector<CredibilityChange> changes;
+  const Json old_values = before.flatten(), new_values = now.flatten();
+  std::set<std::string> seen;
+  for (const auto& [place, value] : old_values.items()) {
+    seen.insert(place);
+    const auto found = new_values.find(place);
+    if (found == new_values.end()) {
+      changes.push_back({place, value_text(value), "gone"});
+    } else if (*found != value) {
+      changes.push_back({place, value_text(value), value_text(*found)});
+    }
+  }
+  for (const auto& [place, value] : new_values.items()) {
+    if (!seen.contains(place)) changes.push_back({place, "not there", value_text(value)});
+  }
+  return changes;
+}
+
+std::string credibility_page(const Json& record, const std::vector<CredibilityChange>& changes) {
+  std::string html = to_html(EvidencePage(record, changes).document(changes), {});
+  std::string data = to_text(record);
+  // "</script>" in a name must not end the record.
+  for (std::size_t at = 0; (at = data.find('<', at)) != std::string::npos;) {
+    data.replace(at, 1, "\\u003c");
+  }
+  const std::string block = fmt::format("{}\n{}{}\n", kRecordOpens, data, kRecordCloses);
+  const auto end = html.rfind("</body>");
+  return end == std::string::npos ? html + block : html.insert(end, block);
+}
+
+Json read_credibility_record(const std::filesystem::path& page) {
+  const std::string text = read_file(page);
+  const auto begin = text.rfind(kRecordOpens);
+  const auto end = begin == std::string::npos ? begin : text.find(kRecordCloses, begin);
+  if (end == std::string::npos) {
+    throw bad_input(page.string(), "is no credibility page",
+                    "a page that tpm validate --credibility has written");
+  }
+  const auto from = begin + kRecordOpens.size();
+  Json record = parse_json(std::string_view(text).substr(from, end - from), page.string());
+  for (const char* key : {"tpm", "words", "invocation", "files", "validation"}) {
+    if (!record.is_object() || !record.contains(key)) {
+      throw bad_input(page.string(), fmt::format("its record lacks '{}'", key),
+                      "a page that tpm validate --credibility has written");
+    }
+  }
+  return record;
+}
+
+}  // namespace tpm::fit
