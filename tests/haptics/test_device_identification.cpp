@@ -48,7 +48,8 @@ TEST_CASE("The check before a session finds the delay of the simulated device") 
   for (const int periods : {0, 3, 10}) {
     HilSession session = test::parsed(test::short_session());
     session.plant.delay_periods = periods;
-    DeviceIdentifyOptions options;
+    session.plant.arm = {1e-9, 0.0, 0.0, 0.0};  // nobody holds it
+    const DeviceIdentifyOptions options;
     const DelayCheck check =
         check_delay(make_device(DeviceChoice{}, session), DeviceChoice{}, session, options);
     CAPTURE(periods, word_of(check.cause));

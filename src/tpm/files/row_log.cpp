@@ -145,13 +145,13 @@ std::optional<std::uint32_t> row_number_at(Cursor cursor, std::vector<std::byte>
 }
 
 /// Where bytes are missing, or too many, the next whole row begins at another place. Leaves the
-/// cursor there; where none is found within a few rows, as it was.
-void find_next_row(Cursor& cursor, std::size_t damaged_at, std::uint32_t expected,
-                   std::size_t row_bytes) {
+/// cursor there and returns its number; where none is found within a few rows, as it was.
+std::optional<std::uint32_t> find_next_row(Cursor& cursor, std::size_t damaged_at,
+                                           std::uint32_t expected, std::size_t row_bytes) {
   constexpr std::size_t kRowsAhead = 4;
   std::vector<std::byte> row(row_bytes);
   const std::size_t slot = row_bytes + 2 * sizeof(std::uint32_t), next = cursor.at();
-  if (cursor.left() < slot || row_number_at(cursor, row)) return;
+  if (cursor.left() < slot || row_number_at(cursor, row)) return std::nullopt;
   Cursor ahead = cursor;
   for (std::size_t at = damaged_at + 1; at < damaged_at + kRowsAhead * slot; ++at) {
     ahead.go_to(at);
@@ -159,9 +159,10 @@ void find_next_row(Cursor& cursor, std::size_t damaged_at, std::uint32_t expecte
     const std::optional<std::uint32_t> number = row_number_at(ahead, row);
     if (!number || *number < expected) continue;
     cursor.go_to(at);
-    return;
+    return number;
   }
   cursor.go_to(next);
+  return std::nullopt;
 }
 
 /// A row, or what stands in its place.
@@ -182,7 +183,10 @@ Found read_slot(Cursor& cursor, RowLog& log, std::uint32_t& expected, std::vecto
   if (!cursor.take(row.data(), row.size()) || !cursor.take(&crc, sizeof crc)) return Found::end;
   const bool whole = number >= expected && crc == crc_of(row.data(), row.size(), number);
   if (!whole) {
-    find_next_row(cursor, begin, expected, row.size());
+    if (const auto next = find_next_row(cursor, begin, expected, row.size())) {
+      if (*next > expected) log.damaged += *next - expected - 1;
+      expected = *next - 1;
+    }
     return Found::damage;
   }
   log.damaged += number - expected;  // rows that are not there
