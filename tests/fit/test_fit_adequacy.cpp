@@ -6,6 +6,7 @@
 #include "tpm/files/blocks/law_export.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
+#include "tpm/fit/select/adequacy.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
@@ -82,6 +83,13 @@ TEST_CASE("a law that describes its recording says how near it comes", "[adequac
   CHECK(adequacy.residual_over_noise.value() == Approx(1.0).margin(0.25));
   CHECK_THAT(s.words.front(), !Contains("no law tried"));
   CHECK_FALSE(best_of(s).parameters.front().only_if_described);
+}
+
+TEST_CASE("times of the noise are written as people write them", "[adequacy]") {
+  CHECK(times_text(1.0432) == "1");
+  CHECK(times_text(2.43) == "2.4");
+  CHECK(times_text(93.2) == "93");
+  CHECK(times_text(1204.4) == "1204");
 }
 
 TEST_CASE("without a rest adequacy cannot be judged", "[adequacy][wired]") {

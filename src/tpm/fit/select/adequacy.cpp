@@ -211,7 +211,7 @@ std::vector<std::string> causes_of(const AdequacyData& data, const RestNoise& no
     if (std::abs(trend->per_s) > kSeen * trend->standard_error && moved > kMatters * sd) {
       causes.push_back(fmt::format(
           "drift: at rest the readings change by {} noises over as long as the fitted part lasts",
-          significant(moved / sd, 2)));
+          times_text(moved / sd)));
     }
   }
   const std::size_t early = std::max<std::size_t>(data.residual.size() / 10, 5);
@@ -231,6 +231,11 @@ std::string_view described_name(Described described) noexcept {
                                       {Described::not_described, "not_described"},
                                       {Described::not_judged, "not_judged"}});
   return word_for(kNames, described);
+}
+
+std::string times_text(double times) {
+  constexpr double kWhole = 10.0;  // from here on whole numbers
+  return times < kWhole ? significant(times, 2) : fixed(times, 0);
 }
 
 double quantum_of(std::span<const double> readings) {

@@ -18,6 +18,9 @@ enum class Described {
 /// "adequate", "not_described", "not_judged": as files say it.
 [[nodiscard]] std::string_view described_name(Described described) noexcept;
 
+/// "2.4", "93" or "1204": how many times the noise something is.
+[[nodiscard]] std::string times_text(double times);
+
 /// What an adequacy test looks at. Responses in one unit, times in s, both in the order of time.
 struct AdequacyData {
   std::span<const double> rest_time_s;  ///< samples in which nothing moves and nothing touches

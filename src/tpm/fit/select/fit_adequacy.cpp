@@ -125,7 +125,7 @@ std::optional<Judged> against_stated_noise(const FitResult& fit) {
 
 std::string times_the_noise(const Judged& judged) {
   return fmt::format("residual {} times the noise {}",
-                     significant(judged.adequacy.residual_over_noise, 2),
+                     times_text(judged.adequacy.residual_over_noise),
                      judged.noise_was_stated ? "that is stated" : "at rest");
 }
 

@@ -174,9 +174,8 @@ std::string least_law_words(const Selection& s, const std::string& data) {
   const Candidate& chosen = s.candidates[s.recommended];
   if (s.candidates.size() == 1) return "the law that was asked for is";
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) {
-    return fmt::format(
-        "of {} laws, none described by {}, the nearest with the fewest parameters is",
-        s.candidates.size(), data);
+    return fmt::format("no law that is identified describes {}; the least of {} is", data,
+                       s.candidates.size());
   }
   if (chosen.identified) return fmt::format("the least law that {} support is", data);
   return fmt::format("{} identify none of the {} laws; near the best BIC the least{} is", data,
