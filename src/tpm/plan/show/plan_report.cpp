@@ -181,7 +181,9 @@ std::string frontier_text(const Plan& plan) {
                         or_dash(c.cost_s_per_s, time_text), or_dash(c.period_s, time_text),
                         or_dash(shown_error(plan, c.claimed_error), share_text),
                         or_dash(shown_error(plan, c.verified_error), share_text),
-                        c.feasible ? "meets both" : c.reason);
+                        !c.feasible            ? c.reason
+                        : plan.masses_left_out ? "meets both but for masses"
+                                               : "meets both");
   }
   return text;
 }
