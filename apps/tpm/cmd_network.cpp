@@ -9,6 +9,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/organ/bonds/local_support.hpp"
+#include "tpm/organ/scene/inspection.hpp"
 #include "tpm/organ/scene/network_file.hpp"
 #include "tpm/plan/show/network_report.hpp"
 #include "tpm/show/draw.hpp"
@@ -54,6 +55,7 @@ Tissue tissue_of(const NetworkChoice& choice) {
 int build(const NetworkChoice& choice, const Session& session) {
   will_write({fs::path(choice.output).replace_extension(".xdmf")});
   const Tissue tissue = tissue_of(choice);
+  require_outer_held(tissue, choice.scene.empty() ? "options" : choice.scene);
   const fs::path xdmf = write_network(tissue, choice.output);
   const NetworkInspection inspection = inspect(tissue);
   if (session.json()) {

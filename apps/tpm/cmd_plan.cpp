@@ -1,5 +1,6 @@
 // tpm plan: the least model for a scene.
 #include <fmt/format.h>
+#include <cstdio>
 
 #include <algorithm>
 #include <filesystem>
@@ -89,8 +90,19 @@ PlanRequest plan_request(const PlanChoice& choice) {
 
 Plan planned(const ExperimentScene& scene, PlanRequest request) {
   Progress progress("planning", 6);
-  request.progress = [&](const std::string&) { progress.advance(); };
+  std::string doing;
+  request.progress = [&](const std::string& what) {
+    doing = what;
+    progress.advance();
+  };
   if (progress.is_shown()) {
+    request.run_progress = [&, shown = -1](double share) mutable {
+      const int percent = static_cast<int>(100.0 * share);
+      if (percent == shown) return;
+      shown = percent;
+      fmt::print(stderr, "\r\033[Kplanning: {}, a run with masses at {} %", doing, percent);
+      std::fflush(stderr);
+    };
     request.expected = [](const ExpectedPlanWork& work) {
       fmt::print(stderr, "\r{}", expected_plan_text(work));
     };

@@ -22,6 +22,8 @@ constexpr double kLeastTolerance = 1e-6, kMostTolerance = 0.5;
 constexpr double kSlowest_Hz = 1.0, kFastest_Hz = 1e6;
 // What a plan may take: in parts of its reference and cross-check, and that anyway.
 constexpr double kMostOfReference = 2.0, kAnyway_s = 1.5;
+/// Runs with masses cannot be cut short: what is begun below this limit ends above it.
+constexpr double kMostOfReferenceWithMasses = 1.5;
 
 void require_valid(const PlanRequest& request) {
   require_number(request.tolerance >= kLeastTolerance && request.tolerance <= kMostTolerance,
@@ -82,6 +84,7 @@ class Planning {
     plan_.duration_s = scene_.duration_s();
     plan_.spheres = scene_.network().organ.size();
     plan_.bonds = scene_.network().bonds.size();
+    scene_.spent().run_reached = request.run_progress;
     tell("coarse runs of the network");
     PlanSurrogate massless(scene_, request.measure, false);
     plan_.work.first_run_s = nominal_costs().seconds_of(massless.work_of_first());
@@ -136,8 +139,9 @@ class Planning {
   }
 
   void limit_work() {
-    if (plan_.request.thorough || plan_.inertial) return;
-    allowance_.set_most(most_work_s(plan_.work.reference_s));
+    if (plan_.request.thorough) return;
+    allowance_.set_most(plan_.inertial ? kMostOfReferenceWithMasses * plan_.work.reference_s
+                                       : most_work_s(plan_.work.reference_s));
   }
 
   [[nodiscard]] const PlanModel& model_of(const PlannedCandidate& candidate) const {

@@ -19,7 +19,8 @@ struct PlanWork {
 };
 
 /// What a plan will take, from its first run: `all_s` is a bound if the reference takes what is
-/// expected, which is within a factor of two; none where masses count or the plan is thorough.
+/// expected, which is within a factor of two; none where masses count, whose first run has none, or
+/// the plan is thorough.
 struct ExpectedPlanWork {
   double first_run_s = 0.0, reference_s = 0.0;
   std::optional<double> all_s;
@@ -37,10 +38,11 @@ struct PlanRequest {
   bool for_loop = false;
   bool relevance = true;  ///< find out what does not matter
   bool changes = true;    ///< find out what would break first
-  /// Try everything, however long it takes. Else, by nominal costs and without masses, a plan takes
-  /// about twice as long as its reference and cross-check at most, or 1.5 s.
+  /// Try everything, however long it takes. Else, by nominal costs, a plan takes about twice as
+  /// long as its reference and cross-check at most, or 1.5 s without masses.
   bool thorough = false;
   std::function<void(const std::string& what)> progress;  ///< told what is being done
+  std::function<void(double share)> run_progress;  ///< told how far a run with masses has come
   std::function<void(const ExpectedPlanWork&)> expected;  ///< told after the first run
 };
 
@@ -94,8 +96,9 @@ struct PlanChange {
 };
 inline constexpr double kMostChange = 16.0;
 
-/// From this part of the peak on (or the tolerance, if that is larger) what masses do is not left
-/// out, whatever formulation the scene has.
+/// From this part of the peak on (or the tolerance, if that is larger) a plan takes a reference
+/// with masses by itself, whatever formulation the scene has. Between the tolerance and this the
+/// claims that are shown count them.
 inline constexpr double kMassesFelt = 0.05;
 
 struct Plan {
@@ -104,7 +107,8 @@ struct Plan {
   bool inertial = false;  ///< the reference has masses
   /// Where it has none: what they would change, in parts of the peak, if that is above the
   /// tolerance. The same number as that of inertia in `relevance`; without that, by the linear
-  /// network.
+  /// network. The errors of `candidates` are against the reference and do not count it; claims that
+  /// are shown do (shown_error()).
   std::optional<double> masses_left_out;
   bool by_depth = true;
   double duration_s = 0.0;
@@ -122,6 +126,16 @@ struct Plan {
 
   [[nodiscard]] const PlannedCandidate& chosen() const { return candidates.at(choice.value()); }
 };
+
+/// An error against the reference as it is shown: what candidate and reference both leave out is
+/// part of it, wherever that exceeds the tolerance.
+[[nodiscard]] inline double shown_error(const Plan& plan, double error) {
+  return error + plan.masses_left_out.value_or(0.0);
+}
+[[nodiscard]] inline std::optional<double> shown_error(const Plan& plan,
+                                                       const std::optional<double>& error) {
+  return error ? std::optional(shown_error(plan, *error)) : std::nullopt;
+}
 
 /// What the errors of a plan are about, in words.
 struct PlanClaim {

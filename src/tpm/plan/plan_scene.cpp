@@ -173,7 +173,13 @@ Trajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
 
 Trajectory PlanScene::inertial(const InertialOptions& options, const std::vector<double>& times_s,
                                bool with_field) const {
-  Trajectory run = run_inertial(scene_, *network_, options, times_s, with_field);
+  std::function<void(double)> reached;
+  if (spent_->run_reached) {
+    reached = [&](double time_s) {
+      spent_->run_reached((time_s - protocol().start_s()) / duration_s());
+    };
+  }
+  Trajectory run = run_inertial(scene_, *network_, options, times_s, with_field, reached);
   spent_->add(run.work);
   return run;
 }

@@ -47,6 +47,8 @@ class WorkSpent {
  public:
   void add(const OperationCount& work);
   [[nodiscard]] OperationCount all() const;
+  /// Told how far a run with masses has come, 0 to 1: these take long. Set before the runs.
+  std::function<void(double share)> run_reached;
 
  private:
   mutable std::mutex mutex_;

@@ -1,4 +1,5 @@
 #include "tpm/haptics/show/formulation_list.hpp"
+#include "tpm/organ/steps/study_only.hpp"
 
 #include <fmt/format.h>
 
@@ -6,6 +7,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/haptics/session/loop_maker.hpp"
 #include "tpm/organ/run/scene_runner.hpp"
+#include "tpm/organ/steps/study_only.hpp"
 #include "tpmkit/elongation_function.hpp"
 #include "tpmkit/model.hpp"
 #include "tpmkit/units.hpp"
@@ -43,11 +45,9 @@ bool runs_at_servo_rate(const ElongationShape& shape) {
 
 Json formulations_json() {
   return array_json(linked_formulations(), [](const Formulation* f) {
-    return Json{{"name", f->name()},
-                {"meaning", f->meaning()},
-                {"can", words_of(f->can())},
-                {"for", users_of(*f)},
-                {"keys", f->keys()}};
+    return Json{{"name", f->name()},         {"meaning", f->meaning()},
+                {"can", words_of(f->can())}, {"for", users_of(*f)},
+                {"keys", f->keys()},         {"study_only", is_study_only(f->name())}};
   });
 }
 
@@ -88,6 +88,9 @@ std::string formulations_text() {
   for (const Formulation* f : linked_formulations()) {
     text += fmt::format("{:<20} {}\n{:<20} can: {}\n{:<20} for: {}\n", f->name(), f->meaning(), "",
                         fmt::join(words_of(f->can()), ", "), "", fmt::join(users_of(*f), ", "));
+    if (is_study_only(f->name())) {
+      text += fmt::format("{:<20} study only: no scene should choose it\n", "");
+    }
     if (!f->keys().empty())
       text += fmt::format("{:<20} keys: {}\n", "", fmt::join(f->keys(), ", "));
   }

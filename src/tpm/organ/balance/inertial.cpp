@@ -171,6 +171,11 @@ class MotionRun {
       put(time);
     }
     advance(to.time_s, to.time_s);
+    // Asked for twice, the corner is answered from either side.
+    while (next_ + 1 < order_.size() && times_s_[order_[next_]] == to.time_s &&
+           times_s_[order_[next_ + 1]] == to.time_s) {
+      put(to.time_s);
+    }
   }
 
   void advance(double time_s, double stop_s) {

@@ -9,6 +9,7 @@
 #include "tpm/base/require.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/relaxation/sampled_function.hpp"
+#include "tpm/organ/balance/buckling.hpp"
 #include "tpm/organ/balance/stage_tangents.hpp"
 #include "tpm/organ/balance/step_growth.hpp"
 #include "tpmkit/error.hpp"
@@ -88,11 +89,10 @@ class Run {
                     depth ? "mm" : "N", what));
   }
 
-  [[nodiscard]] Error lost(double imposed, bool unstable, std::string_view otherwise) const {
-    return unstable ? failed(imposed, "the tissue buckles: its stiffness is no longer positive",
-                             ErrorCause::buckled)
-                    : failed(imposed, fmt::format("{}: it may snap through", otherwise),
-                             ErrorCause::snapped_through);
+  [[nodiscard]] Error lost(double imposed, bool unstable, const std::string& otherwise) {
+    if (unstable)
+      return failed(imposed, "the tissue " + buckling_words(tissue_, state_), ErrorCause::buckled);
+    return failed(imposed, otherwise + ": it may snap through", ErrorCause::snapped_through);
   }
 
   /// Puts the tissue at rest and sets what tolerances refer to.

@@ -45,11 +45,20 @@ struct SolidRequest {
 [[nodiscard]] Organ fill_shell(const Surface& surface, const ShellRequest& request);
 
 /// Spheres throughout the body: an outer layer on the surface as in a shell, and inside it the
-/// points of a lattice that are at least 0.7 spacings deep. Layers inside are one spacing thick. Of
-/// a given count, the spacing is the largest that gives so many; what is then too much is left out
-/// nearest to the outer layer. Numbers run layer by layer, the outer one by rising x, the others in
-/// the order of the lattice (z, then y, then x). O(n log n). Throws Error(bad_input).
+/// points of a lattice that are at least 0.7 spacings deep. Where an outer sphere has fewer than
+/// three of them within 1.5 spacings, spheres are added below it (solid_support.hpp). Layers inside
+/// are one spacing thick. Of a given count, the spacing is about the largest that gives so many;
+/// what is then too much is left out nearest to the outer layer, where the outer spheres can do
+/// without. Numbers run layer by layer, the outer one by rising x, the others in the order of the
+/// lattice (z, then y, then x), those that were added behind them. O(n log n). Throws
+/// Error(bad_input), also for a body with no room for three layers where it is thickest.
 [[nodiscard]] Organ fill_solid(const Surface& surface, const SolidRequest& request);
+
+/// Radius of about the largest ball inside, m: the deepest point of a grid of 24^3, or the first
+/// one, from the middle outwards, that is deeper than `enough`.
+[[nodiscard]] double inner_radius(const Surface& surface, double enough);
+/// By which part it may be below the radius itself: half a diagonal of a cell, on a ball.
+inline constexpr double kInnerRadiusError = 0.07;
 
 /// `count` points evenly spread over a surface, each at a nominal distance of
 /// even_spacing(surface, count) from its neighbours.

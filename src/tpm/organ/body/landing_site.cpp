@@ -8,6 +8,9 @@ namespace tpm::organ {
 namespace {
 
 constexpr double kMostMoved = 0.25;  // spacings
+/// Cosine of the angle between the normals of a sphere and of the contact up to which the sphere
+/// lies on another face: the edge or the far side of a thin body.
+constexpr double kOtherFace = 1e-6;
 
 }  // namespace
 
@@ -24,7 +27,7 @@ LandingSite flatten_landing_site(const Surface& surface, Positions& outer, std::
     const bool beside =
         from_contact.col(i).norm() <= 2.0 * kLandingReach * spacing &&  // not the far side
         (from_contact.col(i) - height(i) * site.normal).norm() <= kLandingReach * spacing;
-    if (!beside) continue;
+    if (!beside || surface.nearest(outer.col(i)).normal.dot(site.normal) <= kOtherFace) continue;
     members.push_back(i);
     mean += height(i);
   }

@@ -38,26 +38,6 @@ struct ShellPlan {
   }
 };
 
-/// Radius of about the largest ball inside: the deepest point of a grid of 24^3, or the first one,
-/// from the middle outwards, that is deeper than `enough`.
-double inner_radius(const Surface& surface, double enough) {
-  constexpr int kGrid = 24;
-  const Eigen::AlignedBox3d box = surface.bounds();
-  double deepest = 0.0;
-  const auto from_middle = [](int i) {  // 12, 11, 13, 10, ...
-    return kGrid / 2 + (i % 2 == 0 ? i / 2 : -(i + 1) / 2);
-  };
-  for (int i = 0; i < kGrid * kGrid * kGrid && deepest < enough; ++i) {
-    const int row = i / kGrid;
-    const int plane = row / kGrid;
-    const Vector3d share(from_middle(i % kGrid), from_middle(row % kGrid), from_middle(plane));
-    const Vector3d point =
-        box.min() + ((share.array() + 0.5) / kGrid * box.sizes().array()).matrix();
-    deepest = std::max(deepest, -surface.signed_distance(point));
-  }
-  return deepest;
-}
-
 void require_spacing(double spacing) {
   if (std::isfinite(spacing) && spacing > 0.0) return;
   throw bad_input("spacing", fmt::format("{} m", spacing), "a length above 0");
@@ -74,6 +54,17 @@ std::size_t decided_count(const Surface& surface, const ShellRequest& request) {
     throw bad_input("shell", "neither a number of spheres nor a spacing is given", "one of them");
   }
   return even_count(surface, *request.spacing) * static_cast<std::size_t>(request.layers);
+}
+
+/// Throws if spheres of one face would be nearer to those of the other than to each other wherever
+/// they lie.
+void require_thinner_spheres(const Surface& surface, double spacing) {
+  const double thickness = 2.0 * inner_radius(surface, 0.5 * spacing);
+  if (spacing <= thickness * (1.0 + kInnerRadiusError)) return;
+  throw bad_input("spacing",
+                  fmt::format("{:.4g} mm in a body about {:.3g} mm thick at most", 1e3 * spacing,
+                              1e3 * thickness),
+                  "a spacing of at most the thickness, so more spheres");
 }
 
 ShellPlan planned(const Surface& surface, const ShellRequest& request) {
@@ -94,6 +85,7 @@ ShellPlan planned(const Surface& surface, const ShellRequest& request) {
                                 plan.count, plan.layers, plan.spacing, surface.area()),
                     fmt::format("a spacing of {:.6g} m, or only one of the two", even));
   }
+  require_thinner_spheres(surface, plan.spacing);
   plan.step = plan.spacing;
   if (plan.layers > 1) {
     const double room = plan.step * (plan.layers - 1) / kRoom;
@@ -242,6 +234,24 @@ OuterLayer outer_layer(const Surface& surface, const ShellPlan& plan, const Shel
 }
 
 }  // namespace
+
+double inner_radius(const Surface& surface, double enough) {
+  constexpr int kGrid = 24;
+  const Eigen::AlignedBox3d box = surface.bounds();
+  double deepest = 0.0;
+  const auto from_middle = [](int i) {  // 12, 11, 13, 10, ...
+    return kGrid / 2 + (i % 2 == 0 ? i / 2 : -(i + 1) / 2);
+  };
+  for (int i = 0; i < kGrid * kGrid * kGrid && deepest < enough; ++i) {
+    const int row = i / kGrid;
+    const int plane = row / kGrid;
+    const Vector3d share(from_middle(i % kGrid), from_middle(row % kGrid), from_middle(plane));
+    const Vector3d point =
+        box.min() + ((share.array() + 0.5) / kGrid * box.sizes().array()).matrix();
+    deepest = std::max(deepest, -surface.signed_distance(point));
+  }
+  return deepest;
+}
 
 Organ fill_shell(const Surface& surface, const ShellRequest& request) {
   const ShellPlan plan = planned(surface, request);

@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/body/neighbours.hpp"
+#include "tpm/organ/body/solid_support.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -15,6 +18,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kLeastDepth = 0.7;  // of lattice points, in spacings: clear of the outer layer
+/// Deeper than a place below the surface and the spheres beside it, in spacings.
+constexpr double kShallow = 2.0;
 
 /// The points of a lattice that lie deep enough inside a surface, row by row along x. The distance
 /// to the surface changes by at most a step per step, so most of a row is decided without asking.
@@ -116,29 +121,137 @@ double spacing_for(const Surface& surface, Lattice lattice, std::size_t count) {
   return enough;
 }
 
-/// A lattice point of the filling.
+/// An inner sphere of the filling.
 struct InnerSphere {
-  Eigen::Index point = 0;
-  Vector3d outwards;   ///< to the nearest point of the surface, m
-  double depth = 0.0;  ///< m
+  Eigen::Index point = 0;  ///< of the lattice, those that were added after them
+  Vector3d place;          ///< m
+  Vector3d outwards;       ///< to the nearest point of the surface, m
+  double depth = 0.0;      ///< m
   int layer = 0;
 };
 
-/// The deepest `keep` points, in the order of the lattice.
-std::vector<InnerSphere> deepest(const Surface& surface, const Positions& points,
-                                 std::size_t keep) {
+InnerSphere inner_sphere(const Surface& surface, Eigen::Index point, const Vector3d& place) {
+  InnerSphere sphere{point, place, surface.nearest(place).position - place, 0.0, 0};
+  sphere.depth = sphere.outwards.norm();
+  return sphere;
+}
+
+/// All points, the deepest first.
+std::vector<InnerSphere> by_depth(const Surface& surface, const Positions& points) {
   std::vector<InnerSphere> inner(static_cast<std::size_t>(points.cols()));
   for (std::size_t i = 0; i < inner.size(); ++i) {
-    inner[i].point = static_cast<Eigen::Index>(i);
-    const Vector3d point = points.col(inner[i].point);
-    inner[i].outwards = surface.nearest(point).position - point;
-    inner[i].depth = inner[i].outwards.norm();
+    const auto point = static_cast<Eigen::Index>(i);
+    inner[i] = inner_sphere(surface, point, points.col(point));
   }
   std::sort(inner.begin(), inner.end(), [](const InnerSphere& a, const InnerSphere& b) {
     return std::tuple(-a.depth, a.point) < std::tuple(-b.depth, b.point);
   });
-  inner.resize(std::min(keep, inner.size()));
   return inner;
+}
+
+/// The outer layer and what is inside it.
+struct SolidFilling {
+  double spacing = 0.0;
+  Positions outer;
+  Eigen::Matrix3Xd normal;         ///< of the outer layer
+  std::vector<InnerSphere> inner;  ///< the deepest first
+  Eigen::Index lattice_points = 0, next_point = 0;
+
+  [[nodiscard]] std::size_t count() const {
+    return static_cast<std::size_t>(outer.cols()) + inner.size();
+  }
+};
+
+/// @param most spheres; the lattice's shallowest are left out
+SolidFilling lattice_filling(const Surface& surface, const SolidRequest& request, double spacing,
+                             std::size_t most) {
+  SolidFilling filling;
+  filling.spacing = spacing;
+  const Positions lattice = DeepPoints(surface, request.lattice, spacing).collect();
+  const std::size_t all = even_count(surface, spacing) + static_cast<std::size_t>(lattice.cols());
+  require_sphere_count(std::min(all, most));
+  filling.outer =
+      sorted_by_x(even_points(surface, std::min(even_count(surface, spacing), most), request.seed));
+  filling.normal.resize(3, filling.outer.cols());
+  for (Eigen::Index i = 0; i < filling.outer.cols(); ++i) {
+    filling.normal.col(i) = surface.nearest(filling.outer.col(i)).normal;
+  }
+  filling.inner = by_depth(surface, lattice);
+  filling.lattice_points = filling.next_point = lattice.cols();
+  const auto outer = static_cast<std::size_t>(filling.outer.cols());
+  filling.inner.resize(std::min(filling.inner.size(), most - outer));
+  return filling;
+}
+
+/// The inner spheres that an outer one or a place below it may touch: the shallow ones.
+Positions shallow(const SolidFilling& filling) {
+  std::vector<Vector3d> found;
+  for (const InnerSphere& sphere : filling.inner) {
+    if (sphere.depth <= kShallow * filling.spacing) found.push_back(sphere.place);
+  }
+  Positions points(3, static_cast<Eigen::Index>(found.size()));
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    points.col(static_cast<Eigen::Index>(i)) = found[i];
+  }
+  return points;
+}
+
+/// Adds what the outer spheres lack.
+/// @param wanted inner spheres within reach of each
+std::size_t add_support(const Surface& surface, SolidFilling& filling, int wanted,
+                        std::size_t most) {
+  const Positions added = support_below(surface, filling.outer, filling.normal, shallow(filling),
+                                        filling.spacing, wanted, most);
+  for (Eigen::Index i = 0; i < added.cols(); ++i) {
+    filling.inner.push_back(inner_sphere(surface, filling.next_point++, added.col(i)));
+  }
+  return static_cast<std::size_t>(added.cols());
+}
+
+/// Leaves out lattice points, the shallowest first, without which every outer sphere still has
+/// what it wants below it; the deepest where there are not so many.
+void leave_out(SolidFilling& filling, std::size_t surplus) {
+  if (surplus == 0) return;
+  const double reach = kSolidReach * filling.spacing;
+  const Positions points = shallow(filling);
+  Positions all(3, filling.outer.cols() + points.cols());
+  all << filling.outer, points;
+  const auto outer = static_cast<std::size_t>(filling.outer.cols());
+  std::vector<int> inside(outer, 0);
+  std::vector<std::vector<std::size_t>> above(static_cast<std::size_t>(points.cols()));
+  for (const NeighbourPair& pair : pairs_within(all, reach)) {
+    if (pair.first >= outer || pair.second < outer) continue;
+    ++inside[pair.first];
+    above[pair.second - outer].push_back(pair.first);
+  }
+  // shallow() keeps the order of the inner spheres, of which it takes the last of the lattice.
+  std::vector<std::pair<std::size_t, std::size_t>> order;  // inner sphere, its number in `above`
+  std::size_t number = 0;
+  for (std::size_t i = 0; i < filling.inner.size(); ++i) {
+    if (filling.inner[i].depth <= kShallow * filling.spacing) order.emplace_back(i, number++);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](const auto& a, const auto& b) {
+    return filling.inner[a.first].depth < filling.inner[b.first].depth;
+  });
+  std::vector<bool> out(filling.inner.size(), false);
+  for (const auto& [sphere, place] : order) {
+    if (surplus == 0) break;
+    const auto& held = above[place];
+    if (std::any_of(held.begin(), held.end(),
+                    [&](std::size_t i) { return inside[i] <= kWantedInside; })) {
+      continue;
+    }
+    for (const std::size_t i : held) --inside[i];
+    out[sphere] = true;
+    --surplus;
+  }
+  for (std::size_t i = 0; i < out.size() && surplus > 0; ++i) {
+    if (out[i]) continue;
+    out[i] = true;
+    --surplus;
+  }
+  std::size_t at = 0;
+  std::erase_if(filling.inner, [&](const InnerSphere&) { return out[at++]; });
 }
 
 /// Layers one spacing thick below the outer one, without gaps, sorted.
@@ -187,39 +300,78 @@ void set_sphere(Organ& organ, Eigen::Index at, const Vector3d& position, const V
   organ.normal.col(at) = normal;
 }
 
+/// Of a number of spheres, those that support the outer layer among them.
+SolidFilling counted_filling(const Surface& surface, const SolidRequest& request,
+                             SolidFilling first, std::size_t added) {
+  constexpr int kRounds = 3, kMostInside = 12;
+  const std::size_t count = *request.count;
+  std::size_t lattice = count - std::min(added, count / 2);
+  SolidFilling filling;
+  for (int round = 0; round < kRounds; ++round) {
+    const double spacing = spacing_for(surface, request.lattice, lattice);
+    filling = lattice_filling(surface, request, spacing, 2 * count);
+    add_support(surface, filling, kWantedInside, count);
+    if (filling.count() >= count) break;
+    lattice += count - filling.count();
+  }
+  for (int wanted = kWantedInside + 1; filling.count() < count && wanted < kMostInside; ++wanted) {
+    add_support(surface, filling, wanted, count - filling.count());
+  }
+  if (filling.count() < count) filling = std::move(first);
+  leave_out(filling, filling.count() - count);
+  return filling;
+}
+
+/// Throws unless three layers fit into the body where it is thickest.
+void require_room(const Surface& surface, double spacing) {
+  constexpr double kRounding = 1e-6;  // of a thickness that is a whole number of spacings
+  const double radius = inner_radius(surface, spacing);
+  if (radius >= (1.0 - kInnerRadiusError - kRounding) * spacing) return;
+  throw bad_input("solid filling",
+                  fmt::format("the body is about {:.3g} mm thick and the spheres {:.4g} mm apart",
+                              2e3 * radius, 1e3 * spacing),
+                  "three layers or more: smaller spheres, or a shell (\"filling\": \"shell\")");
+}
+
 }  // namespace
 
 Organ fill_solid(const Surface& surface, const SolidRequest& request) {
   const double spacing = decided_spacing(surface, request);
-  const Positions lattice = DeepPoints(surface, request.lattice, spacing).collect();
-  std::size_t outer_count = even_count(surface, spacing);
-  const std::size_t all = outer_count + static_cast<std::size_t>(lattice.cols());
-  const std::size_t count = request.count.value_or(all);
-  require_sphere_count(count);
-  outer_count = std::min(outer_count, count);
+  require_room(surface, spacing);
+  const std::size_t most = request.count.value_or(std::numeric_limits<std::size_t>::max());
+  SolidFilling filling = lattice_filling(surface, request, spacing, most);
+  if (const std::size_t added = add_support(surface, filling, kWantedInside, most);
+      added > 0 && request.count) {
+    filling = counted_filling(surface, request, std::move(filling), added);
+  }
+  require_sphere_count(filling.count());
+  set_layers(filling.spacing, filling.inner);
   Organ organ;
-  Positions outer = even_points(surface, outer_count, request.seed);
-  std::vector<InnerSphere> inner = deepest(surface, lattice, count - outer_count);
-  set_layers(spacing, inner);
-  organ.position.resize(3, static_cast<Eigen::Index>(count));
-  organ.normal.resize(3, static_cast<Eigen::Index>(count));
-  outer = sorted_by_x(outer);
+  organ.position.resize(3, static_cast<Eigen::Index>(filling.count()));
+  organ.normal.resize(3, organ.position.cols());
   Eigen::Index at = 0;
-  for (; at < outer.cols(); ++at) {
-    set_sphere(organ, at, outer.col(at), surface.nearest(outer.col(at)).normal);
+  for (; at < filling.outer.cols(); ++at) {
+    set_sphere(organ, at, filling.outer.col(at), filling.normal.col(at));
     organ.layer.push_back(0);
   }
-  for (const InnerSphere& sphere : inner) {
-    set_sphere(organ, at++, lattice.col(sphere.point), sphere.outwards.normalized());
+  for (const InnerSphere& sphere : filling.inner) {
+    set_sphere(organ, at++, sphere.place, sphere.outwards.normalized());
     organ.layer.push_back(sphere.layer);
   }
   round_to_nanometres(organ.position);
-  organ.name = fmt::format("solid filling of {} spheres", count);
-  organ.spacing = spacing;
-  organ.radius = request.radius.value_or(0.5 * spacing);
+  organ.name = fmt::format("solid filling of {} spheres", filling.count());
+  organ.spacing = filling.spacing;
+  organ.radius = request.radius.value_or(0.5 * filling.spacing);
   organ.assumptions.emplace_back("the centres of the outer layer lie on the surface");
   organ.assumptions.push_back(
       fmt::format("the inside is a lattice ({})", entry_of(kLatticeWords, request.lattice).text));
+  const auto added = std::count_if(
+      filling.inner.begin(), filling.inner.end(),
+      [&](const InnerSphere& sphere) { return sphere.point >= filling.lattice_points; });
+  if (added > 0) {
+    organ.assumptions.push_back(fmt::format(
+        "{} spheres off the lattice support the outer layer where it has too few below it", added));
+  }
   require_valid(organ, organ.name);
   return organ;
 }

@@ -13,6 +13,20 @@ namespace {
 
 constexpr int kWatched = 200;  // parts of the protocol's time
 
+/// The times with those twice at which the rate of what is imposed changes while spheres have mass:
+/// the probe's own drag jumps there, and either side may have the largest response.
+std::vector<double> with_both_sides(std::vector<double> times, const ExperimentScene& scene) {
+  if (!scene.formulation.masses) return times;
+  const Protocol& protocol = scene.protocol;
+  for (const Knot& knot : protocol.knots()) {
+    if (knot.time_s <= protocol.start_s() || knot.time_s >= protocol.end_s()) continue;
+    const auto at = std::lower_bound(times.begin(), times.end(), knot.time_s);
+    const bool twice = std::next(at) != times.end() && *std::next(at) == knot.time_s;
+    if (!twice) times.insert(at, knot.time_s);
+  }
+  return times;
+}
+
 }  // namespace
 
 std::vector<double> times_to_watch(const ExperimentScene& scene) {
@@ -34,7 +48,7 @@ Recorder::Recorder(const ExperimentScene& scene, const RunNetwork& network,
       parts_(parts),
       identity_(checkpoint_identity(scene)),
       watch_(scene),
-      times_(times_to_watch(scene)),
+      times_(with_both_sides(times_to_watch(scene), scene)),
       saved_(Clock::now()) {}
 
 bool Recorder::restore() {
@@ -55,6 +69,11 @@ std::span<const double> Recorder::next_part() const {
   // As long as nothing has been imposed there is no scale for the tolerance to refer to.
   const auto still = [&] { return history_until(scene_.protocol, times_[end - 1]).peak() == 0.0; };
   while (end > begin && end < times_.size() && still()) end = std::min(end + length, times_.size());
+  // A part that ended at a corner would know one side of it only.
+  const auto at_corner = [&] {
+    return times_[end] == times_[end - 1] || (end > 1 && times_[end - 2] == times_[end - 1]);
+  };
+  while (end > begin && end < times_.size() && at_corner()) ++end;
   return std::span(times_).subspan(begin, end - begin);
 }
 
@@ -74,6 +93,11 @@ void Recorder::see(const QuasiStaticState& state, const Eigen::VectorXd& contact
   record_.curve.push_back(point);
   const std::vector<double>& wanted = scene_.outputs.times_s;
   if (std::binary_search(wanted.begin(), wanted.end(), state.time_s)) {
+    // The second side of a corner: states are continuous, and the later response is stored.
+    if (!record_.outputs.empty() && record_.outputs.back().time_s == state.time_s) {
+      record_.outputs.pop_back();
+      record_.contact_pushes_N.pop_back();
+    }
     record_.outputs.push_back(state);
     record_.contact_pushes_N.push_back(contact_push_N);
   }

@@ -83,18 +83,20 @@ Trajectory run_quasi_static(const ExperimentScene& scene, const RunNetwork& netw
 
 Trajectory run_inertial(const ExperimentScene& scene, const RunNetwork& network,
                         const InertialOptions& options, const std::vector<double>& times_s,
-                        bool with_field) {
+                        bool with_field, const std::function<void(double)>& reached) {
   const DrivenNetwork& driven = network.driven;
   const Inertial equations(driven.bonds, driven.rest, driven.constraints, driven.probes,
                            masses_kg(scene, network), options);
   Trajectory result;
   const Eigen::Index spheres = network.network.organ.position.cols();
   const auto see = [&](const QuasiStaticState& state, const Eigen::VectorXd& /*pushes*/) {
+    if (reached) reached(state.time_s);
+    if (!with_field) return;
     result.displacement.emplace_back(state.position.leftCols(spheres) -
                                      driven.rest.leftCols(spheres));
   };
-  const InertialRun run =
-      equations.run(scene.protocol, times_s, with_field ? InertialObserver(see) : nullptr);
+  const InertialRun run = equations.run(scene.protocol, times_s,
+                                        with_field || reached ? InertialObserver(see) : nullptr);
   result.response = run.response;
   const BlockPattern& pattern = pattern_of(driven);
   const auto bonds = static_cast<double>(driven.bonds.size());

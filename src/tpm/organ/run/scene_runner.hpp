@@ -1,5 +1,7 @@
 #pragma once
 // What a formulation does for scenes: two of its roles (formulation/formulation.hpp).
+#include <functional>
+
 #include "tpm/organ/run/simulation.hpp"
 #include "tpmkit/simulation.hpp"
 
@@ -28,9 +30,11 @@ class StateRunner {
 /// Those of a run by collocation.
 [[nodiscard]] OperationCount counted_work(const DrivenNetwork& driven, const QuasiStaticWork& work);
 /// The network with masses.
+/// @param reached told each time of `times_s` that the run has come to, s
 [[nodiscard]] Trajectory run_inertial(const ExperimentScene& scene, const RunNetwork& network,
                                       const InertialOptions& options,
-                                      const std::vector<double>& times_s, bool with_field);
+                                      const std::vector<double>& times_s, bool with_field,
+                                      const std::function<void(double)>& reached = {});
 
 /// Throws Error(bad_input), with the scene's place and the formulations that would do, unless the
 /// scene's formulation can run it.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/base/text.hpp"
+#include "tpm/organ/balance/buckling.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -81,11 +82,11 @@ QuasiStaticState StaticPath::move_to(double imposed, double time_s) {
     throw Error(
         ExitCode::numerical, unstable_ ? ErrorCause::buckled : ErrorCause::snapped_through,
         "network",
-        fmt::format("on the way to t = {} s, at {} of {} {}, the tissue {}", significant(time_s, 5),
-                    depth ? "a depth" : "a load",
-                    significant((depth ? 1e3 : 1.0) * state_.imposed, 4), depth ? "mm" : "N",
-                    unstable_ ? "buckles: its stiffness is no longer positive"
-                              : "snaps through: no equilibrium is near"));
+        fmt::format(
+            "on the way to t = {} s, at {} of {} {}, the tissue {}", significant(time_s, 5),
+            depth ? "a depth" : "a load", significant((depth ? 1e3 : 1.0) * state_.imposed, 4),
+            depth ? "mm" : "N",
+            unstable_ ? buckling_words(tissue_, state_) : "snaps through: no equilibrium is near"));
   }
   const double stored_J = tissue_.bonds().stored_energy_J(state_.position, state_.viscous);
   return {time_s,          state_.imposed, tissue_.response(state_),

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "tpm/organ/bonds/outer_support.hpp"
+
 namespace tpm::organ {
 namespace {
 
@@ -49,6 +51,9 @@ NetworkInspection inspect(const Tissue& tissue) {
   }
   result.radial_sum = spread_of(radial);
   result.lateral_sum = spread_of(lateral);
+  const BondSystem bonds = tissue.bonds();
+  result.instantaneous = effective_moduli(tissue.network, bonds, 0.0);
+  result.equilibrium = effective_moduli(tissue.network, bonds, 1.0);
   if (!organ.contact) return result;
   const ContactStiffness held =
       held_stiffness(tissue.bonds(), organ.position, *organ.contact,
@@ -60,6 +65,11 @@ NetworkInspection inspect(const Tissue& tissue) {
   if (star.equilibrium > 0.0)
     result.contact_over_star->equilibrium = held.equilibrium / star.equilibrium;
   return result;
+}
+
+void require_outer_held(const Tissue& tissue, std::string_view where) {
+  if (tissue.star) return;  // A and C have nothing below them, and are fixed
+  require_outer_support(tissue.network, tissue.constraints(), where);
 }
 
 }  // namespace tpm::organ

@@ -1,7 +1,9 @@
 #pragma once
 #include <optional>
+#include <string_view>
 #include <vector>
 
+#include "tpm/organ/balance/effective_moduli.hpp"
 #include "tpm/organ/bonds/contact_stiffness.hpp"
 #include "tpm/organ/scene/scene.hpp"
 
@@ -23,8 +25,14 @@ struct NetworkInspection {
   Spread radial_sum, lateral_sum;
   /// Of the contact along its normal, its neighbours fixed, over that of the star.
   std::optional<ContactStiffness> contact_over_star;
+  /// Of the inside of a solid, instantaneous and at equilibrium; none for single layers and shells.
+  std::optional<EffectiveModuli> instantaneous, equilibrium;
 };
 
 [[nodiscard]] NetworkInspection inspect(const Tissue& tissue);
+
+/// Throws Error(bad_input) unless the inside holds the outer spheres (outer_support.hpp): what
+/// `tpm network build` asks, also of a network without anchors.
+void require_outer_held(const Tissue& tissue, std::string_view where);
 
 }  // namespace tpm::organ

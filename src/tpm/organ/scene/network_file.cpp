@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "tpm/files/file.hpp"
+#include "tpm/organ/scene/bond_laws_file.hpp"
 #include "tpm/organ/scene/xdmf.hpp"
 #include "tpmkit/version.hpp"
 
@@ -59,7 +60,7 @@ void write_bonds(const Network& network, Hdf5Writer& file) {
   file.numbers("/bonds/factor", factor);
   file.attribute("/bonds/ends", "meaning", "spheres by /spheres/index, from 0");
   file.attribute("/bonds/kind", "meaning", "0: radial, 1: lateral");
-  file.attribute("/bonds/factor", "meaning", "times E A0/l0");
+  file.attribute("/bonds/factor", "meaning", "times E A0/l0, without material and regions");
 }
 
 std::string xdmf(const Network& network, const std::string& file) {
@@ -80,7 +81,8 @@ std::string xdmf(const Network& network, const std::string& file) {
   text += "    </Grid>\n    <Grid Name=\"bonds\" GridType=\"Uniform\">\n";
   text += source.lines(position, n, m);
   text += source.scalar("kind", "/bonds/kind", Centre::cell, m, Number::whole);
-  for (const std::string name : {"rest_length_m", "factor"}) {
+  for (const std::string name :
+       {"rest_length_m", "factor", "stiffness_N_per_m", "relaxing_N_per_m"}) {
     text += source.scalar(name, "/bonds/" + name, Centre::cell, m, Number::real);
   }
   return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
@@ -92,6 +94,7 @@ void write_network_datasets(const Tissue& tissue, Hdf5Writer& file) {
   const Organ& organ = tissue.network.organ;
   write_spheres(tissue, file);
   write_bonds(tissue.network, file);
+  write_bond_laws(tissue, file);
   file.attribute("/", "title", tissue.title);
   file.attribute("/", "written_by", fmt::format("tpm {}", version()));
   file.attribute("/", "assumptions", fmt::format("{}", fmt::join(organ.assumptions, "; ")));

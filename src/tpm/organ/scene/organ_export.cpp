@@ -144,18 +144,19 @@ std::string mjcf_bodies(const Tissue& tissue, double mass_kg) {
 std::string mjcf_document(const Tissue& tissue, const OrganExportOptions& options, double mass_kg) {
   const std::vector<ExportedBond> bonds = exported_bonds(tissue, options.instantaneous);
   // Of the memory that MuJoCo would guess, a network of tendons needs many times as much: a row of
-  // the Jacobian for each, thrice.
-  constexpr double kMiB = 1024.0 * 1024.0, kRows = 3.0, kLeastMiB = 64.0;
-  const double rows = kRows * static_cast<double>(bonds.size()) * 8.0 * 3.0 *
+  // the Jacobian for each, thrice. `nstack` counts numbers and is read by every MuJoCo that there
+  // has been; `memory` is unknown before 2.3.
+  constexpr double kRows = 3.0, kLeastNumbers = 8.0 * 1024.0 * 1024.0;
+  const double rows = kRows * static_cast<double>(bonds.size()) * 3.0 *
                       static_cast<double>(tissue.network.organ.size());
   std::string text = "<?xml version=\"1.0\"?>\n" + opening_comments(tissue, options);
   text += fmt::format(
       "<mujoco model=\"{}\">\n"
-      "  <size memory=\"{}M\"/>\n"
+      "  <size nstack=\"{}\"/>\n"
       "  <option timestep=\"0.001\" gravity=\"0 0 0\" integrator=\"implicit\"/>\n"
       "  <worldbody>\n{}  </worldbody>\n  <tendon>\n",
       xml_attribute(tissue.title.empty() ? tissue.network.organ.name : tissue.title),
-      static_cast<long>(kLeastMiB + std::ceil(rows / kMiB)), mjcf_bodies(tissue, mass_kg));
+      static_cast<long>(kLeastNumbers + rows), mjcf_bodies(tissue, mass_kg));
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const ExportedBond& bond = bonds[i];
     // Between the two lengths of a spring nothing pulls: that is a rope.

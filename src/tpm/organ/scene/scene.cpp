@@ -10,6 +10,7 @@
 #include "tpm/organ/bonds/local_support.hpp"
 #include "tpm/organ/bonds/material_refusal.hpp"
 #include "tpm/organ/bonds/rigidity.hpp"
+#include "tpm/organ/scene/inspection.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
 #include "tpmkit/error.hpp"
 
@@ -173,6 +174,7 @@ void require_standing(const Tissue& tissue, std::string_view where) {
     throw bad_input(where, fmt::format("the contact sphere {} is anchored", *organ.contact + 1),
                     "anchors that leave it free");
   }
+  require_outer_held(tissue, where);
   if (organ.size() <= kMostSpheresForModes)
     require_rigid(bonds, organ.position, constraints, where);
   require_supported(bonds, organ, constraints, where);

@@ -32,6 +32,34 @@ Json layer_json(const NetworkInspection& inspection, std::size_t k) {
           {"radial_bonds_of_a_sphere", spread_json(inspection.radial_count[k])}};
 }
 
+Json moduli_json(const std::optional<EffectiveModuli>& moduli) {
+  if (!moduli) return nullptr;
+  return {{"E_Pa", rounded(moduli->mean_young_Pa(), kNetworkDigits)},
+          {"E_least_Pa", rounded(moduli->young_Pa.minCoeff(), kNetworkDigits)},
+          {"E_most_Pa", rounded(moduli->young_Pa.maxCoeff(), kNetworkDigits)},
+          {"nu", rounded(moduli->poisson, kNetworkDigits)},
+          {"anisotropy", rounded(moduli->anisotropy, kNetworkDigits)},
+          {"spheres", moduli->spheres}};
+}
+
+std::string moduli_text(const NetworkInspection& inspection) {
+  const auto& at_once = inspection.instantaneous;
+  if (!at_once) return {};
+  std::string text = fmt::format(
+      "inside, by a relaxed test of {} spheres: E {} kPa ({} to {} along the axes), nu {}, "
+      "anisotropy {}\n",
+      at_once->spheres, significant(1e-3 * at_once->mean_young_Pa(), 3),
+      significant(1e-3 * at_once->young_Pa.minCoeff(), 3),
+      significant(1e-3 * at_once->young_Pa.maxCoeff(), 3), significant(at_once->poisson, 3),
+      significant(at_once->anisotropy, 3));
+  if (const auto& later = inspection.equilibrium) {
+    text +=
+        fmt::format("at equilibrium: E {} kPa, nu {}\n",
+                    significant(1e-3 * later->mean_young_Pa(), 3), significant(later->poisson, 3));
+  }
+  return text;
+}
+
 /// The blocks of the scene that say nothing about the tissue.
 std::string unused_words(const Tissue& tissue) {
   if (tissue.unused_blocks.empty()) return {};
@@ -65,6 +93,8 @@ Json network_json(const Tissue& tissue, const NetworkInspection& inspection) {
          rounded(inspection.contact_over_star->instantaneous, 9)},
         {"stiffness_over_star_equilibrium", rounded(inspection.contact_over_star->equilibrium, 9)}};
   }
+  json["effective_instantaneous"] = moduli_json(inspection.instantaneous);
+  json["effective_equilibrium"] = moduli_json(inspection.equilibrium);
   json["assumptions"] = organ.assumptions;
   json["unused_blocks"] = tissue.unused_blocks;
   return json;
@@ -100,6 +130,7 @@ std::string network_text(const Tissue& tissue, const NetworkInspection& inspecti
         *organ.contact + 1, significant(inspection.contact_over_star->instantaneous, 7),
         significant(inspection.contact_over_star->equilibrium, 7));
   }
+  text += moduli_text(inspection);
   for (const std::string& assumption : organ.assumptions) {
     text += fmt::format("assumed: {}\n", assumption);
   }

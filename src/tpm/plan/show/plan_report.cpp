@@ -14,6 +14,7 @@ namespace tpm::plan {
 namespace {
 
 constexpr int kPlanDigits = 6;
+constexpr double kMostMargin = 1000.0;
 
 Json number(const std::optional<double>& value) {
   return value ? Json(rounded(*value, kPlanDigits)) : Json(nullptr);
@@ -30,16 +31,16 @@ std::string time_text(double seconds) {
   return significant(seconds, 3) + " s";
 }
 
-Json candidate_json(const PlannedCandidate& c) {
+Json candidate_json(const Plan& plan, const PlannedCandidate& c) {
   return {{"name", c.name},
           {"formulation", c.formulation},
           {"settings", c.settings},
           {"reach", c.reach == ModelReach::full ? "full" : "reduced"},
           {"cost_s_per_s", number(c.cost_s_per_s)},
           {"period_s", number(c.period_s)},
-          {"claimed_error", number(c.claimed_error)},
-          {"verified_error", number(c.verified_error)},
-          {"verified_response_error", number(c.verified_response_error)},
+          {"claimed_error", number(shown_error(plan, c.claimed_error))},
+          {"verified_error", number(shown_error(plan, c.verified_error))},
+          {"verified_response_error", number(shown_error(plan, c.verified_response_error))},
           {"accurate", c.accurate},
           {"feasible", c.feasible},
           {"reason", c.reason.empty() ? Json(nullptr) : Json(c.reason)}};
@@ -120,15 +121,29 @@ std::optional<std::pair<std::string, double>> run_offline(const Plan& plan) {
   return std::pair{found->name, *found->cost_s_per_s * plan.duration_s};
 }
 
+/// How far the verified error of the pick is below the tolerance. Beyond the most that is told it
+/// says nothing: such an error is rounding.
+double margin(const Plan& plan) {
+  return std::min(
+      plan.request.tolerance / std::max(shown_error(plan, *plan.chosen().verified_error), 1e-300),
+      kMostMargin);
+}
+
+std::string margin_text(const Plan& plan) {
+  const double times = margin(plan);
+  return times < kMostMargin ? significant(times, 3) + " times"
+                             : fmt::format("over {} times", shortest(kMostMargin));
+}
+
 std::string pick_text(const Plan& plan) {
   const PlannedCandidate& c = plan.chosen();
   std::string text = fmt::format(
-      "pick: {} ({}{}{})\n  claimed error at most {}, verified {}; margin {} times\n  costs {} "
+      "pick: {} ({}{}{})\n  claimed error at most {}, verified {}; margin {}\n  costs {} "
       "per "
       "simulated second{}\n",
       c.name, c.formulation, c.settings.empty() ? "" : ", ", c.settings,
-      share_text(*c.claimed_error), share_text(*c.verified_error),
-      significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
+      share_text(shown_error(plan, *c.claimed_error)),
+      share_text(shown_error(plan, *c.verified_error)), margin_text(plan),
       time_text(*c.cost_s_per_s),
       c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
   const std::string offline = offline_text(plan);
@@ -136,7 +151,7 @@ std::string pick_text(const Plan& plan) {
   if (c.verified_response_error) {
     text += fmt::format("  nothing is claimed of the {}: verified error {}\n",
                         plan.by_depth ? "contact force" : "indentation depth",
-                        share_text(*c.verified_response_error));
+                        share_text(shown_error(plan, *c.verified_response_error)));
   }
   return text;
 }
@@ -146,7 +161,8 @@ std::string choice_text(const Plan& plan) {
   if (!plan.choice && plan.without_budget) {
     const PlannedCandidate& c = plan.candidates[*plan.without_budget];
     text += fmt::format("  without the budget: {}, {} per simulated second, verified error {}\n",
-                        c.name, time_text(*c.cost_s_per_s), share_text(*c.verified_error));
+                        c.name, time_text(*c.cost_s_per_s),
+                        share_text(shown_error(plan, *c.verified_error)));
   }
   if (plan.needs_full) {
     text += "  the scene needs the full nonlinear model: no reduced one meets the tolerance\n";
@@ -163,8 +179,11 @@ std::string frontier_text(const Plan& plan) {
     };
     text += fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}  {}\n", c.name,
                         or_dash(c.cost_s_per_s, time_text), or_dash(c.period_s, time_text),
-                        or_dash(c.claimed_error, share_text), or_dash(c.verified_error, share_text),
-                        c.feasible ? "meets both" : c.reason);
+                        or_dash(shown_error(plan, c.claimed_error), share_text),
+                        or_dash(shown_error(plan, c.verified_error), share_text),
+                        !c.feasible            ? c.reason
+                        : plan.masses_left_out ? "meets both but for masses"
+                                               : "meets both");
   }
   return text;
 }
@@ -232,7 +251,8 @@ Json expected_plan_json(const ExpectedPlanWork& work) {
 
 std::string expected_plan_text(const ExpectedPlanWork& work) {
   if (!work.all_s)
-    return "masses count, or all is tried: no bound is known of how long planning takes\n";
+    return "masses count, or all is tried: how long planning takes is known after its reference, "
+           "which masses make many times as long\n";
   return fmt::format("planning takes up to some {} on a usual machine\n",
                      time_text(rounded(*work.all_s, 1)));
 }
@@ -258,17 +278,15 @@ Json plan_json(const Plan& plan) {
             {"costs", request.costs.source},
             {"response", plan.by_depth ? "force_N" : "depth_m"}};
   json["claim"] = claim_json(plan);
-  json["choice"] = plan.choice ? candidate_json(plan.chosen()) : Json(nullptr);
-  json["margin"] =
-      plan.choice ? Json(rounded(request.tolerance / std::max(*plan.chosen().verified_error, 1e-12),
-                                 kPlanDigits))
-                  : Json(nullptr);
+  json["choice"] = plan.choice ? candidate_json(plan, plan.chosen()) : Json(nullptr);
+  json["margin"] = plan.choice ? Json(rounded(margin(plan), kPlanDigits)) : Json(nullptr);
   const auto offline = run_offline(plan);
   json["network_offline_s"] = offline ? Json(rounded(offline->second, kPlanDigits)) : Json(nullptr);
-  json["without_budget"] =
-      plan.without_budget ? candidate_json(plan.candidates[*plan.without_budget]) : Json(nullptr);
+  json["without_budget"] = plan.without_budget
+                               ? candidate_json(plan, plan.candidates[*plan.without_budget])
+                               : Json(nullptr);
   json["needs_full_model"] = plan.needs_full;
-  json["masses_matter"] = plan.inertial;
+  json["masses_matter"] = plan.inertial || plan.masses_left_out.has_value();
   json["masses_left_out"] = number(plan.masses_left_out);
   json["reference"] = {{"method", plan.reference.method},
                        {"cross_check", plan.reference.cross_check},
@@ -277,7 +295,8 @@ Json plan_json(const Plan& plan) {
   json["work"] = {{"first_run_s", rounded(plan.work.first_run_s, kPlanDigits)},
                   {"reference_s", rounded(plan.work.reference_s, kPlanDigits)},
                   {"all_s", rounded(plan.work.all_s, kPlanDigits)}};
-  json["frontier"] = array_json(plan.candidates, candidate_json);
+  json["frontier"] = array_json(plan.candidates,
+                                [&](const PlannedCandidate& c) { return candidate_json(plan, c); });
   json["relevance"] = relevance_json(plan);
   json["changes"] = changes_json(plan);
   json["validity_passed"] = plan.validity;
@@ -320,8 +339,12 @@ std::string plan_text(const Plan& plan) {
   if (plan.masses_left_out) {
     text += fmt::format(
         "WARNING: inertia matters, and scene and reference leave it out: masses would change the "
-        "answer by {} of the peak{}\n",
-        share_text(*plan.masses_left_out), masses_note(plan));
+        "answer by {} of the peak{}, which exceeds the tolerance; all errors above count that. "
+        "{}\n",
+        share_text(*plan.masses_left_out), masses_note(plan),
+        plan.request.for_loop ? "Nothing that a loop steps has masses."
+                              : "For a model with masses, write \"formulation\": {\"kind\": "
+                                "\"inertial\"} in the scene.");
   }
   for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
   return text;

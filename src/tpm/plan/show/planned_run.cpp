@@ -23,7 +23,7 @@ std::string response_words(const Plan& plan) {
   if (!error) return {};
   return fmt::format("{}: nothing claimed, verified error {} %\n",
                      plan.by_depth ? "contact force" : "indentation depth",
-                     significant(100.0 * *error, 3));
+                     significant(100.0 * shown_error(plan, *error), 3));
 }
 
 /// Under /claim: what is claimed of which quantity, in numbers and words.
@@ -34,10 +34,11 @@ void write_claim(const Plan& plan, Hdf5Writer& file) {
   file.attribute("/claim", "quantity", claim.quantity);
   file.attribute("/claim", "norm", claim.norm);
   file.attribute("/claim", "protocol", claim.protocol);
-  file.numbers("/claim/claimed_error", {rounded(*c.claimed_error, 6)});
-  file.numbers("/claim/verified_error", {rounded(*c.verified_error, 6)});
+  file.numbers("/claim/claimed_error", {rounded(shown_error(plan, *c.claimed_error), 6)});
+  file.numbers("/claim/verified_error", {rounded(shown_error(plan, *c.verified_error), 6)});
   if (c.verified_response_error) {
-    file.numbers("/claim/verified_response_error", {rounded(*c.verified_response_error, 6)});
+    file.numbers("/claim/verified_response_error",
+                 {rounded(shown_error(plan, *c.verified_response_error), 6)});
   }
   file.numbers("/claim/tolerance", {plan.request.tolerance});
 }
@@ -55,11 +56,13 @@ Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
       {"formulation", c.formulation},
       {"settings", c.settings},
       {"claim", claim_json(plan)},
-      {"claimed_error", rounded(c.claimed_error.value(), 6)},
-      {"verified_error", rounded(c.verified_error.value(), 6)},
+      {"claimed_error", rounded(shown_error(plan, c.claimed_error.value()), 6)},
+      {"verified_error", rounded(shown_error(plan, c.verified_error.value()), 6)},
       {"verified_response_error",
-       c.verified_response_error ? Json(rounded(*c.verified_response_error, 6)) : Json(nullptr)},
-      {"tolerance", plan.request.tolerance}};
+       c.verified_response_error ? Json(rounded(shown_error(plan, *c.verified_response_error), 6))
+                                 : Json(nullptr)},
+      {"tolerance", plan.request.tolerance},
+      {"masses_matter", plan.inertial || plan.masses_left_out.has_value()}};
   add_trajectory(json, scene, times_s, answer);
   json["validity_passed"] = plan.validity;
   return json;
@@ -68,12 +71,22 @@ Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
 std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,
                              const Trajectory& answer) {
   const PlannedCandidate& c = plan.chosen();
-  std::string text = fmt::format(
-      "{}: planned model {}\n{}: claimed error at most {} %, verified {} % ({})\n{}{}", plan.title,
-      model_words(c), claim_of(plan).quantity, significant(100.0 * *c.claimed_error, 3),
-      significant(100.0 * *c.verified_error, 3), claim_of(plan).norm, response_words(plan),
-      trajectory_text(plan.by_depth, times_s, answer));
+  std::string text =
+      fmt::format("{}: planned model {}\n{}: claimed error at most {} %, verified {} % ({})\n{}{}",
+                  plan.title, model_words(c), claim_of(plan).quantity,
+                  significant(100.0 * shown_error(plan, *c.claimed_error), 3),
+                  significant(100.0 * shown_error(plan, *c.verified_error), 3), claim_of(plan).norm,
+                  response_words(plan), trajectory_text(plan.by_depth, times_s, answer));
+  if (plan.request.measure.output == PlanOutput::force) {
+    text += "outputs: the response alone; --outputs field plans and stores the whole network\n";
+  }
   text += offline_text(plan);
+  if (plan.masses_left_out) {
+    text += fmt::format(
+        "WARNING: masses, which are left out, would change {} % of the peak; the errors count "
+        "that\n",
+        significant(100.0 * *plan.masses_left_out, 3));
+  }
   for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
   return text;
 }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -18,6 +20,18 @@ Eigen::Index largest_of(const Trajectory& answer) {
   Eigen::Index at = 0;
   answer.response.cwiseAbs().maxCoeff(&at);
   return at;
+}
+
+/// Of the times of an answer with fields, those at which the scene asks for the whole network.
+std::vector<std::size_t> stored_steps(const ExperimentScene& scene,
+                                      const std::vector<double>& times_s,
+                                      const Trajectory& answer) {
+  std::vector<std::size_t> steps;
+  const std::vector<double>& wanted = scene.outputs.times_s;
+  for (std::size_t i = 0; i < answer.displacement.size(); ++i) {
+    if (std::binary_search(wanted.begin(), wanted.end(), times_s[i])) steps.push_back(i);
+  }
+  return steps;
 }
 
 bool driven_by_depth(const ExperimentScene& scene) {
@@ -38,7 +52,7 @@ void add_trajectory(Json& json, const ExperimentScene& scene, const std::vector<
   json["response"] = driven_by_depth(scene) ? "force_N" : "depth_m";
   json["largest"] = point(largest_of(answer));
   json["last"] = point(answer.response.size() - 1);
-  json["outputs"] = answer.displacement.size();
+  json["outputs"] = stored_steps(scene, times_s, answer).size();
 }
 
 std::string trajectory_text(bool by_depth, const std::vector<double>& times_s,
@@ -61,9 +75,12 @@ void write_trajectory(const ExperimentScene& scene, const std::vector<double>& t
   file.numbers("/curve/time_s", times_s);
   file.numbers(by_depth ? "/curve/depth_m" : "/curve/load_N", imposed);
   file.numbers(by_depth ? "/curve/force_N" : "/curve/depth_m", response);
-  if (!answer.displacement.empty()) file.numbers("/steps/time_s", times_s);
-  for (std::size_t i = 0; i < answer.displacement.size(); ++i) {
-    const Eigen::Matrix3Xd& u = answer.displacement[i];
+  const std::vector<std::size_t> steps = stored_steps(scene, times_s, answer);
+  if (steps.empty()) return;
+  file.numbers("/steps/time_s",
+               mapped<double>(steps, [&](std::size_t step) { return times_s[step]; }));
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const Eigen::Matrix3Xd& u = answer.displacement[steps[i]];
     file.table(fmt::format("/steps/{:05}/displacement_m", i), {u.data(), u.data() + u.size()}, 3);
   }
 }

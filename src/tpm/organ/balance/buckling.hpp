@@ -1,0 +1,15 @@
+#pragma once
+#include <string>
+
+#include "tpm/organ/balance/driven_tissue.hpp"
+
+namespace tpm::organ {
+
+/// That a tissue buckles and where, in words for a message: "buckles around sphere 12 at (1, 2, 3)
+/// mm: its stiffness is no longer positive". It is the sphere that moves most in the softest motion
+/// of the last state in balance, found by inverse iteration. Without a place where the stiffness
+/// there cannot be factorised directly.
+/// @param state the last in balance; the factorisation of the tissue is lost
+[[nodiscard]] std::string buckling_words(DrivenTissue& tissue, const TissueState& state);
+
+}  // namespace tpm::organ

@@ -1,0 +1,143 @@
+#include "tpm/organ/balance/effective_moduli.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/organ/balance/equilibrium.hpp"
+#include "tpm/organ/body/lattice.hpp"
+
+namespace tpm::organ {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kHalfBox = 4.5;  // of the block, in spacings
+constexpr std::size_t kFewest = 8;
+
+/// The block: which spheres are free, and which belong to its shell.
+struct InnerBlock {
+  Eigen::Vector3d centre;
+  std::vector<bool> free;
+  std::size_t count = 0;  ///< of free ones
+};
+
+InnerBlock inner_block(const Network& network) {
+  const Organ& organ = network.organ;
+  const auto deepest = std::max_element(organ.layer.begin(), organ.layer.end());
+  InnerBlock block;
+  block.centre = organ.position.col(deepest - organ.layer.begin());
+  block.free.resize(organ.size());
+  const double reach = (kHalfBox - 1.01 * network.options.support) * organ.spacing;
+  for (std::size_t i = 0; i < organ.size(); ++i) {
+    const Eigen::Vector3d from = organ.position.col(static_cast<Index>(i)) - block.centre;
+    block.free[i] = organ.layer[i] >= 2 && from.cwiseAbs().maxCoeff() <= reach;
+  }
+  // Bonds to the outer layers are not the inside's.
+  for (const Bond& bond : network.bonds) {
+    if (organ.layer[bond.a] == 0) block.free[bond.b] = false;
+    if (organ.layer[bond.b] == 0) block.free[bond.a] = false;
+  }
+  block.count = static_cast<std::size_t>(std::count(block.free.begin(), block.free.end(), true));
+  return block;
+}
+
+/// m^3 a sphere, where every free one has as many nearest neighbours as one lattice.
+std::optional<double> volume_of_sphere(const Network& network, const InnerBlock& block) {
+  std::vector<int> nearest(network.organ.size(), 0);
+  for (const Bond& bond : network.bonds) {
+    if (std::abs(bond.rest_length_m / network.organ.spacing - 1.0) > 1e-3) continue;
+    ++nearest[bond.a];
+    ++nearest[bond.b];
+  }
+  int found = 0;
+  for (std::size_t i = 0; i < nearest.size(); ++i) {
+    if (!block.free[i]) continue;
+    if (found != 0 && nearest[i] != found) return std::nullopt;
+    found = nearest[i];
+  }
+  for (const auto& [lattice, neighbours] :
+       {std::pair(Lattice::cubic, 6), {Lattice::bcc, 8}, {Lattice::fcc, 12}}) {
+    if (found == neighbours) return volume_per_sphere(lattice, network.organ.spacing);
+  }
+  return std::nullopt;
+}
+
+Eigen::Matrix3d unit_strain(Index component) {
+  Eigen::Matrix3d strain = Eigen::Matrix3d::Zero();
+  if (component < 3) {
+    strain(component, component) = 1.0;
+  } else {
+    strain((component - 2) % 3, (component - 1) % 3) = 0.5;
+    strain((component - 1) % 3, (component - 2) % 3) = 0.5;
+  }
+  return strain;
+}
+
+}  // namespace
+
+std::optional<EffectiveModuli> effective_moduli(const Network& network, const BondSystem& bonds,
+                                                double relaxation_factor) {
+  const Organ& organ = network.organ;
+  if (organ.layer_count() < 3) return std::nullopt;
+  const InnerBlock block = inner_block(network);
+  if (block.count < kFewest) return std::nullopt;
+  const auto volume_m3 = volume_of_sphere(network, block);
+  if (!volume_m3) return std::nullopt;
+
+  Constraints constraints(organ.size());
+  for (std::size_t i = 0; i < organ.size(); ++i) {
+    if (!block.free[i]) constraints.fix(i);
+  }
+  const ViscousState state{Eigen::VectorXd::Zero(static_cast<Index>(bonds.size())),
+                           relaxation_factor};
+  Equilibrium equilibrium(bonds, constraints);
+  if (!equilibrium.factorise(organ.position, state) || !equilibrium.is_stable()) {
+    return std::nullopt;
+  }
+  const Eigen::VectorXd stiffness = bonds.stiffness_when(relaxation_factor);
+  Eigen::Matrix<double, 6, 6> elasticity;
+  for (Index component = 0; component < 6; ++component) {
+    Eigen::Matrix3Xd moved = unit_strain(component) * (organ.position.colwise() - block.centre);
+    Eigen::Matrix3Xd left = Eigen::Matrix3Xd::Zero(3, moved.cols());
+    bonds.add_stiffness_times(organ.position, state, moved, left);
+    left = -left;
+    constraints.project(left);
+    equilibrium.displace(left);
+    moved += left;
+    Eigen::VectorXd change;
+    bonds.elongation_changes(organ.position, moved, change);
+    Eigen::Matrix3d stress = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < network.bonds.size(); ++i) {
+      const Bond& bond = network.bonds[i];
+      const double share = 0.5 * ((block.free[bond.a] ? 1 : 0) + (block.free[bond.b] ? 1 : 0));
+      if (share == 0.0) continue;
+      const Eigen::Vector3d along = organ.position.col(bond.b) - organ.position.col(bond.a);
+      const auto row = static_cast<Index>(i);
+      stress +=
+          (share * stiffness[row] * change[row] / bond.rest_length_m) * along * along.transpose();
+    }
+    stress /= *volume_m3 * static_cast<double>(block.count);
+    elasticity.col(component) << stress(0, 0), stress(1, 1), stress(2, 2), stress(1, 2),
+        stress(0, 2), stress(0, 1);
+  }
+  elasticity = (0.5 * (elasticity + elasticity.transpose())).eval();
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(elasticity);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  const Eigen::Matrix<double, 6, 6> compliance =
+      factor.solve(Eigen::Matrix<double, 6, 6>::Identity());
+  EffectiveModuli moduli;
+  moduli.spheres = block.count;
+  moduli.young_Pa = compliance.diagonal().head<3>().cwiseInverse();
+  for (Index i = 0; i < 3; ++i) {
+    for (Index j = 0; j < 3; ++j) {
+      if (i != j) moduli.poisson -= compliance(i, j) / compliance(i, i) / 6.0;
+    }
+  }
+  const double c11 = elasticity.diagonal().head<3>().mean();
+  const double c12 = (elasticity(0, 1) + elasticity(0, 2) + elasticity(1, 2)) / 3.0;
+  moduli.anisotropy = 2.0 * elasticity.diagonal().tail<3>().mean() / (c11 - c12);
+  return moduli;
+}
+
+}  // namespace tpm::organ

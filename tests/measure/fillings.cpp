@@ -1,0 +1,130 @@
+// Prints the tables of reports/organ_fillings: how evenly the surface of a solid ball answers.
+//     build/release/tests/measure_fillings [FROM TO]
+// For 20 numbers of spheres (or those between FROM and TO) and each lattice: spheres that were
+// added, the least outer support, and over five pushes spread over the surface the largest over the
+// smallest stiffness and the smallest over the median, under one sphere and under a rigid patch
+// over four spacings.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "organ_meshes.hpp"
+#include "program.hpp"
+#include "tpm/organ/balance/equilibrium.hpp"
+#include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/bonds/outer_support.hpp"
+#include "tpmkit/tpm_element.hpp"
+
+using namespace tpm;
+using namespace tpm::organ;
+
+namespace {
+
+constexpr double kRadius_m = 0.05;
+constexpr double kPatch = 2.0;  // radius in spacings
+
+const std::array<Eigen::Vector3d, 5> kPushes{
+    {{0.1, 0.2, 1.0}, {1.0, 0.1, -0.2}, {-0.3, 1.0, 0.4}, {-0.6, -0.5, 0.8}, {0.7, -0.6, -0.5}}};
+
+struct Stiffness {
+  double single = 0.0, patch = 0.0;
+};
+
+/// N/m, instantaneous at rest, with the far 30 % of the depth fixed.
+Stiffness pushed(Organ organ, const Eigen::Vector3d& towards, const TpmParameters& material) {
+  Eigen::Index contact = 0;
+  const auto outer = std::count(organ.layer.begin(), organ.layer.end(), 0);
+  (organ.position.leftCols(outer).colwise() - kRadius_m * towards.normalized())
+      .colwise()
+      .squaredNorm()
+      .minCoeff(&contact);
+  organ.contact = static_cast<std::size_t>(contact);
+  const Network network = build_network(std::move(organ), {}, "ball");
+  const BondSystem bonds(network, material);
+  const Eigen::Vector3d normal = network.organ.normal.col(contact);
+  Constraints constraints(network.organ.size());
+  for (Eigen::Index i = 0; i < network.organ.position.cols(); ++i) {
+    if (normal.dot(network.organ.position.col(i)) < -0.4 * kRadius_m)
+      constraints.fix(static_cast<std::size_t>(i));
+  }
+  Equilibrium equilibrium(bonds, constraints);
+  if (!equilibrium.factorise(network.organ.position,
+                             {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0}))
+    return {};
+  std::vector<Eigen::Index> patch;
+  for (Eigen::Index i = 0; i < outer; ++i) {
+    const double apart =
+        (network.organ.position.col(i) - network.organ.position.col(contact)).norm();
+    if (apart <= kPatch * network.organ.spacing) patch.push_back(i);
+  }
+  const auto size = static_cast<Eigen::Index>(patch.size());
+  Eigen::MatrixXd compliance(size, size);
+  Stiffness found;
+  for (Eigen::Index j = 0; j < size; ++j) {
+    Eigen::Matrix3Xd field = Eigen::Matrix3Xd::Zero(3, network.organ.position.cols());
+    field.col(patch[static_cast<std::size_t>(j)]) = normal;
+    equilibrium.displace(field);
+    for (Eigen::Index i = 0; i < size; ++i) {
+      compliance(i, j) = normal.dot(field.col(patch[static_cast<std::size_t>(i)]));
+    }
+    if (patch[static_cast<std::size_t>(j)] == contact) found.single = 1.0 / compliance(j, j);
+  }
+  found.patch = compliance.ldlt().solve(Eigen::VectorXd::Ones(size)).sum();
+  return found;
+}
+
+std::string spread(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return fmt::format("{:.2f} | {:.2f}", values.back() / values.front(),
+                     values.front() / values[values.size() / 2]);
+}
+
+void measure(std::size_t from, std::size_t to) {
+  fmt::print(
+      "| lattice | spheres | outer | off the lattice | least outer support | single max/min | "
+      "single min/median | patch max/min | patch min/median "
+      "|\n|---|---|---|---|---|---|---|---|---|"
+      "\n");
+  const test::Sphere ball(kRadius_m);
+  const TpmParameters material;
+  constexpr int kCounts = 20;
+  for (const Lattice lattice : {Lattice::cubic, Lattice::bcc, Lattice::fcc}) {
+    for (int i = 0; i < kCounts; ++i) {
+      const auto count = static_cast<std::size_t>(std::round(400.0 * std::pow(15.0, i / 19.0)));
+      if (count < from || count > to) continue;
+      SolidRequest request;
+      request.count = count;
+      request.lattice = lattice;
+      const Organ organ = fill_solid(ball, request);
+      const std::vector<double> support = outer_support(build_network(organ, {}, "ball"));
+      std::vector<double> single, patch;
+      for (const Eigen::Vector3d& towards : kPushes) {
+        const Stiffness stiffness = pushed(organ, towards, material);
+        single.push_back(stiffness.single);
+        patch.push_back(stiffness.patch);
+      }
+      const std::string added =
+          organ.assumptions.size() > 2
+              ? organ.assumptions.back().substr(0, organ.assumptions.back().find(' '))
+              : "0";
+      fmt::print("| {} | {} | {} | {} | {:.2f} | {} | {} |\n",
+                 entry_of(kLatticeWords, lattice).text, organ.size(), support.size(), added,
+                 *std::min_element(support.begin(), support.end()), spread(single), spread(patch));
+      std::fflush(stdout);
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return test::measured(
+      argc, argv, 0, 2, "measure_fillings [FROM TO]", [](const std::vector<std::string>& words) {
+        const bool all = words.size() < 2;
+        measure(all ? 0 : std::stoul(words[0]), all ? 6000 : std::stoul(words[1]));
+      });
+}

@@ -1,0 +1,144 @@
+// What the inside of a solid gives its outer spheres, and what thin bodies are refused for.
+#include <algorithm>
+#include <catch2/catch.hpp>
+
+#include "organ_meshes.hpp"
+#include "refusal.hpp"
+#include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/body/landing_site.hpp"
+#include "tpm/organ/body/mesh_surface.hpp"
+#include "tpm/organ/body/neighbours.hpp"
+#include "tpm/organ/body/simple_organs.hpp"
+#include "tpm/organ/body/solid_support.hpp"
+#include "tpm/organ/bonds/outer_support.hpp"
+#include "tpmkit/error.hpp"
+
+using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::organ;
+using namespace tpm::test;
+using Catch::Matchers::Contains;
+using Eigen::Vector3d;
+
+namespace {
+
+/// A box from the origin to a corner.
+TriangleMesh box(const Vector3d& corner) {
+  TriangleMesh mesh = unit_cube();
+  mesh.vertices = corner.asDiagonal() * mesh.vertices;
+  return mesh;
+}
+
+Organ solid_of(const Surface& surface, std::size_t count, Lattice lattice) {
+  SolidRequest request;
+  request.count = count;
+  request.lattice = lattice;
+  return fill_solid(surface, request);
+}
+
+double least_outer_support(const Organ& organ) {
+  const std::vector<double> support =
+      outer_support(build_network(organ, NetworkOptions{}, "solid"));
+  return *std::min_element(support.begin(), support.end());
+}
+
+double least_distance(const Organ& organ) {
+  double least = 1e300;
+  for (const NearestDistances& layer : nearest_distances(organ)) least = std::min(least, layer.min);
+  return least;
+}
+
+}  // namespace
+
+TEST_CASE("every outer sphere of a solid ball is held from inside") {
+  const Sphere ball(0.05);
+  for (const Lattice lattice : {Lattice::cubic, Lattice::bcc, Lattice::fcc}) {
+    for (const std::size_t count : {300U, 700U, 1000U, 1700U, 3000U}) {
+      const Organ organ = solid_of(ball, count, lattice);
+      INFO(count << " " << entry_of(kLatticeWords, lattice).text);
+      CHECK(organ.size() == count);
+      CHECK(least_outer_support(organ) >= kLeastOuterSupport);
+      CHECK(least_distance(organ) > 0.6);
+    }
+  }
+}
+
+TEST_CASE("edges of a box and thick plates are held from inside") {
+  const MeshSurface cube(box({0.05, 0.05, 0.05}));
+  const MeshSurface plate(box({0.08, 0.08, 0.02}));
+  for (const Lattice lattice : {Lattice::cubic, Lattice::bcc, Lattice::fcc}) {
+    INFO(entry_of(kLatticeWords, lattice).text);
+    CHECK(least_outer_support(solid_of(cube, 1500, lattice)) >= kLeastOuterSupport);
+    CHECK(least_outer_support(solid_of(plate, 1500, lattice)) >= kLeastOuterSupport);
+  }
+}
+
+TEST_CASE("three inner spheres are within reach of every outer one of a ball") {
+  const Sphere ball(0.05);
+  const Organ organ = solid_of(ball, 2000, Lattice::fcc);
+  std::vector<int> inside(organ.size(), 0);
+  for (const NeighbourPair& pair : pairs_within(organ.position, kSolidReach * organ.spacing)) {
+    if (organ.layer[pair.second] > 0) ++inside[pair.first];
+  }
+  for (std::size_t i = 0; i < organ.size() && organ.layer[i] == 0; ++i) {
+    INFO("sphere " << i + 1);
+    CHECK(inside[i] >= kWantedInside);
+  }
+  CHECK_THAT(organ.assumptions.back(), Contains("spheres off the lattice"));
+}
+
+TEST_CASE("an outer sphere that the inside does not hold is refused by number and place") {
+  // Two layers, and one sphere beside them in the outer one.
+  Organ organ = block(3, 3, 1, 0.01, Lattice::cubic);
+  const auto last = organ.position.cols();
+  organ.position.conservativeResize(3, last + 1);
+  organ.normal.conservativeResize(3, last + 1);
+  organ.position.col(last) = Vector3d(0.042, 0.015, 0.01);
+  organ.normal.col(last) = Vector3d::UnitZ();
+  organ.layer.push_back(0);
+  const Network network = build_network(organ, NetworkOptions{}, "block");
+  CHECK(outer_support(network).back() < 1e-12);
+  const std::string told = refusal_of(
+      [&] { require_outer_support(network, Constraints(network.organ.size()), "plate.json"); });
+  CHECK_THAT(told, Contains("plate.json: 1 of 17 outer spheres is hardly held from inside: sphere "
+                            "33 at (42, 15, 10) mm"));
+  Constraints held(network.organ.size());
+  held.fix(static_cast<std::size_t>(last));
+  CHECK_NOTHROW(require_outer_support(network, held, "plate.json"));
+  // The measure does not follow the spacing law, which scales every bond alike.
+  NetworkOptions continuum;
+  continuum.spacing_law = SpacingLaw::continuum;
+  CHECK(outer_support(build_network(organ, continuum, "block")).front() ==
+        Approx(outer_support(network).front()));
+}
+
+TEST_CASE("a body with no room for three layers is no solid") {
+  SolidRequest request;
+  request.spacing = 0.005;
+  const MeshSurface plate(box({0.08, 0.08, 0.008}));
+  CHECK_THROWS_WITH(fill_solid(plate, request), Contains("solid filling: the body is about") &&
+                                                    Contains("three layers or more"));
+  request.spacing = 0.004;
+  CHECK(least_outer_support(fill_solid(plate, request)) >= kLeastOuterSupport);
+}
+
+TEST_CASE("flattening around a contact leaves the other face of a plate where it is") {
+  const MeshSurface plate(box({0.1, 0.1, 0.006}));
+  ShellRequest request;
+  request.spacing = 0.006;
+  request.layers = 1;
+  request.landing = Vector3d(0.05, 0.05, 0.006);
+  const Organ organ = fill_shell(plate, request);
+  REQUIRE(organ.contact);
+  CHECK(organ.position(2, static_cast<Eigen::Index>(*organ.contact)) == Approx(0.006));
+  for (Eigen::Index i = 0; i < organ.position.cols(); ++i) {
+    const Vector3d at = organ.position.col(i);
+    const double off =
+        std::min({at.x(), 0.1 - at.x(), at.y(), 0.1 - at.y(), at.z(), 0.006 - at.z()});
+    INFO("sphere " << i + 1);
+    CHECK(std::abs(off) < 2e-9);
+  }
+  request.spacing = 0.0179;
+  CHECK_THROWS_WITH(fill_shell(plate, request),
+                    Contains("spacing: 17.9 mm in a body about") && Contains("thick at most"));
+}
