@@ -81,7 +81,7 @@ struct Typesetting {
 }  // namespace
 
 void typeset(Document& document) {
-  for (Block& block : document.blocks) std::visit(Typesetting{}, block);
+  for (DocumentPart& block : document.blocks) std::visit(Typesetting{}, block);
 }
 
 void Document::heading(int level, std::string text) {

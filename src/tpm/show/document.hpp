@@ -47,13 +47,13 @@ struct Picture {
   std::string caption;
 };
 
-using Block = std::variant<Heading, Paragraph, Bullets, Table, Picture>;
+using DocumentPart = std::variant<Heading, Paragraph, Bullets, Table, Picture>;
 
 /// A report as a list of blocks, independent of how it is rendered.
 struct Document {
   std::string title;
   std::string subtitle;
-  std::vector<Block> blocks{};
+  std::vector<DocumentPart> blocks{};
 
   void heading(int level, std::string text);
   void paragraph(std::string text);

@@ -173,7 +173,7 @@ struct HtmlBlock {
 
 std::string contents(const Document& document) {
   std::string out = "<nav aria-label=\"Contents\">\n";
-  for (const Block& block : document.blocks) {
+  for (const DocumentPart& block : document.blocks) {
     const auto* heading = std::get_if<Heading>(&block);
     if (heading == nullptr || heading->level != 2) continue;
     out +=
@@ -191,7 +191,7 @@ std::string to_html(const Document& document, const std::map<std::string, std::s
       "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n"
       "<h1>{0}</h1>\n<p class=\"subtitle\">{2}</p>\n{3}",
       html_escaped(document.title), kStyle, html_escaped(document.subtitle), contents(document));
-  for (const Block& block : document.blocks) out += std::visit(HtmlBlock{drawings}, block);
+  for (const DocumentPart& block : document.blocks) out += std::visit(HtmlBlock{drawings}, block);
   return out + "</body>\n</html>\n";
 }
 

@@ -71,7 +71,7 @@ struct MarkdownBlock {
 std::string to_markdown(const Document& document) {
   std::string out = fmt::format("# {}\n\n{}\n\n", markdown_escaped(document.title),
                                 markdown_escaped(document.subtitle));
-  for (const Block& block : document.blocks) out += std::visit(MarkdownBlock{}, block);
+  for (const DocumentPart& block : document.blocks) out += std::visit(MarkdownBlock{}, block);
   out.pop_back();  // one line feed at the end, not two
   return out;
 }

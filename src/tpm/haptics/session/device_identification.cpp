@@ -88,7 +88,8 @@ double force_around(const std::vector<IdentificationSample>& samples, std::size_
   return sum;
 }
 
-bool whole(const std::vector<IdentificationSample>& samples, std::size_t from, std::size_t to) {
+bool is_covered(const std::vector<IdentificationSample>& samples, std::size_t from,
+                std::size_t to) {
   return std::all_of(samples.begin() + static_cast<std::ptrdiff_t>(from),
                      samples.begin() + static_cast<std::ptrdiff_t>(to) + 1,
                      [](const IdentificationSample& s) { return s.missed == 0; });
@@ -203,7 +204,7 @@ Windows windows_of(const std::vector<IdentificationSample>& samples, std::size_t
   Windows windows;
   std::vector<Eigen::RowVectorXd> rows;
   for (std::size_t c = margin; c + margin < samples.size(); c += apart) {
-    if (!whole(samples, c - margin, c + half)) continue;
+    if (!is_covered(samples, c - margin, c + half)) continue;
     windows.centre.push_back(c);
     rows.push_back(motion_around(samples, c, half, period_s, least_m));
   }
@@ -309,7 +310,7 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
     if (std::abs(jump) < kEdge_N) continue;
     const auto late = static_cast<std::size_t>(std::lround(delay_s / period_s));
     const std::size_t c = i + late;
-    if (c + margin >= samples.size() || !whole(samples, i - half, c + half)) continue;
+    if (c + margin >= samples.size() || !is_covered(samples, i - half, c + half)) continue;
     const double seen = motion_around(samples, c, half, period_s, least_m).dot(s.value);
     const double meant = force_around(samples, c, half, period_s, delay_s);
     const double off =
