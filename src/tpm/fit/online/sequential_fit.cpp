@@ -188,7 +188,7 @@ std::optional<SequentialFit::Prefix> SequentialFit::prefix() const {
   SetupOptions setup;
   setup.reference = settings_.reference;
   setup.profiles = false;
-  setup.drift = false;  // of a rest that is over there is nothing to be followed
+  setup.measured = false;  // sample by sample: the rest is among the samples
   try {
     PreparedRecording prepared = prepare_recording("what was recorded so far", recording_);
     keep_baseline(prepared);

@@ -157,7 +157,8 @@ OwnPlacement place_recording(const LawFile& law, const PreparedRecording& record
   OwnPlacement result{model_parameters(fit.config, fit.best.natural, 0), {}};
   for (const std::size_t free : fit.covariance.free) {
     const std::vector<Target>& sets = fit.config.parameters[free].sets;
-    if (!sets.empty()) result.place.push_back(sets.front().parameter);  // a drift is none of the law
+    if (!sets.empty())
+      result.place.push_back(sets.front().parameter);  // a drift is none of the law
   }
   return result;
 }

@@ -202,6 +202,10 @@ void fit_rests(const RestSamples& rest, double rounding, const std::optional<Hol
 
 }  // namespace
 
+std::size_t samples_before_contact(const PreparedRecording& recording) {
+  return rest_samples(recording).before;
+}
+
 RestReadings read_rests(const PreparedRecording& recording) {
   constexpr double kShort = 30.0;  // samples, below which a longer hold tells the noise
   RestReadings result;

@@ -38,6 +38,9 @@ struct RestReadings {
 /// standard deviation of Student's t. A rest of more than 1,000 samples is averaged in blocks.
 [[nodiscard]] RestReadings read_rests(const PreparedRecording& recording);
 
+/// RestReadings::before alone, which costs little.
+[[nodiscard]] std::size_t samples_before_contact(const PreparedRecording& recording);
+
 /// Where a probe met the tissue, extrapolated from the first part of the ramp.
 struct Onset {
   Measured drive;           ///< SI

@@ -64,7 +64,7 @@ AutomaticBounds slack_length_bounds(const LawSpec& law, const PreparedRecording&
 /// Where contact of a depth can lie at all: the probe touches before the force rises, and in a
 /// recording that begins in contact not much further back than it then goes on.
 AutomaticBounds contact_bounds(const LawSpec& law, const PreparedRecording& r, const Onset& onset,
-                               std::string name) {
+                               bool measured, std::string name) {
   constexpr double kBeforeRise = 0.25, kAfterRise = 0.1;
   FitParameter fit;
   fit.name = std::move(name);
@@ -74,11 +74,12 @@ AutomaticBounds contact_bounds(const LawSpec& law, const PreparedRecording& r, c
   const double range = r.phases.peak_drive - begin;
   fit.lower = begin - (onset.from_rest ? kBeforeRise : kFurthestContact) * range;
   fit.upper = begin + kAfterRise * range;
-  // Under a straight kernel that was in contact from the start, depth and offset say the same.
-  if (!bends(law) && !onset.from_rest) {
+  // Under a straight kernel that was in contact from the start, depth and offset say the same,
+  // unless the zero was measured.
+  if (!bends(law) && !(onset.from_rest && measured)) {
     fit.lower = std::max(fit.lower, r.recording.drive.front());
   }
-  fit.start = std::clamp(onset.drive.value, fit.lower, fit.upper);
+  fit.start = std::clamp(measured ? onset.drive.value : begin, fit.lower, fit.upper);
   return {readable(std::move(fit)), std::nullopt};
 }
 
@@ -204,10 +205,11 @@ void add_placement(FitConfig& config, const LawModel& model,
       add_free_placement(config, model, r, i, scope, named("offset", r), options.nuisance);
       continue;
     }
-    const Placement placement = measure_placement(r, law, options.exponent);
+    const Placement placement =
+        options.measured ? measure_placement(r, law, options.exponent) : Placement{};
     if (!options.zero) {
       add_automatic(config, offset_bounds(law, r, named("offset", r)), {{offset, scope}});
-      config.parameters.back().prior = zero_prior(r, placement.rests);
+      if (options.measured) config.parameters.back().prior = zero_prior(r, placement.rests);
     }
     const bool free = options.nuisance == Nuisance::offset_and_contact || contact_is_seen(law, r);
     if (options.contact || options.nuisance == Nuisance::offset) {
@@ -215,11 +217,12 @@ void add_placement(FitConfig& config, const LawModel& model,
     } else if (r.contact_held && several) {
       add_automatic(config, held_contact(law, r, named("contact", r)), {{contact, scope}});
     } else if (!r.contact_held && free) {
-      add_automatic(config, contact_bounds(law, r, placement.onset, named("contact", r)),
+      add_automatic(config,
+                    contact_bounds(law, r, placement.onset, options.measured, named("contact", r)),
                     {{contact, scope}});
-      config.parameters.back().prior = contact_prior(placement.onset);
+      if (options.measured) config.parameters.back().prior = contact_prior(placement.onset);
     }
-    if (!options.drift) continue;
+    if (!options.measured) continue;
     held += placement.drift != DriftFinding::no_hold;
     told += placement.drift == DriftFinding::told;
     if (placement.drift == DriftFinding::told)

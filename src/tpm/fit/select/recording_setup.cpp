@@ -244,7 +244,7 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
   const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;
   r.contact_held = options.contact_response && r.phases.contact_found;
   // Samples that measure the zero are not fitted once more.
-  if (read_rests(r).before >= kFewestBeforeContact) {
+  if (samples_before_contact(r) >= kFewestBeforeContact) {
     r.from_s = time[contact];
   } else {
     keep_baseline(r);

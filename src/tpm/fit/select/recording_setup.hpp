@@ -62,8 +62,8 @@ struct SetupOptions {
   std::optional<double> exponent;
   std::optional<double> contact;  ///< depth of contact that is held, SI; none: measured
   std::optional<double> zero;     ///< reading without a load that is held, SI; none: measured
-  /// Whether a drift of the zero that the rests tell is fitted.
-  bool drift = true;
+  /// Whether what was measured of zero, contact and drift enters the fit (measure_placement).
+  bool measured = true;
   std::function<bool()> interrupted;  ///< see FitConfig
 };
 
