@@ -7,6 +7,7 @@
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpmkit/law.hpp"
 
 namespace tpm::fit {
@@ -174,8 +175,7 @@ void mark_not_separable(FitResult& result) {
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterResult& p = result.parameters[i];
     p.not_separable = result.config.parameters[i].not_separable;
-    if (p.not_separable.empty()) continue;
-    p.words += fmt::format("; not identified: {}: not separable", p.not_separable);
+    if (!p.not_separable.empty()) p.words = parameter_words(p, result.config.level);
   }
 }
 

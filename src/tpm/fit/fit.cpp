@@ -188,8 +188,8 @@ FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals*
   if (config.bootstrap) {
     result.bootstrap = bootstrap_experiments(function, parameters, result.best, *config.bootstrap);
   }
-  mark_conditions(result, function);
   mark_not_separable(result);
+  mark_conditions(result, function);
   add_flags(result, function);
   return result;
 }

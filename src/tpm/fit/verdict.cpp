@@ -101,6 +101,11 @@ std::string range_words(const ParameterResult& p, double level) {
     case Verdict::identified: {
       const std::string interval =
           fmt::format("{} to {}", in_unit(f, *p.lower), in_unit(f, *p.upper));
+      if (!p.not_separable.empty()) {
+        return fmt::format(
+            "{} = {} is not identified: {}: not separable; {} interval without drift {}", f.name,
+            in_unit(f, p.estimate), p.not_separable, percent(level), interval);
+      }
       return fmt::format("{} = {} is identified: {} interval {}{}", f.name, in_unit(f, p.estimate),
                          percent(level), interval,
                          p.profile.connected ? "" : ", not all of it: separate ranges fit");
@@ -226,9 +231,8 @@ NamedDirection named_direction(const FitResult& result) {
   const Covariance& c = result.covariance;
   const Eigen::VectorXd& v = c.weakest_direction;
   // Steps of parameters with a unit cannot be compared; their effects on the residuals can.
-  const bool pure = std::ranges::all_of(c.free, [&](std::size_t i) {
-    return result.parameters[i].parameter.scale != Scale::linear;
-  });
+  const bool pure = std::ranges::all_of(
+      c.free, [&](std::size_t i) { return result.parameters[i].parameter.scale != Scale::linear; });
   const Eigen::VectorXd& weight = pure || c.weakest_share.size() != v.size() ? v : c.weakest_share;
   // What moves by less than this share of the largest is not worth a word.
   const double least = 0.2 * weight.cwiseAbs().maxCoeff();
