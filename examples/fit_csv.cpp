@@ -20,9 +20,7 @@ int main(int argc, char** argv) try {
   std::printf("%d of %d starts agree\n", fit.starts_agreeing, fit.starts_run);
   for (const tpm::fit::FittedParameter& p : fit.parameters) {
     if (p.nuisance) continue;
-    std::printf("%-5s = %.4g %s", p.name.c_str(), p.estimate, p.unit.c_str());
-    if (p.lower && p.upper) std::printf(", 95 %% interval %.4g to %.4g", *p.lower, *p.upper);
-    std::printf(", %s\n", std::string(tpm::fit::verdict_name(p.verdict)).c_str());
+    std::printf("%s\n", p.words.c_str());
   }
   if (fit.law) tpm::write_law("fitted_law.json", *fit.law);
 } catch (const tpm::Error& error) {

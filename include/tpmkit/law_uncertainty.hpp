@@ -36,6 +36,13 @@ struct FittedFile {
   std::vector<std::string> held = {};
   /// Limits of the force cell: readings at or beyond them were censored, SI.
   std::optional<double> clipped_above = std::nullopt, clipped_below = std::nullopt;
+  /// Drift of the force cell's zero that was found in a recording, N/s or Pa/s, and when it is 0, s.
+  std::optional<double> drift = std::nullopt, drift_origin_s = std::nullopt;
+
+  /// What the drift adds to a reading.
+  [[nodiscard]] double drifted(double time_s) const {
+    return drift ? *drift * (time_s - drift_origin_s.value_or(0.0)) : 0.0;
+  }
 
   /// Whether a reading stands at a limit of the force cell.
   [[nodiscard]] bool clips(double reading) const {
@@ -90,6 +97,8 @@ struct LawUncertainty {
   double duration_s = 0.0;  ///< longest fitted time span; 0 if unknown
   std::vector<FittedFile> data;
   std::vector<std::string> at_bound;  ///< estimated parameters that are fixed on a bound
+  /// Estimated parameters that the recordings cannot tell from something else: from a drift.
+  std::vector<std::string> not_separable;
 
   /// Two-sided quantile: estimate +- this times the standard error is an interval at `level`.
   [[nodiscard]] double quantile(double at_level) const;

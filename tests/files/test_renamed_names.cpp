@@ -64,12 +64,20 @@ std::pair<int, int> minor_version(std::string_view text) {
 }
 
 /// The keys of the objects that a place of a document of this kind names.
-Json properties_at(const Json& schema, const std::string& place) {
+Json properties_at(const Json& whole, const Json& schema, const std::string& place) {
+  if (schema.contains("$ref")) {
+    const std::string pointer = schema.at("$ref").get<std::string>().substr(1);
+    return properties_at(whole, whole.at(Json::json_pointer(pointer)), place);
+  }
+  for (const char* either : {"allOf", "anyOf"}) {
+    if (schema.contains(either)) return properties_at(whole, schema.at(either).at(0), place);
+  }
   if (place.empty()) return schema.at("properties");
   const std::size_t end = std::min(place.find('/', 1), place.size());
   const std::string name = place.substr(1, end - 1);
-  const Json& part = name == "*" ? schema.at("items") : schema.at("properties").at(name);
-  return properties_at(part, place.substr(end));
+  const char* any = schema.contains("items") ? "items" : "additionalProperties";
+  const Json& part = name == "*" ? schema.at(any) : schema.at("properties").at(name);
+  return properties_at(whole, part, place.substr(end));
 }
 
 TEST_CASE("a former key is read as the new one, with one warning") {
@@ -259,7 +267,7 @@ TEST_CASE("schemas mark former keys, and no name outlives its version") {
     if (name.kind == RenamedName::Kind::value) continue;
     const Json schema =
         read_json(share_dir() / "schemas" / (std::string(name.schema) + ".schema.json"));
-    const Json keys = properties_at(schema, std::string(name.place));
+    const Json keys = properties_at(schema, schema, std::string(name.place));
     const Json& former = keys.at(std::string(name.former));
     CHECK(former.value("deprecated", false));
     CHECK_THAT(former.at("description").get<std::string>(),

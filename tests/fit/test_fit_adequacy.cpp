@@ -49,12 +49,12 @@ TEST_CASE("a law that does not describe its recording says so first and everywhe
           "[adequacy][wired]") {
   AdequacyTrial trial;
   trial.at_rest = 60;
-  trial.defect = Defect::drift;
+  trial.defect = Defect::ringing;
   trial.defect_N = 0.1;
   const PreparedRecording recording = prepared(trial);
   const Selection s = selected(recording);
   CHECK_THAT(s.words.front(), StartsWith("no law tried describes this recording: residual "));
-  CHECK_THAT(s.words.front(), Contains("times the noise") && Contains("likely cause: drift"));
+  CHECK_THAT(s.words.front(), Contains("times the noise"));
   CHECK_FALSE(s.candidates[s.recommended].identified);
   const Json json = to_json(s);
   CHECK(json.at("adequacy").at("verdict") == "not_described");

@@ -168,7 +168,7 @@ TEST_CASE("a network in HDF5 holds its spheres and bonds, and the XDMF names onl
        it != std::sregex_iterator(); ++it) {
     named.insert((*it)[1]);
   }
-  CHECK(named.size() == 11);
+  CHECK(named.size() == 13);
   for (const std::string& name : named) CHECK(file.has(name));
   // The same scene gives the same bytes.
   write_network(tissue, folder / "b.h5");

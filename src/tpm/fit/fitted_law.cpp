@@ -185,6 +185,16 @@ void set_placement(FittedFile& file, const FitConfig& config, std::span<const do
   if (!estimated(values.size() - 1)) file.held.emplace_back("offset");
 }
 
+/// The drift of a recording's zero, if one was fitted.
+void set_drift(FittedFile& file, const FitResult& fit, std::size_t choice) {
+  for (std::size_t j = 0; j < fit.config.parameters.size(); ++j) {
+    const std::optional<DriftTerm>& drift = fit.config.parameters[j].drift;
+    if (!drift || drift->choice != choice) continue;
+    file.drift = fit.best.natural[j];
+    file.drift_origin_s = drift->origin_s;
+  }
+}
+
 std::vector<FittedFile> fitted_files(const FitResult& fit) {
   std::vector<FittedFile> files;
   for (std::size_t i = 0; i < fit.config.data.size(); ++i) {
@@ -200,6 +210,7 @@ std::vector<FittedFile> fitted_files(const FitResult& fit) {
       if (fit.config.law && fit.config.data.size() > 1) {
         set_placement(file, fit.config, model_parameters(fit.config, fit.best.natural, i), i);
       }
+      set_drift(file, fit, i);
       file.readings += static_cast<int>(std::count(r.fitted.begin(), r.fitted.end(), true));
     }
     for (const FittedDatum& d : fit.data) file.readings += d.datum.choice == i && !d.datum.held_out;
@@ -233,6 +244,7 @@ std::optional<LawUncertainty> uncertainty_of(const FitResult& fit, const LawSpec
   u.data = fitted_files(fit);
   for (const ParameterResult& p : fit.parameters) {
     if (p.at_lower_bound || p.at_upper_bound) u.at_bound.push_back(p.parameter.name);
+    if (!p.not_separable.empty()) u.not_separable.push_back(p.parameter.name);
   }
   return u;
 }

@@ -155,6 +155,8 @@ Json files::to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
     if (!file.held.empty()) entry["held"] = file.held;
     if (file.clipped_above) entry["clipped_above"] = *file.clipped_above;
     if (file.clipped_below) entry["clipped_below"] = *file.clipped_below;
+    if (file.drift) entry["drift"] = *file.drift;
+    if (file.drift_origin_s) entry["drift_origin_s"] = *file.drift_origin_s;
     data.push_back(std::move(entry));
   }
   Json json{{"parameters", std::move(names)},
@@ -167,6 +169,7 @@ Json files::to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
   if (uncertainty.degrees_of_freedom) json["degrees_of_freedom"] = *uncertainty.degrees_of_freedom;
   if (uncertainty.duration_s > 0.0) json["duration_s"] = uncertainty.duration_s;
   if (!uncertainty.at_bound.empty()) json["at_bound"] = uncertainty.at_bound;
+  if (!uncertainty.not_separable.empty()) json["not_separable"] = uncertainty.not_separable;
   return json;
 }
 
@@ -217,9 +220,12 @@ LawUncertainty files::uncertainty_from_json(const Json& block, const LawSpec& sp
     entry.held = file.value("held", std::vector<std::string>{});
     set(entry.clipped_above, "clipped_above");
     set(entry.clipped_below, "clipped_below");
+    set(entry.drift, "drift");
+    set(entry.drift_origin_s, "drift_origin_s");
     u.data.push_back(std::move(entry));
   }
   u.at_bound = block.value("at_bound", std::vector<std::string>{});
+  u.not_separable = block.value("not_separable", std::vector<std::string>{});
   return u;
 }
 

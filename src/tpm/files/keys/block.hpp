@@ -132,6 +132,8 @@ void write_keys(const std::vector<Key<T>>& keys, const T& from, Json& object) {
   for (const Key<T>& key : keys) {
     Json value = key.write(from);
     if (value.is_null() || (!key.form.required && value == key.form.usual)) continue;
+    // An empty list where one of a few is asked for: nothing was said.
+    if (!key.form.required && value.is_array() && value.size() < key.form.form->fewest) continue;
     object[key.form.name] = std::move(value);
   }
 }

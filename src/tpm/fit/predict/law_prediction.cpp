@@ -195,6 +195,11 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
     p.flags.push_back(
         fmt::format("{} stood on a bound of the fit: its uncertainty is not in the bands", name));
   }
+  for (const std::string& name : law.uncertainty->not_separable) {
+    p.flags.push_back(fmt::format(
+        "{} was not told from a drift or a slow branch: the bands suppose that nothing drifted",
+        name));
+  }
   const auto missing = std::count_if(p.response.begin(), p.response.end(),
                                      [](double f) { return !std::isfinite(f); });
   if (missing > 0) {

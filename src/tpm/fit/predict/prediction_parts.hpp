@@ -55,6 +55,7 @@ void require_quantities_of(const LawFile& law, const PreparedRecording& recordin
 struct OwnPlacement {
   std::vector<double> values;      ///< of the whole law
   std::vector<std::size_t> place;  ///< of what was found
+  FittedFile drifting = {};        ///< its drift, if the rests tell one
 };
 /// All parameters of the law as they were fitted to this recording, told by its SHA-256; none if it
 /// is not among the fitted files, or if the law file does not say where it was placed.

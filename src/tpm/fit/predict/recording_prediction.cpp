@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpm/fit/select/clipping.hpp"
@@ -84,6 +85,20 @@ std::optional<OwnPlacement> placement_in_fit(const LawFile& law, const FittedFil
   return own;
 }
 
+/// Adds the drift of the recording's zero to the response and its bands. Its uncertainty is part of
+/// the fit's, not of these bands.
+void add_drift(LawPrediction& p, const FittedFile& file) {
+  if (!file.drift) return;
+  for (std::vector<double>* values :
+       {&p.response, &p.mean_lower, &p.mean_upper, &p.reading_lower, &p.reading_upper}) {
+    for (std::size_t i = 0; i < values->size(); ++i) (*values)[i] += file.drifted(p.time_s[i]);
+  }
+  const Unit unit = shown_unit(p.response_dimension());
+  p.flags.push_back(
+      fmt::format("the zero drifts by {} {}/s, as the recording's rests tell; it is added",
+                  significant(*file.drift / unit.to_si, 4), unit.symbol));
+}
+
 void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& recording) {
   const Recording& r = recording.recording;
   PredictedRecording own;
@@ -160,6 +175,12 @@ OwnPlacement place_recording(const LawFile& law, const PreparedRecording& record
     if (!sets.empty())
       result.place.push_back(sets.front().parameter);  // a drift is none of the law
   }
+  for (std::size_t j = 0; j < fit.config.parameters.size(); ++j) {
+    if (const std::optional<DriftTerm>& drift = fit.config.parameters[j].drift) {
+      result.drifting.drift = fit.best.natural[j];
+      result.drifting.drift_origin_s = drift->origin_s;
+    }
+  }
   return result;
 }
 
@@ -202,12 +223,18 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
   const bool of_several = p.placement == Placement::fitted && in_fit;
   UncertainCoordinates u = fitted_coordinates(law, of_several ? Placement::own : p.placement);
   std::vector<double> values = law.values;
+  FittedFile drifting;
+  if (const FittedFile* file = fitted_file(law, recording);
+      file != nullptr && p.placement == Placement::fitted) {
+    drifting = *file;
+  }
   if (of_several) {
     values = in_fit->values;
     add_own_directions(u, *in_fit, model, law, recording, motion);
   } else if (p.placement == Placement::own) {
     const OwnPlacement own = place();
     values = own.values;
+    drifting = own.drifting;
     add_own_directions(u, own, model, law, recording, motion);
   } else if (p.placement == Placement::surface) {
     values = at_surface(law).values;
@@ -216,6 +243,7 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
   p.offset = values.back();
   p.time_s = r.time_s;
   fill_prediction(p, model, law, motion, u, values, r.response_sd, options);
+  add_drift(p, drifting);
   compare(p, law, recording);
   return p;
 }
