@@ -6,8 +6,8 @@
 //
 // Prints:
 //     5 of 5 starts agree
-//     k_inf = 39.94 N/m, 95 % interval 38.6 to 41.64, identified
-//     k1    = 22.18 N/m, 95 % interval 9.286 to 29.66, identified
+//     k_inf = 39.87 N/m, 95 % interval 38.65 to 41.44, not told from a drift or a slow branch
+//     k1    = 21.97 N/m, 95 % interval 9.486 to 29, identified
 //     tau1  = 0.125 s, one-sided: upper limit only
 #include <cstdio>
 #include <tpmkit/error.hpp>
@@ -20,7 +20,12 @@ int main(int argc, char** argv) try {
   std::printf("%d of %d starts agree\n", fit.starts_agreeing, fit.starts_run);
   for (const tpm::fit::FittedParameter& p : fit.parameters) {
     if (p.nuisance) continue;
-    std::printf("%s\n", p.words.c_str());
+    std::printf("%-5s = %.4g %s", p.name.c_str(), p.estimate, p.unit.c_str());
+    if (p.lower && p.upper) std::printf(", 95 %% interval %.4g to %.4g", *p.lower, *p.upper);
+    const std::string verdict = p.not_separable.empty()
+                                    ? std::string(tpm::fit::verdict_name(p.verdict))
+                                    : "not told from a " + p.not_separable;
+    std::printf(", %s\n", verdict.c_str());
   }
   if (fit.law) tpm::write_law("fitted_law.json", *fit.law);
 } catch (const tpm::Error& error) {

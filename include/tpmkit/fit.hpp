@@ -34,6 +34,9 @@ struct FittedParameter {
   bool nuisance = false;  ///< belongs to the recording or its noise, not to the material
   /// The law does not describe the data: estimate, limits and verdict hold only if it did.
   bool only_if_described = false;
+  /// What the recording cannot tell it from ("drift or a slow branch"): it is then not identified,
+  /// whatever the verdict. Empty: nothing.
+  std::string not_separable;
   std::string words;  ///< the verdict as a sentence
 };
 

@@ -87,12 +87,12 @@ std::vector<RestedRecording> rested(std::span<const PreparedRecording> recording
 /// Independent samples that correlated ones count as, in a sum of squares: n (1 - r^2) / (1 + r^2),
 /// at the upper confidence bound of their lag-1 correlation.
 double degrees_of(const RecordingFit& fit) {
-  constexpr double kConfidence = 2.0, kMost = 0.98;
+  constexpr double kSureness = 2.0, kMost = 0.98;
   const auto n = static_cast<double>(std::ranges::count(fit.fitted, true));
   if (!fit.correlation || n < 2.0) return n;
   const double r = fit.correlation->lag1;
   const double error = std::sqrt(std::max(1.0 - r * r, 0.05) / n);
-  const double upper = std::clamp(r + kConfidence * error, 0.0, kMost);
+  const double upper = std::clamp(r + kSureness * error, 0.0, kMost);
   return n * (1.0 - upper * upper) / (1.0 + upper * upper);
 }
 

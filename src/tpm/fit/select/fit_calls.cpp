@@ -27,6 +27,7 @@ FitSummary summary_of(const FitResult& fit) {
                                   .verdict = p.verdict,
                                   .nuisance = p.nuisance,
                                   .only_if_described = p.only_if_described,
+                                  .not_separable = p.not_separable,
                                   .words = p.words});
   }
   summary.adequacy = fit.adequacy;

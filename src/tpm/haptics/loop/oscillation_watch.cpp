@@ -25,7 +25,8 @@ void OscillationWatch::observe(double force_N, int periods) noexcept {
 void OscillationWatch::add(const Stroke& stroke) noexcept {
   strokes_[count_ % kFast] = stroke;
   ++count_;
-  found_ = found_ || grows(kGrowing) || steady(kSteady) || fast();
+  found_ =
+      found_ || grows(kGrowing) || steady(kSteady) || (steady(kEqual) && equal(kEqual)) || fast();
 }
 
 bool OscillationWatch::grows(std::size_t strokes) const noexcept {
@@ -53,6 +54,17 @@ bool OscillationWatch::steady(std::size_t strokes) const noexcept {
     if (std::abs(cycle - mean) > settings_.spread_time * mean + 1.0) return false;
   }
   return stays(strokes);
+}
+
+bool OscillationWatch::equal(std::size_t strokes) const noexcept {
+  double mean_N = 0.0;
+  for (std::size_t i = 0; i < strokes; ++i) {
+    mean_N += back(i).swing_N / static_cast<double>(strokes);
+  }
+  for (std::size_t i = 0; i < strokes; ++i) {
+    if (std::abs(back(i).swing_N - mean_N) > settings_.spread_force * mean_N) return false;
+  }
+  return true;
 }
 
 bool OscillationWatch::fast() const noexcept {

@@ -13,6 +13,7 @@ struct OscillationWatchSettings {
   double growth = 1.1;              ///< of a stroke beyond the one of the same direction before
   double decay = 0.8;               ///< of the later half beside the earlier one: it dies out
   double spread_time = 0.15;        ///< of the times of a steady one, in parts of their mean
+  double spread_force = 0.25;       ///< of equal strokes, in parts of their mean
   double fast_Hz = 25.0;            ///< faster ones no hand makes: they need not be regular
 };
 
@@ -22,14 +23,13 @@ struct OscillationWatchSettings {
 ///   - growing: kGrowing strokes in a row, each faster than `longest_stroke_s` and larger than the
 ///     last one of its direction by `growth`, as of a loop that feeds itself;
 ///   - steady: kSteady such strokes that do not die out, at times as regular as a hand does not
-///   make
-///     at this rate, however large each one is;
+///     make at this rate, however large each one is; kEqual where they are equally large, too;
 ///   - fast: kFast strokes faster than a hand can move that do not die out.
 ///
 /// Neither allocates nor throws.
 class OscillationWatch {
  public:
-  static constexpr std::size_t kGrowing = 8, kSteady = 32, kFast = 48;
+  static constexpr std::size_t kGrowing = 8, kEqual = 16, kSteady = 32, kFast = 48;
 
   explicit OscillationWatch(const OscillationWatchSettings& settings) noexcept
       : settings_(settings) {}
@@ -50,6 +50,7 @@ class OscillationWatch {
   }
   [[nodiscard]] bool grows(std::size_t strokes) const noexcept;
   [[nodiscard]] bool steady(std::size_t strokes) const noexcept;
+  [[nodiscard]] bool equal(std::size_t strokes) const noexcept;
   [[nodiscard]] bool fast() const noexcept;
   [[nodiscard]] bool stays(std::size_t strokes) const noexcept;
 

@@ -324,9 +324,9 @@ SolidFilling counted_filling(const Surface& surface, const SolidRequest& request
 
 /// Throws unless three layers fit into the body where it is thickest.
 void require_room(const Surface& surface, double spacing) {
-  constexpr double kRounding = 1e-6;  // of a thickness that is a whole number of spacings
+  constexpr double kWholeNumber = 1e-6;  // of a thickness that is a whole number of spacings
   const double radius = inner_radius(surface, spacing);
-  if (radius >= (1.0 - kInnerRadiusError - kRounding) * spacing) return;
+  if (radius >= (1.0 - kInnerRadiusError - kWholeNumber) * spacing) return;
   throw bad_input("solid filling",
                   fmt::format("the body is about {:.3g} mm thick and the spheres {:.4g} mm apart",
                               2e3 * radius, 1e3 * spacing),

@@ -27,7 +27,7 @@ Network joined(OrganBlock block, const NetworkOptions& options, const std::strin
 /// What is fixed if the scene does not say.
 std::vector<AnchorKeys> usual_anchors(bool star, bool liver) {
   if (star) return {{.kind = AnchorKind::spheres, .spheres = {1, 3, 4}}};
-  if (liver) return {{.kind = AnchorKind::far_side}};
+  if (liver) return {{.kind = AnchorKind::far_side, .spheres = {}}};
   return {};
 }
 
