@@ -36,7 +36,8 @@ struct FittedFile {
   std::vector<std::string> held = {};
   /// Limits of the force cell: readings at or beyond them were censored, SI.
   std::optional<double> clipped_above = std::nullopt, clipped_below = std::nullopt;
-  /// Drift of the force cell's zero that was found in a recording, N/s or Pa/s, and when it is 0, s.
+  /// Drift of the force cell's zero that was found in a recording, N/s or Pa/s, and when it is 0,
+  /// s.
   std::optional<double> drift = std::nullopt, drift_origin_s = std::nullopt;
 
   /// What the drift adds to a reading.

@@ -73,6 +73,7 @@ FitResult fit_of(const std::vector<PreparedRecording>& record, const FitConfig& 
 FitConfig config_for(const std::vector<PreparedRecording>& record) {
   SetupOptions options;
   options.nuisance = Nuisance::offset;
+  options.measured = false;  // the phases are those of the whole record, also of the thinned one
   FitConfig config = recording_config(parse_law_name("linear-1", "test"), record, options);
   config.fixed[3] = 0.0;
   return config;

@@ -21,7 +21,7 @@ namespace tpm::test {
 /// A ramp and hold on a material of 60 + 45 exp(-t / 2 s) N/m.
 struct StudyTest {
   int rest = 40;            ///< readings before the drive moves
-  double start_mm = 0.0;   ///< depth there
+  double start_mm = 0.0;    ///< depth there
   double contact_mm = 0.0;  ///< depth at which contact begins
   double depth_mm = 4.0;    ///< at the end of the ramp
   double rate_mm_per_s = 1.0;

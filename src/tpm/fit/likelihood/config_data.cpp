@@ -97,8 +97,8 @@ void parse_stiffness_per_modulus(const Json& j, const FitConfig& config, DataCho
 /// Limits of the force cell.
 void parse_clipping(const Json& j, const FitConfig& config, DataChoice& data,
                     const DocumentPlace& place) {
-  for (const auto& [key, limit] : {std::pair{"clipped_above", &data.clipped_above},
-                                   {"clipped_below", &data.clipped_below}}) {
+  for (const auto& [key, limit] :
+       {std::pair{"clipped_above", &data.clipped_above}, {"clipped_below", &data.clipped_below}}) {
     if (!j.contains(key)) continue;
     if (data.protocol.kind != Kind::measured) {
       throw bad_input(place.key(key).where, "without a recording",

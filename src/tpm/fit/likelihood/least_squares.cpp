@@ -62,8 +62,7 @@ class FreeThetaCost final : public ceres::CostFunction {
     if (!want_jacobian) return true;
     Eigen::Map<RowMatrix> out(jacobians[0], r.size(), static_cast<Eigen::Index>(free_.size()));
     for (std::size_t j = 0; j < free_.size(); ++j) {
-      const double slope =
-          parameters_[free_[j]].natural_slope(theta[0][j] * units_[j]) * units_[j];
+      const double slope = parameters_[free_[j]].natural_slope(theta[0][j] * units_[j]) * units_[j];
       out.col(static_cast<Eigen::Index>(j)) = d.col(static_cast<Eigen::Index>(free_[j])) * slope;
     }
     return true;

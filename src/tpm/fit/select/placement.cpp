@@ -267,9 +267,9 @@ DriftFinding drift_finding(const PreparedRecording& r, const RestReadings& rests
                                                         : DriftFinding::not_separable;
 }
 
-Placement measure_placement(const PreparedRecording& recording, const LawSpec& law,
-                            std::optional<double> exponent) {
-  Placement placement;
+MeasuredPlacement measure_placement(const PreparedRecording& recording, const LawSpec& law,
+                                    std::optional<double> exponent) {
+  MeasuredPlacement placement;
   placement.rests = read_rests(recording);
   placement.onset = find_onset(recording, placement.rests, first_loading_exponent(law, exponent));
   placement.drift = drift_finding(recording, placement.rests);

@@ -78,13 +78,14 @@ enum class DriftFinding {
                                          const RestReadings& rests);
 
 /// What was measured of one recording's placement, for a law.
-struct Placement {
+struct MeasuredPlacement {
   RestReadings rests;
   Onset onset;
   DriftFinding drift = DriftFinding::no_hold;
 };
 
-[[nodiscard]] Placement measure_placement(const PreparedRecording& recording, const LawSpec& law,
-                                          std::optional<double> exponent);
+[[nodiscard]] MeasuredPlacement measure_placement(const PreparedRecording& recording,
+                                                  const LawSpec& law,
+                                                  std::optional<double> exponent);
 
 }  // namespace tpm::fit

@@ -205,8 +205,8 @@ void add_placement(FitConfig& config, const LawModel& model,
       add_free_placement(config, model, r, i, scope, named("offset", r), options.nuisance);
       continue;
     }
-    const Placement placement =
-        options.measured ? measure_placement(r, law, options.exponent) : Placement{};
+    const MeasuredPlacement placement =
+        options.measured ? measure_placement(r, law, options.exponent) : MeasuredPlacement{};
     if (!options.zero) {
       add_automatic(config, offset_bounds(law, r, named("offset", r)), {{offset, scope}});
       if (options.measured) config.parameters.back().prior = zero_prior(r, placement.rests);
