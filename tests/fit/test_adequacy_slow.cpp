@@ -27,7 +27,7 @@ TEST_CASE("fits of healthy recordings are seldom called wrong", "[adequacy][slow
 
 TEST_CASE("misfits of three noises are found", "[adequacy][slow]") {
   int found = 0, all = 0;
-  for (const Defect defect : {Defect::slow_branch, Defect::drift, Defect::ringing}) {
+  for (const Defect defect : {Defect::slow_branch, Defect::transient, Defect::ringing}) {
     AdequacyTrial trial;
     trial.defect = defect;
     trial.at_rest = 25;
