@@ -64,6 +64,7 @@ py::dict run_scene(const std::string& text, const std::string& where, const fs::
   ExperimentScene scene = parse_experiment(parse_json(text, where), where, folder);
   scene.text = text;
   if (!output.empty()) {
+    require_not_read(output);
     will_update({output + ".checkpoint"});
     (void)Hdf5Writer(output);  // before a long run: can the result be written?
   }

@@ -36,7 +36,9 @@ class Fits(unittest.TestCase):
             self.assertLess(row.lower, made.LAW[key])
             self.assertGreater(row.upper, made.LAW[key])
             self.assertAlmostEqual(row.estimate / made.LAW[key], 1.0, delta=0.02)
-            self.assertEqual(self.fit.verdicts[name], "identified")
+            # Nothing rests before contact: a slow drift of the force cell would look like k_inf.
+            drift = "not identified: drift or a slow branch: not separable"
+            self.assertEqual(self.fit.verdicts[name], drift if name == "k_inf" else "identified")
         self.assertEqual(table.loc["tau1", "unit"], "s")
         self.assertIn("linear-1", self.fit.laws.index)
         self.assertTrue(self.fit.words)

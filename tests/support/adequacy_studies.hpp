@@ -116,6 +116,7 @@ inline AdequacyOutcome fitted(const AdequacyTrial& trial, bool profiles = false)
   fit::SetupOptions setup;
   setup.starts = 4;
   setup.profiles = profiles;
+  setup.measured = trial.noisy;  // without noise what is measured of the placement would be exact
   const std::span<const fit::PreparedRecording> span(&one, 1);
   fit::FitResult result = fit::run_fit(
       fit::recording_config(parse_law_name("linear-1", "law"), span, setup), fit::data_sets(span));

@@ -7,7 +7,6 @@
 #include <map>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <system_error>
 #include <utility>
 
@@ -35,9 +34,10 @@ std::optional<FileIdentity> identity_of(const fs::path& path) {
 
 struct Roles {
   std::string instead;
-  std::map<FileIdentity, fs::path> read;  ///< with the name under which it was read
-  std::set<FileIdentity> written;         ///< by this command
-  std::vector<fs::path> results;          ///< announced, not yet written
+  using Files = std::map<FileIdentity, fs::path>;  ///< with the name under which it was met
+  Files read;
+  Files written;                  ///< by this command
+  std::vector<fs::path> results;  ///< announced, not yet written
   std::vector<fs::path> states;
 
   [[nodiscard]] bool is_state(const FileIdentity& file) const {
@@ -45,9 +45,17 @@ struct Roles {
                        [&](const fs::path& state) { return identity_of(state) == file; });
   }
   /// A file that was deleted leaves its inode to others: it has to be there still.
+  [[nodiscard]] static bool is_among(const Files& files, const std::optional<FileIdentity>& file) {
+    const auto found = file ? files.find(*file) : files.end();
+    return found != files.end() && identity_of(found->second) == file;
+  }
   [[nodiscard]] bool was_read(const std::optional<FileIdentity>& file) const {
-    const auto found = file ? read.find(*file) : read.end();
-    return found != read.end() && identity_of(found->second) == file;
+    return is_among(read, file);
+  }
+  static void add(Files& files, const FileIdentity& file, const fs::path& path) {
+    std::error_code no_folder;  // the working folder is gone: nothing relative was met in it
+    const fs::path name = fs::absolute(path, no_folder);
+    files[file] = no_folder ? path : name;
   }
 };
 
@@ -102,13 +110,11 @@ void note_reading(const fs::path& path, int descriptor) {
   struct stat found {};
   if (!roles || ::fstat(descriptor, &found) != 0) return;
   const auto file = regular_identity(found);
-  if (!file || roles->written.count(*file) > 0 || roles->is_state(*file)) return;
+  if (!file || Roles::is_among(roles->written, file) || roles->is_state(*file)) return;
   for (const fs::path& result : roles->results) {
     if (identity_of(result) == file) throw both_read_and_written(path);
   }
-  std::error_code no_folder;  // the working folder is gone: nothing relative was read from it
-  const fs::path name = fs::absolute(path, no_folder);
-  roles->read[*file] = no_folder ? path : name;
+  Roles::add(roles->read, *file, path);
 }
 
 void require_not_read(const fs::path& path) {
@@ -120,7 +126,7 @@ void require_not_read(const fs::path& path) {
 void note_written(const fs::path& path) {
   const std::lock_guard lock(roles_mutex);
   if (!roles) return;
-  if (const auto file = identity_of(path)) roles->written.insert(*file);
+  if (const auto file = identity_of(path)) Roles::add(roles->written, *file, path);
 }
 
 }  // namespace tpm::files
