@@ -36,8 +36,8 @@ class StoredEnergy {
   [[nodiscard]] double tension_potential(double u) const;
 
   LawSpec spec_;
-  KernelShape shape_;
-  TensionShape tension_;
+  law::KernelShape shape_;
+  law::TensionShape tension_;
   double exponent_, share_, k_inf_, k_tension_, relaxing_;
 };
 
