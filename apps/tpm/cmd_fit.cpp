@@ -13,12 +13,14 @@
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/groups/group_comparison.hpp"
 #include "tpm/fit/likelihood/experiment_refit.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/predict/fitted_scene.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
+#include "tpm/fit/show/comparison_report.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
 #include "tpm/fit/show/fit_report.hpp"
 #include "tpm/fit/show/function_report.hpp"
@@ -43,6 +45,7 @@ struct FitOptions {
   std::string resample;
   std::string reference;
   std::string group_by;
+  bool compare = false;
   std::string contact, zero;
   std::string radius, cone_angle, punch_radius, poisson;
 };
@@ -308,12 +311,65 @@ int fit_folder(const FitOptions& options, const Session& session) {
   std::string text = with_moduli(to_json(study), to_terminal_text(study), moduli, session);
   if (!options.no_draw) {
     const std::string folder = figure_folder(options, options.recordings.files.front());
-    auto files = write_specimen_report(folder, study);
+    auto files = write_specimen_report(folder, study, probe_of(options));
     write_moduli(folder, moduli, files);
     text += written(session, folder, files);
   }
   deliver(text, options.output);
   deliver_csv(pooled_csv(study), csv);
+  return 0;
+}
+
+/// "healthy" of "data/healthy/".
+std::string folder_name(const std::string& folder) {
+  std::filesystem::path path = std::filesystem::absolute(folder).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  return path.filename().string();
+}
+
+RecordingGroup group_in(const FitOptions& options, const std::string& folder) {
+  RecordingOptions input = options.recordings;
+  input.files = recordings_in(folder);
+  RecordingGroup group{folder_name(folder), read_recordings(input)};
+  require_indentation(options, group.recordings);
+  set_specimens(options, group.recordings);
+  return group;
+}
+
+int compare_folders(const FitOptions& options, const Session& session) {
+  const std::vector<std::string>& folders = options.recordings.files;
+  if (folders.size() != 2 || !std::filesystem::is_directory(folders[0]) ||
+      !std::filesystem::is_directory(folders[1])) {
+    throw Error(ExitCode::usage, "--compare",
+                fmt::format("with {} input{}", folders.size(), folders.size() == 1 ? "" : "s"),
+                "two folders of recordings, such as: tpm fit healthy/ fibrotic/ --compare");
+  }
+  const auto csv = csv_beside(options.output, session);
+  RecordingGroup first = group_in(options, folders[0]);
+  RecordingGroup second = group_in(options, folders[1]);
+  if (first.name == second.name) {  // "1/liver" and "2/liver"
+    first.name = folders[0];
+    second.name = folders[1];
+  }
+  const std::string folder =
+      options.folder.empty()
+          ? fmt::format("{}_against_{}", folder_name(folders[1]), folder_name(folders[0]))
+          : options.folder;
+  if (!options.no_draw) will_write_into(folder, {"figures.json", "comparison.json"});
+  SelectionOptions selection = selection_options(options);
+  const std::optional<LawSpec> law =
+      selection.laws.empty() ? std::nullopt : std::optional<LawSpec>(selection.laws.front());
+  set_reference(options, first.recordings, selection);
+  set_placement(options, first.recordings, selection);
+  set_placement(options, second.recordings, selection);
+  const std::optional<ContactGeometry> probe = probe_of(options);
+  const GroupComparison comparison = compare_groups(first, second, law, selection, probe);
+  std::string text = session.json() ? to_text(to_json(comparison)) : to_terminal_text(comparison);
+  if (!options.no_draw) {
+    text += written(session, folder, write_comparison_report(folder, comparison, probe));
+  }
+  deliver(text, options.output);
+  deliver_csv(comparison_csv(comparison), csv);
   return 0;
 }
 
@@ -381,6 +437,11 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
 
 int fit(const FitOptions& options, const Session& session) {
   const std::vector<std::string>& files = options.recordings.files;
+  if (options.compare) return compare_folders(options, session);
+  if (files.size() == 2 && std::filesystem::is_directory(files[0]) &&
+      std::filesystem::is_directory(files[1])) {
+    throw Error(ExitCode::usage, "FILE", "two folders", "--compare beside them, or one folder");
+  }
   if (is_configuration(files)) {
     if (!options.reference.empty() || !options.group_by.empty() || !options.contact.empty() ||
         !options.zero.empty() || probe_of(options)) {
@@ -468,6 +529,10 @@ void add_fit_command(CLI::App& app, Session& session) {
       "--group-by", options->group_by,
       "Folder: what tells the specimens apart: a pattern of the file names with one "
       "group, e.g. \"(liver[0-9]+)_\", or a column or key of the files");
+  command->add_flag(
+      "--compare", options->compare,
+      "Two folders: ratio of each parameter, and of Young's moduli, with interval and "
+      "test");
   add_format_option(*command, session);
   const auto add_probe = options_of_group(*command, "Young's modulus of an indentation, in Pa");
   add_probe("--radius", options->radius,
@@ -480,6 +545,7 @@ void add_fit_command(CLI::App& app, Session& session) {
       "Example:\n  tpm fit configs/liver_relaxation.json\n"
       "  tpm fit meat.csv\n  tpm fit liver.csv --radius \"2 mm\" --poisson 0.5\n  tpm fit "
       "folder_of_recordings --law power-2\n"
+      "  tpm fit healthy/ fibrotic/ --compare --radius \"2 mm\"\n"
       "  tpm fit configs/liver_relaxation.json --hold-out \"8 mm\" --format json -o fit.json");
   set_run(*command, session, [options, &session] { return fit(*options, session); });
 }

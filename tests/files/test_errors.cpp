@@ -506,6 +506,8 @@ std::vector<ErrorCase> recording_folder_cases() {
       {type, "no such column", fit("--group-by cow"), folder},
       {type, "column of two values", fit("--group-by animal"), folder},
       {type, "reference depth 0", fit("--reference '0 mm'"), folder},
+      {type, "comparison of one folder", fit("--compare"), folder},
+      {type, "the same file twice", fit(""), with_files({{"a1.csv", csv}, {"a2.csv", csv}})},
       {type, "group of one recording", "fit {}/a1.csv --no-draw --group-by animal -o {}/out",
        folder},
   };

@@ -56,41 +56,16 @@ WeightedMean weighted_mean(std::span<const SpecimenEstimate> specimens, double t
   return m;
 }
 
-/// -2 ln of the restricted likelihood, without constants.
-double restricted_deviance(std::span<const SpecimenEstimate> specimens, double tau_squared) {
-  const WeightedMean m = weighted_mean(specimens, tau_squared);
-  return m.log_variance + std::log(m.weights) + m.squares;
-}
+using Groups = std::span<const std::vector<SpecimenEstimate>>;
 
-/// The deviance may have a second minimum at 0 or inside, so it is scanned before it is refined.
-double restricted_tau_squared(std::span<const SpecimenEstimate> specimens) {
-  double least = specimens[0].standard_error;
-  double low = specimens[0].estimate;
-  double high = low;
-  for (const SpecimenEstimate& s : specimens) {
-    least = std::min(least, s.standard_error);
-    low = std::min(low, s.estimate);
-    high = std::max(high, s.estimate);
+/// -2 ln of the restricted likelihood, without constants.
+double restricted_deviance(Groups groups, double tau_squared) {
+  double deviance = 0.0;
+  for (const auto& group : groups) {
+    const WeightedMean m = weighted_mean(group, tau_squared);
+    deviance += m.log_variance + std::log(m.weights) + m.squares;
   }
-  // Below, tau^2 is nothing beside the variances; the spread of the estimates is the most it can
-  // be.
-  const double from = std::log(1e-9 * least * least);
-  const double to = std::log(std::max((high - low) * (high - low), least * least));
-  const auto deviance = [&](double log_tau_squared) {
-    return restricted_deviance(specimens, std::exp(log_tau_squared));
-  };
-  constexpr int kScan = 400;
-  const double width = (to - from) / kScan;
-  int best = 0;
-  for (int i = 1; i <= kScan; ++i) {
-    if (deviance(from + i * width) < deviance(from + best * width)) best = i;
-  }
-  constexpr int kBits = 40;
-  const auto [log_tau_squared, minimum] = boost::math::tools::brent_find_minima(
-      deviance, from + (best - 1) * width, from + (best + 1) * width, kBits);
-  // At the lower end the minimum is at 0 itself.
-  if (best == 0 || restricted_deviance(specimens, 0.0) <= minimum) return 0.0;
-  return std::exp(log_tau_squared);
+  return deviance;
 }
 
 EffectInterval around(double middle, double half_width) {
@@ -167,13 +142,66 @@ RepeatSums repeat_sums(const Repeats& groups, double mean) {
 
 }  // namespace
 
+/// The deviance may have a second minimum at 0 or inside, so it is scanned before it is refined.
+double restricted_tau_squared(Groups groups) {
+  double least = groups[0][0].standard_error;
+  double widest = 0.0;
+  for (const auto& group : groups) {
+    double low = group[0].estimate;
+    double high = low;
+    for (const SpecimenEstimate& s : group) {
+      least = std::min(least, s.standard_error);
+      low = std::min(low, s.estimate);
+      high = std::max(high, s.estimate);
+    }
+    widest = std::max(widest, high - low);
+  }
+  // Below, tau^2 is nothing beside the variances; the spread of the estimates is the most it can
+  // be.
+  const double from = std::log(1e-9 * least * least);
+  const double to = std::log(std::max(widest * widest, least * least));
+  const auto deviance = [&](double log_tau_squared) {
+    return restricted_deviance(groups, std::exp(log_tau_squared));
+  };
+  constexpr int kScan = 400;
+  const double width = (to - from) / kScan;
+  int best = 0;
+  for (int i = 1; i <= kScan; ++i) {
+    if (deviance(from + i * width) < deviance(from + best * width)) best = i;
+  }
+  constexpr int kBits = 40;
+  const auto [log_tau_squared, minimum] = boost::math::tools::brent_find_minima(
+      deviance, from + (best - 1) * width, from + (best + 1) * width, kBits);
+  // At the lower end the minimum is at 0 itself.
+  if (best == 0 || restricted_deviance(groups, 0.0) <= minimum) return 0.0;
+  return std::exp(log_tau_squared);
+}
+
+SpecimenMeans specimen_means(std::span<const SpecimenEstimate> repeats) {
+  const Repeats groups = by_specimen(repeats);
+  const RepeatSums sums = repeat_sums(groups, weighted_mean(repeats, 0.0).mean);
+  SpecimenMeans means;
+  means.repeat_degrees = sums.degrees;
+  if (sums.degrees > 0) {
+    means.repeat_variance = std::max(0.0, (sums.within - sums.degrees) / sums.scale);
+  }
+  for (const auto& group : groups) {
+    const WeightedMean own = weighted_mean(group, means.repeat_variance);
+    const SpecimenEstimate& first = group.front();
+    means.specimens.push_back({first.specimen.empty() ? first.name : first.specimen, own.mean,
+                               1.0 / std::sqrt(own.weights)});
+  }
+  return means;
+}
+
 RandomEffects random_effects(std::span<const SpecimenEstimate> specimens, double level) {
   require_valid(specimens, level);
   if (specimens.size() == 1) return one_specimen(specimens[0], level);
   RandomEffects r;
   r.specimens = specimens.size();
   const auto degrees = static_cast<double>(r.specimens - 1);
-  r.tau_squared = restricted_tau_squared(specimens);
+  const std::vector<SpecimenEstimate> group(specimens.begin(), specimens.end());
+  r.tau_squared = restricted_tau_squared({&group, 1});
   r.tau_at_zero = *r.tau_squared == 0.0;
   const WeightedMean m = weighted_mean(specimens, *r.tau_squared);
   r.mean = m.mean;
@@ -196,16 +224,9 @@ RandomEffects random_effects_of_repeats(std::span<const SpecimenEstimate> repeat
   const Repeats groups = by_specimen(repeats);
   const RepeatSums sums = repeat_sums(groups, weighted_mean(repeats, 0.0).mean);
   if (sums.degrees == 0) return random_effects(repeats, level);
-  const double variance = std::max(0.0, (sums.within - sums.degrees) / sums.scale);
-  std::vector<SpecimenEstimate> specimens;
-  for (const auto& group : groups) {
-    const WeightedMean own = weighted_mean(group, variance);
-    const SpecimenEstimate& first = group.front();
-    specimens.push_back({first.specimen.empty() ? first.name : first.specimen, own.mean,
-                         1.0 / std::sqrt(own.weights)});
-  }
-  RandomEffects r = random_effects(specimens, level);
-  r.repeat_variance = variance;
+  const SpecimenMeans means = specimen_means(repeats);
+  RandomEffects r = random_effects(means.specimens, level);
+  r.repeat_variance = means.repeat_variance;
   r.repeat_degrees = sums.degrees;
   if (r.specimens > 1) {
     const double f = (sums.between / static_cast<double>(r.specimens - 1)) /

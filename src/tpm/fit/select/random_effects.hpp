@@ -2,6 +2,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace tpm::fit {
 
@@ -49,6 +50,20 @@ struct RandomEffects {
 /// standard error is not positive.
 [[nodiscard]] RandomEffects random_effects(std::span<const SpecimenEstimate> specimens,
                                            double level = 0.95);
+
+/// One estimate for each specimen of repeats, its weighted mean, in the order of their first
+/// repeats; the variance between repeats beyond their standard errors, and its degrees of freedom.
+struct SpecimenMeans {
+  std::vector<SpecimenEstimate> specimens;
+  double repeat_variance = 0.0;
+  int repeat_degrees = 0;  ///< 0: no specimen was recorded twice
+};
+[[nodiscard]] SpecimenMeans specimen_means(std::span<const SpecimenEstimate> repeats);
+
+/// tau^2, common to all groups, that maximises the restricted likelihood of groups with a mean
+/// each. Of one group it is that of random_effects().
+/// @param groups none of them empty, standard errors > 0, at least one more specimen than groups
+[[nodiscard]] double restricted_tau_squared(std::span<const std::vector<SpecimenEstimate>> groups);
 
 /// The same where specimens were recorded repeatedly (SpecimenEstimate::specimen). Repeats differ
 /// by more than their standard errors: y_ij = mu + u_i + r_ij + e_ij with r_ij ~ N(0, rho^2), rho^2

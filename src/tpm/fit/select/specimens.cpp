@@ -118,11 +118,6 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
   return row;
 }
 
-/// The slack length of a stretched strip is its own, but tells about it; contact and offset do not.
-bool is_of_recording(const ParameterResult& p) {
-  return p.nuisance && p.parameter.name != "slack_length";
-}
-
 void require_one_reference(const SpecimenRow& first, const SpecimenRow& row) {
   if (!row.fit) return;
   const LawSpec& a = first.fit->config.law.value();
@@ -149,34 +144,58 @@ std::string in_natural_words(const PooledParameter& p) {
 
 }  // namespace
 
+/// The slack length of a stretched strip is its own, but tells about it; contact and offset do not.
+bool is_of_recording(const ParameterResult& p) {
+  return p.nuisance && p.parameter.name != "slack_length";
+}
+
+void require_distinct_files(std::span<const PreparedRecording> recordings) {
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const std::string& sum = recordings[i].recording.header.sha256;
+    if (sum.empty()) continue;
+    for (std::size_t k = 0; k < i; ++k) {
+      if (recordings[k].recording.header.sha256 != sum) continue;
+      throw bad_input(recordings[i].name,
+                      fmt::format("the same bytes as '{}'", printable(recordings[k].name)),
+                      "each recording once: a copy is no second specimen");
+    }
+  }
+}
+
+ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows, const SpecimenRow& like,
+                                       std::size_t i) {
+  ParameterEstimates found{like.fit.value().parameters[i].parameter, {}, 0};
+  FitParameter& parameter = found.parameter;
+  // A stiffness varies between specimens by factors, not by differences.
+  parameter.scale = parameter.lower < 0.0 ? Scale::linear : Scale::log;
+  for (const SpecimenRow& row : rows) {
+    if (!row.fit) continue;
+    const ParameterResult& r = row.parameter(i);
+    const bool usable = r.standard_error && !r.at_lower_bound && !r.at_upper_bound &&
+                        r.conditional_on.empty() &&
+                        (parameter.scale == Scale::linear || r.estimate > 0.0);
+    if (!usable) {
+      ++found.left_out;
+      continue;
+    }
+    const double slope = parameter.scale == Scale::log ? r.estimate : 1.0;
+    found.estimates.push_back(
+        {row.name, parameter.theta(r.estimate), *r.standard_error / slope, row.specimen});
+  }
+  return found;
+}
+
 std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows, double level) {
   std::vector<PooledParameter> pooled;
   const auto first = std::find_if(rows.begin(), rows.end(), [](const auto& r) { return !!r.fit; });
   if (first == rows.end()) return pooled;
   for (const SpecimenRow& row : rows) require_one_reference(*first, row);
   for (std::size_t i = 0; i < first->fit->parameters.size(); ++i) {
-    PooledParameter p;
-    p.parameter = first->fit->parameters[i].parameter;
     if (is_of_recording(first->fit->parameters[i])) continue;
-    // A stiffness varies between specimens by factors, not by differences.
-    p.parameter.scale = p.parameter.lower < 0.0 ? Scale::linear : Scale::log;
-    std::vector<SpecimenEstimate> estimates;
-    for (const SpecimenRow& row : rows) {
-      if (!row.fit) continue;
-      const ParameterResult& r = row.parameter(i);
-      const bool usable = r.standard_error && !r.at_lower_bound && !r.at_upper_bound &&
-                          r.conditional_on.empty() &&
-                          (p.parameter.scale == Scale::linear || r.estimate > 0.0);
-      if (!usable) {
-        ++p.left_out;
-        continue;
-      }
-      const double slope = p.parameter.scale == Scale::log ? r.estimate : 1.0;
-      estimates.push_back(
-          {row.name, p.parameter.theta(r.estimate), *r.standard_error / slope, row.specimen});
-    }
-    if (estimates.empty()) continue;
-    p.effects = random_effects_of_repeats(estimates, level);
+    const ParameterEstimates found = parameter_estimates(rows, *first, i);
+    if (found.estimates.empty()) continue;
+    PooledParameter p{found.parameter, random_effects_of_repeats(found.estimates, level),
+                      found.left_out};
     p.effects.words = in_natural_words(p);
     pooled.push_back(std::move(p));
   }
@@ -185,6 +204,7 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
 
 SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
                               const std::optional<LawSpec>& law, SelectionOptions options) {
+  require_distinct_files(recordings);
   SpecimenStudy study;
   if (!options.setup.reference) options.setup.reference = common_reference(recordings);
   if (law) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,23 @@ struct SpecimenStudy {
 /// refer to another depth than the first one's.
 [[nodiscard]] std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows,
                                                           double level);
+
+/// What the recordings say of the common law's parameter i, in theta of `parameter`. A recording
+/// that does not determine it (PooledParameter::left_out) is counted, not listed.
+struct ParameterEstimates {
+  FitParameter parameter;  ///< of log scale unless it may be negative
+  std::vector<SpecimenEstimate> estimates;
+  int left_out = 0;
+};
+/// @param like a row that was fitted: what parameter i is
+[[nodiscard]] ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows,
+                                                     const SpecimenRow& like, std::size_t i);
+
+/// Whether a fit's parameter belongs to the recording (contact, offset), not to the specimen.
+[[nodiscard]] bool is_of_recording(const ParameterResult& p);
+
+/// Two files with the same bytes are one measurement. Throws Error(bad_input) naming both.
+void require_distinct_files(std::span<const PreparedRecording> recordings);
 
 [[nodiscard]] Json to_json(const SpecimenStudy& study);
 [[nodiscard]] std::string to_terminal_text(const SpecimenStudy& study);

@@ -121,7 +121,7 @@ std::string laws_csv(const Selection& selection) {
   return text;
 }
 
-std::string specimens_csv(const SpecimenStudy& study) {
+std::string specimens_csv(const SpecimenStudy& study, const std::optional<ContactGeometry>& probe) {
   std::vector<std::string> columns{"recording", "specimen"};
   for (std::string& column : parameter_columns(study.law)) columns.push_back(std::move(column));
   std::string text = csv_line(columns);
@@ -133,6 +133,13 @@ std::string specimens_csv(const SpecimenStudy& study) {
         cells.push_back(std::move(c));
       }
       text += csv_line(cells);
+    }
+    if (!row.fit || !probe) continue;
+    for (const YoungModulus& m : young_moduli(*row.fit, *probe, false).moduli) {
+      text += csv_line({row.name, row.specimen, m.name, m.unit, cell(m.estimate),
+                        cell(m.standard_error), cell(m.lower), cell(m.upper),
+                        cell(row.fit->config.level), reference_cell(row.fit->config.law), "", "",
+                        "", m.verdict});
     }
   }
   return text;

@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,8 +22,9 @@ namespace tpm::fit {
 [[nodiscard]] std::string readings_csv(const FitResult& fit);
 /// Each law of a selection.
 [[nodiscard]] std::string laws_csv(const Selection& selection);
-/// Each parameter of each recording of a folder.
-[[nodiscard]] std::string specimens_csv(const SpecimenStudy& study);
+/// Each parameter of each recording of a folder, and with a probe its Young's moduli.
+[[nodiscard]] std::string specimens_csv(const SpecimenStudy& study,
+                                        const std::optional<ContactGeometry>& probe = {});
 /// Each pooled parameter.
 [[nodiscard]] std::string pooled_csv(const SpecimenStudy& study);
 

@@ -219,9 +219,10 @@ std::vector<std::string> write_fit_report(const std::filesystem::path& folder,
 }
 
 std::vector<std::string> write_specimen_report(const std::filesystem::path& folder,
-                                               const SpecimenStudy& study) {
+                                               const SpecimenStudy& study,
+                                               const std::optional<ContactGeometry>& probe) {
   write_file(folder / "specimens.json", to_text(to_json(study)));
-  write_file(folder / "specimens.csv", specimens_csv(study));
+  write_file(folder / "specimens.csv", specimens_csv(study, probe));
   write_file(folder / "pooled.csv", pooled_csv(study));
   std::vector<std::string> files{"specimens.json", "specimens.csv", "pooled.csv"};
   std::vector<Figure> figures = specimen_figures(study);

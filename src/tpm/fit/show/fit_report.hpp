@@ -1,9 +1,11 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tpm/fit/select/specimens.hpp"
+#include "tpm/law/contact_geometry.hpp"
 #include "tpm/show/figure.hpp"
 
 namespace tpm::fit {
@@ -26,7 +28,8 @@ namespace tpm::fit {
                                                         const FitResult& fit);
 
 /// The same for recordings that were fitted one by one; writes specimens.json with its tables too.
-[[nodiscard]] std::vector<std::string> write_specimen_report(const std::filesystem::path& folder,
-                                                             const SpecimenStudy& study);
+[[nodiscard]] std::vector<std::string> write_specimen_report(
+    const std::filesystem::path& folder, const SpecimenStudy& study,
+    const std::optional<ContactGeometry>& probe = {});
 
 }  // namespace tpm::fit

@@ -1,0 +1,206 @@
+// Declared in tpm/fit/groups/group_comparison.hpp.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/fit/groups/group_comparison.hpp"
+#include "tpm/show/table_document.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr int kDigits = 6;  // of JSON and CSV
+
+bool is_ratio(const ComparedQuantity& q) {
+  return q.parameter.scale == Scale::log;
+}
+
+/// The difference in theta as a ratio, or in SI.
+double shown_difference(const ComparedQuantity& q, double theta) {
+  return is_ratio(q) ? std::exp(theta) : theta;
+}
+
+Json typical_json(const ComparedQuantity& q, std::size_t group, const std::string& name) {
+  Json j{{"group", name}, {"left_out", q.left_out[group]}};
+  if (!q.typical[group]) return j;
+  const RandomEffects& e = *q.typical[group];
+  j["specimens"] = e.specimens;
+  j["typical_SI"] = rounded(q.parameter.natural(e.mean), kDigits);
+  j["interval_SI"] = {rounded(q.parameter.natural(e.interval.lower), kDigits),
+                      rounded(q.parameter.natural(e.interval.upper), kDigits)};
+  return j;
+}
+
+Json quantity_json(const GroupComparison& c, const ComparedQuantity& q) {
+  Json j{{"name", q.parameter.name},
+         {"unit", q.parameter.name.starts_with("E") ? q.parameter.unit.symbol.substr(1)
+                                                    : std::string(si_unit(q.parameter))}};
+  j["groups"] = Json::array({typical_json(q, 0, c.names[0]), typical_json(q, 1, c.names[1])});
+  if (!q.difference) {
+    j["reason"] = q.reason;
+    return j;
+  }
+  const GroupDifference& d = *q.difference;
+  const std::string key = is_ratio(q) ? "ratio" : "difference_SI";
+  j[key] = rounded(shown_difference(q, d.difference), kDigits);
+  j[is_ratio(q) ? "ratio_interval" : "difference_interval_SI"] = {
+      rounded(shown_difference(q, d.interval.lower), kDigits),
+      rounded(shown_difference(q, d.interval.upper), kDigits)};
+  j["p_value"] = rounded(d.p_value, kDigits);
+  j["degrees_of_freedom"] = d.degrees;
+  j[is_ratio(q) ? "between_specimens_sd_of_log" : "between_specimens_sd_SI"] =
+      rounded(std::sqrt(d.tau_squared), kDigits);
+  return j;
+}
+
+std::string p_text(double p) {
+  return p < 1e-4 ? significant(p, 2) : fixed(p, 4);
+}
+
+std::string with_interval(double value, double lower, double upper) {
+  return fmt::format("{} ({} .. {})", significant(value, 4), significant(lower, 4),
+                     significant(upper, 4));
+}
+
+std::string typical_text(const ComparedQuantity& q, std::size_t group) {
+  if (!q.typical[group]) return "-";
+  const RandomEffects& e = *q.typical[group];
+  const auto shown = [&](double theta) {
+    return q.parameter.natural(theta) / q.parameter.unit.to_si;
+  };
+  return with_interval(shown(e.mean), shown(e.interval.lower), shown(e.interval.upper));
+}
+
+std::string line_of(const ComparedQuantity& q, bool tested) {
+  std::string text =
+      fmt::format("{:<20} {:<26} {:<26} ",
+                  q.parameter.unit.symbol.empty()
+                      ? q.parameter.name
+                      : fmt::format("{}, {}", q.parameter.name, q.parameter.unit.symbol),
+                  typical_text(q, 0), typical_text(q, 1));
+  if (!q.difference) return text + q.reason + "\n";
+  const GroupDifference& d = *q.difference;
+  const double unit = is_ratio(q) ? 1.0 : q.parameter.unit.to_si;
+  const auto shown = [&](double theta) { return shown_difference(q, theta) / unit; };
+  text += fmt::format("{:<26} {:<9} {}",
+                      fmt::format("{}{}", is_ratio(q) ? "x " : "+ ",
+                                  with_interval(shown(d.difference), shown(d.interval.lower),
+                                                shown(d.interval.upper))),
+                      p_text(d.p_value), tested ? p_text(q.p_holm) : std::string("as its parts"));
+  const int left_out = q.left_out[0] + q.left_out[1];
+  if (left_out > 0) text += fmt::format("  left out: {}", left_out);
+  return text + "\n";
+}
+
+std::string conclusion(const GroupComparison& c) {
+  std::vector<std::string> differ, open;
+  const double alpha = 1.0 - c.study.level;
+  for (const ComparedQuantity& q : c.parameters) {
+    if (!q.difference) continue;
+    (q.p_holm < alpha ? differ : open).push_back(q.parameter.name);
+  }
+  if (differ.empty() && open.empty()) {
+    return "the groups cannot be compared: no parameter is determined by two specimens of each";
+  }
+  const std::string against = fmt::format("{} against {}", c.names[1], c.names[0]);
+  if (differ.empty()) {
+    return fmt::format(
+        "{}: no difference is shown in {} (Holm, {:.4g} %); the intervals say how large one "
+        "may be",
+        against, fmt::join(open, ", "), 100.0 * c.study.level);
+  }
+  return fmt::format(
+      "{}: a difference in {} (Holm, {:.4g} %){}", against, fmt::join(differ, ", "),
+      100.0 * c.study.level,
+      open.empty() ? std::string() : fmt::format("; none is shown in {}", fmt::join(open, ", ")));
+}
+
+}  // namespace
+
+Json to_json(const GroupComparison& c) {
+  Json study = to_json(c.study);
+  study.erase("pooled");
+  for (std::size_t i = 0; i < c.study.rows.size(); ++i) {
+    study["recordings"][i]["group"] = c.names[i < c.first ? 0 : 1];
+  }
+  Json j{{"conclusion", conclusion(c)}, {"confidence_level", c.study.level}};
+  j["parameters"] = array_json(c.parameters, [&](const ComparedQuantity& q) {
+    Json entry = quantity_json(c, q);
+    if (q.difference) entry["p_value_holm"] = rounded(q.p_holm, kDigits);
+    return entry;
+  });
+  if (!c.moduli.empty()) {
+    j["young_moduli"] =
+        array_json(c.moduli, [&](const ComparedQuantity& q) { return quantity_json(c, q); });
+  }
+  j.update(study);
+  return j;
+}
+
+std::string to_terminal_text(const GroupComparison& c) {
+  const std::size_t second = c.study.rows.size() - c.first;
+  std::string text = conclusion(c) + "\n" + c.study.why + "\n";
+  if (depends_on_reference(c.study.law)) text += reference_words(c.study.law) + "\n";
+  text += fmt::format(
+      "\n{:<20} {:<26} {:<26} {:<26} {:<9} {}\n", "", fmt::format("{} ({})", c.names[0], c.first),
+      fmt::format("{} ({})", c.names[1], second), "second against first", "p", "p (Holm)");
+  for (const ComparedQuantity& q : c.parameters) text += line_of(q, true);
+  for (const ComparedQuantity& q : c.moduli) text += line_of(q, false);
+  text += fmt::format(
+      "typical specimens and ratios (x) or differences (+) with {:.4g} % intervals; random effects "
+      "with one "
+      "spread between specimens, modified Hartung-Knapp\n",
+      100.0 * c.study.level);
+  for (const SpecimenRow& row : c.study.rows) {
+    if (!row.fit) text += fmt::format("! {} is not fitted: {}\n", row.name, row.reason);
+    if (row.fit && row.fit->adequacy && row.fit->adequacy->is_rejected()) {
+      text += fmt::format("! {}: {}\n", row.name, row.fit->adequacy->words);
+    }
+  }
+  return text;
+}
+
+std::string comparison_csv(const GroupComparison& c) {
+  std::string text = csv_line({"quantity", "SI_unit", "first", "first_lower", "first_upper",
+                               "first_specimens", "second", "second_lower", "second_upper",
+                               "second_specimens", "kind", "second_against_first", "lower", "upper",
+                               "level", "p_value", "p_value_holm", "left_out", "reason"});
+  const auto cell = [](double v) { return significant(v, kDigits); };
+  const auto add = [&](const ComparedQuantity& q, bool tested) {
+    const Json j = quantity_json(c, q);
+    std::vector<std::string> cells{q.parameter.name, j["unit"].get<std::string>()};
+    for (const auto& typical : q.typical) {
+      const auto natural = [&](double theta) { return cell(q.parameter.natural(theta)); };
+      for (std::string value :
+           typical
+               ? std::vector<std::string>{natural(typical->mean), natural(typical->interval.lower),
+                                          natural(typical->interval.upper),
+                                          std::to_string(typical->specimens)}
+               : std::vector<std::string>(4)) {
+        cells.push_back(std::move(value));
+      }
+    }
+    cells.push_back(is_ratio(q) ? "ratio" : "difference");
+    if (q.difference) {
+      const GroupDifference& d = *q.difference;
+      for (const double theta : {d.difference, d.interval.lower, d.interval.upper}) {
+        cells.push_back(cell(shown_difference(q, theta)));
+      }
+      cells.insert(cells.end(),
+                   {cell(c.study.level), cell(d.p_value), tested ? cell(q.p_holm) : std::string()});
+    } else {
+      cells.insert(cells.end(), {"", "", "", cell(c.study.level), "", ""});
+    }
+    cells.insert(cells.end(), {std::to_string(q.left_out[0] + q.left_out[1]), q.reason});
+    text += csv_line(cells);
+  };
+  for (const ComparedQuantity& q : c.parameters) add(q, true);
+  for (const ComparedQuantity& q : c.moduli) add(q, false);
+  return text;
+}
+
+}  // namespace tpm::fit

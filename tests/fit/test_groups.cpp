@@ -1,0 +1,167 @@
+// Two groups of specimens: the difference of their means, and the command that compares folders.
+#include <fmt/format.h>
+#include <sys/wait.h>
+
+#include <boost/math/distributions/students_t.hpp>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+
+#include "group_studies.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/fit/groups/group_comparison.hpp"
+#include "tpmkit/error.hpp"
+
+using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::files;
+using namespace tpm::fit;
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+std::vector<SpecimenEstimate> estimates(const std::vector<double>& values, double standard_error) {
+  std::vector<SpecimenEstimate> all;
+  for (const double v : values) all.push_back({"s", v, standard_error});
+  return all;
+}
+
+struct Said {
+  int code;
+  std::string text;
+};
+
+Said run_in(const test::TempFolder& folder, const std::string& arguments) {
+  const std::string out = folder / "said.log";
+  const int status = std::system(fmt::format("cd '{}' && '" TPM_TEST_PROGRAM "' {} > '{}' 2>&1",
+                                             folder.path().string(), arguments, out)
+                                     .c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1,
+          std::filesystem::is_empty(out) ? std::string() : read_file(out)};
+}
+
+/// Ramp and hold of a stiffness of 60 N/m times a factor with a branch of 45 N/m that relaxes in 2
+/// s.
+std::string recording(double factor, double depth_mm, std::uint64_t seed) {
+  Random random(seed);
+  std::string csv = "time [s],depth [mm],force [N]\n";
+  for (int i = 0; i < 400; ++i) {
+    const double t = 0.05 * i, ramp = std::min(t, 2.0);
+    const double v = depth_mm / 2.0;
+    const double force =
+        0.060 * v * ramp + 0.045 * v * 2.0 * (std::exp((ramp - t) / 2.0) - std::exp(-t / 2.0));
+    csv +=
+        fmt::format("{:.2f},{:.5f},{:.7f}\n", t, v * ramp, factor * force + 2e-4 * random.normal());
+  }
+  return csv;
+}
+
+void write_group(const test::TempFolder& folder, const std::string& name,
+                 const std::vector<double>& factors, double depth_mm, std::uint64_t seed) {
+  std::filesystem::create_directories(folder.path() / name);
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    write_file(folder.path() / name / fmt::format("liver{}.csv", i + 1),
+               recording(factors[i], depth_mm, seed + i));
+  }
+}
+
+}  // namespace
+
+TEST_CASE("With equal standard errors below the spread, two groups are Student's two-sample test",
+          "[groups]") {
+  const std::vector<double> a{0.1, 0.4, -0.2, 0.3}, b{0.9, 0.5, 1.1};
+  const GroupDifference d = group_difference(estimates(a, 0.02), estimates(b, 0.02));
+  const double mean_a = 0.15, mean_b = 2.5 / 3.0;
+  double squares = 0.0;
+  for (const double v : a) squares += (v - mean_a) * (v - mean_a);
+  for (const double v : b) squares += (v - mean_b) * (v - mean_b);
+  const double variance = squares / 5.0;
+  const double error = std::sqrt(variance * (1.0 / 4.0 + 1.0 / 3.0));
+  CHECK_THAT(d.difference, WithinRel(mean_b - mean_a, 1e-12));
+  CHECK_THAT(d.tau_squared, WithinRel(variance - 0.02 * 0.02, 1e-6));
+  CHECK_THAT(d.standard_error, WithinRel(error, 1e-6));
+  CHECK(d.degrees == 5.0);
+  const boost::math::students_t t(5.0);
+  CHECK_THAT(d.p_value, WithinRel(2.0 * cdf(complement(t, d.difference / error)), 1e-5));
+  CHECK_THAT(d.interval.upper, WithinRel(d.difference + quantile(t, 0.975) * error, 1e-6));
+}
+
+TEST_CASE("Groups that agree within their standard errors have no spread and no narrower interval",
+          "[groups]") {
+  const std::vector<SpecimenEstimate> a{{"a", 1.0, 0.1}, {"b", 1.01, 0.2}, {"c", 0.99, 0.3}};
+  const std::vector<SpecimenEstimate> b{{"d", 1.5, 0.1}, {"e", 1.5, 0.1}};
+  const GroupDifference d = group_difference(a, b);
+  CHECK(d.tau_squared == 0.0);
+  const double weights_a = 100.0 + 25.0 + 1.0 / 0.09, weights_b = 200.0;
+  CHECK_THAT(d.standard_error, WithinRel(std::sqrt(1.0 / weights_a + 1.0 / weights_b), 1e-12));
+  CHECK_THROWS_WITH(group_difference(a, std::span(b).first(1)), Contains("at least two"));
+}
+
+TEST_CASE("Groups that do not differ are found to differ in 5 % of studies at most", "[groups]") {
+  for (const auto& [first, second] : {std::pair{3, 3}, {5, 10}}) {
+    const test::GroupDesign design{first, second, 0.2, 0.2 / 3.0, 3.0, 0.3};
+    const test::GroupCounts counts = test::group_counts(design, 1000, 7);
+    CAPTURE(first, second, counts.held);
+    CHECK(counts.held >=
+          926);  // of 1,000 at 95 %: what a fair interval keeps but once in a thousand
+    CHECK(counts.held <= 975);
+  }
+}
+
+TEST_CASE("tpm fit A B --compare: the ratio of what differs, 1 for what does not", "[groups]") {
+  const test::TempFolder folder;
+  write_group(folder, "healthy", {0.9, 1.0, 1.1, 1.05}, 4.0, 1);
+  write_group(folder, "fibrotic", {1.8, 2.0, 2.2, 2.1}, 4.0, 11);
+  const Said said =
+      run_in(folder,
+             "fit healthy fibrotic --compare --law linear-1 --no-draw --punch-radius '2 mm' "
+             "--format json -o c.json");
+  INFO(said.text);
+  REQUIRE(said.code == 0);
+  const Json j = read_json(folder / "c.json");
+  for (const Json& p : j["parameters"]) {
+    CAPTURE(p.dump());
+    const bool time = p["name"] == "tau1";
+    CHECK_THAT(p["ratio"].get<double>(), WithinRel(time ? 1.0 : 2.0, time ? 0.01 : 0.02));
+    CHECK(p["ratio_interval"][0].get<double>() < (time ? 1.0 : 2.0));
+    CHECK(p["ratio_interval"][1].get<double>() > (time ? 1.0 : 2.0));
+    CHECK((p["p_value_holm"].get<double>() < 0.01) == !time);
+  }
+  REQUIRE(j["young_moduli"].size() == 3);  // E_inf, E1 and their sum
+  CHECK(j["young_moduli"][2]["name"] == "E_instantaneous");
+  CHECK_THAT(j["young_moduli"][2]["ratio"].get<double>(), WithinRel(2.0, 0.02));
+  CHECK_THAT(j["conclusion"].get<std::string>(),
+             Contains("fibrotic against healthy: a difference in k_inf, k1"));
+  const Said text = run_in(folder, "fit healthy fibrotic --compare --law linear-1 --folder out");
+  INFO(text.text);
+  CHECK(text.code == 0);
+  CHECK_THAT(text.text, Contains("a difference in k_inf, k1 (Holm, 95 %); none is shown in tau1"));
+  CHECK(std::filesystem::exists(folder.path() / "out" / "comparison.svg"));
+  CHECK_THAT(read_file(folder.path() / "out" / "specimens.csv"), Contains("fibrotic/liver4.csv"));
+}
+
+TEST_CASE("Groups that differ by their depths are refused, copies are no second specimen",
+          "[groups]") {
+  const test::TempFolder folder;
+  write_group(folder, "a", {0.9, 1.0, 1.1}, 4.0, 1);
+  write_group(folder, "b", {0.9, 1.0, 1.1}, 6.0, 11);
+  const Said depths = run_in(folder, "fit a b --compare --law linear-1 --no-draw");
+  CHECK(depths.code == 3);
+  CHECK_THAT(depths.text, Contains("depth and group cannot be told apart"));
+  std::filesystem::copy_file(folder.path() / "a" / "liver1.csv",
+                             folder.path() / "a" / "liver9.csv");
+  for (const char* command :
+       {"fit a --law linear-1 --no-draw", "fit a b --compare --law linear-1 --no-draw"}) {
+    const Said twice = run_in(folder, command);
+    CAPTURE(command, twice.text);
+    CHECK(twice.code == 3);
+  }
+  CHECK_THAT(run_in(folder, "fit a --law linear-1 --no-draw").text,
+             Contains("the same bytes as 'a/liver1.csv'"));
+  CHECK_THAT(run_in(folder, "fit a b").text, Contains("--compare"));
+  CHECK_THAT(run_in(folder, "fit a --compare").text, Contains("two folders of recordings"));
+}
