@@ -116,6 +116,8 @@ Formulations inertial_formulations() {
                           .masses = true,
                           .several_contacts = true,
                           .tools = true,
+                          .own_protocols = true,
+                          .dead_loads = true,
                           .planned = true}),
        180,
        {"damping_ratio", "density_kg_per_m3"}});
