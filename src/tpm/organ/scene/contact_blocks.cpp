@@ -196,6 +196,11 @@ Protocol protocol_of_scene(const std::optional<Protocol>& common,
     }
     end_s = std::max(end_s, contact.protocol->knots().back().time_s);
   }
+  const auto is_own = [](const SceneContact& c) { return c.protocol.has_value(); };
+  if (first.peak() == 0.0 && std::any_of(contacts.begin() + 1, contacts.end(), is_own)) {
+    throw bad_input(place.key("0").where, "the first contact stands still",
+                    "one that is driven first");
+  }
   std::vector<Knot> knots(first.knots().begin(), first.knots().end());
   if (end_s > knots.back().time_s) knots.push_back({end_s, knots.back().value});
   return {first.drive(), std::move(knots), first.name()};
