@@ -12,7 +12,7 @@ TPM = config.get("tpm", "tpm")
 
 rule merge:
     input:
-        expand(OUTPUT + ".shard-{task}-of-{count}.done", task=range(1, SHARDS + 1), count=[SHARDS]),
+        expand(OUTPUT + ".shard-{task}-of-{shards}.done", task=range(1, SHARDS + 1), shards=[SHARDS]),
         sweep=SWEEP,
     output:
         OUTPUT,
@@ -26,9 +26,9 @@ rule shard:
     input:
         SWEEP,
     output:
-        touch(OUTPUT + ".shard-{task}-of-{count}.done"),
+        touch(OUTPUT + ".shard-{task}-of-{shards}.done"),
     threads: 1
     resources:
         mem_mb=4000,
     shell:
-        "{TPM} sweep {input:q} -o " + OUTPUT + " --workers {threads} --shard {wildcards.task}/{wildcards.count}"
+        "{TPM} sweep {input:q} -o " + OUTPUT + " --workers {threads} --shard {wildcards.task}/{wildcards.shards}"

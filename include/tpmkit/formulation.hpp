@@ -19,6 +19,8 @@ struct Capabilities {
   bool masses = false;            ///< spheres may have mass
   bool several_contacts = false;  ///< patches, or several driven spheres
   bool tools = false;             ///< rigid balls and punches
+  bool own_protocols = false;     ///< contacts with protocols of their own
+  bool dead_loads = false;        ///< gravity and pressure before and beside what is imposed
   bool servo = false;             ///< steps a contact at a fixed rate in bounded time
   bool derivatives = false;       ///< exact derivatives by the parameters
   bool course = true;             ///< has a history; otherwise each instant is independent
@@ -39,7 +41,7 @@ struct CapabilityEntry {
   std::string_view text;
   std::string_view words;
 };
-inline constexpr std::array<CapabilityEntry, 19> kCapabilities{{
+inline constexpr std::array<CapabilityEntry, 21> kCapabilities{{
     {&Capabilities::network, "network", "runs on any network, not only on the star"},
     {&Capabilities::depth, "depth", "is driven by a depth"},
     {&Capabilities::load, "load", "is driven by a load"},
@@ -48,6 +50,8 @@ inline constexpr std::array<CapabilityEntry, 19> kCapabilities{{
     {&Capabilities::masses, "masses", "gives spheres mass"},
     {&Capabilities::several_contacts, "several_contacts", "drives several spheres"},
     {&Capabilities::tools, "tools", "lets tools touch and leave"},
+    {&Capabilities::own_protocols, "own_protocols", "drives contacts by protocols of their own"},
+    {&Capabilities::dead_loads, "dead_loads", "starts under gravity and pressure"},
     {&Capabilities::servo, "servo", "steps a contact at a servo's rate"},
     {&Capabilities::derivatives, "derivatives", "has derivatives by the parameters"},
     {&Capabilities::course, "course", "follows the course of time"},

@@ -652,6 +652,16 @@ std::vector<ErrorCase> scene_cases() {
       {type, "far side without contact", check,
        scene(
            R"({"organ": {"kind": "block", "cells": [2, 2, 2]}, "anchors": [{"kind": "far_side"}]})")},
+      {type, "two planes to slide on", check, liver(R"("anchors": [{"kind": "far_side"},
+         {"kind": "half_space", "point": ["0 mm", "0 mm", "0 mm"], "normal": [0, -1, 0], "slides": true},
+         {"kind": "half_space", "point": ["0 mm", "0 mm", "0 mm"], "normal": [-1, 0, 0], "slides": true}])")},
+      {type, "modulus of the tissue of a shell", check, liver(R"("material": {"E": "3 kPa"})")},
+      {type, "Poisson ratio without a modulus", check, liver(R"("material": {"nu": 0.3})")},
+      {type, "Poisson ratio of another tissue", check,
+       scene(
+           R"({"organ": {"kind": "block", "cells": [6, 6, 6]}, "material": {"E": "3 kPa", "nu": 0.49}})")},
+      {type, "modulus of the tissue beside the law paper", check,
+       liver(R"("bonds": {"spacing_law": "paper"}, "material": {"E": "3 kPa"})")},
       {type, "one radial bond a sphere", check, liver(R"("bonds": {"diagonals": false})")},
       {type, "unguided star", check, scene(R"({"organ": {"kind": "star"}, "sliders": []})")},
       {type, "scene and options", check + " --count 424", liver(R"("title": "t")")},

@@ -23,6 +23,13 @@ ExperimentScene plannable(ExperimentScene scene) {
   if (scene.formulation.mass_spring) {
     throw bad_input("scene", "runs the mass-spring model", "the tissue: without a comparison");
   }
+  if (scene.has_own_protocols()) {
+    throw bad_input("scene", "contacts have protocols of their own, which no plan compares",
+                    "one protocol, or tpm simulate");
+  }
+  if (scene.dead_load_N.size() > 0) {
+    throw bad_input("scene", "has loads, which no plan compares", "none, or tpm simulate");
+  }
   return scene;
 }
 

@@ -279,6 +279,14 @@ class OrganCell final : public CellModel {
     key = structure.dump();
     ExperimentScene scene = base_of(structure, key, texts);
     const DocumentPlace place{"scene"};
+    if (changed.value("material", Json::object()).contains("E")) {
+      throw bad_input(place.key("material").key("E").where, "of a scene that is swept",
+                      "the moduli of its bonds, which tpm network build prints");
+    }
+    if (scene.has_own_protocols()) {
+      throw bad_input(place.key("contacts").where, "have protocols of their own in a sweep",
+                      "the scene's protocol alone");
+    }
     MaterialBlock material =
         parse_material(changed.value("material", Json::object()), scene.tissue.materials.lateral(),
                        scene.tissue.network.organ, place.key("material"));

@@ -12,19 +12,20 @@ namespace tpm::organ {
 
 DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ,
                              const Constraints& constraints, std::vector<Probe> driven,
-                             std::vector<PressedTool> tools) {
+                             std::vector<PressedTool> tools, Loading loading) {
   const std::size_t spheres = organ.size();
   Positions rest(3, organ.position.cols() + static_cast<Eigen::Index>(tools.size()));
   rest.leftCols(organ.position.cols()) = organ.position;
   Constraints with_tools = constraints.extended(tools.size());
   std::vector<ToolContact> contacts;
   for (std::size_t i = 0; i < tools.size(); ++i) {
-    const auto& [tool, share, stiffness] = tools[i];
+    const auto& [tool, share, stiffness, group] = tools[i];
     const std::size_t column = spheres + i;
     rest.col(static_cast<Eigen::Index>(column)) = tool.position;
     if (share > 0.0) {
       with_tools.slide(column, tool.direction);
-      driven.push_back({column, tool.direction, share});
+      (group == 0 ? driven : loading.beside[group - 1].probes)
+          .push_back({column, tool.direction, share});
     } else {
       with_tools.fix(column);
     }
@@ -32,8 +33,49 @@ DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ,
         possible_contacts(tool, static_cast<std::uint32_t>(column), organ, stiffness);
     contacts.insert(contacts.end(), possible.begin(), possible.end());
   }
+  if (loading.dead_N.size() > 0) {
+    for (Eigen::Matrix3Xd* of : {&loading.dead_N, &loading.unloaded}) {
+      of->conservativeResize(3, rest.cols());
+    }
+    const auto more = static_cast<Eigen::Index>(tools.size());
+    loading.dead_N.rightCols(more).setZero();
+    loading.unloaded.rightCols(more) = rest.rightCols(more);
+  }
   return {bonds.with_tools(tools.size(), contacts), std::move(rest), std::move(with_tools),
-          Probes(std::move(driven)), std::move(tools)};
+          Probes(std::move(driven), std::move(loading)), std::move(tools)};
+}
+
+Positions loaded_positions(const BondSystem& bonds, const Positions& rest,
+                           const Constraints& constraints, const Eigen::Matrix3Xd& force_N) {
+  constexpr double kBalanced = 1e-12;  // of the sum of the forces
+  constexpr double kLeastPart = 1.0 / 1024.0;
+  const double tolerance_N = kBalanced * force_N.colwise().norm().sum();
+  if (!(tolerance_N > 0.0)) return rest;
+  Equilibrium equilibrium(bonds, constraints, {.solver = StiffnessSolver::automatic});
+  const ViscousState relaxed{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 1.0};
+  Positions position = rest;
+  double done = 0.0, part = 1.0;
+  bool unstable = false;
+  while (done < 1.0) {
+    const double aim = std::min(1.0, done + part);
+    Positions next = position;
+    const EquilibriumSearch found = equilibrium.find(next, relaxed, aim * force_N, tolerance_N);
+    if (found.converged && found.stable) {
+      position = std::move(next);
+      done = aim;
+      part *= 2.0;
+      continue;
+    }
+    unstable = !found.stable;
+    part *= 0.5;
+    if (part >= kLeastPart) continue;
+    throw Error(
+        ExitCode::numerical, unstable ? ErrorCause::buckled : ErrorCause::unspecified, "loads",
+        fmt::format("at {} % of the loads that stay the tissue {}", significant(100.0 * aim, 3),
+                    unstable ? "buckles" : "finds no equilibrium"),
+        "weaker loads, a stiffer tissue or more anchors");
+  }
+  return position;
 }
 
 double usual_contact_stiffness_N_per_m(const BondSystem& bonds) {

@@ -12,6 +12,7 @@ struct PressedTool {
   Tool tool;
   double share = 1.0;              ///< as Probe::share; 0: it stands still
   double stiffness_N_per_m = 0.0;  ///< of its contacts, > 0
+  std::size_t group = 0;           ///< of probes: 0 the first, else one of Loading::beside
 };
 
 /// A network with all that touches it: what a run needs.
@@ -29,12 +30,22 @@ struct DrivenNetwork {
 };
 
 /// @param bonds, constraints of the organ
+/// @param organ in equilibrium with the dead loads of `loading`
 /// @param driven spheres that are driven themselves
+/// @param loading of the spheres alone: tools are added to their groups
 /// Throws Error(bad_input) if nothing is driven.
 [[nodiscard]] DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ,
                                            const Constraints& constraints,
                                            std::vector<Probe> driven,
-                                           std::vector<PressedTool> tools);
+                                           std::vector<PressedTool> tools, Loading loading = {});
+
+/// Where the spheres of a network are in equilibrium with forces that do not change, everything
+/// relaxed. The forces are raised in parts where they cannot be applied together.
+/// @param force_N one column per sphere
+/// Throws Error(numerical) if the network buckles or its forces cannot be balanced.
+[[nodiscard]] Positions loaded_positions(const BondSystem& bonds, const Positions& rest,
+                                         const Constraints& constraints,
+                                         const Eigen::Matrix3Xd& force_N);
 
 /// Stiff enough for a force to be known to about 1e-4, and not so stiff that rounding shows: 1e4
 /// times the stiffest bond, N/m.

@@ -44,8 +44,9 @@ Inertia inertia_of(const BondSystem& bonds, const Eigen::VectorXd& mass, const L
 }
 
 /// The knots up to the last time asked for, where the last value is constant for ever.
-std::vector<Knot> finite_knots(const Protocol& protocol, std::span<const double> times_s) {
-  std::vector<Knot> knots(protocol.knots().begin(), protocol.knots().end());
+std::vector<Knot> finite_knots(const Protocol& protocol, const ImposedPath& path,
+                               std::span<const double> times_s) {
+  std::vector<Knot> knots(path.knots().begin(), path.knots().end());
   double latest = knots.back().time_s;
   for (const double t : times_s) {
     if (std::isinf(t)) {
@@ -85,12 +86,15 @@ class MotionRun {
         observer_(observer),
         times_s_(times_s),
         order_(rising_order(times_s)),
-        knots_(finite_knots(protocol, times_s)),
-        tissue_(bonds, rest, constraints, probes, protocol.drive()),
+        tissue_(bonds, rest, constraints, probes, protocol),
+        knots_(finite_knots(protocol, tissue_.path(), times_s)),
         equation_(tissue_, rest, inertia) {
     TissueState start = tissue_.at_rest(knots_.front().time_s);
     const double response_scale = std::abs(tissue_.linear_response(start, protocol.peak()));
-    const double depth = tissue_.depth_driven() ? protocol.peak() : response_scale;
+    double depth = tissue_.depth_driven() ? protocol.peak() : response_scale;
+    for (std::size_t g = 1; g < tissue_.groups(); ++g) {
+      if (tissue_.depth_driven(g)) depth = std::max(depth, tissue_.path().peak(g));
+    }
     if (!from && protocol.equilibrium_at_start() && knots_.front().value != 0.0) {
       preload(bonds, rest, constraints, probes, start);
     }
@@ -158,10 +162,11 @@ class MotionRun {
 
   void cross(const Knot& from, const Knot& to) {
     const double speed_before = equation_.imposed_speed();
+    const Eigen::Matrix3Xd velocity_before = equation_.imposed_velocity();
     equation_.set_piece(from, to);
     if (!started_) begin(from.time_s);
     const double begin_s = std::max(from.time_s, begin_s_);
-    if (begin_s == from.time_s) blow(from.time_s, speed_before);
+    if (begin_s == from.time_s) blow(from.time_s, speed_before, velocity_before);
     integration_->restart(begin_s, to.time_s);
     while (next_ < order_.size() && times_s_[order_[next_]] < to.time_s) {
       const double time = times_s_[order_[next_]];
@@ -198,11 +203,13 @@ class MotionRun {
     stored_at_start_ = equation_.stored_J(time_s, integration_->state());
   }
 
-  void blow(double time_s, double speed_before) {
+  void blow(double time_s, double speed_before, const Eigen::Matrix3Xd& velocity_before) {
     const double speed = equation_.imposed_speed();
-    if (speed == speed_before) return;
+    const Eigen::Matrix3Xd velocity = equation_.imposed_velocity();
+    if (velocity == velocity_before) return;
     const double impulse = equation_.driven_mass_kg() * (speed - speed_before);
-    blow_work_ += 0.5 * impulse * (speed + speed_before);
+    blow_work_ += 0.5 * (velocity.colwise().squaredNorm() - velocity_before.colwise().squaredNorm())
+                            .dot(equation_.inertia().mass_kg.transpose());
     // Spheres that the tool touches are taken along as it gains speed, so that nothing is lost.
     const ToolImpact impact = integration_->strike(time_s);
     blow_work_ += impact.work_J - impact.lost_J;
@@ -219,9 +226,14 @@ class MotionRun {
   }
 
   void show(double time_s, double response) {
+    std::vector<double> beside;
+    for (std::size_t g = 1; g < tissue_.groups(); ++g) {
+      beside.push_back(equation_.response(time_s, integration_->state(), g));
+    }
     const TissueMotion& now = equation_.unpack(time_s, integration_->state());
-    observer_({time_s, value_at(protocol_, time_s), response, now.position, now.viscous, {}},
-              equation_.contact_pushes_N(time_s, integration_->state()));
+    observer_(
+        {time_s, value_at(protocol_, time_s), response, now.position, now.viscous, {}, beside},
+        equation_.contact_pushes_N(time_s, integration_->state()));
   }
 
   void finish(double end) {
@@ -252,8 +264,8 @@ class MotionRun {
   std::span<const double> times_s_;
   std::vector<std::size_t> order_;
   std::size_t next_ = 0;  ///< the first of order_ not answered yet
-  std::vector<Knot> knots_;
   DrivenTissue tissue_;
+  std::vector<Knot> knots_;  ///< of the path
   InertialEquation equation_;
   std::optional<InertialIntegration> integration_;
   bool started_ = false;
@@ -281,13 +293,15 @@ Inertial::Inertial(const BondSystem& bonds, Positions rest, Constraints constrai
     throw bad_input("mass", fmt::format("of sphere {} is not above 0", i + 1),
                     "one mass above 0 for every sphere");
   }
-  lowest_ = lowest_mode(bonds_, rest_, constraints_, mass_kg_);
+  const Positions& unloaded = probes_.loading().unloaded;
+  lowest_ = lowest_mode(bonds_, unloaded.size() > 0 ? unloaded : rest_, constraints_, mass_kg_);
 }
 
 InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s,
                           const InertialObserver& observer, const InertialState* from) const {
   require_times_within(protocol, times_s);
   require_no_jump_of_depth(protocol);
+  for (const DriveGroup& group : probes_.loading().beside) require_no_jump_of_depth(group.protocol);
   if (from) require_later(times_s, from->time_s);
   return MotionRun(bonds_, rest_, constraints_, probes_,
                    inertia_of(bonds_, mass_kg_, lowest_, options_), options_,

@@ -87,6 +87,7 @@ double InertialEquation::driven_sphere_mass_kg() const {
 
 void InertialEquation::set_piece(const Knot& from, const Knot& to) {
   from_ = from;
+  to_rise_ = to.value - from.value;
   slope_ = (to.value - from.value) / (to.time_s - from.time_s);
 }
 
@@ -95,7 +96,13 @@ double InertialEquation::imposed(double time_s) const {
 }
 
 double InertialEquation::imposed_speed() const {
-  return tissue_.depth_driven() ? slope_ : 0.0;
+  return tissue_.depth_driven() ? slope_ * tissue_.path().slope(0, within_piece()) : 0.0;
+}
+
+Eigen::Matrix3Xd InertialEquation::imposed_velocity() const {
+  Eigen::Matrix3Xd velocity = Eigen::Matrix3Xd::Zero(3, rest_.cols());
+  tissue_.add_imposed_velocity(within_piece(), slope_, velocity);
+  return velocity;
 }
 
 InertialEquation::Vector InertialEquation::pack(const Positions& position,
@@ -117,7 +124,7 @@ const TissueMotion& InertialEquation::unpack(double time_s, const ConstVector& s
   motion_.position = rest_ + ConstSpheres(state.data(), 3, n);
   motion_.velocity = ConstSpheres(state.data() + coordinates(), 3, n);
   tissue_.impose(motion_.position, imposed(time_s));
-  tissue_.add_imposed_velocity(imposed_speed(), motion_.velocity);
+  tissue_.add_imposed_velocity(within_piece(), slope_, motion_.velocity);
   for (const std::size_t bond : relaxing_) {
     const auto row = static_cast<Eigen::Index>(bond);
     Eigen::Index j = 0;
@@ -240,14 +247,22 @@ void InertialEquation::rate(double time_s, const ConstVector& state, Eigen::Ref<
   }
 }
 
+double InertialEquation::drag_N(std::size_t group) const {
+  if (!tissue_.depth_driven(group)) return 0.0;
+  const Eigen::Matrix3Xd drag =
+      imposed_velocity() * (drag_per_s_.cwiseProduct(tissue_mass_kg_)).asDiagonal();
+  return -tissue_.response(motion_.position, drag, group);
+}
+
 double InertialEquation::drag_on_driven_sphere_N() const {
   return inertia_.drag_per_s * driven_sphere_mass_kg() * imposed_speed();
 }
 
-double InertialEquation::response(double time_s, const ConstVector& state) {
+double InertialEquation::response(double time_s, const ConstVector& state, std::size_t group) {
   const TissueMotion& now = unpack(time_s, state);
   forces(time_s, force_);
-  return tissue_.response(now.position, force_) + drag_on_driven_sphere_N();
+  return tissue_.response(now.position, force_, group) +
+         (group == 0 ? drag_on_driven_sphere_N() : drag_N(group));
 }
 
 void InertialEquation::gaps(double time_s, const ConstVector& state, Eigen::Ref<Vector> gap) {
@@ -304,7 +319,7 @@ ToolImpact InertialEquation::strike(double time_s, Eigen::Ref<Vector> state) {
   tissue_.constraints().project(free_velocity);
   ToolImpact impact;
   impact.on_tissue_N_s = tissue_.push_on_tissue(on_tools);
-  impact.work_J = tissue_.depth_driven() ? impact.on_tissue_N_s * imposed_speed() : 0.0;
+  impact.work_J = tissue_.power_on_tissue(on_tools, within_piece(), slope_);
   impact.lost_J = impact.work_J + before_J - kinetic_J(time_s, state);
   return impact;
 }
@@ -312,8 +327,12 @@ ToolImpact InertialEquation::strike(double time_s, Eigen::Ref<Vector> state) {
 Eigen::Vector4d InertialEquation::powers_W(double time_s, const ConstVector& state) {
   const double answer = response(time_s, state);  // unpacks
   const TissueMotion& now = motion_;
-  const double speed = tissue_.depth_of(now.velocity);
-  const double push = tissue_.depth_driven() ? answer : imposed(time_s);
+  double work = 0.0;
+  for (std::size_t g = 0; g < tissue_.groups(); ++g) {
+    const double of_group = g == 0 ? answer : tissue_.response(now.position, force_, g) + drag_N(g);
+    work += tissue_.depth_of(now.velocity, g) *
+            (tissue_.depth_driven(g) ? of_group : tissue_.path().value(g, imposed(time_s)));
+  }
   force_.setZero();
   add_dashpot_forces(now.position, now.velocity, force_);
   const double dashpots = -force_.cwiseProduct(now.velocity).sum();
@@ -329,7 +348,7 @@ Eigen::Vector4d InertialEquation::powers_W(double time_s, const ConstVector& sta
                                   : -tissue_.bonds().contacts()[i].stiffness_N_per_m *
                                         measured.now_m * measured.rate_m_s;
   }
-  return {push * speed, tissue_.bonds().dissipation_W(now.position, now.viscous), dashpots + drag,
+  return {work, tissue_.bonds().dissipation_W(now.position, now.viscous), dashpots + drag,
           contacts};
 }
 
@@ -340,7 +359,8 @@ double InertialEquation::kinetic_J(double time_s, const ConstVector& state) {
 
 double InertialEquation::stored_J(double time_s, const ConstVector& state) {
   const TissueMotion& now = unpack(time_s, state);
-  return tissue_.bonds().stored_energy_J(now.position, now.viscous);
+  return tissue_.bonds().stored_energy_J(now.position, now.viscous) +
+         tissue_.dead_energy_J(now.position);
 }
 
 bool InertialEquation::factorise(double time_s, const ConstVector& state, double gamma) {

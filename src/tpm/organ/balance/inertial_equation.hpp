@@ -56,8 +56,10 @@ class InertialEquation {
 
   /// The piece of the protocol that holds from now on, linear in time.
   void set_piece(const Knot& from, const Knot& to);
-  /// Rate of an imposed depth, m/s; 0 under a load.
+  /// Rate of the depth imposed on the first group, m/s; 0 under a load.
   [[nodiscard]] double imposed_speed() const;
+  /// Velocities that imposed depths give what they drive, m/s; 0 elsewhere.
+  [[nodiscard]] Eigen::Matrix3Xd imposed_velocity() const;
 
   [[nodiscard]] Vector pack(const Positions& position, const Eigen::MatrixXd& viscous) const;
   [[nodiscard]] const TissueMotion& unpack(double time_s, const ConstVector& state);
@@ -67,8 +69,8 @@ class InertialEquation {
   /// d rate / d state, every entry that may differ from 0 and the whole diagonal stored.
   [[nodiscard]] Sparse jacobian(double time_s, const ConstVector& state);
 
-  /// Contact force, N, or depth, m.
-  [[nodiscard]] double response(double time_s, const ConstVector& state);
+  /// Contact force, N, or depth, m, of a group.
+  [[nodiscard]] double response(double time_s, const ConstVector& state, std::size_t group = 0);
   /// The part of it that drags the driven sphere itself, N.
   [[nodiscard]] double drag_on_driven_sphere_N() const;
 
@@ -96,6 +98,10 @@ class InertialEquation {
 
  private:
   [[nodiscard]] double imposed(double time_s) const;
+  /// Somewhere within the piece, as a coordinate of the path.
+  [[nodiscard]] double within_piece() const { return from_.value + 0.5 * to_rise_; }
+  /// The part of a group's response in the motion unpacked that drags what it drives, N.
+  [[nodiscard]] double drag_N(std::size_t group) const;
   /// All forces on the spheres but the drag, load included.
   void forces(double time_s, Eigen::Matrix3Xd& force);
   void add_dashpot_forces(const Positions& position, const Eigen::Matrix3Xd& velocity,
@@ -134,7 +140,7 @@ class InertialEquation {
   Vector drag_per_s_;             ///< of each column
   Vector contact_dashpot_N_s_m_;  ///< of each contact
   Knot from_{0.0, 0.0};
-  double slope_ = 0.0;
+  double slope_ = 0.0, to_rise_ = 0.0;  ///< of the path's coordinate: rate, and over the piece
 
   TissueMotion motion_;
   Eigen::Matrix3Xd force_;

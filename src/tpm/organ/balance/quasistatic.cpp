@@ -38,7 +38,7 @@ class Run {
         options_(options),
         times_s_(times_s),
         observer_(observer),
-        tissue_(bonds, rest, constraints, probes, protocol.drive(), options.equilibrium),
+        tissue_(bonds, rest, constraints, probes, protocol, options.equilibrium),
         stages_(tissue_, options.stages, !options.step_s) {
     order_ = rising_order(times_s);
     const auto asked = static_cast<Eigen::Index>(times_s.size());
@@ -51,7 +51,7 @@ class Run {
 
   QuasiStaticRun go(const QuasiStaticState* begin) {
     begin ? start_from(*begin) : start();
-    const auto knots = protocol_.knots();
+    const auto knots = path().knots();
     for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
       Knot from = knots[k];
       const Knot& to = knots[k + 1];
@@ -79,9 +79,12 @@ class Run {
   }
 
  private:
-  [[nodiscard]] Error failed(double imposed, std::string_view what,
+  [[nodiscard]] const ImposedPath& path() const { return tissue_.path(); }
+
+  [[nodiscard]] Error failed(double at, std::string_view what,
                              ErrorCause cause = ErrorCause::unspecified) const {
     const bool depth = protocol_.drive() == Drive::displacement;
+    const double imposed = path().value(0, at);
     return Error(
         ExitCode::numerical, cause, "network",
         fmt::format("at t = {} s and {} of {} {} {}", significant(state_.time_s, 5),
@@ -104,7 +107,7 @@ class Run {
 
   /// How long the first piece takes in which the imposed value changes gradually, s.
   [[nodiscard]] double first_change_s() const {
-    const auto knots = protocol_.knots();
+    const auto knots = path().knots();
     for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
       const double length_s = knots[k + 1].time_s - knots[k].time_s;
       if (length_s > 0.0 && knots[k + 1].value != knots[k].value) return length_s;
@@ -120,7 +123,7 @@ class Run {
   }
 
   void start() {
-    const Knot& first = protocol_.knots().front();
+    const Knot& first = path().knots().front();
     set_scales(first.time_s);
     if (protocol_.equilibrium_at_start()) {
       move_to(first.value, true);
@@ -137,9 +140,9 @@ class Run {
     state_.viscous = begin.viscous;
     state_.mean = tissue_.bonds().mean_viscous(begin.viscous);
     tissue_.bonds().followed(state_.position, state_.followed);
-    state_.imposed = begin.imposed;
+    state_.imposed = path().single() ? begin.imposed : path().coordinate_at(begin.time_s);
     if (begin.energy) energy_ = *begin.energy;
-    follow(begin.imposed, false);
+    follow(state_.imposed, false);
   }
 
   void jump(double value) { move_to(value, false); }
@@ -149,14 +152,18 @@ class Run {
     return *response_;
   }
 
-  [[nodiscard]] double stored_J() const {
-    return tissue_.bonds().stored_energy_J(state_.position, state_.viscous);
+  [[nodiscard]] double stored_J() const { return stored_J(state_); }
+
+  template <class State>
+  [[nodiscard]] double stored_J(const State& state) const {
+    return tissue_.bonds().stored_energy_J(state.position, state.viscous) +
+           tissue_.dead_energy_J(state.position);
   }
 
   /// The account of the energy where the tissue is in a state.
   template <class State>
   [[nodiscard]] QuasiStaticEnergy energy_of(const State& state, QuasiStaticEnergy spent) const {
-    return with_stored(spent, tissue_.bonds().stored_energy_J(state.position, state.viscous));
+    return with_stored(spent, stored_J(state));
   }
   [[nodiscard]] static QuasiStaticEnergy with_stored(QuasiStaticEnergy spent, double stored_J) {
     spent.stored_J = stored_J;
@@ -174,10 +181,12 @@ class Run {
   /// Waits for ever; what the springs lose then and the probe adds turns into heat.
   void settle() {
     const double before_J = stored_J();
-    const double response = response_now();
+    const auto loads_J = [&] {
+      return tissue_.loads_J(state_.position, state_.imposed, response_now());
+    };
+    const double loads_before_J = loads_J();
     follow(state_.imposed, true);
-    const double work_J =
-        tissue_.depth_driven() ? 0.0 : state_.imposed * (response_now() - response);
+    const double work_J = loads_J() - loads_before_J;
     energy_.work_J += work_J;
     energy_.dissipated_J += work_J + before_J - stored_J();
   }
@@ -212,6 +221,7 @@ class Run {
     StepGrowth growth(options_.stages + 1);
     double h = first_step_s(length);
     if (rate == 0.0 && from.value == 0.0 && is_relaxed()) return stand_still(to.time_s);
+    if (!path().single()) stages_.forget_motion();  // the rate means another motion now
     while (state_.time_s < to.time_s) {
       const double left = to.time_s - state_.time_s;
       const bool last = h >= left * (1.0 - 1e-12);
@@ -279,7 +289,10 @@ class Run {
     throw failed(state_.imposed, "contacts with a tool open and close without end");
   }
 
-  [[nodiscard]] bool is_relaxed() const { return state_.viscous.isZero(0.0); }
+  [[nodiscard]] bool is_relaxed() const {
+    if (!tissue_.preloaded()) return state_.viscous.isZero(0.0);
+    return state_.viscous == state_.followed.replicate(1, state_.viscous.cols());
+  }
 
   void stand_still(double until_s) {
     while (next_ < order_.size() && times_s_[order_[next_]] < until_s) {
@@ -351,8 +364,9 @@ class Run {
         stages_.states_within(state_, fractions, h, rate, options_.energies);
     for (std::size_t i = 0; i < fractions.size(); ++i) {
       if (fractions[i] == 0.0) states[i].response = response_now();
-      const double response = states[i].response;
-      show(states[i], energy ? with(energy->until(fractions[i], response)) : energy_);
+      const double loads_J =
+          tissue_.loads_J(states[i].position, states[i].imposed, states[i].response);
+      show(states[i], energy ? with(energy->until(fractions[i], loads_J)) : energy_);
     }
   }
 
@@ -398,6 +412,12 @@ class Run {
   /// Puts the response of a state, and shows it at the time that was asked for.
   void show(QuasiStaticState& state, const QuasiStaticEnergy& spent) {
     state.time_s = times_s_[order_[next_]];
+    if (!path().single()) {
+      state.beside = tissue_.beside_responses(
+          state.position, {tissue_.bonds().mean_viscous(state.viscous), 0.0, state_.closed},
+          state.imposed);
+      state.imposed = path().value(0, state.imposed);
+    }
     put(state.response);
     if (options_.energies) {
       state.energy =
@@ -478,6 +498,11 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Constraints co
 QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double> times_s,
                                 const QuasiStaticObserver& observer,
                                 const QuasiStaticState* from) const {
+  const Loading& loading = probes_.loading();
+  if (!options_.directions.empty() && (!loading.beside.empty() || loading.dead_N.size() > 0)) {
+    throw bad_input("directions", "of a run with several protocols or with loads that stay",
+                    "one protocol and no other load");
+  }
   if (from && !options_.directions.empty()) {
     throw bad_input("directions", "a run that goes on from a state",
                     "a run from rest: the derivatives of the state are not known");

@@ -5,43 +5,11 @@
 #include <vector>
 
 #include "tpm/organ/balance/equilibrium.hpp"
+#include "tpm/organ/balance/probes.hpp"
 #include "tpm/organ/linear/lanes.hpp"
 #include "tpmkit/protocol.hpp"
 
 namespace tpm::organ {
-
-/// A sphere or tool that the protocol drives, and where to.
-struct Probe {
-  std::size_t sphere = 0;                                ///< column of positions
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector into the tissue
-  double share = 1.0;                                    ///< of what is imposed; see Probes
-};
-
-/// What a protocol drives, one or several at once. An imposed depth D moves each by share D, and
-/// the response is the sum of share times contact force. A load F pushes each with share F / (sum
-/// of shares), and the response is the mean depth, weighted by the shares. Either way what is
-/// imposed and the response are conjugate: their product is the work.
-class Probes {
- public:
-  // NOLINTNEXTLINE(google-explicit-constructor): one is the usual case
-  Probes(Probe probe) : all_{std::move(probe)} {}
-  /// Throws Error(bad_input) if there is none.
-  explicit Probes(std::vector<Probe> all);
-
-  [[nodiscard]] auto begin() const { return all_.begin(); }
-  [[nodiscard]] auto end() const { return all_.end(); }
-  [[nodiscard]] const Probe& front() const { return all_.front(); }
-  [[nodiscard]] std::size_t size() const { return all_.size(); }
-
- private:
-  std::vector<Probe> all_;
-};
-
-/// Throws Error(bad_input) unless the probe's sphere exists and is free to move along its
-/// direction, and its share is above 0.
-void require_valid(const Probe& probe, const Constraints& constraints);
-/// The same for each, and none may be driven twice.
-void require_valid(const Probes& probes, const Constraints& constraints);
 
 /// Throws Error(bad_input) if a time is asked for before the one that a run begins at.
 void require_later(std::span<const double> times_s, double from_s);
@@ -109,6 +77,7 @@ struct QuasiStaticState {
   Positions position;                       ///< of all spheres, m
   Eigen::MatrixXd viscous;                  ///< m_j by (bond, branch), m; see BondSystem
   std::optional<QuasiStaticEnergy> energy;  ///< if asked for; until here
+  std::vector<double> beside = {};          ///< responses of the other groups (Loading)
 };
 
 /// Gets the state at every asked time, in the order of time. What it throws ends the run.

@@ -66,6 +66,21 @@ LaneVector StageBalance::responses(const Within& states) {
   return plain + tissue_.adjoint_sign() * (force_ * lane_field_.transpose());
 }
 
+LaneVector StageBalance::powers_per_rate(const Within& states, const LaneVector& response) const {
+  if (tissue_.path().single()) return tissue_.depth_driven() ? response : LaneVector(-response);
+  LaneMatrix force = LaneMatrix::Zero(kLanes, coordinates_);
+  tissue_.add_load(states.imposed, force);
+  bonds_.add_forces(states.position, states.mean_viscous, force);
+  LaneVector sum = LaneVector::Zero();
+  for (std::size_t g = 0; g < tissue_.groups(); ++g) {
+    const LaneVector slope =
+        states.imposed.unaryExpr([&](double at) { return tissue_.path().slope(g, at); });
+    const LaneVector of_group = g == 0 ? response : tissue_.response(states.position, force, g);
+    sum += (tissue_.depth_driven(g) ? 1.0 : -1.0) * slope.cwiseProduct(of_group);
+  }
+  return sum;
+}
+
 LaneVector StageBalance::responses_within(const TissueState& state,
                                           std::span<const double> fractions, double h,
                                           double rate) {
@@ -99,9 +114,10 @@ std::vector<QuasiStaticState> StageBalance::states_within(const TissueState& sta
     at.viscous = state.viscous;
     put_viscous(viscous, at.viscous);
     if (!energies) continue;
-    at.energy.emplace().stored_J = in_lanes
-                                       ? stored_J[row] + spread_J(viscous)
-                                       : tissue_.bonds().stored_energy_J(at.position, at.viscous);
+    at.energy.emplace().stored_J =
+        tissue_.dead_energy_J(at.position) +
+        (in_lanes ? stored_J[row] + spread_J(viscous)
+                  : tissue_.bonds().stored_energy_J(at.position, at.viscous));
   }
   return states;
 }
@@ -169,33 +185,40 @@ StepEnergy StageBalance::energy_of_step(const TissueState& state, double h, doub
   StepEnergy energy;
   energy.h_s_ = h;
   energy.rate_ = rate;
-  energy.imposed_ = state.imposed;
-  energy.by_load_ = !tissue_.depth_driven();
   for (const double side : {-1.0, 1.0}) {
     std::array<double, kLanes> fractions{};
     for (std::size_t i = 0; i < kLanes; ++i) {
       fractions[i] = 0.5 * (1.0 + side * Points::abscissa()[i]);
     }
     const Within states = within(state, fractions, h, rate);
-    const LaneVector response = responses(states), heat = heat_W(states);
+    const LaneVector per_rate = powers_per_rate(states, responses(states));
+    const LaneVector heat = heat_W(states);
     for (std::size_t i = 0; i < kLanes; ++i) {
       const auto lane = static_cast<Eigen::Index>(i);
       const StepEnergy::Series projected =
           Points::weights()[i] * legendre(side * Points::abscissa()[i]).head<StepEnergy::kPoints>();
-      energy.response_ += response[lane] * projected;
+      energy.per_rate_ += per_rate[lane] * projected;
       energy.heat_W_ += heat[lane] * projected;
     }
   }
   for (Eigen::Index n = 0; n < StepEnergy::kPoints; ++n) {
     const double norm = 0.5 * static_cast<double>(2 * n + 1);
-    energy.response_[n] *= norm;
+    energy.per_rate_[n] *= norm;
     energy.heat_W_[n] *= norm;
   }
-  if (energy.by_load_) {
+  bool by_load = false;
+  for (std::size_t g = 0; g < tissue_.groups(); ++g) by_load = by_load || !tissue_.depth_driven(g);
+  if (by_load) {
     const std::array<double, 2> ends{0.0, 1.0};
-    const LaneVector depth = responses_within(state, ends, h, rate);
-    energy.response_at_start_ = depth[0];
-    energy.response_at_end_ = depth[1];
+    const Within states = within(state, ends, h, rate);
+    const LaneVector response = responses(states);
+    const auto loads_J = [&](Eigen::Index lane) {
+      const Eigen::RowVectorXd place = states.position.row(lane);
+      return tissue_.loads_J(Eigen::Map<const Positions>(place.data(), 3, coordinates_ / 3),
+                             states.imposed[lane], response[lane]);
+    };
+    energy.loads_at_start_J_ = loads_J(0);
+    energy.loads_at_end_J_ = loads_J(1);
   }
   return energy;
 }
@@ -210,14 +233,10 @@ double StepEnergy::integral(const Series& series, double fraction) {
   return 0.5 * sum;
 }
 
-QuasiStaticEnergy StepEnergy::until(double fraction, double response) const {
+QuasiStaticEnergy StepEnergy::until(double fraction, double loads_J) const {
   QuasiStaticEnergy energy;
   energy.dissipated_J = h_s_ * integral(heat_W_, fraction);
-  energy.work_J = rate_ * h_s_ * integral(response_, fraction);
-  if (by_load_) {  // the integral of F du, by parts
-    energy.work_J = (imposed_ + fraction * h_s_ * rate_) * response -
-                    imposed_ * response_at_start_ - energy.work_J;
-  }
+  energy.work_J = rate_ * h_s_ * integral(per_rate_, fraction) + loads_J - loads_at_start_J_;
   return energy;
 }
 

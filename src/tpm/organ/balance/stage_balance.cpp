@@ -69,6 +69,15 @@ void StageBalance::begin(const TissueState& rest, double h, double peak) {
           : tissue_.linear_response(rest, 1.0);
   unit_response_ = std::abs(unit);
   scale_ = std::abs(unit * peak);
+  per_beside_.clear();
+  const ViscousState all_relaxed{Eigen::VectorXd::Zero(rest.mean.size()), 1.0};
+  for (std::size_t g = 1; g < tissue_.groups() && factorised_; ++g) {
+    const double of_group =
+        tissue_.path().peak(g) *
+        tissue_.relaxed_response(rest, tissue_.unit_field(rest, all_relaxed, g).displacement, g);
+    per_beside_.push_back(of_group > 0.0 ? scale_ / of_group : 1.0);
+  }
+  if (!per_beside_.empty()) factorised_ = false;  // to be weighed with these
 }
 
 TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, double tolerance) {
@@ -77,14 +86,16 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
       relaxed ? 1.0 : 0.0};
   Positions position = state.position;
   tissue_.impose(position, imposed);
-  const std::optional<double> furthest_m = furthest_depth_change_m(state, viscous_state, imposed);
+  const auto furthest_m = furthest_depth_changes_m(state, viscous_state, imposed);
   if (!furthest_m) return TissueMove::unbalanced;
   Eigen::Matrix3Xd load;
   tissue_.load(imposed, load);
   // A force error of this size is within the tolerance whatever it acts on; below the least one
   // the rounding of positions decides. Also where a load is taken off.
   const double force_scale =
-      tissue_.depth_driven() ? scale_ : std::max(std::abs(imposed), scale_ / unit_response_);
+      tissue_.depth_driven()
+          ? scale_
+          : std::max(std::abs(tissue_.path().value(0, imposed)), scale_ / unit_response_);
   const EquilibriumSearch search = tissue_.equilibrium().find(
       position, viscous_state, load, std::max(tolerance, kLeastBalance) * force_scale);
   work_.factorisations += search.factorisations;
@@ -93,8 +104,10 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   last_rate_.reset();
   if (!search.stable) return TissueMove::unstable;
   if (!search.converged) return TissueMove::unbalanced;
-  const double change_m = std::abs(tissue_.depth_of(position - state.position));
-  if (change_m > *furthest_m) return TissueMove::unbalanced;
+  for (std::size_t g = 0; g < furthest_m->size(); ++g) {
+    const double change_m = std::abs(tissue_.depth_of(position - state.position, g));
+    if (change_m > (*furthest_m)[g]) return TissueMove::unbalanced;
+  }
   state.imposed = imposed;
   state.position = std::move(position);
   tissue_.bonds().followed(state.position, state.followed);
@@ -103,20 +116,29 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   return TissueMove::done;
 }
 
-std::optional<double> StageBalance::furthest_depth_change_m(const TissueState& state,
-                                                            const ViscousState& viscous_state,
-                                                            double imposed) {
-  constexpr double kAny = std::numeric_limits<double>::infinity();
-  if (tissue_.depth_driven() || imposed == state.imposed) return kAny;
-  ++work_.factorisations;
-  if (!tissue_.equilibrium().factorise(state.position, viscous_state)) return std::nullopt;
-  const double expected =
-      std::abs((imposed - state.imposed) * tissue_.unit_field(state, viscous_state).stiffness);
+std::optional<std::vector<double>> StageBalance::furthest_depth_changes_m(
+    const TissueState& state, const ViscousState& viscous_state, double imposed) {
   const BondSystem& bonds = tissue_.bonds();
   const auto joined = static_cast<Eigen::Index>(bonds.first_contact());
-  const double longest = kLongestMove * bonds.rest_length_m().head(joined).mean();
-  if (expected > longest) return std::nullopt;
-  return std::min(kSnap * expected, longest);
+  const double longest_m = kLongestMove * bonds.rest_length_m().head(joined).mean();
+  const ImposedPath& path = tissue_.path();
+  std::vector<double> furthest_m(tissue_.groups(), std::numeric_limits<double>::infinity());
+  bool factorised = false;
+  for (std::size_t g = 0; g < tissue_.groups(); ++g) {
+    const double change = path.value(g, imposed) - path.value(g, state.imposed);
+    if (tissue_.depth_driven(g) || change == 0.0) continue;
+    if (!factorised) {
+      ++work_.factorisations;
+      factorised = tissue_.equilibrium().factorise(state.position, viscous_state);
+      if (!factorised) return std::nullopt;
+    }
+    const double expected_m =
+        std::abs(change * tissue_.unit_field(state, viscous_state, g).stiffness);
+    if (expected_m > longest_m) return std::nullopt;
+    // What moves beside a load moves it, too: by how much is not known from the load alone.
+    furthest_m[g] = path.single() ? std::min(kSnap * expected_m, longest_m) : longest_m;
+  }
+  return furthest_m;
 }
 
 StageBalance::StepWeights StageBalance::weights_at(const Places& places,
@@ -282,8 +304,28 @@ bool StageBalance::refactorise(const TissueState& state,
       kRoundings * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
   if (tissue_.depth_driven()) rounding_ *= tissue_.held_stiffness(state.position, viscous_state);
   set_relaxing_shares(state, change, field);
+  if (!per_beside_.empty()) weigh_groups_beside(state, viscous_state);
   last_iterations_ = 0;
   return true;
+}
+
+void StageBalance::weigh_groups_beside(const TissueState& state,
+                                       const ViscousState& viscous_state) {
+  double bound = std::sqrt(bounding_stiffness_);
+  Eigen::VectorXd slope;
+  tissue_.bonds().kernel_slopes(state.position, slope);
+  const Eigen::VectorXd relaxing = tissue_.bonds().relaxing().cwiseProduct(slope).cwiseMax(0.0);
+  for (std::size_t g = 1; g < tissue_.groups(); ++g) {
+    const DrivenTissue::UnitField field = tissue_.unit_field(state, viscous_state, g);
+    ++work_.back_solves;
+    Eigen::VectorXd change;
+    tissue_.bonds().elongation_changes(state.position, field.adjoint, change);
+    const double weight = per_beside_[g - 1];
+    adjoint_ += weight * tissue_.adjoint_sign(g) *
+                bonds_.of_relaxing(change.cwiseProduct(tissue_.bonds().relaxing()));
+    bound += weight * std::sqrt(std::max(field.stiffness, 0.0) + change.cwiseAbs2().dot(relaxing));
+  }
+  bounding_stiffness_ = bound * bound;
 }
 
 void StageBalance::set_relaxing_shares(const TissueState& state, const Eigen::VectorXd& change,
@@ -347,7 +389,11 @@ void StageBalance::predict(const TissueState& state, double h, double rate) {
     as_before[lane] = last_rate_ == rate ? std::min(since[lane], last_h_) : 0.0;
   }
   imposed_ = (rate * since).array() + state.imposed;
-  x_.noalias() = rate * (since - as_before) * lane_field_;
+  if (tissue_.path().single()) {
+    x_.noalias() = rate * (since - as_before) * lane_field_;
+  } else {
+    x_.setZero();  // the first correction brings what other groups move
+  }
   if (as_before[0] > 0.0) x_.noalias() += as_before * last_velocity_;
   // Only what is free moves: rounding would make fixed spheres drift.
   tissue_.constraints().project(x_);

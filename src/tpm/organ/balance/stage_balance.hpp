@@ -39,19 +39,20 @@ class StepEnergy {
 
   /// From the start of the step, J.
   /// @param fraction in [0, 1]
-  /// @param response at the fraction; only a load asks for it
-  [[nodiscard]] QuasiStaticEnergy until(double fraction, double response) const;
+  /// @param loads_J DrivenTissue::loads_J() there
+  [[nodiscard]] QuasiStaticEnergy until(double fraction, double loads_J) const;
   /// Of the whole step.
-  [[nodiscard]] QuasiStaticEnergy whole() const { return until(1.0, response_at_end_); }
+  [[nodiscard]] QuasiStaticEnergy whole() const { return until(1.0, loads_at_end_J_); }
 
  private:
   friend class StageBalance;
   [[nodiscard]] static double integral(const Series& series, double fraction);
 
-  Series response_ = Series::Zero(), heat_W_ = Series::Zero();  ///< coefficients of the series
-  double h_s_ = 0.0, rate_ = 0.0, imposed_ = 0.0;
-  bool by_load_ = false;
-  double response_at_start_ = 0.0, response_at_end_ = 0.0;  ///< of a load
+  /// Coefficients of the series; power per rate of what is imposed: of a depth its force, of a load
+  /// minus its depth (F du = d(F u) - u dF).
+  Series per_rate_ = Series::Zero(), heat_W_ = Series::Zero();
+  double h_s_ = 0.0, rate_ = 0.0;
+  double loads_at_start_J_ = 0.0, loads_at_end_J_ = 0.0;
 };
 
 /// Balances the stages of a step together, side by side in lanes: a fixed-point iteration with one
@@ -82,6 +83,8 @@ class StageBalance {
   /// The first contact that was not, in the step just balanced, what it is at the step's start.
   /// @param tolerance of the response, in parts of the scale
   [[nodiscard]] std::optional<ContactChange> contact_change(double tolerance) const;
+  /// The next step moves otherwise than the last did.
+  void forget_motion() { last_rate_.reset(); }
   /// Closes an open contact or opens a closed one.
   void change_contact(TissueState& state, std::size_t contact);
   /// The responses at fractions of the step just balanced.
@@ -159,15 +162,17 @@ class StageBalance {
   [[nodiscard]] Within within(const TissueState& state, std::span<const double> fractions, double h,
                               double rate) const;
   [[nodiscard]] LaneVector responses(const Within& states);
+  /// Power per rate of the path's coordinate (StepEnergy), where responses() is the last call.
+  [[nodiscard]] LaneVector powers_per_rate(const Within& states, const LaneVector& response) const;
   /// Power that the branches turn into heat.
   [[nodiscard]] LaneVector heat_W(const Within& states) const;
 
-  /// By how much the depth may change with a load before it is suspected that the tissue has
-  /// snapped to another place; infinite where the depth is imposed or the load stays, none if the
-  /// stiffness says already that it would go too far, or has no inverse and says nothing.
-  [[nodiscard]] std::optional<double> furthest_depth_change_m(const TissueState& state,
-                                                              const ViscousState& viscous_state,
-                                                              double imposed);
+  /// By how much the depth of each group may change with a load before it is suspected that the
+  /// tissue has snapped to another place; infinite where the depth is imposed or the load stays,
+  /// none if the stiffness says already that it would go too far, or has no inverse and says
+  /// nothing.
+  [[nodiscard]] std::optional<std::vector<double>> furthest_depth_changes_m(
+      const TissueState& state, const ViscousState& viscous_state, double imposed);
 
   enum class Balance { found, hopeless, failed };
 
@@ -186,6 +191,8 @@ class StageBalance {
   /// @param change of the elongation of each bond with the adjoint displacement
   void set_relaxing_shares(const TissueState& state, const Eigen::VectorXd& change,
                            const DrivenTissue::UnitField& field);
+  /// Errors of the other groups' responses are added to those of the first, in parts of theirs.
+  void weigh_groups_beside(const TissueState& state, const ViscousState& viscous_state);
   /// How corrections of the stages depend on each other, since each follows the others: where all
   /// bonds relax alike, the inverse of that.
   [[nodiscard]] LaneSquare mixing(const StepWeights& weights) const;
@@ -216,8 +223,9 @@ class StageBalance {
   LaneStiffness factor_;
   Anderson anderson_;
   QuasiStaticWork work_;
-  double scale_ = 0.0;          ///< size of the response, N or m
-  double unit_response_ = 0.0;  ///< per unit of what is imposed: turns forces into lengths
+  double scale_ = 0.0;              ///< size of the response, N or m
+  double unit_response_ = 0.0;      ///< per unit of what is imposed: turns forces into lengths
+  std::vector<double> per_beside_;  ///< scale_ over that of each group beside the first
 
   // The factorisation in use.
   bool factorised_ = false;

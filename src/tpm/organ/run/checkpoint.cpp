@@ -23,7 +23,7 @@ void append(std::vector<double>& list, const double* first, Eigen::Index count) 
 /// States one after the other: time, imposed, response, work, heat, stored; positions; m_j.
 void write_states(Hdf5Writer& file, const std::string& group,
                   std::span<const QuasiStaticState> states) {
-  std::vector<double> scalars;
+  std::vector<double> scalars, beside;
   std::vector<double> position;
   std::vector<double> viscous;
   for (const QuasiStaticState& s : states) {
@@ -32,7 +32,9 @@ void write_states(Hdf5Writer& file, const std::string& group,
                                    energy.dissipated_J, energy.stored_J});
     append(position, s.position.data(), s.position.size());
     append(viscous, s.viscous.data(), s.viscous.size());
+    beside.insert(beside.end(), s.beside.begin(), s.beside.end());
   }
+  file.numbers(group + "/beside", beside);
   file.numbers(group + "/scalars", scalars);
   file.numbers(group + "/position_m", position);
   file.numbers(group + "/viscous_m", viscous);
@@ -74,10 +76,17 @@ class ListReader {
     if (position.size() != 3 * spheres * count || viscous.size() != of_state * count) {
       throw bad_input(path_.string(), fmt::format("{} is not whole", group), kExpected);
     }
+    const std::vector<double> beside = list(group + "/beside", 1);
+    const std::size_t groups = count > 0 ? beside.size() / count : 0;
+    if (beside.size() != groups * count) {
+      throw bad_input(path_.string(), fmt::format("{} is not whole", group), kExpected);
+    }
     std::vector<QuasiStaticState> states(count);
     for (std::size_t i = 0; i < count; ++i) {
       const double* s = &scalars[6 * i];
-      states[i] = {s[0], s[1], s[2], {}, {}, QuasiStaticEnergy{s[3], s[4], s[5]}};
+      states[i] = {s[0], s[1], s[2], {}, {}, QuasiStaticEnergy{s[3], s[4], s[5]}, {}};
+      const auto first = beside.begin() + static_cast<std::ptrdiff_t>(groups * i);
+      states[i].beside.assign(first, first + static_cast<std::ptrdiff_t>(groups));
       states[i].position = Eigen::Map<const Positions>(position.data() + 3 * spheres * i, 3,
                                                        static_cast<Eigen::Index>(spheres));
       states[i].viscous = Eigen::Map<const Eigen::MatrixXd>(viscous.data() + of_state * i,
@@ -185,6 +194,12 @@ std::string checkpoint_identity(const ExperimentScene& scene) {
       fmt::format("{}\n{}\n{}\n", version(), scene.formulation.mass_spring, scene.text);
   bytes.append(reinterpret_cast<const char*>(at.data()),
                sizeof(double) * static_cast<std::size_t>(at.size()));
+  // What files beside the scene say: motions of contacts.
+  for (const SceneContact& contact : scene.contacts) {
+    if (!contact.protocol) continue;
+    const auto knots = contact.protocol->knots();
+    bytes.append(reinterpret_cast<const char*>(knots.data()), knots.size_bytes());
+  }
   return sha256_hex(bytes);
 }
 
@@ -197,13 +212,15 @@ void write_checkpoint(const fs::path& path, const std::string& identity,
   file.numbers("/spheres", {static_cast<double>(latest.position.cols())});
   file.numbers("/bonds", {static_cast<double>(latest.viscous.rows())});
   file.numbers("/branches", {static_cast<double>(latest.viscous.cols())});
-  std::vector<double> curve;
+  std::vector<double> curve, beside;
   for (const CurvePoint& p : record.curve) {
+    beside.insert(beside.end(), p.beside.begin(), p.beside.end());
     curve.insert(curve.end(), {p.time_s, p.imposed, p.response, p.energy.work_J,
                                p.energy.dissipated_J, p.energy.stored_J,
                                static_cast<double>(p.touching), p.overlap_m, p.force_on_tissue_N});
   }
   file.numbers("/curve", curve);
+  file.numbers("/curve_beside", beside);
   file.numbers("/error_estimate", {record.error_estimate});
   write_states(file, "/outputs", record.outputs);
   write_states(file, "/latest", {&latest, 1});
@@ -240,15 +257,20 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   Checkpoint checkpoint;
   constexpr std::size_t kColumns = 9;
   const std::vector<double> curve = lists.list("/curve", kColumns);
+  const std::vector<double> beside = lists.list("/curve_beside", 1);
+  const std::size_t points = curve.size() / kColumns;
+  const std::size_t groups = points > 0 ? beside.size() / points : 0;
   for (std::size_t i = 0; i + kColumns <= curve.size(); i += kColumns) {
     const double* p = &curve[i];
+    const auto own = beside.begin() + static_cast<std::ptrdiff_t>(groups * (i / kColumns));
     checkpoint.record.curve.push_back({p[0],
                                        p[1],
                                        p[2],
                                        {p[3], p[4], p[5]},
                                        static_cast<int>(lists.whole(p[6], "the tools that touch")),
                                        p[7],
-                                       p[8]});
+                                       p[8],
+                                       {own, own + static_cast<std::ptrdiff_t>(groups)}});
   }
   checkpoint.record.outputs = lists.states("/outputs", spheres, bonds, branches);
   checkpoint.record.validity = read_validity(lists);

@@ -90,6 +90,7 @@ void Recorder::see(const QuasiStaticState& state, const Eigen::VectorXd& contact
   }
   point.force_on_tissue_N = force_on_tissue_N(network_.driven, tools, scene_.protocol.drive(),
                                               state.imposed, state.response);
+  point.beside = state.beside;
   record_.curve.push_back(point);
   const std::vector<double>& wanted = scene_.outputs.times_s;
   if (std::binary_search(wanted.begin(), wanted.end(), state.time_s)) {

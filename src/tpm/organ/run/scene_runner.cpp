@@ -128,6 +128,14 @@ void require_runnable(const ExperimentScene& scene) {
   const bool several =
       scene.contacts.size() > 1 || scene.contacts.front().kind == ContactKind::patch;
   needs(several, &Capabilities::several_contacts);
+  needs(scene.has_own_protocols(), &Capabilities::own_protocols);
+  needs(scene.dead_load_N.size() > 0, &Capabilities::dead_loads);
+  for (const SceneContact& contact : scene.contacts) {
+    if (!contact.protocol) continue;
+    needs(contact.protocol->drive() == Drive::displacement, &Capabilities::depth);
+    needs(contact.protocol->drive() == Drive::force, &Capabilities::load);
+    needs(jumps(*contact.protocol), &Capabilities::jumps);
+  }
   for (const MaterialNeed need : needs_of(scene.tissue.materials)) needs(true, need);
   for (const MaterialNeed need : needs_of(scene.tissue.bonds())) needs(true, need);
 }

@@ -16,23 +16,40 @@ DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bond
   constexpr double kStifferWithMass = 100.0;
   const double usual =
       usual_contact_stiffness_N_per_m(bonds) * (scene.formulation.masses ? kStifferWithMass : 1.0);
+  const Constraints constraints = scene.tissue.constraints();
+  Loading loading;
+  std::optional<Organ> sagged;
+  if (scene.dead_load_N.size() > 0) {
+    loading.dead_N = scene.dead_load_N;
+    loading.unloaded = organ.position;
+    sagged = organ;
+    sagged->position = loaded_positions(bonds, organ.position, constraints, loading.dead_N);
+  }
+  const Organ& at_start = sagged ? *sagged : organ;
   std::vector<Probe> driven;
   std::vector<PressedTool> tools;
-  for (const SceneContact& contact : scene.contacts) {
+  for (std::size_t i = 0; i < scene.contacts.size(); ++i) {
+    const SceneContact& contact = scene.contacts[i];
     const Probe& probe = contact.probe;
+    std::size_t group = 0;
+    if (i > 0 && contact.protocol) {
+      loading.beside.push_back({{}, *contact.protocol});
+      group = loading.beside.size();
+    }
     if (contact.is_tool()) {
       const ToolKind kind = contact.kind == ContactKind::ball ? ToolKind::sphere : ToolKind::punch;
       tools.push_back(
-          {touching_tool({kind, contact.radius_m}, organ, probe.sphere, probe.direction),
-           probe.share, contact.stiffness_N_per_m.value_or(usual)});
+          {touching_tool({kind, contact.radius_m}, at_start, probe.sphere, probe.direction),
+           probe.share, contact.stiffness_N_per_m.value_or(usual), group});
       continue;
     }
+    auto& of_group = group == 0 ? driven : loading.beside.back().probes;
     for (const std::size_t sphere : spheres_of(contact, organ)) {
-      driven.push_back({sphere, probe.direction, probe.share});
+      of_group.push_back({sphere, probe.direction, probe.share});
     }
   }
-  return driven_network(bonds, organ, scene.tissue.constraints(), std::move(driven),
-                        std::move(tools));
+  return driven_network(bonds, at_start, constraints, std::move(driven), std::move(tools),
+                        std::move(loading));
 }
 
 }  // namespace

@@ -32,12 +32,13 @@ struct RunNetwork {
 /// be drawn, and dates what passes a limit.
 struct CurvePoint {
   double time_s = 0.0;
-  double imposed = 0.0;            ///< depth, m, or load, N
-  double response = 0.0;           ///< contact force, N, or depth, m
-  QuasiStaticEnergy energy;        ///< of a quasi-static run
-  int touching = 0;                ///< spheres that tools touch
-  double overlap_m = 0.0;          ///< the largest of their contacts
-  double force_on_tissue_N = 0.0;  ///< force_on_tissue_N()
+  double imposed = 0.0;             ///< depth, m, or load, N
+  double response = 0.0;            ///< contact force, N, or depth, m
+  QuasiStaticEnergy energy;         ///< of a quasi-static run
+  int touching = 0;                 ///< spheres that tools touch
+  double overlap_m = 0.0;           ///< the largest of their contacts
+  double force_on_tissue_N = 0.0;   ///< force_on_tissue_N()
+  std::vector<double> beside = {};  ///< responses of contacts with protocols of their own, in turn
 };
 
 /// Parts of a run; each begins afresh, and a checkpoint can be written after it.

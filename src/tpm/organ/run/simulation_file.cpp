@@ -1,6 +1,7 @@
 #include "tpm/organ/run/simulation_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -147,6 +148,27 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
   file.numbers("/curve/stored_J", stored);
 }
 
+/// Contacts with protocols of their own, under their numbers in the scene.
+void write_contacts_beside(const ExperimentScene& scene, const SimulationRecord& record,
+                           Hdf5Writer& file) {
+  std::size_t index = 0;
+  for (std::size_t i = 1; i < scene.contacts.size(); ++i) {
+    const std::optional<Protocol>& protocol = scene.contacts[i].protocol;
+    if (!protocol) continue;
+    const bool depth = protocol->drive() == Drive::displacement;
+    std::vector<double> imposed, response;
+    for (const CurvePoint& p : record.curve) {
+      imposed.push_back(value_at(*protocol, p.time_s));
+      response.push_back(p.beside[index]);
+    }
+    const std::string group = fmt::format("/contacts/{}", i + 1);
+    file.numbers(group + (depth ? "/depth_m" : "/load_N"), imposed);
+    file.numbers(group + (depth ? "/force_N" : "/depth_m"), response);
+    file.attribute(group, "meaning", "of a contact with its own protocol, at the times of /curve");
+    ++index;
+  }
+}
+
 void write_validity(const Validity& validity, Hdf5Writer& file) {
   file.numbers("/validity/deepest_m", {validity.deepest_m});
   file.numbers("/validity/most_turned_rad", {validity.most_turned_rad});
@@ -270,9 +292,16 @@ fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& networ
                           const SimulationRun& run, const fs::path& path) {
   Hdf5Writer file(path);
   write_network_datasets(scene.tissue, file);
+  if (scene.dead_load_N.size() > 0) {
+    file.table("/spheres/dead_load_N", list_of(scene.dead_load_N), 3);
+    file.attribute(
+        "/spheres/dead_load_N", "meaning",
+        fmt::format("acts from before the start on: {}", fmt::join(scene.load_words, "; ")));
+  }
   write_provenance(scene, run, file);
   write_tools(network.driven, file);
   write_curve(scene, run.record, file);
+  write_contacts_beside(scene, run.record, file);
   if (scene.formulation.masses) write_motion(run, file);
   write_validity(run.record.validity, file);
   write_roughness(scene, run.record, file);

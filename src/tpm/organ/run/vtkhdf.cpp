@@ -48,7 +48,11 @@ void write_still_fields(const Tissue& tissue, std::size_t outputs, Hdf5Writer& f
     number.push_back(static_cast<std::int32_t>(i + 1));
     layer.push_back(organ.layer[i] + 1);
   }
-  for (const Slider& slider : tissue.sliders) constraint[slider.sphere] = 1;
+  const Slider* before = nullptr;
+  for (const Slider& slider : tissue.sliders) {
+    constraint[slider.sphere] = before != nullptr && before->sphere == slider.sphere ? 3 : 1;
+    before = &slider;
+  }
   for (const std::size_t sphere : tissue.anchors) constraint[sphere] = 2;
   const std::vector<std::int64_t> still(outputs, 0);
   for (const auto& [name, values] :

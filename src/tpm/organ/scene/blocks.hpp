@@ -86,6 +86,7 @@ struct OrganBlock {
 struct BondKeys {
   NetworkOptions options;
   LateralBond lateral = LateralBond::elastic;
+  std::optional<SpacingLaw> spacing_law;  ///< as the file states it
 };
 [[nodiscard]] const Block<BondKeys>& bonds_block();
 
@@ -122,6 +123,7 @@ struct RegionKeys {
 /// Block `material`.
 struct MaterialKeys {
   PlainMaterialKeys plain;
+  std::optional<double> E_Pa, nu;  ///< of the tissue
   std::vector<RegionKeys> regions;
   BlendRule between = BlendRule::mean;
 };
@@ -147,6 +149,7 @@ struct AnchorKeys {
   std::vector<std::size_t> spheres;
   PointKeys point{};
   std::array<double, 3> normal{};
+  bool slides = false;  ///< only the motion along the normal is held
 };
 [[nodiscard]] const Kinds<AnchorKeys, AnchorKind>& anchor_kinds();
 
@@ -154,6 +157,7 @@ struct AnchorKeys {
 struct AnchorBlock {
   std::vector<std::size_t> spheres;
   std::string words;
+  std::optional<Eigen::Vector3d> along = std::nullopt;  ///< all that is held; none: everything
 };
 [[nodiscard]] AnchorBlock anchor_of(const AnchorKeys& entry, const Organ& organ,
                                     const DocumentPlace& place);

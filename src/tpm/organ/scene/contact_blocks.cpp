@@ -1,6 +1,7 @@
 // Declared in tpm/organ/scene/experiment_blocks.hpp.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -88,7 +89,9 @@ const Kinds<ContactKeys, ContactKind>& contact_kinds() {
         key("direction", &K::direction, direction(),
             "into the tissue; default: against the sphere's outward normal"),
         key("share", &K::share, number(share),
-            "of the depth, or of the load against those of the others")};
+            "of the depth, or of the load against those of the others"),
+        key("protocol", &K::protocol, contact_motion_kinds().type(),
+            "its own, from when the others begin; default: the scene's")};
   };
   const auto radius = required(key("radius", &K::radius_m, quantity(Dimension::length, kAboveZero),
                                    "radius of what touches"));
@@ -111,9 +114,15 @@ const Kinds<ContactKeys, ContactKind>& contact_kinds() {
         "a rigid ball without friction pushes spheres and does not hold them", tool},
        {ContactKind::punch, word(ContactKind::punch),
         "a rigid flat punch without friction pushes spheres and does not hold them", tool}},
-      {{"either 'number' or 'at'", [](const K& contact) -> std::optional<Fault> {
+      {{"either 'number' or 'at'",
+        [](const K& contact) -> std::optional<Fault> {
           if (!contact.number || !contact.at) return std::nullopt;
           return Fault{"", "says where twice"};
+        }},
+       {"a share of the scene's protocol or a protocol of its own",
+        [](const K& contact) -> std::optional<Fault> {
+          if (!contact.protocol || contact.share == 1.0) return std::nullopt;
+          return Fault{"share", "is of no protocol"};
         }}});
   return kinds;
 }
@@ -143,18 +152,58 @@ SceneContact contact_of(const ContactKeys& block, const Tissue& tissue,
 }  // namespace
 
 SceneContact parse_contact(const Json& block, const Tissue& tissue, const DocumentPlace& place) {
-  return contact_of(contact_kinds().read(block, place, Numbers::also_si), tissue, place);
+  const ContactKeys keys = contact_kinds().read(block, place, Numbers::also_si);
+  if (keys.protocol) {
+    throw bad_input(place.key("protocol").where, "of a contact that the session moves",
+                    "none: a scene of tpm simulate has contacts with protocols");
+  }
+  return contact_of(keys, tissue, place);
 }
 
 std::vector<SceneContact> contacts_of(const std::vector<ContactKeys>& contacts,
-                                      const Tissue& tissue, const DocumentPlace& place) {
+                                      const Tissue& tissue, const DocumentPlace& place,
+                                      const std::filesystem::path& folder) {
   std::vector<SceneContact> all;
   for (const ContactKeys& block : contacts) {
-    all.push_back(contact_of(block, tissue, place.key(std::to_string(all.size()))));
+    const DocumentPlace entry = place.key(std::to_string(all.size()));
+    all.push_back(contact_of(block, tissue, entry));
+    if (block.protocol) {
+      all.back().protocol = protocol_of(*block.protocol, entry.key("protocol"), folder);
+    }
   }
   if (all.front().probe.share > 0.0) return all;
   throw bad_input(place.key("0").key("share").where, "the first contact stands still",
                   "one that is driven first");
+}
+
+Protocol protocol_of_scene(const std::optional<Protocol>& common,
+                           const std::vector<SceneContact>& contacts, const DocumentPlace& place) {
+  const Protocol& first = contacts.front().protocol ? *contacts.front().protocol : *common;
+  double end_s = first.knots().back().time_s;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const SceneContact& contact = contacts[i];
+    const DocumentPlace entry = place.key(std::to_string(i));
+    if (!contact.protocol) {
+      if (contact.probe.share == 0.0 || !contacts.front().protocol) continue;
+      throw bad_input(entry.key("protocol").where, "is missing",
+                      "a protocol of its own, as the first contact has");
+    }
+    if (contact.protocol->start_s() != first.start_s()) {
+      throw bad_input(
+          entry.key("protocol").where,
+          fmt::format("begins at {} s", shortest(contact.protocol->start_s())),
+          fmt::format("{} s, where that of the first contact begins", shortest(first.start_s())));
+    }
+    end_s = std::max(end_s, contact.protocol->knots().back().time_s);
+  }
+  const auto is_own = [](const SceneContact& c) { return c.protocol.has_value(); };
+  if (first.peak() == 0.0 && std::any_of(contacts.begin() + 1, contacts.end(), is_own)) {
+    throw bad_input(place.key("0").where, "the first contact stands still",
+                    "one that is driven first");
+  }
+  std::vector<Knot> knots(first.knots().begin(), first.knots().end());
+  if (end_s > knots.back().time_s) knots.push_back({end_s, knots.back().value});
+  return {first.drive(), std::move(knots), first.name()};
 }
 
 SceneContact usual_contact(const Tissue& tissue, const DocumentPlace& place) {
@@ -182,16 +231,17 @@ double tissue_behind_m(const Organ& organ, const Probe& probe) {
 
 void require_possible(const Protocol& protocol, const std::vector<SceneContact>& contacts,
                       const Tissue& tissue, const DocumentPlace& place) {
-  const bool by_depth = protocol.drive() == Drive::displacement;
   for (const SceneContact& contact : contacts) {
+    const Protocol& own = contact.protocol ? *contact.protocol : protocol;
+    const bool by_depth = own.drive() == Drive::displacement;
     const double room = tissue_behind_m(tissue.network.organ, contact.probe);
-    const double depth = contact.probe.share * protocol.peak();
+    const double depth = contact.probe.share * own.peak();
     if (by_depth && !(depth < room)) {
       throw bad_input(place.where, fmt::format("a depth of {} mm", significant(1e3 * depth, 4)),
                       fmt::format("less than the {} mm of tissue behind sphere {}",
                                   significant(1e3 * room, 4), contact.probe.sphere + 1));
     }
-    for (const Knot& knot : protocol.knots()) {
+    for (const Knot& knot : own.knots()) {
       if (by_depth || !contact.is_tool() || knot.value >= 0.0) continue;
       throw bad_input(
           place.where,

@@ -3,6 +3,7 @@
 // what they lead to. All throw Error(bad_input) with the key.
 #include "tpm/base/namespaces.hpp"
 #include "tpm/organ/scene/blocks.hpp"
+#include "tpm/organ/scene/contact_motion.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
 
 namespace tpm::organ {
@@ -15,13 +16,24 @@ struct ContactKeys {
   std::optional<std::array<double, 3>> direction;
   double share = 1.0, radius_m = 0.0;
   std::optional<double> stiffness_N_per_m, mass_kg;
+  std::optional<ContactMotionKeys> protocol;
 };
 [[nodiscard]] const Kinds<ContactKeys, ContactKind>& contact_kinds();
 
 /// The contacts of a scene. At least one of them is driven.
+/// @param folder that the path of a recording is relative to
 [[nodiscard]] std::vector<SceneContact> contacts_of(const std::vector<ContactKeys>& contacts,
                                                     const Tissue& tissue,
-                                                    const DocumentPlace& place);
+                                                    const DocumentPlace& place,
+                                                    const std::filesystem::path& folder);
+
+/// The protocol of the first contact, held until those of all contacts have ended.
+/// @param common of the contacts without one of their own, if the scene has it
+/// Throws Error(bad_input) for a driven contact without any, and for histories that begin at
+/// different times.
+[[nodiscard]] Protocol protocol_of_scene(const std::optional<Protocol>& common,
+                                         const std::vector<SceneContact>& contacts,
+                                         const DocumentPlace& place);
 
 /// One of them, as a session says it.
 [[nodiscard]] SceneContact parse_contact(const Json& block, const Tissue& tissue,

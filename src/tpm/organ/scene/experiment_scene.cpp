@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "tpm/files/file.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
 #include "tpmkit/error.hpp"
@@ -31,16 +33,20 @@ ExperimentScene parse_checked_experiment(const Json& scene, std::string_view whe
   const SceneKeys keys = scene_block().read(scene, place, Numbers::also_si);
   Tissue tissue = tissue_of(keys, where, folder);
   const DocumentPlace at_protocol = place.key("protocol");
-  if (!keys.protocol) {
+  const bool first_has_own =
+      keys.contacts && !keys.contacts->empty() && keys.contacts->front().protocol.has_value();
+  if (!keys.protocol && !first_has_own) {
     throw bad_input(at_protocol.where, "is missing",
                     "what is done to the tissue, such as {\"kind\": \"ramp_hold\", \"depth\": \"8 "
                     "mm\", \"rate\": \"4 mm/s\", \"hold\": \"29 s\"}");
   }
   const DocumentPlace at_contacts = place.key("contacts");
   std::vector<SceneContact> contacts =
-      keys.contacts ? contacts_of(*keys.contacts, tissue, at_contacts)
+      keys.contacts ? contacts_of(*keys.contacts, tissue, at_contacts, folder)
                     : std::vector<SceneContact>{usual_contact(tissue, at_contacts.key("0"))};
-  Protocol protocol = keys.protocol->protocol(at_protocol);
+  std::optional<Protocol> common;
+  if (keys.protocol) common = keys.protocol->protocol(at_protocol);
+  Protocol protocol = protocol_of_scene(common, contacts, at_contacts);
   require_possible(protocol, contacts, tissue, at_protocol);
   FormulationChoice formulation =
       formulation_of(keys.formulation.value_or(FormulationKeys{}), place.key("formulation"));
@@ -49,8 +55,15 @@ ExperimentScene parse_checked_experiment(const Json& scene, std::string_view whe
   if (formulation.masses) require_masses(contacts, formulation.kind, at_contacts);
   require_standing(tissue, where);
   tissue.unused_blocks.clear();
-  return {std::move(tissue),      std::move(contacts), std::move(protocol),
-          std::move(formulation), std::move(outputs),  to_text(scene)};
+  DeadLoads dead = loads_of(keys.loads.value_or(std::vector<LoadKeys>{}), tissue.network.organ,
+                            place.key("loads"));
+  return {std::move(tissue),  std::move(contacts), std::move(protocol),     std::move(formulation),
+          std::move(outputs), to_text(scene),      std::move(dead.force_N), std::move(dead.words)};
+}
+
+bool ExperimentScene::has_own_protocols() const {
+  return std::any_of(contacts.begin() + 1, contacts.end(),
+                     [](const SceneContact& contact) { return contact.protocol.has_value(); });
 }
 
 ExperimentScene read_experiment(const std::filesystem::path& scene) {

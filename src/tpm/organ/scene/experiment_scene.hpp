@@ -55,9 +55,10 @@ struct SceneContact {
   /// The sphere that is driven or aimed at, the direction, and the share of what is imposed (0: a
   /// tool that stands still).
   Probe probe;
-  double radius_m = 0.0;                    ///< of patch, ball or punch
-  std::optional<double> stiffness_N_per_m;  ///< of a tool's contacts
-  std::optional<double> mass_kg;            ///< of a tool
+  double radius_m = 0.0;                            ///< of patch, ball or punch
+  std::optional<double> stiffness_N_per_m;          ///< of a tool's contacts
+  std::optional<double> mass_kg;                    ///< of a tool
+  std::optional<Protocol> protocol = std::nullopt;  ///< its own, beside or instead of the scene's
 
   [[nodiscard]] bool is_tool() const {
     return kind == ContactKind::ball || kind == ContactKind::punch;
@@ -78,7 +79,12 @@ struct ExperimentScene {
   FormulationChoice formulation;
   Outputs outputs;
   std::string text;  ///< of the scene, for the record
+  /// Forces that act all along on the spheres, N; empty if there are none.
+  Eigen::Matrix3Xd dead_load_N = {};
+  std::vector<std::string> load_words = {};  ///< one for each load, for people
 
+  /// Some contact besides the first has a protocol of its own.
+  [[nodiscard]] bool has_own_protocols() const;
   /// The sphere that the first contact drives or aims at, and where to.
   [[nodiscard]] const Probe& probe() const { return contacts.front().probe; }
 };

@@ -348,6 +348,12 @@ const Block<MaterialKeys>& material_block() {
   static const Block<MaterialKeys> block = [] {
     std::vector<Key<MaterialKeys>> keys;
     for (const Key<Plain>& one : plain_keys()) keys.push_back(within(&MaterialKeys::plain, one));
+    keys.push_back(
+        key("E", &MaterialKeys::E_Pa, quantity(Dimension::stress, kAboveZero),
+            "Young's modulus of the tissue at equilibrium, of a solid: all moduli of the "
+            "bonds are multiplied so that a block of them has it"));
+    keys.push_back(key("nu", &MaterialKeys::nu, number({.least = -1.0, .most = 0.5}),
+                       "Poisson ratio of the tissue, beside E: only the network's own, about 1/4"));
     keys.push_back(key("regions", &MaterialKeys::regions,
                        list(region_kinds().type(), {.fewest = 1, .most = 1000}),
                        "places of another stiffness or material, each on top of those before it"));
@@ -357,7 +363,12 @@ const Block<MaterialKeys>& material_block() {
         "material",
         "of the bonds: the paper's element, whose defaults are its constants, or Einf with "
         "branches",
-        keys, {{kOneWay, [](const MaterialKeys& material) { return two_ways(material.plain); }}});
+        keys,
+        {{kOneWay, [](const MaterialKeys& material) { return two_ways(material.plain); }},
+         {"nu beside E", [](const MaterialKeys& material) -> std::optional<Fault> {
+            if (!material.nu || material.E_Pa) return std::nullopt;
+            return Fault{"nu", "of a tissue without E"};
+          }}});
   }();
   return block;
 }

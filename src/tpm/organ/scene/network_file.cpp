@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "tpm/files/file.hpp"
@@ -24,7 +25,18 @@ void write_spheres(const Tissue& tissue, Hdf5Writer& file) {
   std::vector<std::int32_t> index(organ.size());
   std::iota(index.begin(), index.end(), 0);
   std::vector<std::int32_t> role(organ.size(), 0);
-  for (const Slider& slider : tissue.sliders) role[slider.sphere] = 1;
+  // Spheres that slide in a plane have two sliders; the product of their directions is held.
+  std::vector<double> held(3 * organ.size(), 0.0);
+  const Slider* before = nullptr;
+  for (const Slider& slider : tissue.sliders) {
+    const bool in_plane = before != nullptr && before->sphere == slider.sphere;
+    role[slider.sphere] = in_plane ? 3 : 1;
+    if (in_plane) {
+      const Eigen::Vector3d normal = before->direction.cross(slider.direction);
+      std::copy(normal.begin(), normal.end(), held.begin() + 3 * std::ptrdiff_t(slider.sphere));
+    }
+    before = &slider;
+  }
   for (const std::size_t sphere : tissue.anchors) role[sphere] = 2;
   std::vector<std::int32_t> contact(organ.size(), 0);
   if (organ.contact) contact[*organ.contact] = 1;
@@ -38,8 +50,13 @@ void write_spheres(const Tissue& tissue, Hdf5Writer& file) {
   file.integers("/spheres/constraint", role, 1);
   file.integers("/spheres/contact", contact, 1);
   file.attribute("/spheres/layer", "meaning", "1: outermost");
-  file.attribute("/spheres/constraint", "meaning",
-                 "0: free, 1: slides along its normal, 2: anchored");
+  file.attribute(
+      "/spheres/constraint", "meaning",
+      "0: free, 1: slides along its normal, 2: anchored, 3: slides in the plane square to "
+      "held_direction");
+  if (std::find(role.begin(), role.end(), 3) != role.end()) {
+    file.table("/spheres/held_direction", held, 3);
+  }
 }
 
 void write_bonds(const Network& network, Hdf5Writer& file) {

@@ -12,6 +12,14 @@
 namespace tpm::organ {
 namespace {
 
+void require_lines_alone(const Tissue& tissue) {
+  for (std::size_t i = 1; i < tissue.sliders.size(); ++i) {
+    if (tissue.sliders[i].sphere != tissue.sliders[i - 1].sphere) continue;
+    throw bad_input("anchors", "a half-space that slides, which the export to SOFA does not write",
+                    "anchors that hold everything, or the export to MuJoCo");
+  }
+}
+
 std::string coordinates(const Eigen::Vector3d& v) {
   return fmt::format("{} {} {}", shortest(v.x()), shortest(v.y()), shortest(v.z()));
 }
@@ -95,6 +103,7 @@ std::string sofa_document(const Tissue& tissue, const OrganExportOptions& option
     text += fmt::format("    <FixedProjectiveConstraint indices=\"{}\"/>\n",
                         fmt::join(tissue.anchors, " "));
   }
+  require_lines_alone(tissue);
   for (const Slider& slider : tissue.sliders) {
     text += fmt::format("    <DirectionProjectiveConstraint indices=\"{}\" direction=\"{}\"/>\n",
                         slider.sphere, coordinates(slider.direction));
@@ -122,12 +131,11 @@ std::string mjcf_bodies(const Tissue& tissue, double mass_kg) {
         "    <body name=\"b{}\" pos=\"{}\"><inertial pos=\"0 0 0\" mass=\"{}\" diaginertia=\"{} "
         "{} {}\"/>",
         i, place, shortest(mass_kg), shortest(inertia), shortest(inertia), shortest(inertia));
-    const auto slider = std::find_if(tissue.sliders.begin(), tissue.sliders.end(),
-                                     [&](const Slider& g) { return g.sphere == sphere; });
     std::vector<Eigen::Vector3d> axes;
-    if (slider != tissue.sliders.end()) {
-      axes = {slider->direction};
-    } else {
+    for (const Slider& slider : tissue.sliders) {
+      if (slider.sphere == sphere) axes.push_back(slider.direction);
+    }
+    if (axes.empty()) {
       axes = {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()};
     }
     for (const Eigen::Vector3d& axis : axes) {

@@ -80,6 +80,10 @@ std::array<TangentDirection, kBasis> basis_directions(const Network& network,
 Probe probe_of(const Tissue& tissue) {
   const Organ& organ = tissue.network.organ;
   const auto& unused = tissue.unused_blocks;
+  if (std::find(unused.begin(), unused.end(), "loads") != unused.end()) {
+    throw bad_input("scene", "has a block 'loads'",
+                    "none: as a model the organ starts without loads");
+  }
   if (std::find(unused.begin(), unused.end(), "contacts") != unused.end()) {
     throw bad_input("scene", "has a block 'contacts'",
                     "none: as a model the organ is driven at its contact sphere");

@@ -15,6 +15,8 @@ const Block<SceneKeys>& scene_block() {
            "what is fixed; default: the far side of a liver, A, C and D of a star, else nothing"),
        key("sliders", &K::sliders, list(sphere_type()),
            "spheres that slide along their normal only; default: B of a star, else none"),
+       key("loads", &K::loads, list(load_kinds().type(), {.fewest = 1, .most = 100}),
+           "gravity and pressure, with which the tissue is in equilibrium at the start"),
        key("contacts", &K::contacts, list(contact_kinds().type(), {.fewest = 1, .most = 100}),
            "what meets the tissue; default: the organ's contact sphere is driven"),
        with_example(

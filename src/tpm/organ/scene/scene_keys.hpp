@@ -9,6 +9,7 @@
 #include "tpm/files/keys/file_kind.hpp"
 #include "tpm/organ/scene/blocks.hpp"
 #include "tpm/organ/scene/experiment_blocks.hpp"
+#include "tpm/organ/scene/load_blocks.hpp"
 
 namespace tpm::organ {
 
@@ -19,6 +20,7 @@ struct SceneKeys {
   MaterialKeys material;
   std::optional<std::vector<AnchorKeys>> anchors;
   std::optional<std::vector<std::size_t>> sliders;
+  std::optional<std::vector<LoadKeys>> loads;
   std::optional<std::vector<ContactKeys>> contacts;
   std::optional<ProtocolBlock> protocol;
   std::optional<FormulationKeys> formulation;

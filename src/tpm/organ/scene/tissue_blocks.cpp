@@ -68,7 +68,12 @@ AnchorBlock named_spheres(const AnchorKeys& entry, const Organ& organ, const Doc
 
 AnchorBlock half_space(const AnchorKeys& entry, const Organ& organ) {
   const Eigen::Vector3d normal = vector_of(entry.normal).stableNormalized();
-  return {beyond(organ, normal, normal.dot(vector_of(entry.point))), "a half-space"};
+  AnchorBlock block{beyond(organ, normal, normal.dot(vector_of(entry.point))), "a half-space"};
+  if (entry.slides) {
+    block.words = "a half-space along its normal";
+    block.along = normal;
+  }
+  return block;
 }
 
 AnchorBlock spheres_of(const AnchorKeys& entry, const Organ& organ, const DocumentPlace& place) {
@@ -96,8 +101,9 @@ const Block<BondKeys>& bonds_block() {
                       "neighbours are within this many spacings")),
        of_options(key("diagonals", &O::diagonals, flag(), "false: one radial bond per sphere")),
        of_options(key("rule", &O::rule, word(kRuleWords), "stiffness of a bond")),
-       of_options(key("spacing_law", &O::spacing_law, word(kSpacingLawWords),
-                      "how stiffness follows the spacing")),
+       with_default(key("spacing_law", &BondKeys::spacing_law, word(kSpacingLawWords),
+                        "how stiffness follows the spacing; beside E: continuum"),
+                    "paper"),
        of_options(key("reference_spacing", &O::reference_spacing_m,
                       quantity(Dimension::length, kAboveZero),
                       "where the continuum law has the paper's stiffness")),
@@ -125,7 +131,10 @@ const Kinds<AnchorKeys, AnchorKind>& anchor_kinds() {
         "half_space",
         "the side of a plane that its normal points to",
         {required(key("point", &K::point, point_type(), "a point of the plane")),
-         required(key("normal", &K::normal, direction(), "of the plane, to the fixed side"))}}});
+         required(key("normal", &K::normal, direction(), "of the plane, to the fixed side")),
+         key("slides", &K::slides, flag(),
+             "true: only the motion along the normal is held, as on a smooth plate that they stick "
+             "to")}}});
   return kinds;
 }
 

@@ -36,8 +36,11 @@ SimulationRun run_with_mass(const ExperimentScene& scene, const RunNetwork& netw
     recorder.close_part(run.end, run.energy.value(), run.blows);
   };
   SimulationRun result = run_in_parts(scene, network, controls, run_part);
+  const Positions& unloaded = driven.probes.loading().unloaded;
   result.lowest_frequency_Hz =
-      lowest_mode(driven.bonds, driven.rest, driven.constraints, mass_kg).frequency_Hz;
+      lowest_mode(driven.bonds, unloaded.size() > 0 ? unloaded : driven.rest, driven.constraints,
+                  mass_kg)
+          .frequency_Hz;
   return result;
 }
 
@@ -116,6 +119,8 @@ Formulations inertial_formulations() {
                           .masses = true,
                           .several_contacts = true,
                           .tools = true,
+                          .own_protocols = true,
+                          .dead_loads = true,
                           .planned = true}),
        180,
        {"damping_ratio", "density_kg_per_m3"}});

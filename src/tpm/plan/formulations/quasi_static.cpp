@@ -81,11 +81,13 @@ constexpr Capabilities kOfNetwork = with_any_material({.network = true,
                                                        .field = true,
                                                        .several_contacts = true,
                                                        .tools = true,
+                                                       .own_protocols = true,
+                                                       .dead_loads = true,
                                                        .beforehand = true,
                                                        .planned = true});
 
 Capabilities in_steps(Capabilities can) {
-  can.beforehand = false;
+  can.beforehand = can.own_protocols = can.dead_loads = false;
   return can;
 }
 

@@ -108,6 +108,30 @@ Json motion_json(const ExperimentScene& scene, const SimulationRun& run) {
   return json;
 }
 
+/// What a contact with a protocol of its own has done.
+struct OwnCourse {
+  bool depth = true;
+  double largest = 0.0, last_imposed = 0.0, last = 0.0;
+};
+
+std::optional<OwnCourse> own_course(const ExperimentScene& scene, const SimulationRun& run,
+                                    std::size_t contact) {
+  const std::optional<Protocol>& protocol = scene.contacts[contact].protocol;
+  if (contact == 0 || !protocol) return std::nullopt;
+  const auto before = std::count_if(scene.contacts.begin() + 1,
+                                    scene.contacts.begin() + static_cast<std::ptrdiff_t>(contact),
+                                    [](const SceneContact& c) { return c.protocol.has_value(); });
+  const auto index = static_cast<std::size_t>(before);
+  OwnCourse course;
+  course.depth = protocol->drive() == Drive::displacement;
+  for (const CurvePoint& p : run.record.curve) {
+    if (std::abs(p.beside[index]) > std::abs(course.largest)) course.largest = p.beside[index];
+  }
+  course.last_imposed = value_at(*protocol, run.record.curve.back().time_s);
+  course.last = run.record.curve.back().beside[index];
+  return course;
+}
+
 /// What the contacts are, and the state of the tools among them at the last output.
 Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
                    const SimulationRun& run) {
@@ -123,6 +147,13 @@ Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
               {"direction", {rounded(d.x(), 9), rounded(d.y(), 9), rounded(d.z(), 9)}},
               {"share", contact.probe.share}};
     if (contact.kind != ContactKind::sphere) json["radius_m"] = contact.radius_m;
+    if (const auto own = own_course(scene, run, static_cast<std::size_t>(list.size()))) {
+      json["imposed"] = own->depth ? "depth_m" : "load_N";
+      json["response"] = own->depth ? "force_N" : "depth_m";
+      json["largest_response"] = nine_digits(own->largest);
+      json["last_imposed"] = nine_digits(own->last_imposed);
+      json["last_response"] = nine_digits(own->last);
+    }
     if (contact.kind == ContactKind::patch) {
       json["spheres"] = spheres_of(contact, scene.tissue.network.organ).size();
     }
@@ -153,9 +184,10 @@ std::string contacts_text(const ExperimentScene& scene, const RunNetwork& networ
   const QuasiStaticState& last = run.record.outputs.back();
   const auto states =
       tool_states(network.driven, last.position, run.record.contact_pushes_N.back());
-  std::size_t tool = 0;
+  std::size_t tool = 0, number = 0;
   std::string text;
   for (const SceneContact& contact : scene.contacts) {
+    const auto own = own_course(scene, run, number++);
     if (contact.kind == ContactKind::sphere && scene.contacts.size() == 1) {
       text += sideways_words(scene, contact.probe);
       continue;
@@ -176,6 +208,15 @@ std::string contacts_text(const ExperimentScene& scene, const RunNetwork& networ
       const ToolState& state = states[tool++];
       text += fmt::format(": at the end it touches {} sphere{} with {} N", state.touching,
                           state.touching == 1 ? "" : "s", significant(state.force.norm(), 6));
+    }
+    if (own) {
+      const char* unit = own->depth ? "N" : "mm";
+      const double scale = own->depth ? 1.0 : 1e3;
+      text += fmt::format(
+          "; by its own protocol: largest {} {} {}, at the end {} {} {} {} {}",
+          own->depth ? "force" : "depth", significant(scale * own->largest, 6), unit,
+          significant(scale * own->last, 6), unit, own->depth ? "at a depth of" : "under a load of",
+          significant((own->depth ? 1e3 : 1.0) * own->last_imposed, 4), own->depth ? "mm" : "N");
     }
     text += "\n";
   }
@@ -325,6 +366,7 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
             {"tolerance", f.tolerance},
             {"spheres", scene.tissue.network.organ.size()},
             {"bonds", scene.tissue.network.bonds.size()},
+            {"loads", scene.load_words},
             {"contacts", contacts_json(scene, network, run)},
             {"imposed", depth ? "depth_m" : "load_N"},
             {"response", depth ? "force_N" : "depth_m"}};
@@ -360,6 +402,9 @@ std::string simulation_text(const ExperimentScene& scene, const RunNetwork& netw
   std::string text =
       fmt::format("{}: sphere {} of {} is {}\n", scene.tissue.title, scene.probe().sphere + 1,
                   scene.tissue.network.organ.size(), depth ? "pushed to a depth" : "loaded");
+  for (const std::string& load : scene.load_words) {
+    text += fmt::format("before and all along: {}\n", load);
+  }
   text += contacts_text(scene, network, run);
   text += equations_text(scene, run);
   if (scene.formulation.masses) text += motion_text(scene, run);
