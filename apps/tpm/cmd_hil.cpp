@@ -301,12 +301,18 @@ int run_hil(const RunChoice& choice, const Session& session) {
 }  // namespace
 
 void add_device_options(CLI::App& command, DeviceOptions& options) {
-  std::vector<std::string> kinds = device_kinds();
-  kinds.emplace_back("plugin");
   command
-      .add_option("--device", options.choice.kind,
-                  "virtual, replay, plugin, omega7 or another device of Force Dimension")
-      ->check(CLI::IsMember(kinds))
+      .add_option(
+          "--device", options.choice.kind,
+          "virtual, replay, plugin, omega7 or another device with a file in configs/devices")
+      ->check([](const std::string& kind) {
+        if (kind == "plugin") return std::string();
+        std::vector<std::string> kinds = device_kinds();
+        if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return std::string();
+        kinds.emplace_back("plugin");
+        return fmt::format("'{}' is none; expected one of {}", printable(kind),
+                           fmt::join(kinds, ", "));
+      })
       ->capture_default_str();
   command.add_option("--serial", options.serial, "Of the device, where there are several")
       ->check(CLI::Range(0, 65535));

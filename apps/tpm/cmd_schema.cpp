@@ -9,6 +9,7 @@
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/keys/file_kind.hpp"
+#include "tpm/haptics/device/device_keys.hpp"
 #include "tpm/haptics/session/session_keys.hpp"
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
@@ -24,7 +25,7 @@ struct SchemaOptions {
 
 /// The kinds of files whose keys are declared in the library.
 std::vector<const FileKind*> declared_kinds() {
-  return {&session_kind(), &organ_study_kind(), &protocol_kind(), &scene_kind()};
+  return {&device_kind(), &session_kind(), &organ_study_kind(), &protocol_kind(), &scene_kind()};
 }
 
 constexpr std::string_view kEnding = ".schema.json";

@@ -12,13 +12,15 @@ namespace {
 
 std::unique_ptr<LoopContact> opened(const std::filesystem::path& file, double rate_Hz,
                                     bool start_gate, double longest_s, bool accept_unstable,
-                                    const std::string& device) {
+                                    const std::string& device,
+                                    const std::filesystem::path& device_file) {
   LoopContactOptions options;
   options.rate_Hz = rate_Hz;
   options.start_gate = start_gate;
   options.longest_s = longest_s;
   options.accept_unstable = accept_unstable;
   options.device = device;
+  options.device_file = device_file;
   const py::gil_scoped_release released;
   return std::make_unique<LoopContact>(file, options);
 }
@@ -157,7 +159,8 @@ std::string run_virtual(const std::filesystem::path& session, const std::filesys
 void bind_contacts(py::module_& module) {
   py::class_<LoopContact>(module, "Contact")
       .def(py::init(&opened), py::arg("file"), py::arg("rate_Hz"), py::arg("start_gate"),
-           py::arg("longest_s"), py::arg("accept_unstable"), py::arg("device"))
+           py::arg("longest_s"), py::arg("accept_unstable"), py::arg("device"),
+           py::arg("device_file"))
       .def("step", &step_once, py::arg("position_m"), py::arg("missed") = 0)
       .def("steps", &step_through, py::arg("positions_m"))
       .def("reset", &LoopContact::reset)

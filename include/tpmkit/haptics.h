@@ -102,7 +102,7 @@ typedef struct tpm_haptics_options {
   double longest_s;          /**< of a law file: spring-pots keep their history so long; default 600 */
   uint32_t no_start_gate;    /**< 1: forces do not wait until the tool is in free air and at rest */
   uint32_t accept_unstable;  /**< 1: open what would be unstable; not for a device with motors */
-  char device[32];           /**< whose limits apply, as `tpm hil run --device`; "": omega7 */
+  char device[32];           /**< whose limits apply, as `tpm hil run --device`; "": that of device_file, else omega7 */
   const char *device_file;   /**< limits, delay and friction measured on your device (`tpm hil identify`,
                                   schemas/device.schema.json); NULL: one period of delay and the friction
                                   that is assumed of the kind, which nobody checks */

@@ -22,7 +22,8 @@ struct SessionRequest {
   bool real_time = false;
   RealTimeWish wish = RealTimeWish::ignore;
   /// Device kind whose limits of force, stiffness and delay apply (`tpm hil devices` lists them).
-  /// Empty: "virtual" for Session::simulated_device(), "omega7" for every other device.
+  /// Empty: that of `device_file`, else "virtual" for Session::simulated_device() and "omega7" for
+  /// every other device.
   std::string limits;
   /// What was measured of the device (schemas/device.schema.json, `tpm hil identify`). Without it
   /// hardware counts as 20 ms late and free of friction, and stiff tissues are refused.

@@ -346,7 +346,11 @@ TEST_CASE("A device file in C brings the measured delay, and what it allows") {
   with_delay(0.010);  // 1 N s/m over 11.5 ms: 87 N/m, and the star has 151
   CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_REFUSED, options),
              Contains("at most 87 N/m keep six hands below 5 mJ"));
-  write_file(folder / "device.json", R"({"device": "falcon"})");
+  write_file(folder / "device.json",
+             R"({"device": "falcon", "limits": {"stiffness_N_per_m": 100}})");
+  CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_REFUSED, options),
+             Contains("too stiff for the device") && Contains("at most 100 N/m"));
+  std::strcpy(options.device, "omega7");
   CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_BAD_INPUT, options),
              Contains("is of 'falcon', not of 'omega7'"));
 }

@@ -69,6 +69,11 @@ TEST_CASE("The view tells the last cycle, the target, the counts, and each point
   CHECK(state.at("commanded_N") == 0.4);
   const auto hand_N = state.at("hand_N").get<std::vector<double>>();
   CHECK(std::hypot(hand_N[0], hand_N[1], hand_N[2]) == Approx(0.4));
+  // The tool is 1.199 mm deep, and the force on the hand points out of the tissue.
+  const auto tool_m = state.at("tool_m").get<std::vector<double>>();
+  CHECK(std::hypot(tool_m[0], tool_m[1], tool_m[2]) == Approx(1.199e-3));
+  const double along = tool_m[0] * hand_N[0] + tool_m[1] * hand_N[1] + tool_m[2] * hand_N[2];
+  CHECK(along == Approx(-1.199e-3 * 0.4));
   CHECK(state.at("over") == false);
   CHECK(state.at("counts").at("late") == 0);
   CHECK_THAT(state.at("loop").at("busy_p99_s").get<double>(), WithinAbs(20e-6, 1.1e-6));

@@ -33,7 +33,11 @@ class Contact:
     accept_unstable
         Open what would be unstable on the device.
     device
-        Whose limits apply, as `tpm hil run --device` takes it.
+        Whose limits apply, as `tpm hil run --device` takes it. Default: the device of `device_file`, else omega7.
+    device_file
+        What is known of your device: limits, and the delay and friction that `tpm hil identify` measured
+        (schemas/device.schema.json). Without it forces are taken to come one period late, with the friction that is
+        assumed of the device; nobody checks that.
 
     Raises
     ------
@@ -49,9 +53,12 @@ class Contact:
         start_gate: bool = True,
         longest_s: float = 600.0,
         accept_unstable: bool = False,
-        device: str = "omega7",
+        device: str = "",
+        device_file: str | os.PathLike[str] = "",
     ) -> None:
-        self._core = _core.Contact(os.fspath(file), rate_Hz, start_gate, longest_s, accept_unstable, device)
+        self._core = _core.Contact(
+            os.fspath(file), rate_Hz, start_gate, longest_s, accept_unstable, device, os.fspath(device_file)
+        )
 
     def step(self, position_m: npt.ArrayLike, *, missed: int = 0) -> Array:
         """One period: position of the tool (m) to force on the hand (N), both in device coordinates.

@@ -2,52 +2,109 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "tpm/base/text.hpp"
-#include "tpm/files/renamed_names.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/device/device_keys.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 namespace {
 
-std::optional<double> number_of(const Json& block, const char* key) {
-  if (!block.contains(key)) return std::nullopt;
-  return block.at(key).get<double>();
+/// A number of a part that says it was measured; empty for an assumed one.
+template <class Part>
+std::optional<double> measured_number(const std::optional<Part>& part, double Part::*number) {
+  if (!part || part->provenance != KnownBy::measured) return std::nullopt;
+  return *part.*number;
 }
 
-/// A number of a part that says it was measured; empty for an assumed one.
-std::optional<double> measured_number(const Json& json, const char* part, const char* key) {
-  if (!json.contains(part)) return std::nullopt;
-  const Json& block = json.at(part);
-  if (block.at("provenance") != "measured") return std::nullopt;
-  return block.at(key).get<double>();
+std::filesystem::path shipped_folder() {
+  return share_dir() / "configs" / "devices";
+}
+
+bool is_plain_name(std::string_view kind) {
+  return !kind.empty() && std::all_of(kind.begin(), kind.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+  });
 }
 
 }  // namespace
 
 DeviceFile parse_device_file(const Json& written, const std::string& where) {
-  const Json json = checked(written, "device", where);
+  const DeviceKeys keys =
+      device_block().made(checked(written, device_kind(), where), DocumentPlace{where});
   DeviceFile file;
   file.where = where;
-  file.kind = json.at("device").get<std::string>();
-  file.serial = json.value("serial", std::string());
-  const Json limits = json.value("limits", Json::object());
-  file.force_N = number_of(limits, "force_N");
-  file.reach_m = number_of(limits, "reach_m");
-  file.stiffness_N_per_m = number_of(limits, "stiffness_N_per_m");
-  file.damping_N_s_per_m = number_of(limits, "damping_N_s_per_m");
-  file.slew_N_per_s = number_of(limits, "slew_N_per_s");
-  file.least_ramp_in_s = number_of(limits, "least_ramp_in_s");
-  if (json.contains("encoder_step")) {
-    file.encoder_step_m = json.at("encoder_step").at("step_m").get<double>();
+  file.kind = keys.device;
+  file.name = keys.name.value_or("");
+  file.serial = keys.serial.value_or("");
+  const DeviceLimitKeys limits = keys.limits.value_or(DeviceLimitKeys{});
+  file.force_N = limits.force_N;
+  file.reach_m = limits.reach_m;
+  file.stiffness_N_per_m = limits.stiffness_N_per_m;
+  file.damping_N_s_per_m = limits.damping_N_s_per_m;
+  file.slew_N_per_s = limits.slew_N_per_s;
+  file.least_ramp_in_s = limits.least_ramp_in_s;
+  if (limits.provenance) file.provenance = *limits.provenance;
+  if (keys.encoder_step) file.encoder_step_m = keys.encoder_step->step_m;
+  if (keys.viscous_friction) {
+    file.friction_N_s_per_m = keys.viscous_friction->lower_95_N_s_per_m;
   }
-  file.measured_delay_s = measured_number(json, "delay", "largest_s");
+  file.measured_delay_s = measured_number(keys.delay, &DeviceDelayKeys::largest_s);
   file.measured_friction_N_s_per_m =
-      measured_number(json, "viscous_friction", "lower_95_N_s_per_m");
+      measured_number(keys.viscous_friction, &ViscousFrictionKeys::lower_95_N_s_per_m);
   return file;
 }
 
 DeviceFile read_device_file(const std::filesystem::path& file) {
   return parse_device_file(read_json(file), file.string());
+}
+
+std::vector<std::string> shipped_devices() {
+  std::vector<std::string> kinds;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(shipped_folder(), none)) {
+    if (entry.path().extension() == ".json") kinds.push_back(entry.path().stem().string());
+  }
+  std::sort(kinds.begin(), kinds.end());
+  return kinds;
+}
+
+std::optional<DeviceFile> shipped_device_file(std::string_view kind) {
+  if (!is_plain_name(kind)) return std::nullopt;
+  const std::filesystem::path file = shipped_folder() / fmt::format("{}.json", kind);
+  if (!std::filesystem::is_regular_file(file)) return std::nullopt;
+  DeviceFile shipped = read_device_file(file);
+  if (shipped.kind != kind) {
+    throw bad_input(shipped.where + ": key /device", "is '" + printable(shipped.kind) + "'",
+                    fmt::format("'{}', as the file is called", kind));
+  }
+  return shipped;
+}
+
+DeviceLimits limits_in(const DeviceFile& file) {
+  const auto stated = [&](const std::optional<double>& number, const char* key) {
+    if (number) return *number;
+    throw bad_input(file.where + ": key /limits", fmt::format("states no {}", key),
+                    "all limits of a device that the program does not know itself");
+  };
+  DeviceLimits limits;
+  limits.kind = file.kind;
+  limits.name = file.name.empty() ? file.kind : file.name;
+  limits.force_N = stated(file.force_N, "force_N");
+  limits.reach_m = stated(file.reach_m, "reach_m");
+  limits.stiffness_N_per_m = stated(file.stiffness_N_per_m, "stiffness_N_per_m");
+  limits.damping_N_s_per_m = stated(file.damping_N_s_per_m, "damping_N_s_per_m");
+  limits.slew_N_per_s = stated(file.slew_N_per_s, "slew_N_per_s");
+  limits.least_ramp_in_s = stated(file.least_ramp_in_s, "least_ramp_in_s");
+  limits.friction_N_s_per_m = file.friction_N_s_per_m.value_or(0.0);
+  limits.delay_periods = 1;
+  limits.provenance = file.provenance;
+  if (file.encoder_step_m) limits.encoder_step_m = *file.encoder_step_m;
+  limits.measured_delay_s = file.measured_delay_s;
+  limits.measured_friction_N_s_per_m = file.measured_friction_N_s_per_m;
+  return limits;
 }
 
 DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file) {

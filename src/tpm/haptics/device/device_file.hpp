@@ -2,6 +2,9 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
@@ -14,9 +17,12 @@ namespace tpm::haptics {
 struct DeviceFile {
   std::string where;   ///< the file, for messages
   std::string kind;    ///< as limits_of() takes it, or "plugin"
+  std::string name;    ///< as its maker writes it; may be empty
   std::string serial;  ///< of the device that was measured; empty: any of the kind
   std::optional<double> force_N, reach_m, stiffness_N_per_m, damping_N_s_per_m, slew_N_per_s,
-      least_ramp_in_s, encoder_step_m;
+      least_ramp_in_s, encoder_step_m, friction_N_s_per_m;
+  /// Where a limit comes from, by its key.
+  std::vector<std::pair<std::string, std::string>> provenance;
   /// Largest delay from a position to its force, both paths together and without the hold of a
   /// command, s. Empty unless it was measured: an assumed one is not counted.
   std::optional<double> measured_delay_s;
@@ -27,6 +33,13 @@ struct DeviceFile {
 /// Throws Error(bad_input) with file and key.
 [[nodiscard]] DeviceFile read_device_file(const std::filesystem::path& file);
 [[nodiscard]] DeviceFile parse_device_file(const Json& json, const std::string& where);
+
+/// Kinds of the device files that are installed with the program (configs/devices), sorted.
+[[nodiscard]] std::vector<std::string> shipped_devices();
+/// The file of one of them; none of another kind. Throws Error(bad_input).
+[[nodiscard]] std::optional<DeviceFile> shipped_device_file(std::string_view kind);
+/// Limits of a device that is known by its file alone. Throws Error(bad_input) if one is missing.
+[[nodiscard]] DeviceLimits limits_in(const DeviceFile& file);
 
 /// Limits of a kind of device as far as a file says others. Throws Error(bad_input) if the file is
 /// of another kind, or a limit is above that of the kind.

@@ -3,35 +3,28 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "tpm/haptics/device/device_file.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 namespace {
 
-// Force and reach of the Omega.7: its data sheet. Stiffness and damping of omega, lambda and
-// Falcon: CHAI3D 3.3. All else of the others is assumed, and no higher than that of the Omega.7.
-constexpr DeviceLimits kDeviceLimits[] = {
+// Force and reach of the Omega.7: its data sheet. Stiffness and damping: CHAI3D 3.3. All other
+// devices have a file in configs/devices.
+const DeviceLimits kDeviceLimits[] = {
     {"virtual", "simulated Omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0, 0.0,
      true},
     {"replay", "replay", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
     {"omega7", "omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"omega3", "omega.3", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"omega6", "omega.6", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"delta3", "delta.3", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"sigma3", "sigma.3", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"sigma7", "sigma.7", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"lambda3", "lambda.3", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"lambda6", "lambda.6", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"lambda7", "lambda.7", false, 12.0, 0.075, 8000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"falcon", "Falcon", false, 8.0, 0.05, 3000.0, 20.0, 1000.0, 0.1, 0.1, 1},
 };
 
 }  // namespace
 
-const DeviceLimits& limits_of(std::string_view kind) {
+DeviceLimits limits_of(std::string_view kind) {
   for (const DeviceLimits& limits : kDeviceLimits) {
     if (limits.kind == kind) return limits;
   }
+  if (const auto file = shipped_device_file(kind)) return limits_in(*file);
   throw Error(ExitCode::usage, "--device", "'" + printable(kind) + "'",
               fmt::format("one of {}", fmt::join(device_kinds(), ", ")));
 }
@@ -39,6 +32,7 @@ const DeviceLimits& limits_of(std::string_view kind) {
 std::vector<std::string> device_kinds() {
   std::vector<std::string> kinds;
   for (const DeviceLimits& limits : kDeviceLimits) kinds.emplace_back(limits.kind);
+  for (std::string& kind : shipped_devices()) kinds.push_back(std::move(kind));
   return kinds;
 }
 

@@ -128,7 +128,7 @@ ForceDimension::~ForceDimension() {
 }
 
 Error ForceDimension::fault(std::string_view what, std::string_view expected) const {
-  return {ExitCode::environment, std::string(limits_.kind), what, expected};
+  return {ExitCode::environment, limits_.kind, what, expected};
 }
 
 std::string ForceDimension::last_words() const {
@@ -206,6 +206,9 @@ void ForceDimension::identify() {
         "never tried with {}: it is taken to have at least the force, workspace and stability of "
         "{} N, {} mm and {} N/m",
         limits_.name, limits_.force_N, 1e3 * limits_.reach_m, limits_.stiffness_N_per_m));
+    for (const auto& [limit, source] : limits_.provenance) {
+      identity_.assumptions.push_back(fmt::format("{}: {}", limit, source));
+    }
   }
 }
 

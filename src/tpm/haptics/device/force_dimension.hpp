@@ -65,7 +65,7 @@ class ForceDimension final : public HapticDevice {
 
   std::shared_ptr<DhdLibrary> library_;  ///< shared with a call that is stuck in it
   const DhdCalls& call_;
-  const DeviceLimits& limits_;
+  DeviceLimits limits_;
   DeviceSelection which_;
   DeviceIdentity identity_;
   DeviceStatus status_;

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "tpm/base/text.hpp"
+#include "tpm/haptics/device/device_keys.hpp"
 #include "tpm/haptics/device/forces_off_guard.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
 #include "tpmkit/error.hpp"
@@ -62,10 +63,6 @@ ServoSettings identifying_settings(const HilSession& like, const DeviceLimits& l
   gate.reach_m = limits.reach_m - kLongestStroke_m;
   servo.gate = gate;
   return servo;
-}
-
-Json interval(double low, double high, int digits) {
-  return Json::array({rounded(low, digits), rounded(high, digits)});
 }
 
 /// Moves the handle; fills the identity and the outcome of the run.
@@ -161,37 +158,40 @@ IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& lik
 
 Json device_file_json(const IdentifyRun& run, const std::string& date) {
   constexpr int kDigits = 4;
+  const auto digits = [](const std::optional<double>& value) { return rounded(*value, kDigits); };
   const DeviceIdentification& f = run.found;
-  Json json{{"device", run.device.kind}, {"name", run.device.name}};
-  if (!run.device.serial.empty()) json["serial"] = run.device.serial;
+  DeviceKeys file;
+  file.device = run.device.kind;
+  file.name = run.device.name;
+  if (!run.device.serial.empty()) file.serial = run.device.serial;
   if (f.delay_largest_s) {
-    json["delay"] = {{"provenance", "measured"},
-                     {"mean_s", rounded(*f.delay_mean_s, kDigits)},
-                     {"largest_s", rounded(*f.delay_largest_s, kDigits)},
-                     {"jitter_s", rounded(*f.delay_jitter_s, kDigits)},
-                     {"resolution_s", rounded(f.resolution_s, kDigits)},
-                     {"tries", f.edges}};
+    file.delay = {.provenance = KnownBy::measured,
+                  .largest_s = digits(f.delay_largest_s),
+                  .mean_s = digits(f.delay_mean_s),
+                  .jitter_s = digits(f.delay_jitter_s),
+                  .resolution_s = rounded(f.resolution_s, kDigits),
+                  .tries = f.edges};
   }
   if (f.viscous_lower_95_N_s_per_m) {
-    json["viscous_friction"] = {
-        {"provenance", "measured"},
-        {"lower_95_N_s_per_m", rounded(*f.viscous_lower_95_N_s_per_m, kDigits)},
-        {"estimate_N_s_per_m", rounded(*f.viscous_N_s_per_m, kDigits)}};
-    json["coulomb_friction"] = {
-        {"provenance", "measured"},
-        {"interval_N", interval(*f.coulomb_low_N, *f.coulomb_high_N, kDigits)}};
+    file.viscous_friction = {.provenance = KnownBy::measured,
+                             .lower_95_N_s_per_m = digits(f.viscous_lower_95_N_s_per_m),
+                             .estimate_N_s_per_m = digits(f.viscous_N_s_per_m)};
+    file.coulomb_friction = {
+        .provenance = KnownBy::measured,
+        .interval_N = std::vector{digits(f.coulomb_low_N), digits(f.coulomb_high_N)}};
   }
   if (f.encoder_step_m) {
-    json["encoder_step"] = {{"provenance", "measured"},
-                            {"step_m", rounded(*f.encoder_step_m, kDigits)},
-                            {"noise_m", rounded(f.noise_m, kDigits)}};
+    file.encoder_step = {.provenance = KnownBy::measured,
+                         .step_m = digits(f.encoder_step_m),
+                         .noise_m = rounded(f.noise_m, kDigits)};
   }
   if (f.mass_kg) {
-    json["moving_mass"] = {{"provenance", "measured"},
-                           {"interval_kg", interval(*f.mass_low_kg, *f.mass_high_kg, kDigits)}};
-    if (f.mass_certain) json["moving_mass"]["mass_kg"] = rounded(*f.mass_kg, kDigits);
+    file.moving_mass = {.provenance = KnownBy::measured,
+                        .mass_kg = std::nullopt,
+                        .interval_kg = std::vector{digits(f.mass_low_kg), digits(f.mass_high_kg)}};
+    if (f.mass_certain) file.moving_mass->mass_kg = digits(f.mass_kg);
   }
-  if (!f.not_identified.empty()) json["not_identified"] = f.not_identified;
+  if (!f.not_identified.empty()) file.not_identified = f.not_identified;
   Json measurement{{"version", version()},
                    {"simulated_device", !run.device.hardware},
                    {"time", run.real_time ? "real" : "virtual"},
@@ -205,8 +205,8 @@ Json device_file_json(const IdentifyRun& run, const std::string& date) {
     measurement["host"] = host_line();
     measurement["scheduling"] = run.outcome.scheduling;
   }
-  json["measurement"] = std::move(measurement);
-  return json;
+  file.measurement = std::move(measurement);
+  return device_block().write(file);
 }
 
 }  // namespace tpm::haptics

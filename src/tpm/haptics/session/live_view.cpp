@@ -183,15 +183,20 @@ void LiveView::take_shape(const ServoRecord& row) {
     (void)shape_.field->step(moved);
     shape_.field->displacements(displacement_m_);
   }
-  if (shape_.to_model) {
-    state_.tool_m = moved;
-  } else {
+  if (!shape_.to_model) {
     displacement_m_.col(static_cast<Eigen::Index>(shape_.contact)) = moved;
   }
   state_.displacement_um.clear();
   for (const double x_m : displacement_m_.reshaped()) {
     state_.displacement_um.push_back(static_cast<std::int32_t>(std::lround(1e6 * x_m)));
   }
+}
+
+/// The tool from where the surface is at rest, in the coordinates of the scene.
+Eigen::Vector3d LiveView::tool_of(const ServoRecord& row) const {
+  if (!shape_.to_model) return row.tool_depth_m * shape_.push;
+  const Eigen::Map<const Eigen::Vector3d> at_m(row.position_m);
+  return *shape_.to_model * (at_m - session_.servo.surface_m);
 }
 
 void LiveView::take_point(const ServoRecord& row) {
@@ -211,6 +216,7 @@ void LiveView::see(const ServoRecord& row) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (row.phase < 0) {
     state_.last.tool_depth_m = row.tool_depth_m;
+    state_.tool_m = tool_of(row);
     state_.place = instruction_of(row);
     state_.cause = row.stop;
     return;
@@ -230,6 +236,7 @@ void LiveView::see(const ServoRecord& row) {
     return;
   }
   state_.last = row;
+  state_.tool_m = tool_of(row);
   state_.least_J = std::min(state_.least_J, row.observed_J);
   state_.commanded_N = -session_.servo.push.dot(Eigen::Map<const Eigen::Vector3d>(row.commanded_N));
   state_.hand_N =

@@ -45,13 +45,14 @@ class LiveView {
     std::deque<Point> points;
     std::vector<std::int32_t> displacement_um;         ///< x, y, z of each sphere
     Eigen::Vector3d hand_N = Eigen::Vector3d::Zero();  ///< commanded, in the scene's coordinates
-    Eigen::Vector3d tool_m = Eigen::Vector3d::Zero();  ///< from its start, if it moves in space
+    Eigen::Vector3d tool_m = Eigen::Vector3d::Zero();  ///< from the surface at rest, scene
     std::string place;  ///< what is missing before the session can begin
     bool begun = false, over = false;
     StopCause cause = StopCause::none;
     std::string detail;
   };
   void count(const ServoRecord& row);
+  [[nodiscard]] Eigen::Vector3d tool_of(const ServoRecord& row) const;
   void take_point(const ServoRecord& row);
   void take_shape(const ServoRecord& row);
   void take_times();

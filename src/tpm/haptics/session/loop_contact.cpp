@@ -102,10 +102,14 @@ struct LoopContact::Stepped {
 
 LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOptions& options)
     : session_(session_of(file, options)), loop_(make_loop_model(session_, true)) {
-  DeviceLimits limits = limits_of(options.device);
+  DeviceLimits limits;
   if (!options.device_file.empty()) {
-    limits = limits_by_file(limits, read_device_file(options.device_file));
-  } else if (limits.hardware()) {
+    const DeviceFile file = read_device_file(options.device_file);
+    limits = limits_by_file(limits_of(options.device.empty() ? file.kind : options.device), file);
+  } else {
+    limits = limits_of(options.device.empty() ? "omega7" : options.device);
+  }
+  if (options.device_file.empty() && limits.hardware()) {
     // The loop is the caller's, and so is the device: what is assumed of its kind counts.
     limits.measured_delay_s = 0.0;
     limits.measured_friction_N_s_per_m = limits.friction_N_s_per_m;

@@ -232,7 +232,7 @@ HilSession parse_session(const Json& written, std::string_view where,
   const Json json = checked(written, session_kind(), where);
   const DocumentPlace place{std::string(where)};
   SessionKeys keys = session_block().made(json, place);
-  const DeviceLimits& device = limits_of("omega7");  // the simulated one has the same
+  const DeviceLimits device = limits_of("omega7");  // the simulated one has the same
   HilSession session;
   session.title = keys.title;
   set_model(session, keys.model, place.key("model"), folder);

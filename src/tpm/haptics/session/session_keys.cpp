@@ -17,7 +17,7 @@ constexpr Range from_to(double least, double most) {
 }
 
 /// The simulated device has the limits of this one.
-const DeviceLimits& usual_limits() {
+DeviceLimits usual_limits() {
   return limits_of("omega7");
 }
 
@@ -144,7 +144,7 @@ const Block<DeviceMounting>& mounting_block() {
 const Block<LimitKeys>& limits_block() {
   using K = LimitKeys;
   using S = SessionServo;
-  const DeviceLimits& device = usual_limits();
+  const DeviceLimits device = usual_limits();
   const auto of_servo = [](const Key<S>& key) { return within(&K::servo, key); };
   static const Block<K> block(
       "session_limits", "where the loop cuts, slips or stops",

@@ -183,7 +183,10 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
   run.rendering = check_rendering(session, *stepped, run.model, limits);
   if (choice.kind == "virtual") {
     DeviceLimits real = limits_of("omega7");
-    if (!choice.file.empty()) real = limits_by_file(real, read_device_file(choice.file));
+    if (!choice.file.empty()) {
+      const DeviceFile file = read_device_file(choice.file);
+      real = limits_by_file(limits_of(file.kind), file);
+    }
     run.on_hardware = check_rendering(session, *stepped, run.model, real);
   }
   require_acceptable(run.rendering, choice, limits, options);
@@ -233,7 +236,7 @@ DeviceLimits limits_of(const DeviceChoice& choice) {
 
 std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilSession& session) {
   if (choice.kind == "plugin") return plugin_of(choice);
-  const DeviceLimits& limits = limits_of(choice.kind);
+  const DeviceLimits limits = limits_of(choice.kind);
   if (limits.plant) {
     return std::make_shared<VirtualOmega7>(session.plant, session.operator_script(), limits);
   }

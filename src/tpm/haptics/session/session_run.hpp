@@ -17,7 +17,7 @@ struct DeviceChoice {
   std::filesystem::path replay;   ///< recording to be replayed
   std::filesystem::path plugin;   ///< of the kind "plugin": its shared library
   /// What was measured of it (device_file.hpp); empty: nothing. Of the kind "virtual" that of the
-  /// Omega.7 which it stands for.
+  /// device which it stands for.
   std::filesystem::path file;
   DeviceSelection which;
   bool may_move = false;

@@ -1,0 +1,88 @@
+// Device description files: those that are shipped, what they bring, and what is refused.
+#include <catch2/catch.hpp>
+
+#include "refusal.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/device/device_file.hpp"
+#include "tpm/haptics/device/device_keys.hpp"
+#include "tpm/haptics/session/loop_contact.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
+
+TEST_CASE("Nine devices have a shipped file, in which every limit says that it is assumed") {
+  CHECK(shipped_devices() == std::vector<std::string>{"delta3", "falcon", "lambda3", "lambda6",
+                                                      "lambda7", "omega3", "omega6", "sigma3",
+                                                      "sigma7"});
+  for (const std::string& kind : shipped_devices()) {
+    CAPTURE(kind);
+    const DeviceFile file = shipped_device_file(kind).value();
+    CHECK(file.provenance.size() == 6);
+    for (const auto& [limit, source] : file.provenance) CHECK_THAT(source, StartsWith("assumed: "));
+    const DeviceLimits limits = limits_of(kind);
+    CHECK(limits.kind == kind);
+    CHECK_FALSE(limits.tried);
+    CHECK(limits.hardware());
+    CHECK_FALSE(limits.measured_delay_s.has_value());
+    CHECK_FALSE(limits.measured_friction_N_s_per_m.has_value());
+    // No limit of a device that nobody has tried is above what is known of the Omega.7, but the
+    // stiffness of the lambda.7.
+    const DeviceLimits known = limits_of("omega7");
+    CHECK(limits.force_N <= known.force_N);
+    CHECK(limits.reach_m <= known.reach_m);
+    CHECK(limits.slew_N_per_s <= known.slew_N_per_s);
+    if (kind != "lambda7") CHECK(limits.stiffness_N_per_m <= known.stiffness_N_per_m);
+  }
+  CHECK(limits_of("falcon").reach_m == 0.04);
+  CHECK(limits_of("sigma7").stiffness_N_per_m == 4000.0);
+}
+
+TEST_CASE("A kind of device is known by itself, by a shipped file, or not at all") {
+  CHECK(device_kinds().size() == 12);
+  CHECK(limits_of("omega7").tried);
+  CHECK_FALSE(shipped_device_file("omega7").has_value());
+  CHECK_THAT(test::refusal_of([] { (void)limits_of("gloves"); }),
+             Contains("'gloves'") && Contains("virtual, replay, omega7, delta3, falcon"));
+  // A name is no way to another folder.
+  CHECK_THAT(test::refusal_of([] { (void)limits_of("../hil_liver"); }), Contains("../hil_liver"));
+  CHECK_THAT(test::refusal_of([] { (void)limits_of(""); }), Contains("one of"));
+}
+
+TEST_CASE("The file of a device that only it describes states every limit") {
+  Json json = read_json(share_dir() / "configs" / "devices" / "falcon.json");
+  CHECK(limits_in(parse_device_file(json, "f")).force_N == 8.0);
+  json["limits"].erase("force_N");
+  CHECK_THAT(test::refusal_of([&] { (void)parse_device_file(json, "f"); }),
+             Contains("f: key /limits/provenance: of 'force_N', which is not stated"));
+  json["limits"]["provenance"].erase("force_N");
+  CHECK_THAT(test::refusal_of([&] { (void)limits_in(parse_device_file(json, "f")); }),
+             Contains("f: key /limits: states no force_N"));
+}
+
+TEST_CASE("A device file is written as it is read") {
+  const Json json = read_json(share_dir() / "configs" / "devices" / "lambda7.json");
+  const DeviceKeys keys = device_block().read(json, DocumentPlace{"l"});
+  CHECK(device_block().write(keys) == json);
+}
+
+TEST_CASE("A rehearsal stands for the device of its file") {
+  const test::TempFolder folder;
+  write_file(folder / "d.json", R"({"device": "falcon", "limits": {"force_N": 2}})");
+  const DeviceFile file = read_device_file(folder / "d.json");
+  CHECK(limits_by_file(limits_of(file.kind), file).force_N == 2.0);
+  CHECK(limits_by_file(limits_of(file.kind), file).reach_m == 0.04);
+  write_file(folder / "high.json", R"({"device": "falcon", "limits": {"reach_m": 0.05}})");
+  CHECK_THAT(test::refusal_of([&] {
+               const DeviceFile high = read_device_file(folder / "high.json");
+               (void)limits_by_file(limits_of(high.kind), high);
+             }),
+             Contains("0.05; expected at most 0.04, the limit of 'falcon'"));
+}
+
+}  // namespace
+}  // namespace tpm::haptics
