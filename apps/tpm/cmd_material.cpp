@@ -9,6 +9,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/predict/organ_material.hpp"
+#include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/show/organ_material_report.hpp"
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
@@ -67,9 +68,10 @@ int run_material(const MaterialCommand& command, const Session& session) {
   }
   const LawFile law = read_law(command.law);
   const Json scene = checked(read_json(command.scene), scene_kind(), command.scene);
-  const OrganMaterial result =
+  OrganMaterial result =
       put_on_organ(law, chosen_motions(command, law, scene), scene, command.scene,
                    std::filesystem::path(command.scene).parent_path(), material_options(command));
+  result.samples_sha256 = sample_digests(read_json(command.law));
   if (!command.output.empty()) deliver(to_text(result.scene), command.output);
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
   if (!command.folder.empty()) {

@@ -1,32 +1,45 @@
 // tpm validate: a fitted law against recordings that it has not seen.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <memory>
 
 #include "command.hpp"
+#include "plan_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/instrument.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/predict/organ_prediction.hpp"
+#include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/show/credibility_page.hpp"
 #include "tpm/fit/show/validation_report.hpp"
 #include "tpm/fit/validate/validation.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/verify/session_presses.hpp"
+#include "tpm/organ/scene/experiment_scene.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
 
 namespace tpm::app {
 namespace {
 
+constexpr const char* kSessionEnds = ".tpmrec";
+
 struct ValidateOptions {
-  std::string law;
+  std::string law;  ///< or organ
+  std::string session;
+  bool plan = false;
+  PlanChoice planned;
   RecordingOptions recordings;
   std::vector<std::string> quantities;
   std::string requirement, placement = "held", instrument, calibration_instrument, at;
   std::string folder, output;
   std::string credibility, recheck;
+  std::vector<std::string> evidence;
   CredibilityWords words;
 };
 
@@ -49,20 +62,117 @@ std::optional<Instrument> stated_instrument(const std::string& recording, const 
   return instrument_of(*block, spec, recording);
 }
 
-LawFile law_to_validate(const std::string& path) {
-  if (is_organ_document(read_json(path))) {
-    throw bad_input(
-        path, "is an organ, which tpm validate does not compare yet",
-        "the law.json that was put on it; tpm predict compares an organ with a recording");
+/// The reduced model that a plan picks for an organ, along a motion.
+PickedAnswer picked_answer(const Json& scene, const std::string& where, const PlanChoice& choice,
+                           const Protocol& motion, const std::vector<double>& times_s) {
+  Json bare = scene;
+  bare["protocol"] = {
+      {"kind", "ramp_hold"}, {"depth", "1 mm"}, {"rate", "1 mm/s"}, {"hold", "1 s"}};
+  ExperimentScene experiment = parse_experiment(bare, where, {});
+  experiment.protocol = motion;
+  experiment.protocol.set_equilibrium_at_start(false);  // it begins at the surface
+  PlanRequest request = plan_request(choice);
+  request.relevance = request.changes = false;
+  const Plan plan = planned(experiment, std::move(request));
+  if (!plan.choice) {
+    throw Error(ExitCode::answer_is_no, where, "no model meets the tolerance",
+                "a larger --tolerance; tpm plan says why");
   }
-  return read_law(path);
+  std::vector<double> asked;
+  for (const double t : times_s) {
+    if (t <= motion.end_s()) asked.push_back(t);
+  }
+  const Trajectory answer = run_planned(plan, experiment, asked);
+  PickedAnswer picked{plan.chosen().name, {}, 0.0};
+  picked.value.setConstant(static_cast<Eigen::Index>(times_s.size()),
+                           std::numeric_limits<double>::quiet_NaN());
+  picked.value.head(answer.response.size()) = answer.response;
+  picked.claimed_limit =
+      plan.reference.peak * shown_error(plan, plan.chosen().claimed_error).value_or(0.0);
+  return picked;
+}
+
+/// The law, or the organ that it was put on.
+void set_subject(ValidationRequest& request, std::vector<std::string>& digests,
+                 const ValidateOptions& options) {
+  const Json document = read_json(options.law);
+  request.law_file = options.law;
+  request.law_sha256 = sha256_hex(read_file(options.law));
+  if (!is_organ_document(document)) {
+    if (options.plan) {
+      throw Error(ExitCode::usage, "--plan", "with a law", "the organ that the law was put on");
+    }
+    request.law = read_law(options.law);
+    digests = sample_digests(document);
+    return;
+  }
+  request.organ = std::shared_ptr<const OrganOfLaw>(new OrganOfLaw(read_organ_of_law(options.law)));
+  request.law = request.organ->law();
+  const Json material =
+      document.contains("scene")
+          ? document
+          : read_json(std::filesystem::path(options.law).parent_path() / "material.json");
+  digests = sample_digests(material.at("fitted_law"));
+  if (!options.plan) return;
+  request.pick = [scene = material.at("scene"), where = options.law, choice = options.planned](
+                     const Protocol& motion, const std::vector<double>& times_s) {
+    return picked_answer(scene, where, choice, motion, times_s);
+  };
+}
+
+bool is_session(const std::string& file) {
+  return file.ends_with(kSessionEnds);
+}
+
+void add_presses(ValidationRequest& request, const std::string& file) {
+  const std::vector<SessionPress> presses =
+      session_presses(read_recording(file), sha256_hex(read_file(file)));
+  for (const SessionPress& press : presses) {
+    request.recordings.push_back(press.recording);
+    request.earlier.push_back(press.earlier);
+    request.instruments.emplace_back();
+  }
+}
+
+/// Recordings, or the presses of sessions: not both, for a press has no zero to be found.
+void set_recordings(ValidationRequest& request, const ValidateOptions& options) {
+  const std::vector<std::string>& files = options.recordings.files;
+  const auto sessions = std::ranges::count_if(files, is_session);
+  if (sessions == 0) {
+    request.recordings = read_recordings(options.recordings);
+    for (const std::string& file : files) {
+      request.instruments.push_back(stated_instrument(file, options.instrument, request.law.spec));
+    }
+    return;
+  }
+  if (sessions != std::ssize(files)) {
+    throw Error(ExitCode::usage, "RECORDING", "sessions beside recordings",
+                "one kind; --session FILE adds what a session's rendering changes");
+  }
+  if (!options.session.empty()) {
+    throw Error(ExitCode::usage, "--session", "beside a session that is compared",
+                "recordings of a material");
+  }
+  for (const std::string& file : files) add_presses(request, file);
+}
+
+/// What a session's rendering changes, from the subject along the hand's own motion.
+void add_rendering(ValidationRequest& request, const ValidateOptions& options) {
+  if (options.session.empty()) return;
+  ValidationRequest presses = request;
+  presses.recordings.clear();
+  presses.instruments.clear();
+  presses.requirement.reset();
+  presses.calibration = {};
+  add_presses(presses, options.session);
+  request.session = options.session;
+  request.rendering = rendering_errors(validate(presses));
 }
 
 ValidationRequest validation_request(const ValidateOptions& options) {
   ValidationRequest request;
-  request.law = law_to_validate(options.law);
-  request.law_file = options.law;
-  request.law_sha256 = sha256_hex(read_file(options.law));
+  std::vector<std::string> digests;
+  set_subject(request, digests, options);
   const LawSpec& spec = request.law.spec;
   if (!options.requirement.empty()) {
     request.requirement =
@@ -76,18 +186,17 @@ ValidationRequest validation_request(const ValidateOptions& options) {
   }
   request.contact_by_threshold = !options.recordings.contact_response.empty();
   if (!options.at.empty()) request.at = options.at;
-  request.recordings = read_recordings(options.recordings);
-  for (const std::string& file : options.recordings.files) {
-    request.instruments.push_back(stated_instrument(file, options.instrument, spec));
-  }
-  request.calibration = find_calibration(request.law, options.law, [&](const std::string& file) {
-    return prepared(file, read_recording_file(file, import_options(options.recordings)),
-                    options.recordings);
-  });
+  set_recordings(request, options);
+  request.calibration =
+      find_calibration(request.law, options.law, digests, [&](const std::string& file) {
+        return prepared(file, read_recording_file(file, import_options(options.recordings)),
+                        options.recordings);
+      });
   if (!options.calibration_instrument.empty()) {
     request.calibration.instrument = instrument_of(instrument_block(options.calibration_instrument),
                                                    spec, options.calibration_instrument);
   }
+  add_rendering(request, options);
   return request;
 }
 
@@ -103,7 +212,10 @@ Json invocation_of(const ValidateOptions& o) {
           {"placement", o.placement},
           {"instrument", o.instrument},
           {"calibration_instrument", o.calibration_instrument},
-          {"at", o.at}};
+          {"at", o.at},
+          {"session", o.session},
+          {"evidence", o.evidence},
+          {"plan", o.plan ? o.planned.tolerance : std::string()}};
 }
 
 ValidateOptions options_of(const Json& record, const std::string& page) {
@@ -121,6 +233,11 @@ ValidateOptions options_of(const Json& record, const std::string& page) {
     o.instrument = i.at("instrument");
     o.calibration_instrument = i.at("calibration_instrument");
     o.at = i.at("at");
+    o.session = i.value("session", "");
+    o.evidence = i.value("evidence", std::vector<std::string>{});
+    const std::string tolerance = i.value("plan", "");
+    o.plan = !tolerance.empty();
+    if (o.plan) o.planned.tolerance = tolerance;
     const Json& words = record.at("words");
     o.words = {words.at("question"), words.at("context"), words.at("risk")};
     return o;
@@ -128,6 +245,31 @@ ValidateOptions options_of(const Json& record, const std::string& page) {
     throw bad_input(page, "its record is damaged",
                     "a page that tpm validate --credibility has written");
   }
+}
+
+Json record_of(const ValidateOptions& options, const ValidationRequest& request,
+               const Validation& validation) {
+  std::vector<CredibilityEvidence> evidence;
+  for (const std::string& text : options.evidence) {
+    evidence.push_back(of_option([&] { return parse_evidence(text, "--evidence"); }));
+  }
+  std::vector<std::string> others;
+  for (const std::string& file :
+       {options.session, options.instrument, options.calibration_instrument}) {
+    if (!file.empty()) others.push_back(file);
+  }
+  for (const std::string& file : options.recordings.files) {
+    std::filesystem::path description = file;
+    description.replace_extension(".json");
+    if (description != file && instrument_beside(file)) others.push_back(description.string());
+  }
+  const std::filesystem::path material =
+      std::filesystem::path(options.law).parent_path() / "material.json";
+  if (request.organ && material != options.law && std::filesystem::exists(material)) {
+    others.push_back(material.string());
+  }
+  return credibility_record(request, validation, options.words, invocation_of(options), evidence,
+                            others);
 }
 
 /// The page itself stays: no command writes over what it reads.
@@ -139,8 +281,7 @@ int recheck(const std::string& page, const std::string& output, const Session& s
   const Json before = read_credibility_record(page);
   const ValidateOptions options = options_of(before, page);
   const ValidationRequest request = validation_request(options);
-  const Json now =
-      credibility_record(request, validate(request), options.words, invocation_of(options));
+  const Json now = record_of(options, request, validate(request));
   const std::vector<CredibilityChange> changes = changes_of(before, now);
   write_file(marked, credibility_page(before, changes));
   if (session.json()) {
@@ -176,9 +317,7 @@ int run_validate(const ValidateOptions& options, const Session& session) {
                     write_validation_report(options.folder, request, validation));
   }
   if (!options.credibility.empty()) {
-    const Json record =
-        credibility_record(request, validation, options.words, invocation_of(options));
-    write_file(options.credibility, credibility_page(record));
+    write_file(options.credibility, credibility_page(record_of(options, request, validation)));
     if (!session.json()) text += fmt::format("written: {}\n", options.credibility);
   }
   deliver(text, options.output);
@@ -189,22 +328,36 @@ int run_validate(const ValidateOptions& options, const Session& session) {
 }  // namespace
 
 void add_validate_command(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand(
-      "validate",
-      "Compare a fitted law with recordings that it has not seen: the model error and its "
-      "uncertainty (ASME V&V 20)");
+  CLI::App* command = app.add_subcommand("validate",
+                                         "Compare a law, organ, plan's pick or session with "
+                                         "recordings that it has not seen: the model "
+                                         "error and its uncertainty (ASME V&V 20)");
   auto options = std::make_shared<ValidateOptions>();
-  command->add_option("LAW", options->law, "law.json that tpm fit has written");
+  command->add_option("LAW|SCENE", options->law,
+                      "law.json that tpm fit has written, or the organ (scene.json or "
+                      "material.json) on which tpm material has put it");
   command->add_option("RECORDING", options->recordings.files,
-                      "Recordings that the law was not fitted to, one or more");
+                      "Recordings that the law was not fitted to, one or more; or sessions of tpm "
+                      "hil run (.tpmrec): the force that was rendered along the hand's motion");
+  CLI::Option* plan = command->add_flag(
+      "--plan", options->plan, "S from the reduced model that tpm plan picks for the organ");
+  command
+      ->add_option("--tolerance", options->planned.tolerance,
+                   "Of --plan: largest error, in parts of the peak force, or jnd")
+      ->capture_default_str()
+      ->needs(plan);
+  command->add_option("--session", options->session,
+                      "A session (.tpmrec) whose rendering is part of S: what a hand felt, against "
+                      "recordings of the material");
   command->add_option("--require", options->requirement,
                       "How large a model error may be: a share of the measured value such as 10%, "
                       "an amount such as \"20 mN\", or jnd (what a hand can tell, as in tpm plan)");
   command
-      ->add_option("--quantity", options->quantities,
-                   "Quantity to compare: peak, end, ratio, half-time, work, a time such as \"5 s\" "
-                   "or a depth such as \"2 mm\" (may be repeated; default: those that the "
-                   "recording has)")
+      ->add_option(
+          "--quantity", options->quantities,
+          "Quantity to compare: peak, end, ratio, half-time, rate, work, a time such as \"5 s\" "
+          "or a depth such as \"2 mm\" (may be repeated; default: those that the "
+          "recording has)")
       ->allow_extra_args(false);
   command
       ->add_option("--placement", options->placement,
@@ -221,6 +374,11 @@ void add_validate_command(CLI::App& app, Session& session) {
                       "protocols differ");
   command->add_option("--credibility", options->credibility,
                       "Write a page (HTML) with the evidence under the headings of V&V 40");
+  command
+      ->add_option("--evidence", options->evidence,
+                   "Of that page: CATEGORY=FILE, such as \"code verification=checks.json\" (may be "
+                   "repeated); the file is named with its SHA-256")
+      ->allow_extra_args(false);
   command->add_option("--question", options->words.question, "Of that page: question of interest");
   command->add_option("--context", options->words.context, "Of that page: context of use");
   command->add_option("--risk", options->words.risk, "Of that page: model risk");

@@ -7,6 +7,7 @@
 #include "command.hpp"
 #include "tpm/files/import/reading_options.hpp"
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/select/instrument_of_recording.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpmkit/error.hpp"
 
@@ -87,6 +88,7 @@ PreparedRecording prepared(const std::string& name, RecordingFile file,
   PreparedRecording recording = prepare_recording(name, std::move(file.recording), phases);
   recording.import = import_options(options);
   recording.read_as = std::move(read_as);
+  take_instrument(recording, name);
   return recording;
 }
 

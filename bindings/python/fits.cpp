@@ -11,6 +11,7 @@
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/prediction.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/instrument_of_recording.hpp"
 #include "tpm/fit/select/material_function.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/show/fit_report.hpp"
@@ -203,6 +204,7 @@ Fit fit_files(const FitRequest& request) {
     recordings.push_back(
         prepare_recording(file, read_recording_file(file, request.import).recording));
     recordings.back().import = request.import;
+    take_instrument(recordings.back(), file);
   }
   return fit_selected(call.run([&] { return select_law(recordings, options); }), std::nullopt);
 }

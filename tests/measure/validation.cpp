@@ -174,6 +174,42 @@ void several(int experiments) {
   say("area metric beyond the 95 % point of its draws, 5 recordings", "peak", area);
 }
 
+/// Is u_input what the law's error scatters by? rms of (S of the fitted law - S of the true one)
+/// over u_input, 1 if it is right; at the validation's protocol, contact and zero known.
+void input_alone(int experiments, int calibrations) {
+  const StudyNoise noise;
+  Random random(56);
+  Random unused(0);
+  StudyNoise clean;
+  clean.sigma_N = clean.zero_N = 0.0;
+  const PreparedRecording truth =
+      prepare_recording("truth", study_recording(study_validation(40, 0.0), clean, unused));
+  const RecordingParts parts = parts_of(truth);
+  LawFile right = study_calibration(1, noise, random);
+  right.values = {60.0, 45.0, 2.0, 0.0, 0.0};
+  const Eigen::VectorXd exact = LawAlong(right, truth).at(0.0).value;
+  double peak = 0.0, end = 0.0;
+  for (int i = 0; i < experiments; ++i) {
+    const LawFile law = study_calibration(calibrations, noise, random);
+    const LawAlong along(law, truth);
+    const LawAlong::At at = along.at(0.0);
+    const auto square = [&](QuantityKind kind) {
+      const auto s = read_quantity({kind}, parts, truth.recording, 0.0, at.value).value();
+      const auto t = read_quantity({kind}, parts, truth.recording, 0.0, exact).value();
+      const double u = (s.weight.transpose() * at.by_law * along.root()).norm();
+      return std::pow((s.value - t.value) / u, 2);
+    };
+    peak += square(QuantityKind::peak);
+    end += square(QuantityKind::end_of_hold);
+  }
+  const auto ratio = [experiments](double sum) { return std::sqrt(sum / experiments); };
+  fmt::print(
+      "| error of S over u_input (rms), {} calibration recording{} | peak, end of hold | "
+      "{:.3f}, {:.3f} |\n",
+      calibrations, calibrations > 1 ? "s" : "", ratio(peak), ratio(end));
+  std::fflush(stdout);
+}
+
 }  // namespace
 }  // namespace tpm::test
 
@@ -194,5 +230,7 @@ int main(int argc, char** argv) {
         if (wanted("branch")) branch_left_out(n);
         if (wanted("instruments")) instruments(n);
         if (wanted("several")) several(n);
+        if (wanted("input")) input_alone(n, 1);
+        if (wanted("input")) input_alone(n, 5);
       });
 }

@@ -41,10 +41,10 @@ std::vector<Knot> in_straight_pieces(std::span<const Knot> knots, double within)
 
 }  // namespace
 
-Protocol followed_by_organ(const Protocol& measured, double contact) {
+Protocol followed_by_organ(const Protocol& measured, double contact, double within) {
   double deepest = 0.0;
   for (const Knot& knot : measured.knots()) deepest = std::max(deepest, knot.value - contact);
-  Protocol motion(measured.drive(), in_straight_pieces(measured.knots(), kMotionWithin * deepest),
+  Protocol motion(measured.drive(), in_straight_pieces(measured.knots(), within * deepest),
                   measured.name());
   motion.set_equilibrium_at_start(measured.equilibrium_at_start());
   return motion;

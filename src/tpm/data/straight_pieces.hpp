@@ -11,6 +11,8 @@ inline constexpr double kMotionWithin = 2e-3;
 /// of its depth beyond the contact, at every sample (Douglas and Peucker 1973). Knots are samples,
 /// the first and the last among them.
 /// @param contact where the tissue is met, of the history's unit
-[[nodiscard]] Protocol followed_by_organ(const Protocol& measured, double contact = 0.0);
+/// @param within another distance than kMotionWithin
+[[nodiscard]] Protocol followed_by_organ(const Protocol& measured, double contact = 0.0,
+                                         double within = kMotionWithin);
 
 }  // namespace tpm::data

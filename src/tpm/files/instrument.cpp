@@ -95,15 +95,17 @@ ChannelUncertainty parse_channel_uncertainty(std::string_view text, Dimension di
 Instrument read_instrument(const Json& block, Dimension response, Dimension drive,
                            std::string_view where) {
   if (!block.is_object()) throw bad_input(where, "is no object", "an object with \"id\"");
-  constexpr auto kKeys = std::to_array<std::string_view>(
-      {"id", "force", "depth", "time", "zero", "force_range", "depth_range"});
+  constexpr auto kKeys =
+      std::to_array<std::string_view>({"id", "force", "depth", "time", "zero", "resolution",
+                                       "noise", "force_range", "depth_range"});
   Instrument instrument;
   for (const auto& [key, value] : block.items()) {
     const bool known = std::find(kKeys.begin(), kKeys.end(), key) != kKeys.end();
     const std::string here = fmt::format("{}/{}", where, printable(key));
     if (!known) {
-      throw bad_input(here, "unknown key",
-                      "one of id, force, depth, time, zero, force_range, depth_range");
+      throw bad_input(
+          here, "unknown key",
+          "one of id, force, depth, time, zero, resolution, noise, force_range, depth_range");
     }
     if (!value.is_string()) throw bad_input(here, "is no text", kLimitExpected);
     instrument.stated[key] = value.get<std::string>();
@@ -137,7 +139,13 @@ Instrument read_instrument(const Json& block, Dimension response, Dimension driv
     }
     instrument.zero = zero->absolute;
   }
+  instrument.resolution = range("resolution", response);
+  instrument.noise = range("noise", response);
   return instrument;
+}
+
+double Instrument::reading_floor() const {
+  return std::max(noise.value_or(0.0), resolution.value_or(0.0) / std::sqrt(12.0));
 }
 
 std::optional<Json> instrument_beside(const std::filesystem::path& recording) {

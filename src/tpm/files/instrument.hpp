@@ -22,8 +22,14 @@ struct ChannelUncertainty {
 struct Instrument {
   std::string id;  ///< equal in two recordings: their errors are the same
   std::optional<ChannelUncertainty> force, depth, time;
-  std::optional<double> zero;  ///< of the response before contact, standard uncertainty, SI
+  std::optional<double> zero;        ///< of the response before contact, standard uncertainty, SI
+  std::optional<double> resolution;  ///< step of the response's readings, SI
+  std::optional<double> noise;       ///< standard deviation of a reading of the response, SI
   std::map<std::string, std::string> stated;  ///< keys and texts of the block, for writing it again
+
+  /// Standard deviation below which no reading of the response is known: the noise, and a step
+  /// over sqrt 12.
+  [[nodiscard]] double reading_floor() const;
 };
 
 /// "0.5 % of reading", "0.1 % of range", "10 um": limits of a rectangular distribution, whose
@@ -36,8 +42,8 @@ struct Instrument {
                                                            std::optional<double> range,
                                                            std::string_view where);
 
-/// Reads the block. `force` and `zero` are quantities of the response, `depth` of the drive.
-/// Throws Error(bad_input) naming the key.
+/// Reads the block. `force`, `zero`, `resolution` and `noise` are quantities of the response,
+/// `depth` of the drive. Throws Error(bad_input) naming the key.
 [[nodiscard]] Instrument read_instrument(const Json& block, Dimension response, Dimension drive,
                                          std::string_view where);
 

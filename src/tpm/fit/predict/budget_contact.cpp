@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/contact/law_contact.hpp"
@@ -122,6 +123,38 @@ std::vector<BudgetStage> loop_stages(const LawFile& law, const Protocol& motion,
                      BudgetKind::computation,
                      {}});
   return stages;
+}
+
+/// What the instrument of a recording leaves unknown of its force F at depth u and time t:
+/// u^2 = (gain F)^2 + zero^2 + (dF/du)^2 (a^2 + (b u)^2) + (dF/dt)^2 c^2.
+void add_instrument_part(ErrorBudget& budget, const LawFile& plain, const Protocol& motion,
+                         const Instrument& instrument, double level) {
+  const LawModel model(plain.spec);
+  const Response at =
+      model.respond(motion, budget.time_s, plain.values, Want::values_and_sensitivity);
+  const auto of = [](const std::optional<ChannelUncertainty>& channel) {
+    return channel.value_or(ChannelUncertainty{});
+  };
+  const ChannelUncertainty force = of(instrument.force), depth = of(instrument.depth),
+                           time = of(instrument.time);
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < at.value.size(); ++i) {
+    const double by_depth =
+        -at.sensitivity(i, at.sensitivity.cols() - 2);  // contact is the last but one
+    const double u_m = value_at(motion, budget.time_s[static_cast<std::size_t>(i)]);
+    const Eigen::Index a = std::max<Eigen::Index>(i - 1, 0),
+                       b = std::min<Eigen::Index>(i + 1, at.value.size() - 1);
+    const double dt =
+        budget.time_s[static_cast<std::size_t>(b)] - budget.time_s[static_cast<std::size_t>(a)];
+    const double by_time = dt > 0.0 ? (at.value[b] - at.value[a]) / dt : 0.0;
+    const double u = std::hypot(
+        std::hypot(force.relative * at.value[i],
+                   std::hypot(force.absolute, instrument.zero.value_or(0.0))),
+        by_depth * std::hypot(depth.absolute, depth.relative * u_m), by_time * time.absolute);
+    if (std::isfinite(u)) largest = std::max(largest, u);
+  }
+  const double k = normal_quantile(0.5 + 0.5 * level);
+  budget.instrument = BudgetInstrumentPart{instrument.id, level, k * largest / budget.peak_N};
 }
 
 /// How a prediction is asked for the random part.
@@ -266,6 +299,9 @@ ErrorBudget contact_budget(const LawFile& law, const PreparedRecording& recordin
   budget.title = fmt::format("{} along {}", law_name(law.spec),
                              std::filesystem::path(recording.name).filename().string());
   add_random_part(budget, placed);
+  if (recording.instrument) {
+    add_instrument_part(budget, plain, motion, *recording.instrument, options.level);
+  }
   conclude(budget);
   return budget;
 }

@@ -59,6 +59,11 @@ Json to_json(const ErrorBudget& b) {
                       {"level", b.random->level},
                       {"samples", b.random->samples}};
   }
+  if (b.instrument) {
+    json["instrument"] = {{"id", b.instrument->id},
+                          {"level", b.instrument->level},
+                          {"largest", stored(b.instrument->largest)}};
+  }
   json["combined"] = stored(b.combined);
   json["data_part"] = stored(b.data_part);
   json["computed_part"] = stored(b.computed_part);
@@ -87,7 +92,14 @@ std::string to_terminal_text(const ErrorBudget& b) {
                                     significant(100.0 * b.random->level, 3), b.random->samples),
                         in_percent(b.random->largest));
   }
-  text += fmt::format("{:<54} {:>9}\n\n", "both in quadrature", in_percent(b.combined));
+  if (b.instrument) {
+    text += fmt::format("{:<54} {:>9}\n",
+                        fmt::format("instrument {}, {} %", b.instrument->id,
+                                    significant(100.0 * b.instrument->level, 3)),
+                        in_percent(b.instrument->largest));
+  }
+  text += fmt::format("{:<54} {:>9}\n\n", b.instrument ? "all in quadrature" : "both in quadrature",
+                      in_percent(b.combined));
   for (const std::string& sentence : b.sentences) text += sentence + "\n";
   text += "\na hand tells:";
   for (const Json& t : thresholds()) {

@@ -143,7 +143,8 @@ void conclude(ErrorBudget& budget) {
     const double off = sum - (last.force_N[i] - first.force_N[i]);
     budget.not_closed = std::max(budget.not_closed, std::abs(off) / budget.peak_N);
   }
-  const double scatter = budget.random ? budget.random->largest : 0.0;
+  const double scatter = std::hypot(budget.random ? budget.random->largest : 0.0,
+                                    budget.instrument ? budget.instrument->largest : 0.0);
   budget.combined = std::hypot(budget.total, scatter);
   const double law =
       largest_sum(budget, [](const BudgetLine& line) { return line.kind == BudgetKind::data; });

@@ -46,6 +46,13 @@ struct BudgetRandomPart {
   double largest = 0.0;  ///< half width of the band over time, in parts of the peak
 };
 
+/// What a stated instrument leaves unknown of the recording's force: scale, zero and depth.
+struct BudgetInstrumentPart {
+  std::string id;
+  double level = 0.95;
+  double largest = 0.0;  ///< half width over time, in parts of the peak
+};
+
 /// What the law's line and the parameters' scatter amount to, and what is lost by computing.
 struct ErrorBudget {
   std::string title;
@@ -56,8 +63,10 @@ struct ErrorBudget {
   double total = 0.0;       ///< max |sum of the lines| = max |last - first|, in parts of the peak
   double not_closed = 0.0;  ///< max |sum of the lines - (last - first)|: rounding
   std::optional<BudgetRandomPart> random;
-  double combined = 0.0;   ///< total and random part in quadrature
-  double data_part = 0.0;  ///< the line `law` (if there is one) and the random part in quadrature
+  std::optional<BudgetInstrumentPart> instrument;  ///< of a recording that states one
+  double combined = 0.0;       ///< total, random part and instrument in quadrature
+  double data_part = 0.0;      ///< the line `law` (if there is one), random part and instrument in
+                               ///< quadrature
   double computed_part = 0.0;  ///< max |sum| of the lines of computation
   std::vector<std::string> sentences;
   std::vector<std::string> flags;

@@ -92,8 +92,9 @@ struct MaterialCourse {
 /// A law put on an organ.
 struct OrganMaterial {
   std::string law;
-  LawFile fitted_law;  ///< with what its fit knows of it
-  std::string motion;  ///< "along recording.csv"
+  LawFile fitted_law;                       ///< with what its fit knows of it
+  std::vector<std::string> samples_sha256;  ///< of the law's recordings (sample_digests)
+  std::string motion;                       ///< "along recording.csv"
   BondMaterial material;
   std::vector<OrganMaterialParameter> parameters;
   MaterialIntervals intervals = MaterialIntervals::law;

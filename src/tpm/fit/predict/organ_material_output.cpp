@@ -9,6 +9,7 @@
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/predict/organ_bonds.hpp"
 #include "tpm/fit/predict/organ_material_parts.hpp"
+#include "tpm/fit/sample_digest.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -365,7 +366,7 @@ Json to_json(const OrganMaterial& m) {
     json["organ_less_recording"] = mismatch_json(*m.organ_to_recording);
   }
   json["flags"] = m.flags;
-  json["fitted_law"] = files::to_json(m.fitted_law);
+  json["fitted_law"] = with_sample_digests(files::to_json(m.fitted_law), m.samples_sha256);
   json["scene"] = m.scene;
   return json;
 }

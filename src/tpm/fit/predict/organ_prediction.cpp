@@ -45,6 +45,12 @@ OrganOfLaw::OrganOfLaw(SceneOrgan organ, FittedBonds bonds, std::vector<double> 
       law_(std::move(law)),
       law_model_(law_.spec) {}
 
+OrganOfLaw OrganOfLaw::at_tolerance(double tolerance) const {
+  SceneOrgan organ = organ_;
+  organ.model = std::make_shared<OrganModel>(organ_.tissue, tolerance);
+  return {std::move(organ), bonds_, natural_, follows_, law_};
+}
+
 std::vector<double> OrganOfLaw::natural_at(std::span<const double> parameters) const {
   const LawUncertainty& u = *law_.uncertainty;
   Eigen::VectorXd moved(std::ssize(u.place));

@@ -36,6 +36,9 @@ class OrganOfLaw final : public Model {
   [[nodiscard]] Response respond(const Protocol& protocol, std::span<const double> times_s,
                                  std::span<const double> parameters, Want want) const override;
 
+  /// The same organ, balanced to another tolerance (OrganModel).
+  [[nodiscard]] OrganOfLaw at_tolerance(double tolerance) const;
+
   [[nodiscard]] const LawFile& law() const { return law_; }
   [[nodiscard]] std::size_t spheres() const { return organ_.tissue->network.organ.size(); }
 

@@ -3,6 +3,7 @@
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/instrument_of_recording.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpmkit/fit.hpp"
 
@@ -52,6 +53,7 @@ FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
   std::vector<PreparedRecording> recordings;
   for (const std::filesystem::path& file : files) {
     recordings.push_back(prepare_recording(file.string(), read_recording_file(file, {}).recording));
+    take_instrument(recordings.back(), file);
   }
   SelectionOptions options;
   if (!request.law.empty()) options.laws = {parse_law_name(request.law, "law")};

@@ -106,7 +106,8 @@ double students(double sd, double degrees) {
 double rounding_sd(const PreparedRecording& r) {
   constexpr double kLeast = 1e-9;  // of the peak: rounding of numbers
   const double quantum = quantum_of(r.recording.response);
-  return std::max(quantum / std::sqrt(12.0), kLeast * std::abs(r.phases.peak_response));
+  const double stated = r.instrument ? r.instrument->reading_floor() : 0.0;
+  return std::max({quantum / std::sqrt(12.0), stated, kLeast * std::abs(r.phases.peak_response)});
 }
 
 /// The noise of the longest hold, about a straight line and four exponentials: a short rest does

@@ -99,6 +99,11 @@ Prior zero_prior(const PreparedRecording& r, const RestReadings& rests) {
             rests.before > 0 ? fmt::format("{} samples before contact", rests.before)
                              : fmt::format("{} samples after withdrawal", rests.after)};
   }
+  if (r.instrument && r.instrument->zero && *r.instrument->zero > 0.0) {
+    return {0.0, *r.instrument->zero,
+            fmt::format("stated by instrument {}: no samples before contact tell the zero",
+                        r.instrument->id)};
+  }
   const double floor = std::abs(r.phases.floor_response);
   return {0.0, std::max(floor, kStated * std::abs(r.phases.peak_response)),
           "stated: no samples before contact tell the zero"};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/data/phases.hpp"
+#include "tpm/files/instrument.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
@@ -28,6 +29,7 @@ struct PreparedRecording {
   std::string read_as = {};   ///< how its columns and units were understood, in one sentence
   bool contact_held = false;  ///< contact is where a stated force is passed: it is not fitted
   std::string start_up = {};  ///< what is left out after a step, in one sentence; empty: nothing
+  std::optional<Instrument> instrument = std::nullopt;  ///< if it is stated (take_instrument)
 };
 
 /// Finds the phases and chooses the window. After a step, which the ramp's samples do not show, the

@@ -286,43 +286,21 @@ void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
   });
   if (failure.empty()) return;
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  c.held_out.push_back({"failed: " + failure, kInfinity, kInfinity, kInfinity, 0.0, false});
+  c.held_out.push_back({"failed: " + failure, kInfinity, kInfinity, kInfinity, 0.0});
 }
 
-/// A law predicts what it has not seen if it comes as near as the nearest law does that has.
-void compare_predictions(Selection& s, double factor) {
-  const std::size_t predictions = s.candidates.front().held_out.size();
-  for (std::size_t i = 0; i < predictions; ++i) {
-    double least = std::numeric_limits<double>::infinity();
-    for (const Candidate& c : s.candidates) {
-      if (!c.failed && i < c.held_out.size()) least = std::min(least, c.held_out[i].rms_if_fitted);
-    }
-    for (Candidate& c : s.candidates) {
-      if (i < c.held_out.size()) c.held_out[i].predicts = c.held_out[i].rms <= factor * least;
-    }
-  }
-}
-
-/// Which laws predict recording i from the others, and which do not.
+/// How near each law comes to recording i from the others. No verdict: that takes the uncertainty
+/// of the prediction, which tpm validate counts.
 void describe_prediction(Selection& s, std::size_t i) {
-  std::vector<std::string> able;
-  std::vector<std::string> unable;
+  std::vector<std::string> errors;
   for (const Candidate& c : s.candidates) {
     if (c.failed || i >= c.held_out.size()) continue;
     const HeldOut& h = c.held_out[i];
-    (h.predicts ? able : unable)
-        .push_back(
-            fmt::format("{} ({} %)", law_name(c.law), significant(100.0 * h.rms_over_peak, 3)));
+    errors.push_back(
+        fmt::format("{} {} %", law_name(c.law), significant(100.0 * h.rms_over_peak, 3)));
   }
-  const auto listed = [](const std::vector<std::string>& laws) {
-    return laws.empty() ? std::string("none") : fmt::format("{}", fmt::join(laws, ", "));
-  };
-  s.words.push_back(
-      fmt::format("{} is predicted from the others, to {} times the least residual of any law "
-                  "fitted to it (rms "
-                  "over peak): by {}; not by {}",
-                  s.candidates.front().held_out[i].what, significant(s.prediction_factor, 2),
-                  listed(able), listed(unable)));
+  s.words.push_back(fmt::format("{} predicted from the others, rms over peak: {}",
+                                s.candidates.front().held_out[i].what, fmt::join(errors, ", ")));
 }
 
 void describe(Selection& s) {
@@ -436,7 +414,6 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   const std::vector<DataSet> data = data_sets(recordings);
   Selection s;
   s.margin = options.margin;
-  s.prediction_factor = options.prediction_factor;
   Progress progress("fitting laws", laws.size());
   for (const LawSpec& law : laws) {
     s.candidates.push_back(fit_to_recordings(law, recordings, data, options.setup));
@@ -463,7 +440,6 @@ Selection select_law(std::span<const PreparedRecording> recordings,
       hold_out(c, recordings, options);
       predicting.advance();
     }
-    compare_predictions(s, options.prediction_factor);
     if (s.candidates.front().held_out.empty()) {
       s.warnings.push_back(
           fmt::format("nothing was held out: the second half of the hold has fewer than {} samples",

@@ -17,7 +17,6 @@ struct HeldOut {
   double rms_over_peak = 0.0;
   double rms_standardised = 0.0;  ///< in standard deviations, where the data have their own
   double rms_if_fitted = 0.0;     ///< of the residual where the law is fitted to these data, too
-  bool predicts = false;          ///< see SelectionOptions::prediction_factor
 };
 
 /// One law of the contest.
@@ -51,8 +50,6 @@ struct SelectionOptions {
   bool only_listed = false;   ///< do not try laws without plateau besides
   double margin = 3.0;        ///< how much of BIC a larger law must gain to be preferred
   bool held_out = true;
-  double prediction_factor = 2.0;  ///< a law predicts if its error is at most this many times the
-                                   ///< least residual that any law leaves where it is fitted
   SetupOptions setup;
 };
 
@@ -61,7 +58,6 @@ struct Selection {
   std::size_t recommended = 0;        ///< place in candidates
   std::size_t best_bic = 0;
   double margin = 3.0;
-  double prediction_factor = 2.0;
   int samples = 0;  ///< fitted
   double effective_count = 0.0;
   Correlation correlation;            ///< of the residuals that the law of least deviance leaves

@@ -18,8 +18,7 @@ Json held_out_json(const Candidate& c) {
                 {"rms_SI", kept_digits(h.rms)},
                 {"rms_over_peak", kept_digits(h.rms_over_peak)},
                 {"rms_over_sd", kept_digits(h.rms_standardised)},
-                {"rms_if_fitted_SI", kept_digits(h.rms_if_fitted)},
-                {"predicts", h.predicts}};
+                {"rms_if_fitted_SI", kept_digits(h.rms_if_fitted)}};
   });
 }
 
@@ -42,8 +41,7 @@ Json candidate_json(const Candidate& c) {
 std::string held_out_text(const Candidate& c) {
   std::string text;
   for (const HeldOut& h : c.held_out) {
-    text += fmt::format("{:>9}{}", significant(100.0 * h.rms_over_peak, 3) + " %",
-                        h.predicts ? "  " : " !");
+    text += fmt::format("{:>9}  ", significant(100.0 * h.rms_over_peak, 3) + " %");
   }
   return text;
 }

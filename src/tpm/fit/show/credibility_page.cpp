@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -21,6 +22,11 @@ constexpr std::string_view kRecordOpens =
 constexpr std::string_view kRecordCloses = "</script>";
 constexpr const char* kNotStated = "not stated";
 constexpr std::size_t kShortSha = 12;
+constexpr int kLawDigits = 6;
+// Of the FDA's guidance of November 2023.
+constexpr auto kCategories = std::to_array<std::string_view>(
+    {"code verification", "calculation verification", "calibration", "bench-test validation",
+     "in vivo validation", "population-based validation", "emergent behaviour", "plausibility"});
 
 std::string stated_words(const Json& words, const char* key) {
   const std::string text = words.at(key).get<std::string>();
@@ -49,6 +55,8 @@ class EvidencePage {
               {{"model risk"}, {stated_words(words, "risk")}}}});
     d.heading(2, "Evidence by category");
     add_categories(d);
+    d.heading(2, "Calibration");
+    add_law(d);
     d.heading(2, "Validation");
     add_validation(d);
     d.heading(2, "Applicability");
@@ -81,8 +89,8 @@ class EvidencePage {
     d.table(std::move(table));
   }
 
-  void add_categories(Document& d) const {
-    constexpr const char* kEmpty = "empty: nothing was given";
+  /// What was found by the validation itself, of the categories that it fills.
+  [[nodiscard]] std::map<std::string, Cell> found() const {
     std::string calibration = "files that the law does not name";
     const Json& files = validation_.at("calibration");
     if (!files.empty()) calibration.clear();
@@ -93,29 +101,70 @@ class EvidencePage {
     }
     double worst = 0.0;
     bool tested = false;
+    std::string largest = "rounding";
     for (const Json& r : validation_.at("recordings")) {
       tested = tested || !r.at("fitted").get<bool>();
       for (const Json& q : r.at("quantities")) {
         const double size = std::abs(q.at("S").get<double>());
-        if (size > 0.0) worst = std::max(worst, q.at("u_num").get<double>() / size);
+        if (!(size > 0.0) || q.at("u_num").get<double>() / size <= worst) continue;
+        worst = q.at("u_num").get<double>() / size;
+        largest = q.at("numerical").at(0).at("name").get<std::string>();
       }
     }
-    d.table({"",
-             {{"category"}, {"evidence"}},
-             {{{"code verification"}, {kEmpty}},
-              {{"calculation verification"},
-               {fmt::format("u_num at most {} of S: closed forms", significant(worst, 1))}},
-              {{"calibration"},
-               {fmt::format("{}, fitted to {}; u_input from {}",
-                            validation_.at("law").get<std::string>(), calibration,
-                            validation_.at("u_input_from").get<std::string>())}},
-              {{"bench-test validation"},
-               tested ? cell("/validation/verdict", validation_.at("words").get<std::string>())
-                      : Cell{kEmpty}},
-              {{"in vivo validation"}, {kEmpty}},
-              {{"population-based validation"}, {kEmpty}},
-              {{"emergent behaviour"}, {kEmpty}},
-              {{"plausibility"}, {kEmpty}}}});
+    std::map<std::string, Cell> cells{
+        {"calculation verification",
+         {fmt::format("u_num at most {} of S, the most of it {}", significant(worst, 1), largest)}},
+        {"calibration",
+         {fmt::format("{}, fitted to {}; u_input from {}",
+                      validation_.at("subject").get<std::string>(), calibration,
+                      validation_.at("u_input_from").get<std::string>())}}};
+    if (tested) {
+      cells["bench-test validation"] =
+          cell("/validation/verdict", validation_.at("words").get<std::string>());
+    }
+    return cells;
+  }
+
+  void add_categories(Document& d) const {
+    const std::map<std::string, Cell> own = found();
+    Table table{"", {{"category"}, {"evidence"}}};
+    for (const std::string_view name : kCategories) {
+      const std::string category(name);
+      bool any = own.contains(category);
+      if (any) table.rows.push_back({{category}, own.at(category)});
+      for (const Json& e : record_.at("evidence")) {
+        if (e.at("category") != category) continue;
+        const std::string file = e.at("file").get<std::string>();
+        table.rows.push_back({{category}, file_cell(file)});
+        any = true;
+      }
+      if (!any) table.rows.push_back({{category}, {"empty: nothing was given"}});
+    }
+    d.table(std::move(table));
+  }
+
+  [[nodiscard]] Cell file_cell(const std::string& file) const {
+    Json::json_pointer place("/files");
+    place /= file;
+    const std::string sha256 = record_.at(place).get<std::string>();
+    return cell(place.to_string(),
+                fmt::format("{} (SHA-256 {})", file, sha256.substr(0, kShortSha)));
+  }
+
+  void add_law(Document& d) const {
+    const std::string file = validation_.at("law_file").get<std::string>();
+    Table table{
+        fmt::format("{}, SHA-256 {}", file, validation_.at("law_sha256").get<std::string>()),
+        {{"parameter"}, {"value", true}, {"standard uncertainty", true}}};
+    const Json& parameters = record_.at("law").at("parameters");
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      const std::string at = fmt::format("/law/parameters/{}/", i);
+      table.rows.push_back({number_cell(at + "name"), number_cell(at + "value", kLawDigits),
+                            number_cell(at + "u", 2)});
+    }
+    d.table(std::move(table));
+    d.paragraph(fmt::format("Does the law describe what it was fitted to: {}",
+                            record_.at("law").at("adequacy").get<std::string>()));
   }
 
   void add_validation(Document& d) const {
@@ -210,8 +259,51 @@ std::string value_text(const Json& value) {
 
 }  // namespace
 
+CredibilityEvidence parse_evidence(std::string_view text, std::string_view where) {
+  const auto equals = text.find('=');
+  const std::string category(text.substr(0, equals));
+  const bool known = std::ranges::find(kCategories, category) != kCategories.end();
+  if (equals == std::string_view::npos || !known) {
+    throw bad_input(
+        where, fmt::format("'{}'", printable(text)),
+        fmt::format("CATEGORY=FILE, the category one of {}", fmt::join(kCategories, ", ")));
+  }
+  CredibilityEvidence e{category, std::string(text.substr(equals + 1)), {}};
+  e.sha256 = sha256_hex(read_file(e.file));
+  return e;
+}
+
+namespace {
+
+Json law_record(const LawFile& law) {
+  Json parameters = Json::array();
+  const std::vector<LawParameter> all = law_parameters(law.spec);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (belongs_to_recording(law.spec, all[i])) continue;
+    Json entry{{"name", law_key(all[i])}};
+    // JSON has no infinity.
+    if (std::isfinite(law.values[i])) entry["value"] = rounded(law.values[i], kLawDigits);
+    const auto& places = law.uncertainty->place;
+    const auto place = std::ranges::find(places, i);
+    if (place != places.end()) {
+      const auto k = static_cast<Eigen::Index>(place - places.begin());
+      const double slope =
+          coordinate_slope(law.uncertainty->coordinate[static_cast<std::size_t>(k)], law.values[i]);
+      entry["u"] =
+          rounded(std::abs(slope) * std::sqrt(law.uncertainty->covariance(k, k)), kLawDigits);
+    }
+    parameters.push_back(std::move(entry));
+  }
+  return {{"parameters", std::move(parameters)},
+          {"adequacy", law.adequacy ? law.adequacy->words : std::string("not stated by the law")}};
+}
+
+}  // namespace
+
 Json credibility_record(const ValidationRequest& request, const Validation& validation,
-                        const CredibilityWords& words, Json invocation) {
+                        const CredibilityWords& words, Json invocation,
+                        const std::vector<CredibilityEvidence>& evidence,
+                        const std::vector<std::string>& other_files) {
   Json record{
       {"tpm", version()},
       {"words", {{"question", words.question}, {"context", words.context}, {"risk", words.risk}}},
@@ -220,7 +312,14 @@ Json credibility_record(const ValidationRequest& request, const Validation& vali
   files[validation.law_file] = request.law_sha256;
   for (const RecordingComparison& r : validation.recordings) files[r.name] = r.sha256;
   for (const CalibrationData::File& file : validation.calibration) files[file.name] = file.sha256;
+  for (const std::string& file : other_files) files[file] = sha256_hex(read_file(file));
+  record["evidence"] = Json::array();
+  for (const CredibilityEvidence& e : evidence) {
+    files[e.file] = e.sha256;
+    record["evidence"].push_back({{"category", e.category}, {"file", e.file}});
+  }
   record["files"] = files;
+  record["law"] = law_record(request.law);
   record["validation"] = to_json(validation);
   return record;
 }
@@ -266,7 +365,7 @@ Json read_credibility_record(const std::filesystem::path& page) {
   }
   const auto from = begin + kRecordOpens.size();
   Json record = parse_json(std::string_view(text).substr(from, end - from), page.string());
-  for (const char* key : {"tpm", "words", "invocation", "files", "validation"}) {
+  for (const char* key : {"tpm", "words", "invocation", "files", "evidence", "law", "validation"}) {
     if (!record.is_object() || !record.contains(key)) {
       throw bad_input(page.string(), fmt::format("its record lacks '{}'", key),
                       "a page that tpm validate --credibility has written");

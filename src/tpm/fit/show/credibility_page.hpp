@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tpm/fit/validate/validation.hpp"
@@ -12,12 +13,25 @@ struct CredibilityWords {
   std::string question, context, risk;  ///< empty: not stated, and shown so
 };
 
+/// A file that is evidence for one of the categories of the FDA's guidance.
+struct CredibilityEvidence {
+  std::string category;  ///< "code verification"
+  std::string file, sha256;
+};
+
+/// "code verification=checks.json": the categories by their names; the file is read for its
+/// SHA-256. Throws Error(bad_input) naming them.
+[[nodiscard]] CredibilityEvidence parse_evidence(std::string_view text, std::string_view where);
+
 /// Everything that a credibility page shows, as JSON: the words, the invocation that recomputes it,
-/// the files with their SHA-256, and the validation.
+/// the files with their SHA-256, the law with its parameters, and the validation.
 /// @param invocation as the caller needs it to ask again
+/// @param other_files read beside law and recordings: an instrument, a session
 [[nodiscard]] Json credibility_record(const ValidationRequest& request,
                                       const Validation& validation, const CredibilityWords& words,
-                                      Json invocation);
+                                      Json invocation,
+                                      const std::vector<CredibilityEvidence>& evidence = {},
+                                      const std::vector<std::string>& other_files = {});
 
 /// A number or text of a record that is no longer what it was.
 struct CredibilityChange {

@@ -11,6 +11,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/likelihood/oscillation.hpp"
+#include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
 #include "tpm/fit/show/recording_report.hpp"
 #include "tpm/show/draw.hpp"
@@ -212,7 +213,7 @@ std::vector<std::string> write_fit_report(const std::filesystem::path& folder,
   std::vector<std::string> files = write_fit_csv(folder, fit);
   if (!no_law_because(fit.config)) {
     files.push_back("law.json");
-    write_law(folder / files.back(), fitted_law(fit));
+    write_file(folder / files.back(), to_text(law_document(fit)));
   }
   for (std::string& name : write_figures(folder, figures)) files.push_back(std::move(name));
   return files;

@@ -7,7 +7,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpmkit/law_file.hpp"
@@ -187,7 +187,7 @@ std::vector<std::string> write_selection(const std::filesystem::path& folder,
   std::vector<std::string> files{"config.json", "selection.json", "law.json", "laws.csv"};
   write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
   write_file(folder / files[1], to_text(to_json(selection)));
-  write_law(folder / files[2], fitted_law(fit));
+  write_file(folder / files[2], to_text(law_document(fit)));
   write_file(folder / files[3], laws_csv(selection));
   for (std::string& name : write_fit_csv(folder, fit)) files.push_back(std::move(name));
   return write_figures(folder, figures, std::move(files));

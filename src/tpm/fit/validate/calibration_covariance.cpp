@@ -5,31 +5,59 @@
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/fit/autoregressive.hpp"
+#include "tpm/fit/select/placement.hpp"
 
 namespace tpm::fit {
 namespace {
 
-/// Derivatives of the fitted samples of one recording.
+/// Derivatives of the fitted samples of one recording, and what was measured of its placement.
 struct FittedSlopes {
   std::vector<double> time_s;
-  Eigen::MatrixXd by_law, by_placement;
+  Eigen::MatrixXd by_law,
+      by_placement;                 ///< placement: zero, contact, drift, where they were fitted
+  Eigen::VectorXd prior_precision;  ///< 1/sd^2 of each column of by_placement; 0: no prior
 };
+
+/// Contact and zero of a recording in the fit, and which were estimated.
+struct PlacementInFit {
+  double contact = 0.0;
+  bool fits_contact = false, fits_zero = false;
+};
+
+PlacementInFit placement_in(const LawFile& law, const LawAlong& along, const FittedFile& file,
+                            bool only_one, const PreparedRecording& recording,
+                            const RecordingParts& parts, const ReadingScatter& scatter) {
+  PlacementInFit in;
+  const auto& place = law.uncertainty->place;
+  const auto estimated = [&](std::size_t parameter, const char* name) {
+    return only_one ? std::ranges::find(place, parameter) != place.end()
+                    : std::ranges::find(file.held, name) == file.held.end();
+  };
+  in.fits_zero = estimated(law.values.size() - 1, "offset");
+  in.fits_contact = !along.contact_of_law() && estimated(law.values.size() - 2, "contact");
+  if (along.contact_of_law() || only_one) {
+    in.contact = along.contact_in_law();
+  } else if (file.contact) {
+    in.contact = *file.contact;
+  } else {  // written before law files stated it
+    in.contact = place_for_validation(along, recording, parts, scatter, PlacementRule::fitted,
+                                      KnownPlacement::nothing)
+                     .contact;
+  }
+  return in;
+}
+
+double precision_of(const std::optional<Measured>& measured) {
+  return measured && measured->sd > 0.0 ? 1.0 / (measured->sd * measured->sd) : 0.0;
+}
 
 FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
                        const FittedFile& file, bool only_one, const RecordingParts& parts,
                        const ReadingScatter& scatter) {
   const Recording& r = recording.recording;
   const LawAlong along(law, recording);
-  const auto& place = law.uncertainty->place;
-  const std::size_t contact_place = law.values.size() - 2;
-  const bool known = std::ranges::find(place, contact_place) != place.end();
-  const bool fitted = !along.contact_of_law() && (only_one ? known : true);
-  const double contact =
-      along.contact_of_law() || only_one
-          ? along.contact_in_law()
-          : place_for_validation(along, recording, parts, scatter, PlacementRule::fitted, false)
-                .contact;
-  const LawAlong::At at = along.at(contact);
+  const PlacementInFit in = placement_in(law, along, file, only_one, recording, parts, scatter);
+  const LawAlong::At at = along.at(in.contact);
   std::vector<Eigen::Index> rows;
   FittedSlopes slopes;
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
@@ -39,9 +67,32 @@ FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
     slopes.time_s.push_back(r.time_s[i]);
   }
   slopes.by_law = at.by_law(rows, Eigen::all);
-  slopes.by_placement.resize(static_cast<Eigen::Index>(rows.size()), fitted ? 2 : 1);
-  slopes.by_placement.col(0).setOnes();
-  if (fitted) slopes.by_placement.col(1) = at.by_contact(rows);
+  MeasuredPlacement measured;
+  const bool indents =
+      law.spec.drive == Quantity::indentation_depth && law.spec.response == Quantity::contact_force;
+  if (indents) measured = measure_placement(recording, law.spec, std::nullopt);
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  std::vector<Eigen::VectorXd> columns;
+  std::vector<double> precision;
+  if (in.fits_zero) {
+    columns.emplace_back(Eigen::VectorXd::Ones(n));
+    precision.push_back(precision_of(measured.rests.zero));
+  }
+  if (in.fits_contact) {
+    columns.emplace_back(at.by_contact(rows));
+    precision.push_back(indents ? precision_of(measured.onset.drive) : 0.0);
+  }
+  if (file.drift) {
+    const double origin_s = file.drift_origin_s.value_or(0.0);
+    columns.emplace_back(Eigen::VectorXd::Map(slopes.time_s.data(), n).array() - origin_s);
+    precision.push_back(precision_of(measured.rests.drift));
+  }
+  slopes.by_placement.resize(n, static_cast<Eigen::Index>(columns.size()));
+  slopes.prior_precision =
+      Eigen::VectorXd::Map(precision.data(), static_cast<Eigen::Index>(precision.size()));
+  for (Eigen::Index k = 0; k < slopes.by_placement.cols(); ++k) {
+    slopes.by_placement.col(k) = columns[static_cast<std::size_t>(k)];
+  }
   return slopes;
 }
 
@@ -67,6 +118,9 @@ std::optional<LawFile> with_calibration_covariance(const LawFile& law,
   }
   const Eigen::Index p = all.front().by_law.cols();
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(p + own, p + own), b = a;
+  // Where the size of the noise is estimated, a prior weighs against the variance of an independent
+  // reading (docs/fit_intervals.md).
+  const double of_independent = u.noise.absolute * u.noise.absolute * u.readings_per_independent;
   Eigen::Index place = p;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const Eigen::Index width = all[i].by_placement.cols();
@@ -82,6 +136,9 @@ std::optional<LawFile> with_calibration_covariance(const LawFile& law,
     };
     add(a, gram);
     add(b, noisy);
+    const Eigen::VectorXd prior = of_independent * all[i].prior_precision;
+    a.diagonal().segment(place, width) += prior;
+    b.diagonal().segment(place, width) += of_independent * prior;
     place += width;
   }
   // Columns of one size: coordinates differ by many orders of magnitude.

@@ -5,12 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numbers>
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/autoregressive.hpp"
+#include "tpm/fit/predict/organ_readings.hpp"
+#include "tpm/fit/validate/grid_convergence.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -38,8 +42,8 @@ class Comparer {
   Comparer(const LawFile& law, const PreparedRecording& recording, const ComparisonOptions& options)
       : options_(options),
         prepared_(recording),
-        r_(recording.recording),
-        along_(law, recording),
+        r_(prepared_.recording),
+        along_(law, prepared_, options.organ, options.earlier),
         degrees_of_law_(law.uncertainty->degrees_of_freedom.value_or(kInfinity)) {}
 
   RecordingComparison compare() {
@@ -50,17 +54,19 @@ class Comparer {
     const auto& ours = options_.instrument;
     const auto& theirs = options_.calibration_instrument;
     result_.same_instrument = ours && theirs && ours->id == theirs->id;
+    result_.creep = along_.load_imposed();
     result_.parts = parts_of(prepared_);
     result_.scatter = scatter_of(prepared_, result_.parts);
     result_.placement = place_for_validation(along_, prepared_, result_.parts, result_.scatter,
-                                             options_.placement, options_.contact_by_threshold);
+                                             options_.placement, known_placement());
     at_ = along_.at(result_.placement.contact);
+    refine();
     const auto n = static_cast<Eigen::Index>(r_.response.size());
     measured_ = Eigen::VectorXd::Map(r_.response.data(), n).array() - result_.placement.zero;
     if (ours || theirs) follow_instrument();
     const bool chosen = !options_.quantities.empty();
     for (const QuantityOfInterest& q :
-         chosen ? options_.quantities : default_quantities(result_.parts)) {
+         chosen ? options_.quantities : default_quantities(result_.parts, result_.creep)) {
       add(q);
     }
     if (result_.quantities.empty()) {
@@ -75,6 +81,50 @@ class Comparer {
   }
 
  private:
+  [[nodiscard]] KnownPlacement known_placement() const {
+    return result_.creep ? KnownPlacement::no_load : options_.known;
+  }
+
+  /// How far the numbers of S may be off, and who gives them.
+  void refine() {
+    refinements_ = along_.refinements(result_.placement.contact);
+    if (!options_.pick) return;
+    const Protocol motion = beyond_contact(along_.motion(), result_.placement.contact);
+    PickedAnswer pick = options_.pick(motion, r_.time_s);
+    result_.pick = std::move(pick.name);
+    at_.value = std::move(pick.value);
+    claimed_limit_ = pick.claimed_limit;
+  }
+
+  /// u_num by its sources, and what rendering adds to S.
+  void set_numerical(QuantityComparison& q, Functional& s) const {
+    CombinedUncertainty sum;
+    const auto add = [&](const std::string& name, double u) {
+      sum.add(u, kInfinity);
+      q.parts.push_back({name, u});
+      q.numerical.push_back({name, u});
+    };
+    add("rounding", kNumericalError * std::abs(s.value));
+    for (const LawAlong::Refinement& refinement : refinements_) {
+      std::vector<double> values;
+      for (const Eigen::VectorXd& curve : refinement.values)
+        values.push_back(times(s.weight, curve));
+      add(refinement.name, grid_convergence(values, refinement.ratio).u);
+    }
+    if (claimed_limit_ > 0.0) {
+      add(fmt::format("the claimed error of {}", result_.pick),
+          claimed_limit_ * s.weight.lpNorm<1>() / std::numbers::sqrt3);
+    }
+    for (const RenderingError& rendering : options_.rendering) {
+      if (rendering.quantity != q.quantity) continue;
+      const double size = std::abs(s.value);
+      s.value *= 1.0 + rendering.mean;
+      add("rendering", rendering.limit * size / std::numbers::sqrt3);
+    }
+    std::ranges::stable_sort(q.numerical, std::greater<>(), &UncertaintyPart::u);
+    q.u_num = sum.u();
+  }
+
   void follow_instrument() {
     const double contact = result_.placement.contact;
     depth_scale_ = along_.by_depth_scale(contact);
@@ -93,6 +143,10 @@ class Comparer {
       if (weight[i] != 0.0) sum += weight[i] * slope.row(i);
     }
     return sum;
+  }
+
+  [[nodiscard]] const char* zero_name() const {
+    return result_.creep ? "the reading without a load" : "the zero of the force";
   }
 
   [[nodiscard]] std::vector<InstrumentEffect> effects_of(const Functional& s,
@@ -116,14 +170,23 @@ class Comparer {
     const double by_time = times(s.weight, time_scale_);
     const double by_shift = times(s.weight, time_shift_);
     const double by_travel = -times(s.weight, at_.by_contact);
-    add("scale of the force", times(s.weight, at_.value), -times(d.weight, measured_),
-        [&](const Instrument& i) { return relative(i.force); });
-    add("force channel", s.weight.sum(), -d.weight.sum(),
-        [&](const Instrument& i) { return absolute(i.force); });
-    add("scale of the depth", -by_depth, by_depth,
-        [&](const Instrument& i) { return relative(i.depth); });
-    add("depth channel", -by_travel, by_travel,
-        [&](const Instrument& i) { return absolute(i.depth); });
+    const double by_response = times(s.weight, at_.value);
+    // Of creep the force is what is imposed, and the depth what is read.
+    const bool creep = result_.creep;
+    const auto& read = [creep](const Instrument& i) -> const std::optional<ChannelUncertainty>& {
+      return creep ? i.depth : i.force;
+    };
+    const auto& imposed = [creep](const Instrument& i) -> const std::optional<ChannelUncertainty>& {
+      return creep ? i.force : i.depth;
+    };
+    add(creep ? "scale of the depth" : "scale of the force", by_response,
+        -times(d.weight, measured_), [&](const Instrument& i) { return relative(read(i)); });
+    add(creep ? "depth channel" : "force channel", s.weight.sum(), -d.weight.sum(),
+        [&](const Instrument& i) { return absolute(read(i)); });
+    add(creep ? "scale of the force" : "scale of the depth", -by_depth, by_depth,
+        [&](const Instrument& i) { return relative(imposed(i)); });
+    add(creep ? "force channel" : "depth channel", -by_travel, by_travel,
+        [&](const Instrument& i) { return absolute(imposed(i)); });
     add("scale of the time", -by_time, by_time,
         [&](const Instrument& i) { return relative(i.time); });
     add("time between channels", -by_shift, by_shift,
@@ -134,7 +197,7 @@ class Comparer {
   void add(const QuantityOfInterest& quantity) {
     const double contact = result_.placement.contact;
     const std::string name = quantity_words(quantity, r_.drive_quantity, r_.response_quantity);
-    const auto s = read_quantity(quantity, result_.parts, r_, contact, at_.value);
+    auto s = read_quantity(quantity, result_.parts, r_, contact, at_.value);
     const auto d = read_quantity(quantity, result_.parts, r_, contact, measured_);
     if (!s || !d) {
       result_.without.push_back(
@@ -146,6 +209,7 @@ class Comparer {
     q.quantity = quantity;
     q.name = name;
     q.unit = quantity_unit(quantity, r_.drive_quantity, r_.response_quantity);
+    set_numerical(q, *s);
     q.simulated = s->value;
     q.measured = d->value;
     q.e.error = s->value - d->value;
@@ -176,26 +240,24 @@ class Comparer {
     weights_.push_back(weight);
     const auto u_of = [&](const Eigen::VectorXd& w) { return result_.scatter.of(r_.time_s, w); };
     const double u_readings = u_of(weight);
-    q.parts = {{"the scatter of the readings", u_of(d.weight)},
-               {"the zero of the force", u_of(from_zero)},
-               {"the contact point", u_of(from_contact)}};
+    q.parts.push_back({"the scatter of the readings", u_of(d.weight)});
+    q.parts.push_back({zero_name(), u_of(from_zero)});
+    q.parts.push_back({"the contact point", u_of(from_contact)});
     const Eigen::RowVectorXd by_law =
         times(s.weight, at_.by_law) + by_contact * p.contact_by_law + by_zero * p.zero_by_law;
     q.shared = by_law * along_.root();
     q.u_input = q.shared.norm();
     q.parts.push_back({"the law's parameters", q.u_input});
-    q.u_num = kNumericalError * std::abs(s.value);
-    q.parts.push_back({"numerical errors", q.u_num});
     double own_instrument = 0.0;
     double stated_zero = 0.0;
-    if (p.zero_readings == 0 && std::abs(by_zero) > 1e-9 * d.weight.cwiseAbs().sum()) {
-      if (options_.instrument && options_.instrument->zero) {
+    const bool zero_told = p.zero_readings > 0 || p.zero_known;
+    if (!zero_told && std::abs(by_zero) > 1e-9 * d.weight.cwiseAbs().sum()) {
+      if (!result_.creep && options_.instrument && options_.instrument->zero) {
         stated_zero = std::abs(by_zero) * *options_.instrument->zero;
-        q.parts.push_back({"the zero of the force", stated_zero});
+        q.parts.push_back({zero_name(), stated_zero});
       } else {
-        q.remark =
-            "depends on the zero of the force, which nothing before contact and no instrument "
-            "tells";
+        q.remark = fmt::format("depends on {}, which nothing before {} and no instrument tells",
+                               zero_name(), result_.creep ? "the load" : "contact");
       }
     }
     add_instrument(q, s, d);
@@ -383,13 +445,15 @@ class Comparer {
   }
 
   const ComparisonOptions& options_;
-  const PreparedRecording& prepared_;
+  PreparedRecording prepared_;
   const Recording& r_;
   LawAlong along_;
   double degrees_of_law_;
   LawAlong::At at_;
   Eigen::VectorXd measured_, depth_scale_, time_scale_, time_shift_;
   std::vector<Eigen::VectorXd> weights_;
+  std::vector<LawAlong::Refinement> refinements_;
+  double claimed_limit_ = 0.0;
   RecordingComparison result_;
 };
 
@@ -397,7 +461,8 @@ class Comparer {
 
 RecordingComparison compare_with_recording(const LawFile& law, const PreparedRecording& recording,
                                            const ComparisonOptions& options) {
-  return Comparer(law, recording, options).compare();
+  const bool creep = recording.load_imposed || recording.recording.drive_quantity == Quantity::load;
+  return Comparer(law, creep ? as_load_imposed(recording) : recording, options).compare();
 }
 
 Unit quantity_unit(const QuantityOfInterest& quantity, Quantity drive, Quantity response) {
@@ -406,6 +471,10 @@ Unit quantity_unit(const QuantityOfInterest& quantity, Quantity drive, Quantity 
       return {"", Dimension::dimensionless, 1.0};
     case QuantityKind::half_time:
       return {"s", Dimension::time, 1.0};
+    case QuantityKind::rate: {
+      const std::string symbol(si_symbol(quantity_dimension(response)));
+      return {symbol.empty() ? "1/s" : symbol + "/s", Dimension::dimensionless, 1.0};
+    }
     case QuantityKind::work: {
       const bool indents = drive == Quantity::indentation_depth;
       return {indents ? "J" : "J/m^3", Dimension::dimensionless, 1.0};
@@ -418,7 +487,8 @@ Unit quantity_unit(const QuantityOfInterest& quantity, Quantity drive, Quantity 
 }
 
 Unit scaled_unit(const Unit& unit, double size) {
-  if (unit.symbol.empty() || !(size > 0.0) || !std::isfinite(size)) return unit;
+  if (unit.symbol.empty() || unit.symbol.starts_with("1/") || !(size > 0.0) || !std::isfinite(size))
+    return unit;
   struct Prefix {
     double factor;
     const char* text;
@@ -441,10 +511,15 @@ Unit scaled_unit(const Unit& unit, double size) {
 
 std::optional<double> limit_of(const Requirement& requirement, const QuantityComparison& quantity,
                                Dimension response, double peak) {
+  if (requirement.of_force &&
+      !(is_of_response(quantity.quantity.kind) && response == Dimension::force)) {
+    return std::nullopt;
+  }
   if (!requirement.share) {
     const bool of_response = is_of_response(quantity.quantity.kind);
     const Dimension own = of_response ? response : quantity.unit.dimension;
-    const bool has_dimension = quantity.quantity.kind != QuantityKind::work;
+    const bool has_dimension = quantity.quantity.kind != QuantityKind::work &&
+                               quantity.quantity.kind != QuantityKind::rate;
     if (!has_dimension || own != requirement.dimension) return std::nullopt;
     return requirement.value;
   }

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +20,7 @@ struct QuantityComparison {
   ErrorWithUncertainty e;
   double u_num = 0.0, u_input = 0.0, u_D = 0.0;  ///< of u_val^2 = u_num^2 + u_input^2 + u_D^2
   std::vector<UncertaintyPart> parts;            ///< what these consist of, the largest first
+  std::vector<UncertaintyPart> numerical;        ///< those of u_num, the largest first
   std::optional<double> limit;                   ///< R in this unit
   ModelVerdict verdict = ModelVerdict::not_seen;
   double p_value = 1.0;   ///< before Holm
@@ -64,6 +66,8 @@ struct RecordingComparison {
   ValidationPlacement placement;
   std::optional<Instrument> instrument;
   bool same_instrument = false;  ///< as the calibration's
+  bool creep = false;            ///< the load was imposed
+  std::string pick;              ///< name of the reduced model that answered; empty: none
   std::vector<QuantityComparison> quantities;
   std::vector<std::string> without;  ///< quantities that were asked for and cannot be read, and why
   JointTest joint;
@@ -71,11 +75,33 @@ struct RecordingComparison {
   ModelVerdict verdict = ModelVerdict::not_seen;  ///< of all quantities
 };
 
+/// The reduced model that answers in place of an organ, as a plan picked it.
+struct PickedAnswer {
+  std::string name;            ///< "linear_1"
+  Eigen::VectorXd value;       ///< SI, at the recording's times; NaN where it does not answer
+  double claimed_limit = 0.0;  ///< of its error, SI
+};
+/// @param motion beyond contact, that the organ is driven by
+using PickAnswer =
+    std::function<PickedAnswer(const Protocol& motion, const std::vector<double>& times_s)>;
+
+/// What rendering changes of a quantity, in parts of it, found from a session.
+struct RenderingError {
+  QuantityOfInterest quantity;
+  double mean = 0.0;   ///< rendered over simulated, less 1
+  double limit = 0.0;  ///< of a single press about the mean; of one press its own size
+  int presses = 0;
+};
+
 struct ComparisonOptions {
   std::vector<QuantityOfInterest> quantities;  ///< empty: default_quantities()
   std::optional<Requirement> requirement;
   PlacementRule placement = PlacementRule::held;
-  bool contact_by_threshold = false;
+  KnownPlacement known = KnownPlacement::nothing;
+  const OrganOfLaw* organ = nullptr;  ///< answers in place of the law
+  PickAnswer pick = nullptr;          ///< answers in place of the organ
+  std::vector<Knot> earlier;          ///< motion before the recording
+  std::vector<RenderingError> rendering;
   std::optional<Instrument> instrument, calibration_instrument;
   bool calibration_data = false;
 };
@@ -98,7 +124,8 @@ struct ComparisonOptions {
 /// point.
 [[nodiscard]] Unit scaled_unit(const Unit& unit, double size);
 
-/// R in the unit of a quantity; none if the requirement is an amount of another dimension.
+/// R in the unit of a quantity; none if the requirement is an amount of another dimension, or one
+/// of forces (jnd) and the quantity is none.
 [[nodiscard]] std::optional<double> limit_of(const Requirement& requirement,
                                              const QuantityComparison& quantity, Dimension response,
                                              double peak);

@@ -62,16 +62,35 @@ Functional peak_of(const RecordingParts& parts, std::span<const double> t,
   return f;
 }
 
-Functional end_of(const RecordingParts& parts, std::span<const double> t,
-                  const Eigen::VectorXd& curve) {
+/// The last tenth of the hold.
+Stretch end_window(const RecordingParts& parts, std::span<const double> t) {
   Stretch part{*parts.hold_first, *parts.hold_last};
   const double from = t[part.last] - kEndPart * (t[part.last] - parts.corner_s);
   while (part.count() > 1 && t[part.first] < from) ++part.first;
+  return part;
+}
+
+Functional end_of(const RecordingParts& parts, std::span<const double> t,
+                  const Eigen::VectorXd& curve) {
+  const Stretch part = end_window(parts, t);
   Functional f = nothing(curve);
   const auto first = static_cast<Eigen::Index>(part.first);
   const auto count = static_cast<Eigen::Index>(part.count());
   f.weight.segment(first, count).setConstant(1.0 / static_cast<double>(part.count()));
   f.value = curve.segment(first, count).mean();
+  return f;
+}
+
+std::optional<Functional> rate_of(const RecordingParts& parts, std::span<const double> t,
+                                  const Eigen::VectorXd& curve) {
+  const Stretch part = end_window(parts, t);
+  constexpr std::size_t kFewestOfRate = 3;
+  if (part.count() < kFewestOfRate) return std::nullopt;
+  Functional f = nothing(curve);
+  // Of a line through the window: what it rises by between its ends.
+  const double length = t[part.last] - t[part.first];
+  add_line(f, curve, t, part, t[part.last], 1.0 / length);
+  add_line(f, curve, t, part, t[part.first], -1.0 / length);
   return f;
 }
 
@@ -99,18 +118,19 @@ std::optional<Functional> half_time_of(const RecordingParts& parts, std::span<co
                                        const Eigen::VectorXd& curve) {
   const double level = 0.5 * (peak.value + end.value);
   double early = parts.corner_s, late = t[*parts.hold_last];
-  if (!(peak.value > end.value)) return std::nullopt;
+  const double sign = peak.value > end.value ? 1.0 : -1.0;  // relaxation, or creep
+  if (peak.value == end.value) return std::nullopt;
   constexpr int kHalvings = 50;
   for (int i = 0; i < kHalvings; ++i) {
     const double middle = 0.5 * (early + late);
     const Functional f = line_in(local_window(parts, t, middle), t, middle, curve);
-    (f.value > level ? early : late) = middle;
+    (sign * (f.value - level) > 0.0 ? early : late) = middle;
   }
   const double at = 0.5 * (early + late);
   const Stretch window = local_window(parts, t, at);
   const Functional here = line_in(window, t, at, curve);
   const double slope = line_in(window, t, at + 1.0, curve).value - here.value;  // a line: per s
-  if (!(slope < 0.0)) return std::nullopt;
+  if (!(sign * slope < 0.0)) return std::nullopt;
   return Functional{at - parts.corner_s, (0.5 * (peak.weight + end.weight) - here.weight) / slope};
 }
 
@@ -188,7 +208,7 @@ double corner_of(const Recording& r, const RecordingParts& parts) {
 double parse_place(std::string_view text, Quantity drive, std::string_view where,
                    QuantityKind& kind) {
   const std::string expected =
-      "peak, end, ratio, half-time, work, a time such as \"5 s\" or a depth";
+      "peak, end, ratio, half-time, rate, work, a time such as \"5 s\" or a depth";
   const QuantityText parts = split_quantity(text);
   const Dimension of_drive = quantity_dimension(drive);
   if (!parts.unit.empty() && !is_unit(parts.unit)) {
@@ -212,24 +232,33 @@ QuantityOfInterest parse_quantity_of_interest(std::string_view text, Quantity dr
   if (text == "ratio") return {QuantityKind::relaxation_ratio};
   if (text == "half-time") return {QuantityKind::half_time};
   if (text == "work") return {QuantityKind::work};
+  if (text == "rate") return {QuantityKind::rate};
   QuantityOfInterest q;
   q.at = parse_place(text, drive, where, q.kind);
   return q;
+}
+
+bool is_creep(Quantity response) noexcept {
+  return response == Quantity::indentation_depth || response == Quantity::strain ||
+         response == Quantity::relative_length;
 }
 
 std::string quantity_words(const QuantityOfInterest& quantity, Quantity drive, Quantity response) {
   const std::string name(quantity_short_name(response));
   switch (quantity.kind) {
     case QuantityKind::peak:
-      return fmt::format("peak {}", name);
+      return is_creep(response) ? fmt::format("{} at the corner", name)
+                                : fmt::format("peak {}", name);
     case QuantityKind::end_of_hold:
       return fmt::format("{} at end of hold", name);
     case QuantityKind::relaxation_ratio:
-      return "relaxation ratio";
+      return is_creep(response) ? "creep ratio" : "relaxation ratio";
     case QuantityKind::half_time:
       return "half time";
     case QuantityKind::work:
       return "work of the loop";
+    case QuantityKind::rate:
+      return fmt::format("rate of {} at end of hold", name);
     case QuantityKind::at_time:
       return fmt::format("{} at {} s", name, significant(quantity.at, 6));
     case QuantityKind::at_depth:
@@ -272,12 +301,13 @@ RecordingParts parts_of(const PreparedRecording& recording) {
   return parts;
 }
 
-std::vector<QuantityOfInterest> default_quantities(const RecordingParts& parts) {
+std::vector<QuantityOfInterest> default_quantities(const RecordingParts& parts, bool creep) {
   std::vector<QuantityOfInterest> all{{QuantityKind::peak}};
   if (parts.has_hold()) {
     all.push_back({QuantityKind::end_of_hold});
     all.push_back({QuantityKind::relaxation_ratio});
     all.push_back({QuantityKind::half_time});
+    if (creep) all.push_back({QuantityKind::rate});
   }
   if (parts.loop_last > parts.ramp_last) all.push_back({QuantityKind::work});
   return all;
@@ -290,7 +320,8 @@ std::optional<Functional> read_quantity(const QuantityOfInterest& quantity,
   std::optional<Functional> f;
   const bool of_hold = quantity.kind == QuantityKind::end_of_hold ||
                        quantity.kind == QuantityKind::relaxation_ratio ||
-                       quantity.kind == QuantityKind::half_time;
+                       quantity.kind == QuantityKind::half_time ||
+                       quantity.kind == QuantityKind::rate;
   if (of_hold && !parts.has_hold()) return std::nullopt;
   switch (quantity.kind) {
     case QuantityKind::peak:
@@ -307,6 +338,9 @@ std::optional<Functional> read_quantity(const QuantityOfInterest& quantity,
       break;
     case QuantityKind::work:
       f = work_of(parts, recording.drive, curve);
+      break;
+    case QuantityKind::rate:
+      f = rate_of(parts, t, curve);
       break;
     case QuantityKind::at_time:
       f = at_time(quantity.at, parts, t, curve);

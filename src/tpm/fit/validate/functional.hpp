@@ -17,10 +17,11 @@ enum class QuantityKind {
   peak,              ///< response at the corner between ramp and hold
   end_of_hold,       ///< mean response over the last tenth of the hold
   relaxation_ratio,  ///< end of the hold over peak
-  half_time,         ///< from the corner until half of the fall from peak to end is done, s
+  half_time,         ///< from the corner until half of the change from there to the end is done, s
   work,              ///< integral of the response over the drive, of a loop
   at_time,           ///< response at a time of the recording's clock
   at_depth,          ///< response on the first ramp at a depth beyond the contact
+  rate,              ///< of the response over the last tenth of the hold, per s
 };
 
 struct QuantityOfInterest {
@@ -30,12 +31,15 @@ struct QuantityOfInterest {
   bool operator==(const QuantityOfInterest&) const = default;
 };
 
-/// "peak", "end", "ratio", "half-time", "work", "5 s" or "2 mm" (of a strip: "1.1"). Throws
+/// "peak", "end", "ratio", "half-time", "rate", "work", "5 s" or "2 mm" (of a strip: "1.1"). Throws
 /// Error(bad_input) naming these.
 [[nodiscard]] QuantityOfInterest parse_quantity_of_interest(std::string_view text, Quantity drive,
                                                             std::string_view where);
 
-/// "peak force", "force at the end of the hold", "stress at 5 s".
+/// Whether a recording is one of creep: its load was imposed, and what it moved was measured.
+[[nodiscard]] bool is_creep(Quantity response) noexcept;
+
+/// "peak force", "force at the end of the hold", "stress at 5 s"; of creep "depth at the corner".
 [[nodiscard]] std::string quantity_words(const QuantityOfInterest& quantity, Quantity drive,
                                          Quantity response);
 
@@ -55,8 +59,9 @@ struct RecordingParts {
 [[nodiscard]] RecordingParts parts_of(const PreparedRecording& recording);
 
 /// The quantities that a recording of these parts has: peak, end of the hold, relaxation ratio and
-/// half time of a ramp and hold; the work where it is unloaded.
-[[nodiscard]] std::vector<QuantityOfInterest> default_quantities(const RecordingParts& parts);
+/// half time of a ramp and hold, of creep the rate, too; the work where it is unloaded.
+[[nodiscard]] std::vector<QuantityOfInterest> default_quantities(const RecordingParts& parts,
+                                                                 bool creep = false);
 
 /// A quantity of one curve, and its derivatives by the curve's samples.
 struct Functional {

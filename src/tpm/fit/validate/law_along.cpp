@@ -1,90 +1,196 @@
 #include "tpm/fit/validate/law_along.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/data/straight_pieces.hpp"
+#include "tpm/fit/validate/functional.hpp"
 #include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 #include "tpmkit/protocol.hpp"
 
 namespace tpm::fit {
 namespace {
 
-// Of what central differences change: their error is its square.
-constexpr double kStep = 1e-4;
+// Of what central differences change. Of a closed form the error is its square; an organ's answer
+// has an error of 1e-6 of the largest, which the difference must stand above.
+constexpr double kStep = 1e-4, kStepOfOrgan = 1e-2;
 
-Protocol motion_of(const std::vector<double>& time_s, const std::vector<double>& drive) {
-  Protocol motion = measured_history(Drive::displacement, time_s, drive);
-  motion.set_equilibrium_at_start(true);
-  return motion;
+Protocol history_of(Drive drive, const Recording& r, const std::vector<Knot>& earlier) {
+  std::vector<Knot> knots = earlier;
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) knots.push_back({r.time_s[i], r.drive[i]});
+  Protocol history(drive, std::move(knots), "measured history");
+  history.set_equilibrium_at_start(true);
+  return history;
+}
+
+/// The same history with other times and values.
+template <typename Change>
+Protocol changed(const Protocol& history, const Change& change) {
+  std::vector<Knot> knots(history.knots().begin(), history.knots().end());
+  for (Knot& knot : knots) knot = change(knot);
+  Protocol result(history.drive(), std::move(knots), history.name());
+  result.set_equilibrium_at_start(history.equilibrium_at_start());
+  return result;
+}
+
+/// The samples up to the end of the ramp and hold.
+Protocol until_hold_ends(const Protocol& whole, const PreparedRecording& recording) {
+  return history_until(whole, std::min(recording.to_s, whole.end_s()));
+}
+
+/// Times later by an amount, of a sample within a motion within it still.
+std::vector<double> within(const Protocol& motion, std::vector<double> times_s, double later_s) {
+  for (double& t : times_s) {
+    if (t <= motion.end_s()) t = std::clamp(t + later_s, motion.start_s(), motion.end_s());
+  }
+  return times_s;
+}
+
+bool is_load(Quantity q) {
+  return q == Quantity::load || q == Quantity::contact_force || q == Quantity::stress;
 }
 
 }  // namespace
 
-LawAlong::LawAlong(const LawFile& law, const PreparedRecording& recording)
+PreparedRecording as_load_imposed(const PreparedRecording& recording) {
+  PreparedRecording turned = recording;
+  Recording& r = turned.recording;
+  if (is_load(r.drive_quantity)) return turned;
+  std::swap(r.drive, r.response);
+  std::swap(r.drive_quantity, r.response_quantity);
+  r.response_sd.clear();
+  turned.phases.drive_jitter_sd = recording.phases.noise_sd_estimate;
+  turned.phases.noise_sd_estimate = recording.phases.drive_jitter_sd;
+  return turned;
+}
+
+LawAlong::LawAlong(const LawFile& law, const PreparedRecording& recording, const OrganOfLaw* organ,
+                   const std::vector<Knot>& earlier)
     : law_(law),
       recording_(recording.recording),
-      model_(law.spec),
-      coordinates_(fitted_coordinates(law, Placement::own)) {
-  require_quantities_of(law, recording);
+      own_model_(organ != nullptr ? nullptr : std::make_shared<LawModel>(law.spec)),
+      organ_(organ),
+      model_(organ != nullptr ? static_cast<const Model*>(organ) : own_model_.get()),
+      coordinates_(fitted_coordinates(law, Placement::own)),
+      load_imposed_(is_load(recording_.drive_quantity)),
+      whole_(history_of(load_imposed_ ? Drive::force : Drive::displacement, recording_, earlier)),
+      motion_(whole_) {
+  if (!load_imposed_) {
+    require_quantities_of(law, recording);
+  } else if (recording_.response_quantity != law.spec.drive) {
+    throw bad_input(fmt::format("recording '{}'", recording.name),
+                    fmt::format("{} under a load", quantity_name(recording_.response_quantity)),
+                    fmt::format("{}, as the law answers", quantity_name(law.spec.drive)));
+  }
+  if (organ_ != nullptr) {
+    if (load_imposed_) {
+      throw bad_input(fmt::format("recording '{}'", recording.name),
+                      "creep, which an organ is not compared with",
+                      "an imposed depth; or the law.json that was put on the organ");
+    }
+    motion_ = followed_by_organ(until_hold_ends(whole_, recording));
+  }
   const std::vector<LawParameter> parameters = law_parameters(law.spec);
   const LawParameter& contact = parameters[parameters.size() - 2];
   const double value = law.values[law.values.size() - 2];
   const bool known =
       std::ranges::find(coordinates_.place, parameters.size() - 2) != coordinates_.place.end();
-  contact_of_law_ = !belongs_to_recording(law.spec, contact) && (known || value != 0.0);
+  contact_of_law_ =
+      !load_imposed_ && !belongs_to_recording(law.spec, contact) && (known || value != 0.0);
+}
+
+Response LawAlong::respond(const Protocol& motion, const std::vector<double>& times_s,
+                           double contact, Want want) const {
+  std::vector<double> values = law_.values;
+  values[values.size() - 2] = load_imposed_ ? 0.0 : contact;
+  values.back() = 0.0;
+  if (!load_imposed_ || contact == 0.0) return model_->respond(motion, times_s, values, want);
+  return model_->respond(changed(motion,
+                                 [&](Knot k) {
+                                   return Knot{k.time_s, std::max(k.value - contact, 0.0)};
+                                 }),
+                         times_s, values, want);
 }
 
 LawAlong::At LawAlong::at(double contact) const {
+  const Response response =
+      respond(motion_, recording_.time_s, contact, Want::values_and_sensitivity);
   std::vector<double> values = law_.values;
   values[values.size() - 2] = contact;
-  values.back() = 0.0;
-  const Response response = model_.respond(motion_of(recording_.time_s, recording_.drive),
-                                           recording_.time_s, values, Want::values_and_sensitivity);
-  return {response.value, coordinate_slopes(response, coordinates_, values),
-          response.sensitivity.col(response.sensitivity.cols() - 2)};
+  At result{response.value, coordinate_slopes(response, coordinates_, values), {}};
+  if (!load_imposed_) {
+    result.by_contact = response.sensitivity.col(response.sensitivity.cols() - 2);
+    return result;
+  }
+  const double step = kStep * motion_.peak();
+  const auto beside = [&](double by) {
+    return along(changed(motion_, [&](Knot k) { return Knot{k.time_s, k.value - by}; }), contact);
+  };
+  result.by_contact = (beside(step) - beside(-step)) / (2.0 * step);
+  return result;
 }
 
-Eigen::VectorXd LawAlong::along(const std::vector<double>& time_s, const std::vector<double>& drive,
-                                double contact) const {
-  std::vector<double> values = law_.values;
-  values[values.size() - 2] = contact;
-  values.back() = 0.0;
-  std::vector<double> times = recording_.time_s;
-  for (double& t : times) t = std::clamp(t, time_s.front(), time_s.back());
-  return model_.respond(motion_of(time_s, drive), times, values, Want::values).value;
+Eigen::VectorXd LawAlong::along(const Protocol& motion, double contact, double later_s) const {
+  return respond(motion, within(motion, recording_.time_s, later_s), contact, Want::values).value;
 }
 
 Eigen::VectorXd LawAlong::by_depth_scale(double contact) const {
+  const double step = organ_ != nullptr ? kStepOfOrgan : kStep;
   const auto with = [&](double factor) {
-    std::vector<double> drive = recording_.drive;
-    for (double& d : drive) d = contact + factor * (d - contact);
-    return along(recording_.time_s, drive, contact);
+    return along(changed(motion_,
+                         [&](Knot k) {
+                           return Knot{k.time_s, contact + factor * (k.value - contact)};
+                         }),
+                 contact);
   };
-  return (with(1.0 + kStep) - with(1.0 - kStep)) / (2.0 * kStep);
+  return (with(1.0 + step) - with(1.0 - step)) / (2.0 * step);
 }
 
 Eigen::VectorXd LawAlong::by_time_scale(double contact) const {
   // The same samples, each later by its share: the response at sample i stays sample i.
+  const double step = organ_ != nullptr ? kStepOfOrgan : kStep;
+  const double start_s = recording_.time_s.front();
   const auto with = [&](double factor) {
-    std::vector<double> times = recording_.time_s;
-    for (double& t : times)
-      t = recording_.time_s.front() + factor * (t - recording_.time_s.front());
-    std::vector<double> values = law_.values;
-    values[values.size() - 2] = contact;
-    values.back() = 0.0;
-    return model_.respond(motion_of(times, recording_.drive), times, values, Want::values).value;
+    const auto scaled = [&](double t) { return start_s + factor * (t - start_s); };
+    std::vector<double> times = within(motion_, recording_.time_s, 0.0);
+    for (double& t : times) t = scaled(t);
+    return respond(changed(motion_,
+                           [&](Knot k) {
+                             return Knot{scaled(k.time_s), k.value};
+                           }),
+                   times, contact, Want::values)
+        .value;
   };
-  return (with(1.0 + kStep) - with(1.0 - kStep)) / (2.0 * kStep);
+  return (with(1.0 + step) - with(1.0 - step)) / (2.0 * step);
 }
 
 Eigen::VectorXd LawAlong::by_time_shift(double contact) const {
-  const double step = 1e-2 * median_step(recording_.time_s);
-  const auto with = [&](double later) {
-    std::vector<double> times = recording_.time_s;
-    for (double& t : times) t += later;
-    return along(times, recording_.drive, contact);
-  };
-  return (with(step) - with(-step)) / (2.0 * step);
+  const double part = organ_ != nullptr ? 0.5 : 1e-2;
+  const double step = part * median_step(recording_.time_s);
+  // The motion comes later; the samples stay.
+  return (along(motion_, contact, -step) - along(motion_, contact, step)) / (2.0 * step);
+}
+
+std::vector<LawAlong::Refinement> LawAlong::refinements(double contact) const {
+  if (organ_ == nullptr) return {};
+  Refinement pieces{"straight pieces of the motion", 2.0, {}};
+  for (const double coarser : {1.0, 2.0, 4.0}) {
+    Protocol motion = followed_by_organ(whole_, contact, coarser * kMotionWithin);
+    pieces.values.push_back(along(history_until(motion, motion_.end_s()), contact));
+  }
+  Refinement tolerances{"tolerance of the organ's balance", 10.0, {along(motion_, contact)}};
+  for (const double coarser : {10.0, 100.0}) {
+    const OrganOfLaw coarse = organ_->at_tolerance(coarser * OrganModel::kTolerance);
+    std::vector<double> values = law_.values;
+    values[values.size() - 2] = contact;
+    values.back() = 0.0;
+    tolerances.values.push_back(
+        coarse.respond(motion_, recording_.time_s, values, Want::values).value);
+  }
+  return {std::move(pieces), std::move(tolerances)};
 }
 
 }  // namespace tpm::fit

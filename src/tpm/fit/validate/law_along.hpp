@@ -1,19 +1,28 @@
 #pragma once
 #include <Eigen/Core>
+#include <memory>
+#include <string>
 #include <vector>
 
+#include "tpm/fit/predict/organ_prediction.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpmkit/law_file.hpp"
-#include "tpmkit/law_model.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm::fit {
 
-/// A fitted law along the motion of one recording, without a zero error of the response: what a
-/// validation compares the readings with, and how it follows each of its inputs.
+/// A fitted law, or an organ that it was put on, along the motion of one recording, without a zero
+/// error of the response: what a validation compares the readings with, and how it follows each of
+/// its inputs. Of creep the recording's drive is the load, and contact is a load at which nothing
+/// is pressed yet.
 class LawAlong {
  public:
+  /// @param recording of creep as as_load_imposed() gives it; outlives this
+  /// @param organ answers in place of the law, on the ramp and hold alone; outlives this
+  /// @param earlier motion that the tissue has seen before the recording, which ends before it
   /// Throws Error(bad_input) for a law without uncertainty or a recording of other quantities.
-  LawAlong(const LawFile& law, const PreparedRecording& recording);
+  LawAlong(const LawFile& law, const PreparedRecording& recording,
+           const OrganOfLaw* organ = nullptr, const std::vector<Knot>& earlier = {});
 
   /// Values and derivatives at one contact point.
   struct At {
@@ -28,22 +37,45 @@ class LawAlong {
   [[nodiscard]] Eigen::VectorXd by_time_scale(double contact) const;
   [[nodiscard]] Eigen::VectorXd by_time_shift(double contact) const;
 
+  /// One way in which the computation could be coarser.
+  struct Refinement {
+    std::string name;                     ///< "straight pieces of the motion"
+    double ratio = 2.0;                   ///< of neighbouring resolutions
+    std::vector<Eigen::VectorXd> values;  ///< from the finest on
+  };
+  /// Of an organ: the same answer at three resolutions of its motion. None for closed forms.
+  [[nodiscard]] std::vector<Refinement> refinements(double contact) const;
+
   /// Covariance of the law's coordinates is root root'.
   [[nodiscard]] const Eigen::MatrixXd& root() const { return coordinates_.root; }
   /// Whether contact is a property of the law, as the slack length of a strip.
   [[nodiscard]] bool contact_of_law() const { return contact_of_law_; }
   [[nodiscard]] double contact_in_law() const { return law_.values[law_.values.size() - 2]; }
+  [[nodiscard]] bool load_imposed() const { return load_imposed_; }
+  [[nodiscard]] const OrganOfLaw* organ() const { return organ_; }
   [[nodiscard]] const LawFile& law() const { return law_; }
+  /// What is imposed beyond a contact point, as an organ is driven.
+  [[nodiscard]] Protocol motion() const { return motion_; }
 
  private:
-  [[nodiscard]] Eigen::VectorXd along(const std::vector<double>& time_s,
-                                      const std::vector<double>& drive, double contact) const;
+  [[nodiscard]] Eigen::VectorXd along(const Protocol& motion, double contact,
+                                      double later_s = 0.0) const;
+  [[nodiscard]] Response respond(const Protocol& motion, const std::vector<double>& times_s,
+                                 double contact, Want want) const;
 
   LawFile law_;
   const Recording& recording_;
-  LawModel model_;
+  std::shared_ptr<const Model> own_model_;  ///< none for an organ
+  const OrganOfLaw* organ_;
+  const Model* model_;
   UncertainCoordinates coordinates_;
+  bool load_imposed_ = false;
+  Protocol whole_;   ///< of every sample
+  Protocol motion_;  ///< of an organ, in straight pieces to the end of the hold
   bool contact_of_law_ = false;
 };
+
+/// A recording of creep with the load as its drive and what it moved as its response.
+[[nodiscard]] PreparedRecording as_load_imposed(const PreparedRecording& recording);
 
 }  // namespace tpm::fit

@@ -146,8 +146,14 @@ class HeldPlacement {
     p_.contact_by_law = p_.zero_by_law = Eigen::RowVectorXd::Zero(law.root().rows());
   }
 
-  ValidationPlacement find(bool always_onset, bool threshold) {
-    if (threshold) {
+  ValidationPlacement find(bool always_onset, KnownPlacement known) {
+    if (known == KnownPlacement::surface) {
+      p_.contact_words = "the session's surface";
+      p_.zero_known = true;
+    } else if (known == KnownPlacement::no_load) {
+      p_.contact_words = "load 0";
+      set_zero(p_, r_, zero_count(0.0, 0.0));
+    } else if (known == KnownPlacement::threshold) {
       p_.contact = prepared_.phases.contact_drive;
       p_.contact_words = "where the response passes --contact-force";
       set_zero(p_, r_, samples_before(r_, parts_, p_.contact, kGuard * travel_, false));
@@ -257,7 +263,8 @@ ValidationPlacement fitted_placement(const LawAlong& law, const Recording& r,
   const std::size_t last = parts.hold_last.value_or(parts.ramp_last);
   const auto n = static_cast<Eigen::Index>(last + 1);
   const auto y = Eigen::VectorXd::Map(r.response.data(), n);
-  const bool contact = !law.contact_of_law() && r.drive_quantity != Quantity::strain;
+  const bool contact =
+      !law.contact_of_law() && !law.load_imposed() && r.drive_quantity != Quantity::strain;
   const double travel = r.drive[parts.ramp_last] - r.drive[parts.ramp_first];
   constexpr int kMost = 40;
   for (int i = 0; i < kMost; ++i) {
@@ -313,10 +320,10 @@ PlacementRule parse_placement_rule(std::string_view text, std::string_view where
 
 ValidationPlacement place_for_validation(const LawAlong& law, const PreparedRecording& recording,
                                          const RecordingParts& parts, const ReadingScatter& scatter,
-                                         PlacementRule rule, bool threshold) {
+                                         PlacementRule rule, KnownPlacement known) {
   const ValidationPlacement held =
-      HeldPlacement(law, recording, parts, scatter).find(rule == PlacementRule::onset, threshold);
-  if (rule != PlacementRule::fitted) return held;
+      HeldPlacement(law, recording, parts, scatter).find(rule == PlacementRule::onset, known);
+  if (rule != PlacementRule::fitted || known == KnownPlacement::surface) return held;
   return fitted_placement(law, recording.recording, parts, scatter, held);
 }
 

@@ -19,6 +19,14 @@ enum class PlacementRule {
 [[nodiscard]] std::string_view placement_rule_name(PlacementRule rule) noexcept;
 [[nodiscard]] PlacementRule parse_placement_rule(std::string_view text, std::string_view where);
 
+/// What is known of contact and zero beforehand.
+enum class KnownPlacement {
+  nothing,    ///< both are found in the recording
+  threshold,  ///< contact was defined by a response (--contact-force)
+  no_load,    ///< creep: the load is 0 where nothing presses
+  surface,    ///< a session: depths count from its surface, where the rendered force is 0
+};
+
 /// Contact and zero of one recording, and how they follow readings and law to first order.
 struct ValidationPlacement {
   double contact = 0.0;  ///< drive, SI
@@ -26,6 +34,7 @@ struct ValidationPlacement {
   Eigen::VectorXd contact_by_reading, zero_by_reading;  ///< one a sample
   Eigen::RowVectorXd contact_by_law, zero_by_law;       ///< one a coordinate of the law
   std::size_t zero_readings = 0;  ///< before contact; 0: the recording does not tell the zero
+  bool zero_known = false;        ///< it is 0 by definition
   double contact_u = 0.0, zero_u = 0.0;  ///< standard uncertainties from the readings, SI
   std::optional<double> onset, onset_u;  ///< where the onset was found, whatever is used
   std::string contact_words;             ///< what it rests on
@@ -41,12 +50,10 @@ struct ValidationPlacement {
 /// so that the stiffness that is judged does not move it. Where the drive starts at 0 with the
 /// ramp, and the onset agrees with that within two of its standard uncertainties, contact is at 0
 /// as the recording says.
-/// @param threshold contact was defined by a response (--contact-force): it is where the recording
-///        passes that, and is not found here
 [[nodiscard]] ValidationPlacement place_for_validation(const LawAlong& law,
                                                        const PreparedRecording& recording,
                                                        const RecordingParts& parts,
                                                        const ReadingScatter& scatter,
-                                                       PlacementRule rule, bool threshold);
+                                                       PlacementRule rule, KnownPlacement known);
 
 }  // namespace tpm::fit

@@ -161,7 +161,9 @@ ReadingScatter scatter_of(const PreparedRecording& recording, const RecordingPar
   const double independent = (static_cast<double>(n) - static_cast<double>(fit.columns)) *
                              (1.0 - scatter.phi) / (1.0 + scatter.phi);
   const double quantum = quantum_of({r.response.data() + first, n});
-  scatter.sigma = std::max(scatter.sigma, quantum / std::sqrt(12.0));
+  const double stated =
+      recording.instrument && !recording.load_imposed ? recording.instrument->reading_floor() : 0.0;
+  scatter.sigma = std::max({scatter.sigma, quantum / std::sqrt(12.0), stated});
   scatter.degrees = std::max(independent - 1.0, 1.0);
   return scatter;
 }

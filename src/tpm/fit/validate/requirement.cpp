@@ -41,6 +41,7 @@ Requirement parse_requirement(std::string_view text, std::string_view where) {
   r.stated = std::string(text);
   if (text == "jnd") {
     r.value = kForceJnd;
+    r.of_force = true;
     r.stated = fmt::format("jnd, {} %", significant(100.0 * kForceJnd, 3));
     return r;
   }

@@ -14,6 +14,7 @@ struct Requirement {
   bool share = true;                               ///< of the measured value; else an amount
   double value = 0.0;                              ///< > 0: a share, or SI
   Dimension dimension = Dimension::dimensionless;  ///< of an amount
+  bool of_force = false;                           ///< of forces alone: what a hand can tell
   std::string stated;                              ///< as typed, with what jnd stands for
 };
 

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/base/lists.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/validate/calibration_covariance.hpp"
 #include "tpmkit/error.hpp"
 
@@ -35,14 +37,16 @@ std::optional<fs::path> found_file(const std::string& name, const std::string& s
 Applicability motion_of(const PreparedRecording& recording, const RecordingParts& parts,
                         double contact) {
   const Recording& r = recording.recording;
+  const bool load = r.drive_quantity == Quantity::load;
+  const std::vector<double>& depth = load ? r.response : r.drive;
   Applicability a;
   const std::size_t last = std::max(parts.hold_last.value_or(parts.ramp_last), parts.loop_last);
   for (std::size_t i = parts.ramp_first; i <= last; ++i) {
-    a.depth = std::max(a.depth, r.drive[i] - contact);
+    a.depth = std::max(a.depth, depth[i] - contact);
   }
   a.duration_s = r.time_s[last] - r.time_s[parts.ramp_first];
   const double time = r.time_s[parts.ramp_last] - r.time_s[parts.ramp_first];
-  if (time > 0.0) a.rate = (r.drive[parts.ramp_last] - r.drive[parts.ramp_first]) / time;
+  if (time > 0.0) a.rate = (depth[parts.ramp_last] - depth[parts.ramp_first]) / time;
   return a;
 }
 
@@ -93,8 +97,9 @@ bool same_samples(const Recording& a, const Recording& b) {
 
 bool was_fitted(const ValidationRequest& request, const PreparedRecording& recording) {
   const std::string& sha256 = recording.recording.header.sha256;
+  const std::string numbers = samples_sha256(recording.recording);
   return std::ranges::any_of(request.calibration.files, [&](const CalibrationData::File& file) {
-    return (!sha256.empty() && file.sha256 == sha256) ||
+    return (!sha256.empty() && file.sha256 == sha256) || file.samples_sha256 == numbers ||
            (file.recording && same_samples(file.recording->recording, recording.recording));
   });
 }
@@ -121,15 +126,58 @@ ModelVerdict verdict_of_pooled(const std::vector<PooledQuantity>& pooled) {
   return verdict_of_all(each);
 }
 
+/// A requirement in the unit of nothing that is compared says nothing, whatever else is found.
+void require_fitting_unit(const Validation& v, const std::optional<Requirement>& requirement) {
+  if (!requirement) return;
+  std::vector<std::string> units;
+  for (const RecordingComparison& r : v.recordings) {
+    for (const QuantityComparison& q : r.quantities) {
+      if (q.limit) return;
+      if (!q.unit.symbol.empty()) units.push_back(q.unit.symbol);
+    }
+  }
+  const std::vector<std::string> each = each_once(units, [](const std::string& u) { return u; });
+  throw Error(ExitCode::usage, "--require",
+              fmt::format("{} has the unit of no quantity that is compared", requirement->stated),
+              fmt::format("a share such as 10%{}{}", each.empty() ? "" : ", or an amount in ",
+                          fmt::join(each, " or ")));
+}
+
 }  // namespace
 
+std::vector<RenderingError> rendering_errors(const Validation& presses) {
+  std::vector<RenderingError> all;
+  for (const RecordingComparison& r : presses.recordings) {
+    for (const QuantityComparison& q : r.quantities) {
+      if (q.simulated == 0.0) continue;
+      auto found = std::ranges::find(all, q.quantity, &RenderingError::quantity);
+      if (found == all.end()) found = all.insert(all.end(), {q.quantity});
+      found->mean += q.measured / q.simulated - 1.0;
+      ++found->presses;
+    }
+  }
+  for (RenderingError& e : all) {
+    e.mean /= static_cast<double>(e.presses);
+    for (const RecordingComparison& r : presses.recordings) {
+      for (const QuantityComparison& q : r.quantities) {
+        if (q.quantity != e.quantity || q.simulated == 0.0) continue;
+        const double own = q.measured / q.simulated - 1.0;
+        e.limit = std::max(e.limit, std::abs(e.presses > 1 ? own - e.mean : own));
+      }
+    }
+  }
+  return all;
+}
+
 CalibrationData find_calibration(const LawFile& law, const fs::path& law_file,
+                                 const std::vector<std::string>& digests,
                                  const std::function<PreparedRecording(const std::string&)>& read) {
   CalibrationData data;
   if (!law.uncertainty) return data;
   bool one = true;
   for (const FittedFile& fitted : law.uncertainty->data) {
     CalibrationData::File file{fitted.name, fitted.sha256, std::nullopt};
+    if (data.files.size() < digests.size()) file.samples_sha256 = digests[data.files.size()];
     const auto path =
         fitted.sha256.empty() ? std::nullopt : found_file(fitted.name, fitted.sha256, law_file);
     if (!path) {
@@ -172,12 +220,17 @@ Validation validate(const ValidationRequest& request) {
   v.u_input_from = again ? "the scatter of the calibration's recordings (sandwich)"
                          : "the covariance in the law file";
   v.spec = law.spec;
+  v.subject = law_words(law.spec);
+  if (request.organ)
+    v.subject += fmt::format(", on an organ of {} spheres", request.organ->spheres());
+  v.session = request.session;
+  v.rendering = request.rendering;
   v.law_file = request.law_file;
   v.law_sha256 = request.law_sha256;
   v.placement = request.placement;
   if (request.requirement) v.requirement = request.requirement->stated;
   for (const CalibrationData::File& file : request.calibration.files) {
-    v.calibration.push_back({file.name, file.sha256, file.recording});
+    v.calibration.push_back(file);
   }
   v.remarks = request.calibration.remarks;
   std::vector<RecordingComparison> unseen;
@@ -188,12 +241,21 @@ Validation validate(const ValidationRequest& request) {
     options.quantities = request.quantities;
     options.requirement = request.requirement;
     options.placement = request.placement;
-    options.contact_by_threshold = request.contact_by_threshold;
+    options.organ = request.organ.get();
+    options.pick = request.pick;
+    options.rendering = request.rendering;
+    if (!request.earlier.empty()) {
+      options.earlier = request.earlier.at(i);
+      options.known = KnownPlacement::surface;
+    } else if (request.contact_by_threshold) {
+      options.known = KnownPlacement::threshold;
+    }
     if (i < request.instruments.size()) options.instrument = request.instruments[i];
     options.calibration_instrument = request.calibration.instrument;
     options.calibration_data = was_fitted(request, recording);
     RecordingComparison comparison = compare_with_recording(law, recording, options);
-    Applicability motion = motion_of(recording, comparison.parts, comparison.placement.contact);
+    Applicability motion = motion_of(recording, comparison.parts,
+                                     comparison.creep ? 0.0 : comparison.placement.contact);
     compare_with_calibration(motion, request);
     if (!comparison.calibration) {
       unseen.push_back(comparison);
@@ -212,11 +274,14 @@ Validation validate(const ValidationRequest& request) {
     v.remarks.push_back(
         fmt::format("{} stood on a bound of the fit: its uncertainty is not in u_input", name));
   }
+  require_fitting_unit(v, request.requirement);
   if (unseen.empty()) {
     v.verdict = ModelVerdict::residual;
     return v;
   }
-  PooledOptions pooling{request.requirement, request.at, quantity_dimension(law.spec.response)};
+  const bool creep = unseen.front().creep;
+  PooledOptions pooling{request.requirement, request.at,
+                        quantity_dimension(creep ? law.spec.drive : law.spec.response)};
   v.pooled = pool_recordings(
       unseen, unseen_motions,
       law.uncertainty->degrees_of_freedom.value_or(std::numeric_limits<double>::infinity()),

@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@ struct CalibrationData {
   struct File {
     std::string name, sha256;
     std::optional<PreparedRecording> recording;  ///< if the file was found with its SHA-256
+    std::string samples_sha256 = {};  ///< of its numbers; empty: the law does not state it
   };
   std::vector<File> files;
   std::optional<Instrument> instrument;  ///< of all of them
@@ -23,10 +25,12 @@ struct CalibrationData {
 
 /// Looks for the files that a law names, beside the law and in the current folder; a file counts if
 /// its SHA-256 is the one in the law.
-/// @param law_file path of the law
+/// @param law_file path of the law, or of the organ that it was put on
+/// @param digests sample_digests() of the law
 /// @param read reads and prepares a file as a recording; its errors are told in remarks
 [[nodiscard]] CalibrationData find_calibration(
     const LawFile& law, const std::filesystem::path& law_file,
+    const std::vector<std::string>& digests,
     const std::function<PreparedRecording(const std::string&)>& read);
 
 /// What is asked: see docs/validate.md.
@@ -40,11 +44,20 @@ struct ValidationRequest {
   std::optional<Requirement> requirement;
   PlacementRule placement = PlacementRule::held;
   bool contact_by_threshold = false;
-  std::optional<std::string> at;  ///< see PooledOptions::at
+  std::optional<std::string> at;            ///< see PooledOptions::at
+  std::shared_ptr<const OrganOfLaw> organ;  ///< answers in place of the law
+  PickAnswer pick = nullptr;                ///< answers in place of the organ
+  /// The recordings are presses of a session: what its hand did before each.
+  std::vector<std::vector<Knot>> earlier;
+  std::string session;  ///< file whose rendering is part of S; empty: none
+  std::vector<RenderingError> rendering;
 };
 
 struct Validation {
   LawSpec spec;
+  std::string subject;  ///< "linear kernel, ...", "... on an organ of 142 spheres"
+  std::string session;  ///< file whose rendering is part of S; empty: none
+  std::vector<RenderingError> rendering;
   std::string law_file, law_sha256, requirement;
   PlacementRule placement = PlacementRule::held;
   std::string u_input_from;  ///< where the covariance of the law's parameters comes from
@@ -65,6 +78,10 @@ struct Validation {
 /// else from the law's covariance. Throws Error(bad_input) for a law without uncertainty or
 /// recordings of other quantities.
 [[nodiscard]] Validation validate(const ValidationRequest& request);
+
+/// What rendering changes of each quantity: the rendered force over that of the subject along the
+/// hand's own motion, from a validation whose recordings are presses of a session.
+[[nodiscard]] std::vector<RenderingError> rendering_errors(const Validation& presses);
 
 /// "no model error is seen above the uncertainty", "a model error: peak force -14.2 +- 2.3 mN", ...
 [[nodiscard]] std::string conclusion_words(const Validation& validation);

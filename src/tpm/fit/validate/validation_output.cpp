@@ -115,7 +115,11 @@ std::string placement_text(const RecordingComparison& r, const Unit& unit, Dimen
       p.contact_u > 0.0 ? fmt::format(", u {}", with_unit(number(p.contact_u, shown, 2), shown))
                         : "",
       p.contact_words);
-  if (p.zero_readings == 0) return text + "; nothing before contact tells the zero of the force";
+  if (p.zero_known) return text + "; the force there is 0";
+  if (p.zero_readings == 0) {
+    return text + (r.creep ? "; nothing before the load tells the reading without one"
+                           : "; nothing before contact tells the zero of the force");
+  }
   text += fmt::format("; zero {}, u {}, from {} readings", with_unit(number(p.zero, unit), unit),
                       with_unit(number(p.zero_u, unit, 2), unit), p.zero_readings);
   if (p.zero_moved) {
@@ -132,6 +136,22 @@ std::string scatter_text(const ReadingScatter& s, const Unit& unit) {
       "{} (standard deviation), correlation of neighbours {}, {} degrees of freedom, from {}",
       with_unit(number(s.sigma, unit, 3), unit), significant(s.phi, 2), significant(s.degrees, 3),
       s.told_by);
+}
+
+/// Who answers, where it is no law and no network.
+std::string answer_text(const RecordingComparison& r) {
+  return fmt::format("{}, which a plan picked; its claimed error is in u_num as a limit", r.pick);
+}
+
+std::string rendering_text(const Validation& v) {
+  std::string text = fmt::format("{}: S is times", v.session);
+  for (const RenderingError& e : v.rendering) {
+    text += fmt::format("{} {} ({}, {} {})", &e == &v.rendering.front() ? "" : ",",
+                        significant(1.0 + e.mean, 6),
+                        quantity_words(e.quantity, v.spec.drive, v.spec.response), e.presses,
+                        e.presses == 1 ? "press" : "presses");
+  }
+  return text;
 }
 
 std::string instrument_text(const RecordingComparison& r) {
@@ -163,7 +183,7 @@ Unit response_unit(const RecordingComparison& r) {
 }
 
 std::string header_text(const Validation& v) {
-  std::string text = fmt::format("{}: {}\n", v.law_file, law_words(v.spec));
+  std::string text = fmt::format("{}: {}\n", v.law_file, v.subject);
   const std::string fitted =
       v.calibration.empty()
           ? std::string("files that the law does not name")
@@ -202,7 +222,10 @@ std::string recording_text(const Validation& v, std::size_t index) {
   const Unit unit = response_unit(r);
   text += line("together", joint_text(r.joint));
   text += line("whole curve", curve_text(r.curve, unit));
-  text += line("placement", placement_text(r, unit, quantity_dimension(v.spec.drive)));
+  if (!r.pick.empty()) text += line("S from", answer_text(r));
+  text +=
+      line("placement",
+           placement_text(r, unit, quantity_dimension(r.creep ? v.spec.response : v.spec.drive)));
   text += line("scatter", scatter_text(r.scatter, unit));
   text += line("instrument", instrument_text(r));
   text += line("applicability", applicability_text(v.applicability[index]));
@@ -326,6 +349,7 @@ std::string to_terminal_text(const Validation& v) {
     if (!v.pooled.empty()) text += pooled_text(v);
     text += each_recording_text(v);
   }
+  if (!v.session.empty()) text += line("rendered by", rendering_text(v));
   text += line("u_input", "from " + v.u_input_from);
   for (const std::string& remark : v.remarks) text += line("note", remark);
   return text + line("verdict", conclusion_words(v));
@@ -353,6 +377,9 @@ Json quantity_json(const QuantityComparison& q) {
   j["parts"] = array_json(q.parts, [](const UncertaintyPart& part) {
     return Json{{"name", part.name}, {"u", stored(part.u)}};
   });
+  j["numerical"] = array_json(q.numerical, [](const UncertaintyPart& part) {
+    return Json{{"name", part.name}, {"u", stored(part.u)}};
+  });
   if (q.limit) j["R"] = stored(*q.limit);
   j["verdict"] = verdict_key(q.verdict);
   j["p_value"] = stored(q.p_value);
@@ -376,6 +403,8 @@ Json applicability_json(const Applicability& a) {
 
 Json recording_json(const RecordingComparison& r, const Applicability& a) {
   Json j{{"recording", r.name}, {"sha256", r.sha256}, {"fitted", r.calibration}};
+  if (r.creep) j["load_imposed"] = true;
+  if (!r.pick.empty()) j["pick"] = r.pick;
   j["quantities"] = array_json(r.quantities, quantity_json);
   j["not_compared"] = r.without;
   Json joint{{"rank", r.joint.rank}};
@@ -444,10 +473,24 @@ Json pooled_json(const PooledQuantity& p) {
 }  // namespace
 
 Json to_json(const Validation& v) {
-  Json j{{"law_file", v.law_file}, {"law_sha256", v.law_sha256}, {"law", law_name(v.spec)}};
+  Json j{{"law_file", v.law_file},
+         {"law_sha256", v.law_sha256},
+         {"law", law_name(v.spec)},
+         {"subject", v.subject}};
   j["calibration"] = array_json(v.calibration, [](const CalibrationData::File& f) {
-    return Json{{"name", f.name}, {"sha256", f.sha256}, {"found", f.recording.has_value()}};
+    Json file{{"name", f.name}, {"sha256", f.sha256}, {"found", f.recording.has_value()}};
+    if (!f.samples_sha256.empty()) file["samples_sha256"] = f.samples_sha256;
+    return file;
   });
+  if (!v.session.empty()) {
+    j["session"] = v.session;
+    j["rendering"] = array_json(v.rendering, [&v](const RenderingError& e) {
+      return Json{{"quantity", quantity_words(e.quantity, v.spec.drive, v.spec.response)},
+                  {"mean", stored(e.mean)},
+                  {"limit", stored(e.limit)},
+                  {"presses", e.presses}};
+    });
+  }
   j["requirement"] = v.requirement.empty() ? Json("none") : Json(v.requirement);
   j["placement"] = placement_rule_name(v.placement);
   j["u_input_from"] = v.u_input_from;

@@ -14,8 +14,7 @@
 namespace tpm::organ {
 namespace {
 
-constexpr double kTolerance = 1e-6;            // of the response, in parts of its largest value
-constexpr double kDerivativeTolerance = 1e-5;  // likewise, of relative changes
+constexpr double kDerivativeTolerance = 1e-5;  // of relative changes, in parts of the largest
 constexpr double kDifference = 1e-5;           // of a parameter, where laws are differentiated
 
 /// How the organ of a scene and one of another spacing answer each other.
@@ -97,8 +96,9 @@ Probe probe_of(const Tissue& tissue) {
 
 }  // namespace
 
-OrganModel::OrganModel(std::shared_ptr<const Tissue> tissue)
+OrganModel::OrganModel(std::shared_ptr<const Tissue> tissue, double tolerance)
     : tissue_(std::move(tissue)),
+      tolerance_(tolerance),
       element_(tissue_->by_constants && tissue_->materials.factor.size() == 0),
       bonds_(tissue_->bonds()),
       constraints_(tissue_->constraints()),
@@ -159,7 +159,7 @@ Response OrganModel::respond_by_table(const Protocol& protocol, std::span<const 
                                       const Eigen::MatrixXd& along) const {
   const Network& network = tissue_->network;
   const BondSystem bonds = bonds_.with_materials(network, materials_with(parameters));
-  QuasiStaticOptions options{.tolerance = kTolerance};
+  QuasiStaticOptions options{.tolerance = tolerance_};
   options.derivative_tolerance = kDerivativeTolerance;
   const Eigen::Map<const Eigen::VectorXd> at(parameters.data(), std::ssize(parameters));
   Eigen::VectorXd per_unit = Eigen::VectorXd::Ones(along.cols());
@@ -209,7 +209,7 @@ Response OrganModel::respond_by_element(const Protocol& protocol, std::span<cons
   const Similarity similarity{p.spacing_m / network.organ.spacing, continuum ? 2.0 : 1.0};
   const Drive drive = protocol.drive();
   const Derivatives wanted = derivatives_along(along, p, drive, similarity.power);
-  QuasiStaticOptions options{.tolerance = kTolerance};
+  QuasiStaticOptions options{.tolerance = tolerance_};
   options.derivative_tolerance = kDerivativeTolerance;
   std::vector<Eigen::Index> used;
   if (along.cols() > 0) {

@@ -20,9 +20,12 @@ namespace tpm::organ {
 /// with x.
 class OrganModel final : public Model {
  public:
+  static constexpr double kTolerance = 1e-6;
+
   /// @param tissue stands (require_standing) and has a contact sphere that is free
+  /// @param tolerance of the response, in parts of its largest value
   /// Throws Error(bad_input) for one without.
-  explicit OrganModel(std::shared_ptr<const Tissue> tissue);
+  explicit OrganModel(std::shared_ptr<const Tissue> tissue, double tolerance = kTolerance);
 
   [[nodiscard]] std::string_view name() const override { return "organ"; }
   [[nodiscard]] std::span<const ParameterDescription> parameters() const override { return table_; }
@@ -50,6 +53,7 @@ class OrganModel final : public Model {
   [[nodiscard]] MaterialField materials_with(std::span<const double> parameters) const;
 
   std::shared_ptr<const Tissue> tissue_;
+  double tolerance_;
   bool element_;                          ///< the paper's, without regions
   std::vector<MaterialParameter> names_;  ///< of the material's table
   std::vector<ParameterDescription> table_;

@@ -1,0 +1,15 @@
+#pragma once
+#include <filesystem>
+
+#include "tpm/fit/select/recording_setup.hpp"
+
+namespace tpm::fit {
+
+/// Gives a recording the instrument that the description beside its file states
+/// (instrument_beside), if it states one. A fit takes from it the zero where no samples before
+/// contact tell it, and the least noise of a reading. What an instrument leaves unknown of
+/// stiffnesses as a whole, its gain, is not in a fit's intervals: a warning says so. Throws
+/// Error(bad_input) naming the key of a block that is wrong.
+void take_instrument(PreparedRecording& recording, const std::filesystem::path& file);
+
+}  // namespace tpm::fit

@@ -1,0 +1,301 @@
+// tpm validate beyond one law on one ramp: grids, creep, organs, picks of plans, rendering, copies
+// of fitted data, requirements, and what an instrument adds.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "refusal.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/fit/predict/error_budget.hpp"
+#include "tpm/fit/predict/organ_prediction.hpp"
+#include "tpm/fit/sample_digest.hpp"
+#include "tpm/fit/select/instrument_of_recording.hpp"
+#include "tpm/fit/validate/grid_convergence.hpp"
+#include "validation_studies.hpp"
+
+namespace tpm::fit {
+namespace {
+
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+LawFile quiet_law() {
+  Random random(3);
+  test::StudyNoise noise;
+  noise.sigma_N = 2e-4;
+  return test::study_calibration(1, noise, random);
+}
+
+PreparedRecording quiet_recording(double stiffer, std::uint64_t seed = 5) {
+  Random random(seed);
+  test::StudyNoise noise;
+  noise.sigma_N = 2e-4;
+  return prepare_recording("validation", test::study_recording(test::study_validation(200, 0.0),
+                                                               noise, random, stiffer));
+}
+
+/// 0.1 N within 1 s on the material of the studies, held for 20 s; depths scatter by 2 um.
+PreparedRecording creep_recording(const LawFile& law, double stiffer, std::uint64_t seed) {
+  Recording r;
+  r.header.id = "creep";
+  r.drive_quantity = Quantity::load;
+  r.response_quantity = Quantity::indentation_depth;
+  for (int i = 0; i <= 500; ++i) {
+    const double t = 0.05 * i;
+    r.time_s.push_back(t);
+    r.drive.push_back(0.1 * std::clamp(t - 4.0, 0.0, 1.0));
+  }
+  Protocol load = measured_history(Drive::force, r.time_s, r.drive);
+  load.set_equilibrium_at_start(true);
+  std::vector<double> values{60.0, 45.0, 2.0, 0.0, 0.0};
+  const Response depth = LawModel(law.spec).respond(load, r.time_s, values, Want::values);
+  Random random(seed);
+  for (const double d : depth.value)
+    r.response.push_back(d / stiffer + 2e-6 * random.normal() + 3e-5);
+  PreparedRecording prepared;
+  prepared.name = "creep";
+  prepared.recording = std::move(r);
+  prepared.to_s = prepared.recording.time_s.back();
+  return prepared;
+}
+
+ValidationRequest request_for(const LawFile& law, PreparedRecording recording) {
+  ValidationRequest request;
+  request.law_file = "law.json";
+  request.law = law;
+  request.recordings = {std::move(recording)};
+  return request;
+}
+
+/// The paper's star: four spheres, which answer within milliseconds.
+const OrganMaterial& star_of(const LawFile& law) {
+  static const OrganMaterial once =
+      put_on_organ(law,
+                   {motion_of_protocol(ramp_and_hold(4e-3, 1e-3, 20.0),
+                                       [] {
+                                         std::vector<double> t;
+                                         for (int i = 0; i <= 96; ++i) t.push_back(0.25 * i);
+                                         return t;
+                                       }())},
+                   Json::parse(R"({"organ": {"kind": "star"}, "contacts": [{"kind": "sphere"}]})"),
+                   "test", {}, {});
+  return once;
+}
+
+}  // namespace
+
+TEST_CASE("the grid convergence index has its closed form", "[validate]") {
+  // 1 + 0.1 h^2 on h = 1, 2, 4: the error of the finest is 0.1, and the order 2.
+  const GridConvergence g = grid_convergence({1.1, 1.4, 2.6}, 2.0);
+  CHECK(g.monotone);
+  CHECK_THAT(g.order, WithinRel(2.0, 1e-12));
+  CHECK_THAT(g.expanded, WithinRel(1.25 * 0.1, 1e-12));
+  CHECK_THAT(g.u, WithinRel(0.0625, 1e-12));
+  // An oscillation, differences that grow, and two grids: 3 times the largest difference.
+  CHECK_THAT(grid_convergence({1.0, 1.2, 1.1}, 2.0).expanded, WithinRel(0.6, 1e-12));
+  CHECK_THAT(grid_convergence({1.0, 1.3, 1.4}, 2.0).expanded, WithinRel(1.2, 1e-12));
+  CHECK_THAT(grid_convergence({1.0, 1.1}, 2.0).u, WithinRel(0.15, 1e-12));
+  CHECK_THAT(grid_convergence({1.0, 1.0, 1.0}, 2.0).u, WithinAbs(0.0, 0.0));
+  CHECK_THAT(test::refusal_of([] { (void)grid_convergence({1.0}, 2.0); }),
+             Contains("two or more finite values"));
+}
+
+TEST_CASE("creep has depth, ratio, half time and rate of the curve", "[validate]") {
+  // Depth 1 mm + 0.1 mm/s (t - corner) on a load that ends its ramp at 5 s.
+  PreparedRecording r = creep_recording(quiet_law(), 1.0, 4);
+  Eigen::VectorXd curve(501);
+  for (int i = 0; i <= 500; ++i) curve[i] = 1e-3 + 1e-4 * std::max(0.05 * i - 5.0, 0.0);
+  const RecordingParts parts = parts_of(r);
+  REQUIRE(parts.has_hold());
+  CHECK_THAT(parts.corner_s, WithinAbs(5.0, 1e-9));
+  const auto read = [&](QuantityKind kind) {
+    return read_quantity({kind}, parts, r.recording, 0.0, curve).value().value;
+  };
+  CHECK_THAT(read(QuantityKind::peak), WithinRel(1e-3, 1e-9));
+  CHECK_THAT(read(QuantityKind::rate), WithinRel(1e-4, 1e-9));
+  const double end = 1e-3 + 1e-4 * 19.0;  // mean of the last 2 s of 20 s
+  CHECK_THAT(read(QuantityKind::end_of_hold), WithinRel(end, 1e-9));
+  CHECK_THAT(read(QuantityKind::half_time), WithinRel(9.5, 1e-6));
+  CHECK(quantity_words({QuantityKind::peak}, Quantity::load, Quantity::indentation_depth) ==
+        "depth at the corner");
+}
+
+TEST_CASE("creep of the same material is as predicted, of a stiffer one it is not", "[validate]") {
+  const LawFile law = quiet_law();
+  const Validation same = validate(request_for(law, creep_recording(law, 1.0, 5)));
+  INFO(to_terminal_text(same));
+  CHECK(same.verdict == ModelVerdict::not_seen);
+  CHECK(same.recordings.front().creep);
+  CHECK(same.recordings.front().quantities.size() == 5);
+  ValidationRequest stiff = request_for(law, creep_recording(law, 1.1, 6));
+  stiff.requirement = parse_requirement("0.4 mm", "test");
+  const Validation other = validate(stiff);
+  const QuantityComparison& end =
+      test::study_quantity(other.recordings.front(), QuantityKind::end_of_hold);
+  // S = 0.1 N / 60 N/m, D that over 1.1.
+  CHECK_THAT(end.e.error, WithinAbs((0.1 / 60.0) * (1.0 - 1.0 / 1.1), 3.0 * end.e.u_val + 1e-6));
+  CHECK(end.verdict == ModelVerdict::adequate);
+  CHECK(validate(request_for(law, creep_recording(law, 1.1, 6))).verdict == ModelVerdict::seen);
+}
+
+TEST_CASE("a requirement in the unit of nothing is refused, also of fitted data", "[validate]") {
+  const LawFile law = quiet_law();
+  ValidationRequest request = request_for(law, quiet_recording(1.0));
+  request.requirement = parse_requirement("20 mm", "--require");
+  const auto refused = [&request] { (void)validate(request); };
+  CHECK_THAT(test::refusal_of(refused), Contains("the unit of no quantity") && Contains("in N"));
+  request.recordings.front().recording.header.sha256 = "abc";
+  request.calibration.files.push_back({"fitted.csv", "abc", std::nullopt, ""});
+  CHECK_THAT(test::refusal_of(refused), Contains("the unit of no quantity"));
+}
+
+TEST_CASE("what a hand can tell is asked of forces alone", "[validate]") {
+  ValidationRequest request = request_for(quiet_law(), quiet_recording(1.02));
+  request.requirement = parse_requirement("jnd", "--require");
+  const Validation v = validate(request);
+  for (const QuantityComparison& q : v.recordings.front().quantities) {
+    const bool force = q.unit.symbol == "N";
+    CHECK(q.limit.has_value() == force);
+    CHECK((q.verdict == ModelVerdict::no_requirement) == !force);
+    if (force) CHECK_THAT(*q.limit, WithinRel(0.07 * q.measured, 1e-12));
+  }
+  CHECK(v.verdict == ModelVerdict::adequate);
+}
+
+TEST_CASE("a renamed and resaved copy of fitted data gets no verdict", "[validate]") {
+  const PreparedRecording fitted = prepare_recording("fitted.csv", quiet_recording(1.0).recording);
+  SetupOptions setup;
+  setup.profiles = false;
+  setup.starts = 2;
+  const std::vector<PreparedRecording> data{fitted};
+  const FitResult fit = run_fit(recording_config(test::study_law(), data, setup), data_sets(data));
+  const Json document = law_document(fit);
+  const std::vector<std::string> digests = sample_digests(document);
+  REQUIRE(digests.size() == 1);
+  PreparedRecording copy = fitted;
+  copy.name = "another.csv";
+  copy.recording.header.sha256 = "of other bytes";
+  for (double& f : copy.recording.response) f *= 1.0 + 1e-15;  // units back and forth
+  CHECK(samples_sha256(copy.recording) == digests.front());
+  ValidationRequest request = request_for(fitted_law(fit), copy);
+  request.calibration = find_calibration(request.law, "nowhere/law.json", digests,
+                                         [](const std::string&) { return PreparedRecording(); });
+  CHECK(validate(request).verdict == ModelVerdict::residual);
+  request.recordings.front().recording.response[100] += 1e-6;
+  CHECK(validate(request).verdict != ModelVerdict::residual);
+}
+
+TEST_CASE("an organ is compared as its law is, with the numbers of its network", "[validate]") {
+  const LawFile law = quiet_law();
+  ValidationRequest request = request_for(law, quiet_recording(1.0));
+  const Validation by_law = validate(request);
+  request.organ =
+      std::shared_ptr<const OrganOfLaw>(new OrganOfLaw(organ_of_law(star_of(law), "test")));
+  const Validation v = validate(request);
+  INFO(to_terminal_text(v));
+  CHECK_THAT(v.subject, Contains("on an organ of 4 spheres"));
+  for (const QuantityKind kind : {QuantityKind::peak, QuantityKind::end_of_hold}) {
+    const QuantityComparison& q = test::study_quantity(v.recordings.front(), kind);
+    const QuantityComparison& l = test::study_quantity(by_law.recordings.front(), kind);
+    // The star is the law's own network: what differs is the fit of its bonds.
+    CHECK_THAT(q.simulated, WithinRel(l.simulated, 0.01));
+    CHECK_THAT(q.u_input, WithinRel(l.u_input, 0.2));
+    CHECK(q.u_num > l.u_num);
+    CHECK(q.u_num < 2e-3 * q.simulated);
+  }
+  // A material 10 % stiffer is seen on the organ, too.
+  request.recordings = {quiet_recording(1.1)};
+  CHECK(validate(request).verdict == ModelVerdict::seen);
+}
+
+TEST_CASE("a pick answers in place of its organ, and its claim is a limit", "[validate]") {
+  const LawFile law = quiet_law();
+  const OrganOfLaw organ = organ_of_law(star_of(law), "test");
+  ComparisonOptions options;
+  options.organ = &organ;
+  options.quantities = {{QuantityKind::end_of_hold}};
+  const PreparedRecording recording = quiet_recording(1.0);
+  const QuantityComparison full =
+      compare_with_recording(law, recording, options).quantities.front();
+  options.pick = [&organ](const Protocol& motion, const std::vector<double>& times_s) {
+    const LawFile plain = at_surface(organ.law());
+    return PickedAnswer{
+        "made", 1.02 * organ.respond(motion, times_s, plain.values, Want::values).value, 5e-3};
+  };
+  const RecordingComparison r = compare_with_recording(law, recording, options);
+  CHECK(r.pick == "made");
+  const QuantityComparison& q = r.quantities.front();
+  CHECK_THAT(q.simulated, WithinRel(1.02 * full.simulated, 1e-4));
+  // A mean of readings: a limit of 5 mN is 5 mN / sqrt 3.
+  CHECK_THAT(q.u_num, WithinRel(std::hypot(5e-3 / std::numbers::sqrt3, full.u_num), 1e-3));
+}
+
+TEST_CASE("what a session's rendering changes is part of S, its scatter of u_num", "[validate]") {
+  const LawFile law = quiet_law();
+  ValidationRequest request = request_for(law, quiet_recording(1.0));
+  request.quantities = {{QuantityKind::end_of_hold}};
+  const Validation plain = validate(request);
+  request.rendering = {{{QuantityKind::end_of_hold}, 0.03, 0.01, 4}};
+  request.session = "made.tpmrec";
+  const Validation v = validate(request);
+  const QuantityComparison& a = plain.recordings.front().quantities.front();
+  const QuantityComparison& b = v.recordings.front().quantities.front();
+  CHECK_THAT(b.simulated, WithinRel(1.03 * a.simulated, 1e-12));
+  CHECK_THAT(b.u_num, WithinRel(0.01 * a.simulated / std::numbers::sqrt3, 1e-6));
+  CHECK_THAT(to_terminal_text(v), Contains("made.tpmrec") && Contains("4 presses"));
+}
+
+TEST_CASE("an instrument is stated once, and fits and budgets take it", "[validate]") {
+  const test::TempFolder folder;
+  write_file(folder / "r.json",
+             R"j({"instrument": {"id": "cell", "force": "1 % of reading (standard)",
+                 "depth": "20 um (standard)", "zero": "3 mN (standard)", "resolution": "12 mN",
+                 "noise": "0.1 mN"}})j");
+  PreparedRecording recording = quiet_recording(1.0);
+  take_instrument(recording, folder / "r.csv");
+  REQUIRE(recording.instrument);
+  CHECK_THAT(recording.instrument->reading_floor(), WithinRel(0.012 / std::sqrt(12.0), 1e-12));
+  REQUIRE_FALSE(recording.warnings.empty());
+  CHECK_THAT(recording.warnings.back(), Contains("gain of instrument cell"));
+  // No reading is known better than its step.
+  CHECK_THAT(scatter_of(recording, parts_of(recording)).sigma,
+             WithinRel(0.012 / std::sqrt(12.0), 1e-12));
+  // The budget at the end of the ramp: 1 % of 300 mN, 3 mN, and 20 um of 105 N/m.
+  LawFile law = quiet_law();
+  law.values = {60.0, 45.0, 2.0, 0.0, 0.0};
+  const ErrorBudget budget = contact_budget(law, recording, {});
+  REQUIRE(budget.instrument);
+  const double peak = budget.peak_N;
+  const double u = std::hypot(0.01 * peak, 3e-3, 20e-6 * 105.0);
+  CHECK_THAT(budget.instrument->largest, WithinRel(1.959964 * u / peak, 0.03));
+  CHECK(budget.data_part >= budget.instrument->largest);
+  CHECK_THAT(to_terminal_text(budget), Contains("instrument cell, 95 %"));
+}
+
+TEST_CASE("without readings before contact a fit's zero is what the instrument states",
+          "[validate]") {
+  Random random(11);
+  test::StudyNoise noise;
+  noise.sigma_N = 2e-4;
+  test::StudyTest slow;
+  slow.rate_mm_per_s = 0.5;
+  Recording cut = test::study_recording(slow, noise, random);
+  constexpr std::ptrdiff_t kGone = 42;
+  for (auto* column : {&cut.time_s, &cut.drive, &cut.response}) {
+    column->erase(column->begin(), column->begin() + kGone);
+  }
+  PreparedRecording recording = prepare_recording("cut", cut);
+  recording.instrument = Instrument{};
+  recording.instrument->id = "cell";
+  recording.instrument->zero = 1.5e-3;
+  const FitConfig config = recording_config(test::study_law(), {&recording, 1}, {});
+  const auto zero = std::ranges::find_if(
+      config.parameters, [](const EstimatedParameter& p) { return p.fit.name == "offset"; });
+  REQUIRE(zero != config.parameters.end());
+  REQUIRE(zero->prior);
+  CHECK(zero->prior->sd == 1.5e-3);
+  CHECK_THAT(zero->prior->from, Contains("stated by instrument cell"));
+}
+
+}  // namespace tpm::fit
