@@ -72,5 +72,7 @@ endif()
 # A program or module that is installed: CMake would end its paths of libraries with an empty one until then, and the
 # folder in which it is called would be searched for each of them.
 function(tpm_load_from_fixed_places target)
-  set_target_properties(${target} PROPERTIES BUILD_WITH_INSTALL_RPATH ON INSTALL_RPATH_USE_LINK_PATH ON)
+  if(NOT BUILD_SHARED_LIBS)  # shared rooms are for working on them: they are not installed
+    set_target_properties(${target} PROPERTIES BUILD_WITH_INSTALL_RPATH ON INSTALL_RPATH_USE_LINK_PATH ON)
+  endif()
 endfunction()

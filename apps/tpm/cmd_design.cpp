@@ -33,7 +33,7 @@ int design(const DesignOptions& options, const Session& session) {
   const auto top = static_cast<std::size_t>(parse_whole_number(options.top, "--top", 1));
   will_write_into(options.folder, {"figures.json"});
   const auto csv = csv_beside(options.output, session);
-  const DesignResult result = plan(read_design(options.design));
+  const DesignResult result = fit::plan(read_design(options.design));
   std::optional<DesignCheck> check;
   if (sets > 0) {
     check = check_design(result.problem, result.ranked.front().experiment, sets, seed);

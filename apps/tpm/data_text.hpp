@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/curve_file.hpp"
 
