@@ -28,7 +28,7 @@ THREE_AXES = {"title": "three axes", "model": "single_contact", "indentation": {
               "axes": [{"parameter": "depth", "values": ["2 mm", "4 mm", "6 mm"]},
                        {"parameter": "spacing", "values": ["20 mm", "30 mm"]},
                        {"parameter": "E1", "values": ["6 kPa", "12 kPa", "24 kPa"]}], "outputs": ["peak_force"]}
-STORED = "$(dirname $TPM)/../../reports/stability"  # what `tpm stability` wrote
+STORED = "$(dirname $TPM)/../../reports/stability"  # what `tpm accuracy stability` wrote
 RUN = "$TPM simulate s.json -o o.h5 > out.txt"
 
 
@@ -169,7 +169,7 @@ CASES = [
 
 INTRODUCTION = """Every row: an input, what version {old} answered, what this version answers, and the test that holds it.
 Items 7 to 15 of the list "No wrong number"; several had been mended before {old} and answer alike. Items 11 and 15 are
-those of `tpm stability`: reports/stability had been left from before that; it was computed anew. Item 12 was also tried
+those of `tpm accuracy stability`: reports/stability had been left from before that; it was computed anew. Item 12 was also tried
 with the real Slurm (`scripts/try_slurm.sh`)."""
 
 RELATIVES = """## Relatives found and mended

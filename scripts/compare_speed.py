@@ -63,11 +63,17 @@ def processor_seconds(command):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, None
 
 
+def benchmark_command(program):
+    """The command that records pieces of work: `tpm accuracy benchmark`, and `tpm benchmark` of older programs."""
+    moved = subprocess.run([program, "accuracy", "benchmark", "--help"], capture_output=True).returncode == 0
+    return [program, "accuracy", "benchmark"] if moved else [program, "benchmark"]
+
+
 def recorded(program, names, repeats, folder):
-    """Ratios to the calibration loop of the named works of `tpm benchmark --record`."""
+    """Ratios to the calibration loop of the named works of `tpm accuracy benchmark --record`."""
     file = pathlib.Path(folder, "speed.csv")
     file.unlink(missing_ok=True)
-    subprocess.run([program, "benchmark", "--record", str(file), "--repeats", str(repeats), *names], check=True,
+    subprocess.run([*benchmark_command(program), "--record", str(file), "--repeats", str(repeats), *names], check=True,
                    stdout=subprocess.DEVNULL)
     with file.open(newline="") as rows:
         return {row["work"]: float(row["ratio"]) for row in csv.DictReader(rows)}
@@ -75,7 +81,7 @@ def recorded(program, names, repeats, folder):
 
 def works(program):
     """Names of the works that a program can record; empty if it knows no --record."""
-    done = subprocess.run([program, "benchmark", "--record", "x.csv", "--list"], capture_output=True, text=True)
+    done = subprocess.run([*benchmark_command(program), "--record", "x.csv", "--list"], capture_output=True, text=True)
     return [line.split()[0] for line in done.stdout.splitlines() if line.strip()] if done.returncode == 0 else []
 
 
@@ -134,7 +140,7 @@ def main():
     for name, why in failed.items():
         print(f"{name:<30} not compared: {why}")
     if not common:
-        print("named pieces of work are not compared: one of the two has no tpm benchmark --record")
+        print("named pieces of work are not compared: one of the two has no tpm accuracy benchmark --record")
     if slower:
         print(f"slower by more than {100 * (REGRESSION - 1):.0f} %: {', '.join(slower)}")
         return 1

@@ -117,13 +117,13 @@ COMMANDS = [
     Command("plan", "plan in/indented.json --costs nominal --brief", [], weight=20),
     Command("plan, to a file", "plan in/indented.json --costs nominal --format json -o plan.json",
             ["plan.json", "plan.csv"], weight=20),
-    Command("benchmark", "benchmark bond_paper --no-timing -o bench", [], varies=["bench/report.run.json"],
+    Command("benchmark", "accuracy benchmark bond_paper --no-timing -o bench", [], varies=["bench/report.run.json"],
             kept=["bench/benchmark.part.json"], weight=50),
     Command("hil run", "hil run in/session.json -o s.tpmrec --force", ["s.tpmrec"], varies=["s.tpmrec"],  # ends early where the disk is full
             weight=4),
     Command("hil export", "hil export in/s.tpmrec -o s.h5", ["s.h5"]),
     Command("report", "report -o paper", [], varies=["paper/report.run.json"], weight=100),
-    Command("stability", "stability --points 2 --only maps -o stability", [], varies=["stability/report.run.json"],
+    Command("stability", "accuracy stability --points 2 --only maps -o stability", [], varies=["stability/report.run.json"],
             weight=20),
 ]
 

@@ -2,8 +2,8 @@
 //
 //     tpm_peers [FOLDER] [REPEATS]
 //
-// Writes the report that `tpm benchmark` writes. Engines are set up within a run, as a new scene
-// would; their models are compiled before.
+// Writes the report that `tpm accuracy benchmark` writes. Engines are set up within a run, as a new
+// scene would; their models are compiled before.
 #include <fmt/format.h>
 
 #include <charconv>

@@ -97,6 +97,9 @@ decltype(auto) of_option(Read&& read) {
 /// Throws Error(environment) if it takes nothing more.
 void write_output(std::string_view text);
 
+/// The same, red where standard output is a terminal and $NO_COLOR is not set: for what failed.
+void write_alarming(std::string_view text);
+
 /// Formats and writes an answer to standard output.
 template <class... Arguments>
 void say(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
@@ -143,17 +146,19 @@ void add_simulate_command(CLI::App& app, Session& session);
 void add_plan_command(CLI::App& app, Session& session);
 void add_report_command(CLI::App& app, Session& session);
 void add_experiments_command(CLI::App& app, Session& session);
-void add_benchmark_command(CLI::App& app, Session& session);
-void add_stability_command(CLI::App& app, Session& session);
+void add_accuracy_command(CLI::App& app, Session& session);
 void add_sweep_command(CLI::App& app, Session& session);
 void add_hil_command(CLI::App& app, Session& session);
-void add_hil_check_command(CLI::App& hil, Session& session);      // below `tpm hil`
-void add_hil_identify_command(CLI::App& hil, Session& session);   // below `tpm hil`
-void add_hil_export_command(CLI::App& hil, Session& session);     // below `tpm hil`
-void add_hil_verify_commands(CLI::App& hil, Session& session);    // below `tpm hil`
-void add_hil_stability_command(CLI::App& hil, Session& session);  // below `tpm hil`
-void add_hil_hazards_command(CLI::App& hil, Session& session);    // below `tpm hil`
-void add_data_import_command(CLI::App& data, Session& session);   // below `tpm data`
-void add_sweep_views(CLI::App& sweep, Session& session);          // below `tpm sweep`
+void add_hil_check_command(CLI::App& hil, Session& session);       // below `tpm hil`
+void add_hil_identify_command(CLI::App& hil, Session& session);    // below `tpm hil`
+void add_hil_export_command(CLI::App& hil, Session& session);      // below `tpm hil`
+void add_hil_verify_commands(CLI::App& hil, Session& session);     // below `tpm hil`
+void add_hil_stability_command(CLI::App& hil, Session& session);   // below `tpm hil`
+void add_hil_hazards_command(CLI::App& hil, Session& session);     // below `tpm hil`
+void add_verify_command(CLI::App& accuracy, Session& session);     // below `tpm accuracy`
+void add_benchmark_command(CLI::App& accuracy, Session& session);  // below `tpm accuracy`
+void add_stability_command(CLI::App& accuracy, Session& session);  // below `tpm accuracy`
+void add_data_import_command(CLI::App& data, Session& session);    // below `tpm data`
+void add_sweep_views(CLI::App& sweep, Session& session);           // below `tpm sweep`
 
 }  // namespace tpm::app

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <string_view>
+#include <utility>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
@@ -57,7 +59,16 @@ std::string_view name_of(std::string_view word) {
   return word.substr(0, word.find('='));
 }
 
+/// Commands that stand below another one now.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kMoved{
+    {{"benchmark", "tpm accuracy benchmark"}, {"stability", "tpm accuracy stability"}}};
+
 std::string no_such_command(const CLI::App& command, const std::string& word) {
+  for (const auto& [old, now] : kMoved) {
+    if (command.get_parent() == nullptr && word == old) {
+      return fmt::format("no command '{}'; it is '{}' now", old, now);
+    }
+  }
   const std::vector<std::string> known = commands_of(command);
   const std::string nearest = nearest_word(word, known);
   const std::string name = full_name(command);

@@ -55,6 +55,18 @@ void write_output(std::string_view text) {
               fmt::format("cannot be written: {}", std::strerror(errno)), "room for the answer");
 }
 
+void write_alarming(std::string_view text) {
+  const char* no_color = std::getenv("NO_COLOR");
+  const bool plain = no_color != nullptr && *no_color != '\0';
+  if (plain || ::isatty(STDOUT_FILENO) == 0) {
+    write_output(text);
+    return;
+  }
+  (void)std::fputs("\x1b[31m", stdout);
+  write_output(text);
+  (void)std::fputs("\x1b[0m", stdout);
+}
+
 void write_message(std::string_view line) {
   if (line.ends_with('\n')) line.remove_suffix(1);
   const std::string safe = for_terminal(line, LineEnds::escaped) + "\n";
@@ -159,7 +171,7 @@ void add_commands(CLI::App& app, Session& session) {
       {"Hand: haptic devices", {add_hil_command, add_budget_command}},
       {"Evidence: the paper, and tpm itself",
        {add_report_command, add_tables_command, add_audit_command, add_experiments_command,
-        add_benchmark_command, add_stability_command, add_recovery_command, add_coverage_command,
+        add_accuracy_command, add_recovery_command, add_coverage_command,
         add_check_gradient_command, add_schema_command, add_version_command}}};
   for (const Group& group : groups) {
     for (const Adder add : group.commands) {

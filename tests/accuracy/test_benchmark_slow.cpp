@@ -1,4 +1,5 @@
-// tpm benchmark: errors against the test's own arithmetic, references that disagree, failures.
+// tpm accuracy benchmark: errors against the test's own arithmetic, references that disagree,
+// failures.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>

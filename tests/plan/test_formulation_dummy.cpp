@@ -31,7 +31,7 @@ std::string scene_of(const std::string& kind) {
 }  // namespace
 
 TEST_CASE("a formulation in one file is in the lists") {
-  CHECK(names(answer_of("benchmark --list").at("formulations"), "dummy"));
+  CHECK(names(answer_of("accuracy benchmark --list").at("formulations"), "dummy"));
   CHECK(names(answer_of("simulate --list-formulations").at("formulations"), "dummy"));
 }
 

@@ -101,7 +101,7 @@ using namespace plan;
 using namespace fit;
 }  // namespace tpm::sweep
 
-/// Error against cost, stability.
+/// Error against cost, stability, verification.
 namespace tpm::accuracy {
 using namespace base;
 using namespace work;
@@ -111,6 +111,7 @@ using namespace files;
 using namespace show;
 using namespace organ;
 using namespace contact;
+using namespace fit;
 using namespace haptics;
 }  // namespace tpm::accuracy
 

@@ -27,7 +27,7 @@ constexpr auto kKindMarks = std::to_array<KindMarks>({
     {"sweep", "a sweep", "tpm sweep", {"axes", "outputs"}},
     {"design", "a design of experiments", "tpm design", {"candidates", "noise"}},
     {"organ_experiments", "a study of experiments", "tpm experiments", {"tissues", "conditions"}},
-    {"benchmark", "a benchmark", "tpm benchmark", {"problems", "timing"}},
+    {"benchmark", "a benchmark", "tpm accuracy benchmark", {"problems", "timing"}},
     {"claims", "a list of claims", "tpm audit", {"claims", "symbols"}},
     {"fit_tables", "a fit in tables", "tpm fit", {"parameter_file", "measurement_file"}},
     {"fit", "the configuration of a fit", "tpm fit", {"parameters", "data"}},

@@ -1,5 +1,5 @@
 // Declared in tpm/accuracy/show/benchmark_report.hpp.
-// The record of tpm benchmark as JSON, both ways, and what an earlier run has left.
+// The record of tpm accuracy benchmark as JSON, both ways, and what an earlier run has left.
 #include <fmt/format.h>
 
 #include <algorithm>

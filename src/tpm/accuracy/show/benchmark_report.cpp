@@ -293,7 +293,7 @@ std::string introduction(const BenchmarkOptions& options) {
 /// The setting of each curve that first meets an error, over all problems.
 /// @param figures of benchmark_figures
 Document benchmark_document(const BenchmarkRecord& record, const std::vector<Figure>& figures) {
-  Document document{"Speed against accuracy", "What `tpm benchmark` measured"};
+  Document document{"Speed against accuracy", "What `tpm accuracy benchmark` measured"};
   document.paragraph(introduction(record.options));
   for (const BenchmarkResult& result : record.results) {
     document.heading(2, fmt::format("{} (`{}`)", result.title, result.name));

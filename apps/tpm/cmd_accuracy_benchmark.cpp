@@ -1,4 +1,4 @@
-// tpm benchmark: error against cost of every method on named problems.
+// tpm accuracy benchmark: error against cost of every method on named problems.
 
 #include <chrono>
 #include <filesystem>
@@ -141,8 +141,8 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
 
 }  // namespace
 
-void add_benchmark_command(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand(
+void add_benchmark_command(CLI::App& accuracy, Session& session) {
+  CLI::App* command = accuracy.add_subcommand(
       "benchmark", "Error against cost of every method at many settings, on named problems");
   auto choice = std::make_shared<BenchmarkChoice>();
   command->add_option("PROBLEM", choice->problems, "Names of problems (default: all; see --list)");
@@ -166,10 +166,10 @@ void add_benchmark_command(CLI::App& app, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Run it on an otherwise idle machine. Example:\n"
-      "  tpm benchmark -o reports/accuracy\n"
-      "  tpm benchmark -o reports/accuracy --keep\n"
-      "  tpm benchmark bond_paper organ_poke --repeats 50\n"
-      "  tpm benchmark --record speed.csv --commit $(git rev-parse --short HEAD)");
+      "  tpm accuracy benchmark -o reports/accuracy\n"
+      "  tpm accuracy benchmark -o reports/accuracy --keep\n"
+      "  tpm accuracy benchmark bond_paper organ_poke --repeats 50\n"
+      "  tpm accuracy benchmark --record speed.csv --commit $(git rev-parse --short HEAD)");
   set_run(*command, session, [choice, &session] { return benchmark(*choice, session); });
 }
 

@@ -1,4 +1,4 @@
-// tpm stability: where each step rule fails.
+// tpm accuracy stability: where each step rule fails.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -54,8 +54,8 @@ int stability(const std::string& folder, int along, const StabilityParts& parts,
 
 }  // namespace
 
-void add_stability_command(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand(
+void add_stability_command(CLI::App& accuracy, Session& session) {
+  CLI::App* command = accuracy.add_subcommand(
       "stability", "Where each step rule fails: maps, limits against theory, degenerate corners");
   auto folder = std::make_shared<std::string>("out/stability");
   command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
@@ -68,8 +68,9 @@ void add_stability_command(CLI::App& app, Session& session) {
       ->check(CLI::IsMember({"maps", "limits", "corners", "servo"}));
   add_format_option(*command, session);
   command->footer(
-      "Examples:\n  tpm stability --output out/stability\n  tpm stability --points 5  (a quick "
-      "look)\n  tpm stability --only corners,servo");
+      "Examples:\n  tpm accuracy stability --output out/stability\n  tpm accuracy stability "
+      "--points 5  (a quick "
+      "look)\n  tpm accuracy stability --only corners,servo");
   set_run(*command, session, [folder, along, only, &session] {
     constexpr std::uint64_t kMost = 200;
     const std::uint64_t points = parse_whole_number(*along, "--points", 2);

@@ -1,0 +1,85 @@
+// tpm accuracy verify: what the program computes beside what is known otherwise.
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "command.hpp"
+#include "tpm/accuracy/show/verification_report.hpp"
+#include "tpm/files/writable.hpp"
+#include "tpm/work/progress.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct VerifyChoice {
+  std::vector<std::string> groups;
+  std::string folder;
+  std::string flaw;
+  bool list = false;
+};
+
+int list_groups(const Session& session) {
+  Json json = Json::array();
+  for (const VerificationGroup& group : verification_groups()) {
+    json.push_back({{"name", group.name}, {"summary", group.summary}});
+    if (!session.json()) say("{:<13} {}\n", group.name, group.summary);
+  }
+  if (session.json()) say("{}", to_text(Json{{"groups", std::move(json)}}));
+  return 0;
+}
+
+int verify_program(const VerifyChoice& choice, const Session& session) {
+  if (choice.list) return list_groups(session);
+  const double flaw = choice.flaw.empty() ? 0.0 : parse_share(choice.flaw, "--flaw");
+  const std::vector<VerificationGroup> groups = chosen_groups(choice.groups);
+  if (!choice.folder.empty()) require_writable_folder(choice.folder);
+  const auto start = std::chrono::steady_clock::now();
+  std::size_t count = 0;
+  for (const VerificationGroup& group : groups) count += group.checks().size();
+  Progress progress("verifying", count);
+  const Verification verification = run_verification(groups, flaw, [&] { progress.advance(); });
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  if (!choice.folder.empty()) write_verification(verification, choice.folder, took.count());
+  if (session.json()) {
+    say("{}", to_text(to_json(verification)));
+  } else {
+    for (const VerificationLine& line : verification_lines(verification)) {
+      line.failed ? write_alarming(line.text) : write_output(line.text);
+    }
+    if (!choice.folder.empty()) {
+      say("{}", written(session, choice.folder,
+                        {"report.html", "report.md", "verification.json", "verification.csv"}));
+    }
+  }
+  return exit_code(verification.failed() == 0);
+}
+
+}  // namespace
+
+void add_verify_command(CLI::App& accuracy, Session& session) {
+  CLI::App* command = accuracy.add_subcommand(
+      "verify",
+      "Orders of convergence, certified problems, closed forms, energy: does tpm compute what it "
+      "must?");
+  auto choice = std::make_shared<VerifyChoice>();
+  command->add_option("GROUP", choice->groups, "Groups of checks (default: all; see --list)");
+  command->add_option("-o,--output", choice->folder,
+                      "Folder to write report.html, report.md, verification.json and "
+                      "verification.csv into");
+  command->add_option("--flaw", choice->flaw,
+                      "Make one coefficient of everything that is verified wrong by this share, "
+                      "such as 1%, to see that the checks fail");
+  command->add_flag("--list", choice->list, "Name the groups, and do nothing");
+  add_format_option(*command, session);
+  command->footer(
+      "Exit code 1 if a check fails; its lines are red on a terminal.\nExamples:\n"
+      "  tpm accuracy verify\n"
+      "  tpm accuracy verify regression --format json\n"
+      "  tpm accuracy verify -o verification\n"
+      "  tpm accuracy verify closed-forms --flaw 1%");
+  set_run(*command, session, [choice, &session] { return verify_program(*choice, session); });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,163 @@
+// tpm accuracy verify: every check holds, and every check fails when a coefficient is wrong.
+#include <pty.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "temp_folder.hpp"
+#include "tpm/accuracy/show/verification_report.hpp"
+#include "tpm/files/file.hpp"
+#include "tpmkit/error.hpp"
+
+using namespace tpm;
+using namespace tpm::files;
+using namespace tpm::accuracy;
+using Catch::Matchers::Contains;
+
+namespace {
+
+Verification verified(const std::string& group, double flaw) {
+  const std::vector<std::string> names{group};
+  return run_verification(chosen_groups(names), flaw);
+}
+
+/// Every check of a group holds as it is, and fails once a coefficient is wrong by 1 %.
+void check_group(const std::string& group) {
+  for (const double flaw : {0.0, 0.01}) {
+    const Verification verification = verified(group, flaw);
+    REQUIRE(verification.rows.size() >= 5);
+    for (const VerificationRow& row : verification.rows) {
+      CAPTURE(row.what, row.quantity, row.measured, row.expected, row.tolerance, row.failure, flaw);
+      CHECK(row.holds() == (flaw == 0.0));
+      CHECK(row.tolerance > 0.0);
+      CHECK_FALSE(row.source.empty());
+    }
+    CHECK(verification.failed() == (flaw == 0.0 ? 0 : verification.rows.size()));
+  }
+}
+
+struct Run {
+  int exit_code;
+  std::string output;
+};
+
+Run run_program(const std::string& arguments) {
+  const test::TempFolder folder;
+  const std::string output = folder / "output";
+  const int status =
+      std::system(("'" TPM_TEST_PROGRAM "' " + arguments + " > '" + output + "' 2>&1").c_str());
+  REQUIRE(WIFEXITED(status));
+  return {WEXITSTATUS(status), read_file(output)};
+}
+
+/// The same with standard output on a terminal.
+std::string on_terminal(const std::vector<const char*>& arguments, const char* no_color) {
+  int terminal = -1;
+  const pid_t child = ::forkpty(&terminal, nullptr, nullptr, nullptr);
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    if (no_color != nullptr) ::setenv("NO_COLOR", no_color, 1);
+    if (no_color == nullptr) ::unsetenv("NO_COLOR");
+    std::vector<char*> words{const_cast<char*>("tpm")};
+    for (const char* argument : arguments) words.push_back(const_cast<char*>(argument));
+    words.push_back(nullptr);
+    ::execv(TPM_TEST_PROGRAM, words.data());
+    ::_exit(127);
+  }
+  std::string output;
+  char bytes[4096];
+  for (ssize_t count = 0; (count = ::read(terminal, bytes, sizeof bytes)) > 0;) {
+    output.append(bytes, static_cast<std::size_t>(count));
+  }
+  ::waitpid(child, nullptr, 0);
+  ::close(terminal);
+  return output;
+}
+
+const std::string kRed = "\x1b[31m";
+
+}  // namespace
+
+TEST_CASE("verification: closed forms hold, and fail with a wrong coefficient") {
+  check_group("closed-forms");
+}
+
+TEST_CASE("verification: certified problems hold, and fail with a wrong coefficient", "[heavy]") {
+  check_group("regression");
+}
+
+TEST_CASE("verification: energy is accounted for, and is not with a wrong coefficient", "[heavy]") {
+  check_group("energy");
+}
+
+TEST_CASE("verification: a check without a number has failed") {
+  VerificationRow row;
+  row.tolerance = 1.0;
+  CHECK_FALSE(row.holds());
+  row.measured = 0.5;
+  CHECK(row.holds());
+}
+
+TEST_CASE("verification: names of groups") {
+  CHECK(chosen_groups({}).size() == verification_groups().size());
+  const std::vector<std::string> wrong{"closed_forms"};
+  CHECK_THROWS_WITH(chosen_groups(wrong),
+                    "GROUP: 'closed_forms'; expected one of orders, reduction, regression, "
+                    "closed-forms, energy");
+}
+
+TEST_CASE("tpm accuracy verify: exit code, text, JSON, CSV and pages agree", "[heavy]") {
+  const test::TempFolder folder;
+  const Run good = run_program("accuracy verify closed-forms -o '" + (folder / "good") + "'");
+  CHECK(good.exit_code == 0);
+  CHECK_THAT(good.output, Contains("all hold.") && !Contains("FAILS") && !Contains(kRed));
+  const Run bad = run_program("accuracy verify closed-forms --flaw 1% --format json -o '" +
+                              (folder / "bad") + "'");
+  CHECK(bad.exit_code == 1);
+  const Json json = Json::parse(bad.output);
+  CHECK(json.at("failed") == json.at("checks"));
+  CHECK(json == Json::parse(read_file(folder / "bad/verification.json")));
+  const std::string csv = read_file(folder / "bad/verification.csv");
+  CHECK(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')) ==
+        1 + json.at("rows").size());
+  CHECK_THAT(read_file(folder / "bad/report.html"), Contains("bad\">FAILS"));
+  CHECK_THAT(read_file(folder / "good/report.md"), Contains("all hold"));
+  for (const Json& row : json.at("rows")) {
+    CHECK_THAT(read_file(folder / "bad/report.md"), Contains(row.at("quantity")));
+    CHECK_THAT(good.output, Contains(row.at("what").get<std::string>()));
+  }
+}
+
+TEST_CASE("tpm accuracy verify: failing rows are red on a terminal, others never", "[heavy]") {
+  const std::vector<const char*> flawed{"accuracy", "verify", "closed-forms", "--flaw", "1%"};
+  CHECK_THAT(on_terminal(flawed, nullptr), Contains(kRed + "  FAILS"));
+  CHECK_THAT(on_terminal(flawed, "1"), Contains("FAILS") && !Contains(kRed));
+  CHECK_THAT(on_terminal({"accuracy", "verify", "closed-forms"}, nullptr),
+             Contains("all hold") && !Contains(kRed));
+}
+
+TEST_CASE("the example in the help of tpm accuracy verify runs") {
+  const Run help = run_program("accuracy verify --help");
+  CHECK_THAT(help.output, Contains("tpm accuracy verify closed-forms --flaw 1%"));
+  CHECK(run_program("accuracy verify closed-forms --flaw 1%").exit_code == 1);
+  const Run list = run_program("accuracy verify --list");
+  for (const VerificationGroup& group : verification_groups()) {
+    CHECK_THAT(list.output, Contains(std::string(group.summary)));
+  }
+}
+
+TEST_CASE("the old names of the commands below tpm accuracy name the new ones") {
+  for (const char* name : {"benchmark", "stability"}) {
+    const Run old = run_program(std::string(name) + " --help");
+    CHECK(old.exit_code == 2);
+    CHECK(old.output ==
+          "tpm: no command '" + std::string(name) + "'; it is 'tpm accuracy " + name + "' now\n");
+    const Run with_arguments = run_program(std::string(name) + " -o x");
+    CHECK(with_arguments.output == old.output);
+  }
+}
