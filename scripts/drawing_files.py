@@ -3,28 +3,102 @@
 For the scripts that draw: whoever ends one while it writes finds the drawing of before, or none.
 """
 
+import errno
+import fcntl
+import io
 import os
+import re
 from pathlib import Path
 
 LONGEST_NAME = 255  # bytes; of all usual file systems
 ROOM_FOR_ENDING = 24
+MARK = "user.tpm.origin"  # as files/origin_mark.hpp says
 
 
 def save_drawing(page, path, change=None, **options):
-    """Writes a figure of matplotlib under a temporary name beside `path` and gives it its own when complete.
+    """Writes a figure of matplotlib to `path`, which is complete or as it was before.
 
     The format follows the ending of `path`. `change` makes of the text of an SVG what is kept.
     """
     path = Path(path)
+    drawn = io.BytesIO()
+    page.savefig(drawn, format=path.suffix[1:], **options)
+    content = drawn.getvalue()
+    if change is not None:
+        content = change(content.decode("utf-8")).encode("utf-8")
+    replace_file(path, content)
+
+
+def replace_file(path, content):
+    """Writes a file without a name beside `path` and gives it that when complete, as files/replacement.hpp does.
+
+    A symbolic link stays and leads to the new file. Who is killed leaves nothing, or where the name was taken perhaps
+    a temporary file, which the next to write there removes.
+    """
+    path = Path(os.path.realpath(path))
     beginning = path.name if len(path.name.encode()) + ROOM_FOR_ENDING <= LONGEST_NAME else ".tpm-drawing"
-    unfinished = path.with_name(f"{beginning}.part.{os.getpid()}")
+    remove_abandoned(path.parent, beginning)
+    temporary = path.with_name(f"{beginning}.part.{os.getpid()}")
     try:
-        page.savefig(unfinished, format=path.suffix[1:], **options)
-        if change is not None:
-            unfinished.write_text(change(unfinished.read_text(encoding="utf-8")), encoding="utf-8")
-        unfinished.replace(path)
+        file, named = os.open(path.parent, os.O_TMPFILE | os.O_WRONLY | os.O_CLOEXEC, 0o666), False
+    except OSError as error:
+        if error.errno not in (errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL, errno.ENOENT):
+            raise
+        file, named = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o666), True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with os.fdopen(os.dup(file), "wb") as out:
+            out.write(content)
+        if path.exists():
+            os.fchmod(file, path.stat().st_mode & 0o777)
+        os.fsync(file)
+        mark(file)
+        if not named:
+            try:
+                link_open(file, path)
+                return
+            except FileExistsError:
+                link_open(file, temporary)
+        temporary.replace(path)
     finally:
-        unfinished.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
+        os.close(file)
+
+
+def link_open(file, name):
+    """Gives an open file a name. Only with a folder's descriptor does os.link() follow /proc to the file."""
+    os.link(f"/proc/self/fd/{file}", name, src_dir_fd=file, follow_symlinks=True)
+
+
+def mark(file):
+    """Marks a drawing that tpm asked for with what made it, where the file system has attributes."""
+    origin = os.environ.get("TPM_ORIGIN", "")
+    if not origin:
+        return
+    found = os.fstat(file)
+    seconds, rest = divmod(found.st_mtime_ns, 10**9)
+    try:
+        os.setxattr(file, MARK, f"{found.st_size} {seconds}.{rest:09}\n{origin[:3000]}".encode())
+    except OSError:
+        pass
+
+
+def remove_abandoned(folder, beginning):
+    """Removes temporary files whose writers are dead: a writer that lives holds a lock."""
+    for file in folder.iterdir():
+        if not re.fullmatch(re.escape(beginning) + r"\.part\.[0-9-]+", file.name):
+            continue
+        try:
+            opened = os.open(file, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+        except OSError:
+            continue
+        try:
+            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            file.unlink(missing_ok=True)
+        except BlockingIOError:
+            pass
+        finally:
+            os.close(opened)
 
 
 def literal(value):

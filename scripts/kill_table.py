@@ -31,12 +31,39 @@ COMMANDS = [
     Command("fit FOLDER", "fit in/folder --law linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"], weight=4),
     Command("hil run", "hil run in/session.json -o s.tpmrec", ["s.tpmrec"], old=False),
     Command("report", "report -o paper", [], varies=["paper/report.run.json"], weight=100),
+    # Programs of Python: a drawing script, and the module (where it is on PYTHONPATH) that has figures drawn.
+    Command("draw_figures.py", "draw_figures.py in/fitted/figures.json . --png", [], weight=4),
+    Command("draw_network.py", "draw_network.py in/net.json net", ["net.png", "net.svg"], weight=4),
+    Command("Python: fit", "-c \"import tpmkit; tpmkit.fit('in/folder/a1.csv', law='linear-1', starts=2).save('fitted')\"",
+            [], weight=4),
+    Command("Python: sweep", "-c \"import tpmkit; tpmkit.sweep('in/sweep.json', 'sweep.h5', workers=1)\"",
+            ["sweep.h5", "sweep.csv", "sweep.run.json"], varies=["sweep.run.json"], weight=4),
 ]
+SCRIPTS = Path(__file__).resolve().parent
+PYTHON = os.environ.get("TPMKIT_PYTHON", "/usr/bin/python3")
 RECORDING = ".tpmrec"
 
 
+def is_python(arguments: list) -> bool:
+    return arguments[0] == "-c" or arguments[0].endswith(".py")
+
+
+def program_name(tpm: Path, command: Command) -> str:
+    return Path(PYTHON).name if is_python(shlex.split(command.arguments)) else tpm.name
+
+
+def drawings_of(command: Command, plain: dict) -> list:
+    return list(plain) if shlex.split(command.arguments)[0].endswith(".py") else []
+
+
 def tpm_in(folder: Path, tpm: Path, arguments: list, **environment) -> subprocess.CompletedProcess:
-    return subprocess.run([tpm, *arguments], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, timeout=300,
+    """Runs tpm, or Python on a script or a text."""
+    program = [tpm, *arguments]
+    if is_python(arguments):
+        program = [PYTHON, *(arguments if arguments[0] == "-c" else [SCRIPTS / arguments[0], *arguments[1:]])]
+        environment = {"PYTHONDONTWRITEBYTECODE": "1", "MPLCONFIGDIR": str(Path(tempfile.gettempdir()) / "tpm-kill-matplotlib"),
+                       **environment}
+    return subprocess.run(program, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, timeout=300,
                           env={**os.environ, "XDG_CACHE_HOME": str(folder.parent / "cache"), **environment})
 
 
@@ -85,10 +112,10 @@ def killed(tpm: Path, preload: Path, inputs: Path, command: Command, at: int, pl
         folder = Path(name) / "work"
         folder.mkdir()
         (folder / "in").symlink_to(inputs)
-        for output in command.outputs if command.old else []:
+        for output in command.outputs or drawings_of(command, plain) if command.old else []:
             (folder / output).write_bytes(OLD)
         first = tpm_in(folder, tpm, shlex.split(command.arguments), LD_PRELOAD=str(preload), TPM_FAULT_CALL="change",
-                       TPM_FAULT_HOW="kill", TPM_FAULT_AT=str(at), TPM_FAULT_PROGRAM=tpm.name)
+                       TPM_FAULT_HOW="kill", TPM_FAULT_AT=str(at), TPM_FAULT_PROGRAM=program_name(tpm, command))
         if first.returncode != -signal.SIGKILL:
             return False, []
         found, again = [], shlex.split(command.arguments)
@@ -115,6 +142,13 @@ def killed(tpm: Path, preload: Path, inputs: Path, command: Command, at: int, pl
         return True, found
 
 
+def can_run(command: Command) -> bool:
+    """The module of Python need not be there."""
+    if not shlex.split(command.arguments)[0] == "-c":
+        return True
+    return subprocess.run([PYTHON, "-c", "import tpmkit"], capture_output=True).returncode == 0
+
+
 def main() -> int:
     options = arguments_of(__doc__).parse_args()
     tpm, preload = options.tpm.resolve(), options.preload.resolve()
@@ -123,15 +157,16 @@ def main() -> int:
             concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         inputs = Path(work) / "in"
         write_inputs(tpm, inputs)
+        subprocess.run([tpm, "network", "show", inputs / "liver.json", "-o", inputs / "net"], check=True, capture_output=True)
         for command in COMMANDS:
-            if not is_wanted(command, options):
+            if not is_wanted(command, options) or not can_run(command):
                 continue
             folder, mark = Path(work) / command.name.replace(" ", "_") / "work", Path(work) / "mark"
             folder.mkdir(parents=True)
             (folder / "in").symlink_to(inputs)
             mark.unlink(missing_ok=True)
             done = tpm_in(folder, tpm, shlex.split(command.arguments), LD_PRELOAD=str(preload), TPM_FAULT_CALL="change",
-                          TPM_FAULT_HOW="kill", TPM_FAULT_AT="0", TPM_FAULT_PROGRAM=tpm.name, TPM_FAULT_MARK=str(mark))
+                          TPM_FAULT_HOW="kill", TPM_FAULT_AT="0", TPM_FAULT_PROGRAM=program_name(tpm, command), TPM_FAULT_MARK=str(mark))
             if done.returncode != command.code:
                 raise SystemExit(f"kill_table.py: {command.name}: exit code {done.returncode} undisturbed: "
                                  f"{done.stderr.decode(errors='replace').strip()}")

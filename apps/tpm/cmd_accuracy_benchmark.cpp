@@ -110,6 +110,8 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
   record.options.timing = !choice.no_timing;
   std::vector<BenchmarkEntry> entries = chosen_benchmarks(choice.problems);
   const std::string python = find_drawing_python();  // before minutes of work, not after
+  will_write_into(choice.folder, {"report.html", "report.md", "figures.json"},
+                  session.folder_naming());
   require_writable_folder(choice.folder);
   const std::filesystem::path part = std::filesystem::path(choice.folder) / kBenchmarkPart;
   will_update({part, std::filesystem::path(choice.folder) / "benchmark.json"});

@@ -38,6 +38,8 @@ StabilityParts parts_of(const std::vector<std::string>& names) {
 int stability(const std::string& folder, int along, const StabilityParts& parts,
               const Session& session) {
   const std::string python = find_drawing_python();  // before the work, not after
+  will_write_into(folder, {"report.html", "report.md", "stability.json", "figures.json"},
+                  session.folder_naming());
   require_writable_folder(folder);
   const auto start = std::chrono::steady_clock::now();
   const StabilityStudy study = run_stability_study(along, parts);

@@ -23,8 +23,10 @@ int experiments(const ExperimentsOptions& options, const Session& session) {
   const std::filesystem::path path = options.config.empty()
                                          ? share_dir() / "configs" / "organ_experiments.json"
                                          : std::filesystem::path(options.config);
-  will_write_into(options.folder, {"report.md", "report.html", "experiments.json", "readings.csv",
-                                   "fits.csv", "curves.csv", "figures.json", "report.run.json"});
+  will_write_into(options.folder,
+                  {"report.md", "report.html", "experiments.json", "readings.csv", "fits.csv",
+                   "curves.csv", "figures.json", "report.run.json"},
+                  session.folder_naming());
   const OrganStudyConfig config = read_organ_study(path);
   const auto start = std::chrono::steady_clock::now();
   const OrganStudy study = run_organ_study(config);

@@ -231,6 +231,14 @@ std::string figure_folder(const FitOptions& options, const std::string& input) {
   return path.stem().string() + "_fit";
 }
 
+/// Announces the files of recordings.
+void announce_figures(const FitOptions& options, const std::string& input,
+                      std::initializer_list<const char*> names) {
+  if (options.no_draw) return;
+  will_write_into(figure_folder(options, input), names,
+                  options.folder.empty() ? Naming::by_default : Naming::folder);
+}
+
 /// A probe goes with recordings of a force over a depth alone.
 void require_indentation(const FitOptions& options,
                          const std::vector<PreparedRecording>& recordings) {
@@ -289,10 +297,7 @@ int fit_configuration(const FitOptions& options, const Session& session) {
 
 int fit_folder(const FitOptions& options, const Session& session) {
   const auto csv = csv_beside(options.output, session);
-  if (!options.no_draw) {
-    will_write_into(figure_folder(options, options.recordings.files.front()),
-                    {"figures.json", "specimens.json"});
-  }
+  announce_figures(options, options.recordings.files.front(), {"figures.json", "specimens.json"});
   RecordingOptions input = options.recordings;
   input.files = recordings_in(options.recordings.files.front());
   SelectionOptions selection = selection_options(options);
@@ -376,10 +381,8 @@ int compare_folders(const FitOptions& options, const Session& session) {
 int fit_recordings(const FitOptions& options, const std::vector<PreparedRecording>& recordings,
                    const Session& session) {
   const auto csv = csv_beside(options.output, session);
-  if (!options.no_draw) {
-    will_write_into(figure_folder(options, recordings.front().name),
-                    {"figures.json", "config.json", "selection.json", "law.json"});
-  }
+  announce_figures(options, recordings.front().name,
+                   {"figures.json", "config.json", "selection.json", "law.json"});
   SelectionOptions choices = selection_options(options);
   require_indentation(options, recordings);
   set_reference(options, recordings, choices);
@@ -419,6 +422,8 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
 int fit_function(const FitOptions& options, const MaterialFunction& function,
                  const Session& session) {
   const auto csv = csv_beside(options.output, session);
+  announce_figures(options, function.name,
+                   {"figures.json", "config.json", "selection.json", "law.json"});
   const Selection selection = select_law(function, selection_options(options));
   const FitResult& best = selection.candidates[selection.recommended].fit;
   std::string text =

@@ -34,7 +34,7 @@ struct RunChoice {
   std::string output = "session.tpmrec";
   SessionChanges changes;
   SessionNotes notes;
-  bool force = false, accept_unstable = false;
+  bool accept_unstable = false;
   PageOptions page;
 };
 
@@ -228,7 +228,7 @@ int exit_code_of(const ServoOutcome& outcome) {
 }
 
 int run_hil(const RunChoice& choice, const Session& session) {
-  if (!choice.force && std::filesystem::is_regular_file(choice.output)) {
+  if (!session.force && std::filesystem::is_regular_file(choice.output)) {
     throw Error(ExitCode::usage, "-o " + choice.output, "the file exists",
                 "another --output, or --force");
   }
@@ -390,7 +390,7 @@ void add_hil_command(CLI::App& app, Session& session) {
                   "Code of who runs the session; stands in the recording");
   run->add_option("--subject", choice->notes.subject_code,
                   "Code of who holds the device; stands in the recording");
-  run->add_flag("--force", choice->force, "Replace a recording that exists");
+  run->add_flag("--force", session.force, "Replace a recording that exists");
   run->add_flag("--accept-unstable", choice->accept_unstable,
                 "Run what would be unstable, on the virtual device only");
   run->add_option("--page", choice->page.port,

@@ -40,7 +40,8 @@ int verify_hil(const VerifyChoice& choice, const Session& session) {
 }
 
 int report_hil(const VerifyChoice& choice, const Session& session) {
-  will_write_into(choice.output, {"figures.json", "report.md", "report.html", "report.json"});
+  will_write_into(choice.output, {"figures.json", "report.md", "report.html", "report.json"},
+                  session.folder_naming());
   const std::string python = find_drawing_python();
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));

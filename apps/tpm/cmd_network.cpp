@@ -104,11 +104,11 @@ int check(const NetworkChoice& choice, const Session& session) {
   return exit_code(fault.empty());
 }
 
-int show(const NetworkChoice& choice) {
+int show(const NetworkChoice& choice, const Session& session) {
   fs::path stem = choice.output;
   if (stem.extension() == ".png" || stem.extension() == ".svg") stem.replace_extension();
   const fs::path picture = stem.string() + ".json";
-  will_write({picture, stem.string() + ".svg", stem.string() + ".png"});
+  will_write({picture, stem.string() + ".svg", stem.string() + ".png"}, session.output_naming);
   const Tissue tissue = tissue_of(choice);
   const std::string python = find_drawing_python();
   write_file(picture, to_text(network_picture(tissue)));
@@ -162,7 +162,7 @@ void add_network_command(CLI::App& app, Session& session) {
       ->add_option("-o,--output", to_show->output, "Name of the pictures, without an ending")
       ->capture_default_str();
   show_command->footer("Example:\n  tpm network show configs/liver_scene.json -o liver");
-  set_run(*show_command, session, [to_show] { return show(*to_show); });
+  set_run(*show_command, session, [to_show, &session] { return show(*to_show, session); });
 }
 
 }  // namespace tpm::app

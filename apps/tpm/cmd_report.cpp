@@ -8,7 +8,9 @@
 namespace tpm::app {
 namespace {
 
-int report(const std::string& folder) {
+int report(const std::string& folder, const Session& session) {
+  will_write_into(folder, {"report.html", "report.md", "audit.json", "figures.json"},
+                  session.folder_naming());
   const std::string python = find_drawing_python();  // before minutes of work, not after
   const PaperReport paper = make_paper_report();
   write_paper_report(paper, folder, python);
@@ -25,7 +27,7 @@ void add_report_command(CLI::App& app, Session& session) {
   auto folder = std::make_shared<std::string>("out/paper");
   command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
   command->footer("Example:\n  tpm report --output out/paper");
-  set_run(*command, session, [folder] { return report(*folder); });
+  set_run(*command, session, [folder, &session] { return report(*folder, session); });
 }
 
 }  // namespace tpm::app

@@ -116,7 +116,7 @@ fs::path mass_spring_file(const fs::path& file) {
 }
 
 /// All files that a run writes, before the first is read.
-void announce_files(const SimulateChoice& choice) {
+void announce_files(const SimulateChoice& choice, Naming naming) {
   std::vector<fs::path> results{choice.output};
   if (choice.beside_mass_spring) results.push_back(mass_spring_file(choice.output));
   for (std::size_t i = 0, results_alone = results.size(); i < results_alone; ++i) {
@@ -129,13 +129,14 @@ void announce_files(const SimulateChoice& choice) {
     results.push_back(fs::path(file).replace_extension(".xdmf"));
     if (choice.vtkhdf) results.push_back(fs::path(file).replace_extension(".vtkhdf"));
   }
-  will_write(results);
+  will_write(results, naming);
   will_write_into(choice.figures, {"pictures.json", "figures.json"});
 }
 
-std::vector<Simulated> simulate_all(const SimulateChoice& choice, ExperimentScene scene) {
+std::vector<Simulated> simulate_all(const SimulateChoice& choice, ExperimentScene scene,
+                                    Naming naming) {
   const double every_s = checkpoint_interval_s(choice);
-  announce_files(choice);
+  announce_files(choice, naming);
   will_update(
       {choice.output + ".checkpoint", mass_spring_file(choice.output).string() + ".checkpoint"});
   std::vector<Simulated> all;
@@ -187,7 +188,6 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
         "a formulation that shows whole states: " +
             formulations_that([](const Formulation& f) { return f.as<StateRunner>() != nullptr; }));
   }
-  will_write({choice.output});
   (void)Replacement(choice.output);  // can the result be written?
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_scene(scene, times, scene.formulation.entry().can().field);
@@ -214,7 +214,7 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
   if (scene.formulation.entry().as<StateRunner>() == nullptr) {
     return simulate_trajectory(choice, scene, session);
   }
-  const std::vector<Simulated> all = simulate_all(choice, std::move(scene));
+  const std::vector<Simulated> all = simulate_all(choice, std::move(scene), session.output_naming);
   const std::vector<std::string> files = write_all(choice, all);
   Json json;
   std::string text;

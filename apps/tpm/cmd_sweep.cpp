@@ -192,7 +192,7 @@ int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls
               const Session& session) {
   require_same_count(output, controls.shard);
   const fs::path file = shard_path(output, controls.shard);
-  will_write({file.string() + ".run.json"});
+  will_write({file.string() + ".run.json"}, session.output_naming);
   const Shard shard = controls.shard;
   BlockLog log(file, sweep, say_note);
   const SweepRun run = run_watched(sweep, log, std::move(controls));
@@ -209,7 +209,7 @@ int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls
 }
 
 /// All files that a sweep writes, before the first is read.
-void announce_files(const fs::path& output) {
+void announce_files(const fs::path& output, Naming naming) {
   for (const char* ending : {".csv", ".run.json"}) {
     const fs::path other = beside(output, ending);
     if (other == output) {
@@ -217,14 +217,14 @@ void announce_files(const fs::path& output) {
                   fmt::format("{} goes beside it", other.string()),
                   "a name that leaves that one free, such as results.h5");
     }
-    will_write({other});
+    will_write({other}, naming);
   }
 }
 
 /// Puts shards together.
 int merge(const SweepChoice& choice, const Session& session) {
   const fs::path output = choice.output;
-  announce_files(output);
+  announce_files(output, session.output_naming);
   const Sweep sweep = read_sweep(choice.sweep);
   const auto files = choice.shards.empty() ? shards_beside(output) : choice.shards;
   if (files.empty()) {
@@ -262,7 +262,7 @@ int run_command(const SweepChoice& choice, const Session& session) {
   }
   const std::unique_ptr<SweepRanks> ranks = SweepRanks::of_this_run();
   const fs::path output = choice.output, log_file = log_path(output);
-  announce_files(output);
+  announce_files(output, session.output_naming);
   const Sweep sweep = read_sweep(choice.sweep);
   if (ranks && !ranks->first()) {
     const InterruptWatch until_sent_home;

@@ -157,8 +157,8 @@ int best(const SweepViewChoice& choice, const Session& session) {
   return 0;
 }
 
-int plot(const SweepViewChoice& choice) {
-  will_write_into(choice.folder, {"figures.json"});
+int plot(const SweepViewChoice& choice, const Session& session) {
+  will_write_into(choice.folder, {"figures.json"}, session.folder_naming());
   const SweepReader sweep(choice.file);
   SweepFigures wished;
   wished.variables = choice.variables;
@@ -192,6 +192,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   command->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
   command->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
   command->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
+  add_force_option(*command, session);
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm sweep configs/sweep_sensitivity.json -o samples.h5\n"
@@ -208,6 +209,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
                        "Of what (default: all numbers but counts)");
   refining->add_option("--at", choice->at, "AXIS=VALUE: place on another axis");
   refining->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
+  add_force_option(*refining, session);
   add_format_option(*refining, session);
   refining->footer(
       "Example:\n  tpm sweep configs/sweep_convergence_spheres.json -o spheres.h5\n"
@@ -239,7 +241,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   plotting->footer(
       "Example:\n  tpm sweep configs/sweep_x_depth.json -o sweep.h5\n"
       "  tpm sweep plot sweep.h5 -o figures");
-  set_run(*plotting, session, [choice] { return plot(*choice); });
+  set_run(*plotting, session, [choice, &session] { return plot(*choice, session); });
 }
 
 }  // namespace tpm::app

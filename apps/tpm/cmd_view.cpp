@@ -38,7 +38,7 @@ int view(const ViewChoice& choice, const Session& session) {
       choice.output.empty()
           ? std::filesystem::path(choice.file).filename().replace_extension(".html")
           : std::filesystem::path(choice.output);
-  will_write({output});
+  will_write({output}, choice.output.empty() ? Naming::by_default : Naming::file);
   ViewOptions options;
   options.organ = !choice.no_organ;
   options.progress = OrganProgress();
@@ -88,6 +88,7 @@ void add_view_command(CLI::App& app, Session& session) {
                       "HTML file (default: the name of FILE ending in .html, in this folder)");
   command->add_flag("--no-organ", choice->no_organ,
                     "Of a recording: curves only, without recomputing the organ from the motion");
+  add_force_option(*command, session);
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5\n"

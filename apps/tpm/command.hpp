@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/files/file_roles.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
@@ -24,9 +25,16 @@ namespace tpm::app {
 /// nothing that CLI11 filled in is used if reading failed.
 struct Session {
   std::string format = "text";  ///< --format: text or json
-  std::function<int()> run;     ///< the chosen command; returns the exit code
+  bool force = false;           ///< --force: results may be replaced whoever made them
+  /// Of the result that --output names: Naming::by_default if the option is missing.
+  Naming output_naming = Naming::file;
+  std::function<int()> run;  ///< the chosen command; returns the exit code
 
   [[nodiscard]] bool json() const { return format == "json"; }
+  /// Of files in a folder that --output names.
+  [[nodiscard]] Naming folder_naming() const {
+    return output_naming == Naming::file ? Naming::folder : output_naming;
+  }
 };
 
 /// Has a command do this work, after the whole command line was read (Session::run).
@@ -34,6 +42,10 @@ void set_run(CLI::App& command, Session& session, std::function<int()> work);
 
 /// Adds --format text|json to a command.
 void add_format_option(CLI::App& command, Session& session);
+
+/// Adds --force to a command that writes files of names which the user does not give, unless it has
+/// one of its own.
+void add_force_option(CLI::App& command, Session& session);
 
 /// Adds -o, --output for an answer beside which a table stands (csv_beside()).
 void add_output_option(CLI::App& command, std::string& output);
@@ -64,9 +76,10 @@ void deliver_csv(const std::string& csv, const std::filesystem::path& file);
 [[nodiscard]] std::string written(const Session& session, const std::string& folder,
                                   const std::vector<std::string>& files);
 
-/// Announces the files of these names in a folder, before they are computed (will_write()); none if
-/// the folder is empty.
-void will_write_into(const std::filesystem::path& folder, std::initializer_list<const char*> names);
+/// Announces the files of these names in a folder, before they are computed, and others that come
+/// into it (will_write(), will_write_in()); none if the folder is empty.
+void will_write_into(const std::filesystem::path& folder, std::initializer_list<const char*> names,
+                     Naming naming = Naming::folder);
 
 /// Reads a whole number from `smallest` to `largest`. Throws Error(usage) naming the option.
 [[nodiscard]] std::uint64_t parse_whole_number(const std::string& text, const char* option,

@@ -44,6 +44,13 @@ void add_output_option(CLI::App& command, std::string& output) {
                      "Write here instead of to the terminal; beside JSON the table as .csv");
 }
 
+void add_force_option(CLI::App& command, Session& session) {
+  if (command.get_option_no_throw("--force") != nullptr) return;
+  command.add_flag("--force", session.force,
+                   "Replace files that were changed since tpm wrote them, or results of other "
+                   "inputs under names that were not given");
+}
+
 void set_run(CLI::App& command, Session& session, std::function<int()> work) {
   command.callback([&session, work = std::move(work)] { session.run = work; });
 }
@@ -107,12 +114,13 @@ void say_with_files(const Session& session, Json json, std::string_view text,
                               : fmt::format("{}wrote {}\n", text, fmt::join(files, ", ")));
 }
 
-void will_write_into(const std::filesystem::path& folder,
-                     std::initializer_list<const char*> names) {
+void will_write_into(const std::filesystem::path& folder, std::initializer_list<const char*> names,
+                     Naming naming) {
   if (folder.empty()) return;
+  will_write_in(folder, naming);
   std::vector<std::filesystem::path> files;
   for (const char* name : names) files.push_back(folder / name);
-  will_write(files);
+  will_write(files, naming);
 }
 
 double option_quantity(std::string_view text, Dimension dimension, std::string_view option) {
@@ -143,13 +151,46 @@ namespace {
 
 /// No command writes over a file that it reads: what --output names is announced before anything is
 /// read. Commands that write further files announce them themselves.
-void announce_output(const CLI::App& app) {
+void announce_output(const CLI::App& app, Session& session) {
   for (const CLI::App* command : app.get_subcommands()) {
-    announce_output(*command);
+    announce_output(*command, session);
     const CLI::Option* output = command->get_option_no_throw("--output");
     // Of a command with a command of its own only that one runs.
     if (output == nullptr || !command->get_subcommands().empty()) continue;
-    will_write({output->count() > 0 ? output->results().front() : output->get_default_str()});
+    const bool given = output->count() > 0;
+    session.output_naming = given ? Naming::file : Naming::by_default;
+    will_write({given ? output->results().front() : output->get_default_str()},
+               session.output_naming);
+  }
+}
+
+/// The chosen command with the files that it was given: "tpm fit /data/a.csv".
+std::string origin_of(const CLI::App& app) {
+  std::string origin = app.get_name();
+  for (const CLI::App* command : app.get_subcommands()) {
+    origin += " " + origin_of(*command);
+    for (const CLI::Option* option : command->get_options()) {
+      if (!option->get_positional()) continue;
+      for (const std::string& word : option->results()) {
+        std::error_code ec;
+        const bool file = std::filesystem::exists(word, ec);
+        const auto whole = std::filesystem::weakly_canonical(word, ec);
+        origin += " " + (file && !ec ? whole.string() : word);
+      }
+    }
+  }
+  return origin;
+}
+
+/// Every command that writes under names of its own can be told to replace what stands there.
+void add_force_options(CLI::App& app, Session& session) {
+  for (CLI::App* command : app.get_subcommands({})) {
+    add_force_options(*command, session);
+    const CLI::Option* output = command->get_option_no_throw("--output");
+    const bool has_default = output != nullptr && !output->get_default_str().empty();
+    if (has_default || command->get_option_no_throw("--folder") != nullptr) {
+      add_force_option(*command, session);
+    }
   }
 }
 
@@ -192,8 +233,9 @@ int run(int argc, char** argv) {
       "Each command explains itself: tpm COMMAND --help, or tpm help COMMAND");
   app.set_version_flag("-V,--version", fmt::format("tpm {}", version()), "Print the version");
   Session session;
-  const FileRoles roles;
+  FileRoles roles;
   add_commands(app, session);
+  add_force_options(app, session);
 
   try {
     std::vector<std::string> words = command_words(argc, argv);
@@ -208,7 +250,8 @@ int run(int argc, char** argv) {
     tell_user("tpm: {}\n", refusal(app, error));
     return static_cast<int>(ExitCode::usage);
   }
-  announce_output(app);
+  roles.mark_results(origin_of(app), session.force);
+  announce_output(app, session);
   return session.run();
 }
 

@@ -24,6 +24,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/files/origin_mark.hpp"
 #include "tpm/files/replacement.hpp"
 #include "tpm/files/row_log.hpp"
 
@@ -122,6 +123,59 @@ TEST_CASE("What a command reads and what it writes are told apart in either orde
   CHECK(read_file(folder / "c") == "state");
   CHECK_NOTHROW(write_file(folder / "c", "next state"));
   CHECK(read_file(folder / "a") == "a");
+}
+
+TEST_CASE("a result of a default name gives way to the same command with the same inputs alone") {
+  const test::TempFolder folder;
+  const std::string fit = "tpm fit /data/a.csv";
+  const auto run_as = [&](const std::string& origin, bool force, Naming naming,
+                          const std::string& content) {
+    FileRoles roles;
+    roles.mark_results(origin, force);
+    return test::refusal_of([&] {
+      will_write({folder / "r"}, naming);
+      write_file(folder / "r", content);
+    });
+  };
+  CHECK(run_as(fit, false, Naming::by_default, "a").empty());
+  if (!origin_mark(folder / "r")) {
+    WARN("this file system has no extended attributes: nothing is told apart");
+    return;
+  }
+  CHECK(origin_mark(folder / "r")->origin == fit);
+  CHECK(run_as(fit, false, Naming::by_default, "b").empty());
+  CHECK_THAT(run_as("tpm fit /data/b.csv", false, Naming::by_default, "c"),
+             Contains("r: is a result of: tpm fit /data/a.csv; expected ") && Contains("--force"));
+  CHECK(read_file(folder / "r") == "b");
+  CHECK(run_as("tpm fit /data/b.csv", false, Naming::folder, "c").empty());
+  { std::ofstream(folder / "r", std::ios::app) << "edited"; }
+  for (const Naming naming : {Naming::by_default, Naming::folder}) {
+    CHECK_THAT(run_as("tpm fit /data/b.csv", false, naming, "d"),
+               Contains("was changed since tpm wrote it"));
+  }
+  CHECK(read_file(folder / "r") == "cedited");
+  CHECK(run_as("tpm fit /data/b.csv", true, Naming::by_default, "e").empty());
+  fs::remove(folder / "r");
+  std::ofstream(folder / "r") << "of somebody";
+  CHECK_THAT(run_as(fit, false, Naming::by_default, "f"),
+             Contains("nothing says that tpm wrote it"));
+  CHECK(run_as(fit, false, Naming::folder, "g").empty());
+  CHECK(run_as(fit, false, Naming::file, "h").empty());
+}
+
+TEST_CASE("files whose names come later are kept in a folder of a default name, too") {
+  const test::TempFolder folder;
+  FileRoles roles;
+  fs::create_directory(folder / "out");
+  std::ofstream(folder / "out/figure.svg") << "of somebody";
+  std::ofstream(folder / "figure.svg") << "of somebody";
+  roles.mark_results("tpm report", false);
+  will_write_in(folder / "out", Naming::by_default);
+  CHECK_THAT(test::refusal_of([&] { write_file(folder / "out/figure.svg", "x"); }),
+             Contains("nothing says that tpm wrote it"));
+  CHECK_NOTHROW(write_file(folder / "out/other.svg", "x"));
+  CHECK_NOTHROW(write_file(folder / "out/other.svg", "its own"));
+  CHECK_NOTHROW(write_file(folder / "figure.svg", "x"));
 }
 
 TEST_CASE("A file that is replaced keeps its mode, and a link to it stays a link") {

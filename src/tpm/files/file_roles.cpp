@@ -1,5 +1,6 @@
 #include "tpm/files/file_roles.hpp"
 
+#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -10,7 +11,9 @@
 #include <system_error>
 #include <utility>
 
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/origin_mark.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -34,11 +37,14 @@ std::optional<FileIdentity> identity_of(const fs::path& path) {
 
 struct Roles {
   std::string instead;
+  std::string origin;  ///< empty: results are not marked
+  bool force = false;
   using Files = std::map<FileIdentity, fs::path>;  ///< with the name under which it was met
   Files read;
   Files written;                  ///< by this command
   std::vector<fs::path> results;  ///< announced, not yet written
   std::vector<fs::path> states;
+  std::vector<std::pair<fs::path, Naming>> folders;
 
   [[nodiscard]] bool is_state(const FileIdentity& file) const {
     return std::any_of(states.begin(), states.end(),
@@ -59,6 +65,8 @@ struct Roles {
   }
 };
 
+constexpr std::size_t kLongestOriginShown = 200;
+
 std::mutex roles_mutex;
 std::optional<Roles> roles;
 
@@ -73,15 +81,43 @@ void require_short_name(const fs::path& path) {
   if (path.filename().native().size() > kLongest) throw cannot_write(path, ENAMETOOLONG);
 }
 
-void announce(const std::vector<fs::path>& files, std::vector<fs::path> Roles::*list) {
+/// Throws Error(usage) for a file that a result of such a name may not replace.
+void require_ours(const fs::path& path, Naming naming) {
+  const auto file = identity_of(path);
+  if (roles->origin.empty() || roles->force || naming == Naming::file || !file) return;
+  if (Roles::is_among(roles->written, file)) return;
+  const std::optional<OriginMark> mark = origin_mark(path);
+  std::string what;
+  if (mark && mark->changed) {
+    what = "was changed since tpm wrote it";
+  } else if (naming == Naming::by_default && !mark) {
+    what = "stands there, and nothing says that tpm wrote it";
+  } else if (naming == Naming::by_default && mark->origin != roles->origin) {
+    what = fmt::format("is a result of: {}", printable(mark->origin, kLongestOriginShown));
+  }
+  if (what.empty()) return;
+  throw Error(ExitCode::usage, path.string(), what, "a name for the result, or --force");
+}
+
+void announce(const std::vector<fs::path>& files, std::vector<fs::path> Roles::*list,
+              Naming naming) {
   for (const fs::path& file : files) require_short_name(file);
   const std::lock_guard lock(roles_mutex);
   if (!roles) return;
   for (const fs::path& file : files) {
     const auto identity = identity_of(file);
     if (roles->was_read(identity)) throw both_read_and_written(file);
+    require_ours(file, naming);
     ((*roles).*list).push_back(file);
   }
+}
+
+/// Whether a file stands in a folder or below it.
+bool is_within(const fs::path& file, const fs::path& folder) {
+  std::error_code ec;
+  const fs::path whole = fs::weakly_canonical(file, ec);
+  const fs::path of = fs::weakly_canonical(folder, ec);
+  return std::mismatch(of.begin(), of.end(), whole.begin(), whole.end()).first == of.end();
 }
 
 }  // namespace
@@ -97,12 +133,23 @@ FileRoles::~FileRoles() {
   roles.reset();
 }
 
-void will_write(const std::vector<fs::path>& results) {
-  announce(results, &Roles::results);
+void FileRoles::mark_results(std::string origin, bool force) {
+  const std::lock_guard lock(roles_mutex);
+  roles->origin = std::move(origin);
+  roles->force = force;
+}
+
+void will_write(const std::vector<fs::path>& results, Naming naming) {
+  announce(results, &Roles::results, naming);
+}
+
+void will_write_in(const fs::path& folder, Naming naming) {
+  const std::lock_guard lock(roles_mutex);
+  if (roles && !folder.empty()) roles->folders.emplace_back(folder, naming);
 }
 
 void will_update(const std::vector<fs::path>& states) {
-  announce(states, &Roles::states);
+  announce(states, &Roles::states, Naming::file);
 }
 
 void note_reading(const fs::path& path, int descriptor) {
@@ -120,13 +167,28 @@ void note_reading(const fs::path& path, int descriptor) {
 void require_not_read(const fs::path& path) {
   const std::lock_guard lock(roles_mutex);
   if (!roles) return;
-  if (roles->was_read(identity_of(path))) throw both_read_and_written(path);
+  const auto file = identity_of(path);
+  if (roles->was_read(file)) throw both_read_and_written(path);
+  if (file && roles->is_state(*file)) return;
+  for (const auto& [folder, naming] : roles->folders) {
+    if (is_within(path, folder)) require_ours(path, naming);
+  }
+}
+
+void mark_result(int descriptor) {
+  const std::lock_guard lock(roles_mutex);
+  if (roles && !roles->origin.empty()) set_origin_mark(descriptor, roles->origin);
 }
 
 void note_written(const fs::path& path) {
   const std::lock_guard lock(roles_mutex);
   if (!roles) return;
   if (const auto file = identity_of(path)) Roles::add(roles->written, *file, path);
+}
+
+std::string result_origin() {
+  const std::lock_guard lock(roles_mutex);
+  return roles ? roles->origin : std::string();
 }
 
 }  // namespace tpm::files

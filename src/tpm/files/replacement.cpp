@@ -185,6 +185,7 @@ bool Replacement::link_to(const char* name) const noexcept {
 }
 
 void Replacement::put_in_place() {
+  mark_result(file_);
   bool placed = !open_file_.empty() && link_to(target_.c_str());
   if (!placed && !open_file_.empty()) {
     if (errno != EEXIST) throw cannot_write(path_, errno);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
 #include "tpm/show/run_record.hpp"
 #include "tpmkit/error.hpp"
 
@@ -74,6 +75,10 @@ std::vector<std::string> safe_environment() {
     }
     const auto kept = absolute_parts(text.substr(list->size()));
     if (!kept.empty()) variables.push_back(fmt::format("{}{}", *list, fmt::join(kept, ":")));
+  }
+  // drawing_files.py marks drawings with it.
+  if (const std::string origin = result_origin(); !origin.empty()) {
+    variables.push_back(fmt::format("TPM_ORIGIN={}", origin));
   }
   return variables;
 }
@@ -144,12 +149,16 @@ std::string last_line(std::string text) {
 
 /// Runs a script of the project; throws if it fails. It starts in another folder: files are named
 /// by absolute paths.
+/// @param drawings that it writes
 void run_script(const std::string& python, const char* name,
-                const std::vector<std::string>& arguments) {
+                const std::vector<std::string>& arguments,
+                const std::vector<std::filesystem::path>& drawings) {
+  for (const std::filesystem::path& drawing : drawings) require_not_read(drawing);
   const std::string script = std::filesystem::absolute(share_dir() / "scripts" / name).string();
   std::vector<std::string> words{python, script};
   words.insert(words.end(), arguments.begin(), arguments.end());
   const Outcome outcome = run(words);
+  for (const std::filesystem::path& drawing : drawings) note_written(drawing);
   if (outcome.status == 0) return;
   throw Error(ExitCode::environment, script,
               fmt::format("ended with status {}: {}", outcome.status,
@@ -180,7 +189,13 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
   std::vector<std::string> words{std::filesystem::absolute(figures_json).string(),
                                  std::filesystem::absolute(folder).string()};
   if (drawings == Drawings::svg_and_png) words.emplace_back("--png");
-  run_script(python, "draw_figures.py", words);
+  std::vector<std::filesystem::path> files;
+  for (const Json& figure : read_json(figures_json).at("figures")) {
+    const auto id = figure.at("id").get<std::string>();
+    files.push_back(folder / (id + ".svg"));
+    if (drawings == Drawings::svg_and_png) files.push_back(folder / (id + ".png"));
+  }
+  run_script(python, "draw_figures.py", words, files);
 }
 
 std::map<std::string, std::string> draw_into(const std::filesystem::path& folder,
@@ -212,15 +227,13 @@ void draw_network(const std::string& python, const std::filesystem::path& pictur
                   const std::filesystem::path& stem) {
   run_script(
       python, "draw_network.py",
-      {std::filesystem::absolute(picture_json).string(), std::filesystem::absolute(stem).string()});
+      {std::filesystem::absolute(picture_json).string(), std::filesystem::absolute(stem).string()},
+      {stem.string() + ".svg", stem.string() + ".png"});
 }
 
 std::vector<std::string> draw_deformation(const std::string& python,
                                           const std::filesystem::path& pictures_json,
                                           const std::filesystem::path& folder, bool two) {
-  run_script(python, "draw_deformation.py",
-             {std::filesystem::absolute(pictures_json).string(),
-              std::filesystem::absolute(folder).string()});
   std::vector<std::string> files;
   for (const char* name :
        {"undeformed", "deformed", "displacement", "force", "validity", "side_by_side"}) {
@@ -228,6 +241,12 @@ std::vector<std::string> draw_deformation(const std::string& python,
     files.push_back(fmt::format("{}.svg", name));
     files.push_back(fmt::format("{}.png", name));
   }
+  std::vector<std::filesystem::path> drawings;
+  for (const std::string& file : files) drawings.push_back(folder / file);
+  run_script(python, "draw_deformation.py",
+             {std::filesystem::absolute(pictures_json).string(),
+              std::filesystem::absolute(folder).string()},
+             drawings);
   return files;
 }
 
