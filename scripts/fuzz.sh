@@ -78,6 +78,8 @@ reader_of() {
     sweep_log) echo sweep/block_log.cpp ;;
     checkpoint) echo organ/run/checkpoint.cpp ;;
     hdf5) echo files/hdf5/hdf5_contents.cpp ;;
+    web_socket) echo haptics/inverse/web_socket.cpp ;;
+    inverse) echo haptics/inverse/messages.cpp ;;
   esac
 }
 

@@ -43,7 +43,11 @@ constexpr std::pair<const char*, const char*> kTaken[] = {
     {"law", "tests/fuzz/corpus/law/linear_1.json"},
     {"sweep_log", "tests/fuzz/corpus/sweep_log/begun.blocks"},
     {"checkpoint", "tests/fuzz/corpus/checkpoint/interrupted.h5"},
-    {"hdf5", "tests/fuzz/corpus/hdf5/packed.h5"}};
+    {"hdf5", "tests/fuzz/corpus/hdf5/packed.h5"},
+    {"web_socket", "tests/fuzz/corpus/web_socket/fragments.bytes"},
+    {"web_socket", "tests/fuzz/corpus/web_socket/handshake.bytes"},
+    {"inverse", "tests/fuzz/corpus/inverse/inventory.json"},
+    {"inverse", "tests/fuzz/corpus/inverse/force.json"}};
 
 TEST_CASE("what fuzzing has found is read or refused") {
   const test::TempFolder folder;

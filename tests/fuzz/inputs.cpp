@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <fstream>
+#include <stdexcept>
 #include <string>
 
 #include "tpm/files/checksum.hpp"
+#include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/files/import/description.hpp"
 #include "tpm/files/import/import.hpp"
@@ -17,6 +19,8 @@
 #include "tpm/fit/design/design.hpp"
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/petab.hpp"
+#include "tpm/haptics/inverse/messages.hpp"
+#include "tpm/haptics/inverse/web_socket.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/session.hpp"
 #include "tpm/organ/body/mesh_file.hpp"
@@ -110,6 +114,57 @@ void read_hdf5(const Path& path) {
   }
 }
 
+/// Kind and payload of what a reader takes from bytes that come in pieces of a size, and its fault.
+std::string taken_by(WebSocketSide side, std::string_view bytes, std::size_t piece) {
+  constexpr std::size_t kMostBytes = 1000;
+  WebSocketReader reader(side, kMostBytes);
+  std::string taken;
+  for (std::size_t i = 0; i < bytes.size(); i += piece) {
+    reader.feed(bytes.substr(i, piece));
+    while (const auto message = reader.next()) {
+      if (message->payload.size() > kMostBytes) throw std::logic_error("a message is too long");
+      taken += std::to_string(static_cast<int>(message->kind)) + message->payload + '\n';
+    }
+  }
+  taken += std::to_string(reader.fault());
+  return taken;
+}
+
+/// Bytes from the network, as both sides take them: the same in one piece and one by one.
+void read_web_socket(const Path& path) {
+  const std::string bytes = read_file(path);
+  bool taken = false;
+  for (const WebSocketSide side : {WebSocketSide::client, WebSocketSide::server}) {
+    const std::string whole = taken_by(side, bytes, std::max<std::size_t>(bytes.size(), 1));
+    if (whole != taken_by(side, bytes, 1)) throw std::logic_error("pieces are read otherwise");
+    taken = taken || whole.ends_with('0');
+  }
+  if (const auto head = parse_http_head(bytes)) {
+    taken = answer_upgrade(*head, 10001, {10001}).upgraded || upgrade_fault(*head, "").empty();
+  }
+  if (!taken) throw bad_input(path.native(), "is no WebSocket", "frames or a handshake");
+}
+
+/// A message as a client, a server and who listens to events take it; what none of them takes is
+/// refused by all.
+void read_inverse_message(const Path& path) {
+  const std::string text = read_file(path);
+  bool taken = false;
+  const auto attempt = [&](const auto& parse) {
+    try {
+      parse();
+      taken = true;
+    } catch (const Error&) {
+    }
+  };
+  attempt([&] { (void)parse_command(text, "049D"); });
+  attempt([&] { (void)parse_state(text, "049D"); });
+  attempt([&] { (void)parse_inventory(text); });
+  attempt([&] { (void)parse_event(text); });
+  attempt([&] { (void)format_of_version(parse_version(text)); });
+  if (!taken) throw bad_input(path.native(), "is no message of the Inverse service", "one");
+}
+
 constexpr Input kInputs[] = {
     {"delimited_text", ".csv", read_any_recording},
     {"curve_description", ".json", [](const Path& p) { (void)read_description(p); }},
@@ -132,6 +187,8 @@ constexpr Input kInputs[] = {
     {"sweep_log", ".blocks", read_block_log},
     {"checkpoint", ".h5", read_checkpoint_file},
     {"hdf5", ".h5", read_hdf5},
+    {"web_socket", ".bytes", read_web_socket},
+    {"inverse", ".json", read_inverse_message},
 };
 
 }  // namespace

@@ -1,0 +1,111 @@
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/base/namespaces.hpp"
+
+namespace tpm::haptics {
+
+/// The two forms of a force in messages of the Inverse service: from 3.5 on under "vector", before
+/// under "values".
+enum class InverseFormat { vector, values };
+
+[[nodiscard]] std::string_view word_of(InverseFormat format);
+
+/// What GET /version says, "3.5.0.0". Throws Error(environment) for a version before 3.1 or from 4
+/// on, or no version.
+[[nodiscard]] InverseFormat format_of_version(std::string_view version);
+/// The version in the answer to GET /version. Throws Error(bad_input).
+[[nodiscard]] std::string parse_version(std::string_view text);
+
+/// Most bytes of a message, devices and grips of an inventory.
+inline constexpr std::size_t kMostInventoryBytes = 1'048'576, kMostMessageBytes = 65'536;
+inline constexpr std::size_t kMostInverseDevices = 16;
+
+/// The preset that puts the origin at the middle of the workspace.
+inline constexpr std::string_view kCentredPreset = "arm_front_centered";
+
+/// What acts on a force or a coordinate on its way between program and hand, as the service says.
+struct InverseSettings {
+  std::string handedness;  ///< "left" or "right"
+  std::string preset, basis = "XYZ";
+  Eigen::Vector3d mount_position_m = Eigen::Vector3d::Zero(), mount_scale = Eigen::Vector3d::Ones();
+  Eigen::Quaterniond mount_rotation = Eigen::Quaterniond::Identity();
+  bool filters_named = false;    ///< false: the service says nothing of a force gate
+  double force_gate_gain = 0.0;  ///< of the oscillation guard; 0: it changes no force
+  double damping = 0.0;
+  Eigen::Vector3d directional_damping = Eigen::Vector3d::Zero();
+  bool gravity_compensation = false, torque_scaling = false;
+  double gravity_scaling = 0.0;
+
+  /// A metre of the program is one of the device: a mount or workspace in another scale changes
+  /// every stiffness.
+  [[nodiscard]] bool true_to_scale() const;
+  /// One line for each thing that a recording names.
+  [[nodiscard]] std::vector<std::string> lines() const;
+};
+
+struct InverseState {
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero(), velocity_m_per_s = Eigen::Vector3d::Zero(),
+                  force_N = Eigen::Vector3d::Zero();
+  Eigen::Vector3d workspace_scale = Eigen::Vector3d::Ones();
+  // Of the first grip.
+  bool has_grip = false;
+  Eigen::Quaterniond grip = Eigen::Quaterniond::Identity();
+  std::uint32_t buttons = 0;  ///< a, b, c
+};
+
+struct InverseDeviceEntry {
+  std::string id, type, firmware;
+  bool simulated = false;  ///< it says so itself: SIMULATED DEVICE
+  InverseSettings settings;
+  InverseState state;
+};
+
+struct InverseInventory {
+  std::int64_t session = 0;
+  std::vector<InverseDeviceEntry> devices;
+};
+
+/// First message of a service. Sub-fields of a state that are missing equal the identity.
+/// Throws Error(bad_input) with the key.
+[[nodiscard]] InverseInventory parse_inventory(std::string_view text);
+/// Later messages. Throws Error(bad_input) with the key, also if the device is not there.
+[[nodiscard]] InverseState parse_state(std::string_view text, std::string_view device_id);
+
+/// What a client asks of a device. Forces of several sources add up.
+struct InverseCommand {
+  std::optional<Eigen::Vector3d> force_N, position_m;
+  std::string profile;  ///< of a program that registers itself; else empty
+  std::string preset;   ///< of the coordinates; empty: not asked for
+  std::optional<double> force_gate_gain, damping;
+};
+/// A message of a client. Other devices and unknown keys are skipped. Throws Error(bad_input) with
+/// the key: no object, a force that is no number.
+[[nodiscard]] InverseCommand parse_command(std::string_view text, std::string_view device_id);
+
+/// An event of the service.
+struct InverseEvent {
+  std::string name, level, device_id, safety_type, message;
+};
+[[nodiscard]] InverseEvent parse_event(std::string_view text);
+
+/// A force, N; with `profile` the program registers itself, once.
+[[nodiscard]] std::string force_message(InverseFormat format, std::string_view device_id,
+                                        const Eigen::Vector3d& force_N,
+                                        std::string_view profile = {});
+/// Makes neutral what a session may set: force gate and damping 0, the origin by kCentredPreset.
+[[nodiscard]] std::string neutral_message(std::string_view device_id, std::string_view profile);
+/// @param simulated adds SIMULATED DEVICE to the device and its status
+[[nodiscard]] std::string inventory_message(const InverseInventory& inventory);
+[[nodiscard]] std::string state_message(std::int64_t session, std::string_view device_id,
+                                        const InverseState& state, bool simulated);
+[[nodiscard]] std::string version_message(std::string_view version, bool simulated);
+[[nodiscard]] std::string event_message(const InverseEvent& event);
+
+}  // namespace tpm::haptics
