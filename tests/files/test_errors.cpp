@@ -506,6 +506,8 @@ std::vector<ErrorCase> recording_folder_cases() {
       {type, "no such column", fit("--group-by cow"), folder},
       {type, "column of two values", fit("--group-by animal"), folder},
       {type, "reference depth 0", fit("--reference '0 mm'"), folder},
+      {type, "times that do not rise", fit("--times '1 s, 1 s'"), folder},
+      {type, "times of another law", fit("--times '1 s, 2 s'"), folder},
       {type, "group of one recording", "fit {}/a1.csv --no-draw --group-by animal -o {}/out",
        folder},
   };
