@@ -18,6 +18,7 @@
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/predict/fitted_scene.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/fixed_times.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
 #include "tpm/fit/show/comparison_report.hpp"
@@ -33,7 +34,7 @@ namespace {
 
 struct FitOptions {
   RecordingOptions recordings;  ///< its files may also be one configuration, or one folder
-  std::string law;
+  std::string law, times;
   std::string folder;
   bool no_draw = false;
   std::string output;
@@ -125,9 +126,16 @@ SelectionOptions selection_options(const FitOptions& options) {
   if (!options.law.empty())
     selection.laws = {of_option([&] { return parse_law_name(options.law, "--law"); })};
   selection.only_listed = !options.law.empty();
+  if (!options.times.empty()) {
+    selection.setup.times_s = parse_times(options.times, "--times");
+    selection.laws = {
+        law_of_times(selection.laws.empty() ? std::nullopt : std::optional(selection.laws.front()),
+                     selection.setup.times_s, "--times")};
+    selection.only_listed = true;
+  }
   if (const auto probe = probe_of(options)) {
     selection.setup.exponent = probe_exponent(*probe);
-    if (options.law.empty()) selection.laws = laws_of_probe(classical_family(), *probe);
+    if (selection.laws.empty()) selection.laws = laws_of_probe(classical_family(), *probe);
   }
   if (!options.starts.empty()) {
     selection.setup.starts = parse_whole_number(options.starts, "--starts", 1);
@@ -448,10 +456,10 @@ int fit(const FitOptions& options, const Session& session) {
     throw Error(ExitCode::usage, "FILE", "two folders", "--compare beside them, or one folder");
   }
   if (is_configuration(files)) {
-    if (!options.reference.empty() || !options.group_by.empty() || !options.contact.empty() ||
-        !options.zero.empty() || probe_of(options)) {
+    if (!options.reference.empty() || !options.times.empty() || !options.group_by.empty() ||
+        !options.contact.empty() || !options.zero.empty() || probe_of(options)) {
       throw Error(ExitCode::usage,
-                  "--reference, --group-by, --contact, --zero, --radius, --cone-angle, "
+                  "--reference, --times, --group-by, --contact, --zero, --radius, --cone-angle, "
                   "--punch-radius",
                   "with a configuration",
                   "them only with recordings; a configuration has its own reference and fixed "
@@ -505,6 +513,9 @@ void add_fit_command(CLI::App& app, Session& session) {
   command->add_option(
       "--law", options->law,
       "Recordings: fit this law, e.g. power-2 (default: the least that they support)");
+  command->add_option("--times", options->times,
+                      "Relaxation times that are not fitted: \"0.1 s, 1 s, 10 s\", or \"1 ms : "
+                      "1000 s : 13\" for 13 at equal ratios (law linear-13 unless --law says)");
   CLI::Option* folder =
       command->add_option("--folder", options->folder,
                           "Where figures and files go (default: NAME_fit for recordings, none are "

@@ -37,7 +37,19 @@ struct FittedParameter {
   /// What the recording cannot tell it from ("drift or a slow branch"): it is then not identified,
   /// whatever the verdict. Empty: nothing.
   std::string not_separable;
+  /// Why the minimum itself is not trusted ("found by one start of 5", and what to do); the
+  /// parameter is then not identified, whatever the verdict. Empty: nothing.
+  std::string unconfirmed;
   std::string words;  ///< the verdict as a sentence
+};
+
+/// The law of the lowest BIC, where the data prefer it by more than 10 in BIC to the simplest law
+/// whose parameters they identify: neither answers alone.
+struct PreferredLaw {
+  std::string law;            ///< as law_name() writes it
+  double ahead_in_bic = 0.0;  ///< of the law that the result holds
+  std::string reason;         ///< what is not identified of it
+  std::vector<FittedParameter> parameters;
 };
 
 /// Result of a fit.
@@ -48,10 +60,11 @@ struct FitSummary {
   int starts_run = 0, starts_failed = 0;
   int starts_agreeing = 0;  ///< that ended in the best minimum
   std::vector<FittedParameter> parameters;
-  std::optional<LawAdequacy> adequacy;  ///< whether the law describes the data, if it was tested
-  std::vector<std::string> flags;       ///< warnings and assumptions, one sentence each
-  std::string text;                     ///< for a terminal
-  std::string json;                     ///< everything, keys in docs/fit_results.md
+  std::optional<PreferredLaw> preferred;  ///< see there; none: the result's law stands alone
+  std::optional<LawAdequacy> adequacy;    ///< whether the law describes the data, if it was tested
+  std::vector<std::string> flags;         ///< warnings and assumptions, one sentence each
+  std::string text;                       ///< for a terminal
+  std::string json;                       ///< everything, keys in docs/fit_results.md
 };
 
 /// Options of a fit.

@@ -509,6 +509,8 @@ std::vector<ErrorCase> recording_folder_cases() {
       {type, "reference depth 0", fit("--reference '0 mm'"), folder},
       {type, "comparison of one folder", fit("--compare"), folder},
       {type, "the same file twice", fit(""), with_files({{"a1.csv", csv}, {"a2.csv", csv}})},
+      {type, "times that do not rise", fit("--times '1 s, 1 s'"), folder},
+      {type, "times of another law", fit("--times '1 s, 2 s'"), folder},
       {type, "group of one recording", "fit {}/a1.csv --no-draw --group-by animal -o {}/out",
        folder},
   };

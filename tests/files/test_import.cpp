@@ -138,6 +138,20 @@ TEST_CASE("UTF-16 exports and units in the names") {
   CHECK(wide.time_s == plain.time_s);
 }
 
+TEST_CASE("a relative length that counts the other way is turned about 1") {
+  const TempFolder folder;
+  const std::string path = (folder / "compressed.csv").string();
+  write_file(path, "Time [s],L [-],Stress [kPa]\n0,1,0\n1,0.9,-1\n2,0.8,-2\n3,0.8,-1.5\n");
+  ImportOptions options;
+  options.drive_quantity = Quantity::relative_length;
+  options.drive_column = "L";
+  options.negate_drive = true;
+  options.negate_response = true;
+  const Recording recording = import_recording(path, options);
+  check_values(recording.drive, {1.0, 1.1, 1.2, 1.2});
+  check_values(recording.response, {0.0, 1e3, 2e3, 1.5e3});
+}
+
 TEST_CASE("stress over relative length: what the file does not say has to be said") {
   ImportOptions options;
   CHECK_THROWS_WITH(

@@ -243,16 +243,20 @@ TEST_CASE("correlated noise widens the intervals, and ignoring it is a choice") 
   const FitResult adjusted = run_fit(law_config(kKnown), data);
   REQUIRE(adjusted.correlation);
   CHECK(adjusted.correlation->significant);
-  CHECK_THAT(adjusted.inflation, WithinRel(400.0 / adjusted.correlation->effective_count, 1e-12));
+  REQUIRE(adjusted.noise);
+  CHECK_THAT(adjusted.noise->phi, WithinAbs(0.8, 0.1));
+  CHECK_THAT(adjusted.inflation, WithinRel(9.0, 0.5));
   const FitResult ignored = run_fit(law_config(kKnown, R"(, "correlation": "ignore")"), data);
   CHECK(ignored.inflation == 1.0);
   CHECK(ignored.correlation->significant);  // said all the same
   const auto width = [](const FitResult& fit) {
     return std::log(*find(fit, "tau1").upper / *find(fit, "tau1").lower);
   };
-  CHECK_THAT(width(adjusted) / width(ignored), WithinRel(std::sqrt(adjusted.inflation), 0.02));
-  CHECK_THAT(*find(adjusted, "k1").standard_error / *find(ignored, "k1").standard_error,
-             WithinRel(std::sqrt(adjusted.inflation), 1e-6));
+  // A fast branch suffers less from slow noise than a mean does, a slow one as much.
+  const double wider = width(adjusted) / width(ignored);
+  CHECK(wider > 1.5);
+  CHECK(wider < 1.5 * std::sqrt(adjusted.inflation));
+  CHECK(*find(adjusted, "k1").standard_error > *find(ignored, "k1").standard_error);
   CHECK(says(adjusted.flags, "the intervals count them so"));
   CHECK_THAT(to_terminal_text(adjusted), Contains("a: 400 of 400 samples fitted, rms residual"));
 }

@@ -239,8 +239,14 @@ TEST_CASE("a law with a relaxation time that the sampling cannot support is not 
   CHECK(candidate(s, "linear-1").delta_bic > 10.0);
   CHECK(law_name(s.candidates[s.recommended].law) == "linear-1");
   CHECK_THAT(fmt::format("{}", fmt::join(s.words, "\n")),
-             Catch::Contains("linear-2 has the lowest BIC") &&
-                 Catch::Contains("but is not identified: tau1 is sampled by fewer than 3 points"));
+             Catch::Contains("the data prefer linear-2, by ") &&
+                 Catch::Contains(" in BIC, but do not identify its parameters (tau1 is sampled by "
+                                 "fewer than 3 points); the least law whose parameters they "
+                                 "identify is linear-1"));
+  REQUIRE(s.preferred);
+  CHECK(law_name(s.candidates[*s.preferred].law) == "linear-2");
+  CHECK(to_json(s)["preferred"]["law"] == "linear-2");
+  CHECK_THAT(to_terminal_text(s), Catch::Contains("of the law that the data prefer, linear-2"));
 }
 
 TEST_CASE("a stiffness whose interval ends above 0 is identified, whatever its standard error",

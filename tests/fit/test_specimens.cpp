@@ -138,7 +138,7 @@ TEST_CASE("A folder's stiffnesses under a probe are Young's moduli", "[specimens
   options.setup.exponent = probe_exponent(cone);
   const SpecimenStudy study = study_specimens(one_material(), law_at("power-1", 1.0), options);
   const YoungModuli moduli = pooled_moduli(study, cone, true);
-  REQUIRE(moduli.moduli.size() == 2);
+  REQUIRE(moduli.moduli.size() == 3);
   CHECK(moduli.poisson_assumed);
   CHECK(moduli.reference_m == study.law.reference);
   const YoungModulus& in_the_end = moduli.moduli[0];
@@ -149,6 +149,13 @@ TEST_CASE("A folder's stiffnesses under a probe are Young's moduli", "[specimens
   CHECK(in_the_end.lower.value() < true_Pa);
   CHECK(in_the_end.upper.value() > true_Pa);
   CHECK_THAT(moduli.moduli[1].estimate, WithinRel(1.2 * true_Pa, 0.01));
+  const YoungModulus& sum = moduli.moduli[2];
+  CHECK(sum.name == "E_instantaneous");
+  CHECK(sum.of == "k_inf + k1");
+  CHECK(sum.basis == "pooled");
+  CHECK_THAT(sum.estimate, WithinRel(2.2 * true_Pa, 0.01));
+  CHECK(sum.lower.value() < 2.2 * true_Pa);
+  CHECK(sum.upper.value() > 2.2 * true_Pa);
 }
 
 /// A folder of two recordings, `pig`.

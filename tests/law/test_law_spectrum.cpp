@@ -207,6 +207,20 @@ TEST_CASE("law files go there and back, and faults are named", "[law file]") {
   CHECK_THROWS_WITH(law_from_json(missing, "law.json"), Catch::Contains("no parameter 'tau1_s'"));
 }
 
+TEST_CASE("an incompressible law is exported with its shear modulus", "[export]") {
+  const LawFile law = some_law("hertz-1");
+  ExportOptions options;
+  options.geometry.sphere_radius_m = 2e-3;
+  options.geometry.poisson_ratio = 0.5;
+  const double instant = prony_table(law.spec, law.values, {}).instant;
+  const double shear = *modulus_Pa(law.spec, instant, options.geometry) / 3.0;
+  const std::string abaqus = export_law(law, options);
+  const auto elastic = numbers_after(abaqus, "*ELASTIC, MODULI=INSTANTANEOUS");
+  CHECK(elastic.at(1) == 0.4995);
+  CHECK_THAT(elastic.at(0) / (2.0 * (1.0 + elastic.at(1))), WithinRel(shear, 1e-9));
+  CHECK_THAT(abaqus, Catch::Contains("Poisson's ratio is written as 0.4995"));
+}
+
 TEST_CASE("exported tables reproduce the relaxation", "[export]") {
   const std::vector<double> times{0.0, 0.05, 0.3, 1.0, 4.0, 30.0, 1e4};
   for (const char* name : {"linear-1", "linear-2", "linear-4", "hertz-1", "linear-2-series"}) {

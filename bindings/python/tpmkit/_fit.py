@@ -67,6 +67,13 @@ class Fit:
         return pd.DataFrame(laws, columns=columns).set_index("law")
 
     @property
+    def preferred(self) -> dict[str, Any] | None:
+        """The law of the lowest BIC, where the data prefer it by more than 10 in BIC to the law that is
+        recommended but do not identify its parameters: `law`, `ahead_in_bic`, `not_identified_because`, and its
+        whole `fit`. Neither law answers alone then. None: the recommended law does."""
+        return json.loads(self._core.to_json()).get("preferred")
+
+    @property
     def adequacy(self) -> dict[str, Any] | None:
         """Whether the law describes the data: `verdict` (adequate, not_described, not_judged), `words`,
         `residual_over_noise` where it was judged, `causes` where it is not described. None: not tested."""

@@ -105,12 +105,14 @@ AutoregressionEstimate estimate_autoregression(std::span<const double> time_s,
   }
   const auto p = jacobian.cols();
   estimate.criterion = best.criterion;
+  estimate.gain = std::max(at_zero.criterion - best.criterion, 0.0);
   estimate.variance = best.squares / static_cast<double>(residual.size() - p);
   // One-sided at phi = 0.
   const double step = 0.02 * (1.0 - estimate.phi) + 1e-6;
   const double below = std::max(estimate.phi - step, 0.0), above = estimate.phi + step;
   const Whitened low = likelihood.at(below), high = likelihood.at(above);
   estimate.log_variance_slope = (high.log_variance - low.log_variance) / (above - below);
+  estimate.log_squares_slope = std::log(high.squares / low.squares) / (above - below);
   const double middle = 0.5 * (below + above);
   const Whitened centre = likelihood.at(middle);
   const double half = 0.5 * (above - below);

@@ -45,6 +45,8 @@ struct AutoregressionEstimate {
   double phi_variance = 0.0;  ///< from the curvature of the criterion; 0 where phi is on a bound
   double variance = 0.0;      ///< marginal, of one reading: whitened sum of squares / (n - p)
   double criterion = 0.0;     ///< restricted deviance at phi
+  double gain = 0.0;          ///< how far it lies below the one at phi = 0
+  double log_squares_slope = 0.0;  ///< d ln(variance) / d phi
   /// Of each column: d ln(variance of its estimate) / d phi.
   Eigen::VectorXd log_variance_slope;
 };

@@ -5,11 +5,13 @@
 #include <memory>
 
 #include "tpm/fit/conditional.hpp"
+#include "tpm/fit/confirmation.hpp"
 #include "tpm/fit/fit_flags.hpp"
 #include "tpm/fit/fitted_data.hpp"
 #include "tpm/fit/hypothesis_test.hpp"
 #include "tpm/fit/likelihood/experiment_refit.hpp"
 #include "tpm/fit/likelihood/starts.hpp"
+#include "tpm/fit/outliers.hpp"
 #include "tpm/fit/unpredicted.hpp"
 
 namespace tpm::fit {
@@ -67,9 +69,12 @@ FitResult search(const ExperimentResiduals& function, const std::vector<FitParam
   try {
     const Approach approach =
         near.empty() ? approach_to(function, parameters) : Approach{near, StartKind::solved};
-    return fit_residuals(
-        function, parameters, approach.starts, threshold, profiles, approach.kind,
-        [&](std::span<const double> best) { return inflation_at(function, best); });
+    return fit_residuals(function, parameters, approach.starts, threshold, profiles, approach.kind,
+                         [&](std::span<const double> best, Threshold& at) {
+                           at.noise = noise_of_estimates(function, parameters, best);
+                           at.inflation =
+                               at.noise ? at.noise->inflation : inflation_at(function, best);
+                         });
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical) throw;
     if (const auto reason = unpredicted_window(function, start_values(parameters))) throw *reason;
@@ -163,6 +168,12 @@ FitResult run_fit(const FitConfig& config, const std::vector<DataSet>& data) {
 
 namespace {
 
+Threshold threshold_of_search(Threshold threshold, const FitResult& result) {
+  threshold.inflation = result.inflation;
+  threshold.noise = result.noise;
+  return threshold;
+}
+
 /// @param weighted the same as `function`, if it has priors
 FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals* weighted) {
   const FitConfig& config = function.config();
@@ -173,7 +184,17 @@ FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals*
   FitResult result = weighted != nullptr
                          ? balanced_search(*weighted, parameters, threshold)
                          : widened_search(function, parameters, threshold, config.profiles, {});
-  threshold.inflation = result.inflation;
+  // A search that began at minima of a cheaper model says nothing of its starts.
+  Confirmation confirmation;
+  if (function.surrogate() == nullptr && config.profiles) {
+    confirmation = confirm(result, function, parameters, threshold_of_search(threshold, result));
+  }
+  if (confirmation.deeper) {
+    result = widened_search(function, parameters, threshold, config.profiles,
+                            {*confirmation.deeper, result.best.natural});
+    confirmation.found = 1;
+  }
+  threshold = threshold_of_search(threshold, result);
   result.config = config;
   keep_bounds(result, parameters);
   result.value_count = function.value_count();
@@ -189,6 +210,7 @@ FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals*
     result.bootstrap = bootstrap_experiments(function, parameters, result.best, *config.bootstrap);
   }
   mark_not_separable(result);
+  mark_unconfirmed(result, confirmation);
   mark_conditions(result, function);
   add_flags(result, function);
   return result;
@@ -196,10 +218,38 @@ FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals*
 
 }  // namespace
 
-FitResult fit_experiments(const ExperimentResiduals& function) {
+namespace {
+
+FitResult fit_with_priors(const ExperimentResiduals& function) {
   if (prior_count(function.config()) == 0) return fit_searched(function, nullptr);
   const std::unique_ptr<ExperimentResiduals> weighted = function.copy();
   return fit_searched(*weighted, weighted.get());
+}
+
+}  // namespace
+
+FitResult fit_experiments(const ExperimentResiduals& function) {
+  constexpr int kMostRounds = 5;
+  FitResult result = fit_with_priors(function);
+  std::vector<std::size_t> outliers;
+  for (int round = 0; round < kMostRounds; ++round) {
+    std::vector<std::size_t> found = isolated_outliers(function, result.best.natural);
+    if (found == outliers) break;
+    outliers = std::move(found);
+    const std::unique_ptr<ExperimentResiduals> others = function.copy();
+    others->leave_out(outliers);
+    result = fit_with_priors(*others);
+  }
+  if (!outliers.empty()) result.flags.push_back(outlier_words(function, outliers));
+  return result;
+}
+
+Threshold threshold_of(const FitResult& fit) {
+  Threshold threshold{fit.config.level, fit.config.scale_known(),
+                      fit.value_count + prior_count(fit.config),
+                      static_cast<int>(fit.parameters.size()), fit.inflation};
+  threshold.noise = fit.noise;
+  return threshold;
 }
 
 }  // namespace tpm::fit

@@ -51,6 +51,9 @@ struct ParameterResult {
   Verdict verdict = Verdict::not_profiled;
   /// The law does not describe the data: estimate, interval and verdict hold only if it did.
   bool only_if_described = false;
+  /// Why the minimum itself is not trusted ("found by one start of 5", and what to do); it is then
+  /// not identified, whatever its profile says.
+  std::string unconfirmed;
   std::string words;  ///< one sentence
   Profile profile;
 };
@@ -93,12 +96,14 @@ struct RecordingFit {
   std::vector<double> standardised;                        ///< residuals in standard deviations
   std::vector<bool> fitted;           ///< false: outside the window, or censored
   std::vector<bool> censored;         ///< at a limit of the force cell, within the window
+  std::vector<bool> outlier;          ///< left out of the fit, see isolated_outliers
   double peak = 0.0;                  ///< largest |observed| in the window
   double rms_residual = 0.0;          ///< in the window, SI
   std::optional<double> rms_outside;  ///< of the predicted samples outside, if there are any
   std::size_t not_predicted = 0;      ///< samples outside whose `predicted` is NaN
   /// Prediction band, where one new sample falls, SI; empty if the covariance is not of full rank.
   std::vector<double> lower, upper;
+  [[nodiscard]] bool is_outlier(std::size_t i) const { return i < outlier.size() && outlier[i]; }
   [[nodiscard]] bool is_censored(std::size_t i) const { return i < censored.size() && censored[i]; }
   std::optional<double> share_inside;      ///< of the fitted samples, within that band
   std::optional<Correlation> correlation;  ///< of the fitted samples' residuals
@@ -115,6 +120,7 @@ struct FitResult {
   std::optional<Likelihood> likelihood;    ///< none where there is none, see likelihood_at
   std::optional<Correlation> correlation;  ///< over all recordings, if there are any
   double inflation = 1.0;                  ///< Threshold::inflation of the intervals
+  std::optional<NoiseOfEstimates> noise;   ///< Threshold::noise of the intervals
   std::vector<ParameterResult> parameters;
   Covariance covariance;
   std::string weakest_words;
@@ -140,18 +146,21 @@ struct FitResult {
 
 [[nodiscard]] FitResult fit_experiments(const ExperimentResiduals& function);
 
-/// Readings per independent reading at a minimum (SI values), >= 1.
-using InflationRule = std::function<double(std::span<const double>)>;
+/// That of the intervals of a fit.
+[[nodiscard]] Threshold threshold_of(const FitResult& fit);
+
+/// Sets Threshold::inflation and Threshold::noise by the residuals at a minimum (SI values).
+using NoiseRule = std::function<void(std::span<const double>, Threshold&)>;
 
 /// The same for any residuals: the part of run_fit that does not know what is fitted. Fills best,
 /// parameters, covariance, starts and minima.
-/// @param inflation sets Threshold::inflation once the minimum is known
+/// @param noise asked at the minimum, and again where a profile met a deeper one
 [[nodiscard]] FitResult fit_residuals(const ResidualFunction& function,
                                       std::vector<FitParameter> parameters,
                                       const std::vector<std::vector<double>>& starts,
                                       Threshold threshold, bool profiles,
                                       StartKind kind = StartKind::anywhere,
-                                      const InflationRule& inflation = {});
+                                      const NoiseRule& noise = {});
 
 /// Limits of the free parameters from the covariance alone, open at the bounds; none without one of
 /// full rank.

@@ -49,7 +49,9 @@ void flag_noise(FitResult& result) {
                     "many values, and too short for few",
                     result.value_count));
   }
-  if (result.inflation > 1.0) {
+  if (result.noise) {
+    result.flags.push_back(result.noise->words);
+  } else if (result.inflation > 1.0) {
     result.flags.push_back(
         fmt::format("{}; the intervals count them so", result.correlation.value().words));
   }

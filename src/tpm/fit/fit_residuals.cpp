@@ -101,7 +101,8 @@ std::optional<double> natural_standard_error(const FitResult& result, std::size_
 
 /// What lies below the threshold belongs to every interval. A profile that lay in another valley
 /// may thus show a point beyond the limit of this one: the furthest on either side.
-std::vector<Minimum> beyond_limits(const FitResult& result, std::size_t index) {
+/// @param rise of the deviance at the limits of this parameter
+std::vector<Minimum> beyond_limits(const FitResult& result, std::size_t index, double rise) {
   const Profile& own = result.parameters[index].profile;
   constexpr double kBeyond = 1e-3;  // of the way from the estimate to the limit
   std::vector<Minimum> beyond;
@@ -112,6 +113,7 @@ std::vector<Minimum> beyond_limits(const FitResult& result, std::size_t index) {
     double distance = (1.0 + kBeyond) * (*limit - estimate) * sign;
     for (const ParameterResult& other : result.parameters) {
       for (const Minimum& m : other.profile.inside) {
+        if (!(m.deviance - result.best.deviance < rise)) continue;
         const double here = (m.natural[index] - estimate) * sign;
         if (!(here > distance)) continue;
         distance = here;
@@ -128,7 +130,8 @@ void widen_profiles(const ResidualFunction& function, FitResult& result,
                     std::span<const FitParameter> parameters,
                     const std::vector<Minimum>& candidates, const Threshold& threshold) {
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const std::vector<Minimum> beyond = beyond_limits(result, i);
+    const double rise = threshold.rise_of(i, result.best.deviance);
+    const std::vector<Minimum> beyond = beyond_limits(result, i, rise);
     if (beyond.empty()) continue;
     std::vector<Minimum> starts = candidates;
     starts.insert(starts.end(), beyond.begin(), beyond.end());
@@ -143,7 +146,8 @@ void widen_profiles(const ResidualFunction& function, FitResult& result,
 
 /// Profiles of every parameter; on meeting a deeper minimum descends into it and starts again.
 void profile_all(const ResidualFunction& function, FitResult& result,
-                 std::span<const FitParameter> parameters, const Threshold& threshold) {
+                 std::span<const FitParameter> parameters, Threshold& threshold,
+                 const NoiseRule& noise) {
   Progress progress("profiling", parameters.size());
   for (int restart = 0; restart < 10; ++restart) {
     bool deeper = false;
@@ -157,6 +161,7 @@ void profile_all(const ResidualFunction& function, FitResult& result,
       if (profile.better) {
         result.best = minimise(function, parameters, profile.better->natural);
         function.exchange_order().sort(result.best.natural);
+        if (noise) noise(result.best.natural, threshold);
         result.covariance = linear_covariance(function, parameters, result.best, threshold);
         deeper = true;
         continue;
@@ -193,11 +198,11 @@ void linear_intervals(FitResult& result, std::span<const FitParameter> parameter
                       const Threshold& threshold) {
   const Covariance& c = result.covariance;
   if (!c.full_rank) return;
-  const double wide = threshold.multiplier(result.best.deviance);
   for (std::size_t k = 0; k < c.free.size(); ++k) {
     const std::size_t i = c.free[k];
     const FitParameter& p = parameters[i];
     const double theta = p.theta(result.best.natural[i]);
+    const double wide = threshold.multiplier_of(i, result.best.deviance);
     const double half = wide * c.theta_sd[static_cast<Eigen::Index>(k)];
     const double a = p.natural(std::max(theta - half, p.theta_lower()));
     const double b = p.natural(std::min(theta + half, p.theta_upper()));
@@ -210,7 +215,7 @@ void linear_intervals(FitResult& result, std::span<const FitParameter> parameter
 
 FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParameter> parameters,
                         const std::vector<std::vector<double>>& starts, Threshold threshold,
-                        bool profiles, StartKind kind, const InflationRule& inflation) {
+                        bool profiles, StartKind kind, const NoiseRule& noise) {
   threshold.parameter_count = static_cast<int>(parameters.size());
   FitResult result;
   MultiStart multi = run_starts(function, parameters, starts, kind);
@@ -220,8 +225,7 @@ FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParamet
   result.waterfall = waterfall(multi.end_deviances);
   result.minima = std::move(multi.minima);
   result.best = result.minima.front().minimum;
-  if (inflation) threshold.inflation = inflation(result.best.natural);
-  result.inflation = threshold.inflation;
+  if (noise) noise(result.best.natural, threshold);
   result.covariance = linear_covariance(function, parameters, result.best, threshold);
   for (const FitParameter& p : parameters) {
     ParameterResult r;
@@ -229,7 +233,7 @@ FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParamet
     result.parameters.push_back(std::move(r));
   }
   if (profiles && function.residual_count() <= kMostProfiled) {
-    profile_all(function, result, parameters, threshold);
+    profile_all(function, result, parameters, threshold, noise);
   } else if (profiles) {
     // With so many readings the likelihood is a parabola as far as the interval reaches.
     linear_intervals(result, parameters, threshold);
@@ -237,6 +241,8 @@ FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParamet
         fmt::format("{} readings: the intervals come from the covariance, not from profiles",
                     function.residual_count()));
   }
+  result.inflation = threshold.inflation;
+  result.noise = threshold.noise;
   result.degrees_of_freedom = threshold.data_count - threshold.parameter_count;
   result.variance_factor = threshold.scale_known || result.degrees_of_freedom > 0
                                ? threshold.variance_factor(result.best.deviance)

@@ -108,11 +108,13 @@ RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment
     fit.predicted.push_back(answer);
     fit.fitted.push_back(!d.held_out && !censored);
     fit.censored.push_back(censored);
+    fit.outlier.push_back(d.outlier);
     if (censored) {
       ++at_limit;
       fit.peak = std::max(fit.peak, std::abs(fit.observed.back()));
       continue;
     }
+    if (d.outlier) continue;
     if (d.held_out && !std::isfinite(answer)) {
       ++fit.not_predicted;
       continue;
@@ -124,7 +126,8 @@ RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment
     fit.peak = std::max(fit.peak, std::abs(*d.value));
   }
   fit.rms_residual = std::sqrt(inside / static_cast<double>(std::max<std::size_t>(fitted, 1)));
-  const std::size_t rest = fit.time_s.size() - fitted - at_limit - fit.not_predicted;
+  const auto outliers = static_cast<std::size_t>(std::ranges::count(fit.outlier, true));
+  const std::size_t rest = fit.time_s.size() - fitted - at_limit - fit.not_predicted - outliers;
   if (rest > 0) fit.rms_outside = std::sqrt(outside / static_cast<double>(rest));
   return fit;
 }

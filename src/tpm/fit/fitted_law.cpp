@@ -220,8 +220,7 @@ std::vector<FittedFile> fitted_files(const FitResult& fit) {
 }
 
 std::optional<LawUncertainty> uncertainty_of(const FitResult& fit, const LawSpec& spec) {
-  const Threshold threshold{fit.config.level, fit.config.scale_known(), fit.value_count,
-                            static_cast<int>(fit.config.parameters.size()), fit.inflation};
+  const Threshold threshold = threshold_of(fit);
   if (!fit.covariance.full_rank || !threshold.estimable()) return std::nullopt;
   const std::vector<Coordinate> coordinates = law_coordinates(fit, spec);
   const Eigen::MatrixXd change = coordinate_changes(fit, spec, coordinates);

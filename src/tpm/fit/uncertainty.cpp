@@ -22,6 +22,7 @@ double Threshold::residual_degrees() const {
 
 double Threshold::variance_factor(double minimum_deviance) const {
   if (scale_known) return 1.0;
+  if (noise) return noise->variance;
   if (data_count <= parameter_count) {
     throw bad_input("noise",
                     fmt::format("the scale of the noise is to be estimated from {} data with {} "
@@ -38,6 +39,19 @@ double Threshold::rise(double minimum_deviance, int constrained) const {
   }
   const double factor = inflation * variance_factor(minimum_deviance);
   return factor * constrained * fisher_quantile(level, constrained, residual_degrees());
+}
+
+double Threshold::rise_of(std::size_t parameter, double minimum_deviance) const {
+  if (!noise || !(noise->of[parameter].variance_ratio > 0.0)) return rise(minimum_deviance);
+  const NoiseOfEstimate& own = noise->of[parameter];
+  const double students = std::sqrt(fisher_quantile(level, 1.0, own.degrees));
+  const double half = students * std::sqrt(own.variance_ratio) + own.bias;
+  return half * half;
+}
+
+double Threshold::multiplier_of(std::size_t parameter, double minimum_deviance) const {
+  if (!noise || !(noise->of[parameter].variance_ratio > 0.0)) return multiplier(minimum_deviance);
+  return std::sqrt(rise_of(parameter, minimum_deviance) / noise->of[parameter].variance_ratio);
 }
 
 double Threshold::multiplier(double minimum_deviance) const {
@@ -93,11 +107,21 @@ Covariance linear_covariance(const ResidualFunction& function,
   constexpr double kRankTolerance = 1e-10;
   c.full_rank = length.minCoeff() > 0.0 && c.singular_values[n - 1] > kRankTolerance;
   if (!c.full_rank) return c;
-  const Eigen::MatrixXd root = v * c.singular_values.cwiseInverse().asDiagonal();
-  Eigen::MatrixXd covariance = root * root.transpose();
-  covariance = length.cwiseInverse().asDiagonal() * covariance * length.cwiseInverse().asDiagonal();
-  if (threshold.estimable()) {
-    covariance *= threshold.inflation * threshold.variance_factor(minimum.deviance);
+  Eigen::MatrixXd covariance;
+  if (threshold.noise && threshold.noise->free == c.free) {
+    Eigen::VectorXd by_theta(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const std::size_t i = c.free[static_cast<std::size_t>(k)];
+      by_theta[k] = 1.0 / parameters[i].natural_slope(parameters[i].theta(minimum.natural[i]));
+    }
+    covariance = by_theta.asDiagonal() * threshold.noise->covariance * by_theta.asDiagonal();
+  } else {
+    const Eigen::MatrixXd root = v * c.singular_values.cwiseInverse().asDiagonal();
+    covariance = length.cwiseInverse().asDiagonal() * (root * root.transpose()) *
+                 length.cwiseInverse().asDiagonal();
+    if (threshold.estimable()) {
+      covariance *= threshold.inflation * threshold.variance_factor(minimum.deviance);
+    }
   }
   c.theta_sd = covariance.diagonal().cwiseSqrt();
   c.correlation =
@@ -370,7 +394,7 @@ Profile profile_likelihood(const ResidualFunction& function,
                            const Covariance& covariance, const Threshold& threshold) {
   const FitParameter& p = parameters[index];
   const double best = minima.front().deviance;
-  const double rise = threshold.rise(best);
+  const double rise = threshold.rise_of(index, best);
   const double step = first_step(p, index, covariance, rise);
   const double rounding = rounding_step(function, parameters, minima.front(), index);
   Profile profile;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/fit/likelihood/least_squares.hpp"
+#include "tpm/fit/noise_of_estimates.hpp"
 
 namespace tpm::fit {
 
@@ -18,6 +19,8 @@ struct Threshold {
   /// Readings per independent reading, n / n_eff >= 1 (Correlation::inflation): the rise and the
   /// covariance are multiplied by it, and the F has n / inflation - k degrees of freedom.
   double inflation = 1.0;
+  /// Noise that is not the same for every estimate; then `inflation` is its own.
+  std::optional<NoiseOfEstimates> noise = std::nullopt;
 
   /// Degrees of freedom of an estimated variance: max(n / inflation - k, 1).
   [[nodiscard]] double residual_degrees() const;
@@ -30,8 +33,12 @@ struct Threshold {
   [[nodiscard]] bool estimable() const { return scale_known || data_count > parameter_count; }
   /// Rise of the deviance allowed for `constrained` (>= 1) parameters at once.
   [[nodiscard]] double rise(double minimum_deviance, int constrained = 1) const;
+  /// The same for one parameter, with its own variance and degrees of freedom under `noise`.
+  [[nodiscard]] double rise_of(std::size_t parameter, double minimum_deviance) const;
   /// Half width of a linearised interval in standard errors, which hold the inflation already.
   [[nodiscard]] double multiplier(double minimum_deviance) const;
+  /// The same of one parameter.
+  [[nodiscard]] double multiplier_of(std::size_t parameter, double minimum_deviance) const;
   /// Probability of a rise at least this large if the constrained values are true.
   [[nodiscard]] double p_value(double rise, double minimum_deviance, int constrained = 1) const;
 };

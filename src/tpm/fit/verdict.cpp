@@ -21,6 +21,7 @@ std::string bound_note(const ParameterResult& p) {
     return fmt::format("; the best fit runs to its lower bound {}",
                        in_unit(p.parameter, p.parameter.lower));
   }
+  if (is_dashpot(p)) return "; best fit 1: the spring-pot is a dashpot";
   if (p.at_upper_bound) {
     return fmt::format("; the best fit runs to its upper bound {}",
                        in_unit(p.parameter, p.parameter.upper));
@@ -29,6 +30,11 @@ std::string bound_note(const ParameterResult& p) {
 }
 
 }  // namespace
+
+bool is_dashpot(const ParameterResult& p) {
+  const bool order = p.parameter.name == "alpha" || p.parameter.name == "beta";
+  return order && p.at_upper_bound && p.parameter.upper == 1.0;
+}
 
 std::string_view verdict_name(Verdict verdict) noexcept {
   static constexpr auto kNames = std::to_array<Word<Verdict>>({
@@ -106,6 +112,10 @@ std::string range_words(const ParameterResult& p, double level) {
             "{} = {} is not identified: {}: not separable; {} interval without drift {}", f.name,
             in_unit(f, p.estimate), p.not_separable, percent(level), interval);
       }
+      if (!p.unconfirmed.empty()) {
+        return fmt::format("{} = {}, {}; {} interval of this minimum {}", f.name,
+                           in_unit(f, p.estimate), p.unconfirmed, percent(level), interval);
+      }
       return fmt::format("{} = {} is identified: {} interval {}{}", f.name, in_unit(f, p.estimate),
                          percent(level), interval,
                          p.profile.connected ? "" : ", not all of it: separate ranges fit");
@@ -142,6 +152,7 @@ std::string verdict_text(const ParameterResult& p) {
   if (!p.not_separable.empty()) {
     return fmt::format("not identified: {}: not separable", p.not_separable);
   }
+  if (!p.unconfirmed.empty()) return "not identified: " + p.unconfirmed;
   std::string text(verdict_name(p.verdict));
   for (std::size_t i = 0; i < p.conditional_on.size(); ++i) {
     const Condition& c = p.conditional_on[i];

@@ -9,6 +9,10 @@ namespace tpm::fit {
 /// From which limits the profile reached.
 [[nodiscard]] Verdict verdict_of(const ParameterResult& parameter);
 
+/// Whether it is the order of a spring-pot and 1: a dashpot, which is a special case of the law and
+/// no bound that the search was stopped by.
+[[nodiscard]] bool is_dashpot(const ParameterResult& parameter);
+
 /// The verdict with what it rests on: "identified, conditional on contact at its lower bound".
 [[nodiscard]] std::string verdict_text(const ParameterResult& parameter);
 

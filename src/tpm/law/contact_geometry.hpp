@@ -23,7 +23,7 @@ struct ContactGeometry {
   std::optional<double> punch_radius_m;
   std::optional<double> area_m2;  ///< of a bar; together with length_m
   std::optional<double> length_m;
-  double poisson_ratio = 0.49;  ///< assumed; 0 to below 0.5 for programs, to 0.5 in a fit
+  double poisson_ratio = 0.49;  ///< assumed; 0 to 0.5
 
   [[nodiscard]] bool is_given() const {
     return sphere_radius_m || cone_half_angle_rad || punch_radius_m || area_m2 || length_m;

@@ -133,6 +133,20 @@ std::vector<std::string> remarks_of(const LawFile& law, const PronyTable& table,
   return lines;
 }
 
+/// A program needs a bulk modulus: 0.5 is written as a little less, with the same shear modulus,
+/// which is what relaxes.
+void make_compressible(Exported& e) {
+  constexpr double kNearly = 0.4995;  // K = 1000 G
+  const double nu = e.poisson_ratio;
+  if (nu <= kNearly) return;
+  if (e.instant_Pa) *e.instant_Pa *= (1.0 + kNearly) / (1.0 + nu);
+  e.poisson_ratio = kNearly;
+  e.remarks.push_back(
+      fmt::format("Poisson's ratio is written as {}: the program needs a bulk modulus; the shear "
+                  "modulus is that of {}",
+                  shortest(kNearly), shortest(nu)));
+}
+
 /// @param before what opens a comment; no line holds "--", which XML forbids inside of one
 std::string commented(const std::vector<std::string>& lines, std::string_view before,
                       std::string_view after = {}) {
@@ -237,11 +251,6 @@ std::vector<std::string> export_warnings(const LawFile& law, const ExportOptions
 
 std::string export_law(const LawFile& law, const ExportOptions& options) {
   require_sayable(law, options);
-  if (!(options.geometry.poisson_ratio < 0.5)) {
-    throw bad_input("geometry",
-                    fmt::format("Poisson's ratio {}", shortest(options.geometry.poisson_ratio)),
-                    "0 to below 0.5: the program needs a bulk modulus");
-  }
   PronyWindow window = options.window;
   // FEBio's six terms, spread over the window, unless another number is asked for.
   if (options.target == ExportTarget::febio && window.times == 0) window.times = 6;
@@ -253,6 +262,7 @@ std::string export_law(const LawFile& law, const ExportOptions& options) {
   require_terms(e.table, options.target);
   e.instant_Pa = modulus_Pa(law.spec, e.table.instant, options.geometry);
   e.remarks = remarks_of(law, e.table, options, e.instant_Pa.has_value());
+  if (options.target != ExportTarget::json) make_compressible(e);
   switch (options.target) {
     case ExportTarget::abaqus:
       return abaqus_text(e);

@@ -142,6 +142,10 @@ class SeriesReader {
     const MachineColumn& column = *use.column;
     const Bound bound = use.bound;
     const bool negate = use.negate;
+    // A relative length counts the other way from 1: a slack length stays above 0.
+    const bool mirror = negate && use.quantity == Quantity::relative_length &&
+                        dimension_of(use) == Dimension::dimensionless;
+    const double turned = mirror ? 2.0 : 0.0;
     ImportedColumn imported;
     imported.quantity = use.quantity;
     imported.bound = bound;
@@ -149,7 +153,7 @@ class SeriesReader {
     imported.values.reserve(series_.lines.size());
     for (std::size_t i = header_.block.first; i < end_; ++i) {
       const double value = number_at(table_.rows[i], use);
-      imported.values.push_back(negate ? 0.0 - value : value);  // 0, not -0
+      imported.values.push_back(negate ? turned - value : value);  // 0, not -0
     }
     if (use.clock) unwrap_midnights(imported.values);
     require_plausible_number(use, imported);
@@ -159,7 +163,9 @@ class SeriesReader {
                                             : use.clock                    ? "a clock, in s"
                                             : imported.unit.symbol.empty() ? "plain number"
                                                                            : imported.unit.symbol,
-                                            negate ? ", negated" : "")});
+                                            mirror   ? ", mirrored about 1"
+                                            : negate ? ", negated"
+                                                     : "")});
     used_.push_back(column.index);
     series_.columns.push_back(std::move(imported));
   }

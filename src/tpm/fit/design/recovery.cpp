@@ -129,12 +129,12 @@ void count_intervals(const ExperimentResiduals& function, const Trials& trials,
   // The search ends within 1e-4 standard deviations of a minimum.
   constexpr double kDeeper = 1e-3;
   if (least < fit.best.deviance * (1.0 - kDeeper / fit.value_count)) ++result.missed;
-  const Threshold threshold{kLevel, false, fit.value_count, static_cast<int>(parameters.size()),
-                            fit.inflation};
-  const double rise = threshold.rise(least);
+  Threshold threshold = threshold_of(fit);
+  threshold.level = kLevel;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     for (ParameterCoverage& coverage : result.parameters) {
-      if (coverage.name == parameters[i].name && deviance[i] - least <= rise) ++coverage.covered;
+      const bool held = deviance[i] - least <= threshold.rise_of(i, least);
+      if (coverage.name == parameters[i].name && held) ++coverage.covered;
     }
   }
 }

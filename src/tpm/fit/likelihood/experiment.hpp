@@ -20,6 +20,7 @@ struct FitDatum {
   double sigma = 0.0;                         ///< after the noise model; 0 where it is estimated
   Provenance provenance = Provenance::assumed;
   bool held_out = false;
+  bool outlier = false;  ///< held out because it is none of the curve's noise
 };
 
 /// "2 mm, peak", or the time of a sample.

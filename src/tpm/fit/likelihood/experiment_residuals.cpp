@@ -323,6 +323,12 @@ void ExperimentResiduals::set_counts(std::vector<int> counts) {
   count_residuals();
 }
 
+void ExperimentResiduals::leave_out(std::span<const std::size_t> outliers) {
+  if (surrogate_) surrogate_->leave_out(outliers);
+  for (const std::size_t i : outliers) data_.at(i).held_out = data_[i].outlier = true;
+  count_residuals();
+}
+
 namespace {
 
 /// A course with every so manieth of its knots and samples, and the last.

@@ -51,6 +51,9 @@ class ExperimentResiduals final : public ResidualFunction {
   /// How often each datum counts, in the order of data(); 0 leaves it out.
   void set_counts(std::vector<int> counts);
 
+  /// Holds outliers out, which stay among the data.
+  void leave_out(std::span<const std::size_t> outliers);
+
   /// The same experiments, with data that can be replaced apart from these.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> copy() const;
   /// A copy with at most about `most` samples of each recording, evenly taken from the history and

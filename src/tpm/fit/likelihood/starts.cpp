@@ -185,11 +185,28 @@ std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
   }
   std::vector<std::vector<double>> starts = config.given_starts;
   const std::vector<bool> linear = linear_parameters(function);
+  if (std::ranges::find(linear, false) == linear.end()) {
+    // One minimum, which the first start is solved for.
+    return projected_starts(function, parameters, linear, 1, 1, config.seed);
+  }
   if (std::ranges::find(linear, true) != linear.end()) {
     std::ranges::move(projected_starts(function, parameters, linear, count, kFollowed, config.seed),
                       std::back_inserter(starts));
   }
   // Sorted, so that equal laws are seen to be equal.
+  for (auto& start : starts) function.exchange_order().sort(start);
+  return starts;
+}
+
+std::vector<std::vector<double>> further_starts(const ExperimentResiduals& function,
+                                                std::span<const FitParameter> parameters) {
+  constexpr std::size_t kTimes = 4;
+  const FitConfig& config = function.config();
+  const std::vector<bool> linear = linear_parameters(function);
+  if (std::ranges::find(linear, true) == linear.end()) return {};
+  const std::size_t count = kTimes * std::max<std::size_t>(config.starts, 1);
+  auto starts =
+      projected_starts(function, parameters, linear, count, kTimes * kFollowed, config.seed + 1);
   for (auto& start : starts) function.exchange_order().sort(start);
   return starts;
 }

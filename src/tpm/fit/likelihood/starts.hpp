@@ -37,4 +37,9 @@ enum class StartKind {
 [[nodiscard]] std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
                                                           std::span<const FitParameter> parameters);
 
+/// More starts, where fit_starts() gives projected ones: those of another seed that come nearest to
+/// the data. Empty else.
+[[nodiscard]] std::vector<std::vector<double>> further_starts(
+    const ExperimentResiduals& function, std::span<const FitParameter> parameters);
+
 }  // namespace tpm::fit

@@ -193,9 +193,10 @@ FitResult fit_and_profile(const OrganLessReadings& function, const std::vector<F
   std::vector<double> start = start_values(all);
   constexpr int kMostDescents = 5;
   for (int descents = 0; descents <= kMostDescents; ++descents) {
-    FitResult fit = fit_residuals(
-        function, all, {start}, threshold, false, StartKind::solved,
-        [&](std::span<const double> best) { return function.correlation(best).inflation(); });
+    FitResult fit = fit_residuals(function, all, {start}, threshold, false, StartKind::solved,
+                                  [&](std::span<const double> best, Threshold& at) {
+                                    at.inflation = function.correlation(best).inflation();
+                                  });
     threshold.inflation = fit.inflation;
     linear_intervals(fit, all, threshold);
     if (!profiles) return fit;
@@ -203,7 +204,9 @@ FitResult fit_and_profile(const OrganLessReadings& function, const std::vector<F
     if (!deeper) return fit;
     start = std::move(deeper->natural);
   }
-  throw Error(ExitCode::numerical, "profiles", "a deeper minimum was met again and again");
+  throw Error(ExitCode::numerical, "profiles",
+              "a deeper minimum was met again and again; expected one that stays: fewer bonds to "
+              "fit, or another start");
 }
 
 }  // namespace

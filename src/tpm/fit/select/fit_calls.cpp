@@ -10,6 +10,25 @@
 namespace tpm::fit {
 namespace {
 
+std::vector<FittedParameter> fitted_parameters(const FitResult& fit) {
+  std::vector<FittedParameter> list;
+  for (const ParameterResult& p : fit.parameters) {
+    list.push_back({.name = p.parameter.name,
+                    .unit = si_unit(p.parameter),
+                    .estimate = p.estimate,
+                    .standard_error = p.standard_error,
+                    .lower = p.lower,
+                    .upper = p.upper,
+                    .verdict = p.verdict,
+                    .nuisance = p.nuisance,
+                    .only_if_described = p.only_if_described,
+                    .not_separable = p.not_separable,
+                    .unconfirmed = p.unconfirmed,
+                    .words = p.words});
+  }
+  return list;
+}
+
 FitSummary summary_of(const FitResult& fit) {
   FitSummary summary;
   if (!no_law_because(fit.config)) summary.law = fitted_law(fit);
@@ -18,19 +37,7 @@ FitSummary summary_of(const FitResult& fit) {
   summary.starts_run = fit.starts_run;
   summary.starts_failed = fit.starts_failed;
   summary.starts_agreeing = fit.starts_agreeing;
-  for (const ParameterResult& p : fit.parameters) {
-    summary.parameters.push_back({.name = p.parameter.name,
-                                  .unit = si_unit(p.parameter),
-                                  .estimate = p.estimate,
-                                  .standard_error = p.standard_error,
-                                  .lower = p.lower,
-                                  .upper = p.upper,
-                                  .verdict = p.verdict,
-                                  .nuisance = p.nuisance,
-                                  .only_if_described = p.only_if_described,
-                                  .not_separable = p.not_separable,
-                                  .words = p.words});
-  }
+  summary.parameters = fitted_parameters(fit);
   summary.adequacy = fit.adequacy;
   summary.flags = fit.flags;
   summary.text = to_terminal_text(fit);
@@ -63,6 +70,12 @@ FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
   options.setup.interrupted = request.interrupted;
   const Selection selection = select_law(recordings, options);
   FitSummary summary = summary_of(selection.candidates[selection.recommended].fit);
+  if (selection.preferred) {
+    const Candidate& best = selection.candidates[*selection.preferred];
+    summary.preferred =
+        PreferredLaw{law_name(best.law), selection.candidates[selection.recommended].delta_bic,
+                     best.reason, fitted_parameters(best.fit)};
+  }
   summary.text = to_terminal_text(selection) + "\n" + summary.text;
   summary.json = to_text(to_json(selection));
   return summary;

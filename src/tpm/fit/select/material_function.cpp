@@ -9,7 +9,9 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/select/fixed_times.hpp"
 #include "tpm/fit/select/function_starts.hpp"
+#include "tpm/fit/select/gate.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
@@ -155,8 +157,7 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
       fit_candidate(function_config(law, function, setup), data_set_of(function), refusal_counts);
   if (candidate.failed) return candidate;
   candidate.rms_over_peak = largest_residual_share(candidate.fit);
-  candidate.reason = not_identified(candidate, kEndlessHold);
-  candidate.identified = candidate.reason.empty();
+  judge_identified(candidate, kEndlessHold);
   return candidate;
 }
 
@@ -258,6 +259,10 @@ FitConfig function_config(LawSpec law, const MaterialFunction& function,
     const LawParameter& p = model.law_parameters()[i];
     config.fixed.push_back(p.preset.value_or(0.0));
     if (p.nuisance || p.preset) continue;
+    if (const auto time_s = stated_time(p.name, options.times_s)) {
+      config.fixed.back() = *time_s;
+      continue;
+    }
     config.parameters.push_back(
         {function_bounds(p, sizes, times, law.branches), {{i, {}}}, false, {}});
     if (p.dimension == Dimension::time) ++times;
@@ -300,12 +305,11 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   s.samples = fitted->fit.value_count;
   s.effective_count = s.samples;
   rank_candidates(s);
-  Candidate& chosen = s.candidates[s.recommended];
-  if (options.setup.profiles) {
-    chosen.fit =
-        run_fit(function_config(chosen.law, function, options.setup), data_set_of(function));
-    reassess(chosen, kEndlessHold);
-  }
+  const auto with_profiles = [&](const LawSpec& law) {
+    return run_fit(function_config(law, function, options.setup), data_set_of(function));
+  };
+  settle_choice(s, kEndlessHold, options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
+  const Candidate& chosen = s.candidates[s.recommended];
   s.warnings = range_warnings(chosen.fit, sizes_of_function(function));
   s.words.push_back(fmt::format(
       "{} of {} readings; {} {} ({}): {} parameters, rms residual {} % of the largest "
@@ -313,7 +317,7 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
       function.kind(), s.samples, least_law_words(s, "they"), law_name(chosen.law),
       law_words(chosen.law), chosen.parameters - 1, significant(100.0 * chosen.rms_over_peak, 3)));
   const Candidate& best = s.candidates[s.best_bic];
-  if (s.recommended != s.best_bic) {
+  if (s.recommended != s.best_bic && !s.preferred) {
     s.words.push_back(fmt::format("{} has the lowest BIC, by {}{}{}", law_name(best.law),
                                   significant(chosen.delta_bic, 3), best.identified ? "" : "; ",
                                   best.reason));

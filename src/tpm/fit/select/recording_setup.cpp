@@ -1,4 +1,5 @@
 #include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/select/fixed_times.hpp"
 
 #include <fmt/format.h>
 
@@ -303,6 +304,10 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
     if (p.nuisance || p.preset) continue;
     if (p.name == "exponent" && options.exponent) {
       config.fixed[i] = *options.exponent;
+      continue;
+    }
+    if (const auto time_s = stated_time(p.name, options.times_s)) {
+      config.fixed[i] = *time_s;
       continue;
     }
     add_automatic(config, law_parameter_bounds(p, sizes, law.branches), {{i, {}}});

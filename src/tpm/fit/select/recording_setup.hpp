@@ -62,6 +62,7 @@ struct SetupOptions {
   std::optional<double> reference;
   /// Exponent that power kernels keep, where the probe's shape gives it: 2 of a cone.
   std::optional<double> exponent;
+  std::vector<double> times_s;    ///< relaxation times that are stated, not fitted; empty: none are
   std::optional<double> contact;  ///< depth of contact that is held, SI; none: measured
   std::optional<double> zero;     ///< reading without a load that is held, SI; none: measured
   /// Whether what was measured of zero, contact and drift enters the fit (measure_placement).

@@ -8,6 +8,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpm/work/progress.hpp"
@@ -43,84 +44,7 @@ double rms_over_peak(const FitResult& fit) {
   return worst;
 }
 
-const LawParameter* material_parameter(const std::vector<LawParameter>& table,
-                                       const std::string& name) {
-  for (const LawParameter& p : table) {
-    if (p.name == name && !p.nuisance) return &p;
-  }
-  return nullptr;
-}
-
-/// A material may relax to nothing: without a plateau the law stays what it is (a branch without
-/// its stiffness has a time that means nothing).
-bool may_vanish(const LawSpec& law, const std::string& parameter) {
-  return parameter == "k_inf" && (law.branches > 0 || law.fractional != Fractional::none);
-}
-
-/// See Candidate::contradicted.
-bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
-  double longest_s = 0.0;
-  const auto table = law_parameters(candidate.fit.config.law.value());
-  for (const ParameterResult& p : candidate.fit.parameters) {
-    const LawParameter* law = material_parameter(table, p.parameter.name);
-    if (law == nullptr || law->dimension != Dimension::time) continue;
-    if (spans.samples_too_far_for(p.estimate)) return true;
-    longest_s = std::max(longest_s, p.estimate);
-  }
-  return !candidate.law.solid && spans.too_short_to_end(longest_s);
-}
-
 }  // namespace
-
-std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans) {
-  constexpr int kLeastStandardErrors = 2;
-  double longest_s = 0.0;
-  const auto table = law_parameters(candidate.fit.config.law.value());
-  for (const ParameterResult& p : candidate.fit.parameters) {
-    const LawParameter* law = material_parameter(table, p.parameter.name);
-    if (law == nullptr) continue;
-    if (p.at_lower_bound && may_vanish(candidate.law, law->name)) continue;
-    if (p.at_lower_bound || p.at_upper_bound) {
-      return fmt::format("{} ends at its {} bound", p.parameter.name,
-                         p.at_lower_bound ? "lower" : "upper");
-    }
-    for (const Condition& c : p.conditional_on) {
-      if (!c.at_estimate) continue;
-      return fmt::format("{} ends at its {} bound, and {} depends on it", c.parameter,
-                         c.upper ? "upper" : "lower", p.parameter.name);
-    }
-    // An interval says more than the standard error, and stands in the table of the parameters.
-    const bool has_interval = p.verdict == Verdict::identified || p.verdict == Verdict::lower_only;
-    if (!p.standard_error && !has_interval) {
-      return fmt::format("{} has no standard error", p.parameter.name);
-    }
-    const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0 &&
-                           !may_vanish(candidate.law, law->name);
-    if (from_zero && !has_interval && p.estimate < kLeastStandardErrors * *p.standard_error) {
-      return fmt::format("{} is less than {} standard errors above 0", p.parameter.name,
-                         kLeastStandardErrors);
-    }
-    if (law->dimension != Dimension::time) continue;
-    if (p.standard_error && *p.standard_error > p.estimate) {
-      return fmt::format("{} is known only to its order of magnitude", p.parameter.name);
-    }
-    if (spans.samples_too_far_for(p.estimate)) {
-      return fmt::format("{} is sampled by fewer than {} points", p.parameter.name, kLeastSamples);
-    }
-    longest_s = std::max(longest_s, p.estimate);
-  }
-  if (!candidate.law.solid && spans.too_short_to_end(longest_s)) {
-    return fmt::format("a hold of {} s does not tell that nothing remains in the end",
-                       significant(spans.hold_s, 3));
-  }
-  return {};
-}
-
-void reassess(Candidate& chosen, const ProtocolSpans& spans) {
-  if (chosen.identified) return;
-  chosen.reason = not_identified(chosen, spans);
-  chosen.identified = chosen.reason.empty();
-}
 
 Candidate fit_candidate(const FitConfig& config, const std::vector<DataSet>& data,
                         bool refusal_counts) {
@@ -148,9 +72,7 @@ Candidate fit_to_recordings(const LawSpec& law, std::span<const PreparedRecordin
   if (candidate.failed) return candidate;
   candidate.rms_over_peak = rms_over_peak(candidate.fit);
   const ProtocolSpans spans = protocol_spans(recordings);
-  candidate.reason = not_identified(candidate, spans);
-  candidate.identified = candidate.reason.empty();
-  candidate.contradicted = contradicts(candidate, spans);
+  judge_identified(candidate, spans);
   return candidate;
 }
 
@@ -169,19 +91,6 @@ void score(Candidate& c, int samples, double effective) {
 }
 
 }  // namespace
-
-std::string least_law_words(const Selection& s, const std::string& data) {
-  const Candidate& chosen = s.candidates[s.recommended];
-  if (s.candidates.size() == 1) return "the law that was asked for is";
-  if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) {
-    return fmt::format("no law that is identified describes {}; the least of {} is", data,
-                       s.candidates.size());
-  }
-  if (chosen.identified) return fmt::format("the least law that {} support is", data);
-  return fmt::format("{} identify none of the {} laws; near the best BIC the least{} is", data,
-                     s.candidates.size(),
-                     chosen.contradicted ? "" : " that the protocol does not contradict");
-}
 
 bool plateau_is_not_told(const FitResult& fit) {
   for (const ParameterResult& p : fit.parameters) {
@@ -313,7 +222,7 @@ void describe(Selection& s) {
                                 law_words(chosen.law), chosen.parameters - 1,
                                 significant(100.0 * chosen.rms_over_peak, 3)));
   if (adequacy && !adequacy->is_rejected()) s.words.push_back(adequacy->words);
-  if (s.recommended != s.best_bic) {
+  if (s.recommended != s.best_bic && !s.preferred) {
     s.words.push_back(fmt::format(
         "{} has the lowest BIC, by {}, {}", law_name(best.law), significant(chosen.delta_bic, 3),
         best.identified ? fmt::format("less than the margin of {}", significant(s.margin, 3))
@@ -446,11 +355,12 @@ Selection select_law(std::span<const PreparedRecording> recordings,
                       kFewestPredicted));
     }
   }
+  const auto with_profiles = [&](const LawSpec& law) {
+    return run_fit(recording_config(law, recordings, options.setup), data);
+  };
+  settle_choice(s, protocol_spans(recordings),
+                options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
   Candidate& chosen = s.candidates[s.recommended];
-  if (options.setup.profiles) {
-    chosen.fit = run_fit(recording_config(chosen.law, recordings, options.setup), data);
-    reassess(chosen, protocol_spans(recordings));
-  }
   s.drift = drift_answers(chosen.fit, recordings);
   if (s.drift) chosen.fit.flags.push_back(drift_words(*s.drift, chosen.fit));
   std::ranges::move(protocol_warnings(chosen.fit, recordings), std::back_inserter(s.warnings));

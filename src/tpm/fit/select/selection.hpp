@@ -35,6 +35,8 @@ struct Candidate {
   bool identified = true;
   /// A relaxation time below the sampling, or a fluid from a hold too short to tell.
   bool contradicted = false;
+  bool by_wald = false;  ///< a standard error alone speaks against it, no profile yet
+  std::string special;   ///< what simpler law it is there ("the spring-pot is a dashpot"), or empty
   std::vector<HeldOut> held_out;
 };
 
@@ -57,6 +59,9 @@ struct Selection {
   std::vector<Candidate> candidates;  ///< rising BIC; failed ones last
   std::size_t recommended = 0;        ///< place in candidates
   std::size_t best_bic = 0;
+  /// The law of the lowest BIC, where it is ahead of the recommended one by more than kDecisiveBic:
+  /// the data prefer it but do not identify its parameters, and both answers are given.
+  std::optional<std::size_t> preferred;
   double margin = 3.0;
   int samples = 0;  ///< fitted
   double effective_count = 0.0;

@@ -34,6 +34,7 @@ Json candidate_json(const Candidate& c) {
   j["delta_aicc"] = kept_digits(c.delta_aicc);
   j["identified"] = c.identified;
   j["reason"] = c.reason;
+  if (!c.special.empty()) j["special_case"] = c.special;
   j["held_out"] = held_out_json(c);
   return j;
 }
@@ -70,6 +71,13 @@ Json to_json(const Selection& s) {
   j["words"] = s.words;
   j["warnings"] = s.warnings;
   j["fit"] = to_json(s.candidates[s.recommended].fit);
+  if (s.preferred) {
+    const Candidate& best = s.candidates[*s.preferred];
+    j["preferred"] = {{"law", law_name(best.law)},
+                      {"ahead_in_bic", kept_digits(s.candidates[s.recommended].delta_bic)},
+                      {"not_identified_because", best.reason},
+                      {"fit", to_json(best.fit)}};
+  }
   return j;
 }
 
@@ -85,10 +93,18 @@ std::string to_terminal_text(const Selection& s) {
     }
     text += fmt::format("{}{:<25} {:>6} {:>9} {:>9} {:>9}{}  {}\n", mark, law_name(c.law),
                         c.parameters - 1, significant(100.0 * c.rms_over_peak, 3) + " %",
-                        fixed(c.delta_bic, 1), fixed(c.delta_aicc, 1), held_out_text(c), c.reason);
+                        fixed(c.delta_bic, 1), fixed(c.delta_aicc, 1), held_out_text(c),
+                        c.reason.empty() ? c.special : c.reason);
   }
   text += "\n";
   for (const std::string& line : s.words) text += fmt::format("{}\n", line);
+  if (s.preferred) {
+    const Candidate& best = s.candidates[*s.preferred];
+    text += fmt::format("\nof the law that the data prefer, {} ({}):\n", law_name(best.law),
+                        law_words(best.law));
+    for (const ParameterResult& p : best.fit.parameters) text += fmt::format("- {}\n", p.words);
+    text += "\n";
+  }
   for (const std::string& line : s.warnings) text += fmt::format("! {}\n", line);
   return text;
 }

@@ -11,6 +11,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/gate.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpmkit/error.hpp"
 
@@ -67,13 +68,23 @@ std::pair<LawSpec, std::string> common_law(std::span<const PreparedRecording> re
       if (chosen == nullptr || t.parameters < chosen->parameters) chosen = &t;
     }
     if (chosen == nullptr) continue;
+    const Tally* best = nullptr;
+    for (const Tally& t : tallies) {
+      if (t.recordings == count && (best == nullptr || t.bic < best->bic)) best = &t;
+    }
+    std::string preferred;
+    if (chosen->bic - best->bic > kDecisiveBic * static_cast<double>(recordings.size())) {
+      preferred = fmt::format(
+          "; the data prefer {}, by {} in that sum, but identify its parameters in {} of them",
+          law_name(best->law), significant(chosen->bic - best->bic, 3), best->identified);
+    }
     return {chosen->law,
             fmt::format("{} is the least law within {} of the least sum of BIC over {} recordings"
-                        "{}; its parameters are identified in {} of them",
+                        "{}; its parameters are identified in {} of them{}",
                         law_name(chosen->law), significant(margin, 3), recordings.size(),
                         only_identified ? " among the laws that most of them identify"
                                         : ", but no law is identified in most of them",
-                        chosen->identified)};
+                        chosen->identified, preferred)};
   }
   throw Error(ExitCode::numerical, "fit", "no law could be fitted to every recording");
 }

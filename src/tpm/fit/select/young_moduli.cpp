@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/base/distributions.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/error.hpp"
@@ -74,11 +73,53 @@ std::optional<YoungModulus> sum_of(const FitResult& fit, const std::vector<std::
   }
   if (!c.full_rank) return sum;
   const double sd = factor * std::sqrt(direction.dot(c.theta_covariance() * direction));
-  const double z = normal_quantile(0.5 * (1.0 + fit.config.level));
+  const double z = threshold_of(fit).multiplier(fit.best.deviance);
   sum.standard_error = sd;
   sum.lower = sum.estimate - z * sd;
   sum.upper = sum.estimate + z * sd;
   return sum;
+}
+
+bool adds_up(const LawSpec& law) {
+  return law.form == BranchForm::parallel && law.fractional == Fractional::none;
+}
+
+std::vector<std::size_t> modulus_places(const FitResult& fit) {
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+    if (is_modulus(fit.parameters[i].parameter)) places.push_back(i);
+  }
+  return places;
+}
+
+/// The typical sum of all stiffnesses over the specimens, by the logarithm of each one's; none if
+/// no fit tells it.
+std::optional<YoungModulus> pooled_sum(const SpecimenStudy& study, double factor) {
+  std::vector<SpecimenEstimate> estimates;
+  std::string of;
+  for (const SpecimenRow& row : study.rows) {
+    if (!row.fit) continue;
+    const std::vector<std::size_t> places = modulus_places(*row.fit);
+    if (places.size() < 2) return std::nullopt;
+    const auto sum = sum_of(*row.fit, places, factor);
+    if (!sum || !sum->standard_error || !(sum->estimate > 0.0)) continue;
+    if (!(*sum->standard_error > 0.0)) continue;
+    of = sum->of;
+    estimates.push_back(
+        {row.name, std::log(sum->estimate), *sum->standard_error / sum->estimate, row.specimen});
+  }
+  if (estimates.empty()) return std::nullopt;
+  const RandomEffects effects = random_effects_of_repeats(estimates, study.level);
+  return YoungModulus{"E_instantaneous",
+                      of,
+                      "Pa",
+                      std::exp(effects.mean),
+                      std::nullopt,
+                      std::exp(effects.interval.lower),
+                      std::exp(effects.interval.upper),
+                      "pooled",
+                      fmt::format("typical of {} specimen{}", effects.specimens,
+                                  effects.specimens == 1 ? "" : "s")};
 }
 
 }  // namespace
@@ -94,12 +135,10 @@ YoungModuli young_moduli(const FitResult& fit, const ContactGeometry& geometry,
                   law.reference,
                   {},
                   geometry_warnings(law, geometry, fitted_depth(fit))};
-  std::vector<std::size_t> places;
-  for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+  const std::vector<std::size_t> places = modulus_places(fit);
+  for (const std::size_t i : places) {
     const ParameterResult& p = fit.parameters[i];
     const std::string& name = p.parameter.name;
-    if (!is_modulus(p.parameter)) continue;
-    places.push_back(i);
     YoungModulus m{modulus_name(name),
                    name,
                    modulus_unit(law, name),
@@ -114,8 +153,7 @@ YoungModuli young_moduli(const FitResult& fit, const ContactGeometry& geometry,
     if (p.upper) m.upper = factor * *p.upper;
     all.moduli.push_back(std::move(m));
   }
-  const bool adds_up = law.form == BranchForm::parallel && law.fractional == Fractional::none;
-  if (adds_up && places.size() > 1) {
+  if (adds_up(law) && places.size() > 1) {
     if (auto sum = sum_of(fit, places, factor)) all.moduli.push_back(*std::move(sum));
   }
   return all;
@@ -145,6 +183,9 @@ YoungModuli pooled_moduli(const SpecimenStudy& study, const ContactGeometry& geo
                           pascals(p.effects.interval.upper), "pooled",
                           fmt::format("typical of {} specimen{}", p.effects.specimens,
                                       p.effects.specimens == 1 ? "" : "s")});
+  }
+  if (adds_up(study.law)) {
+    if (auto sum = pooled_sum(study, factor)) all.moduli.push_back(*std::move(sum));
   }
   return all;
 }

@@ -38,7 +38,7 @@ struct YoungModuli {
                                        bool poisson_assumed);
 
 /// Those of the typical specimen of a folder: the pooled stiffnesses and the limits of their
-/// intervals times the same constant. The sum has no interval there and is left out.
+/// intervals times the same constant. Their sum is pooled by the logarithm of each specimen's.
 [[nodiscard]] YoungModuli pooled_moduli(const SpecimenStudy& study, const ContactGeometry& geometry,
                                         bool poisson_assumed);
 

@@ -97,6 +97,7 @@ Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimate
   j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
   j["verdict"] = verdict_text(p);
   if (!p.not_separable.empty()) j["not_separable"] = p.not_separable;
+  if (!p.unconfirmed.empty()) j["unconfirmed"] = p.unconfirmed;
   if (estimated.prior) {
     j["prior_SI"] = {{"mean", number(estimated.prior->mean)},
                      {"sd", number(estimated.prior->sd)},
@@ -193,6 +194,9 @@ Json recordings_json(const FitResult& result) {
     if (const auto count = std::count(r.censored.begin(), r.censored.end(), true); count > 0) {
       j["samples_censored"] = count;
     }
+    if (const auto count = std::count(r.outlier.begin(), r.outlier.end(), true); count > 0) {
+      j["outliers_left_out"] = count;
+    }
     if (r.not_predicted > 0) j["samples_not_predicted"] = r.not_predicted;
     j["share_inside_prediction_band"] = optional_number(r.share_inside);
     if (r.correlation) j["correlation"] = correlation_json(*r.correlation);
@@ -288,6 +292,19 @@ Json to_json(const FitResult& result) {
   if (result.correlation) {
     j["residual_correlation"] = correlation_json(*result.correlation);
     j["residual_correlation"]["inflation"] = number(result.inflation);
+    if (result.noise) {
+      const NoiseOfEstimates& noise = *result.noise;
+      j["noise_of_estimates"] = {{"phi", number(noise.phi)},
+                                 {"step_s", number(noise.step_s)},
+                                 {"beyond", number(noise.beyond)},
+                                 {"words", noise.words}};
+      j["noise_of_estimates"]["parameters"] = array_json(noise.of, [&](const NoiseOfEstimate& e) {
+        return Json{{"degrees_of_freedom", number(e.degrees)},
+                    {"bias_of_rounding_in_standard_errors",
+                     e.variance_ratio > 0.0 ? number(e.bias / std::sqrt(e.variance_ratio))
+                                            : Json(nullptr)}};
+      });
+    }
   }
   j["confidence_level"] = result.config.level;
   Json parameters = Json::array();

@@ -84,6 +84,9 @@ std::string recording_line(const FitResult& result, const RecordingFit& r) {
   if (const auto count = std::ranges::count(r.censored, true); count > 0) {
     text += fmt::format(", {} at a limit of the force cell (censored)", count);
   }
+  if (const auto count = std::ranges::count(r.outlier, true); count > 0) {
+    text += fmt::format(", {} outlier{} left out", count, count == 1 ? "" : "s");
+  }
   if (r.not_predicted > 0) text += fmt::format(", {} samples not predicted", r.not_predicted);
   if (r.share_inside) {
     text += fmt::format(", {} % within the {:.4g} % prediction band",

@@ -1,0 +1,107 @@
+#include "tpm/fit/outliers.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/text.hpp"
+#include "tpm/fit/select/adequacy.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr double kFarFromCurve = 8.0;  // robust standard deviations
+constexpr double kNearCurve = 4.0;
+constexpr std::size_t kMostTogether = 3;
+
+bool may_have_outliers(const FitConfig& config) {
+  if (config.loss.kind != Loss::none) return false;
+  return std::ranges::all_of(config.data, [](const DataChoice& d) {
+    return d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
+  });
+}
+
+/// What was read of one recording and how far it lies from the curve.
+struct CurveDistance {
+  std::vector<std::size_t> data;
+  std::vector<double> reading, sigma, distance;
+};
+
+/// 0 if there is no noise to compare with.
+double robust_deviation(const CurveDistance& d) {
+  constexpr double kOfMedian = 1.4826;
+  constexpr double kNoise = 1e-7;  // of the declared noise: below, it is rounding of numbers
+  std::vector<double> sizes;
+  for (const double z : d.distance) sizes.push_back(std::abs(z));
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  const double own = kOfMedian * *middle;
+  if (!(own > kNoise)) return 0.0;
+  const double rounding = quantum_of(d.reading) / std::sqrt(12.0);
+  return std::max(own, rounding / *std::ranges::min_element(d.sigma));
+}
+
+std::vector<std::size_t> outliers_of(const CurveDistance& d) {
+  constexpr std::size_t kFewest = 20;
+  if (d.data.size() < kFewest) return {};
+  const double sd = robust_deviation(d);
+  if (!(sd > 0.0)) return {};
+  const auto beyond = [&](std::size_t i, double times) {
+    return std::abs(d.distance[i]) > times * sd;
+  };
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < d.data.size(); ++i) {
+    if (!beyond(i, kFarFromCurve)) continue;
+    std::size_t end = i;
+    while (end < d.data.size() && beyond(end, kFarFromCurve)) ++end;
+    const bool alone = end - i <= kMostTogether && (i == 0 || !beyond(i - 1, kNearCurve)) &&
+                       (end == d.data.size() || !beyond(end, kNearCurve));
+    for (std::size_t k = i; k < end && alone; ++k) found.push_back(d.data[k]);
+    i = end;
+  }
+  const bool few = 20 * found.size() <= d.data.size();
+  return few ? found : std::vector<std::size_t>();
+}
+
+}  // namespace
+
+std::vector<std::size_t> isolated_outliers(const ExperimentResiduals& function,
+                                           std::span<const double> natural) {
+  std::vector<std::size_t> outliers;
+  if (!may_have_outliers(function.config())) return outliers;
+  const Eigen::VectorXd answer = function.predict(natural, nullptr);
+  for (const Experiment& experiment : function.experiments()) {
+    if (!experiment.is_recording) continue;
+    CurveDistance distances;
+    for (const std::size_t i : experiment.data) {
+      const FitDatum& d = function.data()[i];
+      if ((d.held_out && !d.outlier) || !d.value) continue;
+      distances.data.push_back(i);
+      distances.reading.push_back(*d.value);
+      distances.sigma.push_back(d.sigma);
+      distances.distance.push_back(
+          function.standardised(i, answer[static_cast<Eigen::Index>(i)], natural));
+    }
+    const std::vector<std::size_t> found = outliers_of(distances);
+    outliers.insert(outliers.end(), found.begin(), found.end());
+  }
+  std::ranges::sort(outliers);
+  return outliers;
+}
+
+std::string outlier_words(const ExperimentResiduals& function,
+                          std::span<const std::size_t> outliers) {
+  constexpr std::size_t kNamed = 5;
+  std::string where;
+  for (std::size_t k = 0; k < std::min(outliers.size(), kNamed); ++k) {
+    where += (k > 0 ? ", " : "") + datum_label(function.data()[outliers[k]]);
+  }
+  if (outliers.size() > kNamed) where += fmt::format(" and {} more", outliers.size() - kNamed);
+  return fmt::format(
+      "{} outlier{} ({}): more than {} robust standard deviations from the curve, which the "
+      "readings beside are not; left out of the fit (noise of distribution 'student_t' keeps them)",
+      outliers.size(), outliers.size() == 1 ? "" : "s", where, kFarFromCurve);
+}
+
+}  // namespace tpm::fit

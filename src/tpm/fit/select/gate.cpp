@@ -1,0 +1,188 @@
+#include "tpm/fit/select/gate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "tpm/base/text.hpp"
+#include "tpm/fit/verdict.hpp"
+
+namespace tpm::fit {
+namespace {
+
+/// Why a law's parameters are not known.
+struct Refusal {
+  std::string reason;
+  bool by_wald = false;  ///< by a standard error alone
+};
+
+const LawParameter* material_parameter(const std::vector<LawParameter>& table,
+                                       const std::string& name) {
+  for (const LawParameter& p : table) {
+    if (p.name == name && !p.nuisance) return &p;
+  }
+  return nullptr;
+}
+
+/// A material may relax to nothing: without a plateau the law stays what it is (a branch without
+/// its stiffness has a time that means nothing).
+bool may_vanish(const LawSpec& law, const std::string& parameter) {
+  return parameter == "k_inf" && (law.branches > 0 || law.fractional != Fractional::none);
+}
+
+/// See Candidate::contradicted.
+bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
+  double longest_s = 0.0;
+  const auto table = law_parameters(candidate.fit.config.law.value());
+  for (const ParameterResult& p : candidate.fit.parameters) {
+    const LawParameter* law = material_parameter(table, p.parameter.name);
+    if (law == nullptr || law->dimension != Dimension::time) continue;
+    if (spans.samples_too_far_for(p.estimate)) return true;
+    longest_s = std::max(longest_s, p.estimate);
+  }
+  return !candidate.law.solid && spans.too_short_to_end(longest_s);
+}
+
+Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
+  constexpr int kLeastStandardErrors = 2;
+  double longest_s = 0.0;
+  Refusal first;  // of a standard error: other reasons go before it
+  const auto keep = [&](Refusal refusal) {
+    if (first.reason.empty()) first = std::move(refusal);
+  };
+  const auto table = law_parameters(candidate.fit.config.law.value());
+  for (const ParameterResult& p : candidate.fit.parameters) {
+    const LawParameter* law = material_parameter(table, p.parameter.name);
+    if (law == nullptr) continue;
+    if (is_dashpot(p)) continue;
+    if (p.at_lower_bound && may_vanish(candidate.law, law->name)) continue;
+    if (p.at_lower_bound || p.at_upper_bound) {
+      return {fmt::format("{} ends at its {} bound", p.parameter.name,
+                          p.at_lower_bound ? "lower" : "upper")};
+    }
+    for (const Condition& c : p.conditional_on) {
+      if (!c.at_estimate) continue;
+      return {fmt::format("{} ends at its {} bound, and {} depends on it", c.parameter,
+                          c.upper ? "upper" : "lower", p.parameter.name)};
+    }
+    // An interval says more than the standard error, and stands in the table of the parameters.
+    const bool has_interval = p.verdict == Verdict::identified || p.verdict == Verdict::lower_only;
+    if (!p.standard_error && !has_interval) {
+      return {fmt::format("{} has no standard error", p.parameter.name)};
+    }
+    const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0 &&
+                           !may_vanish(candidate.law, law->name);
+    if (from_zero && !has_interval && p.estimate < kLeastStandardErrors * *p.standard_error) {
+      keep({fmt::format("{} is less than {} standard errors above 0", p.parameter.name,
+                        kLeastStandardErrors),
+            true});
+    }
+    if (law->dimension != Dimension::time) continue;
+    const bool closed = p.verdict == Verdict::identified;
+    if (!closed && p.standard_error && *p.standard_error > p.estimate) {
+      keep({fmt::format("{} is known only to its order of magnitude", p.parameter.name), true});
+    }
+    if (spans.samples_too_far_for(p.estimate)) {
+      return {
+          fmt::format("{} is sampled by fewer than {} points", p.parameter.name, kLeastSamples)};
+    }
+    longest_s = std::max(longest_s, p.estimate);
+  }
+  if (!candidate.law.solid && spans.too_short_to_end(longest_s)) {
+    return {fmt::format("a hold of {} s does not tell that nothing remains in the end",
+                        significant(spans.hold_s, 3))};
+  }
+  return first;
+}
+
+/// What a law is that stands where it becomes a simpler one.
+std::string special_case(const FitResult& fit) {
+  std::string words;
+  for (const ParameterResult& p : fit.parameters) {
+    if (!is_dashpot(p)) continue;
+    words += fmt::format("{}{} = 1: the spring-pot is a dashpot", words.empty() ? "" : "; ",
+                         p.parameter.name);
+  }
+  return words;
+}
+
+/// The law that would be recommended if a standard error did not speak against it.
+std::optional<std::size_t> refused_by_wald_alone(Selection& s, const std::vector<bool>& profiled) {
+  for (std::size_t i = 0; i < s.candidates.size(); ++i) {
+    Candidate& c = s.candidates[i];
+    if (c.failed || c.identified || !c.by_wald || profiled[i]) continue;
+    c.identified = true;
+    const bool wins = least_within(s.candidates, s.margin) == i;
+    c.identified = false;
+    if (wins) return i;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans) {
+  return refusal_of(candidate, spans).reason;
+}
+
+void judge_identified(Candidate& candidate, const ProtocolSpans& spans) {
+  Refusal refusal = refusal_of(candidate, spans);
+  candidate.identified = refusal.reason.empty();
+  candidate.reason = std::move(refusal.reason);
+  candidate.by_wald = refusal.by_wald;
+  candidate.special = special_case(candidate.fit);
+  candidate.contradicted = contradicts(candidate, spans);
+}
+
+void reassess(Candidate& chosen, const ProtocolSpans& spans) {
+  if (!chosen.identified) judge_identified(chosen, spans);
+}
+
+void settle_choice(Selection& s, const ProtocolSpans& spans, const ProfiledFit& with_profiles) {
+  constexpr int kMostTried = 4;
+  std::vector<bool> profiled(s.candidates.size(), false);
+  const auto profile = [&](std::size_t i) {
+    if (!with_profiles || profiled[i]) return;
+    profiled[i] = true;
+    s.candidates[i].fit = with_profiles(s.candidates[i].law);
+    reassess(s.candidates[i], spans);
+  };
+  for (int tried = 0; with_profiles && tried < kMostTried; ++tried) {
+    const auto next = refused_by_wald_alone(s, profiled);
+    if (!next) break;
+    profile(*next);
+    s.recommended = least_within(s.candidates, s.margin);
+  }
+  profile(s.recommended);
+  s.preferred.reset();
+  if (s.recommended == s.best_bic) return;
+  if (!(s.candidates[s.recommended].delta_bic > kDecisiveBic)) return;
+  s.preferred = s.best_bic;
+  profile(s.best_bic);
+}
+
+std::string least_law_words(const Selection& s, const std::string& data) {
+  const Candidate& chosen = s.candidates[s.recommended];
+  if (s.preferred) {
+    const Candidate& best = s.candidates[*s.preferred];
+    return fmt::format(
+        "{} prefer {}, by {} in BIC, but do not identify its parameters ({}); the least law {} is",
+        data, law_name(best.law), significant(chosen.delta_bic, 3), best.reason,
+        chosen.identified     ? "whose parameters they identify"
+        : chosen.contradicted ? "near the best BIC"
+                              : "that the protocol does not contradict");
+  }
+  if (s.candidates.size() == 1) return "the law that was asked for is";
+  if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) {
+    return fmt::format("no law that is identified describes {}; the least of {} is", data,
+                       s.candidates.size());
+  }
+  if (chosen.identified) return fmt::format("the least law that {} support is", data);
+  return fmt::format("{} identify none of the {} laws; near the best BIC the least{} is", data,
+                     s.candidates.size(),
+                     chosen.contradicted ? "" : " that the protocol does not contradict");
+}
+
+}  // namespace tpm::fit
