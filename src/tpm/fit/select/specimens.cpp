@@ -10,6 +10,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpmkit/error.hpp"
@@ -160,7 +161,8 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
     if (is_of_recording(first->fit->parameters[i])) continue;
     // A stiffness varies between specimens by factors, not by differences.
     p.parameter.scale = p.parameter.lower < 0.0 ? Scale::linear : Scale::log;
-    std::vector<SpecimenEstimate> estimates;
+    std::vector<SpecimenEstimate> estimates, doubtful;
+    std::string doubt;
     for (const SpecimenRow& row : rows) {
       if (!row.fit) continue;
       const ParameterResult& r = row.parameter(i);
@@ -172,12 +174,28 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
         continue;
       }
       const double slope = p.parameter.scale == Scale::log ? r.estimate : 1.0;
-      estimates.push_back(
-          {row.name, p.parameter.theta(r.estimate), *r.standard_error / slope, row.specimen});
+      if (!r.not_separable.empty()) {
+        doubt = r.not_separable;
+        ++p.not_separable;
+      }
+      (r.not_separable.empty() ? estimates : doubtful)
+          .push_back(
+              {row.name, p.parameter.theta(r.estimate), *r.standard_error / slope, row.specimen});
+    }
+    if (estimates.empty()) {
+      estimates = std::move(doubtful);
+      p.only_without = doubt;
     }
     if (estimates.empty()) continue;
     p.effects = random_effects_of_repeats(estimates, level);
     p.effects.words = in_natural_words(p);
+    if (!p.only_without.empty()) {
+      p.effects.words +=
+          fmt::format("; not identified: {}: not separable in any recording", p.only_without);
+    } else if (p.not_separable > 0) {
+      p.effects.words +=
+          fmt::format("; {} more left out: {}: not separable", p.not_separable, doubt);
+    }
     pooled.push_back(std::move(p));
   }
   return pooled;
@@ -196,8 +214,8 @@ SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     study.rows.push_back(fit_specimen(study.law, recordings.subspan(i, 1), options.setup));
   }
-  study.law.drive = recordings.front().recording.drive_quantity;
-  study.law.response = recordings.front().recording.response_quantity;
+  study.law.drive = law_drive(recordings.front().recording);
+  study.law.response = law_response(recordings.front().recording);
   study.law.reference = *options.setup.reference;
   study.pooled = pool_specimens(study.rows, options.setup.level);
   study.level = options.setup.level;
@@ -235,7 +253,10 @@ Json to_json(const SpecimenStudy& study) {
                {"confidence_level", study.level},
                {"specimens", e.specimens},
                {"left_out", p.left_out},
+               {"not_separable", p.not_separable},
+               {"identified", p.only_without.empty()},
                {"words", e.words}};
+    if (!p.only_without.empty()) entry["only_without"] = p.only_without;
     const char* of = p.parameter.scale == Scale::log ? "of_log" : "SI";
     const auto sd_key = [&](const char* between) {
       return fmt::format("between_{}_sd_{}", between, of);
