@@ -15,6 +15,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/groups/group_comparison.hpp"
 #include "tpm/fit/likelihood/experiment_refit.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/predict/fitted_scene.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
@@ -47,7 +48,7 @@ struct FitOptions {
   std::string reference;
   std::string group_by;
   bool compare = false;
-  std::string contact, zero;
+  PlacementArguments placement;
   std::string radius, cone_angle, punch_radius, poisson;
 };
 
@@ -144,34 +145,11 @@ SelectionOptions selection_options(const FitOptions& options) {
   return selection;
 }
 
-/// --contact and --zero hold what is otherwise measured.
-void set_placement(const FitOptions& options, const std::vector<PreparedRecording>& recordings,
-                   SelectionOptions& selection) {
-  const Recording& first = recordings.front().recording;
-  const auto set = [](std::optional<double>& held, const std::string& text, Quantity quantity,
-                      const char* option) {
-    if (!text.empty()) held = option_quantity(text, quantity_dimension(quantity), option);
-  };
-  set(selection.setup.contact, options.contact, first.drive_quantity, "--contact");
-  set(selection.setup.zero, options.zero, first.response_quantity, "--zero");
-  if (!selection.setup.contact) return;
-  if (!options.recordings.contact_response.empty()) {
-    throw Error(ExitCode::usage, "--contact", "beside --contact-force", "one of them");
-  }
-  for (const PreparedRecording& r : recordings) {
-    if (*selection.setup.contact < r.phases.peak_drive) continue;
-    throw Error(ExitCode::usage, "--contact",
-                fmt::format("'{}' is not below the largest depth of '{}'",
-                            printable(options.contact), printable(r.name)),
-                "the depth at which the probe begins to touch");
-  }
-}
-
 /// --reference for recordings: a depth, or a change of relative length.
 void set_reference(const FitOptions& options, const std::vector<PreparedRecording>& recordings,
                    SelectionOptions& selection) {
   if (options.reference.empty()) return;
-  const Dimension drive = quantity_dimension(recordings.front().recording.drive_quantity);
+  const Dimension drive = quantity_dimension(law_drive(recordings.front().recording));
   selection.setup.reference = option_quantity(options.reference, drive, "--reference");
   if (*selection.setup.reference > 0.0) return;
   throw Error(ExitCode::usage, "--reference", fmt::format("'{}'", printable(options.reference)),
@@ -314,7 +292,8 @@ int fit_folder(const FitOptions& options, const Session& session) {
   std::vector<PreparedRecording> recordings = read_recordings(input);
   require_indentation(options, recordings);
   set_reference(options, recordings, selection);
-  set_placement(options, recordings, selection);
+  hold_placement(options.placement, options.recordings, recordings, selection.setup.contact,
+                 selection.setup.zero);
   set_specimens(options, recordings);
   const SpecimenStudy study = study_specimens(recordings, law, selection);
   std::optional<YoungModuli> moduli;
@@ -373,8 +352,10 @@ int compare_folders(const FitOptions& options, const Session& session) {
   const std::optional<LawSpec> law =
       selection.laws.empty() ? std::nullopt : std::optional<LawSpec>(selection.laws.front());
   set_reference(options, first.recordings, selection);
-  set_placement(options, first.recordings, selection);
-  set_placement(options, second.recordings, selection);
+  hold_placement(options.placement, options.recordings, first.recordings, selection.setup.contact,
+                 selection.setup.zero);
+  hold_placement(options.placement, options.recordings, second.recordings, selection.setup.contact,
+                 selection.setup.zero);
   const std::optional<ContactGeometry> probe = probe_of(options);
   const GroupComparison comparison = compare_groups(first, second, law, selection, probe);
   std::string text = session.json() ? to_text(to_json(comparison)) : to_terminal_text(comparison);
@@ -394,7 +375,8 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
   SelectionOptions choices = selection_options(options);
   require_indentation(options, recordings);
   set_reference(options, recordings, choices);
-  set_placement(options, recordings, choices);
+  hold_placement(options.placement, options.recordings, recordings, choices.setup.contact,
+                 choices.setup.zero);
   const Selection selection = select_law(recordings, choices);
   const FitResult& best = selection.candidates[selection.recommended].fit;
   std::optional<YoungModuli> moduli;
@@ -457,7 +439,8 @@ int fit(const FitOptions& options, const Session& session) {
   }
   if (is_configuration(files)) {
     if (!options.reference.empty() || !options.times.empty() || !options.group_by.empty() ||
-        !options.contact.empty() || !options.zero.empty() || probe_of(options)) {
+        !options.placement.contact.empty() || !options.placement.zero.empty() ||
+        probe_of(options)) {
       throw Error(ExitCode::usage,
                   "--reference, --times, --group-by, --contact, --zero, --radius, --cone-angle, "
                   "--punch-radius",
@@ -522,12 +505,7 @@ void add_fit_command(CLI::App& app, Session& session) {
                           "written for a configuration)");
   command->add_flag("--no-draw", options->no_draw, "Write no figures and files")->excludes(folder);
   add_recording_options(*command, options->recordings);
-  command->add_option("--contact", options->contact,
-                      "Recordings: hold the depth of contact, e.g. \"0.3 mm\" (default: the onset "
-                      "of the force, measured with its uncertainty)");
-  command->add_option("--zero", options->zero,
-                      "Recordings: hold the reading without a load, e.g. \"12 mN\" (default: "
-                      "measured before contact)");
+  add_placement_options(*command, options->placement);
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
   command->add_option("--rate", options->rate, "Assume this ramp rate instead, e.g. \"2 mm/s\"");
   command->add_option("--hold-out", options->hold_out_depth,

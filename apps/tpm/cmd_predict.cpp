@@ -22,6 +22,7 @@ namespace {
 struct PredictOptions {
   std::string law;
   RecordingOptions recordings;  ///< its file may also hold a protocol
+  PlacementArguments held;
   RampOptions ramp;
   std::string level, placement, samples, seed = "0";
   std::string folder, output;
@@ -58,10 +59,19 @@ LawPrediction answer_of(const std::string& subject, const std::optional<Protocol
 int predict(const PredictOptions& options, const Session& session) {
   will_write_into(options.folder, {"prediction.csv", "prediction.json", "figures.json"});
   const auto csv = csv_beside(options.output, session);
-  const PredictionOptions chosen = prediction_options(options);
+  PredictionOptions chosen = prediction_options(options);
   const auto file = chosen_protocol(options.ramp, options.recordings.files);
   std::optional<PreparedRecording> recording;
-  if (!file) recording = read_recordings(options.recordings).front();
+  const bool holds = !options.held.contact.empty() || !options.held.zero.empty();
+  if (file && holds) {
+    throw Error(ExitCode::usage, "--contact, --zero", "with a protocol",
+                "them with a recording; a protocol counts from the surface");
+  }
+  if (!file) {
+    recording = read_recordings(options.recordings).front();
+    hold_placement(options.held, options.recordings, std::span(&*recording, 1), chosen.contact,
+                   chosen.zero);
+  }
   const LawPrediction prediction = answer_of(options.law, file, recording, chosen);
   const Json json = to_json(prediction);
   std::string text = session.json() ? "" : to_terminal_text(prediction);
@@ -99,6 +109,7 @@ void add_predict_command(CLI::App& app, Session& session) {
                       "Contact point and offset: surface (0), fitted (those of the fit) or own "
                       "(found for the recording); default: surface for a protocol, fitted for a "
                       "recording that was fitted, own for another");
+  add_placement_options(*command, options->held);
   command->add_option("--samples", options->samples,
                       "Bands from so many laws drawn from the covariance, 100 or more, instead of "
                       "from derivatives");

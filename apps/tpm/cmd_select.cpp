@@ -11,6 +11,7 @@ namespace {
 
 struct SelectOptions {
   RecordingOptions recordings;
+  PlacementArguments placement;
   std::vector<std::string> laws;
   std::string family = "classical";
   std::string margin = "3";
@@ -30,6 +31,8 @@ int select(const SelectOptions& options, const Session& session) {
   selection.setup.seed = parse_whole_number(options.seed, "--seed", 0);
   const auto csv = csv_beside(options.output, session);
   const auto recordings = read_recordings(options.recordings);
+  hold_placement(options.placement, options.recordings, recordings, selection.setup.contact,
+                 selection.setup.zero);
   const Selection result = select_law(recordings, selection);
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
   if (!session.json()) {
@@ -53,6 +56,7 @@ void add_select_command(CLI::App& app, Session& session) {
   add_recording_options(*command, options->recordings);
   command->add_option("--laws", options->laws, "Only these laws, e.g. linear-1-elastic,power-2")
       ->delimiter(',');
+  add_placement_options(*command, options->placement);
   add_family_option(*command, options->family);
   command
       ->add_option("--margin", options->margin, "BIC that a larger law must gain to be preferred")

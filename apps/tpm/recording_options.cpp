@@ -8,6 +8,8 @@
 #include "tpm/files/import/reading_options.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/select/instrument_of_recording.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpmkit/error.hpp"
 
@@ -71,6 +73,32 @@ void add_recording_options(CLI::App& command, RecordingOptions& options) {
   options_of_group(command, group)(
       "--contact-force", options.contact_response,
       "Contact begins where the force passes this, e.g. \"0.05 N\"; default: found");
+}
+
+void add_placement_options(CLI::App& command, PlacementArguments& arguments) {
+  command.add_option("--contact", arguments.contact,
+                     "Recordings: hold the depth of contact, e.g. \"0.3 mm\" (default: the onset "
+                     "of the force, measured with its uncertainty)");
+  command.add_option("--zero", arguments.zero,
+                     "Recordings: hold the reading without a load, e.g. \"12 mN\" (default: "
+                     "measured before contact)");
+}
+
+void hold_placement(const PlacementArguments& arguments, const RecordingOptions& options,
+                    std::span<const PreparedRecording> recordings, std::optional<double>& contact,
+                    std::optional<double>& zero) {
+  const Recording& first = recordings.front().recording;
+  const auto set = [](std::optional<double>& held, const std::string& text, Quantity quantity,
+                      const char* option) {
+    if (!text.empty()) held = option_quantity(text, quantity_dimension(quantity), option);
+  };
+  set(contact, arguments.contact, law_drive(first), "--contact");
+  set(zero, arguments.zero, law_response(first), "--zero");
+  if (!contact) return;
+  if (!options.contact_response.empty()) {
+    throw Error(ExitCode::usage, "--contact", "beside --contact-force", "one of them");
+  }
+  require_contact_within(*contact, recordings, "--contact");
 }
 
 ImportOptions import_options(const RecordingOptions& options) {

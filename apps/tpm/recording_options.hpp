@@ -1,6 +1,8 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <map>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +33,21 @@ struct RecordingOptions {
   ReadingArguments reading;
   std::string contact_response;
 };
+
+/// What the user says of contact and zero, which are measured otherwise.
+struct PlacementArguments {
+  std::string contact, zero;
+};
+
+/// --contact and --zero.
+void add_placement_options(CLI::App& command, PlacementArguments& arguments);
+
+/// Holds what was said. Throws Error(usage) for a contact beside --contact-force, or one that a
+/// recording does not go beyond.
+/// @param recordings not empty
+void hold_placement(const PlacementArguments& arguments, const RecordingOptions& options,
+                    std::span<const PreparedRecording> recordings, std::optional<double>& contact,
+                    std::optional<double>& zero);
 
 /// Adds the options above; `files` is the command's own.
 void add_recording_options(CLI::App& command, RecordingOptions& options);

@@ -13,6 +13,7 @@
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/instrument_of_recording.hpp"
 #include "tpm/fit/select/material_function.hpp"
+#include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/show/fit_report.hpp"
 #include "tpm/fit/show/function_report.hpp"
@@ -29,7 +30,7 @@ struct FitRequest {
   std::optional<std::string> law;
   std::optional<std::size_t> starts;
   std::optional<std::uint64_t> seed;
-  std::optional<double> reference;
+  std::optional<double> reference, contact, zero;
   ImportOptions import;
 };
 
@@ -156,13 +157,15 @@ SelectionOptions selection_of(const FitRequest& request, const LongCall& call) {
   if (request.starts) options.setup.starts = *request.starts;
   if (request.seed) options.setup.seed = *request.seed;
   options.setup.reference = request.reference;
+  options.setup.contact = request.contact;
+  options.setup.zero = request.zero;
   options.setup.interrupted = call.interrupted();
   return options;
 }
 
 Fit fit_configuration(const FitRequest& request, const LongCall& call) {
-  if (request.law || request.reference) {
-    throw Error(ExitCode::usage, "law, reference", "with a configuration",
+  if (request.law || request.reference || request.contact || request.zero) {
+    throw Error(ExitCode::usage, "law, reference, contact, zero", "with a configuration",
                 "them only with recordings; a configuration says its own");
   }
   FitProblem problem = read_fit_problem(request.files.front());
@@ -195,6 +198,10 @@ Fit fit_files(const FitRequest& request) {
   if (alone) {
     auto function = find_material_function(first.string(), request.import);
     if (function) {
+      if (request.contact || request.zero) {
+        throw Error(ExitCode::usage, "contact, zero", "with a material function",
+                    "them only with recordings");
+      }
       Selection selection = call.run([&] { return select_law(*function, options); });
       return fit_selected(std::move(selection), std::move(function));
     }
@@ -206,6 +213,7 @@ Fit fit_files(const FitRequest& request) {
     recordings.back().import = request.import;
     take_instrument(recordings.back(), file);
   }
+  if (request.contact) require_contact_within(*request.contact, recordings, "contact");
   return fit_selected(call.run([&] { return select_law(recordings, options); }), std::nullopt);
 }
 
@@ -266,9 +274,10 @@ void bind_fits(py::module_& module) {
       });
   module.def("fit", [](std::vector<std::string> files, std::optional<std::string> law,
                        std::optional<std::size_t> starts, std::optional<std::uint64_t> seed,
-                       std::optional<double> reference, const py::dict& columns) {
-    return fit_files(
-        {std::move(files), std::move(law), starts, seed, reference, import_of(columns)});
+                       std::optional<double> reference, std::optional<double> contact,
+                       std::optional<double> zero, const py::dict& columns) {
+    return fit_files({std::move(files), std::move(law), starts, seed, reference, contact, zero,
+                      import_of(columns)});
   });
   module.def("read_recording", &recording_of);
 }

@@ -17,6 +17,7 @@
 #include "jpk_error_cases.hpp"
 #include "material_error_cases.hpp"
 #include "organ_law_error_cases.hpp"
+#include "placement_error_cases.hpp"
 #include "simulation_error_cases.hpp"
 #include "sweep_error_cases.hpp"
 #include "temp_folder.hpp"
@@ -805,6 +806,7 @@ std::vector<ErrorCase> all_cases() {
                             test::simulation_error_cases(),
                             test::sweep_error_cases(),
                             test::material_error_cases(),
+                            test::placement_error_cases(),
                             test::plugin_error_cases(),
                             test::organ_law_error_cases(),
                             test::validate_error_cases()}) {

@@ -14,7 +14,7 @@
 
 namespace tpm::test {
 
-enum class Defect { none, slow_branch, drift, ringing, transient, lost };
+enum class Defect { none, slow_branch, drift, slip, ringing, transient, lost };
 
 inline const char* defect_name(Defect defect) {
   switch (defect) {
@@ -24,6 +24,8 @@ inline const char* defect_name(Defect defect) {
       return "a branch of 12 s that is not fitted";
     case Defect::drift:
       return "a drift of the zero";
+    case Defect::slip:
+      return "a jump of the zero at 10 s";
     case Defect::ringing:
       return "ringing after the ramp";
     case Defect::transient:
@@ -59,6 +61,8 @@ inline double defect_force(Defect defect, double t) {
     }
     case Defect::drift:
       return t / kEnd_s;
+    case Defect::slip:
+      return t < 10.0 ? 0.0 : 1.0;
     case Defect::ringing:
       return t < kRamp_s ? 0.0 : std::exp((kRamp_s - t) / 3.0) * std::sin(9.0 * t);
     case Defect::transient:
@@ -106,6 +110,7 @@ struct AdequacyOutcome {
   LawAdequacy adequacy;
   bool clipped = false;
   double rms_N = 0.0;
+  bool drift_fitted = false;
   int intervals = 0;  ///< of k_inf, k1 and tau1, without a condition
   int missing = 0;    ///< of these, that do not hold the true value
 };
@@ -116,7 +121,6 @@ inline AdequacyOutcome fitted(const AdequacyTrial& trial, bool profiles = false)
   fit::SetupOptions setup;
   setup.starts = 4;
   setup.profiles = profiles;
-  setup.measured = trial.noisy;  // without noise what is measured of the placement would be exact
   const std::span<const fit::PreparedRecording> span(&one, 1);
   fit::FitResult result = fit::run_fit(
       fit::recording_config(parse_law_name("linear-1", "law"), span, setup), fit::data_sets(span));
@@ -125,6 +129,8 @@ inline AdequacyOutcome fitted(const AdequacyTrial& trial, bool profiles = false)
   outcome.adequacy = result.adequacy.value();
   outcome.clipped = one.clipped_above.has_value();
   outcome.rms_N = result.recordings.front().rms_residual;
+  outcome.drift_fitted = std::ranges::any_of(result.config.parameters,
+                                             [](const auto& p) { return p.drift.has_value(); });
   const double spread = base::student_quantile(0.975, result.degrees_of_freedom);
   for (const fit::ParameterResult& p : result.parameters) {
     const double truth = p.parameter.name == "k_inf"  ? 60.0
@@ -141,14 +147,27 @@ inline AdequacyOutcome fitted(const AdequacyTrial& trial, bool profiles = false)
   return outcome;
 }
 
-/// The amplitude at which the best fit to a recording without noise leaves so many noises (rms).
+/// What the best fit to a recording without noise leaves (rms), with the zero, contact and drift
+/// that the recording with noise tells.
+inline double left_without_noise(const AdequacyTrial& trial) {
+  const fit::PreparedRecording one = fit::prepare_recording("simulated", simulated(trial));
+  AdequacyTrial clean = trial;
+  clean.noisy = false;
+  clean.quantum = 0.0;
+  fit::SetupOptions setup;
+  setup.starts = 4;
+  setup.profiles = false;
+  const fit::FitConfig config =
+      fit::recording_config(parse_law_name("linear-1", "law"), std::span(&one, 1), setup);
+  const std::vector<fit::DataSet> data{simulated(clean)};
+  return fit::run_fit(config, data).recordings.front().rms_residual;
+}
+
+/// The amplitude at which it leaves so many noises.
 inline double amplitude_for(AdequacyTrial trial, double noises) {
-  trial.noisy = false;
   trial.rho = trial.quantum = 0.0;
   trial.defect_N = noises * kNoise_N;
-  for (int i = 0; i < 3; ++i) {
-    trial.defect_N *= noises * kNoise_N / fitted(trial).rms_N;
-  }
+  for (int i = 0; i < 6; ++i) trial.defect_N *= noises * kNoise_N / left_without_noise(trial);
   return trial.defect_N;
 }
 

@@ -198,6 +198,8 @@ def fit(
     starts: int | None = None,
     seed: int | None = None,
     reference: float | None = None,
+    contact: float | None = None,
+    zero: float | None = None,
     columns: Mapping[str, Any] | None = None,
 ) -> Fit:
     """Fits a law to recordings, or what a configuration says.
@@ -214,6 +216,9 @@ def fit(
         Number of starts and seed of the search; equal seeds give equal answers.
     reference
         Depth (m) at which coefficients are secants. Default: the largest.
+    contact, zero
+        Depth of contact (m) and reading without a load (N) of recordings, to be held. Default: measured, with
+        their uncertainties.
     columns
         What a file does not say: ``{"time": "t", "drive": "z", "response": "F", "units": {"F": "mN"}}``;
         also sd, frequency, storage, loss, drive_quantity, response_quantity; and provenance, such as "assumed"
@@ -235,4 +240,4 @@ def fit(
     if isinstance(files, (str, os.PathLike)):
         files = [files]
     names = [os.fspath(f) for f in files]
-    return Fit(_core.fit(names, law, starts, seed, reference, dict(columns or {})))
+    return Fit(_core.fit(names, law, starts, seed, reference, contact, zero, dict(columns or {})))

@@ -117,7 +117,8 @@ NearMinima minima_of(const FitResult& result) {
 ///
 /// is that of RSS + s^2 sum ((p - mean) / sd)^2 with s^2 = RSS / n_eff, found by repetition. It
 /// begins with priors that hold (s of the declared noise): where a law does not describe the data,
-/// a placement that was measured stays and the residual tells.
+/// a placement that was measured stays and the residual tells. Censored readings are asked the same
+/// way: their likelihood takes that s, too, and before it is known they are left out.
 FitResult balanced_search(ExperimentResiduals& function, std::vector<FitParameter>& parameters,
                           const Threshold& threshold) {
   constexpr int kMostRounds = 40;
@@ -126,11 +127,16 @@ FitResult balanced_search(ExperimentResiduals& function, std::vector<FitParamete
   FitResult result = widened_search(function, parameters, threshold, false, {});
   const FitResult survey = result;
   double weight = 1.0;
+  const bool censored = function.has_censored();
   for (int round = 0; round < kMostRounds; ++round) {
     const double next = std::max(std::sqrt(result.inflation * result.variance_factor), kLeast);
-    if (std::abs(next - weight) <= kSettled * weight) break;
+    const bool settled = std::abs(next - weight) <= kSettled * weight;
+    if (settled && !(censored && round == 0)) break;
     weight = next;
     function.set_prior_weight(weight);
+    if (censored) {
+      function.set_noise_scale(std::max(std::sqrt(result.variance_factor), kLeast));
+    }
     result = search(function, parameters, threshold, false, minima_of(result));
   }
   result = widened_search(function, parameters, threshold, profiles, minima_of(result));
@@ -174,7 +180,7 @@ Threshold threshold_of_search(Threshold threshold, const FitResult& result) {
   return threshold;
 }
 
-/// @param weighted the same as `function`, if it has priors
+/// @param weighted the same as `function`, if it has priors or censored readings
 FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals* weighted) {
   const FitConfig& config = function.config();
   std::vector<FitParameter> parameters = searched_parameters(config);
@@ -221,7 +227,9 @@ FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals*
 namespace {
 
 FitResult fit_with_priors(const ExperimentResiduals& function) {
-  if (prior_count(function.config()) == 0) return fit_searched(function, nullptr);
+  if (prior_count(function.config()) == 0 && !function.has_censored()) {
+    return fit_searched(function, nullptr);
+  }
   const std::unique_ptr<ExperimentResiduals> weighted = function.copy();
   return fit_searched(*weighted, weighted.get());
 }

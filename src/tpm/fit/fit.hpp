@@ -93,7 +93,11 @@ struct RecordingFit {
   Quantity response_quantity = Quantity::contact_force;
   Provenance provenance = Provenance::measured;
   std::vector<double> time_s, drive, observed, predicted;  ///< SI; see Response for NaN
-  std::vector<double> standardised;                        ///< residuals in standard deviations
+  /// Drive of the law at a sample: what was imposed, or what answers an imposed load.
+  [[nodiscard]] double law_drive(std::size_t i) const {
+    return drive_quantity == Quantity::stress ? predicted[i] : drive[i];
+  }
+  std::vector<double> standardised;   ///< residuals in standard deviations
   std::vector<bool> fitted;           ///< false: outside the window, or censored
   std::vector<bool> censored;         ///< at a limit of the force cell, within the window
   std::vector<bool> outlier;          ///< left out of the fit, see isolated_outliers

@@ -83,8 +83,8 @@ int flag_clipping(FitResult& result) {
     if (count == 0) continue;
     all += count;
     result.flags.push_back(fmt::format(
-        "clipping: {} samples of '{}' at a limit of the force cell, or between such, are "
-        "censored: nothing is asked of the law there",
+        "clipping: {} samples of '{}' at a limit of the force cell are censored: of each it counts "
+        "only that it lay there or beyond",
         count, result.config.data[r.choice].dataset));
   }
   return all;

@@ -78,20 +78,15 @@ double inflation_at(const ExperimentResiduals& function, std::span<const double>
 
 namespace {
 
-/// What was read, of a censored sample the limit.
-double reading_of(const FitDatum& d) {
-  if (d.value) return *d.value;
-  return std::isfinite(*d.lower) ? *d.lower : *d.upper;
-}
-
 RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment& experiment,
                            const Eigen::VectorXd& predicted) {
   RecordingFit fit;
   fit.choice = experiment.choice;
   const LawSpec spec = function.config().law.value_or(LawSpec{});
-  fit.drive_quantity = spec.drive;
-  fit.response_quantity = spec.response;
   const auto& course = std::get<TimeCourse>(experiment.imposed);
+  const bool load = course.protocol.drive() == Drive::force;
+  fit.drive_quantity = load ? spec.response : spec.drive;
+  fit.response_quantity = load ? spec.drive : spec.response;
   fit.time_s = course.times_s;
   double inside = 0.0;
   double outside = 0.0;
@@ -104,7 +99,7 @@ RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment
     fit.provenance = d.provenance;
     fit.drive.push_back(knots[k].value);
     const bool censored = !d.value;
-    fit.observed.push_back(reading_of(d));
+    fit.observed.push_back(censored ? d.at_limit.value_or(0.0) : *d.value);
     fit.predicted.push_back(answer);
     fit.fitted.push_back(!d.held_out && !censored);
     fit.censored.push_back(censored);

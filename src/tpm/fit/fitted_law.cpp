@@ -23,7 +23,7 @@ FittedRange range_of_recording(const RecordingFit& recording, double contact) {
     if (!recording.fitted[i]) continue;
     if (!begin) begin = recording.time_s[i];
     range.duration_s = recording.time_s[i] - *begin;
-    range.depth = std::max(range.depth, recording.drive[i] - contact);
+    range.depth = std::max(range.depth, recording.law_drive(i) - contact);
   }
   return range;
 }
@@ -152,7 +152,8 @@ ReadingNoise reading_noise(const FitResult& fit) {
   const DataChoice& data = fit.config.data.front();
   const double scale = std::sqrt(fit.variance_factor);
   if (fit.correlation) noise.lag_1 = fit.correlation->lag1;
-  if (data.noise.shape != ErrorShape::normal || fit.config.loss.kind != Loss::none) {
+  const bool of_strain = std::ranges::any_of(fit.config.data, &DataChoice::load_imposed);
+  if (data.noise.shape != ErrorShape::normal || fit.config.loss.kind != Loss::none || of_strain) {
     noise.kind = "unknown";
     return noise;
   }

@@ -49,6 +49,9 @@ std::optional<Likelihood> likelihood_at(const ExperimentResiduals& function,
     if (d.value) {
       const double scale = factor * function.noise_scale(i, f, natural);
       sum -= 2.0 * log_density(error_law(config.data[d.choice].noise), *d.value, f, scale);
+    } else if (d.at_limit) {
+      const double r = censored_residual(d.sigma * factor, 1.0, *d.lower, *d.upper, f).r;
+      sum += r * r;
     } else {
       const double outside = function.standardised(i, f, natural) / factor;
       sum += outside * outside;

@@ -44,6 +44,11 @@ ComparedQuantity compared(const TwoGroups& groups, const std::array<std::string,
   std::array<SpecimenMeans, 2> means;
   for (std::size_t g = 0; g < 2; ++g) {
     q.left_out[g] = groups[g].left_out;
+    if (!groups[g].only_without.empty()) {
+      q.only_without = groups[g].only_without;
+    } else {
+      q.left_out[g] += groups[g].not_separable;
+    }
     if (groups[g].estimates.empty()) continue;
     q.typical[g] = random_effects_of_repeats(groups[g].estimates, level);
     means[g] = specimen_means(groups[g].estimates);

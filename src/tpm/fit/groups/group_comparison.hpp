@@ -24,6 +24,9 @@ struct ComparedQuantity {
   std::optional<GroupDifference> difference;
   double p_holm = 1.0;  ///< p_value, adjusted by Holm for all quantities that are compared
   std::string reason;   ///< why there is no difference
+  /// A group's recordings do not tell it from this ("drift or a slow branch"): the difference holds
+  /// only without it. Empty: they do.
+  std::string only_without;
 };
 
 struct GroupComparison {

@@ -40,6 +40,7 @@ Json quantity_json(const GroupComparison& c, const ComparedQuantity& q) {
          {"unit", q.parameter.name.starts_with("E") ? q.parameter.unit.symbol.substr(1)
                                                     : std::string(si_unit(q.parameter))}};
   j["groups"] = Json::array({typical_json(q, 0, c.names[0]), typical_json(q, 1, c.names[1])});
+  if (!q.only_without.empty()) j["not_separable"] = q.only_without;
   if (!q.difference) {
     j["reason"] = q.reason;
     return j;
@@ -93,6 +94,9 @@ std::string line_of(const ComparedQuantity& q, bool tested) {
                       p_text(d.p_value), tested ? p_text(q.p_holm) : std::string("as its parts"));
   const int left_out = q.left_out[0] + q.left_out[1];
   if (left_out > 0) text += fmt::format("  left out: {}", left_out);
+  if (!q.only_without.empty()) {
+    text += fmt::format("  ! not identified: {}: not separable", q.only_without);
+  }
   return text + "\n";
 }
 
@@ -100,7 +104,7 @@ std::string conclusion(const GroupComparison& c) {
   std::vector<std::string> differ, open;
   const double alpha = 1.0 - c.study.level;
   for (const ComparedQuantity& q : c.parameters) {
-    if (!q.difference) continue;
+    if (!q.difference || !q.only_without.empty()) continue;
     (q.p_holm < alpha ? differ : open).push_back(q.parameter.name);
   }
   if (differ.empty() && open.empty()) {

@@ -61,9 +61,11 @@ struct DataChoice {
   /// Samples of a recording outside [from_s, to_s] are predicted, not fitted.
   double from_s = -std::numeric_limits<double>::infinity();
   double to_s = std::numeric_limits<double>::infinity();
-  /// Limits of the force cell, SI: samples of a recording that stand at them or beyond, or within
-  /// 20 samples between such, are censored. Nothing is asked of the model there.
+  /// Limits of the force cell, SI: samples of a recording that stand at them or beyond are censored
+  /// (censored_residual).
   std::optional<double> clipped_above, clipped_below;
+  /// Of a recording of stress over strain: the stress was imposed and the strain answers (creep).
+  bool load_imposed = false;
   /// A0/l0 of a contact, m, > 0: its stiffness over the modulus that a spectrum states.
   std::optional<double> stiffness_per_modulus_m;
   /// Names of the estimated parameters that are a and b of sigma = a + b |model|; empty where the

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/blocks/protocol_block.hpp"
 #include "tpm/files/import/reading_options.hpp"
 #include "tpm/fit/likelihood/config_parts.hpp"
@@ -94,6 +95,24 @@ void parse_stiffness_per_modulus(const Json& j, const FitConfig& config, DataCho
   throw bad_input(here.where, "not above 0", "A0/l0 such as \"12.56 mm\"");
 }
 
+/// "imposed": "response" of creep, before what is read in the unit of what answers.
+void parse_imposed(const Json& j, const FitConfig& config, DataChoice& data,
+                   const DocumentPlace& place) {
+  if (!j.contains("imposed")) return;
+  const DocumentPlace here = place.key("imposed");
+  const auto imposed = j.at("imposed").get<std::string>();
+  if (imposed != "drive" && imposed != "response") {
+    throw bad_input(here.where, fmt::format("'{}'", printable(imposed)), "drive or response");
+  }
+  if (imposed == "drive") return;
+  const bool strain = config.law && config.law->drive == Quantity::strain;
+  if (data.protocol.kind != Kind::measured || !strain) {
+    throw bad_input(here.where, "'response' without a recording of stress over strain",
+                    "it only with the protocol 'measured' and a law of stress over strain");
+  }
+  data.load_imposed = true;
+}
+
 /// Limits of the force cell.
 void parse_clipping(const Json& j, const FitConfig& config, DataChoice& data,
                     const DocumentPlace& place) {
@@ -134,6 +153,7 @@ DataChoice parse_data(const Json& j, const FitConfig& config, const DocumentPlac
   data.dataset = j.at("dataset").get<std::string>();
   data.protocol = parse_protocol(j.at("protocol"), config.law, place.key("protocol"));
   parse_stiffness_per_modulus(j, config, data, place);
+  parse_imposed(j, config, data, place);
   parse_noise(j.at("noise"), data, reading_dimension(config, data), place.key("noise"));
   if (j.contains("import")) data.import = parse_import(j.at("import"), place.key("import"));
   if (j.contains("from")) data.from_s = quantity_at(j, "from", Dimension::time, place);

@@ -79,6 +79,7 @@ void require_estimable_sigma(const DataChoice& data, const DocumentPlace& place)
 
 Dimension reading_dimension(const FitConfig& config, const DataChoice& data) {
   if (data.protocol.kind == ProtocolChoice::Kind::creep) return Dimension::length;
+  if (data.load_imposed) return quantity_dimension(config.law->drive);
   const Dimension response =
       config.law ? quantity_dimension(config.law->response) : Dimension::force;
   if (data.protocol.kind != ProtocolChoice::Kind::oscillation) return response;

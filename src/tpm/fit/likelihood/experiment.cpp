@@ -10,6 +10,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/data/straight_pieces.hpp"
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
@@ -83,8 +84,7 @@ void require_drive(const FitConfig& config, const Recording& recording, const st
   const LawSpec spec = config.law.value_or(LawSpec{});
   const bool has_drive = recording.drive.size() == recording.response.size() &&
                          recording.time_s.size() == recording.response.size();
-  if (has_drive && recording.drive_quantity == spec.drive &&
-      recording.response_quantity == spec.response) {
+  if (has_drive && law_drive(recording) == spec.drive && law_response(recording) == spec.response) {
     return;
   }
   throw bad_input(fmt::format("recording '{}'", name),
@@ -198,29 +198,24 @@ void add_step_response(ExperimentSet& set, const FitConfig& config, std::size_t 
   set.experiments.push_back({std::move(course), std::move(places), choice});
 }
 
-/// Censors the readings of a recording at the limits of the force cell: as bands that are open
-/// towards the outside, and of which nothing is asked. Near a limit the noise decides which
-/// readings stand there, so that those in between would bias the fit: they are censored, too.
+/// Censors the readings of a recording at the limits of the force cell. Their likelihood is known
+/// where the noise adds and is normal; elsewhere nothing is asked of them.
 void censor_recording(std::vector<FitDatum>& data, std::span<const std::size_t> places,
                       const DataChoice& choice) {
-  constexpr std::size_t kGap = 20;
   constexpr double kOpen = std::numeric_limits<double>::infinity();
-  const auto censor = [&](std::size_t i, bool above) {
-    FitDatum& d = data[places[i]];
-    if (d.held_out || !d.value) return;
-    d.lower = above ? *d.value : -kOpen;
-    d.upper = above ? kOpen : *d.value;
-    d.sigma = kOpen;
-    d.value.reset();
-  };
-  std::optional<std::size_t> last;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const FitDatum& d = data[places[i]];
+  const Noise& noise = choice.noise;
+  const bool adds = noise.kind != NoiseKind::log && noise.kind != NoiseKind::relative_to_model &&
+                    noise.shape == ErrorShape::normal && !choice.estimates_sigma();
+  for (const std::size_t place : places) {
+    FitDatum& d = data[place];
     if (d.held_out || !d.value) continue;
     const bool above = choice.is_clipped_above(*d.value);
     if (!above && !choice.is_clipped_below(*d.value)) continue;
-    for (std::size_t k = last && i - *last <= kGap ? *last + 1 : i; k <= i; ++k) censor(k, above);
-    last = i;
+    d.lower = above ? *choice.clipped_above : -kOpen;
+    d.upper = above ? kOpen : *choice.clipped_below;
+    if (!adds) d.sigma = kOpen;
+    d.at_limit = d.value;
+    d.value.reset();
   }
 }
 
@@ -233,9 +228,7 @@ void add_recording(ExperimentSet& set, const FitConfig& config, std::size_t choi
   const DataChoice& data = config.data[choice];
   require_drive(config, recording, data.dataset);
   const std::vector<double>& sd = recording.response_sd;
-  Protocol history = measured_history(Drive::displacement, recording.time_s, recording.drive);
-  history.set_equilibrium_at_start(true);
-  TimeCourse course{std::move(history), recording.time_s};
+  TimeCourse course{imposed_history(recording), recording.time_s};
   if (config.organ) course.followed = followed_by_organ(course.protocol);
   Experiment experiment{std::move(course), {}, choice, true};
   const std::size_t n = recording.response.size();
@@ -300,7 +293,8 @@ std::vector<DataSet> load_data(const FitConfig& config) {
   return mapped<DataSet>(config.data, [&](const DataChoice& choice) -> DataSet {
     const std::string path = data_path(config, choice.dataset);
     if (choice.protocol.kind == Kind::measured) {
-      return read_recording_file(path, choice.import).recording;
+      Recording recording = read_recording_file(path, choice.import).recording;
+      return choice.load_imposed ? with_imposed_load(std::move(recording)) : recording;
     }
     if (choice.protocol.kind == Kind::oscillation) return read_spectrum_file(path, choice.import);
     return load_points(path);

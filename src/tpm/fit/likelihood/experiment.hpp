@@ -17,7 +17,10 @@ struct FitDatum {
   double time_s = 0.0;  ///< in the protocol's own time; infinite for a static reading
   std::optional<double> frequency_Hz;         ///< of an oscillation, which has no time
   std::optional<double> value, lower, upper;  ///< SI
-  double sigma = 0.0;                         ///< after the noise model; 0 where it is estimated
+  /// A censored reading, at a limit of the force cell: it has no value, but a band that is open
+  /// beyond the limit.
+  std::optional<double> at_limit = std::nullopt;
+  double sigma = 0.0;  ///< after the noise model; 0 where it is estimated
   Provenance provenance = Provenance::assumed;
   bool held_out = false;
   bool outlier = false;  ///< held out because it is none of the curve's noise

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 #include "tpmkit/error.hpp"
@@ -128,6 +129,17 @@ bool ExperimentResiduals::expected_information_root(std::span<const double> natu
     }
   }
   return true;
+}
+
+bool ExperimentResiduals::has_censored() const {
+  return std::ranges::any_of(data_, [](const FitDatum& d) { return d.at_limit.has_value(); });
+}
+
+void ExperimentResiduals::set_noise_scale(double scale) {
+  if (!(scale > 0.0)) throw std::logic_error("a size of noise that is not above 0");
+  noise_scale_ = scale;
+  find_linear();
+  if (surrogate_) surrogate_->set_noise_scale(scale);
 }
 
 double ExperimentResiduals::noise_scale(std::size_t datum, double answer,

@@ -32,11 +32,12 @@ void ExperimentResiduals::set_up_surrogate() {
 }
 
 void ExperimentResiduals::find_linear() {
-  const bool noise_stays =
-      config_.loss.kind == Loss::none && std::ranges::all_of(config_.data, [](const DataChoice& d) {
-        return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model &&
-               d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
-      });
+  const bool noise_stays = config_.loss.kind == Loss::none && !(noise_scale_ && has_censored()) &&
+                           std::ranges::all_of(config_.data, [](const DataChoice& d) {
+                             return d.noise.kind != NoiseKind::log &&
+                                    d.noise.kind != NoiseKind::relative_to_model &&
+                                    d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
+                           });
   // What answers a load with a depth is linear in a compliance, not in a stiffness.
   const bool by_load = std::ranges::any_of(experiments_, [](const Experiment& e) {
     const auto* course = std::get_if<TimeCourse>(&e.imposed);
@@ -278,7 +279,12 @@ bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::Vecto
       const auto index = static_cast<Eigen::Index>(i);
       w = weight(i);
       if (!d.value) {
-        const DatumResidual r = band_residual(d.sigma, *d.lower, *d.upper, answer[index]);
+        DatumResidual r;
+        if (!d.at_limit) {
+          r = band_residual(d.sigma, *d.lower, *d.upper, answer[index]);
+        } else if (noise_scale_) {
+          r = censored_residual(d.sigma, *noise_scale_, *d.lower, *d.upper, answer[index]);
+        }
         put(r.r, r.d_r, index);
         continue;
       }
@@ -363,6 +369,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::thinned(std::size_t mo
   few->order_ = order_;
   few->drifts_ = drifts_;
   few->prior_weight_ = prior_weight_;
+  few->noise_scale_ = noise_scale_;
   for (Experiment experiment : experiments_) {
     const std::size_t n = experiment.data.size();
     if (experiment.is_recording && n > most) thin(experiment, (n + most - 1) / most);
@@ -391,6 +398,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   other->order_ = order_;
   other->drifts_ = drifts_;
   other->prior_weight_ = prior_weight_;
+  other->noise_scale_ = noise_scale_;
   other->plain_ = plain_;
   other->residual_count_ = residual_count_;
   other->offset_ = offset_;

@@ -48,6 +48,11 @@ class ExperimentResiduals final : public ResidualFunction {
   /// one, where that is only known up to a factor. 1 at first.
   void set_prior_weight(double weight);
 
+  /// Size of a reading's noise in units of the declared one, > 0: from then on censored readings
+  /// count by their likelihood. At first nothing is asked of them.
+  void set_noise_scale(double scale);
+  [[nodiscard]] bool has_censored() const;
+
   /// How often each datum counts, in the order of data(); 0 leaves it out.
   void set_counts(std::vector<int> counts);
 
@@ -157,6 +162,7 @@ class ExperimentResiduals final : public ResidualFunction {
   std::vector<bool> linear_;         ///< of each estimated parameter: linear_in
   std::vector<std::size_t> drifts_;  ///< estimated parameters that are a drift
   double prior_weight_ = 1.0;
+  std::optional<double> noise_scale_;  ///< see set_noise_scale
   ExchangeOrder order_;
   std::optional<PlainResiduals> plain_;
   std::unique_ptr<ExperimentResiduals> surrogate_;  ///< the same, asking the model's surrogate

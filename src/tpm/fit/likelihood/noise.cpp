@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
@@ -136,6 +137,35 @@ DatumResidual band_residual(double sigma, double lower, double upper, double f) 
     residual.r = (f - upper) / sigma;
     residual.d_r = 1.0 / sigma;
   }
+  return residual;
+}
+
+DatumResidual censored_residual(double sigma, double scale, double lower, double upper, double f) {
+  constexpr double kSure = 8.0;   // beyond, -2 ln P is below the rounding of a sum of squares
+  constexpr double kFar = -25.0;  // below, erfc loses its digits
+  if (!std::isfinite(sigma)) return {};
+  const bool above = std::isfinite(lower);
+  const double sign = above ? 1.0 : -1.0;
+  const double z = sign * (f - (above ? lower : upper)) / (scale * sigma);
+  if (z > kSure) return {};
+  double minus_two_log = 0.0;
+  double slope = 0.0;  // phi(z) / Phi(z)
+  if (z > kFar) {
+    const double p = 0.5 * std::erfc(-z / std::numbers::sqrt2);
+    minus_two_log =
+        z > 0.0 ? -2.0 * std::log1p(-0.5 * std::erfc(z / std::numbers::sqrt2)) : -2.0 * std::log(p);
+    slope = std::exp(-0.5 * z * z) * std::numbers::inv_sqrtpi / std::numbers::sqrt2 / p;
+  } else {  // the tail by its asymptotic series
+    const double w = 1.0 / (z * z);
+    const double series = 1.0 - w * (1.0 - 3.0 * w * (1.0 - 5.0 * w));
+    const double root = std::sqrt(2.0 * std::numbers::pi);
+    minus_two_log = z * z + 2.0 * std::log(-z * root) - 2.0 * std::log(series);
+    slope = -z / series;
+  }
+  DatumResidual residual;
+  const double root = std::sqrt(minus_two_log);
+  residual.r = -sign * scale * root;
+  residual.d_r = slope / (sigma * root);
   return residual;
 }
 

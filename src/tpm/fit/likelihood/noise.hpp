@@ -76,6 +76,13 @@ inline constexpr double kNormalisationOffset = 50.0;
 /// Residual of a band: zero inside, a one-sided normal tail of the given sigma outside.
 [[nodiscard]] DatumResidual band_residual(double sigma, double lower, double upper, double f);
 
+/// Residual of a censored reading, of which is known that it lay in a band that is open on one
+/// side: its square is scale^2 (-2 ln P) with P = Phi((f - lower) / (scale sigma)), or Phi((upper -
+/// f) / (scale sigma)) (Tobin 1958). 0 for an infinite sigma.
+/// @param scale size of the noise in units of sigma, > 0: squares of values are not divided by it
+[[nodiscard]] DatumResidual censored_residual(double sigma, double scale, double lower,
+                                              double upper, double f);
+
 /// Applies the shape of the law to r and d_r, which stand for z; `normal` changes nothing.
 void apply_shape(const ErrorLaw& law, DatumResidual& residual);
 

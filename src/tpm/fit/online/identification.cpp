@@ -7,6 +7,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -124,6 +125,7 @@ const IdentifiedSample& Identification::result() const {
 
 Identification identify(const PreparedRecording& recording, const IdentifyOptions& options) {
   require_possible(options);
+  require_imposed_motion(recording.recording, recording.name, "identification");
   Identification id;
   id.name = recording.name;
   id.options = options;

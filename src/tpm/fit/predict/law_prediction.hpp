@@ -28,6 +28,8 @@ struct PredictionOptions {
   /// None: surface for a protocol; for a recording fitted if the fit has read the same bytes, else
   /// own.
   std::optional<Placement> placement;
+  /// Of a recording whose placement is its own: contact and zero that are held, SI; none: found.
+  std::optional<double> contact, zero;
   std::optional<double> level;  ///< in (0, 1); none: that of the fit
   /// Bands from so many laws drawn from the fit's covariance instead of from derivatives; 0: from
   /// derivatives. At least 100.

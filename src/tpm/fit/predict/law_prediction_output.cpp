@@ -26,7 +26,9 @@ Json numbers(const std::vector<double>& values) {
 }
 
 std::string drive_key(const LawPrediction& p) {
-  if (p.drive_kind == Drive::force) return "load_N";
+  if (p.drive_kind == Drive::force) {
+    return p.spec.response == Quantity::contact_force ? "load_N" : si_key(p.spec.response);
+  }
   return p.spec.drive == Quantity::relative_length ? "relative_length" : "depth_m";
 }
 

@@ -237,11 +237,11 @@ namespace {
 
 /// Contact and offset with which the organ comes nearest to a recording in least squares.
 OwnPlacement place_on_organ(const OrganOfLaw& organ, const PreparedRecording& recording,
-                            const Protocol& motion) {
+                            const Protocol& motion, const PredictionOptions& held) {
   constexpr int kMostSteps = 12;
   constexpr std::size_t kMostPlacedTimes = 200;
   constexpr double kSmall = 1e-6;  // of the largest depth
-  OwnPlacement own = place_recording(organ.law(), recording);
+  OwnPlacement own = place_recording(organ.law(), recording, held);
   const Recording& r = recording.recording;
   std::vector<double> times, observed;
   const std::size_t stride = 1 + r.time_s.size() / kMostPlacedTimes;
@@ -298,7 +298,7 @@ LawPrediction predict_organ(const OrganOfLaw& organ, const PreparedRecording& re
   const Protocol motion = followed_by_organ(whole, placed(organ.law().values).contact);
   return named(predict_recording_by(
                    organ, organ.law(), recording, motion,
-                   [&] { return place_on_organ(organ, recording, motion); }, options),
+                   [&] { return place_on_organ(organ, recording, motion, options); }, options),
                organ);
 }
 

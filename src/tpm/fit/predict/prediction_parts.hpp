@@ -62,7 +62,9 @@ struct OwnPlacement {
 [[nodiscard]] std::optional<std::vector<double>> values_in_fit(const LawFile& law,
                                                                const PreparedRecording& recording);
 /// For the law itself, with the starts of a fit.
-[[nodiscard]] OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording);
+/// @param held contact and zero that are held
+[[nodiscard]] OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording,
+                                           const PredictionOptions& held = {});
 
 /// predict_recording with such a model along a given motion.
 /// @param place finds contact and offset where they are the recording's own

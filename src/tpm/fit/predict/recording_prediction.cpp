@@ -8,8 +8,10 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpm/fit/select/clipping.hpp"
+#include "tpm/fit/select/placement.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -164,8 +166,30 @@ std::optional<std::vector<double>> values_in_fit(const LawFile& law,
   return law.values;
 }
 
-OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording) {
+namespace {
+
+/// Nothing is left to be found but a drift, which the rests tell.
+OwnPlacement held_placement(const LawFile& law, const PreparedRecording& recording,
+                            const PredictionOptions& held) {
+  OwnPlacement own{law.values, {}};
+  own.values[own.values.size() - 2] = *held.contact;
+  own.values.back() = *held.zero;
+  const RestReadings rests = read_rests(recording);
+  if (drift_finding(recording, rests) == DriftFinding::told) {
+    own.drifting.drift = rests.drift->value;
+    own.drifting.drift_origin_s = rests.origin_s;
+  }
+  return own;
+}
+
+}  // namespace
+
+OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording,
+                             const PredictionOptions& held) {
+  if (held.contact && held.zero) return held_placement(law, recording, held);
   SetupOptions setup;
+  setup.contact = held.contact;
+  setup.zero = held.zero;
   setup.reference = law.spec.reference;
   setup.profiles = false;
   const FitResult fit = fit_placement(law.spec, law.values, recording, setup);
@@ -186,22 +210,20 @@ OwnPlacement place_recording(const LawFile& law, const PreparedRecording& record
 
 LawPrediction predict_recording(const LawFile& law, const PreparedRecording& recording,
                                 const PredictionOptions& options) {
-  const Recording& r = recording.recording;
-  Protocol protocol = measured_history(Drive::displacement, r.time_s, r.drive);
-  protocol.set_equilibrium_at_start(true);
+  const Protocol protocol = imposed_history(recording.recording);
   return predict_recording_by(
-      LawModel(law.spec), law, recording, protocol, [&] { return place_recording(law, recording); },
-      options);
+      LawModel(law.spec), law, recording, protocol,
+      [&] { return place_recording(law, recording, options); }, options);
 }
 
 void require_quantities_of(const LawFile& law, const PreparedRecording& recording) {
   const Recording& r = recording.recording;
-  if (r.drive_quantity != law.spec.drive || r.response_quantity != law.spec.response) {
-    throw bad_input(fmt::format("recording '{}'", recording.name),
-                    fmt::format("{} over {}", quantity_name(r.response_quantity),
-                                quantity_name(r.drive_quantity)),
-                    fmt::format("{} over {}, as the law answers", quantity_name(law.spec.response),
-                                quantity_name(law.spec.drive)));
+  if (law_drive(r) != law.spec.drive || law_response(r) != law.spec.response) {
+    throw bad_input(
+        fmt::format("recording '{}'", recording.name),
+        fmt::format("{} over {}", quantity_name(law_response(r)), quantity_name(law_drive(r))),
+        fmt::format("{} over {}, as the law answers", quantity_name(law.spec.response),
+                    quantity_name(law.spec.drive)));
   }
 }
 
@@ -212,7 +234,17 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
   LawPrediction p = begin_prediction(law, options);
   const Recording& r = recording.recording;
   require_quantities_of(law, recording);
-  const bool known = values_in_fit(law, recording).has_value();
+  const bool holds = options.contact || options.zero;
+  if (holds && law.spec.drive != Quantity::indentation_depth) {
+    throw Error(ExitCode::usage, "--contact, --zero", "with a law of stress",
+                "them with a law of contact force over indentation depth");
+  }
+  if (holds && options.placement.value_or(Placement::own) != Placement::own) {
+    throw Error(ExitCode::usage, "--contact, --zero",
+                fmt::format("with --placement {}", placement_name(*options.placement)),
+                "them with --placement own, or without --placement");
+  }
+  const bool known = !holds && values_in_fit(law, recording).has_value();
   p.placement = options.placement.value_or(known ? Placement::fitted : Placement::own);
   if (p.placement == Placement::fitted && !known && law.uncertainty->data.size() > 1) {
     throw bad_input(fmt::format("recording '{}'", recording.name),
@@ -243,6 +275,10 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
   p.offset = values.back();
   p.time_s = r.time_s;
   fill_prediction(p, model, law, motion, u, values, r.response_sd, options);
+  if (motion.drive() == Drive::force) {  // the noise of the law file is one of stresses
+    p.reading_lower.clear();
+    p.reading_upper.clear();
+  }
   add_drift(p, drifting);
   compare(p, law, recording);
   return p;

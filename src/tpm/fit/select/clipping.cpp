@@ -86,7 +86,13 @@ void find_clipping(PreparedRecording& recording) {
   if (!run || is_of_the_drive(*run, drive)) return;
   if (run->largest && is_of_a_kept_load(*run, r.time_s, r.drive)) return;
   if (!run->largest && run->first == 0) return;  // what precedes the load is no limit
-  (run->largest ? recording.clipped_above : recording.clipped_below) = run->value;
+  // A reading that is rounded stands for what is up to half a step away from it.
+  const double half = 0.5 * quantum_of(readings);
+  if (run->largest) {
+    recording.clipped_above = run->value - half;
+  } else {
+    recording.clipped_below = run->value + half;
+  }
   const Unit unit = shown_unit(quantity_dimension(r.response_quantity));
   recording.phases.words.insert(
       recording.phases.words.begin(),

@@ -35,7 +35,6 @@ std::pair<int, double> rank(const Judged& judged) {
 struct RestedRecording {
   const Recording* recording = nullptr;
   std::size_t at_rest = 0;
-  bool load_imposed = false;
 };
 
 Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int parameters,
@@ -79,7 +78,7 @@ std::vector<RestedRecording> rested(std::span<const PreparedRecording> recording
   std::vector<RestedRecording> list;
   list.reserve(recordings.size());
   for (const PreparedRecording& r : recordings) {
-    list.push_back({&r.recording, samples_at_rest(r.phases), r.load_imposed});
+    list.push_back({&r.recording, samples_at_rest(r.phases)});
   }
   return list;
 }
@@ -185,18 +184,6 @@ void state(FitResult& fit, LawAdequacy adequacy) {
   fit.adequacy = std::move(adequacy);
 }
 
-/// Creep that is fitted as if its strain were exact.
-bool state_creep(FitResult& fit, std::span<const RestedRecording> rests) {
-  if (std::ranges::none_of(rests, &RestedRecording::load_imposed)) return false;
-  add_condition(fit, "; this supposes an exact strain, and the stress was imposed");
-  fit.adequacy =
-      LawAdequacy{"not_judged",
-                  {},
-                  "adequacy cannot be judged: the stress was imposed and the strain measured",
-                  {}};
-  return true;
-}
-
 }  // namespace
 
 std::size_t samples_at_rest(const RecordingPhases& phases) {
@@ -212,7 +199,6 @@ std::size_t samples_at_rest(const RecordingPhases& phases) {
 
 void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings) {
   const std::vector<RestedRecording> rests = rested(recordings);
-  if (state_creep(fit, rests)) return;
   const auto worst = worst_of(fit, rests);
   if (worst) state(fit, stated(fit, *worst, 1, {}));
 }
@@ -220,11 +206,6 @@ void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recording
 void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
   Candidate& chosen = s.candidates[s.recommended];
   const std::vector<RestedRecording> rests = rested(recordings);
-  if (state_creep(chosen.fit, rests)) {
-    chosen.identified = false;
-    chosen.reason = "supposes an exact strain, and the stress was imposed";
-    return;
-  }
   const auto worst = worst_of(chosen.fit, rests);
   if (!worst) return;
   const bool rejected = worst->adequacy.described == Described::not_described;
@@ -249,7 +230,7 @@ void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
     for (const RecordingFit& r : fit.recordings) {
       const auto* recording = std::get_if<Recording>(&data[r.choice]);
       if (recording == nullptr || is_step_response(recording->response_quantity)) continue;
-      rests[r.choice] = {recording, samples_at_rest(find_phases(*recording)), false};
+      rests[r.choice] = {recording, samples_at_rest(find_phases(*recording))};
     }
     judged = worst_of(fit, rests);
   }

@@ -9,6 +9,7 @@
 
 #include "tpm/base/median.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -68,6 +69,7 @@ void find_imposed_channel(PreparedRecording& recording) {
   constexpr double kNoisy = 2e-3;    // of the range: a channel that is not exact
   const Recording& r = recording.recording;
   if (r.drive_quantity != Quantity::strain || r.response_quantity != Quantity::stress) return;
+  if (r.drive.size() != r.response.size() || r.time_s.size() != r.drive.size()) return;
   const std::size_t end = end_of_load(r.response);
   if (end < kFewest) return;
   const auto time = std::span(r.time_s).first(end);
@@ -82,15 +84,21 @@ void find_imposed_channel(PreparedRecording& recording) {
       of_strain > kMuchLess * of_stress && was_held(stress, stress_noise, strain, strain_noise);
   const bool both_noisy = std::min(of_strain, of_stress) > kNoisy;
   recording.load_imposed = imposed;
+  if (imposed) recording.recording = with_imposed_load(std::move(recording.recording));
   if (!imposed && !both_noisy) return;
+  const std::string_view taken = imposed ? "stress" : "strain";
   recording.warnings.push_back(fmt::format(
       "{}: {}; noise is {} % of the range of the strain and {} % of that of the stress. The fit "
-      "takes "
-      "the strain as exact: its noise makes fast branches look weaker and intervals too narrow",
+      "takes the {} as exact{}",
       recording.name,
       imposed ? "the stress was imposed (it was held while the strain went on: creep)"
               : "both channels are noisy",
-      significant(100.0 * of_strain, 2), significant(100.0 * of_stress, 2)));
+      significant(100.0 * of_strain, 2), significant(100.0 * of_stress, 2), taken,
+      both_noisy
+          ? fmt::format(": the noise of the {} makes fast branches look weaker and intervals "
+                        "too narrow",
+                        taken)
+          : std::string(" and compares the strain")));
 }
 
 }  // namespace tpm::fit

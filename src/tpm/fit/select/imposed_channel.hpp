@@ -3,10 +3,10 @@
 
 namespace tpm::fit {
 
-/// Finds which channel of a stress-strain recording was imposed: the stress if it is the less noisy
-/// one, was held, and the strain went on under it (creep). Sets load_imposed. A fit takes the
-/// strain as exact all the same; `warnings` say what that biases, here and where both channels are
-/// noisy.
+/// Finds which channel of a stress-strain recording was imposed, before its phases are known: the
+/// stress if it is the less noisy one, was held, and the strain went on under it (creep). Drive and
+/// response then change places, and load_imposed is set: a fit imposes the stress and compares the
+/// strain. `warnings` say so, and what it biases if both channels are noisy.
 void find_imposed_channel(PreparedRecording& recording);
 
 }  // namespace tpm::fit

@@ -146,6 +146,20 @@ struct PartRange {
   Measured zero;
 };
 
+/// How far contact may move on one side before the squares have risen, or to the end of the range.
+double way_to(const FirstLoading& part, const FirstLoading::Best& best, double end, double m,
+              double zero, double squares) {
+  constexpr int kHalvings = 40;
+  if (part.at(end, m, zero, true).squares < squares) return std::abs(end - best.contact);
+  double inside = best.contact;
+  double outside = end;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (inside + outside);
+    (part.at(middle, m, zero, true).squares < squares ? inside : outside) = middle;
+  }
+  return std::abs(outside - best.contact);
+}
+
 PartOnset onset_of_part(const FirstLoading& part, const PartRange& range, double m) {
   constexpr double kDeparture = 0.25;  // of what B moves
   const auto best = part.find(range.lower, range.upper, m, range.zero.value, true);
@@ -158,7 +172,12 @@ PartOnset onset_of_part(const FirstLoading& part, const PartRange& range, double
   onset.variance = std::max(best.squares / std::max(n - 3.0, 1.0),
                             range.noise_sd * range.noise_sd / part.block());
   const double correlated = (1.0 + range.phi) / (1.0 - range.phi);
-  const double of_noise = part.spread(best, m) * std::sqrt(onset.variance * correlated);
+  const double linear = part.spread(best, m) * std::sqrt(onset.variance * correlated);
+  // Of a faint onset the squares rise less on the side of the tissue than a parabola would.
+  const double risen = best.squares + onset.variance * correlated;
+  const double before = way_to(part, best, range.lower, m, range.zero.value, risen);
+  const double after = way_to(part, best, range.upper, m, range.zero.value, risen);
+  const double of_noise = std::max(linear, std::sqrt(0.5 * (before * before + after * after)));
   const double of_zero = 0.5 * (above.contact - below.contact);
   const double of_shape = kDeparture * (power.contact - best.contact);
   onset.drive = {best.contact, std::hypot(of_noise, of_zero, of_shape)};
@@ -246,22 +265,46 @@ Onset find_onset(const PreparedRecording& r, const RestReadings& rests,
   if (drifts) {
     zero.sd = std::hypot(zero.sd, rests.drift->sd * (r.recording.time_s[contact] - rests.origin_s));
   }
+  // A part begins where contact is expected: at first where the force is seen, which is late in
+  // noise, then where the largest part says that it lies.
+  double expected = r.phases.contact_drive;
+  const auto onset_about = [&](double share, double room) -> std::optional<Onset> {
+    const auto passes = [&](double depth) {
+      std::size_t i = contact;
+      while (i > 0 && drive[i - 1] >= depth) --i;
+      while (i < end && drive[i] < depth) ++i;
+      return i;
+    };
+    const std::size_t last = passes(expected + share * travel);
+    const std::size_t begin = std::min(passes(expected), last);
+    const std::size_t inside = last - begin;
+    if (inside < kFewestInContact) return std::nullopt;
+    // As many samples before the room as within the part, but no long rest, which would be
+    // averaged.
+    const std::size_t lowest =
+        std::max(passes(expected - room), begin > 2 * inside ? begin - 2 * inside : 0);
+    const std::size_t first = lowest > inside ? lowest - inside : 0;
+    const FirstLoading part(r, first, last, share * travel, drift, rests.origin_s);
+    const PartRange range{expected - room, expected + room, rests.noise_sd, rests.phi, zero};
+    const PartOnset onset =
+        exponent ? onset_of_part(part, range, *exponent) : onset_of_exponents(part, range);
+    return Onset{onset.drive, share, inside, true};
+  };
+  constexpr double kRoom = 0.8, kSure = 3.0;  // of the part; standard deviations
+  const double widest = kRoom * kParts.back() * travel;
+  double unsure = 0.0;
+  for (int round = 0; round < 2; ++round) {
+    const auto onset = onset_about(kParts.back(), widest);
+    if (!onset) break;
+    expected = onset->drive.value;
+    unsure = onset->drive.sd;
+  }
   Onset best;
   best.drive.sd = std::numeric_limits<double>::infinity();
   for (const double share : kParts) {
-    std::size_t last = contact;
-    while (last < end && drive[last] < r.phases.contact_drive + share * travel) ++last;
-    const std::size_t inside = last - contact;
-    if (inside < kFewestInContact) continue;
-    const std::size_t first = contact > inside ? contact - inside : 0;
-    const FirstLoading part(r, first, last, share * travel, drift, rests.origin_s);
-    const double room = 0.8 * share * travel;
-    const PartRange range{r.phases.contact_drive - room, r.phases.contact_drive + room,
-                          rests.noise_sd, rests.phi, zero};
-    const PartOnset onset =
-        exponent ? onset_of_part(part, range, *exponent) : onset_of_exponents(part, range);
-    if (!(onset.drive.sd < best.drive.sd)) continue;
-    best = {onset.drive, share, inside, true};
+    const double room = std::min(std::max(kRoom * share * travel, kSure * unsure), widest);
+    const auto onset = onset_about(share, room);
+    if (onset && onset->drive.sd < best.drive.sd) best = *onset;
   }
   if (best.samples == 0) {
     const std::size_t next = std::min(contact + 1, drive.size() - 1);

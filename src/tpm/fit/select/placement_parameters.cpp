@@ -7,6 +7,7 @@
 
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/placement.hpp"
 #include "tpmkit/error.hpp"
 
@@ -92,6 +93,16 @@ AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, st
   return bounds;
 }
 
+/// Strain without a load, of creep: the load itself is taken as imposed.
+AutomaticBounds strain_zero_bounds(const LawSpec& law, const PreparedRecording& r,
+                                   std::string name) {
+  constexpr double kFurther = 10.0;
+  const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
+  return {readable({std::move(name), shown_unit(quantity_dimension(law.drive)), Scale::linear, 0.0,
+                    -peak, peak}),
+          WidestBounds{-kFurther * peak, kFurther * peak}};
+}
+
 Prior zero_prior(const PreparedRecording& r, const RestReadings& rests) {
   constexpr double kStated = 0.02;  // of the peak
   if (rests.zero) {
@@ -152,6 +163,11 @@ void add_free_placement(FitConfig& config, const LawModel& model, const Prepared
                         std::size_t i, std::vector<std::size_t> scope, std::string offset,
                         Nuisance nuisance) {
   const LawSpec& law = model.spec();
+  if (r.load_imposed) {
+    add_automatic(config, strain_zero_bounds(law, r, std::move(offset)),
+                  {{model.index("contact"), scope}});
+    return;
+  }
   add_automatic(config, offset_bounds(law, r, std::move(offset)), {{model.index("offset"), scope}});
   // The slack length belongs to the specimen.
   const bool slack = is_stretch(law) && i == 0 && nuisance != Nuisance::offset;
@@ -183,6 +199,21 @@ double start_drive(const PreparedRecording& r) {
                                                        : r.recording.drive.front();
 }
 
+void require_contact_within(double contact, std::span<const PreparedRecording> recordings,
+                            std::string_view where) {
+  for (const PreparedRecording& r : recordings) {
+    const double deepest = r.load_imposed ? r.phases.peak_response : r.phases.peak_drive;
+    if (contact < deepest) continue;
+    const Unit unit = shown_unit(quantity_dimension(law_drive(r.recording)));
+    throw Error(
+        ExitCode::usage, std::string(where),
+        fmt::format("{} is not below the largest depth of '{}', {}",
+                    with_unit(significant(contact / unit.to_si, 4), unit), printable(r.name),
+                    with_unit(significant(deepest / unit.to_si, 4), unit)),
+        "the depth at which the probe begins to touch");
+  }
+}
+
 void add_possible_drift(FitConfig& config, const PreparedRecording& r, std::size_t place) {
   const RestReadings rests = read_rests(r);
   if (drift_finding(r, rests) != DriftFinding::not_separable) return;
@@ -207,7 +238,10 @@ void add_placement(FitConfig& config, const LawModel& model,
     const PreparedRecording& r = recordings[i];
     const auto scope = several ? std::vector<std::size_t>{i} : std::vector<std::size_t>{};
     if (!is_indentation(law)) {
-      add_free_placement(config, model, r, i, scope, named("offset", r), options.nuisance);
+      const bool held = r.load_imposed ? options.contact.has_value() : options.zero.has_value();
+      if (held) continue;
+      add_free_placement(config, model, r, i, scope,
+                         named(r.load_imposed ? "strain_zero" : "offset", r), options.nuisance);
       continue;
     }
     const MeasuredPlacement placement =

@@ -1,5 +1,6 @@
 #pragma once
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "tpm/fit/likelihood/config.hpp"
@@ -18,6 +19,12 @@ void add_automatic(FitConfig& config, AutomaticBounds bounds, std::vector<Target
 
 /// Drive at which the phases of a recording say that contact begins.
 [[nodiscard]] double start_drive(const PreparedRecording& recording);
+
+/// Refuses a depth of contact that is held and that a recording does not go beyond. Throws
+/// Error(usage).
+/// @param where what stated it: "--contact"
+void require_contact_within(double contact, std::span<const PreparedRecording> recordings,
+                            std::string_view where);
 
 /// Adds a drift of the zero that the recording does not tell from a slow branch: with what its
 /// rests say of it as a prior, or freely.

@@ -11,6 +11,7 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/reading_options.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
 #include "tpm/fit/select/placement.hpp"
@@ -61,14 +62,15 @@ void require_rise(const PreparedRecording& r) {
   const bool response_down = falls_instead(response, r.phases.noise_sd_estimate);
   if (!down && !response_down) return;
   const bool both = down && response_down;
+  const bool turns_drive = r.load_imposed ? response_down : down;  // the option that does
   throw bad_input(fmt::format("recording '{}'", r.name),
                   both   ? "the drive falls, and so does the response"
                   : down ? "the drive falls"
                          : "the response falls where the drive rises",
                   fmt::format("{}, if the machine counts {} the other way",
-                              both   ? "--negate-drive --negate-response"
-                              : down ? "--negate-drive"
-                                     : "--negate-response",
+                              both          ? "--negate-drive --negate-response"
+                              : turns_drive ? "--negate-drive"
+                                            : "--negate-response",
                               both ? "them" : "it"));
 }
 
@@ -79,8 +81,10 @@ Sizes sizes_of(std::span<const PreparedRecording> recordings) {
   Sizes sizes;
   sizes.shortest_s = std::numeric_limits<double>::infinity();
   for (const PreparedRecording& r : recordings) {
-    sizes.drive = std::max(sizes.drive, r.phases.peak_drive - start_drive(r));
-    sizes.response = std::max(sizes.response, r.phases.peak_response - r.phases.floor_response);
+    const double imposed = r.phases.peak_drive - start_drive(r);
+    const double answer = r.phases.peak_response - r.phases.floor_response;
+    sizes.drive = std::max(sizes.drive, r.load_imposed ? answer : imposed);
+    sizes.response = std::max(sizes.response, r.load_imposed ? imposed : answer);
     sizes.shortest_s = std::min(sizes.shortest_s, median_step(r.recording.time_s));
     sizes.longest_s = std::max(sizes.longest_s, r.to_s - r.from_s);
   }
@@ -150,15 +154,15 @@ void require_alike(std::span<const PreparedRecording> recordings) {
   if (recordings.empty()) throw bad_input("fit", "no recording", "at least one");
   const Recording& first = recordings.front().recording;
   for (const PreparedRecording& r : recordings) {
-    if (r.recording.drive_quantity == first.drive_quantity &&
-        r.recording.response_quantity == first.response_quantity) {
+    if (law_drive(r.recording) == law_drive(first) &&
+        law_response(r.recording) == law_response(first)) {
       continue;
     }
     throw bad_input(fmt::format("recording '{}'", r.name),
-                    fmt::format("{} over {}", quantity_name(r.recording.response_quantity),
-                                quantity_name(r.recording.drive_quantity)),
-                    fmt::format("{} over {}, as in '{}'", quantity_name(first.response_quantity),
-                                quantity_name(first.drive_quantity), recordings.front().name));
+                    fmt::format("{} over {}", quantity_name(law_response(r.recording)),
+                                quantity_name(law_drive(r.recording))),
+                    fmt::format("{} over {}, as in '{}'", quantity_name(law_response(first)),
+                                quantity_name(law_drive(first)), recordings.front().name));
   }
 }
 
@@ -240,6 +244,7 @@ void keep_baseline(PreparedRecording& r) {
 PreparedRecording prepare_recording(std::string name, Recording recording,
                                     const PhaseOptions& options) {
   PreparedRecording r{std::move(name), std::move(recording), {}, 0.0, 0.0, {}};
+  find_imposed_channel(r);
   r.phases = find_phases(r.recording, options);
   const std::vector<double>& time = r.recording.time_s;
   const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;
@@ -258,7 +263,6 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
     r.to_s = time[phase.first];
     break;
   }
-  find_imposed_channel(r);
   if (!r.load_imposed) find_clipping(r);
   leave_out_start_up(r);
   if (r.to_s > r.from_s) return r;
@@ -281,8 +285,8 @@ double common_reference(std::span<const PreparedRecording> recordings) {
 FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recordings,
                            const SetupOptions& options) {
   require_alike(recordings);
-  law.drive = recordings.front().recording.drive_quantity;
-  law.response = recordings.front().recording.response_quantity;
+  law.drive = law_drive(recordings.front().recording);
+  law.response = law_response(recordings.front().recording);
   const Sizes sizes = sizes_of(recordings);
   law.reference = options.reference.value_or(reference_drive(recordings));
   const LawModel model(law);
@@ -319,12 +323,15 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
     data.noise = noise_of(r);
     data.from_s = r.from_s;
     data.to_s = r.to_s;
+    data.load_imposed = r.load_imposed;
     data.clipped_above = r.clipped_above;
     data.clipped_below = r.clipped_below;
     data.import = r.import;
     config.data.push_back(std::move(data));
   }
-  config.fixed[model.index("contact")] = start_drive(recordings.front());
+  if (!recordings.front().load_imposed) {
+    config.fixed[model.index("contact")] = start_drive(recordings.front());
+  }
   add_placement(config, model, recordings, options);
   return config;
 }
@@ -407,9 +414,10 @@ Json config_json(const FitConfig& config) {
     Json entry{{"dataset", d.dataset}};
     entry["protocol"] = {{"kind", protocol_kind_name(d.protocol.kind)}};
     entry["noise"] = {{"kind", noise_kind_name(d.noise.kind)}};
+    if (d.load_imposed) entry["imposed"] = "response";
     if (uses_absolute(d.noise.kind)) {
-      const Dimension response = quantity_dimension(config.law->response);
-      entry["noise"]["absolute"] = text(d.noise.absolute, shown_unit(response));
+      const Quantity read = d.load_imposed ? config.law->drive : config.law->response;
+      entry["noise"]["absolute"] = text(d.noise.absolute, shown_unit(quantity_dimension(read)));
     }
     if (uses_relative(d.noise.kind)) entry["noise"]["relative"] = d.noise.relative;
     entry["noise"]["scale"] = d.noise.scale_known ? "known" : "estimated";

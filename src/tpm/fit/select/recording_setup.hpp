@@ -24,7 +24,7 @@ struct PreparedRecording {
   std::string specimen = {};  ///< whose repeat it is, in a folder; empty: a specimen of its own
   /// Limits of the force cell: readings that stand there are censored, SI.
   std::optional<double> clipped_above = std::nullopt, clipped_below = std::nullopt;
-  bool load_imposed = false;  ///< the response was imposed and the drive measured: creep
+  bool load_imposed = false;  ///< creep: drive and response of `recording` have changed places
   std::vector<std::string> warnings = {};  ///< what the recording cannot tell, one sentence each
   std::string read_as = {};   ///< how its columns and units were understood, in one sentence
   bool contact_held = false;  ///< contact is where a stated force is passed: it is not fitted

@@ -7,6 +7,7 @@
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
@@ -313,9 +314,9 @@ Selection select_law(std::span<const PreparedRecording> recordings,
                      const SelectionOptions& options) {
   std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
   if (!options.only_listed && !recordings.empty() &&
-      is_answered_by_stress(recordings.front().recording.drive_quantity)) {
+      is_answered_by_stress(law_drive(recordings.front().recording))) {
     // Hertz is the contact of a ball, tension that of lateral neighbours.
-    const bool strain = recordings.front().recording.drive_quantity == Quantity::strain;
+    const bool strain = law_drive(recordings.front().recording) == Quantity::strain;
     std::erase_if(laws, [strain](const LawSpec& law) {
       return law.kernel == Kernel::hertz || (strain && law.tension != Tension::none);
     });

@@ -10,6 +10,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/work/give_up.hpp"
@@ -175,10 +176,12 @@ void require_distinct_files(std::span<const PreparedRecording> recordings) {
 
 ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows, const SpecimenRow& like,
                                        std::size_t i) {
-  ParameterEstimates found{like.fit.value().parameters[i].parameter, {}, 0};
+  ParameterEstimates found;
+  found.parameter = like.fit.value().parameters[i].parameter;
   FitParameter& parameter = found.parameter;
   // A stiffness varies between specimens by factors, not by differences.
   parameter.scale = parameter.lower < 0.0 ? Scale::linear : Scale::log;
+  std::vector<SpecimenEstimate> doubtful;
   for (const SpecimenRow& row : rows) {
     if (!row.fit) continue;
     const ParameterResult& r = row.parameter(i);
@@ -190,8 +193,18 @@ ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows, const 
       continue;
     }
     const double slope = parameter.scale == Scale::log ? r.estimate : 1.0;
-    found.estimates.push_back(
-        {row.name, parameter.theta(r.estimate), *r.standard_error / slope, row.specimen});
+    const bool separable = r.not_separable.empty();
+    if (!separable) {
+      found.doubt = r.not_separable;
+      ++found.not_separable;
+    }
+    (separable ? found.estimates : doubtful)
+        .push_back(
+            {row.name, parameter.theta(r.estimate), *r.standard_error / slope, row.specimen});
+  }
+  if (found.estimates.empty()) {
+    found.estimates = std::move(doubtful);
+    found.only_without = found.doubt;
   }
   return found;
 }
@@ -206,8 +219,15 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
     const ParameterEstimates found = parameter_estimates(rows, *first, i);
     if (found.estimates.empty()) continue;
     PooledParameter p{found.parameter, random_effects_of_repeats(found.estimates, level),
-                      found.left_out};
+                      found.left_out, found.not_separable, found.only_without};
     p.effects.words = in_natural_words(p);
+    if (!p.only_without.empty()) {
+      p.effects.words +=
+          fmt::format("; not identified: {}: not separable in any recording", p.only_without);
+    } else if (p.not_separable > 0) {
+      p.effects.words +=
+          fmt::format("; {} more left out: {}: not separable", p.not_separable, found.doubt);
+    }
     pooled.push_back(std::move(p));
   }
   return pooled;
@@ -227,8 +247,8 @@ SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     study.rows.push_back(fit_specimen(study.law, recordings.subspan(i, 1), options.setup));
   }
-  study.law.drive = recordings.front().recording.drive_quantity;
-  study.law.response = recordings.front().recording.response_quantity;
+  study.law.drive = law_drive(recordings.front().recording);
+  study.law.response = law_response(recordings.front().recording);
   study.law.reference = *options.setup.reference;
   study.pooled = pool_specimens(study.rows, options.setup.level);
   study.level = options.setup.level;
@@ -266,7 +286,10 @@ Json to_json(const SpecimenStudy& study) {
                {"confidence_level", study.level},
                {"specimens", e.specimens},
                {"left_out", p.left_out},
+               {"not_separable", p.not_separable},
+               {"identified", p.only_without.empty()},
                {"words", e.words}};
+    if (!p.only_without.empty()) entry["only_without"] = p.only_without;
     const char* of = p.parameter.scale == Scale::log ? "of_log" : "SI";
     const auto sd_key = [&](const char* between) {
       return fmt::format("between_{}_sd_{}", between, of);

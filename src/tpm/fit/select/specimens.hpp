@@ -32,6 +32,11 @@ struct PooledParameter {
   RandomEffects effects;  ///< in theta
   int left_out = 0;       ///< recordings that do not determine it: it is at a bound, depends on a
                           ///< nuisance parameter at one, or the fit is of no full rank
+  int not_separable = 0;  ///< recordings that do not tell it from something else; left out, too,
+                          ///< unless all are such
+  /// All of them are such, and this is what they do not tell it from ("drift or a slow branch"):
+  /// what is pooled is not identified, and holds only without that.
+  std::string only_without = {};
 };
 
 struct SpecimenStudy {
@@ -64,6 +69,9 @@ struct ParameterEstimates {
   FitParameter parameter;  ///< of log scale unless it may be negative
   std::vector<SpecimenEstimate> estimates;
   int left_out = 0;
+  int not_separable = 0;     ///< as PooledParameter
+  std::string only_without;  ///< as PooledParameter
+  std::string doubt;         ///< what `not_separable` recordings do not tell it from
 };
 /// @param like a row that was fitted: what parameter i is
 [[nodiscard]] ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows,

@@ -177,12 +177,15 @@ YoungModuli pooled_moduli(const SpecimenStudy& study, const ContactGeometry& geo
   for (const PooledParameter& p : study.pooled) {
     if (!is_modulus(p.parameter)) continue;
     const auto pascals = [&](double theta) { return factor * p.parameter.natural(theta); };
-    all.moduli.push_back({modulus_name(p.parameter.name), p.parameter.name,
-                          modulus_unit(study.law, p.parameter.name), pascals(p.effects.mean),
-                          std::nullopt, pascals(p.effects.interval.lower),
-                          pascals(p.effects.interval.upper), "pooled",
-                          fmt::format("typical of {} specimen{}", p.effects.specimens,
-                                      p.effects.specimens == 1 ? "" : "s")});
+    all.moduli.push_back(
+        {modulus_name(p.parameter.name), p.parameter.name,
+         modulus_unit(study.law, p.parameter.name), pascals(p.effects.mean), std::nullopt,
+         pascals(p.effects.interval.lower), pascals(p.effects.interval.upper), "pooled",
+         fmt::format("typical of {} specimen{}{}", p.effects.specimens,
+                     p.effects.specimens == 1 ? "" : "s",
+                     p.only_without.empty()
+                         ? std::string()
+                         : fmt::format(", not identified: {}: not separable", p.only_without))});
   }
   if (adds_up(study.law)) {
     if (auto sum = pooled_sum(study, factor)) all.moduli.push_back(*std::move(sum));

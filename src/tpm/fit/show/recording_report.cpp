@@ -23,9 +23,8 @@ struct Units {
 };
 
 Units units_of(const RecordingFit& r) {
-  const bool stretch = is_answered_by_stress(r.drive_quantity);
-  return {shown_unit(stretch ? Dimension::dimensionless : Dimension::length),
-          shown_unit(stretch ? Dimension::stress : Dimension::force)};
+  return {shown_unit(quantity_dimension(r.drive_quantity)),
+          shown_unit(quantity_dimension(r.response_quantity))};
 }
 
 /// Takes every k-th sample for which `wanted` holds and that has a value (a law may not predict).

@@ -11,6 +11,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/sample_digest.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/validate/calibration_covariance.hpp"
 #include "tpmkit/error.hpp"
 
@@ -187,8 +188,10 @@ CalibrationData find_calibration(const LawFile& law, const fs::path& law_file,
     } else {
       try {
         file.recording = read(path->string());
+        require_imposed_motion(file.recording->recording, fitted.name, "validation");
       } catch (const Error& error) {
         if (error.code() != ExitCode::bad_input) throw;
+        file.recording.reset();
         data.remarks.push_back(
             fmt::format("the calibration's file was not read: {}", error.what()));
       }
@@ -237,6 +240,7 @@ Validation validate(const ValidationRequest& request) {
   std::vector<Applicability> unseen_motions;
   for (std::size_t i = 0; i < request.recordings.size(); ++i) {
     const PreparedRecording& recording = request.recordings[i];
+    require_imposed_motion(recording.recording, recording.name, "validation");
     ComparisonOptions options;
     options.quantities = request.quantities;
     options.requirement = request.requirement;

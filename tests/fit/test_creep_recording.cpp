@@ -1,0 +1,163 @@
+// A recording of stress and strain in which the stress was imposed is fitted as creep.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <string>
+
+#include "creep_recordings.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/online/identification.hpp"
+#include "tpm/fit/predict/law_prediction.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/selection.hpp"
+#include "tpmkit/law_model.hpp"
+
+using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::data;
+using namespace tpm::files;
+using namespace tpm::fit;
+using Catch::Contains;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+using test::CreepTrial;
+
+namespace {
+
+PreparedRecording prepared_creep(const CreepTrial& trial) {
+  Recording r = test::creep_recording_of(trial);
+  r.header.sha256 = std::string(64, 'c');
+  return prepare_recording("creep.csv", std::move(r));
+}
+
+FitResult creep_fit(std::span<const PreparedRecording> recordings) {
+  SetupOptions setup;
+  setup.starts = 4;
+  setup.profiles = false;
+  FitResult fit = run_fit(recording_config(parse_law_name("linear-1", "test"), recordings, setup),
+                          data_sets(recordings));
+  state_adequacy(fit, recordings);
+  return fit;
+}
+
+double estimate_of(const FitResult& fit, const std::string& name) {
+  for (const ParameterResult& p : fit.parameters) {
+    if (p.parameter.name == name) return p.estimate;
+  }
+  throw std::runtime_error(name);
+}
+
+}  // namespace
+
+TEST_CASE("the closed form of creep is the law's answer to the ramped stress", "[creep]") {
+  CreepTrial trial;
+  trial.noise = 0.0;
+  const Recording r = with_imposed_load(test::creep_recording_of(trial));
+  LawSpec spec = parse_law_name("linear-1", "test");
+  spec.drive = Quantity::strain;
+  spec.response = Quantity::stress;
+  spec.reference = 0.05;
+  const Eigen::VectorXd strain =
+      LawModel(spec)
+          .respond(imposed_history(r), r.time_s, std::vector{2000.0, 3000.0, 5.0, 0.0, 0.0},
+                   Want::values)
+          .value;
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    CHECK_THAT(strain[static_cast<Eigen::Index>(i)], WithinAbs(r.response[i], 1e-10));
+  }
+}
+
+TEST_CASE("a stress that was held is imposed, and the strain compared", "[creep]") {
+  CreepTrial trial;
+  trial.rest_s = 4.0;
+  trial.strain_zero = 2e-3;
+  const PreparedRecording recording = prepared_creep(trial);
+  REQUIRE(recording.load_imposed);
+  CHECK(recording.recording.drive_quantity == Quantity::stress);
+  CHECK_THAT(recording.warnings.front(), Contains("the stress was imposed"));
+  const FitResult fit = creep_fit(std::span(&recording, 1));
+  CHECK_THAT(estimate_of(fit, "k_inf"), WithinRel(2000.0, 0.02));
+  CHECK_THAT(estimate_of(fit, "k1"), WithinRel(3000.0, 0.06));
+  CHECK_THAT(estimate_of(fit, "tau1"), WithinRel(5.0, 0.06));
+  CHECK_THAT(estimate_of(fit, "strain_zero"), WithinAbs(2e-3, 3e-4));
+  const RecordingFit& r = fit.recordings.front();
+  CHECK(r.response_quantity == Quantity::strain);
+  CHECK_THAT(r.rms_residual, WithinRel(6e-4, 0.15));
+  CHECK(fit.adequacy.value().is_adequate());
+  CHECK(std::ranges::none_of(fit.parameters, &ParameterResult::only_if_described));
+}
+
+TEST_CASE("a law of creep says what it was fitted to, and predicts it as it was fitted",
+          "[creep]") {
+  for (const std::size_t count : {1, 2}) {
+    std::vector<PreparedRecording> recordings;
+    for (std::size_t i = 0; i < count; ++i) {
+      CreepTrial trial;
+      trial.stress_Pa = 100.0 * static_cast<double>(i + 1);
+      trial.strain_zero = 1e-3;
+      trial.seed = 40 + i;
+      recordings.push_back(prepared_creep(trial));
+      recordings.back().name += std::to_string(i);
+      recordings.back().recording.header.sha256 = std::string(64, static_cast<char>('a' + i));
+    }
+    const FitResult fit = creep_fit(recordings);
+    const LawFile law = fitted_law(fit);
+    CHECK(law.fitted_to.value() < 0.11);  // a strain, not a stress
+    CHECK(law.uncertainty.value().noise.kind == "unknown");
+    for (std::size_t i = 0; i < count; ++i) {
+      const LawPrediction p = predict_recording(law, recordings[i], {});
+      CHECK(p.placement == Placement::fitted);
+      CHECK_THAT(p.recording.value().fitted.rms, WithinRel(fit.recordings[i].rms_residual, 1e-6));
+      CHECK(p.reading_lower.empty());
+      CHECK(to_json(p).contains("stress_Pa"));
+    }
+  }
+}
+
+TEST_CASE("the written configuration of a creep fit is read as it was", "[creep]") {
+  const test::TempFolder folder;
+  const Recording r = test::creep_recording_of({});
+  std::string text = "time [s],strain [-],stress [Pa]\n";
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    text += fmt::format("{:.1f},{:.17g},{:.17g}\n", r.time_s[i], r.drive[i], r.response[i]);
+  }
+  write_file(folder / "creep.csv", text);
+  const PreparedRecording one = prepare_recording((folder / "creep.csv"), r);
+  SetupOptions setup;
+  setup.starts = 4;
+  setup.profiles = false;
+  const std::span<const PreparedRecording> span(&one, 1);
+  const FitConfig config = recording_config(parse_law_name("linear-1", "test"), span, setup);
+  const Json written = config_json(config);
+  CHECK(written.at("data").front().at("imposed") == "response");
+  write_file(folder / "config.json", to_text(written));
+  const FitResult again = run_fit(read_fit_config(folder / "config.json"));
+  CHECK_THAT(estimate_of(again, "k1"),
+             WithinRel(estimate_of(run_fit(config, data_sets(span)), "k1"), 1e-4));
+}
+
+TEST_CASE("what takes an imposed strain only refuses creep", "[creep]") {
+  CHECK_THROWS_WITH(identify(prepared_creep({}), {}),
+                    Contains("the stress was imposed") && Contains("identification"));
+}
+
+TEST_CASE("a strain that was held is imposed however noisy it is", "[creep]") {
+  // Relaxation: the strain stands and the stress falls.
+  Recording r;
+  r.drive_quantity = Quantity::strain;
+  r.response_quantity = Quantity::stress;
+  Random random(5);
+  for (int i = 0; i <= 300; ++i) {
+    const double t = 0.1 * i;
+    r.time_s.push_back(t);
+    r.drive.push_back(0.01 * std::min(t, 1.0) + 1e-4 * random.normal());
+    r.response.push_back(20.0 * std::min(t, 1.0) +
+                         (t > 1.0 ? 30.0 * std::exp((1.0 - t) / 5.0) : 30.0 * t));
+  }
+  const PreparedRecording recording = prepare_recording("relaxation", r);
+  CHECK_FALSE(recording.load_imposed);
+  CHECK(recording.recording.drive_quantity == Quantity::strain);
+}

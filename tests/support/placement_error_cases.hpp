@@ -1,0 +1,81 @@
+#pragma once
+// Bad input about the placement of recordings: priors, drifts, held contacts, imposed loads.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "error_case.hpp"
+
+namespace tpm::test {
+
+/// A ramp to 2 mm in 2 s and a hold to 4 s.
+inline std::string ramp_recording() {
+  std::string text = "time [s],depth [mm],force [N]\n";
+  for (int i = 0; i <= 40; ++i) {
+    const double depth = std::min(0.1 * i, 2.0);
+    text += fmt::format("{:.1f},{:.1f},{:.4f}\n", 0.1 * i, depth, 0.01 * depth + 1e-4 * (i % 3));
+  }
+  return text;
+}
+
+/// A stress that is ramped and held while the strain goes on, under noise.
+inline std::string creep_recording() {
+  std::string text = "time [s],strain [%],stress [Pa]\n";
+  for (int i = 0; i <= 200; ++i) {
+    const double t = 0.1 * i;
+    text +=
+        fmt::format("{:.1f},{:.4f},{:.1f}\n", t,
+                    std::min(t, 2.0) + 3.0 * (1.0 - std::exp(-0.2 * t)) + 0.05 * (i * 7 % 5 - 2),
+                    50.0 * std::min(t, 2.0));
+  }
+  return text;
+}
+
+inline std::vector<ErrorCase> placement_error_cases() {
+  const std::string type = "placement of a recording";
+  const std::string config = R"({"title": "t", "law": {"name": "linear", "reference": "2 mm"},
+"parameters": {
+  "k_inf": {"start": "10 N/m", "lower": "1 N/m", "upper": "100 N/m",
+            "prior": {"mean": "10 N/m", "sd": "1 N/m"}},
+  "drift": {"start": "0 mN/s", "lower": "-1 mN/s", "upper": "1 mN/s", "scale": "linear",
+            "drift": {"of": "r.csv", "origin": "0 s"}}},
+"data": [{"dataset": "r.csv", "protocol": {"kind": "measured"},
+          "noise": {"kind": "absolute", "absolute": "1 mN"}}]})";
+  const auto with = [config](const std::string& from, const std::string& to) {
+    std::string changed = config;
+    const auto at = changed.find(from);
+    if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
+    return with_files(
+        {{"r.csv", ramp_recording()}, {"f.json", changed.replace(at, from.size(), to)}});
+  };
+  const std::string fit = "fit {}/f.json -o {}/out";
+  const auto files = with_files({{"r.csv", ramp_recording()}, {"c.csv", creep_recording()}});
+  const std::string law = R"({"law": "linear", "drive": "indentation_depth",
+"response": "contact_force", "reference_m": 0.002, "provenance": "assumed",
+"parameters": {"k_inf": 10}})";
+  return {
+      {type, "drift of no recording", fit, with("\"of\": \"r.csv\"", "\"of\": \"q.csv\"")},
+      {type, "drift beside sets", fit,
+       with("\"drift\": {\"of\"", "\"sets\": [\"k_inf\"], \"drift\": {\"of\"")},
+      {type, "drift without a second", fit, with("0 mN/s", "0 mN")},
+      {type, "prior of standard deviation 0", fit, with("\"sd\": \"1 N/m\"", "\"sd\": \"0 N/m\"")},
+      {type, "imposed load of an indentation", fit,
+       with("\"protocol\": {\"kind\": \"measured\"}",
+            "\"protocol\": {\"kind\": \"measured\"}, \"imposed\": \"response\"")},
+      {type, "contact deeper than the recording",
+       "fit {}/r.csv --contact \"3 mm\" --no-draw -o {}/out", files},
+      {type, "contact beside a force of contact",
+       "fit {}/r.csv --contact \"1 mm\" --contact-force \"2 mN\" --no-draw -o {}/out", files},
+      {type, "contact deeper, all laws", "select {}/r.csv --contact \"3 mm\" -o {}/out", files},
+      {type, "zero in another unit", "fit {}/r.csv --zero \"3 mm\" --no-draw -o {}/out", files},
+      {type, "contact with a protocol",
+       "predict {}/law.json --depth \"1 mm\" --rate \"1 mm/s\" --contact \"1 mm\" -o {}/out",
+       with_files({{"law.json", law}})},
+      {type, "creep identified sample by sample", "identify {}/c.csv -o {}/out", files},
+  };
+}
+
+}  // namespace tpm::test
