@@ -144,7 +144,9 @@ TEST_CASE("A folder's stiffnesses under a probe are Young's moduli", "[specimens
   const YoungModulus& in_the_end = moduli.moduli[0];
   CHECK(in_the_end.name == "E_inf");
   CHECK(in_the_end.basis == "pooled");
-  CHECK(in_the_end.verdict == "typical of 5 specimens");
+  // No rest of these recordings tells a drift.
+  CHECK(in_the_end.verdict ==
+        "typical of 5 specimens, not identified: drift or a slow branch: not separable");
   CHECK_THAT(in_the_end.estimate, WithinRel(true_Pa, 0.01));
   CHECK(in_the_end.lower.value() < true_Pa);
   CHECK(in_the_end.upper.value() > true_Pa);

@@ -10,6 +10,8 @@
 #include "tpm/base/median.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/likelihood/starts.hpp"
+#include "tpm/work/give_up.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -61,7 +63,45 @@ bool was_held(std::span<const double> held, double held_noise, std::span<const d
   return moved > kSure * other_noise / std::sqrt(static_cast<double>(quarter));
 }
 
+/// The recording as its table has it.
+PreparedRecording with_imposed_strain(PreparedRecording recording) {
+  if (!recording.load_imposed) return recording;
+  recording.recording = with_imposed_load(std::move(recording.recording));
+  recording.load_imposed = false;
+  recording.phases = find_phases(recording.recording);
+  return recording;
+}
+
 }  // namespace
+
+std::vector<std::vector<double>> creep_starts(const FitConfig& config,
+                                              std::span<const PreparedRecording> recordings,
+                                              const SetupOptions& options) {
+  constexpr std::size_t kMost = 5;
+  std::vector<PreparedRecording> strained;
+  for (const PreparedRecording& r : recordings) strained.push_back(with_imposed_strain(r));
+  std::vector<std::vector<double>> starts;
+  // Where these fits give up, the search begins anywhere.
+  const std::string failure = gave_up([&] {
+    FitConfig simple = recording_config(config.law.value(), strained, options);
+    simple.profiles = false;
+    const FitResult fit = run_fit(simple, data_sets(strained));
+    for (const DistinctMinimum& m : fit.minima) {
+      if (starts.size() == kMost) break;
+      std::vector<double> start = start_values(searched_parameters(config));
+      for (std::size_t j = 0; j < start.size(); ++j) {
+        const FitParameter& p = config.parameters[j].fit;
+        for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+          if (fit.parameters[i].parameter.name != p.name) continue;
+          start[j] = std::clamp(m.minimum.natural[i], p.lower, p.upper);
+        }
+      }
+      starts.push_back(std::move(start));
+    }
+  });
+  if (!failure.empty()) starts.clear();
+  return starts;
+}
 
 void find_imposed_channel(PreparedRecording& recording) {
   constexpr std::size_t kFewest = 40;

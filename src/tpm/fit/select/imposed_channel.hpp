@@ -9,4 +9,13 @@ namespace tpm::fit {
 /// strain. `warnings` say so, and what it biases if both channels are noisy.
 void find_imposed_channel(PreparedRecording& recording);
 
+/// Where the search for a law of creep begins: what fits find that take the strain as exact. The
+/// stress is linear in the stiffnesses, so that those fits are quick and meet every minimum; the
+/// strain under a stress is linear in none.
+/// @param config of the recordings, some of which are of creep
+/// @return each in the order of config.parameters and within their bounds; may be empty
+[[nodiscard]] std::vector<std::vector<double>> creep_starts(
+    const FitConfig& config, std::span<const PreparedRecording> recordings,
+    const SetupOptions& options);
+
 }  // namespace tpm::fit

@@ -333,6 +333,9 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
     config.fixed[model.index("contact")] = start_drive(recordings.front());
   }
   add_placement(config, model, recordings, options);
+  if (std::ranges::any_of(recordings, &PreparedRecording::load_imposed)) {
+    config.given_starts = creep_starts(config, recordings, options);
+  }
   return config;
 }
 
