@@ -304,7 +304,7 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
   command
       .add_option(
           "--device", options.choice.kind,
-          "virtual, replay, plugin, omega7 or another device with a file in configs/devices")
+          "virtual, replay, plugin, omega7, inverse3 or another device with a file in configs/devices")
       ->check([](const std::string& kind) {
         if (kind == "plugin") return std::string();
         std::vector<std::string> kinds = device_kinds();
@@ -326,6 +326,23 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
       "--device-file", options.file,
       "What was measured of the device (tpm hil identify; schemas/device.schema.json); "
       "without it hardware counts as 20 ms late and free of friction");
+  command
+      .add_option("--inverse-port", options.choice.inverse.port,
+                  "Of --device inverse3: simulation channel of the Inverse service")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
+  command
+      .add_option("--inverse-events-port", options.choice.inverse.events_port,
+                  "The same: its events, of versions from 3.5 on")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
+  command
+      .add_option("--inverse-http-port", options.choice.inverse.old_http_port,
+                  "The same: HTTP of versions before 3.5")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
+  command.add_option("--inverse-id", options.choice.inverse.device_id,
+                     "The same: which device, where there are several");
   command.add_option("--recording", options.replay, "What --device replay plays");
   command.add_flag("--may-move", options.choice.may_move,
                    "The device may move by itself to initialise");
@@ -405,9 +422,11 @@ void add_hil_command(CLI::App& app, Session& session) {
   run->footer(
       "Examples:\n  tpm hil run configs/hil_omega7.json --device virtual -o session.tpmrec\n"
       "  tpm fit recording.csv -o fitted && tpm hil run configs/hil_omega7.json --law "
-      "fitted/law.json");
+      "fitted/law.json\n"
+      "  tpm hil run session.json --device inverse3 --device-file inverse.json");
   set_run(*run, session, [choice, &session] { return run_hil(*choice, session); });
 
+  add_hil_serve_command(*hil, session);
   add_hil_check_command(*hil, session);
   add_hil_identify_command(*hil, session);
   add_hil_verify_commands(*hil, session);

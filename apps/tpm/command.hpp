@@ -162,6 +162,7 @@ void add_experiments_command(CLI::App& app, Session& session);
 void add_accuracy_command(CLI::App& app, Session& session);
 void add_sweep_command(CLI::App& app, Session& session);
 void add_hil_command(CLI::App& app, Session& session);
+void add_hil_serve_command(CLI::App& hil, Session& session);       // below `tpm hil`
 void add_hil_check_command(CLI::App& hil, Session& session);       // below `tpm hil`
 void add_hil_identify_command(CLI::App& hil, Session& session);    // below `tpm hil`
 void add_hil_export_command(CLI::App& hil, Session& session);      // below `tpm hil`

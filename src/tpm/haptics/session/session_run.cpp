@@ -240,6 +240,9 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
   if (limits.plant) {
     return std::make_shared<VirtualOmega7>(session.plant, session.operator_script(), limits);
   }
+  if (choice.kind == "inverse3") {
+    return std::make_shared<InverseDevice>(choice.inverse, limits_of(choice), !choice.file.empty());
+  }
   if (limits.hardware()) {
     return std::make_shared<ForceDimension>(choice.library, choice.kind, choice.which);
   }

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "tpm/haptics/device/force_dimension.hpp"
+#include "tpm/haptics/inverse/inverse_device.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/rendering_check.hpp"
 
@@ -20,6 +21,7 @@ struct DeviceChoice {
   /// device which it stands for.
   std::filesystem::path file;
   DeviceSelection which;
+  InverseAddress inverse;  ///< of the kind "inverse3"
   bool may_move = false;
   bool take_as_ready = false;
 };

@@ -1,0 +1,389 @@
+#include "tpm/haptics/inverse/inverse_device.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+constexpr double kPatience_s = 2.0;  // of everything before a session
+constexpr double kMessagesPerPeriod = 4.0;
+constexpr double kMostUnanswered_s = 0.004;  // after which another message is sent
+constexpr int kMostUnreadable = 20;          // in a row
+constexpr std::int64_t kLookForEvents_ns = 2'000'000;
+constexpr std::string_view kProfile = "org.tpmkit:tpm-hil";
+
+Error service_fault(std::string_view what, std::string_view expected) {
+  return {ExitCode::environment, "inverse3", what, expected};
+}
+
+double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
+  return static_cast<double>(to_ns - from_ns) * 1e-9;
+}
+
+/// Whether an event means that forces no longer reach the hand.
+std::optional<ForcesOff> end_of(const InverseEvent& event) {
+  if (event.name == "device-disconnected") return ForcesOff::unplugged;
+  if (event.name == "device-busy") return ForcesOff::software;
+  if (event.name != "device-safety-triggered") return std::nullopt;
+  const bool harmless = event.safety_type == "ebrake_released" || event.level == "info";
+  return harmless ? std::nullopt : std::optional(ForcesOff::software);
+}
+
+std::string words_of(const InverseEvent& event) {
+  return event.safety_type.empty() ? event.name
+                                   : fmt::format("{}: {}", event.name, event.safety_type);
+}
+
+}  // namespace
+
+InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits, bool said_by_user)
+    : address_(std::move(address)),
+      limits_(limits),
+      said_by_user_(said_by_user),
+      wake_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+
+InverseDevice::~InverseDevice() {
+  stop();
+}
+
+std::string InverseDevice::take_text(double timeout_s) {
+  std::optional<std::string> text = service_->receive(timeout_s);
+  if (text) return std::move(*text);
+  throw service_fault(service_->over().empty() ? "the service is silent" : service_->over(),
+                      "a service that answers each message");
+}
+
+/// The device that is meant, of those in the inventory.
+void InverseDevice::choose(const InverseInventory& inventory) {
+  std::vector<std::string> ids;
+  const InverseDeviceEntry* meant = nullptr;
+  for (const InverseDeviceEntry& entry : inventory.devices) {
+    ids.push_back(entry.id);
+    if (address_.device_id.empty() ? inventory.devices.size() == 1
+                                   : entry.id == address_.device_id) {
+      meant = &entry;
+    }
+  }
+  if (meant == nullptr) {
+    throw service_fault(fmt::format("the service has {} such devices{}", ids.size(),
+                                    ids.empty() ? "" : fmt::format(": {}", fmt::join(ids, ", "))),
+                        "one device, or --inverse-id with one of them");
+  }
+  session_ = inventory.session;
+  device_ = *meant;
+}
+
+/// What the service says of its devices now, as this session sees them.
+InverseInventory InverseDevice::read_back() {
+  if (format_ == InverseFormat::vector) {
+    return parse_inventory(http_exchange(
+        address_.port, fmt::format("/devices?session=%23{}", session_), "", kPatience_s));
+  }
+  return parse_inventory(http_exchange(address_.old_http_port, "/3.0/devices", "", kPatience_s));
+}
+
+void InverseDevice::make_neutral() {
+  if (!service_->send(neutral_message(device_.id, kProfile))) (void)take_text(0.0);
+  device_.state = parse_state(take_text(kPatience_s), device_.id);
+  if (!device_.settings.filters_named && format_ == InverseFormat::values) return;
+  const InverseInventory now = read_back();
+  const auto found = std::ranges::find(now.devices, device_.id, &InverseDeviceEntry::id);
+  if (found == now.devices.end()) {
+    throw service_fault("the settings cannot be read back: the device is not listed", "");
+  }
+  device_.settings = found->settings;
+  const InverseSettings& s = device_.settings;
+  if (!s.filters_named || s.force_gate_gain != 0.0) {
+    throw service_fault(
+        s.filters_named
+            ? fmt::format("the force gate of the service stays at {}", s.force_gate_gain)
+            : "the service does not say what its force gate does",
+        "a service whose force gate can be set to 0: it changes forces on their way to the hand");
+  }
+  if (s.damping != 0.0 || !s.directional_damping.isZero()) {
+    throw service_fault(fmt::format("the damping of the service stays at {}", s.damping),
+                        "a service whose damping can be set to 0");
+  }
+}
+
+void InverseDevice::identify() {
+  identity_ = {};
+  identity_.kind = std::string(limits_.kind);
+  identity_.name = device_.type.empty() ? "Inverse3" : device_.type;
+  identity_.serial = device_.id;
+  identity_.firmware = device_.firmware;
+  identity_.library = fmt::format("service on port {}", address_.port);
+  identity_.library_version = fmt::format("service {}, format '{}'", version_, word_of(format_));
+  identity_.link = DeviceLink::network;
+  identity_.left_handed = device_.settings.handedness == "left";
+  identity_.hardware = !device_.simulated;
+  if (device_.simulated) identity_.name += ", SIMULATED DEVICE behind a service";
+  identity_.assumptions = device_.settings.lines();
+  if (!device_.settings.filters_named) {
+    identity_.assumptions.push_back(
+        "no filter of the service acts on a force (assumed: it names "
+        "none)");
+  }
+  if (events_ == nullptr) {
+    identity_.assumptions.push_back("events of the service are not heard: its version has none");
+  }
+  identity_.assumptions.push_back(
+      fmt::format("{} N, {} mm from the middle of the workspace, {} N/m ({})", limits_.force_N,
+                  1e3 * limits_.reach_m, limits_.stiffness_N_per_m,
+                  said_by_user_ ? "device file" : "assumed: no data sheet was found"));
+}
+
+const DeviceIdentity& InverseDevice::open() {
+  const auto version_at = [](int port, const char* target) -> std::string {
+    try {
+      return parse_version(http_exchange(port, target, "", kPatience_s));
+    } catch (const Error&) {
+      return {};
+    }
+  };
+  // The WebSocket first: where nobody listens at all, its message says so.
+  service_ =
+      std::make_unique<WebSocketClient>(address_.port, "/", kPatience_s, kMostInventoryBytes);
+  version_ = version_at(address_.port, "/version");
+  if (version_.empty()) version_ = version_at(address_.port, "/3.0/version");
+  if (version_.empty()) version_ = version_at(address_.old_http_port, "/3.0/version");
+  if (version_.empty()) {
+    throw service_fault(
+        fmt::format("no version is told on ports {} and {}", address_.port, address_.old_http_port),
+        "GET /version or /3.0/version");
+  }
+  format_ = format_of_version(version_);
+  choose(parse_inventory(take_text(kPatience_s)));
+  if (format_ == InverseFormat::vector) {
+    events_ = std::make_unique<WebSocketClient>(address_.events_port, "/", kPatience_s,
+                                                kMostMessageBytes);
+  }
+  make_neutral();
+  if (!device_.settings.true_to_scale() ||
+      !device_.state.workspace_scale.isApprox(Eigen::Vector3d::Ones(), 1e-9)) {
+    throw service_fault("the service scales coordinates", "a mount and a workspace of scale 1");
+  }
+  identify();
+  return identity_;
+}
+
+void InverseDevice::prepare(const DevicePreparation& preparation) {
+  if (!preparation.real_time && identity_.hardware) {
+    throw service_fault("a device keeps the clock", "--time real");
+  }
+  preparation_ = preparation;
+  prepared_ = true;
+  preparation_.max_force_N = std::min(preparation.max_force_N, limits_.force_N);
+  status_ = {};
+  seen_ = {device_.state, now_ns()};
+  if (preparation.real_time) messages_ = std::thread([this] { exchange_in_turn(); });
+}
+
+void InverseDevice::enable_forces() {
+  order_.write({Eigen::Vector3d::Zero(), now_ns()});
+  forces_on_ = true;
+}
+
+void InverseDevice::fail(ForcesOff cause, std::string_view words) noexcept {
+  if (fault_.load(std::memory_order_relaxed) != ForcesOff::none) return;
+  const std::size_t size = std::min(words.size(), fault_words_.size() - 1);
+  std::memcpy(fault_words_.data(), words.data(), size);
+  fault_words_[size] = '\0';
+  fault_.store(cause, std::memory_order_release);
+}
+
+Eigen::Vector3d InverseDevice::force_to_send() noexcept {
+  (void)order_.refresh();
+  const Order& order = order_.latest();
+  if (!forces_on_ || cut_ || ending_ || fault_ != ForcesOff::none) return Eigen::Vector3d::Zero();
+  // In virtual time nobody counts the time between two commands.
+  if (preparation_.real_time && seconds_between(order.at_ns, now_ns()) > preparation_.watchdog_s) {
+    fail(ForcesOff::watchdog, "no command in the watchdog's time");
+    return Eigen::Vector3d::Zero();
+  }
+  const double size_N = order.force_N.norm();
+  if (!(size_N <= preparation_.max_force_N)) {
+    return Eigen::Vector3d(order.force_N * (preparation_.max_force_N / size_N));
+  }
+  return order.force_N;
+}
+
+/// One message and the states that come; false if none came in time.
+bool InverseDevice::exchange(const Eigen::Vector3d& force_N, double timeout_s) {
+  ++traffic_.messages;
+  if (!service_->send(force_message(format_, device_.id, force_N))) {
+    fail(ForcesOff::unplugged, service_->over());
+    return false;
+  }
+  std::optional<std::string> text = service_->receive(timeout_s, address_.poll);
+  if (!text) {
+    ++traffic_.unanswered;
+    if (!service_->over().empty()) fail(ForcesOff::unplugged, service_->over());
+    return false;
+  }
+  // A state that came late belongs to a message that was given up: the newest counts.
+  while (std::optional<std::string> newer = service_->receive(0.0)) text = std::move(newer);
+  try {
+    answer_.write({parse_state(*text, device_.id), now_ns()});
+    unreadable_in_a_row_ = 0;
+  } catch (const Error&) {
+    ++traffic_.unreadable;
+    if (++unreadable_in_a_row_ >= kMostUnreadable) {
+      fail(ForcesOff::unknown, "the service sends what is no state");
+    }
+  }
+  return true;
+}
+
+void InverseDevice::look_for_events() {
+  if (events_ == nullptr || now_ns() < next_look_ns_) return;
+  next_look_ns_ = now_ns() + kLookForEvents_ns;
+  while (const std::optional<std::string> text = events_->receive(0.0)) {
+    try {
+      const InverseEvent event = parse_event(*text);
+      const bool ours = event.device_id.empty() || event.device_id == device_.id;
+      const std::optional<ForcesOff> end = end_of(event);
+      if (ours && end) fail(*end, words_of(event));
+    } catch (const Error&) {
+      ++traffic_.unreadable;  // an event of a kind that nobody knows ends nothing
+    }
+  }
+  if (!events_->over().empty()) fail(ForcesOff::unplugged, "events: " + events_->over());
+}
+
+/// Until the loop has written another force, or a fraction of a period is over.
+void InverseDevice::wait_for_order() noexcept {
+  const double wait_s = preparation_.period_s / kMessagesPerPeriod;
+  if (address_.poll) {
+    const std::int64_t until_ns = now_ns() + static_cast<std::int64_t>(wait_s * 1e9);
+    while (orders_.load(std::memory_order_acquire) == orders_seen_ && now_ns() < until_ns &&
+           !ending_) {
+    }
+  } else {
+    pollfd wanted{wake_.handle(), POLLIN, 0};
+    const timespec time{0, static_cast<long>(wait_s * 1e9)};
+    if (::ppoll(&wanted, 1, &time, nullptr) > 0) {
+      std::uint64_t count = 0;
+      (void)!::read(wake_.handle(), &count, sizeof count);
+    }
+  }
+  orders_seen_ = orders_.load(std::memory_order_acquire);
+}
+
+void InverseDevice::exchange_in_turn() noexcept {
+  try {
+    if (!address_.poll) (void)become_real_time(RealTimeWish::ignore);
+    while (!ending_ && service_->over().empty()) {
+      const Eigen::Vector3d force_N = force_to_send();
+      (void)exchange(force_N, kMostUnanswered_s);
+      if (cut_) zero_sent_ = true;
+      look_for_events();
+      wait_for_order();
+    }
+    if (service_->over().empty()) (void)exchange(Eigen::Vector3d::Zero(), kMostUnanswered_s);
+  } catch (const std::exception& error) {
+    fail(ForcesOff::unknown, error.what());
+  } catch (...) {
+    fail(ForcesOff::unknown, "something that is no error was thrown");
+  }
+}
+
+DeviceAnswer InverseDevice::read(Eigen::Vector3d& position_m) noexcept {
+  const bool fresh = answer_.refresh();
+  if (fresh) seen_ = answer_.latest();
+  const double age_s = seconds_between(seen_.at_ns, now_ns());
+  if (preparation_.real_time && age_s > preparation_.watchdog_s) {
+    fault_ == ForcesOff::none ? fail(ForcesOff::unplugged, "the service sends no state") : void();
+    return DeviceAnswer::failed;
+  }
+  position_m = seen_.state.position_m;
+  if (fresh || !preparation_.real_time) return DeviceAnswer::ok;
+  ++status_.time_guards;
+  return DeviceAnswer::time_guard;
+}
+
+DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
+  if (cut_ || fault_ != ForcesOff::none) return DeviceAnswer::failed;
+  const bool clipped = force_N.norm() > preparation_.max_force_N;
+  if (clipped) ++status_.saturations;
+  order_.write({force_N, now_ns()});
+  if (preparation_.real_time) {
+    orders_.fetch_add(1, std::memory_order_release);
+    const std::uint64_t one = 1;
+    if (!address_.poll) (void)!::write(wake_.handle(), &one, sizeof one);
+  } else {
+    try {
+      if (!exchange(force_to_send(), kPatience_s)) {
+        fail(ForcesOff::unplugged, "the service is silent");
+        return DeviceAnswer::failed;
+      }
+      look_for_events();
+    } catch (...) {
+      fail(ForcesOff::unknown, "no memory for a message");
+      return DeviceAnswer::failed;
+    }
+  }
+  return clipped ? DeviceAnswer::saturated : DeviceAnswer::ok;
+}
+
+DeviceStatus InverseDevice::status() noexcept {
+  const ForcesOff fault = fault_.load(std::memory_order_acquire);
+  status_.forces_off = fault == ForcesOff::none && cut_ ? ForcesOff::software : fault;
+  if (fault != ForcesOff::none) {
+    status_.error = 1;
+    std::memcpy(status_.error_text, fault_words_.data(), sizeof status_.error_text);
+  }
+  return status_;
+}
+
+HandState InverseDevice::hand() noexcept {
+  HandState hand;
+  hand.buttons = seen_.state.buttons;
+  return hand;
+}
+
+void InverseDevice::end_thread() noexcept {
+  ending_ = true;
+  const std::uint64_t one = 1;
+  (void)!::write(wake_.handle(), &one, sizeof one);
+  if (messages_.joinable()) messages_.join();
+}
+
+void InverseDevice::stop() noexcept {
+  forces_on_ = false;
+  const bool threaded = messages_.joinable();
+  end_thread();
+  if (service_ != nullptr && service_->over().empty()) {
+    if (prepared_ && !threaded) {
+      (void)service_->send(force_message(format_, device_.id, Eigen::Vector3d::Zero()));
+      (void)service_->receive(kMostUnanswered_s);
+    }
+    service_->close();
+  }
+  if (events_ != nullptr) events_->close();
+}
+
+void InverseDevice::cut_forces() noexcept {
+  // The thread of the messages is not the one that is stuck: it sends zero from now on.
+  cut_ = true;
+  const std::uint64_t one = 1;
+  (void)!::write(wake_.handle(), &one, sizeof one);
+  constexpr timespec kLook{0, 100'000};
+  constexpr int kLooks = 50;
+  for (int i = 0; i < kLooks && messages_.joinable() && !zero_sent_; ++i) {
+    (void)::nanosleep(&kLook, nullptr);
+  }
+}
+
+}  // namespace tpm::haptics

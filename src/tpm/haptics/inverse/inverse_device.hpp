@@ -1,0 +1,111 @@
+#pragma once
+#include <array>
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/inverse/loopback.hpp"
+#include "tpm/haptics/inverse/messages.hpp"
+#include "tpm/haptics/loop/triple_buffer.hpp"
+#include "tpmkit/device.hpp"
+
+namespace tpm::haptics {
+
+/// Where a service that is compatible with the Inverse service listens on this machine, and which
+/// of its devices is meant.
+struct InverseAddress {
+  int port = 10001;
+  int events_port = 10020;    ///< of versions from 3.5 on
+  int old_http_port = 10000;  ///< of versions before 3.5
+  std::string device_id;      ///< empty: the only one
+  bool poll = false;          ///< the thread of the messages looks again and again, for latency
+};
+
+/// An Inverse3 through a service that is compatible with the Inverse service: messages over
+/// loopback, no vendor library.
+///
+/// In real time a thread of its own exchanges messages, at least four times a period, and always
+/// with the newest force. The loop meets it in two mailboxes and never waits. A force that the loop
+/// has not renewed for the watchdog's time is replaced by zero, for good; a state that is older
+/// than that is a failed read. In virtual time each write is one message and its state, which only
+/// a simulated device allows.
+///
+/// open() makes force gate and damping of the service 0 and reads them back; a service in which one
+/// of them stays, or in another scale, is refused.
+class InverseDevice final : public HapticDevice {
+ public:
+  /// @param limits ceilings of the force, marked as assumed in the identity unless `said_by_user`
+  InverseDevice(InverseAddress address, const DeviceLimits& limits, bool said_by_user);
+  ~InverseDevice() override;
+
+  const DeviceIdentity& open() override;
+  void prepare(const DevicePreparation& preparation) override;
+  void enable_forces() override;
+  DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override;
+  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
+  DeviceStatus status() noexcept override;
+  HandState hand() noexcept override;
+  void stop() noexcept override;
+  void cut_forces() noexcept override;
+
+  /// Round trips of messages since prepare(); read after stop().
+  struct Traffic {
+    std::uint64_t messages = 0, unanswered = 0, unreadable = 0;
+  };
+  [[nodiscard]] Traffic traffic() const noexcept { return traffic_; }
+
+ private:
+  struct Order {
+    Eigen::Vector3d force_N = Eigen::Vector3d::Zero();
+    std::int64_t at_ns = 0;
+  };
+  struct Seen {
+    InverseState state;
+    std::int64_t at_ns = 0;
+  };
+  void choose(const InverseInventory& inventory);
+  void make_neutral();
+  void identify();
+  [[nodiscard]] InverseInventory read_back();
+  [[nodiscard]] std::string take_text(double timeout_s);
+  void exchange_in_turn() noexcept;
+  bool exchange(const Eigen::Vector3d& force_N, double timeout_s);
+  [[nodiscard]] Eigen::Vector3d force_to_send() noexcept;
+  void wait_for_order() noexcept;
+  void look_for_events();
+  void fail(ForcesOff cause, std::string_view words) noexcept;
+  void end_thread() noexcept;
+
+  InverseAddress address_;
+  const DeviceLimits limits_;
+  const bool said_by_user_;
+  std::string version_;
+  InverseFormat format_ = InverseFormat::vector;
+  std::unique_ptr<WebSocketClient> service_, events_;
+  std::int64_t session_ = 0;
+  InverseDeviceEntry device_;
+  DeviceIdentity identity_;
+  DevicePreparation preparation_;
+  bool prepared_ = false;
+  // Of the loop's thread.
+  DeviceStatus status_;
+  Seen seen_;
+  // Between the loop and the thread of the messages.
+  TripleBuffer<Order> order_;
+  TripleBuffer<Seen> answer_;
+  std::atomic<std::uint32_t> orders_{0};
+  std::atomic<bool> forces_on_{false}, cut_{false}, zero_sent_{false}, ending_{false};
+  std::atomic<ForcesOff> fault_{ForcesOff::none};
+  std::array<char, sizeof DeviceStatus::error_text> fault_words_{};  ///< before fault_ is set
+  Socket wake_;                                                      ///< an eventfd
+  // Of the thread of the messages.
+  std::thread messages_;
+  Traffic traffic_;
+  std::uint32_t orders_seen_ = 0;
+  std::int64_t next_look_ns_ = 0;
+  int unreadable_in_a_row_ = 0;
+};
+
+}  // namespace tpm::haptics

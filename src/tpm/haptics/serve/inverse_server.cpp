@@ -1,0 +1,374 @@
+#include "tpm/haptics/serve/inverse_server.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cerrno>
+
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+constexpr std::size_t kMostWaitingBytes = 262'144;  // that a client does not read
+constexpr std::size_t kMostDiscarded = 16'777'216;  // after the last word to a client
+constexpr std::int64_t kTimeToAsk_ns = 2'000'000'000, kTimeToLeave_ns = 2'000'000'000;
+constexpr int kMostLines = 20;  // in the log, of one client
+constexpr int kLook_ms = 50;
+constexpr double kFarthest_m = 1.0;  // a place that a hand is asked to go to
+
+bool waits() {
+  return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
+}
+
+}  // namespace
+
+struct InverseServer::Connection {
+  enum class Stage { asking, open, leaving, gone };
+
+  explicit Connection(Socket s) : socket(std::move(s)), since_ns(now_ns()) {}
+
+  Socket socket;
+  Stage stage = Stage::asking;
+  std::int64_t since_ns;  ///< of the stage
+  std::int64_t session = 0;
+  bool events = false, centred = false, told_reader = false, shut = false;
+  std::string head, out;
+  WebSocketReader reader{WebSocketSide::server, kMostMessageBytes};
+  std::size_t discarded = 0;
+  int lines = 0;
+
+  void enter(Stage next) {
+    stage = next;
+    since_ns = now_ns();
+  }
+};
+
+InverseServer::InverseServer(ServedHand& hand, InverseServerSettings settings)
+    : hand_(hand),
+      settings_(std::move(settings)),
+      listening_(listen_on_loopback(settings_.port)),
+      events_(settings_.events_port < 0 ? Socket() : listen_on_loopback(settings_.events_port)),
+      port_(port_of(listening_)),
+      events_port_(events_.open() ? port_of(events_) : -1),
+      thread_([this] { serve(); }) {}
+
+InverseServer::~InverseServer() {
+  ending_ = true;
+  thread_.join();
+}
+
+InverseServer::Counts InverseServer::counts() const noexcept {
+  return {connected_, refused_, messages_, states_, unreadable_, closed_for_fault_};
+}
+
+void InverseServer::say(Connection& c, const std::string& line) {
+  if (!settings_.log || ++c.lines > kMostLines) return;
+  settings_.log(fmt::format("client {}: {}{}", c.session, line,
+                            c.lines == kMostLines ? " (its last line here)" : ""));
+}
+
+void InverseServer::serve() {
+  std::vector<pollfd> wanted;
+  while (!ending_) {
+    wanted = {{listening_.handle(), POLLIN, 0}, {events_.handle(), POLLIN, 0}};
+    for (const auto& c : connections_) {
+      const short events = static_cast<short>(POLLIN | (c->out.empty() ? 0 : POLLOUT));
+      wanted.push_back({c->socket.handle(), events, 0});
+    }
+    (void)::poll(wanted.data(), wanted.size(),
+                 settings_.poll && !connections_.empty() ? 0 : kLook_ms);
+    const std::size_t there = connections_.size();
+    for (std::size_t i = 0; i < there; ++i) {
+      Connection& c = *connections_[i];
+      try {
+        if (wanted[i + 2].revents != 0) take_bytes(c);
+        look_at(c);
+      } catch (const std::exception& error) {  // of a stranger's message: nothing of ours is broken
+        say(c, error.what());
+        end_of(c);
+      }
+    }
+    if (wanted[0].revents != 0) accept_new(listening_, false);
+    if (wanted[1].revents != 0) accept_new(events_, true);
+    send_events();
+    std::erase_if(connections_, [](const auto& c) { return c->stage == Connection::Stage::gone; });
+  }
+  for (const auto& c : connections_) {
+    if (c->stage != Connection::Stage::open) continue;
+    send(*c, frame_bytes(FrameKind::close, close_payload(kCloseGoingAway, "the server ends")));
+  }
+  hand_.let_go();
+}
+
+void InverseServer::tell(const InverseEvent& event) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  to_tell_.push_back(frame_bytes(FrameKind::text, event_message(event)));
+}
+
+void InverseServer::send_events() {
+  std::vector<std::string> frames;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    frames.swap(to_tell_);
+  }
+  for (const std::string& frame : frames) {
+    for (const auto& c : connections_) {
+      if (c->events && c->stage == Connection::Stage::open) send(*c, frame);
+    }
+  }
+}
+
+void InverseServer::accept_new(const Socket& listening, bool events) {
+  Socket socket = accepted(listening);
+  if (!socket.open()) return;
+  if (connections_.size() >= kMostConnections) {
+    ++refused_;
+    return;  // closed
+  }
+  ++connected_;
+  connections_.push_back(std::make_unique<Connection>(std::move(socket)));
+  connections_.back()->events = events;
+}
+
+/// What follows from the clock.
+void InverseServer::look_at(Connection& c) {
+  using Stage = Connection::Stage;
+  flush(c);
+  const std::int64_t age_ns = now_ns() - c.since_ns;
+  if (c.stage == Stage::asking && age_ns > kTimeToAsk_ns) end_of(c);
+  if (c.stage != Stage::leaving) return;
+  if (c.out.empty() && !c.shut) {
+    // What is still under way is taken, so that the system does not withdraw the last words.
+    (void)::shutdown(c.socket.handle(), SHUT_WR);
+    c.shut = true;
+  }
+  if (age_ns > kTimeToLeave_ns || c.discarded > kMostDiscarded) end_of(c);
+}
+
+void InverseServer::take_bytes(Connection& c) {
+  using Stage = Connection::Stage;
+  std::array<char, 65'536> block;
+  const ssize_t count = ::recv(c.socket.handle(), block.data(), block.size(), 0);
+  if (count == 0 || (count < 0 && !waits())) return end_of(c);
+  if (count < 0) return;
+  const std::string_view bytes(block.data(), static_cast<std::size_t>(count));
+  if (c.stage == Stage::leaving) {
+    c.discarded += bytes.size();
+  } else if (c.stage == Stage::asking) {
+    c.head.append(bytes);
+    take_head(c);
+  } else if (c.stage == Stage::open) {
+    c.reader.feed(bytes);
+    take_messages(c);
+  }
+}
+
+void InverseServer::take_head(Connection& c) {
+  const std::size_t end = c.head.find("\r\n\r\n");
+  if (end == std::string::npos && c.head.size() <= kMostHeadBytes) return;
+  const std::optional<HttpHead> head = parse_http_head(c.head);
+  if (!head) {
+    ++refused_;
+    send(c, http_answer("400 Bad Request", "text/plain", "no request\n"));
+    return c.enter(Connection::Stage::leaving);
+  }
+  if (head->count("upgrade") == 0) return answer_http(c, *head);
+  const UpgradeAnswer answer = answer_upgrade(*head, c.events ? events_port_ : port_, {port_});
+  send(c, answer.bytes);
+  if (!answer.upgraded) {
+    ++refused_;
+    say(c, "refused: " + answer.why);
+    return c.enter(Connection::Stage::leaving);
+  }
+  c.session = next_session_++;
+  c.enter(Connection::Stage::open);
+  if (!c.events) send(c, frame_bytes(FrameKind::text, inventory_message(inventory(&c))));
+  const std::string left = c.head.substr(end + 4);
+  c.head.clear();
+  c.reader.feed(left);
+  take_messages(c);
+}
+
+InverseState InverseServer::state_for(const Connection& c) const {
+  InverseState state = hand_.state();
+  if (!c.centred) state.position_m += settings_.centre_m;
+  return state;
+}
+
+InverseInventory InverseServer::inventory(const Connection* c) const {
+  InverseInventory all;
+  all.devices = {settings_.device};
+  InverseDeviceEntry& device = all.devices.front();
+  if (c != nullptr) {
+    all.session = c->session;
+    device.state = state_for(*c);
+    if (c->centred) device.settings.preset = kCentredPreset;
+  } else {
+    device.state = hand_.state();
+    device.state.position_m += settings_.centre_m;
+  }
+  return all;
+}
+
+void InverseServer::answer_http(Connection& c, const HttpHead& head) {
+  c.enter(Connection::Stage::leaving);
+  const std::string path = head.start[1].substr(0, head.start[1].find('?'));
+  const bool simulated = settings_.device.simulated;
+  if (!names_this_host(head, port_)) {
+    ++refused_;
+    return send(c, http_answer("403 Forbidden", "text/plain", "Host is not this machine\n"));
+  }
+  if (head.start[0] != "GET") {
+    return send(
+        c, http_answer("405 Method Not Allowed", "text/plain", "GET only\n", "Allow: GET\r\n"));
+  }
+  if (path == "/version" || path == "/3.0/version") {
+    return send(c, http_answer("200 OK", "application/json",
+                               version_message(settings_.version, simulated)));
+  }
+  if (path == "/devices" || path == "/3.0/devices") {
+    // "?session=#7", as that session sees it.
+    const std::size_t number = head.start[1].find("session=%23");
+    const std::string session =
+        number == std::string::npos ? "" : head.start[1].substr(number + 11);
+    const auto asked = std::ranges::find_if(connections_, [&](const auto& other) {
+      return other->session != 0 && std::to_string(other->session) == session;
+    });
+    return send(
+        c, http_answer(
+               "200 OK", "application/json",
+               inventory_message(inventory(asked == connections_.end() ? nullptr : asked->get()))));
+  }
+  if (path == "/" && !settings_.page.empty()) {
+    return send(c,
+                http_answer("200 OK", "text/html; charset=utf-8", settings_.page,
+                            "Content-Security-Policy: default-src 'none'; script-src "
+                            "'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self' "
+                            "ws://127.0.0.1:* ws://localhost:*; base-uri 'none'; form-action "
+                            "'none'; frame-ancestors 'none'\r\nReferrer-Policy: no-referrer\r\n"));
+  }
+  send(c, http_answer("404 Not Found", "text/plain", "nothing here\n"));
+}
+
+void InverseServer::take_messages(Connection& c) {
+  using Stage = Connection::Stage;
+  while (c.stage == Stage::open) {
+    const std::optional<WebSocketMessage> message = c.reader.next();
+    if (!message) break;
+    switch (message->kind) {
+      case FrameKind::text:
+        take_text(c, message->payload);
+        break;
+      case FrameKind::binary:
+        take_text(c, "");  // is no JSON
+        break;
+      case FrameKind::ping:
+        send(c, frame_bytes(FrameKind::pong, message->payload));
+        break;
+      case FrameKind::close:
+        send(c, frame_bytes(FrameKind::close, close_payload(kCloseNormal, "")));
+        c.enter(Stage::leaving);
+        release(c);
+        break;
+      default:
+        break;
+    }
+  }
+  if (c.stage == Stage::open && c.reader.fault() != 0) {
+    fault(c, c.reader.fault(), c.reader.fault_words());
+  }
+}
+
+/// Exactly one state, whatever the text.
+void InverseServer::take_text(Connection& c, const std::string& text) {
+  if (c.events) return;  // read only
+  ++messages_;
+  try {
+    obey(c, parse_command(text, settings_.device.id));
+  } catch (const Error& error) {
+    ++unreadable_;
+    if (driver_ == c.session) hand_.push(Eigen::Vector3d::Zero());
+    say(c, error.what());
+  }
+  ++states_;
+  send(c, frame_bytes(FrameKind::text, state_message(c.session, settings_.device.id, state_for(c),
+                                                     settings_.device.simulated)));
+}
+
+void InverseServer::obey(Connection& c, const InverseCommand& command) {
+  if (!command.profile.empty()) say(c, "registers as " + command.profile);
+  if (command.force_gate_gain && *command.force_gate_gain == 0.0) {
+    settings_.device.settings.force_gate_gain = 0.0;  // there is no gate to switch on
+  }
+  if (!command.preset.empty()) c.centred = command.preset == kCentredPreset;
+  if (command.position_m && command.position_m->norm() <= kFarthest_m &&
+      (mover_ == 0 || mover_ == c.session)) {
+    mover_ = c.session;
+    const Eigen::Vector3d middle_m = c.centred ? Eigen::Vector3d::Zero() : settings_.centre_m;
+    hand_.move_to(*command.position_m - middle_m);
+  }
+  if (!command.force_N) return;
+  if (driver_ == 0) {
+    driver_ = c.session;
+    say(c, "drives");
+  }
+  if (driver_ == c.session) return hand_.push(*command.force_N);
+  if (!c.told_reader) say(c, fmt::format("reads only, client {} drives", driver_));
+  c.told_reader = true;
+}
+
+void InverseServer::fault(Connection& c, std::uint16_t code, const std::string& why) {
+  ++closed_for_fault_;
+  say(c, fmt::format("closed with {}: {}", code, why));
+  send(c, frame_bytes(FrameKind::close, close_payload(code, why)));
+  c.enter(Connection::Stage::leaving);
+  release(c);
+}
+
+/// Whatever this client held is free again.
+void InverseServer::release(Connection& c) {
+  if (c.session == 0) return;
+  if (driver_ == c.session) {
+    driver_ = 0;
+    hand_.let_go();
+    say(c, "drives no more");
+  }
+  if (mover_ == c.session) {
+    mover_ = 0;
+    hand_.move_to(std::nullopt);
+  }
+}
+
+void InverseServer::end_of(Connection& c) {
+  c.socket.close();
+  c.enter(Connection::Stage::gone);
+  release(c);
+}
+
+void InverseServer::send(Connection& c, std::string_view bytes) {
+  if (c.stage == Connection::Stage::gone) return;
+  c.out.append(bytes);
+  flush(c);
+  if (c.out.size() > kMostWaitingBytes) {
+    ++closed_for_fault_;
+    say(c, "does not read");
+    end_of(c);
+  }
+}
+
+void InverseServer::flush(Connection& c) {
+  while (c.stage != Connection::Stage::gone && !c.out.empty()) {
+    const ssize_t count = ::send(c.socket.handle(), c.out.data(), c.out.size(), MSG_NOSIGNAL);
+    if (count <= 0) {
+      if (count < 0 && !waits()) end_of(c);
+      return;
+    }
+    c.out.erase(0, static_cast<std::size_t>(count));
+  }
+}
+
+}  // namespace tpm::haptics

@@ -1,0 +1,133 @@
+#include "tpm/haptics/serve/simulated_hand.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/haptics/loop/real_time.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+Eigen::Vector3d no_longer_than(const Eigen::Vector3d& v, double most) {
+  const double size = v.norm();
+  return size > most ? Eigen::Vector3d(v * (most / size)) : v;
+}
+
+}  // namespace
+
+SimulatedHand::SimulatedHand(SimulatedHandSettings settings)
+    : settings_(std::move(settings)), propagator_(place_propagator(settings_.plant)) {
+  identity_.kind = "virtual";
+  identity_.name = "simulated device of tpm hil serve";
+  identity_.assumptions = assumptions_of(settings_.plant);
+  if (settings_.script.pieces().empty()) {
+    settings_.script = OperatorScript({{OperatorPiece::Aim::place, 0.0, 0.0, 0.0}});
+  }
+  const OperatorAim first = settings_.script.at(0.0);
+  const double along_m = first.aim == OperatorPiece::Aim::place ? first.value : 0.0;
+  at_m_ = settings_.plant.origin_m + along_m * settings_.plant.push + first.across_m;
+  InverseState shown;
+  shown.position_m = at_m_;
+  shown_.write(shown);
+}
+
+const DeviceIdentity& SimulatedHand::open() {
+  return identity_;
+}
+
+void SimulatedHand::prepare(const DevicePreparation& preparation) {
+  settings_.force_limit_N = std::min(settings_.force_limit_N, preparation.max_force_N);
+  owed_s_ = 0.0;
+}
+
+DeviceAnswer SimulatedHand::read(Eigen::Vector3d& position_m) noexcept {
+  const double step_m = settings_.plant.encoder_step_m;
+  position_m = step_m > 0.0 ? Eigen::Vector3d((at_m_ / step_m).array().round() * step_m) : at_m_;
+  return DeviceAnswer::ok;
+}
+
+DeviceAnswer SimulatedHand::write(const Eigen::Vector3d& force_N) noexcept {
+  tissue_N_ = force_N;
+  return DeviceAnswer::ok;
+}
+
+DeviceStatus SimulatedHand::status() noexcept {
+  DeviceStatus status;
+  status.saturations = saturations_;
+  if (!forces_on_) status.forces_off = ForcesOff::software;
+  return status;
+}
+
+/// Of a client that has spoken lately.
+Eigen::Vector3d SimulatedHand::client_force_N() const noexcept {
+  const Wish& wish = asked_.latest();
+  const double age_s = static_cast<double>(now_ns() - wish.force_at_ns) * 1e-9;
+  return age_s < kDriverSilence_s ? wish.force_N : Eigen::Vector3d(Eigen::Vector3d::Zero());
+}
+
+void SimulatedHand::step() noexcept {
+  const PlantSettings& plant = settings_.plant;
+  (void)asked_.refresh();
+  const Wish& wish = asked_.latest();
+  const Eigen::Vector3d wanted_N = tissue_N_ + client_force_N();
+  const double limit_N = std::min(settings_.force_limit_N, plant.motor_limit_N);
+  if (wanted_N.norm() > limit_N) ++saturations_;
+  rendered_N_ = forces_on_ ? no_longer_than(wanted_N, limit_N) : Eigen::Vector3d::Zero();
+  largest_N_ = std::max(largest_N_, rendered_N_.norm());
+  const OperatorAim aim = settings_.script.at(time_s_);
+  Eigen::Vector3d goal_m = wish.goal_m, force_N = rendered_N_;
+  if (!wish.guided) {
+    goal_m = plant.origin_m + aim.value * plant.push + aim.across_m;
+    if (aim.aim == OperatorPiece::Aim::force) {
+      goal_m += (plant.push.dot(at_m_ - plant.origin_m) - aim.value) * plant.push;
+      force_N += aim.value * plant.push;
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d from(at_m_[axis] - goal_m[axis], speed_m_per_s_[axis], force_N[axis]);
+    const Eigen::Vector2d next = propagator_ * from;
+    at_m_[axis] = goal_m[axis] + next[0];
+    speed_m_per_s_[axis] = next[1];
+  }
+  time_s_ += plant.period_s;
+}
+
+void SimulatedHand::advance(double seconds) noexcept {
+  owed_s_ += seconds;
+  // Half a period of tolerance: sums of periods are not exact.
+  while (owed_s_ > 0.5 * settings_.plant.period_s) {
+    step();
+    owed_s_ -= settings_.plant.period_s;
+  }
+  InverseState shown;
+  shown.position_m = at_m_;
+  shown.velocity_m_per_s = speed_m_per_s_;
+  shown.force_N = rendered_N_;
+  shown_.write(shown);
+}
+
+InverseState SimulatedHand::state() noexcept {
+  (void)shown_.refresh();
+  return shown_.latest();
+}
+
+void SimulatedHand::push(const Eigen::Vector3d& force_N) noexcept {
+  // Beyond the limit the size means nothing more.
+  wish_.force_N = no_longer_than(force_N, settings_.force_limit_N);
+  wish_.force_at_ns = now_ns();
+  asked_.write(wish_);
+}
+
+void SimulatedHand::move_to(const std::optional<Eigen::Vector3d>& position_m) noexcept {
+  wish_.guided = position_m.has_value();
+  if (position_m) wish_.goal_m = no_longer_than(*position_m, settings_.reach_m);
+  asked_.write(wish_);
+}
+
+void SimulatedHand::let_go() noexcept {
+  wish_.force_N.setZero();
+  wish_.force_at_ns = 0;
+  asked_.write(wish_);
+}
+
+}  // namespace tpm::haptics

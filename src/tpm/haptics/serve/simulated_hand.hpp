@@ -1,0 +1,72 @@
+#pragma once
+#include <atomic>
+#include <optional>
+
+#include "tpm/haptics/device/virtual_plant.hpp"
+#include "tpm/haptics/loop/triple_buffer.hpp"
+#include "tpm/haptics/serve/inverse_server.hpp"
+#include "tpmkit/device.hpp"
+
+namespace tpm::haptics {
+
+struct SimulatedHandSettings {
+  PlantSettings plant;
+  OperatorScript script;       ///< of the hand, while nobody moves it
+  double force_limit_N = 8.0;  ///< of tissue and client together; nobody raises it
+  double reach_m = 0.075;      ///< where the hand can be asked to go
+};
+
+/// A simulated device, the hand that holds it, and a client that pushes it as well as the tissue.
+/// The servo loop uses it as a HapticDevice, the server as a ServedHand; they meet in mailboxes.
+///
+/// Device and arm move exactly for a force and a goal that stay within a period (place_propagator):
+///
+///     m x'' + b x' + k (x - goal) = F_tissue + F_client
+///
+/// along each axis. Where the script asks for a push in place of a place, the goal is where the
+/// hand is and the push is added.
+class SimulatedHand final : public HapticDevice, public ServedHand {
+ public:
+  explicit SimulatedHand(SimulatedHandSettings settings);
+
+  const DeviceIdentity& open() override;
+  void prepare(const DevicePreparation& preparation) override;
+  void enable_forces() override { forces_on_ = true; }
+  DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override;
+  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
+  DeviceStatus status() noexcept override;
+  void advance(double seconds) noexcept override;
+  void stop() noexcept override { forces_on_ = false; }
+  void cut_forces() noexcept override { forces_on_ = false; }
+
+  [[nodiscard]] InverseState state() noexcept override;
+  void push(const Eigen::Vector3d& force_N) noexcept override;
+  void move_to(const std::optional<Eigen::Vector3d>& position_m) noexcept override;
+  void let_go() noexcept override;
+
+  /// Largest force that was rendered, N; of the loop's thread.
+  [[nodiscard]] double largest_N() const noexcept { return largest_N_; }
+
+ private:
+  struct Wish {
+    Eigen::Vector3d force_N = Eigen::Vector3d::Zero(), goal_m = Eigen::Vector3d::Zero();
+    std::int64_t force_at_ns = 0;
+    bool guided = false;
+  };
+  void step() noexcept;
+  [[nodiscard]] Eigen::Vector3d client_force_N() const noexcept;
+
+  SimulatedHandSettings settings_;
+  Eigen::Matrix<double, 2, 3> propagator_;
+  DeviceIdentity identity_;
+  Wish wish_;  ///< of the server's thread
+  TripleBuffer<Wish> asked_;
+  TripleBuffer<InverseState> shown_;
+  Eigen::Vector3d at_m_, speed_m_per_s_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero(), rendered_N_ = Eigen::Vector3d::Zero();
+  double time_s_ = 0.0, owed_s_ = 0.0, largest_N_ = 0.0;
+  std::uint64_t saturations_ = 0;
+  std::atomic<bool> forces_on_{false};
+};
+
+}  // namespace tpm::haptics

@@ -1,0 +1,356 @@
+// --device inverse3 on a stand-in service: sessions, delays, and each way in which a service fails.
+#include <fmt/format.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <thread>
+
+#include "hil_scenes.hpp"
+#include "stand_in_inverse.hpp"
+#include "temp_folder.hpp"
+#include "tpm/haptics/device/device_file.hpp"
+#include "tpm/haptics/session/identify_run.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpm/haptics/verify/verify.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinAbs;
+using namespace std::chrono_literals;
+using test::StandInFaults;
+using test::StandInInverse;
+using How = StandInFaults::How;
+
+/// The short session within the limits of the device, on a tissue of half the stiffness.
+Json inverse_session() {
+  Json json = test::short_session();
+  for (const char* modulus : {"E1", "E2", "Eprime"}) {
+    json["model"]["scene"]["material"][modulus] = "6 kPa";
+  }
+  json["model"]["scene"]["material"]["eta1"] = "1.2e4 Pa s";
+  json["limits"] = {{"force", "3 N"}};
+  return json;
+}
+
+/// With a plant that is later by some milliseconds.
+PlantSettings plant_of(const HilSession& session, int late_ms) {
+  PlantSettings plant = session.plant;
+  plant.period_s = session.servo.period_s;
+  plant.push = session.servo.push;
+  plant.delay_periods = late_ms;
+  return plant;
+}
+
+DeviceChoice choice_of(const StandInInverse& service) {
+  DeviceChoice choice;
+  choice.kind = "inverse3";
+  choice.inverse.port = service.port();
+  choice.inverse.events_port = service.events_port();
+  choice.inverse.old_http_port = service.port();
+  return choice;
+}
+
+std::string error_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+/// Message with which a device on such a service cannot be opened.
+std::string refusal(const StandInFaults& faults, const std::string& id = {}) {
+  StandInInverse service(PlantSettings{}, {}, false, faults);
+  InverseAddress address{service.port(), service.events_port(), service.port(), id};
+  InverseDevice device(address, limits_of("inverse3"), false);
+  return error_of([&] { (void)device.open(); });
+}
+
+TEST_CASE("A service is opened in both formats, made neutral, and what it says is recorded") {
+  for (const bool old : {false, true}) {
+    StandInFaults faults;
+    faults.version = old ? "3.1.1.0" : "3.5.0.0";
+    StandInInverse service(PlantSettings{}, {}, false, faults);
+    InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                         limits_of("inverse3"), false);
+    const DeviceIdentity& identity = device.open();
+    CHECK(identity.kind == "inverse3");
+    CHECK(identity.serial == "049D");
+    CHECK(identity.left_handed);
+    CHECK_FALSE(identity.hardware);  // it says SIMULATED DEVICE
+    CHECK_THAT(identity.library_version, Contains(old ? "values" : "vector"));
+    std::string all;
+    for (const std::string& line : identity.assumptions) all += line + "\n";
+    CHECK_THAT(all, Contains("force gate 0") && Contains("preset 'arm_front_centered'") &&
+                        Contains("4 N, 80 mm") && Contains("assumed"));
+    CHECK(service.last_profile() == "org.tpmkit:tpm-hil");
+    device.prepare({});
+    device.enable_forces();
+    CHECK(device.write({0.0, 0.0, 1.25}) == DeviceAnswer::ok);
+    CHECK(service.last_N().z() == 1.25);
+    CHECK((service.last_format() == InverseFormat::values) == old);
+    CHECK(device.write({0.0, 0.0, 50.0}) == DeviceAnswer::saturated);
+    CHECK_THAT(service.last_N().z(), WithinAbs(4.0, 1e-12));
+    Eigen::Vector3d at_m(1.0, 1.0, 1.0);
+    CHECK(device.read(at_m) == DeviceAnswer::ok);
+    CHECK(at_m.norm() < 0.01);  // from the middle of the workspace
+    service.press(0b10U);
+    (void)device.write({0.0, 0.0, 0.5});
+    (void)device.read(at_m);
+    CHECK(device.hand().buttons == 0b10U);
+    device.stop();
+    for (int i = 0; i < 100 && service.last_N().norm() > 0.0; ++i) std::this_thread::sleep_for(5ms);
+    CHECK(service.last_N().norm() == 0.0);
+  }
+}
+
+TEST_CASE("A service that is not what it should be is refused with the reason") {
+  StandInFaults f;
+  f.gate_stays = 0.3;
+  CHECK_THAT(refusal(f), Contains("force gate of the service stays at 0.3"));
+  f = {};
+  f.names_no_filters = true;
+  CHECK_THAT(refusal(f), Contains("does not say what its force gate does"));
+  f = {};
+  f.damping_stays = 0.5;
+  CHECK_THAT(refusal(f), Contains("damping of the service stays at 0.5"));
+  f = {};
+  f.scale = 2.0;
+  CHECK_THAT(refusal(f), Contains("scales coordinates"));
+  f = {};
+  f.version = "4.0.0.0";
+  CHECK_THAT(refusal(f), Contains("of version '4.0.0.0'; expected 3.1 or later"));
+  f = {};
+  f.no_inventory = true;
+  CHECK_THAT(refusal(f), Contains("the service is silent"));
+  f = {};
+  f.devices = {};
+  CHECK_THAT(refusal(f), Contains("has 0 such devices"));
+  f.devices = {"049D", "0A14"};
+  CHECK_THAT(refusal(f),
+             Contains("2 such devices: 049D, 0A14; expected one device, or --inverse-id"));
+  CHECK(refusal(f, "049D").empty());
+  f = {};
+  f.wrong_accept = "AAAA";
+  CHECK_THAT(refusal(f), Contains("Sec-WebSocket-Accept is not that of the key"));
+  f = {};
+  f.no_events = true;
+  CHECK_THAT(refusal(f), Contains("no WebSocket"));
+  InverseDevice nobody({1, 1, 1, ""}, limits_of("inverse3"), false);
+  CHECK_THAT(error_of([&] { (void)nobody.open(); }),
+             Contains("port 1 of this machine: nobody answers"));
+}
+
+TEST_CASE("A device that keeps the clock has no virtual time") {
+  StandInFaults faults;
+  faults.simulated = false;
+  StandInInverse service(PlantSettings{}, {}, false, faults);
+  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                       limits_of("inverse3"), false);
+  CHECK(device.open().hardware);
+  CHECK_THAT(error_of([&] { device.prepare({}); }), Contains("expected --time real"));
+}
+
+TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any other") {
+  const test::TempFolder folder;
+  for (const int late_ms : {0, 2, 5}) {
+    const HilSession session = test::parsed(inverse_session());
+    DeviceChoice choice;
+    {
+      PlantSettings free = plant_of(session, late_ms);
+      free.arm = {1e-9, 0.0, 0.0, 0.0};  // nobody holds it
+      StandInInverse service(free, {}, false);
+      choice = choice_of(service);
+      DeviceIdentifyOptions options;
+      options.duration_s = 8.0;
+      const IdentifyRun identified = run_identification(choice, session, options);
+      CAPTURE(late_ms, word_of(identified.outcome.cause), identified.outcome.device.error_text);
+      REQUIRE(identified.found.delay_mean_s);
+      CHECK_THAT(*identified.found.delay_mean_s, WithinAbs(1e-3 * late_ms, 0.5e-3 + 1e-9));
+      CHECK_THAT(*identified.found.delay_largest_s, WithinAbs(1e-3 * late_ms, 1e-3 + 1e-9));
+      choice.file = folder / fmt::format("late{}.json", late_ms);
+      std::ofstream(choice.file) << to_text(device_file_json(identified, "2026-11-28"));
+    }
+    StandInInverse service(plant_of(session, late_ms), session.operator_script(), false);
+    const std::filesystem::path file = choice.file;
+    choice = choice_of(service);
+    choice.file = file;
+    SessionRunOptions options;
+    options.recording = folder / fmt::format("late{}.tpmrec", late_ms);
+    bool begun = false;
+    options.watcher = [&](const ServoRecord& row) {
+      if (row.phase >= 0 && !begun) service.begin();
+      begun = begun || row.phase >= 0;
+    };
+    const SessionRun run = run_session(session, choice, options);
+    CAPTURE(late_ms, run.outcome.detail, run.outcome.device.error_text);
+    REQUIRE(run.outcome.cause == StopCause::finished);
+    CHECK(run.rendering.delay_measured);
+    CHECK(service.largest_N() <= 3.0);
+    const HilRecording recording = read_recording(options.recording);
+    CHECK(recording.simulated());
+    CHECK_THAT(device_line(recording), Contains("SIMULATED DEVICE"));
+    CHECK(recording.header.at("device").at("serial") == "049D");
+    const Verification v = verify(recording, {.window_s = 0.0});
+    CHECK(v.all.max_N < 0.01 * v.all.peak_N);
+    CHECK(v.all.peak_N > 0.1);
+    UNSCOPED_INFO(
+        fmt::format("{} ms put in: max/peak {:.3g} %", late_ms, 1e2 * v.all.max_N / v.all.peak_N));
+  }
+}
+
+/// A session, message by message, on a service that goes wrong.
+SessionRun run_on(const StandInFaults& faults,
+                  const std::function<void(StandInInverse&)>& act = {}) {
+  const test::TempFolder folder;
+  const HilSession session = test::parsed(inverse_session());
+  StandInInverse service(plant_of(session, 0), session.operator_script(), false, faults);
+  const auto device = std::make_shared<InverseDevice>(
+      InverseAddress{service.port(), service.events_port(), service.port(), "049D"},
+      limits_of("inverse3"), false);
+  DeviceLimits limits = limits_of("inverse3");
+  limits.simulated = true;  // its delay is not what is tried here
+  SessionRunOptions options;
+  options.recording = folder / "failed.tpmrec";
+  bool begun = false;
+  options.watcher = [&](const ServoRecord& row) {
+    if (row.phase < 0 || begun) return;
+    begun = true;
+    service.begin();
+    if (act) act(service);
+  };
+  SessionRun run = run_session_on(session, device, limits, {}, options);
+  if (faults.how != How::close) {
+    for (int i = 0; i < 200 && service.last_N().norm() > 0.0; ++i) std::this_thread::sleep_for(5ms);
+    CHECK(service.last_N().norm() == 0.0);
+  }
+  const HilRecording recording = read_recording(options.recording);
+  CHECK(recording.closing.at("device_error_text") == std::string(run.outcome.device.error_text));
+  return run;
+}
+
+TEST_CASE("Each way in which a service fails ends the session with its cause") {
+  struct Case {
+    How how;
+    StopCause cause;
+    const char* words;
+  };
+  for (const Case& c : {Case{How::silence, StopCause::unplugged, "the service is silent"},
+                        Case{How::close, StopCause::unplugged, "the service is gone"},
+                        Case{How::garbage, StopCause::forces_off, "sends what is no state"},
+                        Case{How::other_device, StopCause::forces_off, "sends what is no state"}}) {
+    StandInFaults faults;
+    faults.from = 2000;
+    faults.how = c.how;
+    const SessionRun run = run_on(faults);
+    CAPTURE(static_cast<int>(c.how), word_of(run.outcome.cause), run.outcome.device.error_text);
+    CHECK(run.outcome.cause == c.cause);
+    CHECK_THAT(run.outcome.device.error_text, Contains(c.words));
+  }
+}
+
+TEST_CASE("Events of the service end a session with their words") {
+  struct Case {
+    InverseEvent event;
+    StopCause cause;
+  };
+  for (const Case& c :
+       {Case{{"device-disconnected", "warning", "049D", "", "lost"}, StopCause::unplugged},
+        Case{{"device-busy", "warning", "049D", "", "taken"}, StopCause::software},
+        Case{{"device-safety-triggered", "error", "049D", "ebrake_triggered", "brake"},
+             StopCause::software},
+        // Of another device, or none that takes forces away.
+        Case{{"device-disconnected", "warning", "FFFF", "", "lost"}, StopCause::finished},
+        Case{{"device-safety-triggered", "notice", "049D", "ebrake_released", "brake"},
+             StopCause::finished}}) {
+    const SessionRun run = run_on({}, [&c](StandInInverse& service) { service.tell(c.event); });
+    CAPTURE(c.event.name, word_of(run.outcome.cause), run.outcome.device.error_text);
+    CHECK(run.outcome.cause == c.cause);
+    if (c.cause != StopCause::finished) {
+      CHECK_THAT(run.outcome.device.error_text,
+                 Contains(c.event.name) && Contains(c.event.safety_type));
+    }
+  }
+}
+
+TEST_CASE(
+    "A thread of messages without commands sends zero, and states that stop are no position") {
+  StandInInverse service(PlantSettings{}, {}, true);
+  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                       limits_of("inverse3"), false);
+  (void)device.open();
+  DevicePreparation preparation;
+  preparation.real_time = true;
+  preparation.watchdog_s = 0.016;
+  device.prepare(preparation);
+  device.enable_forces();
+  const auto until = [&](const std::function<bool()>& met) {
+    for (int i = 0; i < 2000 && !met(); ++i) std::this_thread::sleep_for(1ms);
+    return met();
+  };
+  CHECK(until([&] {
+    (void)device.write({0.0, 0.0, 1.0});
+    return service.last_N().z() == 1.0;
+  }));
+  CHECK(until([&] { return service.last_N().norm() == 0.0; }));  // the watchdog's time is over
+  CHECK(device.status().forces_off == ForcesOff::watchdog);
+  CHECK(device.write({0.0, 0.0, 1.0}) == DeviceAnswer::failed);
+  std::this_thread::sleep_for(20ms);
+  CHECK(service.last_N().norm() == 0.0);
+  device.stop();
+}
+
+TEST_CASE("Forces that are cut from another thread are zero at the service before that returns") {
+  StandInInverse service(PlantSettings{}, {}, true);
+  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                       limits_of("inverse3"), false);
+  (void)device.open();
+  DevicePreparation preparation;
+  preparation.real_time = true;
+  preparation.watchdog_s = 10.0;
+  device.prepare(preparation);
+  device.enable_forces();
+  for (int i = 0; i < 2000 && service.last_N().z() != 2.0; ++i) {
+    (void)device.write({0.0, 0.0, 2.0});
+    std::this_thread::sleep_for(1ms);
+  }
+  REQUIRE(service.last_N().z() == 2.0);
+  std::thread([&] { device.cut_forces(); }).join();
+  for (int i = 0; i < 500 && service.last_N().norm() > 0.0; ++i) std::this_thread::sleep_for(1ms);
+  CHECK(service.last_N().norm() == 0.0);
+  CHECK(device.write({0.0, 0.0, 2.0}) == DeviceAnswer::failed);
+  device.stop();
+}
+
+TEST_CASE("Answers that are dropped now and then end nothing") {
+  StandInFaults faults;
+  faults.from = 1;
+  faults.how = How::drop_every_third;
+  StandInInverse service(PlantSettings{}, {}, true, faults);
+  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                       limits_of("inverse3"), false);
+  (void)device.open();
+  DevicePreparation preparation;
+  preparation.real_time = true;
+  preparation.watchdog_s = 2.0;
+  device.prepare(preparation);
+  device.enable_forces();
+  Eigen::Vector3d at_m;
+  for (int i = 0; i < 300; ++i) {
+    CHECK(device.read(at_m) != DeviceAnswer::failed);
+    CHECK(device.write({0.0, 0.0, 0.1}) == DeviceAnswer::ok);
+    std::this_thread::sleep_for(1ms);
+  }
+  device.stop();
+  CHECK(device.traffic().unanswered > 5);
+  CHECK(device.status().forces_off == ForcesOff::none);
+}
+
+}  // namespace
+}  // namespace tpm::haptics

@@ -1,0 +1,400 @@
+// tpm hil serve: what clients of the Inverse service receive, and that none of them gets in the
+// way.
+#include <fmt/format.h>
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "hil_scenes.hpp"
+#include "raw_client.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/files/json.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
+#include "tpm/haptics/serve/serve.hpp"
+#include "tpm/haptics/serve/simulated_hand.hpp"
+#include "tpmkit/error.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinAbs;
+using namespace std::chrono_literals;
+using files::Json;
+
+constexpr double kSoon_s = 5.0;
+
+/// A server with a hand that notes what it is asked, and no tissue.
+class NotingHand final : public ServedHand {
+ public:
+  InverseState state() noexcept override {
+    InverseState state;
+    state.position_m = {0.01, 0.02, 0.03};
+    state.force_N = force_N;
+    return state;
+  }
+  void push(const Eigen::Vector3d& wanted_N) noexcept override {
+    force_N = wanted_N;
+    ++pushes;
+  }
+  void move_to(const std::optional<Eigen::Vector3d>& position_m) noexcept override {
+    goal_m = position_m;
+  }
+  void let_go() noexcept override { force_N.setZero(); }
+
+  Eigen::Vector3d force_N = Eigen::Vector3d::Zero();
+  std::optional<Eigen::Vector3d> goal_m;
+  std::atomic<int> pushes{0};
+};
+
+class Served {
+ public:
+  Served() {
+    InverseServerSettings settings;
+    settings.events_port = 0;
+    settings.device.id = "049D";
+    settings.device.type = "inverse3";
+    settings.device.simulated = true;
+    settings.device.settings.handedness = "right";
+    settings.device.settings.filters_named = true;
+    settings.page = "<p>SIMULATED DEVICE</p>";
+    settings.log = [this](const std::string& line) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      lines_.push_back(line);
+    };
+    server = std::make_unique<InverseServer>(hand, std::move(settings));
+  }
+  [[nodiscard]] std::unique_ptr<WebSocketClient> client(std::string* inventory = nullptr) const {
+    auto one = std::make_unique<WebSocketClient>(server->port(), "/", kSoon_s, kMostInventoryBytes);
+    const auto first = one->receive(kSoon_s);
+    REQUIRE(first);
+    if (inventory != nullptr) *inventory = *first;
+    return one;
+  }
+  [[nodiscard]] std::vector<std::string> lines() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return lines_;
+  }
+
+  NotingHand hand;
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::string> lines_;
+
+ public:
+  std::unique_ptr<InverseServer> server;  ///< ends first: its thread writes lines
+};
+
+InverseState state_after(WebSocketClient& client, const std::string& message) {
+  REQUIRE(client.send(message));
+  const auto text = client.receive(kSoon_s);
+  REQUIRE(text);
+  return parse_state(*text, "049D");
+}
+
+std::string push_of(double newtons, InverseFormat format = InverseFormat::vector) {
+  return force_message(format, "049D", {0.0, 0.0, newtons});
+}
+
+bool silent(WebSocketClient& client) {
+  return !client.receive(0.05) && client.over().empty();
+}
+
+TEST_CASE("An inventory comes first, then exactly one state for each message, in both formats") {
+  Served served;
+  std::string inventory;
+  const auto client = served.client(&inventory);
+  const Json first = Json::parse(inventory);
+  CHECK(first.at("inverse3")[0].at("config").at("handedness") == "right");
+  CHECK(first.at("inverse3")[0].at("config").at("simulated_device") == "SIMULATED DEVICE");
+  CHECK(parse_inventory(inventory).devices.at(0).state.position_m.isApprox(
+      Eigen::Vector3d(0.01, -0.10, 0.18)));
+  CHECK(silent(*client));
+  for (const InverseFormat format : {InverseFormat::vector, InverseFormat::values}) {
+    CHECK(state_after(*client, push_of(1.5, format)).force_N.z() == 1.5);
+    CHECK(silent(*client));
+  }
+  REQUIRE(client->send(push_of(0.25)));
+  const Json state = Json::parse(*client->receive(kSoon_s)).at("inverse3")[0];
+  CHECK_FALSE(state.contains("config"));
+  CHECK(state.at("state").contains("cursor_velocity"));
+  CHECK(state.at("state").at("current_cursor_force").at("z") == 0.25);
+  // Coordinates around the middle of the workspace, for who asks for them.
+  CHECK(state_after(*client, neutral_message("049D", "who")).position_m ==
+        Eigen::Vector3d(0.01, 0.02, 0.03));
+}
+
+TEST_CASE("Garbage is answered by one state, no force and one line in the log") {
+  Served served;
+  const auto client = served.client();
+  const std::string nan =
+      R"({"inverse3":[{"device_id":"049D","commands":{"set_cursor_force":{"vector":{"x":1e400,"y":0,"z":0}}}}]})";
+  for (const std::string& garbage :
+       {std::string(R"({"inverse3": [)"), nan, std::string(), std::string(60'000, '[')}) {
+    CHECK(state_after(*client, push_of(2.0)).force_N.z() == 2.0);
+    const std::size_t before = served.lines().size();
+    CHECK(state_after(*client, garbage).force_N.norm() == 0.0);
+    CHECK(silent(*client));
+    CHECK(served.lines().size() == before + 1);
+  }
+  CHECK(served.server->counts().unreadable == 4);
+  for (int i = 0; i < 200; ++i) (void)state_after(*client, "x");
+  CHECK(served.lines().size() < 30);  // the log of one client has an end
+}
+
+TEST_CASE("A flood of 50 by 50 is answered by as many states") {
+  Served served;
+  const auto client = served.client();
+  for (int round = 0; round < 50; ++round) {
+    for (int i = 0; i < 50; ++i) REQUIRE(client->send(push_of(i)));
+    for (int i = 0; i < 50; ++i) {
+      const auto text = client->receive(kSoon_s);
+      REQUIRE(text);
+      CHECK(parse_state(*text, "049D").force_N.z() == i);
+    }
+  }
+  CHECK(silent(*client));
+  CHECK(served.server->counts().states == 2500);
+}
+
+TEST_CASE("One client drives, a second reads only until the first has left") {
+  Served served;
+  auto first = served.client();
+  const auto second = served.client();
+  CHECK(state_after(*first, push_of(1.0)).force_N.z() == 1.0);
+  CHECK(state_after(*second, push_of(3.0)).force_N.z() == 1.0);
+  CHECK(served.hand.pushes == 1);
+  first.reset();
+  double newtons = 0.0;
+  for (int i = 0; i < 100 && newtons == 0.0; ++i) {
+    newtons = state_after(*second, push_of(3.0)).force_N.z();
+    std::this_thread::sleep_for(10ms);
+  }
+  CHECK(newtons == 3.0);
+}
+
+TEST_CASE("A message of 3 MB is closed with 1009, and all others go on") {
+  Served served;
+  const auto other = served.client();
+  const auto client = served.client();
+  (void)state_after(*client, push_of(1.0));
+  std::thread sender([&] { (void)client->send(std::string(3'000'000, '['), kSoon_s); });
+  (void)state_after(*other, "{}");
+  sender.join();
+  CHECK_FALSE(client->receive(kSoon_s));
+  CHECK(client->close_code() == kCloseTooBig);
+  CHECK(state_after(*other, push_of(2.0)).force_N.z() == 2.0);  // who is free to drive now
+  const auto third = served.client();
+  (void)state_after(*third, "{}");
+}
+
+TEST_CASE("A client that does not read is closed, and connections are counted") {
+  Served served;
+  const auto deaf = served.client();
+  bool taken = true;
+  for (int i = 0; i < 200'000 && taken; ++i) taken = deaf->send("{}", 0.5);
+  for (int i = 0; i < 200 && served.server->counts().closed_for_fault == 0; ++i) {
+    std::this_thread::sleep_for(10ms);
+  }
+  CHECK(served.server->counts().closed_for_fault == 1);
+  std::vector<std::unique_ptr<WebSocketClient>> all;
+  for (std::size_t i = 0; i + 1 < InverseServer::kMostConnections; ++i) {
+    all.push_back(served.client());
+  }
+  all.push_back(served.client());
+  CHECK_THROWS_AS(served.client(), Error);  // the ninth
+  CHECK(served.server->counts().refused == 1);
+  (void)state_after(*all.front(), "{}");
+}
+
+TEST_CASE("The server answers programs and its own page on this machine, and nobody else") {
+  Served served;
+  const int port = served.server->port();
+  const auto answer = [port](const std::string& fields,
+                             const std::string& first = "GET / HTTP/1.1") {
+    const test::RawClient raw(port);
+    raw.send(first + "\r\n" + fields + "\r\n");
+    return raw.answer();
+  };
+  const std::string host = fmt::format("Host: 127.0.0.1:{}\r\n", port);
+  const std::string upgrade =
+      "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+      "Sec-WebSocket-Version: 13\r\n";
+  CHECK_THAT(answer(upgrade + "Host: evil.example\r\n"), Contains("403 Forbidden"));
+  CHECK_THAT(answer(host + upgrade + "Origin: http://evil.example\r\n"), Contains("403 Forbidden"));
+  CHECK_THAT(answer("Host: evil.example\r\n"), Contains("403 Forbidden"));
+  CHECK_THAT(answer(host), Contains("SIMULATED DEVICE"));
+  CHECK_THAT(answer(host, "POST / HTTP/1.1"), Contains("405 "));
+  CHECK_THAT(answer(host, "GET /etc/passwd HTTP/1.1"), Contains("404 "));
+  CHECK_THAT(answer("\x01\x02\r\n"), Contains("400 "));
+  CHECK_THAT(http_exchange(port, "/version", "", kSoon_s), Contains("SIMULATED DEVICE"));
+  CHECK(parse_version(http_exchange(port, "/3.0/version", "", kSoon_s)) == "3.5.0.0");
+  CHECK(parse_inventory(http_exchange(port, "/devices", "", kSoon_s)).devices.at(0).simulated);
+  const test::RawClient dumb(port);  // asks for nothing
+  CHECK(dumb.answer(5.0).empty());
+}
+
+TEST_CASE("Events reach those who listen, and their words are nothing to the hand") {
+  Served served;
+  WebSocketClient events(served.server->events_port(), "/", kSoon_s, kMostMessageBytes);
+  REQUIRE(events.send(push_of(3.0)));
+  CHECK(silent(events));
+  CHECK(served.hand.pushes == 0);
+  served.server->tell({"device-busy", "warning", "049D", "", "taken"});
+  const auto text = events.receive(kSoon_s);
+  REQUIRE(text);
+  CHECK(parse_event(*text).name == "device-busy");
+}
+
+/// What a client sees of a served session while `act` is at work.
+ServeRun with_session(const Json& json, double duration_s,
+                      const std::function<void(WebSocketClient&)>& act) {
+  const HilSession session = test::parsed(json);
+  std::thread worker;
+  std::atomic<bool> done{false};
+  ServeOptions options;
+  options.port = options.events_port = 0;
+  options.duration_s = duration_s;
+  options.interrupted = [&done] { return done.load(); };
+  options.opened = [&](const InverseServer& server, const DeviceIdentity& identity,
+                       const LoopModel&) {
+    CHECK_FALSE(identity.hardware);
+    worker = std::thread([&, port = server.port()] {
+      WebSocketClient client(port, "/", kSoon_s, kMostInventoryBytes);
+      (void)client.receive(kSoon_s);
+      act(client);
+      done = true;
+    });
+  };
+  ServeRun run = serve_session(session, options);
+  worker.join();
+  return run;
+}
+
+InverseState served_state(WebSocketClient& client, const std::string& message) {
+  REQUIRE(client.send(message));
+  return parse_state(client.receive(kSoon_s).value(), "SIMULATED");
+}
+
+std::string served_push(const Eigen::Vector3d& force_N) {
+  return force_message(InverseFormat::vector, "SIMULATED", force_N);
+}
+
+/// Until the state is as wanted, or for 5 s.
+InverseState when(WebSocketClient& client, const std::string& message,
+                  const std::function<bool(const InverseState&)>& wanted) {
+  InverseState state;
+  for (int i = 0; i < 5000; ++i) {
+    state = served_state(client, message);
+    if (wanted(state)) break;
+    std::this_thread::sleep_for(1ms);
+  }
+  return state;
+}
+
+TEST_CASE("A client's force moves the simulated hand, never above the limit, and ends in silence") {
+  Json json = test::short_session();
+  json["limits"]["force"] = "3 N";
+  double silent_N = 1.0, moved_m = 0.0, strong_N = 0.0;
+  const ServeRun run = with_session(json, 60.0, [&](WebSocketClient& client) {
+    const double before_m = served_state(client, "{}").position_m.x();
+    const auto pushed = [&](const InverseState& s) { return s.position_m.x() > before_m + 5e-3; };
+    moved_m = when(client, served_push({2.0, 0.0, 0.0}), pushed).position_m.x() - before_m;
+    std::this_thread::sleep_for(500ms);
+    silent_N = std::abs(
+        served_state(client,
+                     R"({"inverse3":[{"device_id":"SIMULATED","commands":{"probe_position":{}}}]})")
+            .force_N.x());
+    strong_N = when(client, served_push({1e3, 0.0, 0.0}), [](const InverseState& s) {
+                 return s.force_N.norm() > 2.99;
+               }).force_N.norm();
+  });
+  CHECK(moved_m > 5e-3);
+  CHECK(silent_N == 0.0);
+  CHECK_THAT(strong_N, WithinAbs(3.0, 1e-9));
+  CHECK(run.largest_force_N <= 3.0 + 1e-9);
+  CHECK(run.outcome.cause == StopCause::signal);
+  CHECK_THAT(serve_text(test::parsed(json), run), Contains("SIMULATED DEVICE"));
+  CHECK(serve_json(test::parsed(json), run).at("states") == run.counts.states);
+}
+
+TEST_CASE("A hand that a client moves into the tissue meets its force") {
+  double tissue_N = 0.0, depth_m = 0.0;
+  const ServeRun run = with_session(test::short_session(), 60.0, [&](WebSocketClient& client) {
+    (void)served_state(client, neutral_message("SIMULATED", "test"));
+    const std::string down =
+        R"({"inverse3":[{"device_id":"SIMULATED","commands":{"set_cursor_position":{"position":{"x":0,"y":0,"z":-0.010}}}}]})";
+    const InverseState deep =
+        when(client, down, [](const InverseState& s) { return s.force_N.z() > 0.3; });
+    tissue_N = deep.force_N.z();
+    depth_m = -deep.position_m.z();
+  });
+  CHECK(tissue_N > 0.3);
+  CHECK(depth_m > 1e-3);
+  CHECK(run.outcome.cause == StopCause::signal);
+}
+
+TEST_CASE("The example client in Python is served, and names a simulated device") {
+  const test::TempFolder folder;
+  const std::string output = folder / "output";
+  Json json = test::short_session();
+  json["limits"]["force"] = "3 N";
+  int status = -1;
+  std::thread worker;
+  std::atomic<bool> done{false};
+  ServeOptions options;
+  options.port = options.events_port = 0;
+  options.duration_s = 60.0;
+  options.interrupted = [&done] { return done.load(); };
+  options.opened = [&](const InverseServer& server, const DeviceIdentity&, const LoopModel&) {
+    worker = std::thread([&, port = server.port()] {
+      status = std::system(fmt::format("python3 {}/examples/inverse_client.py --port {} "
+                                       "--messages 300 >{} 2>&1",
+                                       TPM_TEST_SOURCE_DIR, port, output)
+                               .c_str());
+      done = true;
+    });
+  };
+  const ServeRun run = serve_session(test::parsed(json), options);
+  worker.join();
+  const std::string said = files::read_file(output);
+  INFO(said);
+  CHECK(status == 0);
+  CHECK_THAT(said, Contains("SIMULATED DEVICE") && Contains("'x': 0.5"));
+  CHECK(run.counts.states == 300);
+}
+
+TEST_CASE("The simulated hand moves as the oscillator that it is") {
+  SimulatedHandSettings settings;
+  settings.plant.encoder_step_m = 0.0;
+  SimulatedHand hand(settings);
+  (void)hand.open();
+  hand.prepare({});
+  hand.enable_forces();
+  const double force_N = 1.0;
+  const PlantSettings& plant = settings.plant;
+  const double mass = plant.mass_kg + plant.arm.mass_kg, stiffness = plant.arm.stiffness_N_per_m;
+  const double half_rate = (plant.damping_N_s_per_m + plant.arm.damping_N_s_per_m) / (2.0 * mass);
+  const double w = std::sqrt(stiffness / mass - half_rate * half_rate);
+  Eigen::Vector3d at_m;
+  for (int i = 1; i <= 300; ++i) {
+    (void)hand.write({force_N, 0.0, 0.0});
+    hand.advance(plant.period_s);
+    (void)hand.read(at_m);
+    const double t = i * plant.period_s;
+    const double exact =
+        force_N / stiffness *
+        (1.0 - std::exp(-half_rate * t) * (std::cos(w * t) + half_rate / w * std::sin(w * t)));
+    REQUIRE_THAT(at_m.x(), WithinAbs(exact, 1e-12));
+  }
+}
+
+}  // namespace
+}  // namespace tpm::haptics

@@ -1,0 +1,322 @@
+#pragma once
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <atomic>
+#include <cerrno>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tpm/haptics/device/virtual_plant.hpp"
+#include "tpm/haptics/inverse/loopback.hpp"
+#include "tpm/haptics/inverse/messages.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
+
+namespace tpm::test {
+using namespace haptics;
+
+/// How the stand-in departs from a service that works.
+struct StandInFaults {
+  std::string version = "3.5.0.0";
+  bool simulated = true;      ///< it says so
+  bool no_inventory = false;  ///< it accepts and is silent
+  bool no_events = false;     ///< nobody listens there
+  bool names_no_filters = false;
+  double gate_stays = 0.0, damping_stays = 0.0;  ///< what cannot be made neutral
+  double scale = 1.0;                            ///< of the mount
+  std::vector<std::string> devices = {"049D"};
+  std::string wrong_accept;  ///< in place of Sec-WebSocket-Accept
+  /// From this message with a force on, what `how` says; 0: never.
+  int from = 0;
+  enum class How { silence, garbage, other_device, close, drop_every_third } how = How::silence;
+};
+
+/// A service on loopback with a simulated device, for tests of the client: the codec of the library
+/// and a loop of its own, nothing of `tpm hil serve`.
+class StandInInverse {
+ public:
+  /// @param on_the_clock the plant moves with the time; else by a period for each force
+  StandInInverse(const PlantSettings& plant, OperatorScript script, bool on_the_clock,
+                 StandInFaults faults = {});
+  ~StandInInverse();
+  StandInInverse(const StandInInverse&) = delete;
+  StandInInverse& operator=(const StandInInverse&) = delete;
+
+  [[nodiscard]] int port() const { return port_of(service_); }
+  [[nodiscard]] int events_port() const { return port_of(events_); }
+  /// The script of the hand begins.
+  void begin();
+  void tell(const InverseEvent& event);
+  void press(std::uint32_t buttons);
+  [[nodiscard]] int forces() const { return forces_; }
+  [[nodiscard]] double largest_N();
+  [[nodiscard]] Eigen::Vector3d last_N();
+  [[nodiscard]] std::string last_profile();
+  [[nodiscard]] InverseFormat last_format();
+
+ private:
+  void accept_all();
+  void talk(Socket socket, bool events);
+  [[nodiscard]] std::string http(const HttpHead& head);
+  [[nodiscard]] bool answer(int socket, const std::string& text, bool& centred);
+  [[nodiscard]] InverseInventory inventory(bool centred);
+  void live();
+
+  StandInFaults faults_;
+  bool on_the_clock_;
+  PlantSettings settings_;
+  Socket service_, events_;
+  std::mutex mutex_;  ///< of what follows
+  VirtualPlant plant_;
+  std::int64_t lived_until_ns_ = 0;
+  double largest_N_ = 0.0;
+  Eigen::Vector3d last_N_ = Eigen::Vector3d::Zero();
+  std::string last_profile_;
+  InverseFormat last_format_ = InverseFormat::vector;
+  std::uint32_t buttons_ = 0;
+  bool gate_open_ = false, centred_ = false;
+  std::vector<int> listeners_;
+  std::atomic<int> forces_{0};
+  std::atomic<bool> ending_{false};
+  std::vector<std::thread> talks_;
+  std::thread accepting_;
+};
+
+namespace stand_in {
+
+inline const Eigen::Vector3d kCentre_m(0.0, -0.12, 0.15);
+
+inline void send_bytes(int socket, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (count > 0) {
+      bytes.remove_prefix(static_cast<std::size_t>(count));
+    } else if (errno != EAGAIN) {
+      return;
+    }
+  }
+}
+
+inline void send_text(int socket, std::string_view text) {
+  send_bytes(socket, frame_bytes(FrameKind::text, text));
+}
+
+}  // namespace stand_in
+
+inline StandInInverse::StandInInverse(const PlantSettings& plant, OperatorScript script,
+                                      bool on_the_clock, StandInFaults faults)
+    : faults_(std::move(faults)),
+      on_the_clock_(on_the_clock),
+      settings_(plant),
+      service_(listen_on_loopback(0)),
+      events_(listen_on_loopback(0)),
+      plant_(plant, std::move(script)),
+      lived_until_ns_(now_ns()),
+      accepting_([this] { accept_all(); }) {
+  plant_.await();
+}
+
+inline StandInInverse::~StandInInverse() {
+  ending_ = true;
+  accepting_.join();
+  for (std::thread& talk : talks_) talk.join();
+}
+
+inline void StandInInverse::begin() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  plant_.begin();
+}
+
+inline void StandInInverse::tell(const InverseEvent& event) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const int listener : listeners_) stand_in::send_text(listener, event_message(event));
+}
+
+inline void StandInInverse::press(std::uint32_t buttons) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  buttons_ = buttons;
+}
+
+inline double StandInInverse::largest_N() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return largest_N_;
+}
+
+inline Eigen::Vector3d StandInInverse::last_N() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return last_N_;
+}
+
+inline std::string StandInInverse::last_profile() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return last_profile_;
+}
+
+inline InverseFormat StandInInverse::last_format() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return last_format_;
+}
+
+inline void StandInInverse::accept_all() {
+  while (!ending_) {
+    pollfd wanted[] = {{service_.handle(), POLLIN, 0}, {events_.handle(), POLLIN, 0}};
+    if (::poll(wanted, 2, 10) <= 0) continue;
+    for (const bool events : {false, true}) {
+      if (wanted[events ? 1 : 0].revents == 0) continue;
+      Socket socket = accepted(events ? events_ : service_);
+      if (!socket.open()) continue;
+      talks_.emplace_back([this, events, s = std::make_shared<Socket>(std::move(socket))] {
+        talk(std::move(*s), events);
+      });
+    }
+  }
+}
+
+/// The plant catches up with the clock.
+inline void StandInInverse::live() {
+  const auto period_ns = static_cast<std::int64_t>(settings_.period_s * 1e9);
+  for (const std::int64_t now = now_ns(); on_the_clock_ && lived_until_ns_ + period_ns <= now;
+       lived_until_ns_ += period_ns) {
+    plant_.advance();
+  }
+}
+
+inline InverseInventory StandInInverse::inventory(bool centred) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  live();
+  InverseInventory all;
+  all.session = 7;
+  for (const std::string& id : faults_.devices) {
+    InverseDeviceEntry entry;
+    entry.id = id;
+    entry.type = "inverse3";
+    entry.simulated = faults_.simulated;
+    entry.settings.handedness = "left";
+    entry.settings.preset = centred ? kCentredPreset : "defaults";
+    entry.settings.filters_named = true;
+    entry.settings.force_gate_gain = gate_open_ ? faults_.gate_stays : 0.3;
+    entry.settings.damping = faults_.damping_stays;
+    entry.settings.mount_scale *= faults_.scale;
+    entry.state.position_m = plant_.measured_m();
+    if (!centred) entry.state.position_m += stand_in::kCentre_m;
+    all.devices.push_back(entry);
+  }
+  return all;
+}
+
+inline std::string StandInInverse::http(const HttpHead& head) {
+  const std::string path = head.start[1].substr(0, head.start[1].find('?'));
+  const bool old = faults_.version < "3.5";
+  if (path == (old ? "/3.0/version" : "/version")) {
+    return http_answer("200 OK", "application/json",
+                       fmt::format(R"({{"project_version":"{}"}})", faults_.version));
+  }
+  if (path == (old ? "/3.0/devices" : "/devices")) {
+    std::string text = inventory_message(inventory(centred_));
+    if (faults_.names_no_filters) {
+      const std::size_t at = text.find("\"filters\"");
+      text.replace(at, 9, "\"unnamed\"");
+    }
+    return http_answer("200 OK", "application/json", text);
+  }
+  return http_answer("404 Not Found", "text/plain", "no\n");
+}
+
+/// False: this connection is over.
+inline bool StandInInverse::answer(int socket, const std::string& text, bool& centred) {
+  using How = StandInFaults::How;
+  const InverseCommand command = parse_command(text, faults_.devices.at(0));
+  InverseState state;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (command.force_gate_gain) gate_open_ = true;
+    if (!command.preset.empty()) centred = centred_ = command.preset == kCentredPreset;
+    if (!command.profile.empty()) last_profile_ = command.profile;
+    live();
+    if (command.force_N) {
+      ++forces_;
+      last_format_ =
+          text.find("\"values\"") == text.npos ? InverseFormat::vector : InverseFormat::values;
+      last_N_ = *command.force_N;
+      largest_N_ = std::max(largest_N_, last_N_.norm());
+      (void)plant_.command(last_N_);
+      if (!on_the_clock_) plant_.advance();
+    }
+    state.position_m = plant_.measured_m();
+    if (!centred) state.position_m += stand_in::kCentre_m;
+    state.velocity_m_per_s = plant_.velocity_m_per_s();
+    state.force_N = last_N_;
+    state.has_grip = true;
+    state.buttons = buttons_;
+  }
+  std::string id = faults_.devices.at(0);
+  if (faults_.from > 0 && forces_ >= faults_.from) {
+    if (faults_.how == How::silence) return true;
+    if (faults_.how == How::close) return false;
+    if (faults_.how == How::garbage) {
+      stand_in::send_text(socket, R"({"inverse3": [{"device_id": )");
+      return true;
+    }
+    if (faults_.how == How::drop_every_third && forces_ % 3 == 0) return true;
+    if (faults_.how == How::other_device) id = "FFFF";
+  }
+  stand_in::send_text(socket, state_message(7, id, state, faults_.simulated));
+  return true;
+}
+
+inline void StandInInverse::talk(Socket socket, bool events) {
+  std::string head;
+  WebSocketReader reader(WebSocketSide::server, 65'536);
+  bool open = false, centred = false;
+  if (events && faults_.no_events) return;
+  while (!ending_) {
+    pollfd wanted{socket.handle(), POLLIN, 0};
+    if (::poll(&wanted, 1, 20) <= 0) continue;
+    char block[16'384];
+    const ssize_t count = ::recv(socket.handle(), block, sizeof block, 0);
+    if (count == 0 || (count < 0 && errno != EAGAIN)) break;
+    if (count < 0) continue;
+    const std::string_view bytes(block, static_cast<std::size_t>(count));
+    if (!open) {
+      head.append(bytes);
+      const auto request = parse_http_head(head);
+      if (!request) continue;
+      if (request->count("upgrade") == 0) {
+        stand_in::send_bytes(socket.handle(), http(*request));
+        break;
+      }
+      std::string upgrade = answer_upgrade(*request, events ? events_port() : port(), {}).bytes;
+      if (!faults_.wrong_accept.empty()) {
+        const std::size_t at = upgrade.find("Accept: ") + 8;
+        upgrade.replace(at, upgrade.find("\r\n", at) - at, faults_.wrong_accept);
+      }
+      stand_in::send_bytes(socket.handle(), upgrade);
+      open = true;
+      if (events) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        listeners_.push_back(socket.handle());
+      } else if (!faults_.no_inventory) {
+        stand_in::send_text(socket.handle(), inventory_message(inventory(false)));
+      }
+      continue;
+    }
+    reader.feed(bytes);
+    bool goes_on = true;
+    while (const auto message = reader.next()) {
+      if (message->kind == FrameKind::close) goes_on = false;
+      if (message->kind == FrameKind::text && !events) {
+        goes_on = answer(socket.handle(), message->payload, centred);
+      }
+      if (!goes_on) break;
+    }
+    if (!goes_on) break;
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::erase(listeners_, socket.handle());
+}
+
+}  // namespace tpm::test
