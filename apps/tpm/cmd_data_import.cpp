@@ -188,7 +188,7 @@ void print_json(const std::vector<Target>& targets, bool written) {
 void write_curves(const std::vector<Target>& targets) {
   for (const Target& target : targets) {
     const Json description = description_json(target.curve.description);
-    check_schema(description, "curve", target.csv.string());
+    (void)checked(description, curve_kind(), target.csv.string());
     write_file(target.csv, target.curve.csv);
     write_file(fs::path(target.csv).replace_extension(".json"), to_text(description));
   }

@@ -302,9 +302,9 @@ int run_hil(const RunChoice& choice, const Session& session) {
 
 void add_device_options(CLI::App& command, DeviceOptions& options) {
   command
-      .add_option(
-          "--device", options.choice.kind,
-          "virtual, replay, plugin, omega7, inverse3 or another device with a file in configs/devices")
+      .add_option("--device", options.choice.kind,
+                  "virtual, replay, plugin, omega7, inverse3 or another device with a file in "
+                  "configs/devices")
       ->check([](const std::string& kind) {
         if (kind == "plugin") return std::string();
         std::vector<std::string> kinds = device_kinds();

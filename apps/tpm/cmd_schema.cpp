@@ -5,15 +5,23 @@
 #include <memory>
 
 #include "command.hpp"
+#include "tpm/accuracy/show/benchmark_report.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/nearest_word.hpp"
+#include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/import/description.hpp"
 #include "tpm/files/keys/file_kind.hpp"
+#include "tpm/fit/design/design.hpp"
+#include "tpm/fit/likelihood/fit_keys.hpp"
 #include "tpm/haptics/device/device_keys.hpp"
+#include "tpm/haptics/session/recording_keys.hpp"
 #include "tpm/haptics/session/session_keys.hpp"
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
+#include "tpm/paper/claims/claims.hpp"
 #include "tpm/paper/organ_study.hpp"
+#include "tpm/sweep/sweep_keys.hpp"
 
 namespace tpm::app {
 namespace {
@@ -25,7 +33,21 @@ struct SchemaOptions {
 
 /// The kinds of files whose keys are declared in the library.
 std::vector<const FileKind*> declared_kinds() {
-  return {&device_kind(), &session_kind(), &organ_study_kind(), &protocol_kind(), &scene_kind()};
+  return {&benchmark_kind(),
+          &claims_kind(),
+          &curve_kind(),
+          &design_kind(),
+          &device_kind(),
+          &fit_kind(),
+          &fit_tables_kind(),
+          &law_kind(),
+          &session_kind(),
+          &recording_closing_kind(),
+          &recording_header_kind(),
+          &organ_study_kind(),
+          &protocol_kind(),
+          &scene_kind(),
+          &sweep_kind()};
 }
 
 constexpr std::string_view kEnding = ".schema.json";

@@ -11,7 +11,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
-#include "tpm/files/renamed_names.hpp"
+#include "tpm/fit/likelihood/fit_keys.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpm/sweep/best_cells.hpp"
 #include "tpm/sweep/show/sweep_convergence_report.hpp"
@@ -128,7 +128,7 @@ int best(const SweepViewChoice& choice, const Session& session) {
     throw Error(ExitCode::usage, "--fit", "alone", "--fit FIT.json with --start START.json");
   }
   if (!choice.fit.empty()) {
-    Json fit = checked(read_json(choice.fit), "fit", choice.fit);
+    Json fit = checked(read_json(choice.fit), fit_kind(), choice.fit);
     fit = fit_from_cell(std::move(fit), cells.front(), choice.fit);
     move_scene(fit, choice.fit, choice.start);
     write_file(choice.start, to_text(fit));

@@ -103,9 +103,7 @@ int run_command(const TableOptions& options) {
   const TableRequest request = request_of(options);
   const auto path = paper_claims_path();
   const std::string name = path.filename().string();
-  const Json claims = read_json(path);
-  check_schema(claims, "claims", name);
-  const auto printed = read_printed_tables(claims, name);
+  const auto printed = read_printed_tables(read_json(path), name);
   const std::string text = rendered(make_tables(request, printed), options.format);
   warn_of_depths(request);
   deliver(text, options.output);

@@ -6,6 +6,7 @@
 #include "refusal.hpp"
 #include "tpm/files/keys/block.hpp"
 #include "tpm/files/keys/file_kind.hpp"
+#include "tpm/files/keys/more_types.hpp"
 
 using namespace tpm;
 using namespace tpm::files;
@@ -156,4 +157,46 @@ TEST_CASE("programs may put numbers in SI where files have quantities", "[keys]"
   const Json filled{{"radius", 0.003}};
   CHECK_THROWS(needle_block().read(filled, DocumentPlace{"n"}));
   CHECK(needle_block().read(filled, DocumentPlace{"n"}, Numbers::also_si).radius_m == 0.003);
+}
+
+TEST_CASE(
+    "forms without members: texts with a pattern, null, other keys, kinds by a key of their own",
+    "[keys]") {
+  Form by_key{.type = Form::Type::kinds, .name = "place"};
+  by_key.by = "";
+  by_key.kinds = {{"at", "", {required_key("at", quantity(Dimension::time).form, "when")}},
+                  {"over",
+                   "",
+                   {required_key("over", list_form(number().form, 1), "when"),
+                    optional_key("step", or_null(number().form), "between them")}}};
+  const FormPtr whole_form = object_form(
+      "thing", "",
+      {required_key("name", text_like("^[a-z]+$", "small letters", "abc").form, "of it"),
+       optional_key("place", shared(std::move(by_key)), "when"),
+       optional_key("more", with_others(object_form("", "", {required_key("a", flag().form, "")})),
+                    "whatever")});
+  const FileKind kind{"thing", "A thing", "", whole_form};
+  const auto answer = [&](const char* document) {
+    return test::refusal_of([&] { (void)checked(parse_json(document, "t"), kind, "t"); });
+  };
+  for (const char* good : {R"({"name": "abc"})", R"({"name": "a", "place": {"at": "1 s"}})",
+                           R"({"name": "a", "place": {"over": [1], "step": null}})",
+                           R"({"name": "a", "more": {"a": true, "b": 7}})"}) {
+    CAPTURE(good);
+    CHECK(answer(good).empty());
+  }
+  CHECK_THAT(answer(R"({"name": "Abc"})"), Contains("key /name: 'Abc'; expected small letters"));
+  CHECK_THAT(answer(R"({"name": "a", "place": {}})"),
+             Contains("key /place: has no key that says what it is; expected one of at, over"));
+  CHECK_THAT(answer(R"({"name": "a", "place": {"at": "1 s", "step": 1}})"),
+             Contains("key /place/step: stands beside 'at'") && Contains("step goes with over"));
+  CHECK_THAT(answer(R"({"name": "a", "place": {"over": [1], "step": "x"}})"),
+             Contains("key /place/step: is of the wrong type"));
+  CHECK_THAT(answer(R"({"name": "a", "more": {"b": 7}})"), Contains("key /more/a: is missing"));
+  const Json schema = json_schema(kind);
+  CHECK(schema["properties"]["name"]["pattern"] == "^[a-z]+$");
+  CHECK(schema["definitions"]["place"]["oneOf"][0]["required"] == Json::array({"at"}));
+  // A text of any length is refused without a matcher that calls itself for each byte.
+  const std::string longest = R"({"name": ")" + std::string(10'000'000, 'a') + R"("})";
+  CHECK_THAT(answer(longest.c_str()), Contains("expected small letters"));
 }

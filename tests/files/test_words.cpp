@@ -18,9 +18,15 @@
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/import/description.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/files/renamed_names.hpp"
+#include "tpm/fit/design/design.hpp"
+#include "tpm/fit/likelihood/fit_keys.hpp"
+#include "tpm/haptics/session/session_keys.hpp"
+#include "tpm/organ/scene/protocol_file.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
+#include "tpm/sweep/sweep_keys.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
@@ -156,22 +162,25 @@ TEST_CASE(
 "response": "contact_force", "reference_m": 0.004, "parameters": {"k_inf_N_per_m": 10},
 "provenance": "assumed"})");
   CHECK(law_from_json(law, "f").values.front() == 10.0);
-  CHECK_FALSE(checked(law, "law", "f").contains("$schema"));
-  for (const auto& [schema, file] :
-       {std::pair{"sweep", "configs/sweep_x_depth.json"}, {"hil", "configs/hil_law.json"}}) {
+  CHECK_FALSE(checked(law, law_kind(), "f").contains("$schema"));
+  for (const auto& [kind, file] : {std::pair{&sweep::sweep_kind(), "configs/sweep_x_depth.json"},
+                                   {&haptics::session_kind(), "configs/hil_law.json"}}) {
     CAPTURE(file);
     const auto path = std::filesystem::path(TPM_TEST_SOURCE_DIR) / file;
     const Json json = with_schema(read_file(path));
-    CHECK(checked(json, schema, "f") == checked(read_json(path), schema, "f"));
+    CHECK(checked(json, *kind, "f") == checked(read_json(path), *kind, "f"));
   }
-  for (const char* schema : {"benchmark", "claims", "curve", "design", "fit", "fit_tables", "hil",
-                             "law", "organ_experiments", "protocol", "scene", "sweep"}) {
-    CAPTURE(schema);
+  for (const FileKind* kind :
+       {&curve_kind(), &fit::design_kind(), &fit::fit_kind(), &fit::fit_tables_kind(),
+        &haptics::session_kind(), &law_kind(), &organ::protocol_kind(), &organ::scene_kind(),
+        &sweep::sweep_kind()}) {
+    CAPTURE(kind->name);
     const Json only{{"$schema", "x"}};
-    CHECK_THAT(test::refusal_of([&] { check_schema(only, schema, "f"); }),
+    CHECK_THAT(test::refusal_of([&] { (void)checked(only, *kind, "f"); }),
                !Contains("unknown key"));
     const Json wrong{{"$schema", 1}};
-    CHECK_THAT(test::refusal_of([&] { check_schema(wrong, schema, "f"); }), Contains("f: key /"));
+    CHECK_THAT(test::refusal_of([&] { (void)checked(wrong, *kind, "f"); }),
+               Contains("f: key /$schema: is of the wrong type"));
   }
 }
 

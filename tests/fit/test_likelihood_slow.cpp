@@ -517,7 +517,7 @@ TEST_CASE("what tables hold and cannot be used is refused by its name and line")
   refuse("parameters.csv", "eta1,log", "E,log", "'E' stands twice");
   refuse("parameters.csv", "parameterScale", "objectivePriorType", "is not supported");
   refuse("conditions.csv", "protocol", "treatment", "column 'treatment': is not supported");
-  refuse("problem.json", "\"starts\"", "\"data\": [], \"starts\"", "beside tables");
+  refuse("problem.json", "\"starts\"", "\"data\": [], \"starts\"", "key /data: unknown key");
 }
 
 TEST_CASE("a noise formula may be a number, a multiple of the observable or a parameter") {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hil_scenes.hpp"
+#include "odd_documents.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
@@ -16,6 +17,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/recording_export.hpp"
+#include "tpm/haptics/session/recording_keys.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 #include "tpm/haptics/show/view_recording.hpp"
 #include "tpmkit/error.hpp"
@@ -172,6 +174,13 @@ Json mutated(Json json, Random& random, std::string& what) {
     parent.erase(static_cast<std::size_t>(std::stoul(place.back())));
   }
   return json;
+}
+
+TEST_CASE("schema and reader of a recording's header and closing record agree on odd ones",
+          "[keys]") {
+  test::compare_schema_and_form(recording_header_kind(),
+                                {whole_header(), whole_header(law_session())}, 300);
+  test::compare_schema_and_form(recording_closing_kind(), {whole_closing()}, 200);
 }
 
 TEST_CASE("a whole recording is read, its header that of the writer") {

@@ -378,11 +378,13 @@ TEST_CASE("a load that nothing carries is refused where the tissue gives way", "
 TEST_CASE("lists of a session and of a design's candidates are protocols of the one parser") {
   const DocumentPlace place{"f.json"};
   const auto parsed = [&](const std::string& text) {
-    return parse_protocol_lists(parse_json(text, "f.json"), place, ProtocolKind::ramp_hold,
-                                {{"rate", "rates"}}, {"rest"});
+    const Block<ProtocolLists> block(
+        "lists", "", protocol_list_keys(ProtocolKind::ramp_hold, {{"rate", "rates"}}));
+    return combinations(ProtocolKind::ramp_hold, block.read(parse_json(text, "f.json"), place),
+                        place);
   };
-  const std::vector<ProtocolBlock> all = parsed(
-      R"({"depth": ["1 mm", "2 mm"], "rates": ["1 mm/s", "4 mm/s"], "hold": "3 s", "rest": "1 s"})");
+  const std::vector<ProtocolBlock> all =
+      parsed(R"({"depth": ["1 mm", "2 mm"], "rates": ["1 mm/s", "4 mm/s"], "hold": "3 s"})");
   REQUIRE(all.size() == 4);
   for (std::size_t i = 0; i < 4; ++i) {
     CHECK(*all[i].depth_m == Approx(i < 2 ? 1e-3 : 2e-3));
@@ -392,15 +394,15 @@ TEST_CASE("lists of a session and of a design's candidates are protocols of the 
   struct Case {
     const char *text, *expected;
   };
-  for (const Case& c :
-       {Case{R"({"depth": ["1 mm", "0 mm"], "rates": "1 mm/s", "hold": "3 s"})",
-             "f.json: key /depth/1: 0 m; expected above 0 m"},
-        Case{R"({"depth": "1 mm", "rates": ["1 mm"], "hold": "3 s"})",
-             "f.json: key /rates/0: 'mm' is a unit of length"},
-        Case{R"({"depth": "1 mm", "hold": "3 s"})",
-             "key /rates: is missing; expected 'ramp_hold' needs depth, rates, hold"},
-        Case{R"({"depth": "1 mm", "rate": "1 mm/s", "hold": "3 s"})",
-             "key /rate: is no key of the kind 'ramp_hold'; expected depth, rates, hold, rest"}}) {
+  for (const Case& c : {Case{R"({"depth": ["1 mm", "0 mm"], "rates": "1 mm/s", "hold": "3 s"})",
+                             "f.json: key /depth/1: 0 m; expected above 0 m"},
+                        Case{R"({"depth": "1 mm", "rates": ["1 mm"], "hold": "3 s"})",
+                             "f.json: key /rates/0: 'mm' is a unit of length"},
+                        Case{R"({"depth": "1 mm", "hold": "3 s"})",
+                             "key /rates: is missing; expected speed of the ramp"},
+                        Case{R"({"depth": "1 mm", "rate": "1 mm/s", "hold": "3 s"})",
+                             "key /rate: unknown key (did you mean 'rates'?); expected one of "
+                             "depth, rates, hold"}}) {
     CHECK_THAT(refusal_of([&] { (void)parsed(c.text); }), Contains(c.expected));
   }
 }

@@ -25,10 +25,4 @@ struct DocumentPlace {
 [[nodiscard]] double positive_at(const Json& object, std::string_view key, Dimension dimension,
                                  const DocumentPlace& place);
 
-/// Throws unless a block has the keys that its kind needs, and no others but `kind` and those
-/// allowed.
-void require_keys_of(const Json& block, std::string_view kind,
-                     const std::vector<std::string_view>& needed,
-                     const std::vector<std::string_view>& allowed, const DocumentPlace& place);
-
 }  // namespace tpm::files

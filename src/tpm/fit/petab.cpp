@@ -9,7 +9,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/delimited.hpp"
-#include "tpm/files/renamed_names.hpp"
+#include "tpm/fit/likelihood/fit_keys.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -265,16 +265,12 @@ void add_measurements(const Table& measurements, const Table& conditions, const 
 }
 
 FitProblem parse_fit_tables(const Json& written, const fs::path& path) {
-  const Json problem = checked(written, "fit_tables", path.string());
+  const Json problem = checked(written, fit_tables_kind(), path.string());
   const auto file = [&](const char* key) {
     return path.parent_path() / problem.at(key).get<std::string>();
   };
   Json document = Json::object();
   for (const auto& [key, value] : problem.items()) {
-    if (key == "parameters" || key == "fixed" || key == "data") {
-      throw bad_input(fmt::format("{}: key /{}", path.string(), key), "beside tables",
-                      "them in the tables");
-    }
     if (!key.ends_with("_file")) document[key] = value;
   }
   add_parameters(read_table(file("parameter_file"),

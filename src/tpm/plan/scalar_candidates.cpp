@@ -2,6 +2,7 @@
 // Models of the contact alone: the element, linear and with two static curves.
 #include <fmt/format.h>
 
+#include "tpm/organ/scene/exponentials.hpp"
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/plan/scalar_contact.hpp"
 #include "tpm/plan/scalar_run.hpp"
@@ -175,8 +176,9 @@ class CurvesCandidate final : public ScalarCandidate {
 
 PlanModels linear_candidates() {
   PlanModels models;
-  for (const int branches : {1, 2, 3})
+  for (int branches = 1; branches <= most_exponentials("linear"); ++branches) {
     models.push_back(std::make_unique<LinearCandidate>(branches));
+  }
   return models;
 }
 
@@ -188,7 +190,9 @@ PlanModels element_candidates() {
 
 PlanModels curves_candidates() {
   PlanModels models;
-  for (const int branches : {1, 2}) models.push_back(std::make_unique<CurvesCandidate>(branches));
+  for (int branches = 1; branches <= most_exponentials("curves"); ++branches) {
+    models.push_back(std::make_unique<CurvesCandidate>(branches));
+  }
   return models;
 }
 

@@ -14,6 +14,7 @@
 #include "tpm/files/renamed_names.hpp"
 #include "tpm/fit/expression/expression.hpp"
 #include "tpm/sweep/sweep.hpp"
+#include "tpm/sweep/sweep_keys.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
@@ -84,10 +85,6 @@ class AxisReader {
 
   void read(const Json& axis) {
     const DocumentPlace here = place_.key(std::to_string(sweep_.axes.size()));
-    const auto has = [&](const char* key) { return axis.contains(key) ? 1 : 0; };
-    if (has("parameter") + has("together") + has("samples") != 1) {
-      throw bad_input(here.where, "no axis", "one of 'parameter', 'together' and 'samples'");
-    }
     if (axis.contains("parameter")) return single(axis, here);
     if (axis.contains("samples")) return sampled(axis, here);
     together(axis, here);
@@ -106,13 +103,11 @@ class AxisReader {
 
   /// Several parameters with a list each, which go on together.
   void together(const Json& axis, const DocumentPlace& here) {
-    only(axis, {"together", "name"}, here);
     std::uint64_t count = 0;
     const DocumentPlace lists = here.key("together");
     for (const auto& [target, object] : axis.at("together").items()) {
       const DocumentPlace at = lists.key(target);
       const Dimension dimension = sweep_.model->dimension_of(target, at.where);
-      only(object, {"values", "name"}, at);
       CountedValues values = parse_values(without(object, {"name"}), dimension, at);
       if (count != 0 && values.count != count) {
         throw bad_input(at.where, fmt::format("{} values beside {}", values.count, count),
@@ -126,17 +121,12 @@ class AxisReader {
 
   /// Points in the box between the ends of several parameters.
   void sampled(const Json& axis, const DocumentPlace& here) {
-    only(axis, {"samples", "name", "count", "replicates", "seed", "parameters"}, here);
-    for (const char* key : {"count", "parameters"}) {
-      if (!axis.contains(key)) throw bad_input(here.where, fmt::format("no '{}'", key), "one");
-    }
     const Json& parameters = axis.at("parameters");
     const SampledPoints points = parse_points(axis, static_cast<int>(parameters.size()), here);
     add_axis(axis.value("name", "sample"), points.count, here);
     int dimension_of_cube = 0;
     for (const auto& [target, object] : parameters.items()) {
       const DocumentPlace at = here.key("parameters").key(target);
-      only(object, {"from", "to", "scale", "name"}, at);
       const Dimension dimension = sweep_.model->dimension_of(target, at.where);
       const SweepRange range = parse_range(object, dimension, at);
       add_parameter(
@@ -152,14 +142,6 @@ class AxisReader {
     Json rest = object;
     for (const char* key : keys) rest.erase(key);
     return rest;
-  }
-
-  static void only(const Json& object, const std::set<std::string>& keys,
-                   const DocumentPlace& place) {
-    for (const auto& [key, value] : object.items()) {
-      if (keys.contains(key)) continue;
-      throw bad_input(place.key(key).where, "does not belong to this kind of axis", "");
-    }
   }
 
   void add_axis(const std::string& name, std::uint64_t size, const DocumentPlace& here) {
@@ -190,14 +172,9 @@ class AxisReader {
   std::set<std::string> names_, targets_;
 };
 
-void read_formulas(const Json& outputs, Sweep& sweep, const DocumentPlace& place) {
-  for (std::size_t i = 0; i < outputs.size(); ++i) {
-    const Json& output = outputs[i];
+void read_formulas(const Json& outputs, Sweep& sweep) {
+  for (const Json& output : outputs) {
     if (!output.is_object() || !output.contains("formula")) continue;
-    const DocumentPlace here = place.key(std::to_string(i));
-    if (output.size() != 2 || !output.contains("name") || !output.at("formula").is_string()) {
-      throw bad_input(here.where, "no formula", "{\"formula\": TEXT, \"name\": NAME}");
-    }
     sweep.formulas.push_back(
         {output.at("name").get<std::string>(), output.at("formula").get<std::string>()});
     sweep.variables.push_back({sweep.formulas.back().name, "", sweep.formulas.back().text, {}});
@@ -263,28 +240,13 @@ void read_axes(const Json& document, Sweep& sweep, const DocumentPlace& place) {
   }
 }
 
-/// Each model has blocks of its own.
-void require_blocks_of_model(const Json& document, const DocumentPlace& place) {
-  const bool organ = document.at("model").get<std::string>() == "organ";
-  for (const char* key : {"material", "indentation", "creep"}) {
-    if (!organ || !document.contains(key)) continue;
-    throw bad_input(place.key(key).where, "belongs to the single contact", "keys of the scene");
-  }
-  for (const char* key : {"tolerance", "integrator"}) {
-    if (organ || !document.contains(key)) continue;
-    throw bad_input(place.key(key).where, "belongs to the model 'organ'",
-                    "nothing of the kind: the single contact is a closed form");
-  }
-  if (organ == document.contains("scene")) return;
-  throw bad_input(place.key("scene").where, organ ? "is missing" : "belongs to the model 'organ'",
-                  organ ? "a scene's file, or a scene" : "");
-}
-
 /// The document before former names became the current ones, its scene put in: how a log stands
 /// for it that was begun when they were current.
-Json as_written(Json written, const std::filesystem::path& folder) {
+Json as_written(const Json& with_schema, const std::filesystem::path& folder) {
+  Json written = without_schema_key(with_schema);
   if (written.contains("scene") && written.at("scene").is_string()) {
-    written["scene"] = read_json(folder / written.at("scene").get<std::string>());
+    written["scene"] =
+        without_schema_key(read_json(folder / written.at("scene").get<std::string>()));
   }
   return written;
 }
@@ -293,7 +255,8 @@ Json as_written(Json written, const std::filesystem::path& folder) {
 std::filesystem::path put_scene_in(Json& document, const std::filesystem::path& folder) {
   if (!document.contains("scene") || !document.at("scene").is_string()) return folder;
   const std::filesystem::path file = folder / document.at("scene").get<std::string>();
-  document.at("scene") = with_current_names(read_json(file), "scene", file.string());
+  document.at("scene") =
+      with_current_names(without_schema_key(read_json(file)), "scene", file.string());
   return file.parent_path();
 }
 
@@ -352,9 +315,8 @@ std::size_t Sweep::width() const {
 
 Sweep parse_sweep(const Json& written, std::string_view where,
                   const std::filesystem::path& folder) {
-  Json document = checked(written, "sweep", where);
+  Json document = checked(written, sweep_kind(), where);
   const DocumentPlace place{std::string(where)};
-  require_blocks_of_model(document, place);
   const std::filesystem::path scene_folder = put_scene_in(document, folder);
   Sweep sweep;
   sweep.title = document.value("title", "");
@@ -363,7 +325,7 @@ Sweep parse_sweep(const Json& written, std::string_view where,
                                            : single_contact_model(document, where);
   read_axes(document, sweep, place);
   sweep.variables = sweep.model->variables();
-  read_formulas(document.at("outputs"), sweep, place.key("outputs"));
+  read_formulas(document.at("outputs"), sweep);
   require_own_names(sweep, place.key("axes"), place.key("outputs"));
   for (const Json& skip : document.value("skip", Json::array())) {
     const auto when = skip.at("when").get<std::string>();

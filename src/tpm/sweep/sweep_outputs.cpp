@@ -16,15 +16,9 @@ namespace {
 
 using Kind = SweepOutput::Kind;
 
-enum class When { fixed, at, over };
+using When = OutputForm::When;
 
-struct OutputWord {
-  Kind meaning;
-  std::string_view text, unit, words;
-  When when;
-};
-
-constexpr std::array<OutputWord, 9> kOutputWords{{
+constexpr std::array<OutputForm, 9> kOutputWords{{
     {Kind::lambda1, "lambda1", "Pa", "lambda1 at the imposed depth", When::fixed},
     {Kind::peak_force, "peak_force", "N", "largest force of the indentation", When::fixed},
     {Kind::end_force, "end_force", "N", "force at the end of the indentation", When::fixed},
@@ -45,31 +39,15 @@ double quantity(const Json& value, Dimension dimension, const DocumentPlace& pla
                         place.where);
 }
 
-double time_of(const Json& text, const DocumentPlace& place) {
-  const double time_s = parse_quantity(text.get<std::string>(), Dimension::time, place.where);
-  if (time_s >= 0.0) return time_s;
-  throw bad_input(place.where, "before the start", "a time of at least 0 s");
-}
-
-SweepOutput plain_output(const std::string& word, const DocumentPlace& place) {
-  const Kind kind = parse_word(kOutputWords, "output", word, place.where);
-  const OutputWord& entry = entry_of(kOutputWords, kind);
-  if (entry.when != When::fixed) {
-    throw bad_input(place.where, fmt::format("'{}' without a time", word),
-                    fmt::format("{{\"{}\": ..., \"name\": ...}}", word));
-  }
-  return {kind, {word, std::string(entry.unit), std::string(entry.words), {}}, 0.0};
+SweepOutput plain_output(const std::string& word) {
+  const OutputForm& entry = *find_entry(kOutputWords, word);
+  return {entry.meaning, {word, std::string(entry.unit), std::string(entry.words), {}}, 0.0};
 }
 
 SweepOutput timed_output(const Json& object, const DocumentPlace& place) {
   const auto entry = std::find_if(kOutputWords.begin(), kOutputWords.end(), [&](const auto& word) {
     return word.when != When::fixed && object.contains(std::string(word.text));
   });
-  if (entry == kOutputWords.end() || object.size() != 2 || !object.contains("name")) {
-    throw bad_input(place.where, "no output",
-                    "a name, and one of force_at, force_over, creep_depth_at, creep_depth_over "
-                    "and formula");
-  }
   const std::string key(entry->text);
   const DocumentPlace here = place.key(key);
   SweepOutput output{entry->meaning,
@@ -79,13 +57,8 @@ SweepOutput timed_output(const Json& object, const DocumentPlace& place) {
                       {}},
                      0.0};
   const Json& when = object.at(key);
-  if (when.is_string() != (entry->when == When::at)) {
-    throw bad_input(here.where, "of another type",
-                    entry->when == When::at ? "a time such as \"1 s\""
-                                            : "{\"from\", \"to\", \"count\"} or {\"values\"}");
-  }
   if (entry->when == When::at) {
-    output.time_s = time_of(when, here);
+    output.time_s = quantity(when, Dimension::time, here);
     return output;
   }
   const CountedValues places = parse_values(when, Dimension::time, here);
@@ -94,21 +67,24 @@ SweepOutput timed_output(const Json& object, const DocumentPlace& place) {
     throw bad_input(here.where, "too many times", fmt::format("at most {}", kMostTimes));
   }
   for (std::uint64_t i = 0; i < places.count; ++i) times.push_back(places.values.at(i));
-  if (times.front() < 0.0 ||
-      std::adjacent_find(times.begin(), times.end(), std::greater_equal<>()) != times.end()) {
-    throw bad_input(here.where, "times that do not rise from 0 s on", "rising times");
+  if (std::adjacent_find(times.begin(), times.end(), std::greater_equal<>()) != times.end()) {
+    throw bad_input(here.where, "times that do not rise", "rising times");
   }
   return output;
 }
 
 }  // namespace
 
+std::span<const OutputForm> output_forms() {
+  return kOutputWords;
+}
+
 std::vector<SweepOutput> parse_sweep_outputs(const Json& list, const DocumentPlace& place) {
   std::vector<SweepOutput> outputs;
   for (std::size_t i = 0; i < list.size(); ++i) {
     const DocumentPlace here = place.key(std::to_string(i));
     if (list[i].is_object() && list[i].contains("formula")) continue;
-    outputs.push_back(list[i].is_string() ? plain_output(list[i].get<std::string>(), here)
+    outputs.push_back(list[i].is_string() ? plain_output(list[i].get<std::string>())
                                           : timed_output(list[i], here));
   }
   return outputs;

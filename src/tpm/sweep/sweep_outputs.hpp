@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,6 +33,15 @@ struct SweepOutput {
            kind == Kind::creep_depth_at || kind == Kind::creep_depth_over;
   }
 };
+
+/// How a file says an output.
+struct OutputForm {
+  enum class When { fixed, at, over };
+  SweepOutput::Kind meaning;
+  std::string_view text, unit, words;
+  When when;
+};
+[[nodiscard]] std::span<const OutputForm> output_forms();
 
 /// Reads the block `outputs`, without its formulas. Throws Error(bad_input).
 [[nodiscard]] std::vector<SweepOutput> parse_sweep_outputs(const Json& list,

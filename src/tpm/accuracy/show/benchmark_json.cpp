@@ -11,6 +11,7 @@
 #include "tpm/accuracy/show/benchmark_report.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
+#include "tpm/files/keys/more_types.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::accuracy {
@@ -202,16 +203,107 @@ BenchmarkRecord read_record(const Json& json) {
   return record;
 }
 
+FormPtr positive_form() {
+  return number(kZeroOrMore).form;
+}
+
+FormPtr counted_form(double least = 0.0) {
+  return whole<std::int64_t>(least, 9007199254740991.0).form;
+}
+
+KeyForm number_key(const char* name, const char* sentence) {
+  return required_key(name, positive_form(), sentence);
+}
+
+KeyForm maybe_number_key(const char* name, const char* sentence) {
+  return optional_key(name, positive_form(), sentence);
+}
+
+KeyForm text_key(const char* name, const char* sentence) {
+  return required_key(name, text().form, sentence);
+}
+
+FormPtr point_form() {
+  const FormPtr claims = object_form("claimed", "what a method claimed of its error",
+                                     {number_key("largest_error", "claimed"),
+                                      number_key("median_over_true", "claimed over true error"),
+                                      number_key("share_covered", "of instants")});
+  const FormPtr wall = object_form("wall", "wall time of a run",
+                                   {number_key("median", "s"), number_key("lower_quartile", "s"),
+                                    number_key("upper_quartile", "s"), number_key("least", "s")});
+  const FormPtr step_wall =
+      object_form("step_wall", "wall time of a step",
+                  {number_key("median", "s"), number_key("p99", "s"), number_key("largest", "s")});
+  return object_form("point", "a method at a setting",
+                     {text_key("method", "its name"),
+                      optional_key("variant", text().form, "of the method"),
+                      maybe_number_key("step_s", "of the method"),
+                      maybe_number_key("tolerance", "the setting"),
+                      maybe_number_key("relaxation_time_s", "the setting"),
+                      text_key("end", "how the run ended"),
+                      optional_key("reason", text().form, "why it ended early"),
+                      maybe_number_key("error", "against the reference"),
+                      optional_key("below_floor", flag().form, "the reference is no better"),
+                      required_key("end_time_s", number().form, "that was reached"),
+                      required_key("steps", counted_form(), "taken"),
+                      required_key("rates", counted_form(), "evaluations"),
+                      required_key("factorisations", counted_form(), "of matrices"),
+                      required_key("solves", counted_form(), "of linear systems"),
+                      optional_key("claims", claims, "of its own error"),
+                      optional_key("repeats", whole<int>(1, 1e6).form, "measurements"),
+                      optional_key("runs_per_repeat", counted_form(1), "in each"),
+                      optional_key("wall_s", wall, "wall time of a run"),
+                      optional_key("step_wall_s", step_wall, "wall time of a step"),
+                      maybe_number_key("build_s", "before the first step")});
+}
+
+FormPtr problem_form() {
+  const FormPtr target = object_form(
+      "target", "a point of a curve",
+      {text_key("curve", "which"), number_key("error", "of it"),
+       number_key("step_median_s", "wall time"), maybe_number_key("step_p99_s", "wall time"),
+       maybe_number_key("build_s", "before the first step")});
+  const FormPtr reference = object_form(
+      "benchmark_reference", "what errors are relative to",
+      {text_key("first", "in words"), text_key("first_method", "of the first"),
+       text_key("second", "in words"), text_key("second_method", "of the second"),
+       required_key("exact", flag().form, "a closed form"), number_key("peak", "of the response"),
+       text_key("peak_unit", "its unit"), number_key("agreement", "of the two"),
+       number_key("floor", "below which errors say nothing")});
+  return object_form(
+      "problem", "a named problem",
+      {required_key(
+           "name",
+           text_like("^[a-z0-9_]+$", "a name of small letters, digits and _", "bond_paper").form,
+           "of the problem"),
+       text_key("title", "in a line"), text_key("text", "in words"),
+       text_key("response", "what is compared"), number_key("simulated_s", "time"),
+       maybe_number_key("relaxation_time_s", "of the tissue"),
+       optional_key("targets", list_form(target, 0), "other points"),
+       required_key("reference", reference, "what errors are relative to"),
+       required_key("points", list_form(point_form(), 0), "methods at their settings"),
+       optional_key("run", map_form(any("").form), "when and where it was measured")});
+}
+
 /// Reads what to_json wrote, for a run that goes on from it: of references only words and numbers
 /// are there, not their responses.
 /// Throws Error(input) with the place in the file where it is not what to_json writes.
 BenchmarkRecord read_benchmark(const std::filesystem::path& file) {
-  const Json json = read_json(file);
-  check_schema(json, "benchmark", file.string());
-  return read_record(json);
+  return read_record(checked(read_json(file), benchmark_kind(), file.string()));
 }
 
 }  // namespace
+
+const FileKind& benchmark_kind() {
+  static const FileKind kind{
+      "benchmark", "What tpm accuracy benchmark measured",
+      "Written by tpm accuracy benchmark, read by --keep",
+      object_form("benchmark", "",
+                  {required_key("timing", flag().form, "times were measured"),
+                   optional_key("repeats", whole<int>(1, 1e6).form, "measurements of each run"),
+                   required_key("problems", list_form(problem_form(), 0), "in their order")})};
+  return kind;
+}
 
 Json to_json(const BenchmarkRecord& record) {
   Json json{{"timing", record.options.timing}};

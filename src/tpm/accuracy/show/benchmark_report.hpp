@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/accuracy/runner.hpp"
+#include "tpm/files/keys/file_kind.hpp"
 #include "tpm/show/document.hpp"
 #include "tpm/show/figure.hpp"
 
@@ -23,6 +24,9 @@ struct BenchmarkRecord {
 
 /// The same for a program (docs/benchmark_files.md lists the keys).
 [[nodiscard]] Json to_json(const BenchmarkRecord& record);
+
+/// What such a record may hold.
+[[nodiscard]] const FileKind& benchmark_kind();
 
 /// The problems that are there already, and what has to be run to have them all.
 struct KeptBenchmark {

@@ -275,7 +275,7 @@ std::vector<std::string> stability_sentences(const StabilityStudy& study) {
                                     percent(furthest)));
   }
   for (const StabilityLimit& l : study.limits) {
-    if (l.problem.find("paper") == std::string::npos) continue;
+    if (!l.at_papers_eta1) continue;
     sentences.push_back(fmt::format("At the paper's eta1 {} holds above {} Hz (theory {} Hz).",
                                     step_rule_name(l.rule), significant(1.0 / l.found_s, 4),
                                     significant(1.0 / l.theory_s, 4)));

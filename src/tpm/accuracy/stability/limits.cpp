@@ -48,7 +48,7 @@ bool run_fails(const MethodProblem& problem, StepRule rule, double step_s) {
 void add_limit(std::vector<StabilityLimit>& limits, std::string problem, StepRule rule,
                std::string theory, double theory_s, const std::function<bool(double)>& fails) {
   limits.push_back(
-      {std::move(problem), rule, std::move(theory), theory_s, bisected(theory_s, fails)});
+      {std::move(problem), rule, std::move(theory), theory_s, bisected(theory_s, fails), false});
 }
 
 constexpr double kRestSteps = 4000.0;
@@ -69,6 +69,7 @@ void add_rest_limits(std::vector<StabilityLimit>& limits) {
                 return run_fails(*element_problem(paper, step_and_hold(0.004, kRestSteps * h)), r,
                                  h);
               });
+    limits.back().at_papers_eta1 = true;
     add_limit(limits, "element with tension, tau = 0.1 s, 0.3 N at once", r,
               std::string(factor) + " tau/(1 - g/(k + tension'))",
               *stable_step_s(r, linear_element(slow, depth)), [&](double h) {

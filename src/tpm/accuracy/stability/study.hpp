@@ -34,6 +34,7 @@ struct StabilityLimit {
   std::string theory;  ///< its formula
   double theory_s = 0.0;
   double found_s = 0.0;
+  bool at_papers_eta1 = false;
   [[nodiscard]] double ratio() const { return found_s / theory_s; }
 };
 

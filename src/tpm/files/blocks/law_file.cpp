@@ -7,16 +7,16 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
+#include "tpm/data/curve_words.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/files/renamed_names.hpp"
+#include "tpm/files/keys/more_types.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
 namespace tpm {
 using namespace base;
-using namespace files;
-
+using namespace data;
 using namespace files;
 
 namespace {
@@ -29,23 +29,99 @@ const char* fitted_to_key(const LawSpec& spec) {
   return is_answered_by_stress(spec.drive) ? "fitted_to" : "fitted_to_m";
 }
 
-LawSpec spec_of(const Json& json, std::string_view where) {
-  LawSpec spec = parse_law_name(json.at("law").get<std::string>(), where);
-  spec.drive = parse_quantity_name(json.at("drive").get<std::string>(), where);
-  spec.response = parse_quantity_name(json.at("response").get<std::string>(), where);
-  const char* key = reference_key(spec);
-  if (!json.contains(key)) throw bad_input(where, fmt::format("no key '{}'", key), "the reference");
-  spec.reference = json.at(key).get<double>();
+struct LawKeys {
+  std::string law, note;
+  LawSpec spec;  ///< of drive and response
+  std::optional<double> reference_m, reference, fitted_to_m, fitted_to;
+  std::vector<std::pair<std::string, double>> parameters;
+  Provenance provenance = Provenance::assumed;
+  std::optional<LawAdequacy> adequacy;
+  Json fit;
+};
+
+/// Some of the quantities of files.
+ValueType<Quantity> quantity_among(std::initializer_list<Quantity> all) {
+  std::vector<Word<Quantity>> words;
+  for (const Quantity one : all) words.push_back({one, quantity_name(one)});
+  return word(words);
+}
+
+const Block<LawAdequacy>& adequacy_block() {
+  using A = LawAdequacy;
+  static const Block<A> block(
+      "law_adequacy",
+      "whether the law describes the data: the residual against the noise where nothing moves",
+      {required(key("verdict", &A::verdict, one_of({"adequate", "not_described", "not_judged"}),
+                    "in a word")),
+       key("residual_over_noise", &A::residual_over_noise, number(kZeroOrMore),
+           "ratio of standard deviations, of the worst recording"),
+       required(key("words", &A::words, text(1), "in a sentence")),
+       key("causes", &A::causes, list(text()),
+           "likely ones, where the law does not describe the data")});
+  return block;
+}
+
+const Block<LawKeys>& law_block() {
+  using K = LawKeys;
+  const auto of_spec = [](const Key<LawSpec>& one) { return within(&K::spec, one); };
+  static const Block<K> block(
+      "law", "",
+      {required(with_example(
+           key("law", &K::law, text(1), "the name, such as 'linear-2-elastic' or 'hertz-fzener'"),
+           "linear-1")),
+       required(of_spec(key("drive", &LawSpec::drive,
+                            quantity_among({Quantity::indentation_depth, Quantity::strain,
+                                            Quantity::relative_length}),
+                            "what is imposed"))),
+       required(of_spec(key("response", &LawSpec::response,
+                            quantity_among({Quantity::contact_force, Quantity::stress}),
+                            "what answers"))),
+       with_example(key("reference_m", &K::reference_m, number(kAboveZero),
+                        "the reference depth of an indentation"),
+                    0.001),
+       key("reference", &K::reference, number(kAboveZero),
+           "the reference of a stretched strip, a relative length"),
+       required(with_example(
+           key("parameters", &K::parameters, map_of(number(), 1),
+               "each parameter in SI by its name and unit, such as k_inf_N_per_m, tau1_s, alpha; "
+               "spacing, contact and offset may be left out"),
+           {{"k_inf_N_per_m", 20.0}, {"k1_N_per_m", 30.0}, {"tau1_s", 1.5}})),
+       key("fitted_to_m", &K::fitted_to_m, number(kAboveZero),
+           "largest depth of the data that the law was fitted to, from the contact point"),
+       key("fitted_to", &K::fitted_to, number(kAboveZero),
+           "the same of a stretched strip, a relative length beyond the slack"),
+       required(with_example(
+           key("provenance", &K::provenance, word(kProvenances), "where the parameters come from"),
+           "assumed")),
+       key("note", &K::note, text_if_any(), "anything else worth knowing"),
+       key("adequacy", &K::adequacy, adequacy_block().type(), "whether the law describes the data"),
+       key("fit", &K::fit, as_json(uncertainty_form()),
+           "what the fit knows about the parameters")});
+  return block;
+}
+
+LawSpec spec_of(const LawKeys& keys, std::string_view where) {
+  LawSpec spec = parse_law_name(keys.law, where);
+  spec.drive = keys.spec.drive;
+  spec.response = keys.spec.response;
+  const bool strip = is_answered_by_stress(spec.drive);
+  const std::optional<double>& reference = strip ? keys.reference : keys.reference_m;
+  if (!reference) {
+    throw bad_input(where, fmt::format("no key '{}'", reference_key(spec)), "the reference");
+  }
+  spec.reference = *reference;
   require_valid(spec, where);
   return spec;
 }
 
-void require_known_keys(const Json& values, const std::vector<LawParameter>& parameters,
+using NamedValues = std::vector<std::pair<std::string, double>>;
+
+void require_known_keys(const NamedValues& values, const std::vector<LawParameter>& parameters,
                         std::string_view where) {
   std::vector<std::string> known;
   known.reserve(parameters.size());
   for (const LawParameter& p : parameters) known.push_back(law_key(p));
-  for (const auto& [key, value] : values.items()) {
+  for (const auto& [key, value] : values) {
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
     throw bad_input(
         where, fmt::format("unknown parameter '{}'{}", printable(key), did_you_mean(key, known)),
@@ -53,15 +129,18 @@ void require_known_keys(const Json& values, const std::vector<LawParameter>& par
   }
 }
 
-std::vector<double> values_of(const Json& values, const LawSpec& spec, std::string_view where) {
+std::vector<double> values_of(const NamedValues& values, const LawSpec& spec,
+                              std::string_view where) {
   const std::vector<LawParameter> parameters = law_parameters(spec);
   require_known_keys(values, parameters, where);
   std::vector<double> result;
   result.reserve(parameters.size());
   for (const LawParameter& p : parameters) {
     const std::string key = law_key(p);
-    if (values.contains(key)) {
-      result.push_back(values.at(key).get<double>());
+    const auto found = std::find_if(values.begin(), values.end(),
+                                    [&](const auto& value) { return value.first == key; });
+    if (found != values.end()) {
+      result.push_back(found->second);
     } else if (p.preset) {
       result.push_back(*p.preset);
     } else {
@@ -82,34 +161,33 @@ std::string law_key(const LawParameter& parameter) {
   return parameter.name + "_" + unit;
 }
 
+const FileKind& files::law_kind() {
+  static const FileKind kind{
+      "law", "A law with its parameters",
+      "One member of the family of laws at given parameters. Written by fits, read by simulations "
+      "and exports. Which parameters belong to a law: tpm laws NAME",
+      law_block().form()};
+  return kind;
+}
+
 LawFile files::law_from_json(const Json& written, std::string_view where) {
-  const Json json = checked(written, "law", where);
+  LawKeys keys =
+      law_block().made(checked(written, law_kind(), where), DocumentPlace{std::string(where)});
   LawFile law;
-  law.spec = spec_of(json, where);
-  law.values = values_of(json.at("parameters"), law.spec, where);
+  law.spec = spec_of(keys, where);
+  law.values = values_of(keys.parameters, law.spec, where);
   try {
     LawModel(law.spec).require_in_range(law.values);
   } catch (const Error& error) {
     throw error.within(where);
   }
-  law.provenance = parse_provenance(json.at("provenance").get<std::string>(), where);
-  law.note = json.value("note", "");
-  if (const char* key = fitted_to_key(law.spec); json.contains(key)) {
-    law.fitted_to = json.at(key).get<double>();
-  }
-  if (json.contains("adequacy")) {
-    const Json& stated = json.at("adequacy");
-    law.adequacy = LawAdequacy{.verdict = stated.at("verdict").get<std::string>(),
-                               .residual_over_noise = {},
-                               .words = stated.at("words").get<std::string>(),
-                               .causes = stated.value("causes", std::vector<std::string>{})};
-    if (stated.contains("residual_over_noise")) {
-      law.adequacy->residual_over_noise = stated.at("residual_over_noise").get<double>();
-    }
-  }
-  if (json.contains("fit")) {
+  law.provenance = keys.provenance;
+  law.note = std::move(keys.note);
+  law.fitted_to = is_answered_by_stress(law.spec.drive) ? keys.fitted_to : keys.fitted_to_m;
+  law.adequacy = std::move(keys.adequacy);
+  if (!keys.fit.is_null()) {
     law.uncertainty =
-        uncertainty_from_json(json.at("fit"), law.spec, law.values, fmt::format("{}: fit", where));
+        uncertainty_from_json(keys.fit, law.spec, law.values, fmt::format("{}: fit", where));
   }
   return law;
 }

@@ -3,10 +3,14 @@
 #include <string_view>
 
 #include "tpm/files/json.hpp"
+#include "tpm/files/keys/file_kind.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_uncertainty.hpp"
 
 namespace tpm::files {
+
+/// A law with its parameters.
+[[nodiscard]] const FileKind& law_kind();
 
 /// Throws Error(bad_input) for anything that schemas/law.schema.json or the law does not allow: an
 /// unknown law or key, a missing parameter without a preset, a value out of range.
@@ -20,8 +24,11 @@ namespace tpm::files {
 /// The block "fit" of a law file. Keys of `parameters` and `covariance` are law_key() names.
 [[nodiscard]] Json to_json(const LawUncertainty& uncertainty, const LawSpec& spec);
 
-/// Throws Error(bad_input) for names that the law has not, a matrix of another size, one that is
-/// not symmetric or not positive semidefinite.
+/// Its form.
+[[nodiscard]] const FormPtr& uncertainty_form();
+
+/// Reads what has that form. Throws Error(bad_input) for names that the law has not, a matrix of
+/// another size, one that is not symmetric or not positive semidefinite.
 [[nodiscard]] LawUncertainty uncertainty_from_json(const Json& block, const LawSpec& spec,
                                                    std::span<const double> values,
                                                    std::string_view where);

@@ -11,6 +11,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
+#include "tpm/files/keys/more_types.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
 
@@ -34,7 +35,8 @@ std::size_t place_of_key(const std::vector<LawParameter>& parameters, const std:
                   "a parameter of the law");
 }
 
-Eigen::MatrixXd matrix_of(const Json& rows, std::size_t size, std::string_view where) {
+Eigen::MatrixXd matrix_of(const std::vector<std::vector<double>>& rows, std::size_t size,
+                          std::string_view where) {
   const auto n = static_cast<Eigen::Index>(size);
   Eigen::MatrixXd matrix(n, n);
   if (rows.size() != size) {
@@ -46,9 +48,8 @@ Eigen::MatrixXd matrix_of(const Json& rows, std::size_t size, std::string_view w
       throw bad_input(where, fmt::format("{} numbers in row {}", rows[r].size(), r),
                       fmt::format("{}", size));
     }
-    for (std::size_t c = 0; c < size; ++c) {
-      matrix(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = rows[r][c].get<double>();
-    }
+    matrix.row(static_cast<Eigen::Index>(r)) =
+        Eigen::Map<const Eigen::RowVectorXd>(rows[r].data(), n);
   }
   return matrix;
 }
@@ -81,15 +82,99 @@ Json noise_json(const ReadingNoise& noise, const LawSpec& spec) {
   return json;
 }
 
-ReadingNoise noise_of_block(const Json& json, const LawSpec& spec) {
-  const bool stress = spec.response == Quantity::stress;
+struct NoiseKeys {
   ReadingNoise noise;
-  noise.kind = json.at("kind").get<std::string>();
-  noise.absolute = json.value(stress ? "absolute_Pa" : "absolute_N", 0.0);
-  noise.relative = json.value("relative", 0.0);
-  noise.column = json.value("column_factor", 1.0);
-  noise.lag_1 = json.value("lag_1_correlation", 0.0);
-  return noise;
+  std::optional<double> absolute_N, absolute_Pa;
+};
+
+const Block<NoiseKeys>& reading_noise_block() {
+  using K = NoiseKeys;
+  const auto of_noise = [](const Key<ReadingNoise>& one) { return within(&K::noise, one); };
+  static const Block<K> block(
+      "reading_noise", "scatter of one reading about the law",
+      {required(of_noise(key("kind", &ReadingNoise::kind,
+                             one_of({"absolute", "combined", "relative_to_datum",
+                                     "relative_to_model", "log", "per_row", "unknown"}),
+                             "kind of the fit's noise"))),
+       key("absolute_N", &K::absolute_N, number(kZeroOrMore), "a of sigma = a + b |model|"),
+       key("absolute_Pa", &K::absolute_Pa, number(kZeroOrMore), "the same of a stress"),
+       of_noise(key("relative", &ReadingNoise::relative, number(kZeroOrMore),
+                    "b; of log the standard deviation of the logarithm")),
+       of_noise(key("column_factor", &ReadingNoise::column, number(kZeroOrMore),
+                    "per_row: times the data's own standard deviations")),
+       of_noise(key("lag_1_correlation", &ReadingNoise::lag_1, number({.least = -1.0, .most = 1.0}),
+                    "of neighbouring residuals"))});
+  return block;
+}
+
+const Block<FittedFile>& fitted_file_block() {
+  using F = FittedFile;
+  static const Block<F> block(
+      "fitted_file", "what was fitted",
+      {required(key("file", &F::name, text(), "its name")),
+       key("sha256", &F::sha256, text_if_any(), "of its bytes"),
+       key("samples_sha256", &F::samples_sha256, text_if_any(),
+           "of the numbers alone (time, drive, response with 9 digits, SI): a copy of the "
+           "recording has the same, however it is named or formatted"),
+       key("readings", &F::readings, whole<int>(0, 2147483647), "how many were fitted"),
+       key("from_s", &F::from_s, number(), "of a recording: earlier samples were not fitted"),
+       key("to_s", &F::to_s, number(), "of a recording: later samples were not fitted"),
+       key("contact", &F::contact, number(),
+           "of a recording that was fitted together with others: its own contact, m or a relative "
+           "length"),
+       key("offset", &F::offset, number(), "and its own offset, N or Pa"),
+       key("held", &F::held, list(one_of({"contact", "offset"})),
+           "which of contact and offset were not estimated"),
+       key("clipped_above", &F::clipped_above, number(),
+           "readings from here on stood at the limit of the force cell and were censored, N or "
+           "Pa"),
+       key("clipped_below", &F::clipped_below, number(), "the same of the smallest reading"),
+       key("drift", &F::drift, number(), "of the force cell's zero in this recording, N/s or Pa/s"),
+       key("drift_origin_s", &F::drift_origin_s, number(), "when the drift is 0, s")});
+  return block;
+}
+
+struct UncertaintyKeys {
+  std::vector<std::string> parameters;
+  std::vector<Coordinate> coordinates;
+  std::vector<std::vector<double>> covariance;
+  LawUncertainty rest;
+  NoiseKeys noise;
+};
+
+const Block<UncertaintyKeys>& uncertainty_block() {
+  using K = UncertaintyKeys;
+  using U = LawUncertainty;
+  const auto of_rest = [](const Key<U>& one) { return within(&K::rest, one); };
+  static const Block<K> block(
+      "law_uncertainty", "what the fit knows about the parameters",
+      {required(key("parameters", &K::parameters, list(text(1), {.fewest = 1}),
+                    "keys of the uncertain parameters")),
+       required(key("coordinates", &K::coordinates, list(word(kCoordinateWords)),
+                    "of each: the coordinate of the covariance, p, ln p or 1/p^2")),
+       required(
+           key("covariance", &K::covariance, list(list(number())), "of these coordinates, SI")),
+       of_rest(key("level", &U::level, number({.least = 0.0, .most = 1.0, .above = true}),
+                   "confidence level of the fit's intervals")),
+       of_rest(key("degrees_of_freedom", &U::degrees_of_freedom, number(kAboveZero),
+                   "of Student's t; without it the size of the noise was known")),
+       of_rest(key("readings_per_independent_reading", &U::readings_per_independent,
+                   number({.least = 1.0}), "n / n_eff of correlated residuals")),
+       required(key("noise", &K::noise, reading_noise_block().type(),
+                    "scatter of one reading about the law")),
+       of_rest(key("duration_s", &U::duration_s, number(kZeroOrMore),
+                   "longest fitted stretch of time; 0: not known")),
+       of_rest(key("data", &U::data, list(fitted_file_block().type()), "what was fitted")),
+       of_rest(key("at_bound", &U::at_bound, list(text()),
+                   "estimated parameters on a bound: fixed there")),
+       of_rest(key("not_separable", &U::not_separable, list(text()),
+                   "estimated parameters that the recordings cannot tell from a drift or a slow "
+                   "branch"))},
+      {{"a confidence level below 1", [](const K& keys) -> std::optional<Fault> {
+          if (keys.rest.level < 1.0) return std::nullopt;
+          return Fault{"level", "is 1"};
+        }}});
+  return block;
 }
 
 }  // namespace
@@ -148,6 +233,7 @@ Json files::to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
   for (const FittedFile& file : uncertainty.data) {
     Json entry{{"file", file.name}, {"readings", file.readings}};
     if (!file.sha256.empty()) entry["sha256"] = file.sha256;
+    if (!file.samples_sha256.empty()) entry["samples_sha256"] = file.samples_sha256;
     if (file.from_s) entry["from_s"] = *file.from_s;
     if (file.to_s) entry["to_s"] = *file.to_s;
     if (file.contact) entry["contact"] = *file.contact;
@@ -173,20 +259,22 @@ Json files::to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
   return json;
 }
 
+const FormPtr& files::uncertainty_form() {
+  return uncertainty_block().form();
+}
+
 LawUncertainty files::uncertainty_from_json(const Json& block, const LawSpec& spec,
                                             std::span<const double> values,
                                             std::string_view where) {
+  UncertaintyKeys keys = uncertainty_block().made(block, DocumentPlace{std::string(where)});
   const std::vector<LawParameter> parameters = law_parameters(spec);
-  LawUncertainty u;
-  for (const Json& name : block.at("parameters")) {
-    u.place.push_back(place_of_key(parameters, name.get<std::string>(), where));
+  LawUncertainty u = std::move(keys.rest);
+  for (const std::string& name : keys.parameters) {
+    u.place.push_back(place_of_key(parameters, name, where));
     if (std::count(u.place.begin(), u.place.end(), u.place.back()) == 1) continue;
-    throw bad_input(where, fmt::format("'{}' twice", name.get<std::string>()), "each once");
+    throw bad_input(where, fmt::format("'{}' twice", printable(name)), "each once");
   }
-  for (const Json& word : block.at("coordinates")) {
-    u.coordinate.push_back(
-        parse_word(kCoordinateWords, "coordinates", word.get<std::string>(), where));
-  }
+  u.coordinate = std::move(keys.coordinates);
   if (u.coordinate.size() != u.place.size()) {
     throw bad_input(where, fmt::format("{} coordinates", u.coordinate.size()),
                     fmt::format("{}, one for each parameter", u.place.size()));
@@ -196,36 +284,11 @@ LawUncertainty files::uncertainty_from_json(const Json& block, const LawSpec& sp
     throw bad_input(where, fmt::format("'{}' is not above 0", law_key(parameters[u.place[i]])),
                     "the coordinate linear");
   }
-  u.covariance = matrix_of(block.at("covariance"), u.place.size(), where);
+  u.covariance = matrix_of(keys.covariance, u.place.size(), where);
   require_covariance(u.covariance, where);
-  u.level = block.value("level", u.level);
-  u.readings_per_independent = block.value("readings_per_independent_reading", 1.0);
-  if (block.contains("degrees_of_freedom")) {
-    u.degrees_of_freedom = block.at("degrees_of_freedom").get<double>();
-  }
-  u.duration_s = block.value("duration_s", 0.0);
-  u.noise = noise_of_block(block.at("noise"), spec);
-  for (const Json& file : block.value("data", Json::array())) {
-    FittedFile entry;
-    entry.name = file.at("file").get<std::string>();
-    entry.sha256 = file.value("sha256", "");
-    entry.readings = file.value("readings", 0);
-    const auto set = [&file](std::optional<double>& value, const char* key) {
-      if (file.contains(key)) value = file.at(key).get<double>();
-    };
-    set(entry.from_s, "from_s");
-    set(entry.to_s, "to_s");
-    set(entry.contact, "contact");
-    set(entry.offset, "offset");
-    entry.held = file.value("held", std::vector<std::string>{});
-    set(entry.clipped_above, "clipped_above");
-    set(entry.clipped_below, "clipped_below");
-    set(entry.drift, "drift");
-    set(entry.drift_origin_s, "drift_origin_s");
-    u.data.push_back(std::move(entry));
-  }
-  u.at_bound = block.value("at_bound", std::vector<std::string>{});
-  u.not_separable = block.value("not_separable", std::vector<std::string>{});
+  u.noise = std::move(keys.noise.noise);
+  const bool stress = spec.response == Quantity::stress;
+  u.noise.absolute = (stress ? keys.noise.absolute_Pa : keys.noise.absolute_N).value_or(0.0);
   return u;
 }
 

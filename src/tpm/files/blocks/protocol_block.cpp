@@ -273,22 +273,4 @@ std::vector<ProtocolBlock> combinations(ProtocolKind kind, const ProtocolLists& 
   return all;
 }
 
-std::vector<ProtocolBlock> parse_protocol_lists(const Json& block, const DocumentPlace& place,
-                                                ProtocolKind kind,
-                                                std::initializer_list<ProtocolKeyName> renamed,
-                                                const std::vector<std::string_view>& others) {
-  const std::vector<Key<ProtocolLists>> keys = protocol_list_keys(kind, renamed);
-  Form form{.type = Form::Type::block, .keys = mapped<KeyForm>(keys, &Key<ProtocolLists>::form)};
-  std::vector<std::string_view> needed;
-  for (const KeyForm& key : form.keys) needed.push_back(key.name);
-  require_keys_of(block, entry_of(kProtocolKindWords, kind).text, needed, others, place);
-  const FormPtr unread = any("").form;
-  for (const std::string_view other : others) form.keys.push_back({std::string(other), unread, ""});
-  if (block.contains("kind")) form.keys.push_back({"kind", unread, ""});
-  require_form(block, form, place, Numbers::also_si);
-  ProtocolLists lists;
-  read_keys(keys, block, place, lists);
-  return combinations(kind, lists, place);
-}
-
 }  // namespace tpm::files

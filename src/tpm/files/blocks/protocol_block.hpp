@@ -80,15 +80,4 @@ struct ProtocolLists {
 [[nodiscard]] std::vector<ProtocolBlock> combinations(ProtocolKind kind, const ProtocolLists& lists,
                                                       const DocumentPlace& place);
 
-/// All combinations of the numbers in a block that has a list of quantities, or one quantity, under
-/// each key: the candidates of a design. The first key of the
-/// kind varies most slowly; every number is in range.
-/// @param renamed the keys that have another name in this block
-/// @param others keys of the block that say nothing of the protocol
-/// Throws Error(bad_input) as parse_protocol_block() does, for numbers out of range, and for more
-/// than 100,000 combinations.
-[[nodiscard]] std::vector<ProtocolBlock> parse_protocol_lists(
-    const Json& block, const DocumentPlace& place, ProtocolKind kind,
-    std::initializer_list<ProtocolKeyName> renamed, const std::vector<std::string_view>& others);
-
 }  // namespace tpm::files

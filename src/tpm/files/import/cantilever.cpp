@@ -94,11 +94,11 @@ void resolve_cantilever(ImportedSeries& series, const std::vector<CantileverColu
                       "--spring-constant, such as --spring-constant \"0.05 N/m\"");
     }
     if (!found.force) return;
-    series.findings.push_back(
-        {"warning",
-         fmt::format("{} is the travel of the cantilever's base, not the depth: the deflection is "
-                     "still in it (--spring-constant \"0.05 N/m\" takes force/k away)",
-                     columns[*found.height].column->label())});
+    series.findings.push_back(ImportFinding::told_of(
+        "warning",
+        fmt::format("{} is the travel of the cantilever's base, not the depth: the deflection is "
+                    "still in it (--spring-constant \"0.05 N/m\" takes force/k away)",
+                    columns[*found.height].column->label())));
     return;
   }
   const double stiffness = *options.spring_constant_N_per_m;
@@ -131,7 +131,7 @@ void resolve_cantilever(ImportedSeries& series, const std::vector<CantileverColu
     depth.shifted = true;
     words += "; depth = height - deflection";
   }
-  series.findings.push_back({"converted", words});
+  series.findings.push_back(ImportFinding::told_of("converted", words));
 }
 
 }  // namespace tpm::files

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <iterator>
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/namespaces.hpp"
-#include "tpm/base/text.hpp"
-#include "tpm/files/renamed_names.hpp"
+#include "tpm/data/curve_words.hpp"
+#include "tpm/files/keys/block.hpp"
+#include "tpm/files/keys/more_types.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -16,13 +18,8 @@ namespace {
 constexpr auto kBounds = std::to_array<Word<Bound>>(
     {{Bound::value, "value"}, {Bound::lower, "lower"}, {Bound::upper, "upper"}, {Bound::sd, "sd"}});
 
-std::string text_of(const Json& object, const char* key) {
-  return object.contains(key) ? object.at(key).get<std::string>() : std::string();
-}
-
-std::optional<Provenance> provenance_of(const Json& object, const std::string& where) {
-  if (!object.contains("provenance")) return std::nullopt;
-  return parse_provenance(object.at("provenance").get<std::string>(), where + "/provenance");
+ValueType<Provenance> provenance_word() {
+  return word(kProvenances).named("provenance", "where a number comes from");
 }
 
 /// A header such as force_mN must not be described as newtons.
@@ -36,98 +33,176 @@ void require_unit_of_name(const std::string& name, const Unit& unit, const std::
                   "the same unit in both");
 }
 
-ColumnDescription read_column(const std::string& name, const Json& json, const std::string& file) {
-  const std::string where = fmt::format("{}: key /columns/{}", file, name);
-  ColumnDescription column;
-  column.quantity = parse_quantity_name(json.at("quantity").get<std::string>(), where);
-  column.unit = parse_unit(text_of(json, "unit"), quantity_dimension(column.quantity), where);
-  require_unit_of_name(name, column.unit, where);
-  if (json.contains("bound"))
-    column.bound = parse_word(kBounds, "bound", text_of(json, "bound"), where);
-  column.provenance = provenance_of(json, where);
-  column.note = text_of(json, "note");
-  return column;
+const Block<ProbeShape>& probe_block() {
+  using P = ProbeShape;
+  static const Block<P> block(
+      "probe", "the indenter",
+      {key("shape", &P::shape, one_of({"hemisphere", "sphere", "flat punch", "cone"}),
+           "the shape of the tip; left out if it is not known"),
+       key("diameter", &P::diameter_m, quantity(Dimension::length, kAboveZero), "its diameter"),
+       key("provenance", &P::provenance, provenance_word(), "where shape and diameter come from")});
+  return block;
 }
 
-ProbeShape read_probe(const Json& json, const std::string& file) {
-  ProbeShape probe;
-  probe.shape = text_of(json, "shape");
-  if (json.contains("diameter")) {
-    const std::string where = file + ": key /probe/diameter";
-    probe.diameter_m = parse_quantity(text_of(json, "diameter"), Dimension::length, where);
-    if (*probe.diameter_m <= 0) throw bad_input(where, "is not positive", "a length above 0");
-  }
-  probe.provenance = provenance_of(json, file + ": key /probe");
-  return probe;
+/// Not written where nothing is known.
+ValueType<ProbeShape> probe_type() {
+  ValueType<ProbeShape> type = probe_block().type();
+  type.write = [write = type.write](const ProbeShape& probe) {
+    Json json = write(probe);
+    return json.empty() ? Json() : json;
+  };
+  return type;
 }
 
-void require_keys_of_kind(const CurveDescription& description, const std::string& file) {
-  const std::string& kind = description.kind;
-  const bool fixed_columns = kind == "values";
-  const std::string in_file = fmt::format("stands in a file of kind {}", kind);
-  if (fixed_columns != description.columns.empty()) {
-    throw bad_input(file + ": key /columns", fixed_columns ? in_file : "is missing",
-                    fixed_columns ? "no columns: the columns of values are fixed"
-                                  : "a description of each numeric column");
-  }
-  const bool observes = kind == "points" || kind == "recording";
-  if (observes != description.observable.has_value()) {
-    throw bad_input(file + ": key /observable", observes ? "is missing" : in_file,
-                    observes ? "the quantity that was observed" : "no observable");
-  }
-  if (kind != "recording" && !description.segments.empty()) {
-    throw bad_input(file + ": key /segments", in_file, "segments of a recording only");
-  }
-  const bool whole = kind == "recording" || kind == "spectrum";
-  if (whole != description.provenance.has_value()) {
-    throw bad_input(
-        file + ": key /provenance", whole ? "is missing" : "stands at the top",
-        whole ? fmt::format("where the {} comes from", kind) : "a provenance in each row");
-  }
+struct ColumnKeys {
+  Quantity quantity = Quantity::ordinate;
+  std::string unit;
+  Bound bound = Bound::value;
+  std::optional<Provenance> provenance;
+  std::string note;
+};
+
+const Block<ColumnKeys>& column_block() {
+  using K = ColumnKeys;
+  static const Block<K> block(
+      "column", "one numeric column",
+      {required(key("quantity", &K::quantity,
+                    word(kQuantities).named("quantity", "a physical quantity"),
+                    "what the column holds")),
+       key("unit", &K::unit, text_if_any(), "of its numbers; left out for plain numbers"),
+       key("bound", &K::bound, word(kBounds),
+           "the value, the lower or upper end of a band, or a standard deviation"),
+       key("provenance", &K::provenance, provenance_word(),
+           "where the numbers of this column come from, if it differs from the row's"),
+       key("note", &K::note, text_if_any(), "what a reader has to know about this column")});
+  return block;
 }
 
-std::vector<RecordedSegment> read_segments(const Json& json) {
-  std::vector<RecordedSegment> segments;
-  for (const Json& segment : json) {
-    segments.push_back({text_of(segment, "kind"), text_of(segment, "control"),
-                        segment.at("samples").get<std::size_t>()});
-  }
-  return segments;
+ValueType<ColumnDescription> column_type() {
+  return converted<ColumnDescription>(
+      column_block().type(),
+      [](ColumnKeys keys, const DocumentPlace& place) {
+        return ColumnDescription{
+            keys.quantity, parse_unit(keys.unit, quantity_dimension(keys.quantity), place.where),
+            keys.bound, keys.provenance, std::move(keys.note)};
+      },
+      [](const ColumnDescription& column) {
+        return ColumnKeys{column.quantity, std::string(column.unit.symbol), column.bound,
+                          column.provenance, column.note};
+      });
 }
 
-/// A key is written only where there is something to say.
-void put(Json& object, const char* key, std::string_view text) {
-  if (!text.empty()) object[key] = text;
+using Columns = std::map<std::string, ColumnDescription>;
+
+ValueType<Columns> columns_type(std::size_t fewest) {
+  using Pairs = std::vector<std::pair<std::string, ColumnDescription>>;
+  return converted<Columns>(
+      map_of(column_type(), fewest),
+      [](const Pairs& pairs, const DocumentPlace& place) {
+        for (const auto& [name, column] : pairs) {
+          require_unit_of_name(name, column.unit, place.key(name).where);
+        }
+        return Columns(pairs.begin(), pairs.end());
+      },
+      [](const Columns& columns) { return Pairs(columns.begin(), columns.end()); });
 }
 
-Json probe_json(const ProbeShape& probe) {
-  Json json = Json::object();
-  put(json, "shape", probe.shape);
-  if (probe.diameter_m) {
-    json["diameter"] = fmt::format("{} mm", significant(*probe.diameter_m * 1e3, 12));
-  }
-  if (probe.provenance) json["provenance"] = provenance_name(*probe.provenance);
-  return json;
+const Block<RecordedSegment>& segment_block() {
+  using S = RecordedSegment;
+  const auto instruments_word = text_like(
+      "^[a-z0-9-]{1,60}$", "a word of the instrument: small letters, digits and hyphens", "extend");
+  static const Block<S> block(
+      "segment", "a part that the instrument ran as one",
+      {required(key("kind", &S::kind, instruments_word,
+                    "the instrument's word: extend, pause, retract")),
+       key("control", &S::control, instruments_word,
+           "how it was run, such as constant-height-pause"),
+       required(key("samples", &S::samples, whole<std::size_t>(1, 1e15), "how many rows"))});
+  return block;
 }
 
-Json column_json(const ColumnDescription& column) {
-  Json json{{"quantity", quantity_name(column.quantity)}};
-  put(json, "unit", column.unit.symbol);
-  if (column.bound != Bound::value) json["bound"] = bound_name(column.bound);
-  if (column.provenance) json["provenance"] = provenance_name(*column.provenance);
-  put(json, "note", column.note);
-  return json;
+/// The sentence of each key of the block "instrument", which read_instrument() reads.
+struct InstrumentKeys {
+  std::string id, force, depth, time, zero, resolution, noise, force_range, depth_range;
+};
+
+const Block<InstrumentKeys>& instrument_block() {
+  using K = InstrumentKeys;
+  static const Block<K> block(
+      "instrument",
+      "how well the instrument knows what it records: limits such as '0.5 % of reading', '0.1 % of "
+      "range' or '10 um', with '(standard)' behind a standard uncertainty",
+      {required(key("id", &K::id, text(1), "equal in two recordings: their errors are the same")),
+       key("force", &K::force, text(), "of the response"),
+       key("depth", &K::depth, text(), "of the drive"),
+       key("time", &K::time, text(), "between the channels"),
+       key("zero", &K::zero, text(),
+           "of the response before contact, where nothing was recorded there"),
+       key("resolution", &K::resolution, text(),
+           "step of the readings of the response, such as '0.1 mN'"),
+       key("noise", &K::noise, text(),
+           "standard deviation of a reading of the response, such as '0.2 mN'"),
+       key("force_range", &K::force_range, text(),
+           "of the response, for a share of it, such as '10 N'"),
+       key("depth_range", &K::depth_range, text(), "of the drive, for a share of it")});
+  return block;
 }
 
-Json segments_json(const std::vector<RecordedSegment>& segments) {
-  Json json = Json::array();
-  for (const RecordedSegment& segment : segments) {
-    Json item{{"kind", segment.kind}};
-    put(item, "control", segment.control);
-    item["samples"] = segment.samples;
-    json.push_back(std::move(item));
-  }
-  return json;
+using CurveKey = Key<CurveDescription>;
+
+std::vector<CurveKey> keys_of_all() {
+  using D = CurveDescription;
+  using H = CurveHeader;
+  const auto said = [](Key<H> declared) { return within(&D::header, declared); };
+  return {required(said(key("id", &H::id, text(1), "the file name without its ending"))),
+          required(said(key("title", &H::title, text(1), "one line that says what the curve is"))),
+          said(key("citation", &H::citation, text_if_any(), "authors, journal, year, pages")),
+          said(key("doi", &H::doi,
+                   text_like("^10\\.", "a bare DOI, without https://doi.org/", "10.1000/182"),
+                   "of the publication")),
+          said(key("specimen", &H::specimen, text_if_any(), "what was tested and in what state")),
+          said(key("probe", &H::probe, probe_type(), "the indenter")),
+          said(key("note", &H::note, text_if_any(), "what a reader has to know about the curve"))};
+}
+
+/// Those of all kinds and some more.
+std::vector<CurveKey> keys_with(std::vector<CurveKey> more) {
+  std::vector<CurveKey> keys = keys_of_all();
+  std::move(more.begin(), more.end(), std::back_inserter(keys));
+  return keys;
+}
+
+const Kinds<CurveDescription, std::string>& curve_kinds() {
+  using D = CurveDescription;
+  const auto observable = required(
+      key("observable", &D::observable, word(kQuantities).named("quantity", "a physical quantity"),
+          "the quantity that was observed and that a model has to answer"));
+  const auto columns = required(
+      with_example(key("columns", &D::columns, columns_type(1),
+                       "each numeric column of the CSV file by its header; the text columns label, "
+                       "provenance, where and note need no description"),
+                   {{"time_s", {{"quantity", "time"}, {"unit", "s"}}}}));
+  const auto whole_provenance = required(
+      key("provenance", &D::provenance, provenance_word(), "where the whole of it comes from"));
+  const auto instrument = key("instrument", &D::instrument, as_json(instrument_block().form()),
+                              "how well the instrument knows what it records");
+  static const Kinds<D, std::string> kinds(
+      {"curve", ""}, &D::kind,
+      {{"points", "points", "readings of separate experiments",
+        keys_with(
+            {observable,
+             key("time_origin", &D::time_origin, word(kTimeOrigins), "what the times count from"),
+             columns, instrument})},
+       {"recording", "recording", "samples of one experiment",
+        keys_with({observable, whole_provenance, columns,
+                   key("segments", &D::segments, list(segment_block().type(), {.fewest = 1}),
+                       "the parts that the instrument ran one after the other; together they hold "
+                       "all samples"),
+                   instrument})},
+       {"spectrum", "spectrum", "storage and loss over frequency",
+        keys_with({whole_provenance, columns, instrument})},
+       {"values", "values", "single numbers, whose columns are fixed", keys_of_all()}});
+  return kinds;
 }
 
 }  // namespace
@@ -145,64 +220,30 @@ std::string segments_words(const std::vector<RecordedSegment>& segments) {
   return words;
 }
 
+const FileKind& curve_kind() {
+  static const FileKind kind{
+      "curve", "Description of a curve file",
+      "Stands beside a CSV file of the same name and says what its columns mean and where its "
+      "numbers come from",
+      curve_kinds().form()};
+  return kind;
+}
+
 CurveDescription read_description(const std::filesystem::path& path) {
   const std::string file = path.string();
-  const Json json = checked(read_json(path), "curve", file);
-  CurveDescription description;
-  CurveHeader& header = description.header;
-  header.id = text_of(json, "id");
-  if (header.id != path.stem().string()) {
-    throw bad_input(file + ": key /id", fmt::format("'{}' is not the file's name", header.id),
+  const DocumentPlace place{file};
+  CurveDescription description =
+      curve_kinds().made(checked(read_json(path), curve_kind(), file), place);
+  if (const std::string& id = description.header.id; id != path.stem().string()) {
+    throw bad_input(place.key("id").where,
+                    fmt::format("'{}' is not the file's name", printable(id)),
                     fmt::format("'{}'", printable(path.stem().string())));
   }
-  header.title = text_of(json, "title");
-  header.citation = text_of(json, "citation");
-  header.doi = text_of(json, "doi");
-  header.specimen = text_of(json, "specimen");
-  header.note = text_of(json, "note");
-  if (json.contains("probe")) header.probe = read_probe(json.at("probe"), file);
-  description.kind = text_of(json, "kind");
-  if (json.contains("observable")) {
-    description.observable = parse_quantity_name(text_of(json, "observable"), file);
-  }
-  if (json.contains("time_origin")) {
-    description.time_origin = parse_time_origin(text_of(json, "time_origin"), file);
-  }
-  description.provenance = provenance_of(json, file + ": key ");
-  if (json.contains("columns")) {
-    for (const auto& [name, column] : json.at("columns").items()) {
-      description.columns.emplace(name, read_column(name, column, file));
-    }
-  }
-  if (json.contains("segments")) description.segments = read_segments(json.at("segments"));
-  if (json.contains("instrument")) description.instrument = json.at("instrument");
-  require_keys_of_kind(description, file);
   return description;
 }
 
 Json description_json(const CurveDescription& description) {
-  const CurveHeader& header = description.header;
-  Json json{{"id", header.id}, {"title", header.title}};
-  put(json, "citation", header.citation);
-  put(json, "doi", header.doi);
-  put(json, "specimen", header.specimen);
-  if (const Json probe = probe_json(header.probe); !probe.empty()) json["probe"] = probe;
-  json["kind"] = description.kind;
-  if (description.observable) json["observable"] = quantity_name(*description.observable);
-  if (description.time_origin != TimeOrigin::none) {
-    json["time_origin"] = time_origin_name(description.time_origin);
-  }
-  if (description.provenance) json["provenance"] = provenance_name(*description.provenance);
-  if (!description.columns.empty()) {
-    json["columns"] = Json::object();
-    for (const auto& [name, column] : description.columns) {
-      json["columns"][name] = column_json(column);
-    }
-  }
-  if (!description.segments.empty()) json["segments"] = segments_json(description.segments);
-  if (!description.instrument.is_null()) json["instrument"] = description.instrument;
-  put(json, "note", header.note);
-  return json;
+  return curve_kinds().write(description);
 }
 
 }  // namespace tpm::files

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/files/json.hpp"
+#include "tpm/files/keys/file_kind.hpp"
 #include "tpmkit/curve.hpp"
 #include "tpmkit/units.hpp"
 
@@ -48,6 +49,9 @@ struct CurveDescription {
   std::vector<RecordedSegment> segments;
   Json instrument;  ///< the block "instrument" as it stands there (read_instrument); else null
 };
+
+/// The description of a curve.
+[[nodiscard]] const FileKind& curve_kind();
 
 /// Reads and checks a description; header.sha256 stays empty. Throws Error(bad_input) naming the
 /// key.

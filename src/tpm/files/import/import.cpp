@@ -130,8 +130,10 @@ std::vector<ImportFinding> format_findings(const Importer& importer, ImportInput
   if (!input.is_table()) return findings;
   const DelimitedTable& table = input.table();
   const bool told = table.encoding == Encoding::latin1 && !input.options().text.latin1;
-  findings.push_back({"encoding", fmt::format("{}{}", encoding_name(table.encoding),
-                                              told ? ", because it is not UTF-8" : "")});
+  findings.push_back(
+      {"encoding",
+       fmt::format("{}{}", encoding_name(table.encoding), told ? ", because it is not UTF-8" : ""),
+       told});
   findings.push_back({"separator", std::string(separator_name(table.separator))});
   // A machine's samples tell their decimal sign, whatever stands above them.
   if (importer.name != "machine") {

@@ -79,6 +79,11 @@ struct ImportOptions {
 struct ImportFinding {
   std::string what;
   std::string value;
+  bool told = false;  ///< which column it is, or what a reader would not expect
+
+  [[nodiscard]] static ImportFinding told_of(std::string what, std::string value) {
+    return {std::move(what), std::move(value), true};
+  }
 };
 
 /// A column as it stood in the file.

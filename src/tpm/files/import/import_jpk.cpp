@@ -398,8 +398,8 @@ ImportedSeries read_jpk(std::string_view bytes, const std::string& file,
   const std::string depth =
       fmt::format("channel {} and the deflection: tip position", printable(height));
   series.findings = {{"segments", segments_words(series.segments)},
-                     {"indentation_depth", depth},
-                     {"contact_force", force}};
+                     ImportFinding::told_of("indentation_depth", depth),
+                     ImportFinding::told_of("contact_force", force)};
   if (const auto stamp = segments.front().properties.find("force-segment-header.time-stamp")) {
     series.findings.push_back({"recorded", printable(*stamp)});
   }

@@ -157,15 +157,16 @@ class SeriesReader {
     }
     if (use.clock) unwrap_midnights(imported.values);
     require_plausible_number(use, imported);
-    series_.findings.push_back({bound == Bound::sd ? "standard deviation" : finding_name(use),
-                                fmt::format("{}, {}{}", column.label(),
-                                            use.volts                      ? column.unit
-                                            : use.clock                    ? "a clock, in s"
-                                            : imported.unit.symbol.empty() ? "plain number"
-                                                                           : imported.unit.symbol,
-                                            mirror   ? ", mirrored about 1"
-                                            : negate ? ", negated"
-                                                     : "")});
+    series_.findings.push_back(
+        ImportFinding::told_of(bound == Bound::sd ? "standard deviation" : finding_name(use),
+                               fmt::format("{}, {}{}", column.label(),
+                                           use.volts                      ? column.unit
+                                           : use.clock                    ? "a clock, in s"
+                                           : imported.unit.symbol.empty() ? "plain number"
+                                                                          : imported.unit.symbol,
+                                           mirror   ? ", mirrored about 1"
+                                           : negate ? ", negated"
+                                                    : "")));
     used_.push_back(column.index);
     series_.columns.push_back(std::move(imported));
   }
@@ -180,8 +181,8 @@ class SeriesReader {
     for (const MachineColumn& column : header_.columns) {
       if (!column.refused) continue;
       if (std::find(used_.begin(), used_.end(), column.index) != used_.end()) continue;
-      series_.findings.push_back(
-          {"no meaning", fmt::format("{}: {}", column.label(), column.refused->why)});
+      series_.findings.push_back(ImportFinding::told_of(
+          "no meaning", fmt::format("{}: {}", column.label(), column.refused->why)));
     }
     series_.findings.insert(series_.findings.end(), header_.findings.begin(),
                             header_.findings.end());
@@ -199,8 +200,8 @@ class SeriesReader {
     };
     while (end_ > header_.block.first + 1 && blank(table_.rows[end_ - 1])) --end_;
     if (end_ == all) return;
-    series_.findings.push_back(
-        {"blank", fmt::format("{} in these columns", lines_of(table_, end_, all))});
+    series_.findings.push_back(ImportFinding::told_of(
+        "blank", fmt::format("{} in these columns", lines_of(table_, end_, all))));
   }
 
   void require_width(const DelimitedRow& row, const std::vector<Use>& uses) const {
@@ -323,8 +324,9 @@ void resolve_phase(ImportedSeries& series, const std::vector<Use>& uses) {
   second.shifted = true;  // converted: not the digits of the file
   second.quantity = spectrum_quantities(first.unit.dimension).loss;
   second.unit = first.unit;
-  series.findings.push_back({"converted", polar ? "magnitude and phase to storage and loss"
-                                                : "storage and loss tangent to loss"});
+  series.findings.push_back(
+      ImportFinding::told_of("converted", polar ? "magnitude and phase to storage and loss"
+                                                : "storage and loss tangent to loss"));
 }
 
 /// The response of a strain is a stress, if there is one beside a force.
@@ -459,10 +461,10 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   for (const Use& use : uses) reader.add(use);
   ImportedSeries series = reader.take();
   if (choice.specimens() > 1) {
-    series.findings.push_back(
-        {"specimens", fmt::format("{} side by side, of which the first is read (--time, --drive "
-                                  "and --response choose another)",
-                                  choice.specimens())});
+    series.findings.push_back(ImportFinding::told_of(
+        "specimens", fmt::format("{} side by side, of which the first is read (--time, --drive "
+                                 "and --response choose another)",
+                                 choice.specimens())));
   }
   if (spectrum) {
     resolve_phase(series, uses);
@@ -482,7 +484,8 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   if (header.style.thousands != ThousandsMark::none) {
     series.findings.insert(
         series.findings.begin() + 1,
-        {"marks of thousands", std::string(thousands_name(header.style.thousands))});
+        ImportFinding::told_of("marks of thousands",
+                               std::string(thousands_name(header.style.thousands))));
   }
   const bool step = !spectrum && is_step_response(series.columns.back().bound == Bound::sd
                                                       ? series.columns.at(1).quantity

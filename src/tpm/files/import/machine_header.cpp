@@ -349,8 +349,9 @@ void tell_unread_rows(const DelimitedTable& table, const std::vector<SampleBlock
   for (const SampleBlock& block : all) {
     if (block.size() < 2 || block.first == header.block.first) continue;
     if (block.end > header.block.first && block.first < header.block.end) continue;
-    header.findings.push_back({"not read", fmt::format("{}, another block of samples",
-                                                       lines_of(table, block.first, block.end))});
+    header.findings.push_back(ImportFinding::told_of(
+        "not read",
+        fmt::format("{}, another block of samples", lines_of(table, block.first, block.end))));
   }
   std::size_t end = header.block.end;
   while (end < table.rows.size() && table.rows[end].fields.size() > 1) ++end;
@@ -358,8 +359,9 @@ void tell_unread_rows(const DelimitedTable& table, const std::vector<SampleBlock
   const bool numbers =
       below > header.block.end && is_number_in_some_style(field_at(table.rows[below - 1], 1));
   if (numbers) {
-    header.findings.push_back({"not read", fmt::format("{}, below the samples",
-                                                       lines_of(table, header.block.end, below))});
+    header.findings.push_back(ImportFinding::told_of(
+        "not read",
+        fmt::format("{}, below the samples", lines_of(table, header.block.end, below))));
   }
 }
 

@@ -94,17 +94,9 @@ std::string described_label(const fs::path& path, std::string_view key) {
 }  // namespace
 
 std::string columns_words(const std::vector<ImportFinding>& findings) {
-  // What a reader would not expect stands there too, and why.
-  constexpr auto kTold =
-      std::to_array<std::string_view>({"converted", "marks of thousands", "specimens", "blank",
-                                       "window", "step", "not read", "no meaning", "warning"});
   std::string words;
   for (const ImportFinding& finding : findings) {
-    const bool column =
-        finding.value.starts_with("column ") || finding.value.starts_with("channel ");
-    const bool told = std::find(kTold.begin(), kTold.end(), finding.what) != kTold.end() ||
-                      (finding.what == "encoding" && finding.value.find(',') != std::string::npos);
-    if (finding.what == "not used" || (!column && !told)) continue;
+    if (!finding.told) continue;
     words +=
         fmt::format("{}{}: {}", words.empty() ? "read as " : "; ", finding.what, finding.value);
   }

@@ -15,11 +15,11 @@ void divide_by_size(ImportedSeries& series, const ImportOptions& options) {
     if (!length && column.unit.dimension != Dimension::force) continue;
     const double size = length ? options.rest_length_m.value() : options.area_m2.value();
     for (double& value : column.values) value *= column.unit.to_si / size;
-    series.findings.push_back(
-        {"converted",
-         fmt::format("{} to {} by a {} of {} {}", column.unit.symbol,
-                     quantity_name(column.quantity), length ? "length at rest" : "cross section",
-                     significant(length ? 1e3 * size : 1e6 * size, 6), length ? "mm" : "mm^2")});
+    series.findings.push_back(ImportFinding::told_of(
+        "converted",
+        fmt::format("{} to {} by a {} of {} {}", column.unit.symbol, quantity_name(column.quantity),
+                    length ? "length at rest" : "cross section",
+                    significant(length ? 1e3 * size : 1e6 * size, 6), length ? "mm" : "mm^2")));
     column.unit = parse_unit(si_symbol(wanted), wanted, {});
     column.shifted = true;  // converted: not the digits of the file
   }

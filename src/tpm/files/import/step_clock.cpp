@@ -76,7 +76,8 @@ void keep_time_window(ImportedSeries& series, const std::string& file,
   for (ImportedColumn& column : series.columns) keep_rows(column.values, first, last);
   keep_rows(series.lines, first, last);
   if (first > 0 || last < all) {
-    series.findings.push_back({"window", fmt::format("{} of {} samples", last - first, all)});
+    series.findings.push_back(
+        ImportFinding::told_of("window", fmt::format("{} of {} samples", last - first, all)));
   }
   if (!options.step_time_s || *options.step_time_s == 0.0) return;
   for (ImportedColumn& column : series.columns) {
@@ -84,8 +85,9 @@ void keep_time_window(ImportedSeries& series, const std::string& file,
     for (double& value : column.values) value -= *options.step_time_s / to_si;
     column.shifted = true;
   }
-  series.findings.push_back({"step", fmt::format("at {} s of the file, from which the times count",
-                                                 significant(*options.step_time_s, 9))});
+  series.findings.push_back(
+      ImportFinding::told_of("step", fmt::format("at {} s of the file, from which the times count",
+                                                 significant(*options.step_time_s, 9))));
 }
 
 void resolve_kept_step(ImportedSeries& series) {
@@ -117,11 +119,11 @@ void resolve_kept_step(ImportedSeries& series) {
   const Dimension dimension = quantity_dimension(answer.quantity);
   answer.unit = parse_unit(si_symbol(dimension), dimension, {});
   answer.shifted = true;
-  series.findings.push_back(
-      {"converted", relaxation ? "stress over the strain that is kept, to a relaxation modulus; "
-                                 "the times count from the step"
-                               : "strain over the stress that is kept, to a creep compliance; the "
-                                 "times count from the step"});
+  series.findings.push_back(ImportFinding::told_of(
+      "converted", relaxation ? "stress over the strain that is kept, to a relaxation modulus; "
+                                "the times count from the step"
+                              : "strain over the stress that is kept, to a creep compliance; the "
+                                "times count from the step"));
   series.columns.erase(relaxation ? strain : stress);
 }
 

@@ -14,11 +14,16 @@ Json checked(Json document, const FileKind& kind, std::string_view where, Number
       throw bad_input(place.key(kSchemaKey).where, "is of the wrong type",
                       "a text: the schema of this file, for editors");
     }
-    current.erase(kSchemaKey);
+    current = without_schema_key(std::move(current));
   }
   require_not_other_kind(current, kind.name, where);
   require_form(current, *kind.form, place, numbers);
   return current;
+}
+
+Json without_schema_key(Json document) {
+  if (document.is_object()) document.erase(kSchemaKey);
+  return document;
 }
 
 }  // namespace tpm::files

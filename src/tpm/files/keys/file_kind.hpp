@@ -23,6 +23,9 @@ struct FileKind {
 [[nodiscard]] Json checked(Json document, const FileKind& kind, std::string_view where,
                            Numbers numbers = Numbers::texts_alone);
 
+/// A document without "$schema": a document within another, where the name would mean another file.
+[[nodiscard]] Json without_schema_key(Json document);
+
 /// The JSON Schema (draft 7) of a kind, as it stands in schemas/. Rules about several keys stand in
 /// descriptions.
 [[nodiscard]] Json json_schema(const FileKind& kind);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <regex>
 #include <set>
 #include <stdexcept>
 
@@ -52,6 +53,7 @@ std::string expected_words(const Form& form) {
       return fmt::format("a text of a number and a unit of {}: {}", dimension_name(form.dimension),
                          units_of(form.dimension));
     case Type::text:
+      if (!form.pattern.empty()) return form.sentence;
       return form.fewest > 0 ? "a text that is not empty" : "a text";
     case Type::word:
       return fmt::format("one of {}", fmt::join(form.words, ", "));
@@ -124,7 +126,8 @@ void require_keys(const Json& object, const std::vector<KeyForm>& keys, const Do
 
 /// The keys of all kinds, each once.
 std::vector<std::string> all_keys(const Form& form) {
-  std::vector<std::string> all{form.by};
+  std::vector<std::string> all;
+  if (!form.by.empty()) all.push_back(form.by);
   for (const KindForm& kind : form.kinds) {
     for (const KeyForm& key : kind.keys) {
       if (std::find(all.begin(), all.end(), key.name) == all.end()) all.push_back(key.name);
@@ -141,17 +144,28 @@ std::string kinds_with(const Form& form, std::string_view key) {
   return fmt::format("{}", fmt::join(words, ", "));
 }
 
+/// Throws for a key that no kind has.
+void require_known_to_one(const Json& object, const Form& form, const DocumentPlace& place) {
+  const std::vector<std::string> known = all_keys(form);
+  for (const auto& item : object.items()) {
+    if (std::find(known.begin(), known.end(), item.key()) != known.end()) continue;
+    throw bad_input(place.key(item.key()).where, "unknown key" + did_you_mean(item.key(), known),
+                    fmt::format("one of {}", fmt::join(known, ", ")));
+  }
+}
+
 void require_kind_named(const Json& object, const Form& form, const DocumentPlace& place) {
   const std::vector<std::string> words = mapped<std::string>(form.kinds, &KindForm::word);
   const std::string expected = fmt::format("one of {}", fmt::join(words, ", "));
+  if (form.by.empty()) {
+    const auto there = [&](const std::string& word) { return object.contains(word); };
+    if (std::any_of(words.begin(), words.end(), there)) return;
+    require_known_to_one(object, form, place);
+    throw bad_input(place.where, "has no key that says what it is", expected);
+  }
   if (!object.contains(form.by)) {
     if (!form.usual_kind.empty()) return;
-    const std::vector<std::string> known = all_keys(form);
-    for (const auto& item : object.items()) {
-      if (std::find(known.begin(), known.end(), item.key()) != known.end()) continue;
-      throw bad_input(place.key(item.key()).where, "unknown key" + did_you_mean(item.key(), known),
-                      fmt::format("one of {}", fmt::join(known, ", ")));
-    }
+    require_known_to_one(object, form, place);
     throw bad_input(place.key(form.by).where, "is missing", expected);
   }
   const Json& kind = object.at(form.by);
@@ -179,8 +193,9 @@ void require_kinds(const Json& object, const Form& form, const DocumentPlace& pl
     const std::string others = kinds_with(form, key);
     throw bad_input(
         place.key(key).where,
-        others.empty() ? "unknown key" + did_you_mean(key, known)
-                       : fmt::format("is no key of the {} '{}'", form.by, kind.word),
+        others.empty()    ? "unknown key" + did_you_mean(key, known)
+        : form.by.empty() ? fmt::format("stands beside '{}'", kind.word)
+                          : fmt::format("is no key of the {} '{}'", form.by, kind.word),
         fmt::format("{}{}{}",
                     known.empty() ? fmt::format("no key but {}", form.by)
                                   : fmt::format("one of {}", fmt::join(known, ", ")),
@@ -255,6 +270,11 @@ void require_either(const Json& value, const Form& form, const DocumentPlace& pl
                     Numbers numbers) {
   const auto found = std::find_if(form.forms.begin(), form.forms.end(),
                                   [&](const FormPtr& one) { return looks_like(value, *one); });
+  const auto words = std::find_if(form.forms.begin(), form.forms.end(),
+                                  [](const FormPtr& one) { return one->type == Type::word; });
+  if (found == form.forms.end() && value.is_string() && words != form.forms.end()) {
+    return require_form(value, **words, place, numbers);  // says which word was meant
+  }
   if (found == form.forms.end()) refuse_type(value, form, place);
   require_form(value, **found, place, numbers);
 }
@@ -274,6 +294,19 @@ void require_word(const Json& value, const Form& form, const DocumentPlace& plac
       place.where,
       fmt::format("unknown word '{}'{}", printable(word), did_you_mean(word, form.words)),
       expected_words(form));
+}
+
+/// The library's matcher calls itself for each character.
+constexpr std::size_t kLongestMatched = 4096;
+
+void require_text(const Json& value, const Form& form, const DocumentPlace& place) {
+  if (!value.is_string()) refuse_type(value, form, place);
+  const auto& text = value.get_ref<const std::string&>();
+  if (text.size() < form.fewest) throw bad_input(place.where, "is empty", expected_words(form));
+  if (form.pattern.empty()) return;
+  const bool fits =
+      text.size() <= kLongestMatched && std::regex_search(text, std::regex(form.pattern));
+  if (!fits) throw bad_input(place.where, fmt::format("'{}'", printable(text)), form.sentence);
 }
 
 }  // namespace
@@ -299,6 +332,13 @@ std::string Range::words(std::string_view unit) const {
 }
 
 const KindForm& kind_of(const Json& object, const Form& kinds) {
+  if (kinds.by.empty()) {
+    const auto found =
+        std::find_if(kinds.kinds.begin(), kinds.kinds.end(),
+                     [&](const KindForm& kind) { return object.contains(kind.word); });
+    if (found == kinds.kinds.end()) throw std::logic_error("of no kind");
+    return *found;
+  }
   const std::string word = object.value(kinds.by, kinds.usual_kind);
   const auto found = std::find_if(kinds.kinds.begin(), kinds.kinds.end(),
                                   [&](const KindForm& kind) { return kind.word == word; });
@@ -316,6 +356,7 @@ Form with_open_keys(Form form) {
 
 void require_form(const Json& value, const Form& form, const DocumentPlace& place,
                   Numbers numbers) {
+  if (form.null_too && value.is_null()) return;
   switch (form.type) {
     case Type::any:
       return;
@@ -331,9 +372,7 @@ void require_form(const Json& value, const Form& form, const DocumentPlace& plac
     case Type::quantity:
       return require_quantity(value, form, place, numbers);
     case Type::text:
-      if (!value.is_string()) refuse_type(value, form, place);
-      if (value.get_ref<const std::string&>().size() >= form.fewest) return;
-      throw bad_input(place.where, "is empty", expected_words(form));
+      return require_text(value, form, place);
     case Type::word:
       return require_word(value, form, place);
     case Type::list:
@@ -347,7 +386,7 @@ void require_form(const Json& value, const Form& form, const DocumentPlace& plac
       return;
     case Type::block:
       if (!value.is_object()) refuse_type(value, form, place);
-      require_known(value, form.keys, place);
+      if (!form.others_too) require_known(value, form.keys, place);
       return require_keys(value, form.keys, place, numbers);
     case Type::kinds:
       return require_kinds(value, form, place, numbers);

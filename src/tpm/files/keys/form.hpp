@@ -56,7 +56,7 @@ struct Form {
     whole,     ///< a whole number in `range`; 71.0 is one
     number,    ///< a number in `range`
     quantity,  ///< a text of a number and a unit of `dimension`, in `range`
-    text,      ///< a text of at least `fewest` bytes
+    text,      ///< a text of at least `fewest` bytes, which `pattern` matches
     word,      ///< one of `words`
     list,      ///< `fewest` to `most` of `item`
     map,       ///< an object with `fewest` or more keys of any names, each an `item`
@@ -78,7 +78,7 @@ struct Form {
   bool not_all_zero = false;  ///< of a list of numbers
   FormPtr item = nullptr;
   std::vector<KeyForm> keys = {};
-  std::string by = "kind";
+  std::string by = "kind";  ///< empty: each kind has a key of its own, its word, that others lack
   std::string usual_kind =
       {};  ///< the kind of an object without the key `by`; empty: it must be there
   std::vector<KindForm> kinds = {};
@@ -87,6 +87,9 @@ struct Form {
   /// Rules about several keys, which a JSON schema does not say: a refusal ends with them.
   std::vector<std::string> rules = {};
   Json example = nullptr;
+  bool null_too = false;     ///< null may stand there: programs write it where there is nothing
+  bool others_too = false;   ///< of a block: it may have keys that nobody reads
+  std::string pattern = {};  ///< of a text: a regular expression; `sentence` says what it is
 };
 
 /// Numbers in place of quantities are SI: programs put them into documents that they fill in.

@@ -81,6 +81,7 @@ class SchemaWriter {
       case Type::text:
         schema["type"] = "string";
         if (form.fewest > 0) schema["minLength"] = form.fewest;
+        if (!form.pattern.empty()) schema["pattern"] = form.pattern;
         break;
       case Type::word:
         schema["enum"] = form.words;
@@ -95,6 +96,7 @@ class SchemaWriter {
         break;
       case Type::block:
         add_object(form.keys, "", "", false, schema);
+        if (form.others_too) schema.erase("additionalProperties");
         break;
       case Type::kinds:
         add_kinds(form, schema);
@@ -105,7 +107,9 @@ class SchemaWriter {
       case Type::later:
         return body_of(*form.made());
     }
-    return schema;
+    if (!form.null_too) return schema;
+    Json or_null{{"anyOf", Json::array({Json{{"type", "null"}}, std::move(schema)})}};
+    return or_null;
   }
 
   [[nodiscard]] Json definitions() && { return std::move(definitions_); }

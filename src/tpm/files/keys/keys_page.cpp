@@ -39,7 +39,7 @@ std::string type_cell(const Form& form) {
       return with_range(std::string(dimension_name(form.dimension)), si_symbol(form.dimension)) +
              (form.plain_too ? ", or a number in SI" : "");
     case Type::text:
-      return "text";
+      return form.pattern.empty() ? "text" : form.sentence;
     case Type::word:
       return fmt::format("`{}`", fmt::join(form.words, "`, `"));
     case Type::list:
@@ -86,8 +86,10 @@ class PageWriter {
     if (!form.sentence.empty()) text_ += fmt::format("{}.\n\n", sentence_case(form.sentence));
     if (form.type == Type::block) text_ += table(form.keys);
     for (const KindForm& kind : form.kinds) {
-      text_ += fmt::format("`\"{}\": \"{}\"`{}{}{}\n\n", form.by, kind.word,
-                           kind.word == form.usual_kind ? " (default)" : "",
+      const std::string head = form.by.empty()
+                                   ? fmt::format("With `{}`", kind.word)
+                                   : fmt::format("`\"{}\": \"{}\"`", form.by, kind.word);
+      text_ += fmt::format("{}{}{}{}\n\n", head, kind.word == form.usual_kind ? " (default)" : "",
                            kind.sentence.empty() ? "" : ": ", kind.sentence);
       text_ += table(kind.keys);
     }
@@ -167,7 +169,7 @@ Json example_value(const Form& form) {
       add_examples(form.keys, object);
       return object;
     case Type::kinds:
-      object[form.by] = form.kinds.front().word;
+      if (!form.by.empty()) object[form.by] = form.kinds.front().word;
       add_examples(form.kinds.front().keys, object);
       return object;
     case Type::either:

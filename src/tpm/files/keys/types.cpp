@@ -2,6 +2,7 @@
 
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/keys/more_types.hpp"
 
 namespace tpm::files {
 namespace {
@@ -32,6 +33,78 @@ ValueType<std::string> text(std::size_t fewest) {
   return {shared({.type = Form::Type::text, .fewest = fewest}),
           [](const Json& value, const DocumentPlace&) { return value.get<std::string>(); },
           [](const std::string& value) { return Json(value); }};
+}
+
+ValueType<std::string> text_if_any() {
+  ValueType<std::string> type = text();
+  type.write = [](const std::string& value) { return value.empty() ? Json() : Json(value); };
+  return type;
+}
+
+ValueType<Unit> unit_text() {
+  return converted<Unit>(
+      text_if_any(),
+      [](const std::string& value, const DocumentPlace& place) {
+        return parse_unit(value, place.where);
+      },
+      [](const Unit& unit) { return std::string(unit.symbol); });
+}
+
+KeyForm optional_key(std::string name, FormPtr form, std::string sentence) {
+  return {.name = std::move(name), .form = std::move(form), .sentence = std::move(sentence)};
+}
+
+KeyForm required_key(std::string name, FormPtr form, std::string sentence) {
+  KeyForm key = optional_key(std::move(name), std::move(form), std::move(sentence));
+  key.required = true;
+  return key;
+}
+
+FormPtr list_form(FormPtr item, std::size_t fewest, std::size_t most) {
+  return shared(
+      {.type = Form::Type::list, .fewest = fewest, .most = most, .item = std::move(item)});
+}
+
+FormPtr map_form(FormPtr item, std::size_t fewest) {
+  return shared({.type = Form::Type::map, .fewest = fewest, .item = std::move(item)});
+}
+
+FormPtr or_null(const FormPtr& form) {
+  Form changed = *form;
+  changed.null_too = true;
+  return shared(std::move(changed));
+}
+
+FormPtr with_others(const FormPtr& object) {
+  Form changed = *object;
+  changed.others_too = true;
+  return shared(std::move(changed));
+}
+
+FormPtr either_form(std::vector<FormPtr> forms) {
+  return shared({.type = Form::Type::either, .forms = std::move(forms)});
+}
+
+FormPtr object_form(std::string name, std::string sentence, std::vector<KeyForm> keys) {
+  return shared({.type = Form::Type::block,
+                 .name = std::move(name),
+                 .sentence = std::move(sentence),
+                 .keys = std::move(keys)});
+}
+
+ValueType<std::string> one_of(std::vector<std::string> words) {
+  ValueType<std::string> type = text_if_any();
+  type.form = shared({.type = Form::Type::word, .words = std::move(words)});
+  return type;
+}
+
+ValueType<std::string> text_like(std::string pattern, std::string what, std::string example) {
+  ValueType<std::string> type = text_if_any();
+  type.form = shared({.type = Form::Type::text,
+                      .sentence = std::move(what),
+                      .example = std::move(example),
+                      .pattern = std::move(pattern)});
+  return type;
 }
 
 ValueType<double> number(Range range) {

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/files/keys/file_kind.hpp"
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
 
@@ -85,6 +86,9 @@ struct DesignProblem {
     return config.parameters.at(i).fit;
   }
 };
+
+/// What a design file may hold.
+[[nodiscard]] const FileKind& design_kind();
 
 /// Reads and checks a design file. Throws Error(bad_input) with the file and the key.
 [[nodiscard]] DesignProblem read_design(const std::filesystem::path& path);

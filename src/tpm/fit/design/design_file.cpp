@@ -2,11 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
+#include "tpm/base/enum_names.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/protocol_block.hpp"
-#include "tpm/files/renamed_names.hpp"
+#include "tpm/files/keys/more_types.hpp"
 #include "tpm/fit/design/design.hpp"
 #include "tpmkit/error.hpp"
 
@@ -18,20 +20,177 @@ using ExperimentKind = PlannedExperiment::Kind;
 /// More candidates than this are a mistake of the file.
 constexpr std::size_t kMostCandidates = 20000;
 
-/// A quantity above 0 (or equal to it, if that is allowed).
-double quantity(const Json& value, Dimension dimension, const DocumentPlace& place,
-                bool zero_allowed = false) {
-  const auto text = value.get<std::string>();
-  const double si = parse_quantity(text, dimension, place.where);
-  if (si > 0.0 || (zero_allowed && si == 0.0)) return si;
-  throw bad_input(place.where, fmt::format("'{}'", printable(text)),
-                  zero_allowed ? "0 or more" : "more than 0");
+/// All combinations of what a file lists.
+struct GridKeys {
+  ProtocolKind kind = ProtocolKind::ramp_hold;
+  ProtocolLists lists;
+  std::vector<double> intervals_s;
+  std::vector<int> repeats{1};
+};
+
+std::vector<Key<GridKeys>> grid_keys(ProtocolKind kind,
+                                     std::initializer_list<ProtocolKeyName> renamed) {
+  using K = GridKeys;
+  std::vector<Key<K>> keys;
+  for (const Key<ProtocolLists>& one : protocol_list_keys(kind, renamed)) {
+    keys.push_back(within(&K::lists, one));
+  }
+  keys.push_back(
+      required(with_example(key("interval", &K::intervals_s,
+                                list(files::quantity(Dimension::time, kAboveZero), {.fewest = 1}),
+                                "between samples, from the first moment on"),
+                            Json::array({"0.1 s"}))));
+  keys.push_back(key("repeats", &K::repeats, list(whole<int>(1, 1000), {.fewest = 1}),
+                     "recordings on fresh sites; default [1]"));
+  return keys;
 }
 
-std::vector<double> intervals_of(const Json& grid, const DocumentPlace& place) {
-  return mapped<double>(grid.at("interval"), [&](const auto& value) {
-    return quantity(value, Dimension::time, place.key("interval"));
-  });
+const Kinds<GridKeys, ProtocolKind>& grid_kinds() {
+  using Kind = ProtocolKind;
+  static const Kinds<GridKeys, Kind> kinds(
+      {"grid", "experiments: every combination of what is listed"}, &GridKeys::kind,
+      {{Kind::ramp_hold, "ramp_hold", "a ramp that is held", grid_keys(Kind::ramp_hold, {})},
+       {Kind::creep, "creep", "a load as a step", grid_keys(Kind::creep, {{"duration", "hold"}})}});
+  return kinds;
+}
+
+const Block<PlannedNoise>& noise_block(Dimension dimension) {
+  using N = PlannedNoise;
+  const auto of = [](const char* name, Dimension unit) {
+    return Block<N>(
+        name, "scatter of a reading",
+        {required(with_example(
+             key("absolute", &N::absolute, files::quantity(unit, kAboveZero), "of every reading"),
+             unit == Dimension::force ? "5 mN" : "0.01 mm")),
+         key("relative", &N::relative, number({.least = 0.0, .most = 10.0}),
+             "share of the expected reading that is added")});
+  };
+  static const Block<N> force = of("force_noise", Dimension::force);
+  static const Block<N> depth = of("depth_noise", Dimension::length);
+  return dimension == Dimension::force ? force : depth;
+}
+
+struct DesignKeys {
+  std::string title;
+  Json model, law, tension, parameters, fixed;  ///< of the fit, whose reader reads them
+  std::vector<std::string> nuisance;
+  std::vector<std::pair<std::string, double>> known;
+  PlannedNoise force;
+  std::optional<PlannedNoise> depth;
+  bool scale_known = true;
+  double correlation_time_s = 0.0;
+  MachineLimits limits;
+  std::vector<GridKeys> candidates, previous;
+  std::string criterion = "worst";
+  double factor = 2.0, level = FitConfig{}.level;
+};
+
+constexpr std::array<Word<bool>, 2> kScales{{{true, "known"}, {false, "estimated"}}};
+
+const Block<DesignKeys>& planned_noise_block() {
+  using K = DesignKeys;
+  static const Block<K> block(
+      "planned_noise", "scatter of the readings",
+      {required(key("force", &K::force, noise_block(Dimension::force).type(), "of a force")),
+       key("depth", &K::depth, noise_block(Dimension::length).type(), "of a depth: of creep"),
+       key("scale", &K::scale_known, word(kScales),
+           "estimated: right up to one factor, intervals from Student's t"),
+       key("correlation_time", &K::correlation_time_s,
+           files::quantity(Dimension::time, kZeroOrMore),
+           "of the noise; 0 s: independent samples")});
+  return block;
+}
+
+const Block<MachineLimits>& limits_block() {
+  using L = MachineLimits;
+  const auto limit = [](const char* name, double L::*member, Dimension dimension,
+                        const char* sentence, Json usual = nullptr) {
+    return with_default(key(name, member, files::quantity(dimension, kAboveZero), sentence),
+                        std::move(usual));
+  };
+  static const Block<L> block(
+      "limits", "what the machine and the tissue bear",
+      {limit("rate", &L::rate_m_per_s, Dimension::speed, "of a ramp"),
+       limit("depth", &L::depth_m, Dimension::length, "damage of liver", "12 mm"),
+       limit("load", &L::load_N, Dimension::force, "of creep"),
+       limit("duration", &L::duration_s, Dimension::time, "of one recording"),
+       limit("total_time", &L::total_s, Dimension::time, "of all repeats"),
+       key("samples", &L::samples, whole<double>(1, 1e6), "of one recording")});
+  return block;
+}
+
+/// Of the fit, in the forms that a design takes.
+FormPtr planned_parameters_form() {
+  const FormPtr quantity_text = text(1).form;
+  return map_form(
+      object_form("planned_parameter", "a parameter, at the value taken as true",
+                  {required_key("start", quantity_text, "the value taken as true"),
+                   required_key("lower", quantity_text, "least value"),
+                   required_key("upper", quantity_text, "largest value"),
+                   optional_key("scale", one_of({"log", "linear", "inverse_square"}).form,
+                                "coordinate of the search; default log"),
+                   optional_key("sets", list(text(1), {.fewest = 1, .distinct = true}).form,
+                                "model parameters that take this value; default: the one of the "
+                                "same name")}),
+      1);
+}
+
+FormPtr planned_law_form() {
+  return object_form(
+      "planned_law", "a law of the family instead of the paper's element",
+      {required_key("name", text(1).form,
+                    "kernel, branches, tension: linear-1-elastic, power-2, hertz-fzener"),
+       optional_key("drive", one_of({"indentation_depth", "relative_length"}).form,
+                    "answered by a contact force or a stress; default indentation_depth"),
+       required_key("reference", text(1).form, "reference depth of the kernel, such as \"5 mm\"")});
+}
+
+const Block<DesignKeys>& design_block() {
+  using K = DesignKeys;
+  ValueType<K> noise = planned_noise_block().type();
+  Key<K> noise_key{{.name = "noise",
+                    .form = noise.form,
+                    .sentence = "scatter of the readings",
+                    .required = true},
+                   [](K& into, const Json& value, const DocumentPlace& place) {
+                     read_keys(planned_noise_block().keys(), value, place, into);
+                   },
+                   [](const K& from) { return planned_noise_block().write(from); }};
+  const auto grids = list(grid_kinds().type());
+  static const Block<K> block(
+      "design", "",
+      {required(key("title", &K::title, text(), "what the design is")),
+       unread<K>("description", text().form, "what else is to be said of it"),
+       key("model", &K::model, as_json(one_of({"closed_form", "cvodes"}).form),
+           "default closed_form"),
+       key("law", &K::law, as_json(planned_law_form()),
+           "a law of the family instead of the paper's element; its parameters are listed by tpm "
+           "laws NAME"),
+       key("tension", &K::tension, as_json(one_of({"exact", "frozen_at_peak"}).form),
+           "exact: lambda1(e); frozen_at_peak: as the paper; default exact"),
+       required(
+           with_example(key("parameters", &K::parameters, as_json(planned_parameters_form()),
+                            "as in a fit; start is the value taken as true"),
+                        {{"E1", {{"start", "12 kPa"}, {"lower", "1 kPa"}, {"upper", "200 kPa"}}}})),
+       key("fixed", &K::fixed, as_json(map_form(text(1).form)),
+           "model parameters fixed at a value; what is neither estimated nor fixed has the paper's "
+           "value (with a law: contact and offset 0, spacing infinite)"),
+       key("nuisance", &K::nuisance, list(text(1), {.distinct = true}),
+           "parameters of which every recording has its own, such as an offset"),
+       key("known", &K::known, map_of(number({.least = 1e-6, .most = 1e6})),
+           "relative standard errors known beforehand, such as {\"E1\": 0.3}"),
+       noise_key, key("limits", &K::limits, limits_block().type(), "of machine and tissue"),
+       required(key("candidates", &K::candidates, list(grid_kinds().type(), {.fewest = 1}),
+                    "grids: every combination is a candidate")),
+       key("previous", &K::previous, grids,
+           "experiments already done, every combination once: their information is added"),
+       with_default(
+           key("criterion", &K::criterion, text(), "worst, all, or the name of a parameter"),
+           "worst"),
+       key("identified_factor", &K::factor, number({.least = 1.000001, .most = 1e6}),
+           "identified: the interval reaches no further than value / factor and value * factor"),
+       key("level", &K::level, number({.least = 0.01, .most = 0.9999}), "of the intervals")});
+  return block;
 }
 
 PlannedExperiment planned(const ProtocolBlock& block) {
@@ -42,76 +201,45 @@ PlannedExperiment planned(const ProtocolBlock& block) {
 }
 
 /// All combinations; those that differ only in their repeats stand side by side.
-void add_grid(const Json& grid, const DocumentPlace& place, std::vector<PlannedExperiment>& list) {
-  const bool creep = grid.at("kind") == "creep";
-  const std::vector<ProtocolBlock> protocols =
-      creep
-          ? parse_protocol_lists(grid, place, ProtocolKind::creep, {{"duration", "hold"}},
-                                 {"interval", "repeats"})
-          : parse_protocol_lists(grid, place, ProtocolKind::ramp_hold, {}, {"interval", "repeats"});
-  const auto intervals = intervals_of(grid, place);
-  const auto repeats = grid.value("repeats", std::vector<int>{1});
-  const std::size_t count = protocols.size() * intervals.size() * repeats.size();
-  if (list.size() + count > kMostCandidates) {
-    throw bad_input(place.where, fmt::format("{} experiments", list.size() + count),
+void add_grid(const GridKeys& grid, const DocumentPlace& place,
+              std::vector<PlannedExperiment>& experiments) {
+  const auto protocols = combinations(grid.kind, grid.lists, place);
+  const std::size_t count = protocols.size() * grid.intervals_s.size() * grid.repeats.size();
+  if (experiments.size() + count > kMostCandidates) {
+    throw bad_input(place.where, fmt::format("{} experiments", experiments.size() + count),
                     fmt::format("at most {}", kMostCandidates));
   }
   for (const ProtocolBlock& protocol : protocols) {
-    for (const double interval : intervals) {
-      for (const int repeat : repeats) {
-        list.push_back(planned(protocol));
-        list.back().interval_s = interval;
-        list.back().repeats = repeat;
+    for (const double interval : grid.intervals_s) {
+      for (const int repeat : grid.repeats) {
+        experiments.push_back(planned(protocol));
+        experiments.back().interval_s = interval;
+        experiments.back().repeats = repeat;
       }
     }
   }
 }
 
-std::vector<PlannedExperiment> parse_grids(const Json& document, const char* key,
-                                           const DocumentPlace& place) {
-  std::vector<PlannedExperiment> list;
-  if (!document.contains(key)) return list;
-  std::size_t index = 0;
-  for (const auto& grid : document.at(key)) {
-    add_grid(grid, place.key(key).key(std::to_string(index++)), list);
+std::vector<PlannedExperiment> experiments_of(const std::vector<GridKeys>& grids,
+                                              const DocumentPlace& place) {
+  std::vector<PlannedExperiment> experiments;
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    add_grid(grids[i], place.key(std::to_string(i)), experiments);
   }
-  return list;
-}
-
-PlannedNoise parse_noise(const Json& j, Dimension dimension, const DocumentPlace& place) {
-  return {quantity(j.at("absolute"), dimension, place.key("absolute")), j.value("relative", 0.0)};
-}
-
-void parse_noises(const Json& j, DesignProblem& problem, const DocumentPlace& place) {
-  problem.force_noise = parse_noise(j.at("force"), Dimension::force, place.key("force"));
-  if (j.contains("depth")) {
-    problem.depth_noise = parse_noise(j.at("depth"), Dimension::length, place.key("depth"));
-  }
-  problem.scale_known = j.value("scale", "known") == "known";
-  if (j.contains("correlation_time")) {
-    problem.correlation_time_s =
-        quantity(j.at("correlation_time"), Dimension::time, place.key("correlation_time"), true);
-  }
-}
-
-void parse_limits(const Json& j, MachineLimits& limits, const DocumentPlace& place) {
-  const auto set = [&](const char* key, Dimension dimension, double& limit) {
-    if (j.contains(key)) limit = quantity(j.at(key), dimension, place.key(key));
-  };
-  set("rate", Dimension::speed, limits.rate_m_per_s);
-  set("depth", Dimension::length, limits.depth_m);
-  set("load", Dimension::force, limits.load_N);
-  set("duration", Dimension::time, limits.duration_s);
-  set("total_time", Dimension::time, limits.total_s);
-  limits.samples = j.value("samples", limits.samples);
+  return experiments;
 }
 
 /// The fit that the design prepares, through the reader of fit configurations.
-FitConfig parse_model(const Json& document, const DocumentPlace& place) {
-  Json fit{{"title", document.at("title")}};
-  for (const char* key : {"model", "law", "tension", "parameters", "fixed"}) {
-    if (document.contains(key)) fit[key] = document.at(key);
-  }
+FitConfig parse_model(const DesignKeys& keys, const DocumentPlace& place) {
+  Json fit{{"title", keys.title}};
+  const auto pass_on = [&](const char* key, const Json& value) {
+    if (!value.is_null()) fit[key] = value;
+  };
+  pass_on("model", keys.model);
+  pass_on("law", keys.law);
+  pass_on("tension", keys.tension);
+  pass_on("parameters", keys.parameters);
+  pass_on("fixed", keys.fixed);
   fit["data"] = Json::array({{{"dataset", "planned"},
                               {"protocol", {{"kind", "measured"}}},
                               {"noise", {{"kind", "per_row"}}}}});
@@ -134,12 +262,10 @@ std::size_t parameter_place(const FitConfig& config, const std::string& name,
                   fmt::format("{}{}", besides, listed(all, &FitParameter::name)));
 }
 
-void separate_nuisance(const Json& document, DesignProblem& problem, const DocumentPlace& place) {
-  if (!document.contains("nuisance")) return;
+void separate_nuisance(const DesignKeys& keys, DesignProblem& problem, const DocumentPlace& place) {
   auto& list = problem.config.parameters;
-  for (const auto& name : document.at("nuisance")) {
-    const std::size_t i =
-        parameter_place(problem.config, name.get<std::string>(), place.key("nuisance"), "one of ");
+  for (const std::string& name : keys.nuisance) {
+    const std::size_t i = parameter_place(problem.config, name, place.key("nuisance"), "one of ");
     problem.nuisance.push_back(list[i]);
     list.erase(list.begin() + static_cast<std::ptrdiff_t>(i));
   }
@@ -156,17 +282,15 @@ void require_sizes(const DesignProblem& problem, const DocumentPlace& place) {
   }
 }
 
-void parse_known(const Json& document, DesignProblem& problem, const DocumentPlace& place) {
+void set_known(const DesignKeys& keys, DesignProblem& problem, const DocumentPlace& place) {
   problem.known.assign(problem.config.parameters.size(), std::numeric_limits<double>::infinity());
-  if (!document.contains("known")) return;
-  for (const auto& [name, error] : document.at("known").items()) {
-    problem.known[parameter_place(problem.config, name, place.key("known"), "one of ")] =
-        error.get<double>();
+  for (const auto& [name, error] : keys.known) {
+    problem.known[parameter_place(problem.config, name, place.key("known"), "one of ")] = error;
   }
 }
 
-void parse_criterion(const Json& document, DesignProblem& problem, const DocumentPlace& place) {
-  const std::string criterion = document.value("criterion", "worst");
+void set_criterion(const DesignKeys& keys, DesignProblem& problem, const DocumentPlace& place) {
+  const std::string& criterion = keys.criterion;
   if (criterion == "all" || criterion == "worst") {
     problem.criterion = criterion == "all" ? Criterion::all : Criterion::worst;
     return;
@@ -189,24 +313,34 @@ void require_creep_noise(const DesignProblem& problem, const DocumentPlace& plac
 
 }  // namespace
 
+const FileKind& design_kind() {
+  static const FileKind kind{
+      "design", "Design of tpm design",
+      "Which experiments could be done, and what is taken as true. Quantities are texts of a "
+      "number and a unit, such as \"12 kPa\"",
+      design_block().form()};
+  return kind;
+}
+
 DesignProblem parse_design(const Json& written, std::string_view where) {
-  const Json document = checked(written, "design", where);
   const DocumentPlace place{std::string(where)};
+  const DesignKeys keys = design_block().made(checked(written, design_kind(), where), place);
   DesignProblem problem;
-  problem.config = parse_model(document, place);
-  separate_nuisance(document, problem, place);
+  problem.config = parse_model(keys, place);
+  separate_nuisance(keys, problem, place);
   require_sizes(problem, place);
-  parse_known(document, problem, place);
-  parse_noises(document.at("noise"), problem, place.key("noise"));
-  if (document.contains("limits")) {
-    parse_limits(document.at("limits"), problem.limits, place.key("limits"));
-  }
-  problem.candidates = parse_grids(document, "candidates", place);
-  problem.previous = parse_grids(document, "previous", place);
+  set_known(keys, problem, place);
+  problem.force_noise = keys.force;
+  problem.depth_noise = keys.depth;
+  problem.scale_known = keys.scale_known;
+  problem.correlation_time_s = keys.correlation_time_s;
+  problem.limits = keys.limits;
+  problem.candidates = experiments_of(keys.candidates, place.key("candidates"));
+  problem.previous = experiments_of(keys.previous, place.key("previous"));
   require_creep_noise(problem, place);
-  parse_criterion(document, problem, place);
-  problem.factor = document.value("identified_factor", problem.factor);
-  problem.config.level = document.value("level", problem.config.level);
+  set_criterion(keys, problem, place);
+  problem.factor = keys.factor;
+  problem.config.level = keys.level;
   return problem;
 }
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "tpm/base/lists.hpp"
-#include "tpm/files/renamed_names.hpp"
 #include "tpm/fit/likelihood/config_parts.hpp"
 #include "tpm/fit/likelihood/experiment_refit.hpp"
+#include "tpm/fit/likelihood/fit_keys.hpp"
 #include "tpm/organ/scene/organ_model.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/formulation.hpp"
@@ -131,7 +131,7 @@ TpmVector fitted_element(const FitConfig& config, std::span<const double> natura
 
 FitConfig parse_fit_config(const Json& written, std::string_view where,
                            const std::filesystem::path& folder) {
-  const Json document = checked(written, "fit", where);
+  const Json document = checked(written, fit_kind(), where);
   const DocumentPlace place{std::string(where)};
   FitConfig config;
   config.folder = folder;

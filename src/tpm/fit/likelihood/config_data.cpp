@@ -28,14 +28,8 @@ constexpr auto kProtocolKinds = std::to_array<Word<Kind>>(
 /// What only oscillations have.
 void parse_oscillation(const Json& j, const std::optional<LawSpec>& law, ProtocolChoice& protocol,
                        const DocumentPlace& place) {
+  if (protocol.kind != Kind::oscillation) return;
   const DocumentPlace depth = place.key("operating_depth");
-  if (protocol.kind != Kind::oscillation) {
-    if (!j.contains("operating_depth")) return;
-    throw bad_input(
-        depth.where,
-        fmt::format("protocol '{}' has no operating depth", protocol_kind_name(protocol.kind)),
-        "an operating depth only with oscillation");
-  }
   if (!law) {
     throw bad_input(place.key("kind").where, "'oscillation' with the paper's element",
                     "a law of the family under /law");
@@ -50,20 +44,13 @@ void parse_oscillation(const Json& j, const std::optional<LawSpec>& law, Protoco
 ProtocolChoice parse_protocol(const Json& j, const std::optional<LawSpec>& law,
                               const DocumentPlace& place) {
   ProtocolChoice protocol;
-  const auto name = j.at("kind").get<std::string>();
-  protocol.kind = parse_word(kProtocolKinds, "protocol", name, place.key("kind").where);
+  protocol.kind = find_entry(kProtocolKinds, j.at("kind").get<std::string>())->meaning;
   if (protocol.kind == Kind::ramp_hold) {
-    Json imposed = j;
-    for (const char* key : {"rate_provenance", "operating_depth"}) imposed.erase(key);
-    protocol.rate_m_per_s =
-        parse_protocol_block(imposed, place, Openness::open).number("rate", place);
+    protocol.rate_m_per_s = quantity_at(j, "rate", Dimension::speed, place);
     if (j.contains("rate_provenance")) {
       protocol.rate_provenance = parse_provenance(j.at("rate_provenance").get<std::string>(),
                                                   place.key("rate_provenance").where);
     }
-  } else if (j.contains("rate")) {
-    throw bad_input(place.key("rate").where, fmt::format("protocol '{}' has no rate", name),
-                    "a rate only with ramp_hold");
   }
   parse_oscillation(j, law, protocol, place);
   return protocol;
@@ -91,8 +78,6 @@ void parse_stiffness_per_modulus(const Json& j, const FitConfig& config, DataCho
         "it only with oscillation and a law of contact force over indentation depth");
   }
   data.stiffness_per_modulus_m = quantity_at(j, "stiffness_per_modulus", Dimension::length, place);
-  if (*data.stiffness_per_modulus_m > 0.0) return;
-  throw bad_input(here.where, "not above 0", "A0/l0 such as \"12.56 mm\"");
 }
 
 /// "imposed": "response" of creep, before what is read in the unit of what answers.

@@ -23,13 +23,7 @@ class ReducedContact : public Formulation, public SceneRunner, public PlanOffer 
 
   [[nodiscard]] Trajectory run(const ExperimentScene& scene, const RunNetwork& /*network*/,
                                const std::vector<double>& times_s, bool with_field) const override {
-    const PlanModels all = offered_();
-    const std::size_t number = which_(scene.formulation);
-    if (number >= all.size()) {
-      throw bad_input(scene.formulation.where, fmt::format("'{}' of number {}", name(), number + 1),
-                      fmt::format("at most {}", all.size()));
-    }
-    return run_candidate_on(*all[number], scene, times_s, with_field);
+    return run_candidate_on(*offered_().at(which_(scene.formulation)), scene, times_s, with_field);
   }
   [[nodiscard]] PlanModels candidates(const PlanScene& /*scene*/) const override {
     return offered_();

@@ -9,6 +9,7 @@
 #include "tpm/files/renamed_names.hpp"
 #include "tpm/files/row_log.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
+#include "tpm/haptics/session/recording_keys.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
@@ -169,7 +170,7 @@ HilRecording read_recording(const std::filesystem::path& file) {
   if ((format != kFormat && format != kFirstFormat) || log.row_bytes != row_bytes) {
     throw bad_input(file.string(), "is a recording of another version of tpm", kFormat);
   }
-  check_schema(recording.header, "hil_recording", at_header);
+  recording.header = checked(std::move(recording.header), recording_header_kind(), at_header);
   const std::string at_session = at_header + ": session";
   const Json session =
       with_current_names(recording.header.at("session"), "hil", at_session, FormerNames::silent);
@@ -193,7 +194,12 @@ HilRecording read_recording(const std::filesystem::path& file) {
   if (log.closed) {
     const std::string at_closing = file.string() + ": closing record";
     recording.closing = parse_json(log.closing, at_closing);
-    check_schema(recording.closing, "hil_closing", at_closing);
+    recording.closing = checked(std::move(recording.closing), recording_closing_kind(), at_closing);
+    for (const char* key : {"host", "woke_late", "busy"}) {
+      if (!recording.closing.contains("scheduling") || recording.closing.contains(key)) continue;
+      throw bad_input(DocumentPlace{at_closing}.key(key).where, "is missing",
+                      "it beside 'scheduling'");
+    }
   }
   return recording;
 }

@@ -115,8 +115,9 @@ void set_tissue(HilSession& session, const SessionModelKeys& model, const Docume
     session.law = law_from_json(tissue.is_string() ? read_json(file) : tissue, where);
   } else {
     session.scene_place = where;
-    session.scene = with_mesh_listed(tissue.is_string() ? read_json(file) : tissue, where,
-                                     tissue.is_string() ? file.parent_path() : folder);
+    session.scene =
+        with_mesh_listed(without_schema_key(tissue.is_string() ? read_json(file) : tissue), where,
+                         tissue.is_string() ? file.parent_path() : folder);
   }
 }
 

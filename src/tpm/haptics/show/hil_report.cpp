@@ -158,7 +158,7 @@ void add_glance(Document& d, const HilRecording& r, const Verification& v,
                    v.all.max_N <= kMostError * v.all.peak_N ? Tone::good : Tone::bad});
   if (r.session.measured_N.empty()) lines.push_back({experiment_line(v)});
   for (const CrossCheck& o : v.others) {
-    if (o.name.starts_with("MEASURED")) {
+    if (o.measured) {
       lines.push_back({fmt::format("{}: {} mN rms, {} mN at most", o.name, mN(o.commanded.rms_N),
                                    mN(o.commanded.max_N))});
     }

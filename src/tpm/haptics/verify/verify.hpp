@@ -36,6 +36,7 @@ struct CrossCheck {
   double start_s = 0.0, end_s = 0.0;
   ForceFidelity commanded;  ///< against this cross-check
   double apart_N = 0.0;     ///< between this cross-check and the reference, at most
+  bool measured = false;    ///< by an instrument, not computed
 };
 
 /// A reading of the experiment beside the session's.

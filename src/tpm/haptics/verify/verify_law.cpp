@@ -53,6 +53,7 @@ void put_beside_recording(Verification& v, const HilRecording& recording, const 
   const HilSession& session = recording.session;
   if (session.measured_N.size() < 2) return;
   CrossCheck& cross_check = v.others.emplace_back();
+  cross_check.measured = true;
   cross_check.name =
       fmt::format("MEASURED: the recording {}, its offset taken off", session.phases.back().name);
   FidelitySum sum;

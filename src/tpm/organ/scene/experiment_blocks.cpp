@@ -9,6 +9,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/organ/scene/exponentials.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -80,6 +81,13 @@ std::optional<Fault> masses_fault(const FormulationKeys& block) {
   return std::nullopt;
 }
 
+/// As many as a formulation has.
+Key<FormulationKeys> exponentials_key(std::string_view formulation) {
+  return with_default(key("exponentials", &FormulationKeys::exponentials,
+                          whole<int>(1, most_exponentials(formulation)), "of the contact"),
+                      FormulationChoice{}.exponentials);
+}
+
 /// The keys that formulations take.
 std::vector<Key<FormulationKeys>> settings() {
   using K = FormulationKeys;
@@ -95,8 +103,7 @@ std::vector<Key<FormulationKeys>> settings() {
                        "1 ms"),
           with_default(key("sweeps", &K::sweeps, whole<int>(1, 1e6), "over the bonds, a step"),
                        usual.sweeps),
-          with_default(key("exponentials", &K::exponentials, whole<int>(1, 3), "of the contact"),
-                       usual.exponentials),
+          exponentials_key({}),
           with_default(key("rings", &K::rings, whole<int>(1, 3), "of bonds that are kept"),
                        usual.rings),
           with_default(key("solver", &K::solver, word(kStiffnessSolverWords),
@@ -125,7 +132,8 @@ const Kinds<FormulationKeys, std::string>& formulation_kinds() {
       Kind<K, std::string> kind{
           std::string(f->name()), std::string(f->name()), std::string(f->meaning()), {}};
       for (const Key<K>& key : known) {
-        if (f->takes(key.form.name)) kind.keys.push_back(key);
+        if (!f->takes(key.form.name)) continue;
+        kind.keys.push_back(key.form.name == "exponentials" ? exponentials_key(f->name()) : key);
       }
       for (const Key<K>& key : comparison()) kind.keys.push_back(key);
       if (!f->also().empty()) {

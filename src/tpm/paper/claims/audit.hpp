@@ -60,6 +60,7 @@ struct AuditDetail {
   AuditQuantity recomputed;
   std::string verdict;
   std::optional<double> difference_percent;
+  bool exact = false;  ///< the printed digits follow
 };
 
 /// How many cells of printed tables follow (kind "table").

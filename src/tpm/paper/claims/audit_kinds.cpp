@@ -139,7 +139,8 @@ void add_check(Finding& finding, std::string what, const DigitCheck& check, cons
                              with_unit(check.printed.text, unit),
                              {check.computed, unit},
                              check.words(),
-                             check.difference_percent});
+                             check.difference_percent,
+                             check.explained()});
 }
 
 void check_range(const ClaimReader& claim, Finding& finding) {
@@ -192,7 +193,8 @@ void check_agree(const ClaimReader& claim, Finding& finding) {
                                  with_unit(significant(a, 4), unit),
                                  {b, unit},
                                  relative <= tolerance ? "agrees" : "does not agree",
-                                 percent});
+                                 percent,
+                                 false});
     }
     if (relative <= worst) continue;
     worst = relative;

@@ -6,6 +6,7 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
+#include "tpm/files/keys/file_kind.hpp"
 #include "tpm/fit/expression/expression.hpp"
 #include "tpmkit/units.hpp"
 
@@ -68,12 +69,15 @@ struct ClaimSet {
 /// The paper's own claims: data/paper_claims.json of share_dir().
 [[nodiscard]] std::filesystem::path paper_claims_path();
 
-/// Only the tables of a claims file, which is all that `tpm tables` needs.
-/// @param document already checked against schemas/claims.schema.json
+/// What a paper prints.
+[[nodiscard]] const FileKind& claims_kind();
+
+/// Only the tables of a claims file, which is all that `tpm tables` needs. Throws Error(bad_input)
+/// as read_claims() does.
 [[nodiscard]] std::vector<PrintedTable> read_printed_tables(const Json& document,
                                                             std::string_view file);
 
-/// Checks the document against the schema and reads it. Throws Error(bad_input) naming the file
+/// Reads a document. Throws Error(bad_input) naming the file
 /// and the symbol, table or claim.
 [[nodiscard]] ClaimSet read_claims(const Json& document, std::string_view file);
 

@@ -32,7 +32,7 @@ std::string inputs_text(const Finding& finding) {
 std::string details_text(const Finding& finding) {
   std::string out;
   for (const AuditDetail& detail : finding.details) {
-    if (detail.verdict.starts_with("exact") && finding.details.size() > 4) continue;
+    if (detail.exact && finding.details.size() > 4) continue;
     out += fmt::format("    {:<{}}{}: {} against {}, {}\n", "", kLabel - 4, detail.what,
                        detail.printed, quantity_with_unit(detail.recomputed, 4), detail.verdict);
   }

@@ -1,0 +1,13 @@
+#pragma once
+#include "tpm/base/namespaces.hpp"
+#include "tpm/files/keys/file_kind.hpp"
+
+namespace tpm::haptics {
+
+/// What stands before the rows of a recording.
+[[nodiscard]] const FileKind& recording_header_kind();
+
+/// What stands behind them.
+[[nodiscard]] const FileKind& recording_closing_kind();
+
+}  // namespace tpm::haptics

@@ -1,0 +1,10 @@
+#pragma once
+#include "tpm/base/namespaces.hpp"
+#include "tpm/files/keys/file_kind.hpp"
+
+namespace tpm::sweep {
+
+/// What a sweep's file may hold. Its parts are read where they are used.
+[[nodiscard]] const FileKind& sweep_kind();
+
+}  // namespace tpm::sweep
