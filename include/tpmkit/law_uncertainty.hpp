@@ -33,15 +33,16 @@ struct FittedFile {
   /// and offset (N or Pa). Of a single one they stand among the law's parameters.
   std::optional<double> contact = std::nullopt, offset = std::nullopt;
   /// Which of the two were not estimated: "contact", "offset".
-  std::vector<std::string> held = {  /// SHA-256 of the samples' numbers (time, drive, response with 9 digits): a copy of the recording
-  /// has the same, however its file is named or formatted. Empty: not stated.
-  std::string samples_sha256 = {};
-};
+  std::vector<std::string> held = {};
   /// Limits of the force cell: readings at or beyond them were censored, SI.
   std::optional<double> clipped_above = std::nullopt, clipped_below = std::nullopt;
   /// Drift of the force cell's zero that was found in a recording, N/s or Pa/s, and when it is 0,
   /// s.
   std::optional<double> drift = std::nullopt, drift_origin_s = std::nullopt;
+
+  /// SHA-256 of the samples' numbers (time, drive, response with 9 digits): a copy of the recording
+  /// has the same, however its file is named or formatted. Empty: not stated.
+  std::string samples_sha256 = {};
 
   /// What the drift adds to a reading.
   [[nodiscard]] double drifted(double time_s) const {
