@@ -39,7 +39,7 @@ int verify_program(const VerifyChoice& choice, const Session& session) {
   std::size_t count = 0;
   for (const VerificationGroup& group : groups) count += group.checks().size();
   Progress progress("verifying", count);
-  const Verification verification = run_verification(groups, flaw, [&] { progress.advance(); });
+  const VerificationRun verification = run_verification(groups, flaw, [&] { progress.advance(); });
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   if (!choice.folder.empty()) write_verification(verification, choice.folder, took.count());
   if (session.json()) {

@@ -21,7 +21,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-Verification verified(const std::string& group, double flaw) {
+VerificationRun verified(const std::string& group, double flaw) {
   const std::vector<std::string> names{group};
   return run_verification(chosen_groups(names), flaw);
 }
@@ -29,7 +29,7 @@ Verification verified(const std::string& group, double flaw) {
 /// Every check of a group holds as it is, and fails once a coefficient is wrong by 1 %.
 void check_group(const std::string& group) {
   for (const double flaw : {0.0, 0.01}) {
-    const Verification verification = verified(group, flaw);
+    const VerificationRun verification = verified(group, flaw);
     REQUIRE(verification.rows.size() >= 5);
     for (const VerificationRow& row : verification.rows) {
       CAPTURE(row.what, row.quantity, row.measured, row.expected, row.tolerance, row.failure, flaw);

@@ -22,7 +22,7 @@ TEST_CASE("verification: orders and reductions hold, and fail with a wrong coeff
 
 TEST_CASE("verification: everything takes at most two minutes") {
   const auto start = std::chrono::steady_clock::now();
-  const Verification all = run_verification(verification_groups(), 0.0);
+  const VerificationRun all = run_verification(verification_groups(), 0.0);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   CHECK(all.rows.size() > 100);
   CHECK(all.failed() == 0);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "tpm/base/random.hpp"
-#include "tpm/fit/select/adequacy.hpp"
+#include "tpm/fit/adequacy.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;

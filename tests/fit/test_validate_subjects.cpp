@@ -87,7 +87,7 @@ const OrganMaterial& star_of(const LawFile& law) {
 
 TEST_CASE("the grid convergence index has its closed form", "[validate]") {
   // 1 + 0.1 h^2 on h = 1, 2, 4: the error of the finest is 0.1, and the order 2.
-  const GridConvergence g = grid_convergence({1.1, 1.4, 2.6}, 2.0);
+  const GridConvergenceEstimate g = grid_convergence({1.1, 1.4, 2.6}, 2.0);
   CHECK(g.monotone);
   CHECK_THAT(g.order, WithinRel(2.0, 1e-12));
   CHECK_THAT(g.expanded, WithinRel(1.25 * 0.1, 1e-12));

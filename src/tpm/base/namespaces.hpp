@@ -80,6 +80,7 @@ using namespace plan;
 namespace tpm::haptics {
 using namespace base;
 using namespace work;
+using namespace data;
 using namespace law;
 using namespace files;
 using namespace show;

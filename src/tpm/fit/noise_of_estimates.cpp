@@ -9,10 +9,10 @@
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/likelihood/correlation.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
-#include "tpm/fit/select/adequacy.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

@@ -36,7 +36,7 @@ std::string summary_of_group(const std::string& name) {
   return {};
 }
 
-Table table_of_group(const Verification& verification, const std::string& name) {
+Table table_of_group(const VerificationRun& verification, const std::string& name) {
   Table table{"",
               {{"what is verified"},
                {"quantity"},
@@ -64,7 +64,7 @@ std::string flaw_words(double flaw) {
       significant(100.0 * flaw, 3));
 }
 
-Document verification_document(const Verification& verification) {
+Document verification_document(const VerificationRun& verification) {
   Document document;
   document.title = "Verification of tpm";
   document.subtitle = "What this program computes beside what is known otherwise";
@@ -98,13 +98,13 @@ Document verification_document(const Verification& verification) {
 
 }  // namespace
 
-std::string verification_words(const Verification& verification) {
+std::string verification_words(const VerificationRun& verification) {
   const std::size_t failed = verification.failed();
   return failed == 0 ? fmt::format("{} checks: all hold.", verification.rows.size())
                      : fmt::format("{} checks: {} FAILED.", verification.rows.size(), failed);
 }
 
-std::vector<VerificationLine> verification_lines(const Verification& verification) {
+std::vector<VerificationLine> verification_lines(const VerificationRun& verification) {
   std::vector<VerificationLine> lines;
   for (const std::string& name : each_once(verification.rows, &VerificationRow::group)) {
     if (!lines.empty()) lines.push_back({"\n"});
@@ -123,7 +123,7 @@ std::vector<VerificationLine> verification_lines(const Verification& verificatio
   return lines;
 }
 
-Json to_json(const Verification& verification) {
+Json to_json(const VerificationRun& verification) {
   constexpr int kKeptDigits = 6;
   Json json{{"checks", verification.rows.size()},
             {"failed", verification.failed()},
@@ -141,7 +141,7 @@ Json to_json(const Verification& verification) {
   return json;
 }
 
-std::string verification_csv(const Verification& verification) {
+std::string verification_csv(const VerificationRun& verification) {
   std::string text = csv_line(
       {"group", "what", "quantity", "measured", "expected", "tolerance", "verdict", "reference"});
   for (const VerificationRow& row : verification.rows) {
@@ -153,7 +153,7 @@ std::string verification_csv(const Verification& verification) {
   return text;
 }
 
-void write_verification(const Verification& verification, const std::filesystem::path& folder,
+void write_verification(const VerificationRun& verification, const std::filesystem::path& folder,
                         double seconds) {
   const Document document = verification_document(verification);
   write_file(folder / "report.md", to_markdown(document));

@@ -8,7 +8,7 @@
 namespace tpm::accuracy {
 
 /// "114 checks: all hold." or how many fail.
-[[nodiscard]] std::string verification_words(const Verification& verification);
+[[nodiscard]] std::string verification_words(const VerificationRun& verification);
 
 /// A line of the text, and whether it belongs to a check that failed.
 struct VerificationLine {
@@ -16,18 +16,18 @@ struct VerificationLine {
   bool failed = false;
 };
 /// A table for a terminal, then verification_words().
-[[nodiscard]] std::vector<VerificationLine> verification_lines(const Verification& verification);
+[[nodiscard]] std::vector<VerificationLine> verification_lines(const VerificationRun& verification);
 
 /// Keys: docs/verify.md.
-[[nodiscard]] Json to_json(const Verification& verification);
+[[nodiscard]] Json to_json(const VerificationRun& verification);
 
 /// One line a check.
-[[nodiscard]] std::string verification_csv(const Verification& verification);
+[[nodiscard]] std::string verification_csv(const VerificationRun& verification);
 
 /// Writes report.md, report.html, verification.json, verification.csv, and report.run.json, the
 /// only one that changes from run to run.
 /// @param seconds wall time of the checks
-void write_verification(const Verification& verification, const std::filesystem::path& folder,
+void write_verification(const VerificationRun& verification, const std::filesystem::path& folder,
                         double seconds);
 
 }  // namespace tpm::accuracy

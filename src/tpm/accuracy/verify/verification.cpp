@@ -59,14 +59,14 @@ std::vector<VerificationGroup> chosen_groups(std::span<const std::string> names)
   return chosen;
 }
 
-std::size_t Verification::failed() const {
+std::size_t VerificationRun::failed() const {
   return static_cast<std::size_t>(
       std::ranges::count_if(rows, [](const VerificationRow& row) { return !row.holds(); }));
 }
 
-Verification run_verification(std::span<const VerificationGroup> groups, double flaw,
-                              const std::function<void()>& progress) {
-  Verification verification;
+VerificationRun run_verification(std::span<const VerificationGroup> groups, double flaw,
+                                 const std::function<void()>& progress) {
+  VerificationRun verification;
   verification.flaw = flaw;
   for (const VerificationGroup& group : groups) {
     for (const VerificationCheck& check : group.checks()) {

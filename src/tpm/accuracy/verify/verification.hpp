@@ -1,6 +1,6 @@
 #pragma once
-// Verification that a user can run: what the program computes beside what is known otherwise. See
-// docs/verify.md.
+// VerificationRun that a user can run: what the program computes beside what is known otherwise.
+// See docs/verify.md.
 #include <Eigen/Core>
 #include <cmath>
 #include <functional>
@@ -52,7 +52,7 @@ struct VerificationGroup {
 /// Throws Error(usage) with the known names for one that is not there.
 [[nodiscard]] std::vector<VerificationGroup> chosen_groups(std::span<const std::string> names);
 
-struct Verification {
+struct VerificationRun {
   std::vector<VerificationRow> rows;
   double flaw = 0.0;
 
@@ -63,8 +63,9 @@ struct Verification {
 /// gives up (Error(numerical)) has failed.
 /// @param flaw see VerificationCheck::measure
 /// @param progress if any, called after each check
-[[nodiscard]] Verification run_verification(std::span<const VerificationGroup> groups, double flaw,
-                                            const std::function<void()>& progress = {});
+[[nodiscard]] VerificationRun run_verification(std::span<const VerificationGroup> groups,
+                                               double flaw,
+                                               const std::function<void()>& progress = {});
 
 // --- the groups, one source each
 [[nodiscard]] std::vector<VerificationCheck> order_checks();

@@ -9,7 +9,7 @@
 
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/fit/select/adequacy.hpp"
+#include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 
 namespace tpm::fit {

@@ -8,7 +8,7 @@
 
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/fit/select/adequacy.hpp"
+#include "tpm/fit/adequacy.hpp"
 
 namespace tpm::fit {
 namespace {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
-#include "tpm/fit/select/adequacy.hpp"
 
 namespace tpm::fit {
 namespace {

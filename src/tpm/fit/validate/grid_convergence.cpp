@@ -9,8 +9,8 @@
 
 namespace tpm::fit {
 
-GridConvergence grid_convergence(const std::vector<double>& values, double ratio,
-                                 double largest_order) {
+GridConvergenceEstimate grid_convergence(const std::vector<double>& values, double ratio,
+                                         double largest_order) {
   const bool finite = std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
   if (values.size() < 2 || !(ratio > 1.0) || !finite) {
     throw bad_input("grid convergence",
@@ -18,7 +18,7 @@ GridConvergence grid_convergence(const std::vector<double>& values, double ratio
                     "two or more finite values and a ratio above 1");
   }
   constexpr double kSafe = 1.25, kUnsafe = 3.0, kCoverage = 2.0;
-  GridConvergence g;
+  GridConvergenceEstimate g;
   const auto [least, most] = std::ranges::minmax(values);
   g.expanded = kUnsafe * (most - least);
   if (values.size() >= 3) {

@@ -6,7 +6,7 @@ namespace tpm::fit {
 
 /// The numerical uncertainty of a value that was computed on grids (or at tolerances) that are a
 /// constant factor apart.
-struct GridConvergence {
+struct GridConvergenceEstimate {
   double order = 0.0;     ///< observed p; 0 where the values are not monotone
   bool monotone = false;  ///< three values that approach each other
   double expanded = 0.0;  ///< GCI: Fs = 1.25 of the extrapolated error; else 3 of the largest
@@ -26,7 +26,7 @@ struct GridConvergence {
 /// @param values from the finest grid on, two or more
 /// @param ratio of neighbouring grids, > 1
 /// Throws Error(bad_input) for fewer values, another ratio, or values that are not finite.
-[[nodiscard]] GridConvergence grid_convergence(const std::vector<double>& values, double ratio,
-                                               double largest_order = 2.0);
+[[nodiscard]] GridConvergenceEstimate grid_convergence(const std::vector<double>& values,
+                                                       double ratio, double largest_order = 2.0);
 
 }  // namespace tpm::fit

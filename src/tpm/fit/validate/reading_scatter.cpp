@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
-#include "tpm/fit/select/adequacy.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

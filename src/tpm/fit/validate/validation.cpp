@@ -10,8 +10,8 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/validate/calibration_covariance.hpp"
 #include "tpmkit/error.hpp"
 

@@ -1,4 +1,4 @@
-#include "tpm/fit/select/adequacy.hpp"
+#include "tpm/fit/adequacy.hpp"
 
 #include <fmt/format.h>
 
