@@ -1,5 +1,5 @@
 #pragma once
-// VerificationRun that a user can run: what the program computes beside what is known otherwise.
+// Verification that a user can run: what the program computes beside what is known otherwise.
 // See docs/verify.md.
 #include <Eigen/Core>
 #include <cmath>
