@@ -663,7 +663,7 @@ std::vector<ErrorCase> scene_cases() {
       {type, "Poisson ratio without a modulus", check, liver(R"("material": {"nu": 0.3})")},
       {type, "Poisson ratio of another tissue", check,
        scene(
-           R"({"organ": {"kind": "block", "cells": [6, 6, 6]}, "material": {"E": "3 kPa", "nu": 0.49}})")},
+           R"({"organ": {"kind": "liver", "count": 3000, "filling": "solid"}, "material": {"E": "3 kPa", "nu": 0.49}})")},
       {type, "modulus of the tissue beside the law paper", check,
        liver(R"("bonds": {"spacing_law": "paper"}, "material": {"E": "3 kPa"})")},
       {type, "one radial bond a sphere", check, liver(R"("bonds": {"diagonals": false})")},

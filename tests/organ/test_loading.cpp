@@ -44,7 +44,7 @@ std::pair<std::size_t, std::size_t> two_upper_spheres() {
   return {static_cast<std::size_t>(first) + 1, static_cast<std::size_t>(second) + 1};
 }
 
-Json contact(std::size_t number) {
+Json pushed_sphere(std::size_t number) {
   return {{"kind", "sphere"}, {"number", number}, {"direction", {0, 0, -1}}};
 }
 
@@ -59,10 +59,10 @@ const Json kLoad = parse_json(R"({"kind": "knots", "knots": [{"time": "0 s", "lo
 TEST_CASE("contacts with equal protocols of their own answer as contacts that share one") {
   const auto [first, second] = two_upper_spheres();
   Json shared = block_scene();
-  shared["contacts"] = {contact(first), contact(second)};
+  shared["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   shared["protocol"] = kRamp;
   Json own = block_scene();
-  own["contacts"] = {contact(first), contact(second)};
+  own["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   for (Json& one : own["contacts"]) one["protocol"] = kRamp;
   const ExperimentScene together = scene_of(shared), apart = scene_of(own);
   CHECK_FALSE(together.has_own_protocols());
@@ -84,7 +84,7 @@ TEST_CASE("contacts with equal protocols of their own answer as contacts that sh
 TEST_CASE("the energy of a depth beside a load, under gravity, is accounted for") {
   const auto [first, second] = two_upper_spheres();
   Json json = block_scene();
-  json["contacts"] = {contact(first), contact(second)};
+  json["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   json["contacts"][0]["protocol"] = kRamp;
   json["contacts"][1]["protocol"] = kLoad;
   json["loads"] = {{{"kind", "gravity"}, {"direction", {0, 0, -1}}}};
@@ -103,7 +103,7 @@ TEST_CASE("anchors bear the weight of a sagged block, and nothing has to relax a
   const auto [first, second] = two_upper_spheres();
   (void)second;
   Json json = block_scene();
-  json["contacts"] = {contact(first)};
+  json["contacts"] = {pushed_sphere(first)};
   json["protocol"] = parse_json(R"({"kind": "knots", "knots": [{"time": "0 s", "depth": "0 mm"},
       {"time": "3 s", "depth": "0 mm"}, {"time": "4 s", "depth": "1 mm"}]})",
                                 "protocol");
@@ -135,7 +135,7 @@ TEST_CASE("anchors bear the weight of a sagged block, and nothing has to relax a
 TEST_CASE("a sagged network can be given masses: light spheres move as without them") {
   const auto [first, second] = two_upper_spheres();
   Json json = block_scene();
-  json["contacts"] = {contact(first), contact(second)};
+  json["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   json["contacts"][0]["protocol"] = kRamp;
   json["contacts"][1]["protocol"] = kLoad;
   json["loads"] = {{{"kind", "gravity"}, {"direction", {0, 0, -1}}}};
@@ -168,7 +168,7 @@ TEST_CASE("a sagged network can be given masses: light spheres move as without t
 TEST_CASE("a run with two protocols and gravity goes on from a checkpoint to the bit") {
   const auto [first, second] = two_upper_spheres();
   Json json = block_scene();
-  json["contacts"] = {contact(first), contact(second)};
+  json["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   json["contacts"][0]["protocol"] = kRamp;
   json["contacts"][1]["protocol"] = kLoad;
   json["loads"] = {{{"kind", "gravity"}, {"direction", {0, 0, -1}}}};
@@ -241,7 +241,8 @@ TEST_CASE("the areas of the outer spheres are those of the surface") {
 
 TEST_CASE("a tissue of a stated modulus has it, and no other Poisson ratio than its network's") {
   Json json = block_scene();
-  json["organ"]["cells"] = {6, 6, 6};
+  json["organ"] = parse_json(R"({"kind": "liver", "count": 3000, "filling": "solid"})", "organ");
+  json["anchors"] = {{{"kind", "far_side"}}};
   json["material"]["E"] = "3 kPa";
   const Tissue tissue = parse_tissue(json, "scene", {});
   CHECK(tissue.network.options.spacing_law == SpacingLaw::continuum);
@@ -275,7 +276,7 @@ TEST_CASE("a scene that states neither E nor a spacing law is told which law it 
 TEST_CASE("scenes with several protocols that make no sense are refused") {
   const auto [first, second] = two_upper_spheres();
   Json json = block_scene();
-  json["contacts"] = {contact(first), contact(second)};
+  json["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   json["contacts"][0]["protocol"] = kRamp;
   CHECK_THROWS_WITH(scene_of(json), Contains("/contacts/1/protocol") && Contains("is missing"));
   json["contacts"][1]["protocol"] = parse_json(

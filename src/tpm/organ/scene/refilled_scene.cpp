@@ -21,7 +21,11 @@ void refuse_numbered(const Json& list, const DocumentPlace& place,
 }
 
 void require_limit(const Json& scene, const ExperimentScene& own, const DocumentPlace& place) {
-  if (scene.value("bonds", Json::object()).value("spacing_law", "paper") != "continuum") {
+  if (own.has_own_protocols() || own.dead_load_N.size() > 0) {
+    throw bad_input(place.where, "has loads, or contacts with protocols of their own",
+                    "one protocol alone");
+  }
+  if (own.tissue.network.options.spacing_law != SpacingLaw::continuum) {
     throw bad_input(place.key("bonds").key("spacing_law").where,
                     "under the law 'paper' tissue becomes stiffer with smaller spheres",
                     "\"continuum\", under which forces have a limit");
