@@ -164,7 +164,7 @@ TEST_CASE("each fault of a description is told with its key") {
     return error_of(json, "depth_mm,time_s,force_mN,sd_mN,provenance\n2,0,1,,table\n");
   };
   CHECK_THAT(fault(with("/kind", "curve")),
-             Catch::StartsWith("c.json: key /kind: is none of the known words; expected one of "
+             Catch::StartsWith("c.json: key /kind: unknown curve 'curve'; expected one of "
                                "points, recording, spectrum, values"));
   CHECK_THAT(
       fault(with("/colums", 1)),
@@ -176,11 +176,11 @@ TEST_CASE("each fault of a description is told with its key") {
           "c.json: key /columns/depth_mm/unti: unknown key (did you mean 'unit'?); expected one of "
           "quantity, unit"));
   CHECK_THAT(fault(with("/columns/depth_mm", Json::object())),
-             Catch::StartsWith("c.json: key /columns/depth_mm/quantity: is missing; expected one "
-                               "of time, indentation_depth"));
-  CHECK_THAT(
-      fault(with("/title", 7)),
-      Catch::StartsWith("c.json: key /title: is of the wrong type; expected JSON type string"));
+             Catch::StartsWith("c.json: key /columns/depth_mm/quantity: is missing; expected what "
+                               "the column holds: one of time, indentation_depth"));
+  CHECK_THAT(fault(with("/title", 7)),
+             Catch::StartsWith(
+                 "c.json: key /title: is of the wrong type: 7; expected a text that is not empty"));
   CHECK_THAT(fault(with("/columns/depth_mm/unit", "N")),
              Catch::StartsWith("c.json: key /columns/depth_mm: 'N' is a unit of force"));
   CHECK_THAT(fault(with("/columns/force_mN/unit", "N")),

@@ -94,10 +94,10 @@ TEST_CASE("each fault of a spectrum is told with its place") {
   };
   CHECK_THAT(
       fault(with(kModuli, "\"provenance\": \"measured\",", ""), kHead + "1,1,0,1\n"),
-      Catch::Contains("key /provenance: is missing; expected where the spectrum comes from"));
+      Catch::Contains("key /provenance: is missing; expected where the whole of it comes from"));
   CHECK_THAT(
       fault(with(kModuli, "\"kind\"", "\"observable\": \"stress\", \"kind\""), kHead + "1,1,0,1\n"),
-      Catch::Contains("key /observable: stands in a file of kind spectrum"));
+      Catch::Contains("key /observable: is no key of the kind 'spectrum'"));
   CHECK_THAT(fault(with(kModuli, "loss_modulus", "stress"), kHead + "1,1,0,1\n"),
              Catch::Contains("'stress' in a file of kind spectrum"));
   const auto mixed = with(

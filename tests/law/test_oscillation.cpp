@@ -335,9 +335,10 @@ TEST_CASE("spectra that the configuration cannot answer are refused") {
   refused(R"({"kind": "oscillation", "operating_depth": "2 furlong"})", "1 N/m", "",
           "/data/0/protocol/operating_depth");
   refused(R"({"kind": "oscillation", "operating_depth": "-2 mm"})", "1 N/m", "", "below 0");
-  refused(R"({"kind": "measured", "operating_depth": "2 mm"})", "1 mN", "", "no operating depth");
+  refused(R"({"kind": "measured", "operating_depth": "2 mm"})", "1 mN", "",
+          "is no key of the kind 'measured'");
   refused(R"({"kind": "measured"})", "1 mN", R"(, "stiffness_per_modulus": "1 mm")", "measured");
-  refused(kOscillation, "1 kPa", R"(, "stiffness_per_modulus": "0 mm")", "not above 0");
+  refused(kOscillation, "1 kPa", R"(, "stiffness_per_modulus": "0 mm")", "expected above 0 m");
   refused(kOscillation, "1 kPa", "", "/data/0/noise/absolute");
   refused(kOscillation, "1 N/m", R"(, "from": "1 s")", "without a recording");
 }

@@ -320,7 +320,8 @@ TEST_CASE("bad files are refused") {
   CHECK_THROWS_WITH(run_audit(file, "f.json"), Contains("'a' is taken"));
   file = good;
   file["tables"][0]["rows"][1] = Json::array({"1"});
-  CHECK_THROWS_WITH(run_audit(file, "f.json"), Contains("table 'T': row 2 has 1 cells"));
+  CHECK_THROWS_WITH(run_audit(file, "f.json"),
+                    Contains("key /tables/0/rows: row 2 of table 'T' has 1 cells"));
   file = good;
   file.erase("symbols");
   CHECK_THROWS_AS(run_audit(file, "f.json"), Error);
