@@ -238,32 +238,6 @@ std::string times_text(double times) {
   return times < kWhole ? significant(times, 2) : fixed(times, 0);
 }
 
-double quantum_of(std::span<const double> readings) {
-  constexpr double kSame = 1e-9;    // of the range: one level, written with rounding
-  constexpr double kOnGrid = 0.02;  // of the step
-  constexpr double kShareOnGrid = 0.99;
-  if (readings.size() < 2) return 0.0;
-  std::vector<double> levels(readings.begin(), readings.end());
-  std::ranges::sort(levels);
-  const double range = levels.back() - levels.front();
-  double step = range;
-  for (std::size_t i = 1; i < levels.size(); ++i) {
-    const double gap = levels[i] - levels[i - 1];
-    if (gap > kSame * range) step = std::min(step, gap);
-  }
-  if (!(step > 0.0)) return 0.0;
-  std::size_t on_grid = 0;
-  std::size_t gaps = 0;
-  for (std::size_t i = 1; i < levels.size(); ++i) {
-    const double gap = (levels[i] - levels[i - 1]) / step;
-    if (gap * step <= kSame * range) continue;
-    ++gaps;
-    on_grid += std::abs(gap - std::round(gap)) <= kOnGrid * gap;
-  }
-  const bool grid = static_cast<double>(on_grid) >= kShareOnGrid * static_cast<double>(gaps);
-  return grid ? step : 0.0;
-}
-
 std::optional<EqualRun> clipped_run(std::span<const double> readings,
                                     std::span<const double> rest) {
   constexpr std::size_t kLeast = 4, kTimes = 3;

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/fit/likelihood/quantum.hpp"
+
 namespace tpm::fit {
 
 /// Whether a law describes a recording.
@@ -53,9 +55,6 @@ struct Adequacy {
   double p_value = 1.0;              ///< of a ratio at least this large if the law is right
   std::vector<std::string> causes;   ///< likely ones, if not described
 };
-
-/// Step between neighbouring levels of readings that were rounded to a grid; 0 if there is none.
-[[nodiscard]] double quantum_of(std::span<const double> readings);
 
 /// The longest run of equal readings at the largest or smallest value that is longer than rounding
 /// makes: at least 4, and more than 3 times the longest run at other values near it (where readings

@@ -13,6 +13,7 @@
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/likelihood/correlation.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
+#include "tpm/fit/likelihood/quantum.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

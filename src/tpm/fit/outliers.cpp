@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "tpm/base/text.hpp"
-#include "tpm/fit/adequacy.hpp"
+#include "tpm/fit/likelihood/quantum.hpp"
 
 namespace tpm::fit {
 namespace {

@@ -69,15 +69,15 @@ std::pair<LawSpec, std::string> common_law(std::span<const PreparedRecording> re
       if (chosen == nullptr || t.parameters < chosen->parameters) chosen = &t;
     }
     if (chosen == nullptr) continue;
-    const Tally* best = nullptr;
+    const Tally* ahead = nullptr;
     for (const Tally& t : tallies) {
-      if (t.recordings == count && (best == nullptr || t.bic < best->bic)) best = &t;
+      if (t.recordings == count && (ahead == nullptr || t.bic < ahead->bic)) ahead = &t;
     }
     std::string preferred;
-    if (chosen->bic - best->bic > kDecisiveBic * static_cast<double>(recordings.size())) {
+    if (chosen->bic - ahead->bic > kDecisiveBic * static_cast<double>(recordings.size())) {
       preferred = fmt::format(
           "; the data prefer {}, by {} in that sum, but identify its parameters in {} of them",
-          law_name(best->law), significant(chosen->bic - best->bic, 3), best->identified);
+          law_name(ahead->law), significant(chosen->bic - ahead->bic, 3), ahead->identified);
     }
     return {chosen->law,
             fmt::format("{} is the least law within {} of the least sum of BIC over {} recordings"
