@@ -109,8 +109,8 @@ def main():
         session["limits"] = {**session.get("limits", {}), "watchdog": "16 ms", "cycle_timeout": "1 s", "late_cycles": 1000}
         session["indentations"] = {"depths": ["4 mm"], "rates": ["2 mm/s"], "hold": "5 s", "rest": "1 s"}
         session.pop("creep", None)
+        session["surface"] = ["0 mm", "0 mm", "-5 mm"]  # the hand rests above it
         (folder / "s.json").write_text(json.dumps(session))
-        session["surface"] = ["0 mm", "0 mm", "-5 mm"]  # the hand rests above it; the watchdog is not what is looked at
         (folder / "script").write_text(f"watchdog_by_clock 0\nevents {folder / 'log'}\n")
         log = folder / "log"
         environment = {**os.environ, "TPM_STAND_IN_SCRIPT": str(folder / "script"), "TPM_ENDS_LOG": str(log)}
