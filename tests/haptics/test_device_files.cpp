@@ -1,6 +1,7 @@
 // Device description files: those that are shipped, what they bring, and what is refused.
 #include <catch2/catch.hpp>
 
+#include "hil_scenes.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
@@ -76,6 +77,15 @@ TEST_CASE("A rehearsal stands for the device of its file") {
   const DeviceFile file = read_device_file(folder / "d.json");
   CHECK(limits_by_file(limits_of(file.kind), file).force_N == 2.0);
   CHECK(limits_by_file(limits_of(file.kind), file).reach_m == 0.04);
+  DeviceChoice rehearsal;
+  rehearsal.file = folder / "d.json";
+  SessionRunOptions options;
+  options.recording = folder / "r.tpmrec";
+  const SessionRun run = run_session(test::parsed(test::short_session()), rehearsal, options);
+  CHECK(run.hardware_kind == "falcon");
+  REQUIRE(run.on_hardware.has_value());
+  CHECK(run.on_hardware->largest_N_per_m == 3000.0);
+  CHECK_FALSE(run.on_hardware->acceptable());  // nobody has measured its delay
   write_file(folder / "high.json", R"({"device": "falcon", "limits": {"reach_m": 0.05}})");
   CHECK_THAT(test::refusal_of([&] {
                const DeviceFile high = read_device_file(folder / "high.json");

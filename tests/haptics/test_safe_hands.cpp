@@ -169,6 +169,33 @@ TEST_CASE(
   }
 }
 
+TEST_CASE(
+    "Where the friction of the device makes a rendering passive, a delay that grows is found") {
+  // Just passive at the delay told; 20 ms late from 1 s on. Earlier joules reached a hand.
+  for (const double stiffness : {200.0, 1000.0, 4000.0}) {
+    for (const SafeHand& hand : kSafeHands) {
+      ServoSettings settings;
+      settings.delay_periods = 1;
+      settings.friction_N_s_per_m = 1.0001 * stiffness * 1.5e-3;
+      test::LateHandSettings s;
+      s.mass_kg = hand.mass_kg;
+      s.damping_N_s_per_m = hand.damping_N_s_per_m;
+      s.stiffness_N_per_m = hand.stiffness_N_per_m;
+      s.friction_N_s_per_m = settings.friction_N_s_per_m;
+      s.push_N = 1.0;
+      CAPTURE(stiffness, hand.name);
+      CHECK(test::run_hand(s, stiffness, settings).cause == StopCause::finished);
+      s.later_s = 20e-3;
+      s.grows_at_s = 1.0;
+      const test::HandRun run = test::run_hand(s, stiffness, settings);
+      CAPTURE(run.most_given_J, word_of(run.cause));
+      CHECK(run.most_given_J < 0.1);
+      const double fed = stiffness * 20e-3 - settings.friction_N_s_per_m;
+      if (hand.damping_N_s_per_m < 0.3 * fed) CHECK(run.cause == StopCause::oscillation);
+    }
+  }
+}
+
 TEST_CASE("Slow indentations of a rendering that is not passive come to their end") {
   // 8 mm at 10 mm/s into 170 N/m, 2 ms told, in the published hand.
   ServoSettings settings;

@@ -1,6 +1,9 @@
 // Prints the measured numbers of the newest reports/safety/hands_*.md as CSV:
 //     measure_hands gate     what the gate lets pass, delay wrong by half a period, with jitter
 //     measure_hands grown    a delay that grows unseen, beside an oracle
+//     measure_hands passive  the same where the rendering is passive with the friction of the
+//     device
+//                            at the delay measured, and without any growth
 //     measure_hands limits   the gate's stiffness for some delays
 // A spring of 100 to 4000 N/m, forces 0 to 20 ms late, six hands (haptics/six_hands.hpp), 1 kHz.
 #include <fmt/format.h>
@@ -110,6 +113,43 @@ void print_grown() {
   }
 }
 
+void print_passive() {
+  fmt::print(
+      "stiffness_N_per_m,friction_N_s_per_m,measured_delay_ms,grown_to_ms,hand,push_N,speed_m_per_"
+      "s,"
+      "into_hand_mJ,oracle_mJ,reaches_2_mJ,off_after_2_mJ_ms,allowed_ms,off_s,cause\n");
+  for (const double delay_s : {0.0, 1e-3, 2e-3}) {
+    ServoSettings settings = told(delay_s + kPeriod_s);
+    for (const double grown_s : {0.0, 5e-3, 10e-3, 20e-3}) {  // 0: it does not grow
+      for (const double stiffness : kStiffnesses) {
+        // 0.01 % above the border of passivity at the delay told.
+        const double friction = 1.0001 * stiffness * (0.5 + settings.delay_periods) * kPeriod_s;
+        settings.friction_N_s_per_m = friction;
+        for (const SafeHand& hand : kSafeHands) {
+          for (const double push_N : kPushes_N) {
+            for (const double speed : kSpeeds_m_per_s) {
+              test::LateHandSettings s = in_hand(hand, push_N, speed);
+              s.friction_N_s_per_m = friction;
+              s.delay_s = delay_s;
+              s.later_s = grown_s;
+              if (grown_s > 0.0) s.grows_at_s = 1.0;
+              const test::HandRun run = test::run_hand(s, stiffness, settings);
+              const test::HandRun oracle = test::run_hand(s, stiffness, settings, true);
+              const bool reached = run.first_2_mJ_s >= 0.0;
+              const double after_s = reached ? run.off_s - run.first_2_mJ_s : 0.0;
+              fmt::print("{},{:.4f},{},{},\"{}\",{},{},{:.3f},{:.3f},{},{:.1f},{:.0f},{:.3f},{}\n",
+                         stiffness, friction, 1e3 * delay_s, 1e3 * grown_s, hand.name, push_N,
+                         speed, 1e3 * run.most_given_J, 1e3 * oracle.most_given_J, reached ? 1 : 0,
+                         1e3 * after_s, 1e3 * (3.0 * grown_s + 0.02), run.off_s,
+                         word_of(run.cause));
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
 void print_limits() {
   fmt::print("delay_ms,largest_stiffness_N_per_m\n");
   for (const double delay_s : {0.0, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3}) {
@@ -120,12 +160,13 @@ void print_limits() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return test::measured(argc, argv, 1, 1, "measure_hands gate|grown|limits",
+  return test::measured(argc, argv, 1, 1, "measure_hands gate|grown|passive|limits",
                         [](const std::vector<std::string>& words) {
                           if (words[0] == "gate") return print_gate();
                           if (words[0] == "grown") return print_grown();
+                          if (words[0] == "passive") return print_passive();
                           if (words[0] == "limits") return print_limits();
                           throw Error(ExitCode::usage, "measure_hands", words[0],
-                                      "gate, grown or limits");
+                                      "gate, grown, passive or limits");
                         });
 }

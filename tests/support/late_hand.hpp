@@ -40,6 +40,7 @@ class LinearSpring final : public ContactModel {
 /// periods. The hand comes from 2 mm above the surface, pushes, and goes back.
 struct LateHandSettings {
   double mass_kg = 0.2, damping_N_s_per_m = 0.2, stiffness_N_per_m = 5.0;  ///< device included
+  double friction_N_s_per_m = 0.0;  ///< of the device, in addition: what it takes up is not given
   double delay_s = 0.0;
   double jitter_s = 0.0;  ///< of each force, evenly within +-
   double later_s = 0.0;   ///< the delay from `grows_at_s` on; 0: as before
@@ -53,7 +54,9 @@ struct LateHandSettings {
 class LateHand final : public HapticDevice {
  public:
   explicit LateHand(const LateHandSettings& settings)
-      : s_(settings), decay_(std::exp(-s_.damping_N_s_per_m / s_.mass_kg * s_.period_s / kParts)) {}
+      : s_(settings),
+        decay_(std::exp(-(s_.damping_N_s_per_m + s_.friction_N_s_per_m) / s_.mass_kg * s_.period_s /
+                        kParts)) {}
 
   const DeviceIdentity& open() override { return identity_; }
   void prepare(const DevicePreparation&) override {}
@@ -113,7 +116,7 @@ class LateHand final : public HapticDevice {
     time_s_ += part_s;
     fastest_m_per_s_ = std::max(fastest_m_per_s_, std::abs(speed_));
     if (off_s_ >= 0.0) return;
-    given_J_ += force_N_ * (at_m_ - before_m);
+    given_J_ += (force_N_ - s_.friction_N_s_per_m * speed_) * (at_m_ - before_m);
     const double now_J = given_J_ + stored_J_;
     least_J_ = std::min(least_J_, now_J);
     most_given_J_ = std::max(most_given_J_, now_J - least_J_);

@@ -99,7 +99,9 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
       late_({.period_s = settings_.period_s,
              .told_s = settings_.delay_periods * settings_.period_s,
              .friction_N_s_per_m = settings_.friction_N_s_per_m}),
-      watch_late_(!is_passive(model, settings_)),
+      delay_(
+          {.period_s = settings_.period_s, .told_s = settings_.delay_periods * settings_.period_s}),
+      passive_(is_passive(model, settings_)),
       outside_validity_periods_(settings_.outside_validity_limit_s / settings_.period_s),
       stiffness_N_per_m_(stiffness_of(model, settings_)),
       least_stiffness_N_per_m_(stiffness_N_per_m_),
@@ -320,7 +322,11 @@ StopCause ServoStep::check_rendering(int periods) noexcept {
   if (energy_.too_much()) return StopCause::energy;
   if (settings_.watch_oscillation) {
     late_.observe(sent_N_, moved_m_, tissue_work_J_, periods);
-    if (oscillation_.found() || (watch_late_ && late_.found())) return StopCause::oscillation;
+    if (passive_) {
+      delay_.observe(settings_.push.dot(position_m_), settings_.push.dot(sent_N_), periods);
+    }
+    const bool late = late_.found() && (!passive_ || delay_.found());
+    if (oscillation_.found() || late) return StopCause::oscillation;
     if (damped_share_ > kMostDamped) return StopCause::damping;
   }
   return doubted_ > outside_validity_periods_ ? StopCause::outside_validity : StopCause::none;

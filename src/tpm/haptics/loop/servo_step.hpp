@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "tpm/haptics/loop/delay_watch.hpp"
 #include "tpm/haptics/loop/energy_watch.hpp"
 #include "tpm/haptics/loop/late_energy_watch.hpp"
 #include "tpm/haptics/loop/one_sided_contact.hpp"
@@ -97,7 +98,10 @@ class ServoStep {
   EnergyWatch energy_;
   OscillationWatch oscillation_;
   LateEnergyWatch late_;
-  bool watch_late_;  ///< a rendering that is passive with the friction of the device is not watched
+  DelayWatch delay_;
+  /// The rendering is passive with the friction of the device: a delay that has grown is looked for
+  /// in the motion too, because the energy of a later force alone would stop every fast motion.
+  bool passive_;
   double outside_validity_periods_;  ///< after which the session ends
   std::optional<StartGate> gate_;
   ServoCounts counts_;

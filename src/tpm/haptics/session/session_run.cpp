@@ -188,6 +188,7 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
       real = limits_by_file(limits_of(file.kind), file);
     }
     run.on_hardware = check_rendering(session, *stepped, run.model, real);
+    run.hardware_kind = real.kind;
   }
   require_acceptable(run.rendering, choice, limits, options);
   if (checks) check_at_start(run, session, choice, limits, options, *stepped, make);

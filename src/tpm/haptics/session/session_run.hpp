@@ -58,9 +58,10 @@ struct SessionRun {
   DeviceIdentity device;
   LoopModel model;  ///< its `model` is with the run
   RenderingCheck rendering;
-  /// Of a rehearsal on the simulated Omega.7: the check of the same session on the real one, with
-  /// the device file if there is one.
+  /// Of a rehearsal on the simulated Omega.7: the check of the same session on the device that it
+  /// stands for, that of the device file if there is one, else an Omega.7.
   std::optional<RenderingCheck> on_hardware = std::nullopt;
+  std::string hardware_kind;  ///< of that device
   ServoOutcome outcome;
   double largest_force_N = 0.0;  ///< that was sent to the device
 };

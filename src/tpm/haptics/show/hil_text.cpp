@@ -190,7 +190,8 @@ Json run_json(const HilSession& session, const SessionRun& run) {
             {"adequacy", tested ? files::to_json(*session.law->adequacy) : Json()},
             {"plan", run.model.plan}}},
           {"rendering", to_json(run.rendering)},
-          {"rendering_on_omega7", run.on_hardware ? to_json(*run.on_hardware) : Json()},
+          {"stands_for", run.on_hardware ? Json(run.hardware_kind) : Json()},
+          {"rendering_on_hardware", run.on_hardware ? to_json(*run.on_hardware) : Json()},
           {"rate_Hz", rounded(1.0 / session.servo.period_s, kHilDigits)},
           {"duration_s", rounded(session.duration_s(), kHilDigits)},
           {"phases", session.phases.size()},
@@ -210,7 +211,7 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
       significant(1.0 / session.servo.period_s, 4), o.real_time ? "real" : "virtual",
       session.phases.size());
   if (run.on_hardware) {
-    text += fmt::format("on an omega7 it would be {}: {}\n",
+    text += fmt::format("on the device '{}' it would be {}: {}\n", run.hardware_kind,
                         run.on_hardware->acceptable() ? "accepted" : "refused",
                         run.on_hardware->verdict());
   }
