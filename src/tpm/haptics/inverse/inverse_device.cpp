@@ -196,7 +196,7 @@ void InverseDevice::enable_forces() {
 }
 
 void InverseDevice::fail(ForcesOff cause, std::string_view words) noexcept {
-  if (fault_.load(std::memory_order_relaxed) != ForcesOff::none) return;
+  if (failing_.exchange(true)) return;  // the first one counts, of whichever thread
   const std::size_t size = std::min(words.size(), fault_words_.size() - 1);
   std::memcpy(fault_words_.data(), words.data(), size);
   fault_words_[size] = '\0';
@@ -317,7 +317,7 @@ DeviceAnswer InverseDevice::read(Eigen::Vector3d& position_m) noexcept {
   if (fresh) seen_ = answer_.latest();
   const double age_s = seconds_between(seen_.at_ns, now_ns());
   if (preparation_.real_time && age_s > preparation_.watchdog_s) {
-    fault_ == ForcesOff::none ? fail(ForcesOff::unplugged, "the service sends no state") : void();
+    fail(ForcesOff::unplugged, "the service sends no state");
     return DeviceAnswer::failed;
   }
   position_m = seen_.state.position_m;

@@ -98,6 +98,7 @@ class InverseDevice final : public HapticDevice {
   TripleBuffer<Seen> answer_;
   std::atomic<std::uint32_t> orders_{0};
   std::atomic<bool> forces_on_{false}, cut_{false}, zero_sent_{false}, ending_{false}, over_{false};
+  std::atomic<bool> failing_{false};
   std::atomic<ForcesOff> fault_{ForcesOff::none};
   std::array<char, sizeof DeviceStatus::error_text> fault_words_{};  ///< before fault_ is set
   Socket wake_;                                                      ///< an eventfd
