@@ -741,6 +741,12 @@ std::vector<ErrorCase> device_file_cases() {
        with_files({})},
       {type, "identification of a recording", "hil identify --device replay -o {}/out",
        with_files({})},
+      {"Inverse service", "a force that was never measured",
+       "hil run {}/h.json --device inverse3 -o {}/out", with_files({{"h.json", kSession}})},
+      {"Inverse service", "a port of the system", "hil serve {}/h.json --port 80",
+       with_files({{"h.json", kSession}})},
+      {"Inverse service", "no time to serve", "hil serve {}/h.json --duration '0 s'",
+       with_files({{"h.json", kSession}})},
   };
 }
 

@@ -101,6 +101,12 @@ inline void send_bytes(int socket, std::string_view bytes) {
   }
 }
 
+/// Of a service that has no watchdog of its own.
+inline PlantSettings never_cut(PlantSettings plant) {
+  plant.watchdog_s = 1e9;
+  return plant;
+}
+
 inline void send_text(int socket, std::string_view text) {
   send_bytes(socket, frame_bytes(FrameKind::text, text));
 }
@@ -114,7 +120,7 @@ inline StandInInverse::StandInInverse(const PlantSettings& plant, OperatorScript
       settings_(plant),
       service_(listen_on_loopback(0)),
       events_(listen_on_loopback(0)),
-      plant_(plant, std::move(script)),
+      plant_(stand_in::never_cut(plant), std::move(script)),
       lived_until_ns_(now_ns()),
       accepting_([this] { accept_all(); }) {
   plant_.await();

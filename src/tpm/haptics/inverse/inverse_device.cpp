@@ -55,6 +55,7 @@ InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits,
 
 InverseDevice::~InverseDevice() {
   stop();
+  if (messages_.joinable()) messages_.join();
 }
 
 std::string InverseDevice::take_text(double timeout_s) {
@@ -128,7 +129,6 @@ void InverseDevice::identify() {
   identity_.link = DeviceLink::network;
   identity_.left_handed = device_.settings.handedness == "left";
   identity_.hardware = !device_.simulated;
-  if (device_.simulated) identity_.name += ", SIMULATED DEVICE behind a service";
   identity_.assumptions = device_.settings.lines();
   if (!device_.settings.filters_named) {
     identity_.assumptions.push_back(
@@ -196,7 +196,7 @@ void InverseDevice::enable_forces() {
 }
 
 void InverseDevice::fail(ForcesOff cause, std::string_view words) noexcept {
-  if (fault_.load(std::memory_order_relaxed) != ForcesOff::none) return;
+  if (failing_.exchange(true)) return;  // the first one counts, of whichever thread
   const std::size_t size = std::min(words.size(), fault_words_.size() - 1);
   std::memcpy(fault_words_.data(), words.data(), size);
   fault_words_[size] = '\0';
@@ -221,14 +221,14 @@ Eigen::Vector3d InverseDevice::force_to_send() noexcept {
 
 /// One message and the states that come; false if none came in time.
 bool InverseDevice::exchange(const Eigen::Vector3d& force_N, double timeout_s) {
-  ++traffic_.messages;
+  ++sent_;
   if (!service_->send(force_message(format_, device_.id, force_N))) {
     fail(ForcesOff::unplugged, service_->over());
     return false;
   }
   std::optional<std::string> text = service_->receive(timeout_s, address_.poll);
   if (!text) {
-    ++traffic_.unanswered;
+    ++unanswered_;
     if (!service_->over().empty()) fail(ForcesOff::unplugged, service_->over());
     return false;
   }
@@ -238,7 +238,7 @@ bool InverseDevice::exchange(const Eigen::Vector3d& force_N, double timeout_s) {
     answer_.write({parse_state(*text, device_.id), now_ns()});
     unreadable_in_a_row_ = 0;
   } catch (const Error&) {
-    ++traffic_.unreadable;
+    ++unreadable_;
     if (++unreadable_in_a_row_ >= kMostUnreadable) {
       fail(ForcesOff::unknown, "the service sends what is no state");
     }
@@ -256,7 +256,7 @@ void InverseDevice::look_for_events() {
       const std::optional<ForcesOff> end = end_of(event);
       if (ours && end) fail(*end, words_of(event));
     } catch (const Error&) {
-      ++traffic_.unreadable;  // an event of a kind that nobody knows ends nothing
+      ++unreadable_;  // an event of a kind that nobody knows ends nothing
     }
   }
   if (!events_->over().empty()) fail(ForcesOff::unplugged, "events: " + events_->over());
@@ -291,12 +291,25 @@ void InverseDevice::exchange_in_turn() noexcept {
       look_for_events();
       wait_for_order();
     }
-    if (service_->over().empty()) (void)exchange(Eigen::Vector3d::Zero(), kMostUnanswered_s);
   } catch (const std::exception& error) {
     fail(ForcesOff::unknown, error.what());
   } catch (...) {
     fail(ForcesOff::unknown, "something that is no error was thrown");
   }
+  say_goodbye();
+  over_ = true;
+}
+
+/// A zero force, and the end of both connections; waits for nobody.
+void InverseDevice::say_goodbye() noexcept {
+  try {
+    if (prepared_ && service_->over().empty()) {
+      (void)service_->send(force_message(format_, device_.id, Eigen::Vector3d::Zero()), 0.002);
+    }
+  } catch (...) {  // no memory: the connection closes below
+  }
+  if (service_->over().empty()) service_->close();
+  if (events_ != nullptr) events_->close();
 }
 
 DeviceAnswer InverseDevice::read(Eigen::Vector3d& position_m) noexcept {
@@ -304,7 +317,7 @@ DeviceAnswer InverseDevice::read(Eigen::Vector3d& position_m) noexcept {
   if (fresh) seen_ = answer_.latest();
   const double age_s = seconds_between(seen_.at_ns, now_ns());
   if (preparation_.real_time && age_s > preparation_.watchdog_s) {
-    fault_ == ForcesOff::none ? fail(ForcesOff::unplugged, "the service sends no state") : void();
+    fail(ForcesOff::unplugged, "the service sends no state");
     return DeviceAnswer::failed;
   }
   position_m = seen_.state.position_m;
@@ -320,8 +333,7 @@ DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
   order_.write({force_N, now_ns()});
   if (preparation_.real_time) {
     orders_.fetch_add(1, std::memory_order_release);
-    const std::uint64_t one = 1;
-    if (!address_.poll) (void)!::write(wake_.handle(), &one, sizeof one);
+    if (!address_.poll) wake();
   } else {
     try {
       if (!exchange(force_to_send(), kPatience_s)) {
@@ -353,32 +365,30 @@ HandState InverseDevice::hand() noexcept {
   return hand;
 }
 
-void InverseDevice::end_thread() noexcept {
-  ending_ = true;
+void InverseDevice::wake() noexcept {
   const std::uint64_t one = 1;
   (void)!::write(wake_.handle(), &one, sizeof one);
-  if (messages_.joinable()) messages_.join();
 }
 
+/// Waits for the last zero a little and never for the thread of the messages: the loop may be in
+/// its last cycle. The destructor waits.
 void InverseDevice::stop() noexcept {
   forces_on_ = false;
-  const bool threaded = messages_.joinable();
-  end_thread();
-  if (service_ != nullptr && service_->over().empty()) {
-    if (prepared_ && !threaded) {
-      (void)service_->send(force_message(format_, device_.id, Eigen::Vector3d::Zero()));
-      (void)service_->receive(kMostUnanswered_s);
-    }
-    service_->close();
+  if (ending_.exchange(true)) return;
+  wake();
+  if (!messages_.joinable()) {
+    if (service_ != nullptr) say_goodbye();
+    return;
   }
-  if (events_ != nullptr) events_->close();
+  constexpr timespec kLook{0, 100'000};
+  constexpr int kLooks = 30;
+  for (int i = 0; i < kLooks && !over_; ++i) (void)::nanosleep(&kLook, nullptr);
 }
 
 void InverseDevice::cut_forces() noexcept {
   // The thread of the messages is not the one that is stuck: it sends zero from now on.
   cut_ = true;
-  const std::uint64_t one = 1;
-  (void)!::write(wake_.handle(), &one, sizeof one);
+  wake();
   constexpr timespec kLook{0, 100'000};
   constexpr int kLooks = 50;
   for (int i = 0; i < kLooks && messages_.joinable() && !zero_sent_; ++i) {

@@ -50,11 +50,11 @@ class InverseDevice final : public HapticDevice {
   void stop() noexcept override;
   void cut_forces() noexcept override;
 
-  /// Round trips of messages since prepare(); read after stop().
+  /// Round trips of messages since prepare().
   struct Traffic {
     std::uint64_t messages = 0, unanswered = 0, unreadable = 0;
   };
-  [[nodiscard]] Traffic traffic() const noexcept { return traffic_; }
+  [[nodiscard]] Traffic traffic() const noexcept { return {sent_, unanswered_, unreadable_}; }
 
  private:
   struct Order {
@@ -76,7 +76,8 @@ class InverseDevice final : public HapticDevice {
   void wait_for_order() noexcept;
   void look_for_events();
   void fail(ForcesOff cause, std::string_view words) noexcept;
-  void end_thread() noexcept;
+  void say_goodbye() noexcept;
+  void wake() noexcept;
 
   InverseAddress address_;
   const DeviceLimits limits_;
@@ -96,13 +97,14 @@ class InverseDevice final : public HapticDevice {
   TripleBuffer<Order> order_;
   TripleBuffer<Seen> answer_;
   std::atomic<std::uint32_t> orders_{0};
-  std::atomic<bool> forces_on_{false}, cut_{false}, zero_sent_{false}, ending_{false};
+  std::atomic<bool> forces_on_{false}, cut_{false}, zero_sent_{false}, ending_{false}, over_{false};
+  std::atomic<bool> failing_{false};
   std::atomic<ForcesOff> fault_{ForcesOff::none};
   std::array<char, sizeof DeviceStatus::error_text> fault_words_{};  ///< before fault_ is set
   Socket wake_;                                                      ///< an eventfd
   // Of the thread of the messages.
   std::thread messages_;
-  Traffic traffic_;
+  std::atomic<std::uint64_t> sent_{0}, unanswered_{0}, unreadable_{0};
   std::uint32_t orders_seen_ = 0;
   std::int64_t next_look_ns_ = 0;
   int unreadable_in_a_row_ = 0;
