@@ -45,15 +45,19 @@ TEST_CASE("misfits of three noises are found", "[adequacy][slow]") {
 }
 
 TEST_CASE("a clipped force cell is named and its samples censored", "[adequacy][slow]") {
-  int named = 0, adequate = 0;
+  int named = 0, adequate = 0, intervals = 0, missing = 0;
   for (int i = 0; i < 60; ++i) {
     AdequacyTrial trial;
     trial.seed = 300 + static_cast<std::uint64_t>(i);
     trial.clip = 0.6 + 0.35 * i / 59.0;
-    const AdequacyOutcome o = test::fitted(trial);
+    const AdequacyOutcome o = test::fitted(trial, true);
     named += o.clipped;
+    intervals += o.intervals;
+    missing += o.missing;
     adequate += o.adequacy.is_adequate();
   }
   CHECK(named >= 59);
   CHECK(adequate >= 55);
+  CHECK(intervals >= 150);
+  CHECK(missing <= intervals / 14);
 }

@@ -6,7 +6,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "placed_recordings.hpp"
+#include "placement_studies.hpp"
+#include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/predict/law_prediction.hpp"
+#include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/verdict.hpp"
@@ -125,6 +128,25 @@ TEST_CASE("the onset is off by less than 0.2 % of the force", "[placement]") {
   }
 }
 
+TEST_CASE("an onset that noise hides is not late, and its uncertainty says how far it may be",
+          "[placement]") {
+  // F ~ x^2 with noise of 1 % of the peak: three standard deviations are passed 37 % late.
+  PlacedTest test;
+  test.law = "power-1";
+  test.material = {60.0, 45.0, 2.0, 2.0};
+  test.step_s = 0.01;
+  test.hold_s = 5.0;
+  test.zero_N = 5e-3;
+  test.start_m = -0.5e-3;
+  const Recording clean = test::placed(test);
+  test.noise_N = 1e-2 * *std::ranges::max_element(clean.response);
+  const test::OnsetErrors e = test::onset_errors(test, 2.0, 40, 7);
+  INFO(e.mean << " +- " << e.scatter << ", stated " << e.stated << ", part " << e.part);
+  CHECK(std::abs(e.mean) < 0.02);
+  CHECK(e.scatter < 1.3 * e.stated);
+  CHECK(e.threshold > 0.3);
+}
+
 TEST_CASE("a drift that the rest tells is in the fit, and k_inf knows it", "[placement]") {
   PlacedTest test;
   test.rest_s = 10.0;
@@ -234,6 +256,29 @@ TEST_CASE("contact and zero that are stated are held", "[placement]") {
   CHECK(fit.config.fixed[model.index("offset")] == 5e-3);
 }
 
+TEST_CASE("contact and zero that are stated are held in a prediction", "[placement]") {
+  PlacedTest test;
+  test.zero_N = 5e-3;
+  const LawFile law = fitted_law(quick_fit(test::prepared(test, 7), "linear-1"));
+  const PreparedRecording other = test::prepared(test, 8);
+  for (const bool both : {true, false}) {
+    PredictionOptions options;
+    options.zero = 5e-3;
+    if (both) options.contact = 0.1e-3;
+    const LawPrediction p = predict_recording(law, other, options);
+    CHECK(p.placement == Placement::own);
+    CHECK(p.offset == 5e-3);
+    if (both) CHECK(p.contact == 0.1e-3);
+    if (!both) CHECK_THAT(p.contact, Catch::Matchers::WithinAbs(0.0, 0.05e-3));
+  }
+  PredictionOptions contrary;
+  contrary.zero = 5e-3;
+  contrary.placement = Placement::surface;
+  CHECK_THROWS_WITH(predict_recording(law, other, contrary), Catch::Contains("--placement own"));
+  CHECK_THROWS_WITH(require_contact_within(5e-3, std::span(&other, 1), "--contact"),
+                    Catch::Contains("5 mm is not below the largest depth"));
+}
+
 TEST_CASE("a law that does not describe a recording leaves its contact where it was measured",
           "[placement]") {
   // A power of 2.5 fitted by a straight kernel: contact used to go where the residual is least.
@@ -283,6 +328,40 @@ TEST_CASE("recordings of one material at unequal depths, preloads and zeros pool
       INFO(law << " " << name << ": " << low << " to " << high);
       CHECK(high < 1.3 * low);
     }
+  }
+}
+
+TEST_CASE("a stiffness that is not told from a drift is not pooled as if it were identified",
+          "[placement]") {
+  const auto study_of = [](std::vector<double> rests_s) {
+    std::vector<PreparedRecording> recordings;
+    for (std::size_t i = 0; i < rests_s.size(); ++i) {
+      PlacedTest test;
+      test.rest_s = rests_s[i];
+      test.noise_N = 5e-4;
+      recordings.push_back(test::prepared(test, 60 + i));
+      recordings.back().name = fmt::format("{}.csv", i);
+    }
+    SelectionOptions options;
+    options.setup.starts = 4;
+    options.setup.profiles = false;
+    return study_specimens(recordings, parse_law_name("linear-1", "test"), options);
+  };
+  const auto k_inf_of = [](const SpecimenStudy& study) {
+    return *std::ranges::find(study.pooled, "k_inf",
+                              [](const PooledParameter& p) { return p.parameter.name; });
+  };
+  const SpecimenStudy some = study_of({20.0, 20.0, 20.0, 0.5, 0.5});
+  const PooledParameter pooled = k_inf_of(some);
+  CHECK(pooled.effects.specimens == 3);
+  CHECK(pooled.not_separable == 2);
+  CHECK(pooled.only_without.empty());
+  CHECK_THAT(pooled.effects.words, Catch::Contains("2 more left out"));
+  const SpecimenStudy none = study_of({0.5, 0.5, 0.5});
+  CHECK(k_inf_of(none).only_without == "drift or a slow branch");
+  CHECK_THAT(to_terminal_text(none), Catch::Contains("not identified: drift or a slow branch"));
+  for (const Json& entry : to_json(none).at("pooled")) {
+    CHECK(entry.at("identified").get<bool>() == (entry.at("name") != "k_inf"));
   }
 }
 

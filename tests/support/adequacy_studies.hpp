@@ -137,7 +137,8 @@ inline AdequacyOutcome fitted(const AdequacyTrial& trial, bool profiles = false)
                          : p.parameter.name == "k1"   ? 45.0
                          : p.parameter.name == "tau1" ? 2.0
                                                       : 0.0;
-    if (truth == 0.0 || !p.standard_error || p.only_if_described) continue;
+    const bool told = !p.only_if_described && p.not_separable.empty();
+    if (truth == 0.0 || !p.standard_error || !told) continue;
     if (profiles && p.verdict != fit::Verdict::identified) continue;
     const double lower = profiles ? *p.lower : p.estimate - spread * *p.standard_error;
     const double upper = profiles ? *p.upper : p.estimate + spread * *p.standard_error;

@@ -72,7 +72,8 @@ inline std::vector<ErrorCase> placement_error_cases() {
       {type, "contact deeper, all laws", "select {}/r.csv --contact \"3 mm\" -o {}/out", files},
       {type, "zero in another unit", "fit {}/r.csv --zero \"3 mm\" --no-draw -o {}/out", files},
       {type, "contact with a protocol",
-       "predict {}/law.json --depth \"1 mm\" --rate \"1 mm/s\" --hold \"1 s\" --contact \"1 mm\" -o {}/out",
+       "predict {}/law.json --depth \"1 mm\" --rate \"1 mm/s\" --hold \"1 s\" --contact \"1 mm\" "
+       "-o {}/out",
        with_files({{"law.json", law}})},
       {type, "creep identified sample by sample", "identify {}/c.csv -o {}/out", files},
   };

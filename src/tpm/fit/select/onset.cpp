@@ -124,6 +124,13 @@ class FirstLoading {
     return variance > 0.0 ? std::sqrt(variance) / size[0] : std::numeric_limits<double>::infinity();
   }
 
+  /// The same loading as of another part, in this one's length.
+  [[nodiscard]] Best rescaled(const Best& best, const FirstLoading& other, double m) const {
+    const double ratio = length_ / other.length_;
+    return {best.contact, best.squares, best.a * std::pow(ratio, m),
+            best.b * std::pow(ratio, m + 1.0)};
+  }
+
   [[nodiscard]] std::size_t size() const { return drive_.size(); }
   /// Samples averaged into one.
   [[nodiscard]] double block() const { return static_cast<double>(block_); }
@@ -137,8 +144,9 @@ class FirstLoading {
 /// Contact from one part of the ramp, for one exponent.
 struct PartOnset {
   Measured drive;
-  double squares = 0.0;   ///< left over
-  double variance = 0.0;  ///< of a reading
+  double expected_sd = 0.0;  ///< as the largest part tells the loading
+  double squares = 0.0;      ///< left over
+  double variance = 0.0;     ///< of a reading
 };
 
 struct PartRange {
@@ -160,7 +168,14 @@ double way_to(const FirstLoading& part, const FirstLoading::Best& best, double e
   return std::abs(outside - best.contact);
 }
 
-PartOnset onset_of_part(const FirstLoading& part, const PartRange& range, double m) {
+/// The largest part, and where its contact is looked for.
+struct LargestPart {
+  const FirstLoading* part = nullptr;
+  PartRange range;
+};
+
+PartOnset onset_of_part(const FirstLoading& part, const PartRange& range,
+                        const LargestPart& largest, double m) {
   constexpr double kDeparture = 0.25;  // of what B moves
   const auto best = part.find(range.lower, range.upper, m, range.zero.value, true);
   const auto power = part.find(range.lower, range.upper, m, range.zero.value, false);
@@ -172,32 +187,37 @@ PartOnset onset_of_part(const FirstLoading& part, const PartRange& range, double
   onset.variance = std::max(best.squares / std::max(n - 3.0, 1.0),
                             range.noise_sd * range.noise_sd / part.block());
   const double correlated = (1.0 + range.phi) / (1.0 - range.phi);
-  const double linear = part.spread(best, m) * std::sqrt(onset.variance * correlated);
+  const double noise = std::sqrt(onset.variance * correlated);
+  const PartRange& wide = largest.range;
+  const auto shape = largest.part->find(wide.lower, wide.upper, m, wide.zero.value, true);
+  const double expected = part.spread(part.rescaled(shape, *largest.part, m), m) * noise;
   // Of a faint onset the squares rise less on the side of the tissue than a parabola would.
   const double risen = best.squares + onset.variance * correlated;
   const double before = way_to(part, best, range.lower, m, range.zero.value, risen);
   const double after = way_to(part, best, range.upper, m, range.zero.value, risen);
-  const double of_noise = std::max(linear, std::sqrt(0.5 * (before * before + after * after)));
+  const double of_noise = std::max(expected, std::sqrt(0.5 * (before * before + after * after)));
   const double of_zero = 0.5 * (above.contact - below.contact);
   const double of_shape = kDeparture * (power.contact - best.contact);
   onset.drive = {best.contact, std::hypot(of_noise, of_zero, of_shape)};
+  onset.expected_sd = std::hypot(expected, of_zero, of_shape);
   return onset;
 }
 
 /// Over exponents that fit: the mean and its standard deviation under equal odds before.
-PartOnset onset_of_exponents(const FirstLoading& part, const PartRange& range) {
+PartOnset onset_of_exponents(const FirstLoading& part, const PartRange& range,
+                             const LargestPart& largest) {
   constexpr std::array kExponents{1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0};
   std::vector<PartOnset> all;
   double least = std::numeric_limits<double>::infinity();
   for (const double m : kExponents) {
-    all.push_back(onset_of_part(part, range, m));
+    all.push_back(onset_of_part(part, range, largest, m));
     least = std::min(least, all.back().squares);
   }
   const double n = static_cast<double>(part.size());
   const double variance =
       std::max(least / std::max(n - 4.0, 1.0), range.noise_sd * range.noise_sd / part.block());
   const double correlated = (1.0 + range.phi) / (1.0 - range.phi);
-  double total = 0.0, mean = 0.0, square = 0.0;
+  double total = 0.0, mean = 0.0, square = 0.0, expected = 0.0;
   for (const PartOnset& each : all) {
     const double weight =
         variance > 0.0 ? std::exp(-0.5 * (each.squares - least) / (variance * correlated)) : 1.0;
@@ -210,8 +230,9 @@ PartOnset onset_of_exponents(const FirstLoading& part, const PartRange& range) {
         variance > 0.0 ? std::exp(-0.5 * (each.squares - least) / (variance * correlated)) : 1.0;
     const double off = each.drive.value - mean;
     square += weight * (off * off + each.drive.sd * each.drive.sd) / total;
+    expected += weight * (off * off + each.expected_sd * each.expected_sd) / total;
   }
-  return {{mean, std::sqrt(square)}, least, variance};
+  return {{mean, std::sqrt(square)}, std::sqrt(expected), least, variance};
 }
 
 /// A preload extrapolated back along a power, from its slope at the first movement.
@@ -249,7 +270,7 @@ Onset stated_onset(const PreparedRecording& r, std::optional<double> exponent) {
 
 Onset find_onset(const PreparedRecording& r, const RestReadings& rests,
                  std::optional<double> exponent) {
-  constexpr std::array kParts{0.05, 0.1, 0.15, 0.2, 0.3};
+  constexpr std::array kParts{0.05, 0.1, 0.15, 0.2, 0.3, 0.5};
   constexpr std::size_t kFewestInContact = 8;
   constexpr double kLeast = 1e-4;   // of the travel: nothing is known better
   constexpr double kCoarse = 0.05;  // of the travel, where the ramp has too few samples
@@ -268,13 +289,18 @@ Onset find_onset(const PreparedRecording& r, const RestReadings& rests,
   // A part begins where contact is expected: at first where the force is seen, which is late in
   // noise, then where the largest part says that it lies.
   double expected = r.phases.contact_drive;
-  const auto onset_about = [&](double share, double room) -> std::optional<Onset> {
-    const auto passes = [&](double depth) {
-      std::size_t i = contact;
-      while (i > 0 && drive[i - 1] >= depth) --i;
-      while (i < end && drive[i] < depth) ++i;
-      return i;
-    };
+  const auto passes = [&](double depth) {
+    std::size_t i = contact;
+    while (i > 0 && drive[i - 1] >= depth) --i;
+    while (i < end && drive[i] < depth) ++i;
+    return i;
+  };
+  struct Part {
+    FirstLoading loading;
+    PartRange range;
+    std::size_t inside = 0;
+  };
+  const auto part_of = [&](double share, double room) -> std::optional<Part> {
     const std::size_t last = passes(expected + share * travel);
     const std::size_t begin = std::min(passes(expected), last);
     const std::size_t inside = last - begin;
@@ -284,27 +310,38 @@ Onset find_onset(const PreparedRecording& r, const RestReadings& rests,
     const std::size_t lowest =
         std::max(passes(expected - room), begin > 2 * inside ? begin - 2 * inside : 0);
     const std::size_t first = lowest > inside ? lowest - inside : 0;
-    const FirstLoading part(r, first, last, share * travel, drift, rests.origin_s);
-    const PartRange range{expected - room, expected + room, rests.noise_sd, rests.phi, zero};
-    const PartOnset onset =
-        exponent ? onset_of_part(part, range, *exponent) : onset_of_exponents(part, range);
-    return Onset{onset.drive, share, inside, true};
+    return Part{FirstLoading(r, first, last, share * travel, drift, rests.origin_s),
+                {expected - room, expected + room, rests.noise_sd, rests.phi, zero},
+                inside};
+  };
+  const auto onset_of = [&](const Part& part, const Part& largest) {
+    const LargestPart whole{&largest.loading, largest.range};
+    return exponent ? onset_of_part(part.loading, part.range, whole, *exponent)
+                    : onset_of_exponents(part.loading, part.range, whole);
   };
   constexpr double kRoom = 0.8, kSure = 3.0;  // of the part; standard deviations
   const double widest = kRoom * kParts.back() * travel;
   double unsure = 0.0;
   for (int round = 0; round < 2; ++round) {
-    const auto onset = onset_about(kParts.back(), widest);
-    if (!onset) break;
-    expected = onset->drive.value;
-    unsure = onset->drive.sd;
+    const auto part = part_of(kParts.back(), widest);
+    if (!part) break;
+    const Measured found = onset_of(*part, *part).drive;
+    expected = found.value;
+    unsure = found.sd;
   }
+  // The largest part says what each would tell, and the one that would tell most is taken: of what
+  // they tell themselves, the one that noise has made steep looks best, and is late.
   Onset best;
-  best.drive.sd = std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();
+  const auto largest = part_of(kParts.back(), widest);
   for (const double share : kParts) {
     const double room = std::min(std::max(kRoom * share * travel, kSure * unsure), widest);
-    const auto onset = onset_about(share, room);
-    if (onset && onset->drive.sd < best.drive.sd) best = *onset;
+    const auto part = part_of(share, room);
+    if (!part || !largest) continue;
+    const PartOnset onset = onset_of(*part, *largest);
+    if (!(onset.expected_sd < least)) continue;
+    least = onset.expected_sd;
+    best = {onset.drive, share, part->inside, true};
   }
   if (best.samples == 0) {
     const std::size_t next = std::min(contact + 1, drive.size() - 1);

@@ -50,9 +50,9 @@ struct Onset {
 };
 
 /// Contact as the onset of first loading F = zero + A x^m (1 + B x), x = drive - contact >= 0, by
-/// least squares over the first 5 to 30 % of the travel, whichever part has the least uncertainty:
-/// of the noise, the zero, and a quarter of what B moves (how far the loading departs from a power
-/// within the part).
+/// least squares over the first 5 to 50 % of the travel, whichever part is expected to leave the
+/// least uncertainty: of the noise (for the loading that the largest part shows), the zero, and a
+/// quarter of what B moves (how far the loading departs from a power within the part).
 ///
 /// Without samples before contact, a preload is extrapolated back to no force, and the uncertainty
 /// is as large as the way there.
