@@ -87,6 +87,16 @@ class Contacts(unittest.TestCase):
         sent = np.column_stack([data.commanded_x_N, data.commanded_y_N, data.commanded_z_N])[:-1]
         self.assertTrue(np.array_equal(contact.steps(positions), sent))
 
+    def test_a_device_file_brings_limits_and_the_measured_delay(self):
+        file = Path(self.folder.name) / "device.json"
+        file.write_text(json.dumps({"device": "omega7", "delay": {"provenance": "measured", "largest_s": 0.002}}))
+        tpmkit.Contact(self.file, device_file=file)
+        file.write_text(json.dumps({"device": "omega7", "delay": {"provenance": "measured", "largest_s": 0.02}}))
+        with self.assertRaisesRegex(tpmkit.Error, "keep six hands below 5 mJ"):
+            tpmkit.Contact(self.file, device_file=file)
+        with self.assertRaisesRegex(tpmkit.Error, "is of 'omega7', not of 'falcon'"):
+            tpmkit.Contact(self.file, device="falcon", device_file=file)
+
     def test_errors(self):
         with self.assertRaisesRegex(tpmkit.Error, "none.json"):
             tpmkit.Contact("none.json")

@@ -106,7 +106,14 @@ class Fit:
 
 class Contact:
     def __init__(
-        self, file: str, rate_Hz: float, start_gate: bool, longest_s: float, accept_unstable: bool, device: str
+        self,
+        file: str,
+        rate_Hz: float,
+        start_gate: bool,
+        longest_s: float,
+        accept_unstable: bool,
+        device: str,
+        device_file: str,
     ) -> None: ...
     def step(self, position_m: Array, missed: int = 0) -> Array: ...
     def steps(self, positions_m: Array) -> Array: ...

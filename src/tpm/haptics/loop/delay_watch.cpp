@@ -17,13 +17,13 @@ constexpr double kSame = 8.0;
 /// In units that make the sums alike.
 constexpr double kPlaceUnit_m = 0.01;
 
-/// What active hands on passive set-ups bring about, for each window, and a tenth or more: standard
+/// What active hands on passive set-ups bring about, for each window, and a quarter more: standard
 /// errors below 0, and the least ratio of what a longer delay leaves unexplained. Found by
 /// simulation (tests/haptics/test_safety_slow.cpp, tests/measure/hands.cpp), not derived.
 struct Usual {
   double most_errors, least_ratio;
 };
-constexpr std::array<Usual, 3> kUsual{{{6.5, 0.20}, {10.0, 0.10}, {16.0, 0.065}}};
+constexpr std::array<Usual, 3> kUsual{{{8.5, 0.12}, {13.0, 0.05}, {20.0, 0.03}}};
 constexpr double kMostUnexplained = 0.4;  ///< above it the fit says nothing
 constexpr double kLeastErrors = 1.0;      ///< below 0, for a ratio to count
 
