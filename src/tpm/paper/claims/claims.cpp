@@ -30,6 +30,7 @@ double printed_si(const std::string& value, const Unit& unit, const Evaluator& e
 PrintedSymbol read_symbol(const Json& item, const Evaluator& evaluator, std::string_view file) {
   PrintedSymbol symbol;
   symbol.name = item.at("name").get<std::string>();
+  symbol.words = item.value("words", symbol.name);
   const std::string at = fmt::format("{}: symbol '{}'", file, symbol.name);
   symbol.value = item.at("value").get<std::string>();
   symbol.unit = parse_unit(text_of(item, "unit"), at);
