@@ -90,69 +90,66 @@ std::string counted(const char* whose, const VerdictCounts& counts) {
 }
 
 /// E of one kind of comparison in percent of D, [E - U, E + U], beside its depth or load.
+/// @param shift of the bars, so that those of one depth stand side by side
 Series errors_of(const std::vector<PrintedComparison>& all, const std::string& parameters,
-                 const std::string& quantity_start, double shift) {
+                 const std::string& label, const std::string& quantity_start, double shift) {
   Series series;
   series.kind = Series::Kind::bracket;
-  series.label = parameters;
+  series.label = label;
   series.provenance = "model";
   for (const PrintedComparison& c : all) {
     if (c.parameters != parameters || !c.quantity.starts_with(quantity_start)) continue;
     const double at = c.imposed * (c.experiment == "creep" ? 1.0 : 1e3);
     const double U = c.e.expanded();
-    series.add_range(at * (1.0 + shift), 100.0 * (c.simulated - c.high - U) / c.high,
+    series.add_range(at + shift, 100.0 * (c.simulated - c.high - U) / c.high,
                      100.0 * (c.simulated - c.low + U) / c.low);
   }
   return series;
 }
 
-Series limit_of_requirement(double percent) {
-  Series series;
-  series.kind = Series::Kind::level;
-  series.label = "requirement";
-  series.y = {percent};
-  series.text = fmt::format("{}R", percent < 0.0 ? "-" : "+");
-  return series;
-}
+/// One panel of the figure.
+struct ErrorPanel {
+  const char* title;
+  const char* start;  ///< of the names of its quantities
+  const char* axis;
+  const char* unit;
+  double first, last, apart;  ///< on the axis: the requirement's ends, and from bar to bar
+  std::vector<std::pair<const char*, const char*>> kinds;  ///< parameters and label
+};
 
 }  // namespace
 
 Figure validation_error_figure(const std::vector<PrintedComparison>& all, double requirement) {
+  const char* const printed = "printed parameters";
+  const char* const fitted = "fitted parameters";
+  const std::vector<std::pair<const char*, const char*>> relaxing{
+      {"printed, step", printed},
+      {"printed, ramp of 4 mm/s", "printed parameters, ramp of 4 mm/s"},
+      {"fitted to the other depths", fitted}};
+  const std::vector<std::pair<const char*, const char*>> steady{{"printed", printed},
+                                                                {"fitted to relaxation", fitted}};
   Figure figure{"validation_error", "Model error against the requirement",
                 "What is known of the model error, [E - U, E + U] in percent of D, for every D "
-                "that the print allows. Adequate: the whole bar lies between the lines. Not "
+                "that the print allows. Adequate: the whole bar lies between the dashed lines. Not "
                 "adequate: the whole bar lies outside. u_D holds the printed digits alone."};
-  struct Shown {
-    const char* title;
-    const char* start;
-    const char* axis;
-    const char* unit;
-    std::vector<const char*> parameters;
-  };
-  for (const Shown& shown :
-       {Shown{"Relaxation, peak",
-              "peak force",
-              "depth",
-              "mm",
-              {"printed, step", "printed, ramp of 4 mm/s", "fitted to the other depths"}},
-        Shown{"Relaxation, 30 s",
-              "force after",
-              "depth",
-              "mm",
-              {"printed, step", "printed, ramp of 4 mm/s", "fitted to the other depths"}},
-        Shown{"Static force", "equilibrium", "depth", "mm", {"printed", "fitted to relaxation"}},
-        Shown{"Creep, 300 s", "depth after", "load", "N", {"printed", "fitted to relaxation"}}}) {
+  for (const ErrorPanel& shown :
+       {ErrorPanel{"Relaxation, peak", "peak force", "depth", "mm", 1.0, 9.0, 0.45, relaxing},
+        ErrorPanel{"Relaxation, 30 s", "force after", "depth", "mm", 1.0, 9.0, 0.45, relaxing},
+        ErrorPanel{"Static force", "equilibrium", "depth", "mm", 1.0, 9.0, 0.6, steady},
+        ErrorPanel{"Creep, 300 s", "depth after", "load", "N", 0.1, 1.1, 0.1, steady}}) {
     Panel panel;
     panel.title = shown.title;
     panel.x = {shown.axis, shown.unit};
     panel.y = {"model error / D", "%"};
-    double shift = -0.04;
-    for (const char* parameters : shown.parameters) {
-      panel.series.push_back(errors_of(all, parameters, shown.start, shift));
-      shift += 0.04;
+    double shift = -0.5 * shown.apart * static_cast<double>(shown.kinds.size() - 1);
+    for (const auto& [parameters, label] : shown.kinds) {
+      panel.series.push_back(errors_of(all, parameters, label, shown.start, shift));
+      shift += shown.apart;
     }
-    panel.series.push_back(limit_of_requirement(100.0 * requirement));
-    panel.series.push_back(limit_of_requirement(-100.0 * requirement));
+    for (const double percent : {100.0 * requirement, -100.0 * requirement}) {
+      panel.series.push_back(
+          line("requirement", {shown.first, shown.last}, {percent, percent}, "assumed"));
+    }
     figure.panels.push_back(std::move(panel));
   }
   return figure;
