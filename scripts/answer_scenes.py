@@ -169,7 +169,7 @@ CASES = [
 
 INTRODUCTION = """Every row: an input, what version {old} answered, what this version answers, and the test that holds it.
 Items 7 to 15 of the list "No wrong number"; several had been mended before {old} and answer alike. Items 11 and 15 are
-those of `tpm accuracy stability`: reports/stability had been left from before that; it was computed anew. Item 12 was also tried
+those of `tpm stability`: reports/stability had been left from before that; it was computed anew. Item 12 was also tried
 with the real Slurm (`scripts/try_slurm.sh`)."""
 
 RELATIVES = """## Relatives found and mended

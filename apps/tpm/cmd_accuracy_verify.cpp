@@ -13,7 +13,7 @@
 namespace tpm::app {
 namespace {
 
-struct VerifyChoice {
+struct VerificationChoice {
   std::vector<std::string> groups;
   std::string folder;
   std::string flaw;
@@ -30,7 +30,7 @@ int list_groups(const Session& session) {
   return 0;
 }
 
-int verify_program(const VerifyChoice& choice, const Session& session) {
+int verify_program(const VerificationChoice& choice, const Session& session) {
   if (choice.list) return list_groups(session);
   const double flaw = choice.flaw.empty() ? 0.0 : parse_share(choice.flaw, "--flaw");
   const std::vector<VerificationGroup> groups = chosen_groups(choice.groups);
@@ -63,7 +63,7 @@ void add_verify_command(CLI::App& accuracy, Session& session) {
       "verify",
       "Orders of convergence, certified problems, closed forms, energy: does tpm compute what it "
       "must?");
-  auto choice = std::make_shared<VerifyChoice>();
+  auto choice = std::make_shared<VerificationChoice>();
   command->add_option("GROUP", choice->groups, "Groups of checks (default: all; see --list)");
   command->add_option("-o,--output", choice->folder,
                       "Folder to write report.html, report.md, verification.json and "

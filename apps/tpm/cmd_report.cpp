@@ -8,14 +8,17 @@
 namespace tpm::app {
 namespace {
 
-int report(const std::string& folder, const Session& session) {
-  will_write_into(folder, {"report.html", "report.md", "audit.json", "figures.json"},
+int report(const std::string& folder, double requirement, const Session& session) {
+  will_write_into(folder,
+                  {"report.html", "report.md", "audit.json", "validation.json", "figures.json"},
                   session.folder_naming());
   const std::string python = find_drawing_python();  // before minutes of work, not after
-  const PaperReport paper = make_paper_report();
+  const PaperReport paper = make_paper_report(requirement);
   write_paper_report(paper, folder, python);
   for (const std::string& sentence : summary_sentences(paper)) say("- {}\n", sentence);
-  say("written to {}: report.html, report.md, tables.*, audit.json, fit_*.json, figures\n", folder);
+  say("written to {}: report.html, report.md, tables.*, audit.json, fit_*.json, validation.json, "
+      "figures\n",
+      folder);
   return 0;
 }
 
@@ -26,8 +29,21 @@ void add_report_command(CLI::App& app, Session& session) {
       "report", "Recompute the paper: tables, audit, fits and figures in one report");
   auto folder = std::make_shared<std::string>("out/paper");
   command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
-  command->footer("Example:\n  tpm report --output out/paper");
-  set_run(*command, session, [folder, &session] { return report(*folder, session); });
+  auto requirement = std::make_shared<std::string>("10%");
+  command
+      ->add_option("--require", *requirement,
+                   "How large a model error may be, as a share of the measured value (the section "
+                   "on validation)")
+      ->capture_default_str();
+  command->footer("Example:\n  tpm report --output out/paper\n  tpm report --require 20%");
+  set_run(*command, session, [folder, requirement, &session] {
+    const double share = parse_share(*requirement, "--require");
+    if (!(share > 0.0 && share < 1.0)) {
+      throw Error(ExitCode::usage, "--require", fmt::format("'{}'", printable(*requirement)),
+                  "a share above 0 and below 100 %");
+    }
+    return report(*folder, share, session);
+  });
 }
 
 }  // namespace tpm::app

@@ -151,6 +151,21 @@ TEST_CASE("the example in the help of tpm accuracy verify runs") {
   }
 }
 
+TEST_CASE("tpm accuracy verify: what it refuses is one line and exit code 2") {
+  const Run group = run_program("accuracy verify closed_forms");
+  CHECK(group.exit_code == 2);
+  CHECK_THAT(group.output, Contains("tpm: GROUP: 'closed_forms'; expected one of orders"));
+  const Run flaw = run_program("accuracy verify --flaw much");
+  CHECK(flaw.exit_code == 2);
+  CHECK(flaw.output == "tpm: --flaw: 'much'; expected a share such as 10% or 0.1\n");
+  CHECK(run_program("accuracy")
+            .output.starts_with(
+                "tpm: accuracy: no command; expected one of verify, benchmark, stability"));
+  const Run require = run_program("report --require 200%");
+  CHECK(require.exit_code == 2);
+  CHECK(require.output == "tpm: --require: '200%'; expected a share above 0 and below 100 %\n");
+}
+
 TEST_CASE("the old names of the commands below tpm accuracy name the new ones") {
   for (const char* name : {"benchmark", "stability"}) {
     const Run old = run_program(std::string(name) + " --help");

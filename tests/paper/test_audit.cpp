@@ -161,7 +161,7 @@ TEST_CASE("items 3 and 4: the search finds the two loads, 0.20 N and 3.68 mm by 
   const Finding& start = finding(printed_paper(), "creep-small-start");
   CHECK(start.verdict == AuditVerdict::differs);
   CHECK_THAT(start.recomputed->value, test::expected("paper_audit.creep_small_start"));
-  CHECK_THAT(start.causes.at(0).text, Contains("load_small = 0.2 N instead of 0.196 N"));
+  CHECK_THAT(start.causes.at(0).text, Contains("load = 0.2 N instead of 0.196 N"));
   CHECK_THAT(finding(printed_paper(), "creep-small-lambda1").causes.at(0).text,
              Contains("3.68 mm"));
   CHECK_THAT(finding(printed_paper(), "creep-large-start").causes.at(0).text,

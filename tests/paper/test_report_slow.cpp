@@ -23,8 +23,10 @@ namespace fs = std::filesystem;
 namespace {
 
 const std::vector<std::string> kResults{
-    "report.md",  "tables.md",           "tables.csv",           "tables.tex",       "tables.json",
-    "audit.json", "fit_relaxation.json", "fit_sensitivity.json", "fit_held_out.json"};
+    "report.md",        "validation.json",     "tables.md",
+    "tables.csv",       "tables.tex",          "tables.json",
+    "audit.json",       "fit_relaxation.json", "fit_sensitivity.json",
+    "fit_held_out.json"};
 
 fs::path fresh_report(const char* name) {
   fs::path folder = fs::temp_directory_path() / ("tpm_report_" + std::string(name));

@@ -30,9 +30,12 @@ Json cause_json(const AuditCause& cause) {
           {"only_printed_values", cause.only_printed}};
 }
 
-Json detail_json(const AuditDetail& detail) {
+const char* const kDerivedKey = "derived_from_print";
+
+/// @param key of the number that is compared
+Json detail_json(const AuditDetail& detail, const char* key) {
   return {{"what", detail.what},
-          {"printed", detail.printed},
+          {key, detail.printed},
           {"recomputed", quantity_json(detail.recomputed)},
           {"verdict", detail.verdict},
           {"difference_percent", optional_number(detail.difference_percent)}};
@@ -47,13 +50,16 @@ Json finding_json(const Finding& finding) {
   json["claim"] = finding.claim;
   json["verdict"] = verdict_name(finding.verdict);
   json["difference_percent"] = optional_number(finding.difference_percent);
-  json["printed"] = finding.printed;
+  const bool in_print = !finding.printed.empty();
+  json[in_print ? "printed" : kDerivedKey] = finding.compared();
   json["recomputed"] = finding.recomputed ? quantity_json(*finding.recomputed) : Json();
   if (finding.bound) json["bound"] = quantity_json(*finding.bound);
   json["expression"] = finding.expression;
   json["inputs"] = array_json(finding.inputs, input_json);
   json["causes"] = array_json(finding.causes, cause_json);
-  json["details"] = array_json(finding.details, detail_json);
+  json["details"] = array_json(finding.details, [&](const AuditDetail& detail) {
+    return detail_json(detail, in_print ? "printed" : kDerivedKey);
+  });
   if (finding.cells) {
     json["cells"] = {{"cells", finding.cells->cells},
                      {"by_rounding", finding.cells->by_rounding},

@@ -48,7 +48,7 @@ std::string number_text(const AuditQuantity& quantity) {
 /// What a consequence may quote.
 Placeholders placeholders(const ClaimReader& claim, const Finding& finding) {
   Placeholders values;
-  values["printed"] = finding.printed;
+  values["printed"] = finding.compared();
   values["recomputed"] = finding.recomputed_words();
   if (finding.bound) values["bound"] = number_text(*finding.bound);
   values["difference"] =

@@ -56,7 +56,7 @@ struct AuditCause {
 /// One of several numbers inside a finding: a table cell, a datum, a sample point.
 struct AuditDetail {
   std::string what;
-  std::string printed;
+  std::string printed;  ///< or derived, as of the finding
   AuditQuantity recomputed;
   std::string verdict;
   std::optional<double> difference_percent;
@@ -76,8 +76,11 @@ struct Finding {
   std::string topic;
   std::string kind;
   std::string where;
-  std::string claim;                        ///< the paper's words, quoted or paraphrased
-  std::string printed;                      ///< what is printed, with unit
+  std::string claim;    ///< the paper's words, quoted or paraphrased
+  std::string printed;  ///< what is printed, with unit; empty if no number is
+  /// Where no number is printed: what the printed equations give for the left side of `agree`, or
+  /// the bound of `inequality`.
+  std::string derived;
   std::optional<AuditQuantity> recomputed;  ///< in the printed unit
   std::optional<AuditQuantity> bound;       ///< right-hand side of an inequality
   std::string expression;                   ///< what was evaluated
@@ -93,6 +96,10 @@ struct Finding {
   [[nodiscard]] std::string verdict_words() const;
   /// The recomputed number, range or count of cells with its unit, four digits.
   [[nodiscard]] std::string recomputed_words() const;
+  /// What the recomputed number is compared with: `printed`, else `derived`.
+  [[nodiscard]] const std::string& compared() const noexcept {
+    return printed.empty() ? derived : printed;
+  }
   /// True for holds and holds_by_truncation.
   [[nodiscard]] bool stands() const noexcept;
 };

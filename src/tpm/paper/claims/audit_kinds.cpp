@@ -175,6 +175,19 @@ void check_range(const ClaimReader& claim, Finding& finding) {
   finding.difference_percent = worst;
 }
 
+namespace {
+
+/// The symbol whose name is the whole of a formula, if its value stands in print.
+const PrintedSymbol* printed_alone(const ClaimReader& claim, const std::string& formula) {
+  const PrintedSymbol* symbol = claim.set().symbol(formula);
+  if (symbol == nullptr) return nullptr;
+  const bool in_print = symbol->provenance == "table" || symbol->provenance == "text" ||
+                        symbol->provenance == "abstract";
+  return in_print ? symbol : nullptr;
+}
+
+}  // namespace
+
 void check_agree(const ClaimReader& claim, Finding& finding) {
   const std::string left = claim.text("left");
   const std::string right = claim.text("right");
@@ -198,7 +211,11 @@ void check_agree(const ClaimReader& claim, Finding& finding) {
     }
     if (relative <= worst) continue;
     worst = relative;
-    finding.printed = with_unit(significant(a, 4), unit);
+    if (const PrintedSymbol* symbol = printed_alone(claim, left)) {
+      finding.printed = with_unit(symbol->value, symbol->unit);
+    } else {
+      finding.derived = with_unit(significant(a, 4), unit);
+    }
     finding.recomputed = {b, unit};
     finding.difference_percent = percent;
     finding.inputs = claim.inputs(right, scope);
@@ -219,7 +236,13 @@ void check_inequality(const ClaimReader& claim, Finding& finding) {
   const double a = claim.evaluate(left, scope) / unit.to_si;
   const double b = claim.evaluate(right, scope) / unit.to_si;
   finding.expression = fmt::format("{} {} {}", left, relation, right);
-  finding.printed = fmt::format("{} {}", relation, with_unit(significant(b, 4), unit));
+  if (const PrintedSymbol* symbol = printed_alone(claim, right)) {
+    finding.printed = fmt::format("{} {}", relation, with_unit(symbol->value, symbol->unit));
+  } else {
+    finding.derived = fmt::format("{} {}", relation, with_unit(significant(b, 4), unit));
+    const PrintedSymbol* own = claim.set().symbol(right);
+    if (own != nullptr && own->provenance == "assumed") finding.derived += " (assumed)";
+  }
   finding.recomputed = {a, unit};
   finding.bound = {b, unit};
   finding.inputs = claim.inputs(left, scope);

@@ -68,6 +68,12 @@ std::string chosen_text(const PrintedSymbol& symbol, std::size_t choice) {
   return fmt::format("{} ({})", with_unit(value, symbol.unit), where);
 }
 
+/// An input in words for people.
+std::string called(const ClaimReader& reader, const std::string& name) {
+  const PrintedSymbol* symbol = reader.set().symbol(name);
+  return symbol == nullptr ? name : symbol->words;
+}
+
 void CauseSearch::add_choice(const AuditInput& input, const PrintedSymbol& symbol,
                              const std::vector<std::size_t>& choice) {
   double sum = 0.0;
@@ -81,7 +87,7 @@ void CauseSearch::add_choice(const AuditInput& input, const PrintedSymbol& symbo
   cause.recomputed = sum;
   const bool mixed =
       std::adjacent_find(choice.begin(), choice.end(), std::not_equal_to<>()) != choice.end();
-  cause.text = input.name + " = ";
+  cause.text = symbol.words + " = ";
   for (std::size_t t = 0; t < (mixed ? choice.size() : 1); ++t) {
     if (t > 0) cause.text += ", ";
     cause.text += chosen_text(symbol, choice[t]);
@@ -165,7 +171,8 @@ void CauseSearch::try_any_value(const AuditInput& input) {
     AuditCause cause;
     const std::string was =
         input.printed.empty() ? with_unit(significant(input.value.value, 4), unit) : input.printed;
-    cause.text = fmt::format("{} = {} instead of {}", input.name, with_unit(text, unit), was);
+    cause.text = fmt::format("{} = {} instead of {}", called(reader_, input.name),
+                             with_unit(text, unit), was);
     cause.recomputed = *there;
     cause.digits = digits;
     cause.relative_change = std::abs(*root / original - 1.0);

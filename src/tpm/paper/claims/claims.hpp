@@ -22,6 +22,7 @@ struct PrintedAlternative {
 /// A named number of the paper.
 struct PrintedSymbol {
   std::string name;
+  std::string words;  ///< for people, "load" of load_small; the name if the file says none
   std::string value;  ///< as printed, e.g. "12" or "pi/6"
   Unit unit;
   double si = 0.0;

@@ -45,8 +45,8 @@ std::string finding_text(const Finding& finding) {
   std::string out = fmt::format("{}  {}  [{}]\n", mark, finding.id, finding.verdict_words());
   // "paper" first: the reader knows the paper, not our names.
   out += entry("paper", fmt::format("{}: {}", finding.where, finding.claim));
-  out += entry("printed",
-               fmt::format("{}   recomputed {}", finding.printed, finding.recomputed_words()));
+  out += entry(finding.printed.empty() ? "derived" : "printed",
+               fmt::format("{}   recomputed {}", finding.compared(), finding.recomputed_words()));
   out += entry("by", finding.expression);
   out += entry("with", inputs_text(finding));
   for (const AuditCause& cause : finding.causes) {

@@ -49,6 +49,7 @@ PaperFigureData figure_data(const FitResult& fit, const ClaimSet& claims) {
 std::vector<Figure> all_figures(const PaperReport& report) {
   std::vector<Figure> figures = paper_figures(report.figure_data);
   figures.push_back(profile_figure(report.fits));
+  figures.push_back(validation_error_figure(report.comparisons, report.requirement));
   figures.push_back(sensitivity_figure(report.fits, "eta1", report.figure_data.paper.eta1_Pa_s));
   return figures;
 }
@@ -71,8 +72,9 @@ void write_json(const fs::path& path, Json value) {
 
 }  // namespace
 
-PaperReport make_paper_report() {
+PaperReport make_paper_report(double requirement) {
   PaperReport report;
+  report.requirement = requirement;
   std::map<std::string, double> seconds;
   const fs::path claims_file = paper_claims_path();
   const Json claims = read_json(claims_file);
@@ -86,6 +88,11 @@ PaperReport make_paper_report() {
   const fs::path config = share_dir() / "configs" / "liver_relaxation.json";
   report.fits = timed(seconds, "fits", [&] { return run_fit_study(read_fit_config(config)); });
   report.figure_data = figure_data(report.fits.reference, read_claims(claims, file));
+  report.comparisons = timed(seconds, "validation", [&] {
+    const PaperFigureData& d = report.figure_data;
+    return compare_with_print({d.paper, d.relaxation, d.static_bands, d.creep}, report.fits,
+                              requirement);
+  });
   report.figures = all_figures(report);
   report.seconds = std::move(seconds);
   return report;
@@ -103,6 +110,7 @@ Document paper_document(const PaperReport& report) {
   add_tables(document, report);
   add_audit(document, report);
   add_fits(document, report);
+  add_validation(document, report);
   add_paper_figures(document, report);
   add_validity(document, report);
   add_assumptions(document, report);
@@ -119,6 +127,7 @@ void write_paper_report(const PaperReport& report, const fs::path& folder,
   write_file(folder / "tables.csv", tables_csv(report.tables));
   write_json(folder / "tables.json", to_json(report.tables));
   write_json(folder / "audit.json", to_json(report.audit));
+  write_json(folder / "validation.json", to_json(report.comparisons, report.requirement));
   write_json(folder / "fit_relaxation.json", to_json(report.fits.reference));
   write_json(folder / "fit_sensitivity.json", variants_json(report.fits));
   write_json(folder / "fit_held_out.json", held_out_json(report.fits));

@@ -24,10 +24,13 @@ Cell tables_sentence(const TablesResult& tables) {
 Cell audit_sentence(const AuditReport& audit) {
   int stand = 0;
   for (const Finding& f : audit.findings) stand += f.stands() ? 1 : 0;
-  return {fmt::format("Audit: of {} claims {} stand, {} differ from their recomputation, {} are "
-                      "contradicted by the paper's own equations or numbers.",
-                      audit.findings.size(), stand, audit.count(AuditVerdict::differs),
-                      audit.count(AuditVerdict::contradicted)),
+  return {fmt::format(
+              "Audit: of {} claims {} stand, {} differ from their recomputation, {} are "
+              "contradicted by the paper's own equations or numbers; off in the last digit: "
+              "{}; cannot be told: {}.",
+              audit.findings.size(), stand, audit.count(AuditVerdict::differs),
+              audit.count(AuditVerdict::contradicted), audit.count(AuditVerdict::last_digit_off),
+              audit.count(AuditVerdict::cannot_be_told)),
           audit.count(AuditVerdict::contradicted) > 0 ? Tone::bad : Tone::good};
 }
 
@@ -69,6 +72,7 @@ std::vector<Cell> verdicts(const PaperReport& report) {
     items.push_back({"Fit: " + h.words, h.excluded ? Tone::bad : Tone::plain});
   }
   items.push_back(held_out_sentence(report.fits));
+  items.push_back({validation_sentence(report), Tone::fair});
   return items;
 }
 

@@ -11,9 +11,17 @@ void add_data(Document& document, const PaperReport& report);
 void add_tables(Document& document, const PaperReport& report);
 void add_audit(Document& document, const PaperReport& report);
 void add_fits(Document& document, const PaperReport& report);
+void add_validation(Document& document, const PaperReport& report);
 void add_paper_figures(Document& document, const PaperReport& report);
 void add_validity(Document& document, const PaperReport& report);
 void add_assumptions(Document& document, const PaperReport& report);
+
+/// How many comparisons with the printed data are adequate, not adequate, undetermined.
+[[nodiscard]] std::string validation_sentence(const PaperReport& report);
+
+/// The errors of the section on validation beside the requirement.
+[[nodiscard]] Figure validation_error_figure(const std::vector<PrintedComparison>& all,
+                                             double requirement);
 
 /// Title and caption of a figure of the report. Throws Error(environment) if there is none of that
 /// id.
