@@ -11,6 +11,7 @@
 #include "tpm/contact/element_contact.hpp"
 #include "tpm/contact/law_contact.hpp"
 #include "tpm/law/contact_geometry.hpp"
+#include "tpm/organ/balance/quasistatic.hpp"
 #include "tpm/organ/bonds/lowest_mode.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_model.hpp"
@@ -314,6 +315,57 @@ Network joined_springs(const std::vector<std::array<double, 2>>& places,
   return join(std::move(organ), pairs, options, "verification");
 }
 
+/// A cantilever of square bays, each with one diagonal; statically determinate. Deflection of the
+/// loaded corner by the sum of n^2/k over the springs, n the force of each under a unit load: in
+/// the bay j from the tip the chords carry j and j + 1, the diagonal sqrt(2), the upright 1.
+VerificationCheck beam_check() {
+  return {"beam of 10 square bays of springs, load at its end, deflection",
+          kRelativeError,
+          "principle of virtual work: F/k times the sum of n^2 = 700 F/k",
+          0.0,
+          1e-5,
+          [](double flaw) {
+            constexpr std::uint32_t kBays = 10;
+            constexpr double kBay_m = 10e-3;
+            std::vector<std::array<double, 2>> places;
+            for (std::uint32_t i = 0; i <= kBays; ++i) {
+              places.push_back({i * kBay_m, kBay_m});  // 2 i
+              places.push_back({i * kBay_m, 0.0});     // 2 i + 1
+            }
+            std::vector<NeighbourPair> pairs;
+            double sum = 0.0;
+            for (std::uint32_t i = 0; i < kBays; ++i) {
+              const std::uint32_t top = 2 * i, bottom = top + 1;
+              pairs.push_back({top, top + 2});
+              pairs.push_back({top, top + 3});
+              pairs.push_back({bottom, bottom + 2});
+              pairs.push_back({top + 2, bottom + 2});
+              const double from_tip = kBays - 1 - i;
+              sum += from_tip * from_tip + (from_tip + 1.0) * (from_tip + 1.0) + 2.0 + 1.0;
+            }
+            const Network network = joined_springs(places, pairs);
+            Constraints constraints(places.size());
+            constraints.fix(0);
+            constraints.fix(1);
+            for (std::size_t i = 2; i < places.size(); ++i) {
+              constraints.impose(i, Eigen::Vector3d::UnitZ());  // stays in the plane
+            }
+            const BondMaterial material = springs(kSpring_Pa);
+            const BondSystem bonds(network, springs(kSpring_Pa * (1.0 + flaw)));
+            const QuasiStatic beam(bonds, network.organ.position, constraints,
+                                   Probe{2 * kBays, -Eigen::Vector3d::UnitY(), 1.0},
+                                   {.tolerance = 1e-4});
+            // Small, and pushed both ways: what is not linear cancels to second order. What is left
+            // unbalanced is 1e-3 of the tolerance; less would be below the rounding of forces.
+            constexpr double kSmall_m = 1e-5;
+            const double load_N = kSmall_m * material.modulus_to_stiffness_m() * kSpring_Pa / sum;
+            const std::vector<double> end{1.0};
+            const double down = beam.run(creep(load_N, 1.0), end).response[0];
+            const double up = beam.run(creep(-load_N, 1.0), end).response[0];
+            return std::abs(0.5 * (down - up) / kSmall_m - 1.0);
+          }};
+}
+
 /// The slowest vibration of a row of equal masses and springs, one end fixed.
 VerificationCheck vibration_check() {
   return {"row of 20 masses on springs, slowest vibration",
@@ -355,7 +407,7 @@ std::vector<VerificationCheck> closed_form_checks() {
   append_checks(checks, {oscillation_check(), chain_check(), paper_step_check()});
   append_checks(checks, probe_checks());
   append_checks(checks, servo_checks());
-  append_checks(checks, {vibration_check()});
+  append_checks(checks, {beam_check(), vibration_check()});
   return checks;
 }
 
