@@ -656,8 +656,8 @@ std::vector<ErrorCase> scene_cases() {
        scene(
            R"({"organ": {"kind": "block", "cells": [2, 2, 2]}, "anchors": [{"kind": "far_side"}]})")},
       {type, "two planes to slide on", check, liver(R"("anchors": [{"kind": "far_side"},
-         {"kind": "half_space", "point": ["0 mm", "0 mm", "0 mm"], "normal": [0, -1, 0], "slides": true},
-         {"kind": "half_space", "point": ["0 mm", "0 mm", "0 mm"], "normal": [-1, 0, 0], "slides": true}])")},
+         {"kind": "half_space", "point": ["0 mm", "136 mm", "57 mm"], "normal": [0, 1, 0], "slides": true},
+         {"kind": "half_space", "point": ["0 mm", "136 mm", "57 mm"], "normal": [1, 0, 0], "slides": true}])")},
       {type, "modulus of the tissue of a shell", check, liver(R"("material": {"E": "3 kPa"})")},
       {type, "Poisson ratio without a modulus", check, liver(R"("material": {"nu": 0.3})")},
       {type, "Poisson ratio of another tissue", check,

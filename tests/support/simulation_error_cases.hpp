@@ -50,20 +50,20 @@ inline std::vector<ErrorCase> simulation_error_cases() {
          "contacts": [{"kind": "patch", "radius": "20 cm"}])")},
       {type, "contact without a protocol", simulate,
        scene(R"(, "contacts": [{"kind": "sphere", )" + push +
-             R"(}, {"kind": "sphere", "number": 70}])")},
+             R"(}, {"kind": "sphere", "number": 80}])")},
       {type, "protocols that begin apart", simulate,
-       pushed(R"("contacts": [{"kind": "sphere"}, {"kind": "sphere", "number": 70,
+       pushed(R"("contacts": [{"kind": "sphere"}, {"kind": "sphere", "number": 80,
          "protocol": {"kind": "knots", "knots": [{"time": "1 s", "depth": "0 mm"},
          {"time": "2 s", "depth": "1 mm"}]}}])")},
       {type, "first contact stands still beside another", simulate,
        scene(R"(, "contacts": [{"kind": "sphere", "protocol": {"kind": "knots",
          "knots": [{"time": "0 s", "depth": "0 mm"}, {"time": "2 s", "depth": "0 mm"}]}},
-         {"kind": "sphere", "number": 70, )" +
+         {"kind": "sphere", "number": 80, )" +
              push + "}]")},
       {type, "share beside a protocol of its own", simulate, contact(R"("share": 0.5, )" + push)},
       {type, "protocols of their own, static", simulate,
        scene(R"(, "formulation": {"kind": "static"}, "contacts": [{"kind": "sphere", )" + push +
-             R"(}, {"kind": "sphere", "number": 70, )" + push + "}]")},
+             R"(}, {"kind": "sphere", "number": 80, )" + push + "}]")},
       {type, "recording that is not there", simulate, scene(R"(, "contacts": [{"kind": "sphere",
          "protocol": {"kind": "recording", "file": "none.csv"}}])")},
       {type, "mass said twice", simulate,

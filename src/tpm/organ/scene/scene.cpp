@@ -182,7 +182,7 @@ void scale_to_tissue(double E_Pa, std::optional<double> nu, Tissue& tissue,
     throw bad_input(
         place.key("nu").where,
         fmt::format("{}: central forces give this network {}; under a patch a tissue of 0.49 takes "
-                    "28 % more force than one of 1/4 (measured with finite elements)",
+                    "28 % more force than one of 1/4 (measured)",
                     shortest(*nu), significant(own->poisson, 3)),
         "the network's own ratio, or none, with E raised for the error to be made in force");
   }

@@ -14,7 +14,8 @@
 
 namespace tpm::organ {
 
-/// A sphere that may only move along a line.
+/// A sphere that may only move along a line; one that may move in a plane has two of them, one
+/// after the other, along directions square to each other.
 struct Slider {
   std::size_t sphere = 0;
   Eigen::Vector3d direction;  ///< unit vector
