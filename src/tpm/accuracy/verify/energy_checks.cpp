@@ -15,7 +15,7 @@
 namespace tpm::accuracy {
 namespace {
 
-constexpr double kTau_s = 0.1, kPushed_m = 4e-3, kSpeed = 0.02;  // s, m, m/s
+constexpr double kStarTau_s = 0.1, kPushed_m = 4e-3, kSpeed = 0.02;  // s, m, m/s
 constexpr double kRampEnd_s = kPushed_m / kSpeed;
 const char* const kBalance = "(stored + dissipated - work)/work";
 
@@ -57,7 +57,7 @@ VerificationCheck star_check(const char* quantity, const char* source,
           0.0,
           1e-7,
           [=](double flaw) {
-            const BondElement p = paper_element(kTau_s);
+            const BondElement p = paper_element(kStarTau_s);
             BondElement wrong = flawed(p, flaw);
             for (BondMaterial::Branch& branch : wrong.branches) branch.modulus_Pa *= 1.0 + flaw;
             const Protocol protocol = pushed_and_held();
@@ -73,17 +73,17 @@ double work_by_formula(const BondElement& p) {
   const double v = kSpeed, t = kRampEnd_s, e = kPushed_m, x = p.spacing_m;
   // Integral of 2 E' (1 - cos(arctan(e/x))) e de.
   const double tension = 2.0 * p.lateral_Pa * (0.5 * e * e - x * (std::sqrt(x * x + e * e) - x));
-  const double branch = p.relaxing_Pa() * v * v * kTau_s * (t + kTau_s * std::expm1(-t / kTau_s));
+  const double branch = p.relaxing_Pa() * v * v * kStarTau_s * (t + kStarTau_s * std::expm1(-t / kStarTau_s));
   return (0.5 * p.equilibrium_Pa * e * e + tension + branch) * p.modulus_to_stiffness_m();
 }
 
 /// Force^2 of the branch over its dashpot, integrated over ramp and hold.
 double heat_by_formula(const BondElement& p) {
   const double t = kRampEnd_s, end = pushed_and_held().end_s() - t;
-  const double reached = -std::expm1(-t / kTau_s);
-  const double ramp = t - 2.0 * kTau_s * reached - 0.5 * kTau_s * std::expm1(-2.0 * t / kTau_s);
-  const double hold = -reached * reached * 0.5 * kTau_s * std::expm1(-2.0 * end / kTau_s);
-  return p.relaxing_Pa() * kSpeed * kSpeed * kTau_s * (ramp + hold) * p.modulus_to_stiffness_m();
+  const double reached = -std::expm1(-t / kStarTau_s);
+  const double ramp = t - 2.0 * kStarTau_s * reached - 0.5 * kStarTau_s * std::expm1(-2.0 * t / kStarTau_s);
+  const double hold = -reached * reached * 0.5 * kStarTau_s * std::expm1(-2.0 * end / kStarTau_s);
+  return p.relaxing_Pa() * kSpeed * kSpeed * kStarTau_s * (ramp + hold) * p.modulus_to_stiffness_m();
 }
 
 VerificationCheck organ_balance_check() {
@@ -93,7 +93,7 @@ VerificationCheck organ_balance_check() {
           0.0,
           1e-4,
           [](double flaw) {
-            const BondElement p = paper_element(kTau_s);
+            const BondElement p = paper_element(kStarTau_s);
             const Protocol protocol = pushed_and_held();
             const double work = work_of_push([&](const std::vector<double>& times) {
               const auto posed =
