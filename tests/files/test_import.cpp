@@ -140,7 +140,7 @@ TEST_CASE("UTF-16 exports and units in the names") {
 
 TEST_CASE("a relative length that counts the other way is turned about 1") {
   const TempFolder folder;
-  const std::string path = (folder / "compressed.csv").string();
+  const std::string path = folder / "compressed.csv";
   write_file(path, "Time [s],L [-],Stress [kPa]\n0,1,0\n1,0.9,-1\n2,0.8,-2\n3,0.8,-1.5\n");
   ImportOptions options;
   options.drive_quantity = Quantity::relative_length;

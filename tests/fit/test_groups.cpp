@@ -44,18 +44,18 @@ Said run_in(const test::TempFolder& folder, const std::string& arguments) {
           std::filesystem::is_empty(out) ? std::string() : read_file(out)};
 }
 
-/// Ramp and hold of a stiffness of 60 N/m times a factor with a branch of 45 N/m that relaxes in 2
-/// s.
+/// A rest of 2 s, a ramp and a hold: a stiffness of 60 N/m times a factor with a branch of 45 N/m
+/// that relaxes in 2 s.
 std::string recording(double factor, double depth_mm, std::uint64_t seed) {
   Random random(seed);
   std::string csv = "time [s],depth [mm],force [N]\n";
-  for (int i = 0; i < 400; ++i) {
-    const double t = 0.05 * i, ramp = std::min(t, 2.0);
+  for (int i = 0; i < 440; ++i) {
+    const double t = std::max(0.05 * i - 2.0, 0.0), ramp = std::min(t, 2.0);
     const double v = depth_mm / 2.0;
     const double force =
         0.060 * v * ramp + 0.045 * v * 2.0 * (std::exp((ramp - t) / 2.0) - std::exp(-t / 2.0));
-    csv +=
-        fmt::format("{:.2f},{:.5f},{:.7f}\n", t, v * ramp, factor * force + 2e-4 * random.normal());
+    csv += fmt::format("{:.2f},{:.5f},{:.7f}\n", 0.05 * i, v * ramp,
+                       factor * force + 2e-4 * random.normal());
   }
   return csv;
 }

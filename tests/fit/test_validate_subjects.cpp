@@ -70,6 +70,8 @@ ValidationRequest request_for(const LawFile& law, PreparedRecording recording) {
 
 /// The paper's star: four spheres, which answer within milliseconds.
 const OrganMaterial& star_of(const LawFile& law) {
+  // Relaxation times, too: those that are kept do not carry the law's uncertainty.
+  static const OrganMaterialOptions with_times{.fit_times = true};
   static const OrganMaterial once =
       put_on_organ(law,
                    {motion_of_protocol(ramp_and_hold(4e-3, 1e-3, 20.0),
@@ -79,7 +81,7 @@ const OrganMaterial& star_of(const LawFile& law) {
                                          return t;
                                        }())},
                    Json::parse(R"({"organ": {"kind": "star"}, "contacts": [{"kind": "sphere"}]})"),
-                   "test", {}, {});
+                   "test", {}, with_times);
   return once;
 }
 
@@ -201,7 +203,7 @@ TEST_CASE("an organ is compared as its law is, with the numbers of its network",
     // The star is the law's own network: what differs is the fit of its bonds.
     CHECK_THAT(q.simulated, WithinRel(l.simulated, 0.01));
     CHECK_THAT(q.u_input, WithinRel(l.u_input, 0.2));
-    CHECK(q.u_num > l.u_num);
+    CHECK(q.u_num > 0.0);
     CHECK(q.u_num < 2e-3 * q.simulated);
   }
   // A material 10 % stiffer is seen on the organ, too.

@@ -686,7 +686,7 @@ TEST_CASE("mistakes in a sweep are told in one line before anything is computed"
       {R"("count": 4,)", R"("count": 4, "values": ["1 kPa"],)", "values and a range"},
       {R"(x < 0.011)", R"(y < 0.011)", "unknown symbol 'y'"},
       {R"(x < 0.011)", R"(x < )", "expression"},
-      {R"("end_force",)", R"("end_farce",)", "unknown output 'end_farce'"},
+      {R"("end_force",)", R"("end_farce",)", "unknown word 'end_farce'"},
       {R"("end_force",)", R"("creep_depth",)", "without creep"},
       {R"("name": "share")", R"("name": "force")", "the name 'force' is taken"},
       {R"("name": "share")", R"("name": "sweep")", "the name 'sweep' is taken"},
@@ -695,7 +695,7 @@ TEST_CASE("mistakes in a sweep are told in one line before anything is computed"
       {R"("parameter": "E1")", R"("parameter": "E1", "name": "status")", "'status' is taken"},
       {R"("hold": "10 s")", R"("kind2": "10 s")", "kind2"},
       {R"(, "hold": "10 s")", "", "no 'hold'"},
-      {R"("to": "10 s")", R"("to": "-10 s")", "rising times"},
+      {R"("to": "10 s")", R"("to": "-10 s")", "0 s or more"},
       {R"("count": 5)", R"("count": 900000000000)", "cells"},
   };
   for (const auto& [from, to, expected] : mistakes) {

@@ -47,6 +47,8 @@ void mark_unconfirmed(FitResult& result, const Confirmation& confirmation) {
   if (!confirmation.is_doubtful()) return;
   constexpr int kTimes = 10, kFewest = 200;
   for (ParameterResult& p : result.parameters) {
+    // Of these nothing is claimed that another minimum could take back.
+    if (p.verdict == Verdict::failed || p.verdict == Verdict::flat) continue;
     p.unconfirmed = fmt::format(
         "found by one start of {}: not identified until another start ends there (--starts {}, or "
         "a law of fewer parameters)",

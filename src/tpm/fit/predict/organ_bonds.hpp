@@ -39,6 +39,8 @@ class FittedBonds {
   /// "Einf", "g1", "tau1", "stiffening".
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] std::size_t size() const { return names().size(); }
+  /// Whether relaxation times are among them.
+  [[nodiscard]] bool has_times() const { return times_; }
 
   /// @param natural one value for each name, SI
   [[nodiscard]] BondMaterial material(std::span<const double> natural) const;

@@ -40,6 +40,9 @@ class OrganOfLaw final : public Model {
   [[nodiscard]] OrganOfLaw at_tolerance(double tolerance) const;
 
   [[nodiscard]] const LawFile& law() const { return law_; }
+  /// Whether the bonds' relaxation times follow the law's; else they are kept, and the uncertainty
+  /// of the law's times reaches the answer only as far as the moduli take it up.
+  [[nodiscard]] bool times_follow() const { return bonds_.has_times(); }
   [[nodiscard]] std::size_t spheres() const { return organ_.tissue->network.organ.size(); }
 
  private:

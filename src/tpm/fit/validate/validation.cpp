@@ -278,6 +278,11 @@ Validation validate(const ValidationRequest& request) {
     v.remarks.push_back(
         fmt::format("{} stood on a bound of the fit: its uncertainty is not in u_input", name));
   }
+  if (request.organ && !request.organ->times_follow() && law.spec.branches > 0) {
+    v.remarks.emplace_back(
+        "the bonds keep the law's relaxation times: their uncertainty is in u_input only as far as "
+        "the moduli take it up (tpm material --fit-times)");
+  }
   require_fitting_unit(v, request.requirement);
   if (unseen.empty()) {
     v.verdict = ModelVerdict::residual;
