@@ -16,10 +16,10 @@ namespace {
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 
-TEST_CASE("Nine devices have a shipped file, in which every limit says that it is assumed") {
-  CHECK(shipped_devices() == std::vector<std::string>{"delta3", "falcon", "lambda3", "lambda6",
-                                                      "lambda7", "omega3", "omega6", "sigma3",
-                                                      "sigma7"});
+TEST_CASE("Ten devices have a shipped file, in which every limit says that it is assumed") {
+  CHECK(shipped_devices() == std::vector<std::string>{"delta3", "falcon", "inverse3", "lambda3",
+                                                      "lambda6", "lambda7", "omega3", "omega6",
+                                                      "sigma3", "sigma7"});
   for (const std::string& kind : shipped_devices()) {
     CAPTURE(kind);
     const DeviceFile file = shipped_device_file(kind).value();
@@ -32,10 +32,10 @@ TEST_CASE("Nine devices have a shipped file, in which every limit says that it i
     CHECK_FALSE(limits.measured_delay_s.has_value());
     CHECK_FALSE(limits.measured_friction_N_s_per_m.has_value());
     // No limit of a device that nobody has tried is above what is known of the Omega.7, but the
-    // stiffness of the lambda.7.
+    // stiffness of the lambda.7 and the reach of the Inverse3.
     const DeviceLimits known = limits_of("omega7");
     CHECK(limits.force_N <= known.force_N);
-    CHECK(limits.reach_m <= known.reach_m);
+    if (kind != "inverse3") CHECK(limits.reach_m <= known.reach_m);
     CHECK(limits.slew_N_per_s <= known.slew_N_per_s);
     if (kind != "lambda7") CHECK(limits.stiffness_N_per_m <= known.stiffness_N_per_m);
   }
@@ -44,7 +44,7 @@ TEST_CASE("Nine devices have a shipped file, in which every limit says that it i
 }
 
 TEST_CASE("A kind of device is known by itself, by a shipped file, or not at all") {
-  CHECK(device_kinds().size() == 12);
+  CHECK(device_kinds().size() == 13);
   CHECK(limits_of("omega7").tried);
   CHECK_FALSE(shipped_device_file("omega7").has_value());
   CHECK_THAT(test::refusal_of([] { (void)limits_of("gloves"); }),
@@ -66,7 +66,8 @@ TEST_CASE("The file of a device that only it describes states every limit") {
 }
 
 TEST_CASE("A device file is written as it is read") {
-  const Json json = read_json(share_dir() / "configs" / "devices" / "lambda7.json");
+  Json json = read_json(share_dir() / "configs" / "devices" / "lambda7.json");
+  json.erase("$schema");  // which every kind of file may name
   const DeviceKeys keys = device_block().read(json, DocumentPlace{"l"});
   CHECK(device_block().write(keys) == json);
 }

@@ -24,7 +24,7 @@ struct PrintedSymbol {
   std::string name;
   std::string words;  ///< for people, "load" of load_small; the name if the file says none
   std::string value;  ///< as printed, e.g. "12" or "pi/6"
-  Unit unit;
+  Unit unit{"", Dimension::dimensionless, 1.0};  ///< of a plain number unless said
   double si = 0.0;
   std::string where;
   std::string provenance;                ///< empty if not said
@@ -34,7 +34,7 @@ struct PrintedSymbol {
 /// A column of a printed table; its name is bound to the row's value while a row is evaluated.
 struct PrintedColumn {
   std::string name;
-  Unit unit;
+  Unit unit{"", Dimension::dimensionless, 1.0};  ///< of a plain number unless said
 };
 
 /// A table with its numbers as printed, row by row.
