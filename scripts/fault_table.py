@@ -57,12 +57,12 @@ EXPERIMENTS = {"title": "t", "tissues": [{"name": "star"}],
                "conditions": {"static": {"depth": "8 mm", "readings": ["4 mm", "8 mm"]}}}
 
 
-def recording() -> str:
+def recording(stiffer: float = 1.0) -> str:
     rows = ["time [s],depth [mm],force [N]"]
     for i in range(60):
         depth = min(0.2 * i, 3.0)
         relaxed = 0.05 * depth * (1.0 + 0.6 * 2.718 ** (-max(0.0, 0.1 * i - 1.5) / 1.2))
-        rows.append(f"{0.1 * i:.2f},{depth:.3f},{relaxed + 0.001 * ((i * 7919) % 5 - 2):.5f}")
+        rows.append(f"{0.1 * i:.2f},{depth:.3f},{stiffer * relaxed + 0.001 * ((i * 7919) % 5 - 2):.5f}")
     return "\n".join(rows) + "\n"
 
 
@@ -144,8 +144,8 @@ def write_inputs(tpm: Path, folder: Path) -> None:
                     "time_s": {"quantity": "time", "unit": "s"},
                     "force_N": {"quantity": "contact_force", "unit": "N"}}}))
     (folder / "c.csv").write_text("depth_mm,time_s,force_N,provenance\n2,0,0.32,table\n2,30,0.21,table\n")
-    for name in ["a1.csv", "a2.csv"]:
-        (folder / "folder" / name).write_text(recording())
+    for name, stiffer in [("a1.csv", 1.0), ("a2.csv", 1.1)]:
+        (folder / "folder" / name).write_text(recording(stiffer))
     subprocess.run([tpm, "hil", "run", folder / "session.json", "-o", folder / "s.tpmrec"], check=True,
                    capture_output=True)
     subprocess.run([tpm, "fit", folder / "folder" / "a1.csv", "--law", "linear-1", "--starts", "2",

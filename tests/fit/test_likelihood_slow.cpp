@@ -408,7 +408,8 @@ TEST_CASE("all-equal data: stiffness that does not relax, or noise that cannot b
   CHECK_NOTHROW(to_text(to_json(zero)));
 }
 
-TEST_CASE("an outlier of 100 sigma: said, and held down by a wide-tailed law or a loss") {
+TEST_CASE(
+    "an outlier of 100 sigma: left out and said, or held down by a wide-tailed law or a loss") {
   std::vector<double> errors = normal_errors(200, 1e-3, 12);
   errors[40] += 0.1;
   const std::vector<DataSet> data{DataSet(computed_recording(errors))};
@@ -416,7 +417,8 @@ TEST_CASE("an outlier of 100 sigma: said, and held down by a wide-tailed law or 
     return std::abs(std::log(find(fit, "tau1").estimate / 5.0));
   };
   const FitResult normal = run_fit(without_profiles(law_config(kKnown)), data);
-  CHECK(says(normal.flags, "1 of 200 values lies more than 8 standard deviations"));
+  CHECK(says(normal.flags, "1 outlier ("));
+  CHECK(says(normal.flags, "left out of the fit"));
   CHECK(says(normal.flags, "t = 6.0"));
   const FitResult wide = run_fit(
       without_profiles(
@@ -426,10 +428,11 @@ TEST_CASE("an outlier of 100 sigma: said, and held down by a wide-tailed law or 
   const FitResult huber =
       run_fit(without_profiles(law_config(kKnown, R"(, "loss": {"kind": "huber"})")), data);
   CAPTURE(shift(normal), shift(wide), shift(huber));
-  CHECK(shift(wide) < 0.5 * shift(normal));
-  CHECK(shift(huber) < 0.5 * shift(normal));
+  for (const FitResult* fit : {&normal, &wide, &huber}) {
+    const ParameterResult& tau = find(*fit, "tau1");
+    CHECK(shift(*fit) < 3.0 * tau.standard_error.value() / tau.estimate);
+  }
   CHECK_FALSE(huber.likelihood.has_value());
-  CHECK(wide.likelihood.value().aic < normal.likelihood.value().aic);
 }
 
 TEST_CASE("mistakes about the noise are named") {

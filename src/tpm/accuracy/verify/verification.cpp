@@ -22,8 +22,13 @@ constexpr std::array<VerificationGroup, 5> kGroups{{
 
 VerificationRow run_check(const VerificationGroup& group, const VerificationCheck& check,
                           double flaw) {
-  VerificationRow row{std::string(group.name), check.what,     check.quantity, check.source,
-                      check.expected,          check.tolerance};
+  VerificationRow row;
+  row.group = group.name;
+  row.what = check.what;
+  row.quantity = check.quantity;
+  row.source = check.source;
+  row.expected = check.expected;
+  row.tolerance = check.tolerance;
   try {
     row.measured = check.measure(flaw);
   } catch (const Error& error) {

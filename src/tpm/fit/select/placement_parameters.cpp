@@ -238,8 +238,7 @@ void add_placement(FitConfig& config, const LawModel& model,
     const PreparedRecording& r = recordings[i];
     const auto scope = several ? std::vector<std::size_t>{i} : std::vector<std::size_t>{};
     if (!is_indentation(law)) {
-      const bool held = r.load_imposed ? options.contact.has_value() : options.zero.has_value();
-      if (held) continue;
+      if (r.load_imposed ? options.contact.has_value() : options.zero.has_value()) continue;
       add_free_placement(config, model, r, i, scope,
                          named(r.load_imposed ? "strain_zero" : "offset", r), options.nuisance);
       continue;

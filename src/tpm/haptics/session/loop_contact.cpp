@@ -104,8 +104,9 @@ LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOpt
     : session_(session_of(file, options)), loop_(make_loop_model(session_, true)) {
   DeviceLimits limits;
   if (!options.device_file.empty()) {
-    const DeviceFile file = read_device_file(options.device_file);
-    limits = limits_by_file(limits_of(options.device.empty() ? file.kind : options.device), file);
+    const DeviceFile device = read_device_file(options.device_file);
+    limits =
+        limits_by_file(limits_of(options.device.empty() ? device.kind : options.device), device);
   } else {
     limits = limits_of(options.device.empty() ? "omega7" : options.device);
   }
