@@ -71,7 +71,8 @@ ValidationRequest request_for(const LawFile& law, PreparedRecording recording) {
 /// The paper's star: four spheres, which answer within milliseconds.
 const OrganMaterial& star_of(const LawFile& law) {
   // Relaxation times, too: those that are kept do not carry the law's uncertainty.
-  static const OrganMaterialOptions with_times{.fit_times = true};
+  OrganMaterialOptions with_times;
+  with_times.fit_times = true;
   static const OrganMaterial once =
       put_on_organ(law,
                    {motion_of_protocol(ramp_and_hold(4e-3, 1e-3, 20.0),
