@@ -13,8 +13,7 @@ namespace {
 
 constexpr double kFarFromCurve = 8.0;  // robust standard deviations
 constexpr double kNearCurve = 4.0;
-// Two in a row are no scatter but something that lasted, a start-up or a slip: adequacy tells it.
-constexpr std::size_t kMostTogether = 1;
+constexpr std::size_t kMostTogether = 3;
 
 bool may_have_outliers(const FitConfig& config) {
   if (config.loss.kind != Loss::none) return false;

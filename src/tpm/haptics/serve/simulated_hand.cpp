@@ -17,6 +17,7 @@ Eigen::Vector3d no_longer_than(const Eigen::Vector3d& v, double most) {
 
 SimulatedHand::SimulatedHand(SimulatedHandSettings settings)
     : settings_(std::move(settings)), propagator_(place_propagator(settings_.plant)) {
+  force_limit_N_ = settings_.force_limit_N;
   identity_.kind = "virtual";
   identity_.name = "simulated device of tpm hil serve";
   identity_.assumptions = assumptions_of(settings_.plant);
@@ -36,7 +37,7 @@ const DeviceIdentity& SimulatedHand::open() {
 }
 
 void SimulatedHand::prepare(const DevicePreparation& preparation) {
-  settings_.force_limit_N = std::min(settings_.force_limit_N, preparation.max_force_N);
+  force_limit_N_ = std::min(settings_.force_limit_N, preparation.max_force_N);
   owed_s_ = 0.0;
 }
 
@@ -70,7 +71,7 @@ void SimulatedHand::step() noexcept {
   (void)asked_.refresh();
   const Wish& wish = asked_.latest();
   const Eigen::Vector3d wanted_N = tissue_N_ + client_force_N();
-  const double limit_N = std::min(settings_.force_limit_N, plant.motor_limit_N);
+  const double limit_N = std::min(force_limit_N_.load(), plant.motor_limit_N);
   if (wanted_N.norm() > limit_N) ++saturations_;
   rendered_N_ = forces_on_ ? no_longer_than(wanted_N, limit_N) : Eigen::Vector3d::Zero();
   largest_N_ = std::max(largest_N_, rendered_N_.norm());
@@ -113,7 +114,7 @@ InverseState SimulatedHand::state() noexcept {
 
 void SimulatedHand::push(const Eigen::Vector3d& force_N) noexcept {
   // Beyond the limit the size means nothing more.
-  wish_.force_N = no_longer_than(force_N, settings_.force_limit_N);
+  wish_.force_N = no_longer_than(force_N, force_limit_N_.load());
   wish_.force_at_ns = now_ns();
   asked_.write(wish_);
 }

@@ -67,6 +67,9 @@ class SimulatedHand final : public HapticDevice, public ServedHand {
   double time_s_ = 0.0, owed_s_ = 0.0, largest_N_ = 0.0;
   std::uint64_t saturations_ = 0;
   std::atomic<bool> forces_on_{false};
+  /// Of what a client may push with; lowered by prepare() while the server's thread may already
+  /// read.
+  std::atomic<double> force_limit_N_{0.0};
 };
 
 }  // namespace tpm::haptics
