@@ -148,20 +148,19 @@ inline AdequacyOutcome fitted(const AdequacyTrial& trial, bool profiles = false)
   return outcome;
 }
 
-/// What the best fit to a recording without noise leaves (rms), with the zero, contact and drift
-/// that the recording with noise tells.
-inline double left_without_noise(const AdequacyTrial& trial) {
+/// What the best fit to a recording without noise leaves (rms). Zero, contact and drift are what
+/// that recording tells: those of a noisy one would leave something of their own.
+inline double left_without_noise(AdequacyTrial trial) {
+  trial.noisy = false;
+  trial.quantum = 0.0;
   const fit::PreparedRecording one = fit::prepare_recording("simulated", simulated(trial));
-  AdequacyTrial clean = trial;
-  clean.noisy = false;
-  clean.quantum = 0.0;
   fit::SetupOptions setup;
   setup.starts = 4;
   setup.profiles = false;
-  const fit::FitConfig config =
-      fit::recording_config(parse_law_name("linear-1", "law"), std::span(&one, 1), setup);
-  const std::vector<fit::DataSet> data{simulated(clean)};
-  const fit::FitResult fit = fit::run_fit(config, data);
+  setup.measured = false;
+  const std::span<const fit::PreparedRecording> span(&one, 1);
+  const fit::FitResult fit = fit::run_fit(
+      fit::recording_config(parse_law_name("linear-1", "law"), span, setup), fit::data_sets(span));
   // Without noise a defect of a few samples stands out and is left out of the fit: it counts here.
   const fit::RecordingFit& r = fit.recordings.front();
   double squares = 0.0;

@@ -238,18 +238,21 @@ FitResult fit_with_priors(const ExperimentResiduals& function) {
 
 FitResult fit_experiments(const ExperimentResiduals& function) {
   constexpr int kMostRounds = 5;
-  FitResult result = fit_with_priors(function);
+  const FitResult of_all = fit_with_priors(function);
+  FitResult result = of_all;
   std::vector<std::size_t> outliers;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round <= kMostRounds; ++round) {
     std::vector<std::size_t> found = isolated_outliers(function, result.best.natural);
-    if (found == outliers) break;
+    if (found == outliers) {
+      if (!outliers.empty()) result.flags.push_back(outlier_words(function, outliers));
+      return result;
+    }
     outliers = std::move(found);
     const std::unique_ptr<ExperimentResiduals> others = function.copy();
     others->leave_out(outliers);
     result = fit_with_priors(*others);
   }
-  if (!outliers.empty()) result.flags.push_back(outlier_words(function, outliers));
-  return result;
+  return of_all;  // what lies far off depends on what is left out: nothing is
 }
 
 Threshold threshold_of(const FitResult& fit) {

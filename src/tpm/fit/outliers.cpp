@@ -55,7 +55,13 @@ std::vector<std::size_t> outliers_of(const CurveDistance& d) {
     if (!beyond(i, kFarFromCurve)) continue;
     std::size_t end = i;
     while (end < d.data.size() && beyond(end, kFarFromCurve)) ++end;
-    const bool alone = end - i <= kMostTogether && (i == 0 || !beyond(i - 1, kNearCurve)) &&
+    bool one_sign = true;
+    for (std::size_t k = i; k < end; ++k)
+      one_sign &= (d.distance[k] > 0.0) == (d.distance[i] > 0.0);
+    // Several in a row on one side are no scatter but something that lasted, a start-up or a slip:
+    // adequacy tells it.
+    const bool scattered = end - i == 1 || (end - i <= kMostTogether && !one_sign);
+    const bool alone = scattered && (i == 0 || !beyond(i - 1, kNearCurve)) &&
                        (end == d.data.size() || !beyond(end, kNearCurve));
     for (std::size_t k = i; k < end && alone; ++k) found.push_back(d.data[k]);
     i = end;
