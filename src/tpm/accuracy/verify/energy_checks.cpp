@@ -73,7 +73,8 @@ double work_by_formula(const BondElement& p) {
   const double v = kSpeed, t = kRampEnd_s, e = kPushed_m, x = p.spacing_m;
   // Integral of 2 E' (1 - cos(arctan(e/x))) e de.
   const double tension = 2.0 * p.lateral_Pa * (0.5 * e * e - x * (std::sqrt(x * x + e * e) - x));
-  const double branch = p.relaxing_Pa() * v * v * kStarTau_s * (t + kStarTau_s * std::expm1(-t / kStarTau_s));
+  const double branch =
+      p.relaxing_Pa() * v * v * kStarTau_s * (t + kStarTau_s * std::expm1(-t / kStarTau_s));
   return (0.5 * p.equilibrium_Pa * e * e + tension + branch) * p.modulus_to_stiffness_m();
 }
 
@@ -81,9 +82,11 @@ double work_by_formula(const BondElement& p) {
 double heat_by_formula(const BondElement& p) {
   const double t = kRampEnd_s, end = pushed_and_held().end_s() - t;
   const double reached = -std::expm1(-t / kStarTau_s);
-  const double ramp = t - 2.0 * kStarTau_s * reached - 0.5 * kStarTau_s * std::expm1(-2.0 * t / kStarTau_s);
+  const double ramp =
+      t - 2.0 * kStarTau_s * reached - 0.5 * kStarTau_s * std::expm1(-2.0 * t / kStarTau_s);
   const double hold = -reached * reached * 0.5 * kStarTau_s * std::expm1(-2.0 * end / kStarTau_s);
-  return p.relaxing_Pa() * kSpeed * kSpeed * kStarTau_s * (ramp + hold) * p.modulus_to_stiffness_m();
+  return p.relaxing_Pa() * kSpeed * kSpeed * kStarTau_s * (ramp + hold) *
+         p.modulus_to_stiffness_m();
 }
 
 VerificationCheck organ_balance_check() {

@@ -41,6 +41,7 @@ ComparedQuantity compared(const TwoGroups& groups, const std::array<std::string,
                           double level) {
   ComparedQuantity q;
   q.parameter = groups[0].parameter;
+  q.si_unit = si_unit(q.parameter);
   std::array<SpecimenMeans, 2> means;
   for (std::size_t g = 0; g < 2; ++g) {
     q.left_out[g] = groups[g].left_out;
@@ -134,6 +135,7 @@ std::vector<ComparedQuantity> compared_moduli(const GroupComparison& c, const Sp
     }
     if (found[0].estimates.empty() && found[1].estimates.empty()) continue;
     all.push_back(compared(found, c.names, c.study.level));
+    all.back().si_unit = m.unit;
   }
   return all;
 }

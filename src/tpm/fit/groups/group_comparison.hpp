@@ -18,6 +18,7 @@ struct RecordingGroup {
 
 /// One parameter, or one Young's modulus, in two groups.
 struct ComparedQuantity {
+  std::string si_unit;     ///< "N/m", "Pa s^alpha"
   FitParameter parameter;  ///< theta, unit and scale; of a modulus its name and "Pa"
   std::array<std::optional<RandomEffects>, 2> typical;  ///< none: no recording determines it
   std::array<int, 2> left_out{};                        ///< recordings that do not determine it

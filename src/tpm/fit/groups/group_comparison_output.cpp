@@ -36,9 +36,7 @@ Json typical_json(const ComparedQuantity& q, std::size_t group, const std::strin
 }
 
 Json quantity_json(const GroupComparison& c, const ComparedQuantity& q) {
-  Json j{{"name", q.parameter.name},
-         {"unit", q.parameter.name.starts_with("E") ? q.parameter.unit.symbol.substr(1)
-                                                    : std::string(si_unit(q.parameter))}};
+  Json j{{"name", q.parameter.name}, {"unit", q.si_unit}};
   j["groups"] = Json::array({typical_json(q, 0, c.names[0]), typical_json(q, 1, c.names[1])});
   if (!q.only_without.empty()) j["not_separable"] = q.only_without;
   if (!q.difference) {
@@ -175,8 +173,7 @@ std::string comparison_csv(const GroupComparison& c) {
                                "level", "p_value", "p_value_holm", "left_out", "reason"});
   const auto cell = [](double v) { return significant(v, kDigits); };
   const auto add = [&](const ComparedQuantity& q, bool tested) {
-    const Json j = quantity_json(c, q);
-    std::vector<std::string> cells{q.parameter.name, j["unit"].get<std::string>()};
+    std::vector<std::string> cells{q.parameter.name, q.si_unit};
     for (const auto& typical : q.typical) {
       const auto natural = [&](double theta) { return cell(q.parameter.natural(theta)); };
       for (std::string value :

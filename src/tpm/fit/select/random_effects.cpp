@@ -13,9 +13,8 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
-namespace {
 
-void require_valid(std::span<const SpecimenEstimate> specimens, double level) {
+void require_estimates(std::span<const SpecimenEstimate> specimens, double level) {
   if (specimens.empty()) throw bad_input("specimens", "none is given", "at least one");
   if (!(level > 0.0 && level < 1.0)) {
     throw bad_input("specimens", fmt::format("a confidence level of {}", shortest(level)),
@@ -32,14 +31,6 @@ void require_valid(std::span<const SpecimenEstimate> specimens, double level) {
   }
 }
 
-/// Weighted sums for one tau^2.
-struct WeightedMean {
-  double weights = 0.0;  ///< sum w
-  double mean = 0.0;
-  double squares = 0.0;       ///< sum w (y - mean)^2
-  double log_variance = 0.0;  ///< sum ln(s^2 + tau^2)
-};
-
 WeightedMean weighted_mean(std::span<const SpecimenEstimate> specimens, double tau_squared) {
   WeightedMean m;
   for (const SpecimenEstimate& s : specimens) {
@@ -55,6 +46,8 @@ WeightedMean weighted_mean(std::span<const SpecimenEstimate> specimens, double t
   }
   return m;
 }
+
+namespace {
 
 using Groups = std::span<const std::vector<SpecimenEstimate>>;
 
@@ -195,7 +188,7 @@ SpecimenMeans specimen_means(std::span<const SpecimenEstimate> repeats) {
 }
 
 RandomEffects random_effects(std::span<const SpecimenEstimate> specimens, double level) {
-  require_valid(specimens, level);
+  require_estimates(specimens, level);
   if (specimens.size() == 1) return one_specimen(specimens[0], level);
   RandomEffects r;
   r.specimens = specimens.size();
@@ -220,7 +213,7 @@ RandomEffects random_effects(std::span<const SpecimenEstimate> specimens, double
 }
 
 RandomEffects random_effects_of_repeats(std::span<const SpecimenEstimate> repeats, double level) {
-  require_valid(repeats, level);
+  require_estimates(repeats, level);
   const Repeats groups = by_specimen(repeats);
   const RepeatSums sums = repeat_sums(groups, weighted_mean(repeats, 0.0).mean);
   if (sums.degrees == 0) return random_effects(repeats, level);

@@ -51,6 +51,19 @@ struct RandomEffects {
 [[nodiscard]] RandomEffects random_effects(std::span<const SpecimenEstimate> specimens,
                                            double level = 0.95);
 
+/// Weighted sums over estimates, w = 1 / (s^2 + tau^2).
+struct WeightedMean {
+  double weights = 0.0;  ///< sum w
+  double mean = 0.0;
+  double squares = 0.0;       ///< sum w (y - mean)^2
+  double log_variance = 0.0;  ///< sum ln(s^2 + tau^2)
+};
+[[nodiscard]] WeightedMean weighted_mean(std::span<const SpecimenEstimate> specimens,
+                                         double tau_squared);
+
+/// Throws Error(bad_input) as random_effects().
+void require_estimates(std::span<const SpecimenEstimate> specimens, double level);
+
 /// One estimate for each specimen of repeats, its weighted mean, in the order of their first
 /// repeats; the variance between repeats beyond their standard errors, and its degrees of freedom.
 struct SpecimenMeans {
