@@ -50,6 +50,7 @@ std::vector<SpeedWork> chosen_speed_works(const std::vector<std::string>& names)
         std::find_if(all.begin(), all.end(), [&](const SpeedWork& w) { return w.name == name; });
     if (found == all.end()) {
       std::vector<std::string_view> known;
+      known.reserve(all.size());
       for (const SpeedWork& work : all) known.push_back(work.name);
       throw Error(ExitCode::usage, "--record", fmt::format("no work '{}'", name),
                   fmt::format("one of: {}", fmt::join(known, ", ")));

@@ -35,6 +35,9 @@ inline constexpr bool kIsOptional = false;
 template <class V>
 inline constexpr bool kIsOptional<std::optional<V>> = true;
 
+// clang-tidy 14 does not see in a template that a parameter is moved into a designated initializer.
+// NOLINTBEGIN(performance-unnecessary-value-param)
+
 /// Declares a key. The value of a default-constructed T is the default, unless the member is
 /// optional.
 template <class T, class M, class V>
@@ -94,6 +97,8 @@ template <class T>
   key.form.example = std::move(example);
   return key;
 }
+
+// NOLINTEND(performance-unnecessary-value-param)
 
 /// What breaks a rule about several keys.
 struct Fault {

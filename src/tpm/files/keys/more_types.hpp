@@ -44,6 +44,7 @@ template <class To, class From, class Make, class Unmake>
 
 /// A key that files may have and nobody reads, such as a quotation.
 template <class T>
+// NOLINTNEXTLINE(performance-unnecessary-value-param): moved; clang-tidy 14 does not see it
 [[nodiscard]] Key<T> unread(std::string name, FormPtr form, std::string sentence) {
   return {{.name = std::move(name), .form = std::move(form), .sentence = std::move(sentence)},
           [](T&, const Json&, const DocumentPlace&) {},
