@@ -125,10 +125,8 @@ if(NOT TPM_CONSUMER)
   find_package(nlohmann_json 3.11 REQUIRED)
   find_package(Boost 1.74 REQUIRED)  # quadrature and quantiles of Boost.Math
   find_package(utf8cpp 3.2 REQUIRED)
-  # scripts/install_packages.sh unpacks its headers there; an installed package does as well.
-  find_package(valijson REQUIRED HINTS ${PROJECT_SOURCE_DIR}/build/packages/libvalijson-dev/usr)
   find_package(nanoflann 1.4 REQUIRED)  # neighbours within a radius
   add_library(tpm_header_only INTERFACE IMPORTED)
-  target_link_libraries(tpm_header_only INTERFACE Boost::headers utf8::cpp valijson nanoflann::nanoflann)
+  target_link_libraries(tpm_header_only INTERFACE Boost::headers utf8::cpp nanoflann::nanoflann)
   find_package(CLI11 2.1 REQUIRED)
 endif()

@@ -9,7 +9,6 @@ source scripts/install_packages.sh
 source scripts/tidy.sh
 
 install_missing "to build, run and test tpm" "${packages_run[@]}" "${packages_test[@]}"
-unpack_headers "${packages_unpacked[@]}"
 install_missing "to check its sources and to show its results to other programs" "${packages_check[@]}"
 find_python numpy matplotlib scipy h5py
 

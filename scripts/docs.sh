@@ -11,7 +11,6 @@ install_missing "to build the site" "${packages_docs[@]}"
 tpm=${1:-build/release/tpm}
 if [ $# = 0 ] && [ ! -x "$tpm" ]; then
   install_missing "to build tpm" "${packages_run[@]}"
-  unpack_headers "${packages_unpacked[@]}"
   configure release -DTPM_BUILD_TESTS=OFF
   build release tpm
 fi

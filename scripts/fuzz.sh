@@ -26,7 +26,6 @@ if [[ $preset == fuzz-readers && $seconds -lt 60 ]]; then
   quarters=4 coverage=0  # naming what a run covered takes 20 s
 fi
 install_missing "to build and run tpm" "${packages_run[@]}"
-unpack_headers "${packages_unpacked[@]}"
 install_missing "to fuzz what tpm reads" clang
 
 step "building the fuzzer (build/$preset)"

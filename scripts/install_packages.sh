@@ -48,30 +48,6 @@ install_missing() {
   rm -f "$log"
 }
 
-# unpack_headers PACKAGE...: the files of packages that are not installed, without what they depend on, into
-# build/packages; leaves the network alone if they are there.
-unpack_headers() {
-  command -v dpkg-deb >/dev/null || return 0
-  local package folder
-  for package in "$@"; do
-    folder=build/packages/$package
-    if is_installed "$package" || [ -d "$folder" ]; then continue; fi
-    say "unpacking the headers of $package"
-    local download
-    download=$(mktemp -d)
-    chmod 755 "$download"  # apt's own user may have to write into it
-    if ! (cd "$download" && LC_ALL=C.UTF-8 apt-get -qq download "$package") >"$download/log" 2>&1; then
-      tail -n 15 "$download/log" >&2
-      rm -rf "$download"
-      die "apt-get could not download $package (its last lines stand above)"
-    fi
-    mkdir -p build/packages
-    dpkg-deb -x "$download"/*.deb "$folder.part"
-    mv "$folder.part" "$folder"
-    rm -rf "$download"
-  done
-}
-
 # find_python MODULE...: sets and exports TPMKIT_PYTHON. The first `python3` on the path may be a
 # version manager's, which does not see the distribution's modules.
 find_python() {

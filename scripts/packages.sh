@@ -11,12 +11,6 @@ packages_run=(
   python3 python3-numpy python3-matplotlib
 )
 
-# Header-only libraries whose packages ask for much that is not used: for its adapters to other JSON libraries
-# libvalijson-dev would bring Qt and Poco, 130 packages of 292 MiB. Unpacked into build/packages, not installed.
-packages_unpacked=(
-  libvalijson-dev
-)
-
 # What the Python package needs to be built, installed and used.
 packages_python=(
   pybind11-dev python3-dev python3-setuptools python3-wheel python3-pip python3-venv

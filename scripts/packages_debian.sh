@@ -7,7 +7,6 @@ cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
 
 install_missing "to make Debian packages" "${packages_run[@]}" "${packages_python[@]}" "${packages_debian[@]}"
-unpack_headers "${packages_unpacked[@]}"
 
 step "building (build/release); some minutes the first time"
 folder=build/release

@@ -8,7 +8,6 @@ cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
 
 install_missing "to build and run tpm" "${packages_run[@]}"
-unpack_headers "${packages_unpacked[@]}"
 folder=$PWD/build/packages/ceres-permissive
 
 if [ ! -d "$folder/installed" ]; then

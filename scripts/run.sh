@@ -6,7 +6,6 @@ cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
 
 install_missing "to build and run tpm" "${packages_run[@]}"
-unpack_headers "${packages_unpacked[@]}"
 find_python numpy matplotlib
 
 configure release -DTPM_BUILD_TESTS=OFF

@@ -6,7 +6,6 @@ cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
 
 install_missing "to build, run and test tpm" "${packages_run[@]}" "${packages_test[@]}"
-unpack_headers "${packages_unpacked[@]}"
 find_python numpy matplotlib scipy h5py
 
 configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=OFF

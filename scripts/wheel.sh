@@ -11,7 +11,6 @@ cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
 
 install_missing "to build the wheel" "${packages_run[@]}" "${packages_python[@]}"
-unpack_headers "${packages_unpacked[@]}"
 python=${TPMKIT_WHEEL_PYTHON:-/usr/bin/python3}
 
 [ -f build/release/CMakeCache.txt ] || configure release -DTPM_BUILD_TESTS=OFF

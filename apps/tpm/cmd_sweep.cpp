@@ -272,14 +272,9 @@ int run_command(const SweepChoice& choice, const Session& session) {
   will_update({output});  // a result that stands already is asked which sweep it holds
   // A log beside the result: a run was killed before all files were written.
   if (choice.shard.empty() && !fs::exists(log_file)) {
-    const std::string held = fingerprint_of(output);
-    if (held == sweep.fingerprint) {
+    if (fingerprint_of(output) == sweep.fingerprint) {
       tell_user("tpm: {} holds this sweep already\n", output.string());
       return 0;
-    }
-    if (held == sweep.fingerprint_as_written) {
-      tell_user("tpm: {} holds this sweep under former names; it is computed again\n",
-                output.string());
     }
   }
   require_replaceable(output);

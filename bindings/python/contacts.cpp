@@ -75,8 +75,6 @@ py::dict state_of(LoopContact& contact) {
       py::arg("touching") = (s.row.flags & kTouching) != 0,
       py::arg("waiting") = (s.row.flags & kWaiting) != 0,
       py::arg("valid") = (s.row.flags & kBeyondModel) == 0,
-      // Until 0.3: the former name of valid.
-      py::arg("trusted") = (s.row.flags & kBeyondModel) == 0,
       py::arg("stop") = std::string(word_of(s.row.stop)));
 }
 

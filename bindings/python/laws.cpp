@@ -14,17 +14,7 @@ namespace tpm::python {
 namespace {
 
 Protocol history(const Numbers& times_s, const Numbers& values, const std::string& drive,
-                 bool equilibrium_at_start, std::optional<bool> relaxed_at_start) {
-  if (relaxed_at_start) {  // the former name, read until 0.3
-    if (equilibrium_at_start) {
-      throw bad_input("relaxed_at_start", "stands beside its new name 'equilibrium_at_start'",
-                      "'equilibrium_at_start' alone");
-    }
-    warn(
-        "relaxed_at_start is now called 'equilibrium_at_start'; the former name is read until "
-        "version 0.3");
-    equilibrium_at_start = *relaxed_at_start;
-  }
+                 bool equilibrium_at_start) {
   Drive kind = Drive::displacement;
   if (drive == "force") {
     kind = Drive::force;
@@ -97,7 +87,6 @@ void bind_protocols(py::module_& module) {
       .def_static(
           "history", &history, py::arg("times_s"), py::arg("values"),
           py::arg("drive") = "displacement", py::arg("equilibrium_at_start") = false,
-          py::arg("relaxed_at_start") = py::none(),
           "A measured history of depths (drive \"displacement\") or loads (\"force\"); times "
           "increase. equilibrium_at_start: the first value had been kept for ever before.")
       .def_property_readonly("name", &Protocol::name, "What kind of history it is.")

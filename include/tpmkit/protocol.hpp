@@ -46,13 +46,6 @@ class Protocol {
   /// instead of jumping to it from 0.
   [[nodiscard]] bool equilibrium_at_start() const noexcept { return equilibrium_at_start_; }
   void set_equilibrium_at_start(bool equilibrium) noexcept { equilibrium_at_start_ = equilibrium; }
-  [[deprecated("use equilibrium_at_start()")]] bool relaxed_at_start() const noexcept {
-    return equilibrium_at_start();
-  }
-  [[deprecated("use set_equilibrium_at_start()")]] void set_relaxed_at_start(
-      bool relaxed) noexcept {
-    set_equilibrium_at_start(relaxed);
-  }
 
  private:
   Drive drive_;

@@ -1,14 +1,6 @@
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <catch2/catch.hpp>
-#include <memory>
-#include <new>
-#include <vector>
+#include <cmath>
 
-#include "sanitizer.hpp"
-#include "tpm/base/memory_reserve.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
@@ -105,56 +97,4 @@ TEST_CASE("JSON that nlohmann-json would let pass is refused") {
 TEST_CASE("SHA-256 matches the published test vector") {
   // FIPS 180-2, appendix B.1
   CHECK(sha256_hex("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-}
-
-namespace {
-
-constexpr std::size_t kMegabyte = std::size_t{1} << 20U;
-
-/// How many blocks of 8 MB this process gets with room for 64 MB: in all, and before a reserve of
-/// 20 MB says that it was needed.
-std::pair<int, int> blocks_until_full() {
-  rlimit limit{};
-  limit.rlim_cur = limit.rlim_max = 1;
-  std::FILE* file = std::fopen("/proc/self/statm", "re");
-  unsigned long long pages = 0;
-  if (file == nullptr || std::fscanf(file, "%llu", &pages) != 1) return {-1, -1};
-  (void)std::fclose(file);
-  limit.rlim_cur = limit.rlim_max =
-      pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + 64 * kMegabyte;
-  if (::setrlimit(RLIMIT_AS, &limit) != 0) return {-1, -1};
-  std::vector<std::unique_ptr<char[]>> blocks;
-  blocks.reserve(100);
-  int before = 0;
-  const tpm::base::MemoryReserve reserve(20 * kMegabyte);
-  try {
-    while (blocks.size() < 100) {
-      blocks.emplace_back(new char[8 * kMegabyte]);
-      try {
-        reserve.require_unused();
-        before = static_cast<int>(blocks.size());
-      } catch (const std::bad_alloc&) {  // it was needed, and the block is there
-      }
-    }
-  } catch (const std::bad_alloc&) {
-    return {static_cast<int>(blocks.size()), before};
-  }
-  return {-1, -1};
-}
-
-}  // namespace
-
-TEST_CASE("A reserve of memory meets the request that fails, and says that it was needed") {
-  if (test::has_sanitizer()) return;
-  const pid_t child = ::fork();
-  if (child == 0) {
-    const auto [all, before] = blocks_until_full();
-    // 44 MB make five blocks, the reserve two more.
-    ::_exit(before >= 4 && before <= 5 && all == before + 2 ? 0 : 1);
-  }
-  int status = 0;
-  REQUIRE(::waitpid(child, &status, 0) == child);
-  CHECK(status == 0);
-  const tpm::base::MemoryReserve unused(kMegabyte);
-  CHECK_NOTHROW(unused.require_unused());
 }

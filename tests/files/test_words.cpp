@@ -20,7 +20,6 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/description.hpp"
 #include "tpm/files/json.hpp"
-#include "tpm/files/renamed_names.hpp"
 #include "tpm/fit/design/design.hpp"
 #include "tpm/fit/likelihood/fit_keys.hpp"
 #include "tpm/haptics/session/session_keys.hpp"

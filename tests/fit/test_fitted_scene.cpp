@@ -10,6 +10,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/predict/fitted_scene.hpp"
+#include "tpm/haptics/session/session_keys.hpp"
 #include "tpm/organ/run/scene_runner.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
 #include "tpm/organ/scene/organ_model.hpp"
@@ -38,7 +39,7 @@ void check_run(const FitResult& fit) {
   REQUIRE(fitted);
   CHECK(fitted->scene.at("protocol").at("depth") == "8 mm");
   CHECK(fitted->session.at("model").at("scene").at("material") == fitted->scene.at("material"));
-  check_schema(fitted->session, "hil", "test");
+  (void)files::checked(fitted->session, haptics::session_kind(), "test");
   const std::vector<double> times{2.0, 32.0};  // 8 mm at 4 mm/s, and 30 s later
   const Trajectory run = run_scene(parse_experiment(fitted->scene, "test", {}), times, false);
   int compared = 0;

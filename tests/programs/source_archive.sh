@@ -19,10 +19,6 @@ missing=$(comm -23 <(git -C "$sources" ls-tree -r --name-only HEAD | sort) <(cd 
 
 printf '#!/bin/sh\necho "$@" >>%q\nexit 1\n' "$folder/git_was_called" >"$folder/bin/git"
 chmod +x "$folder/bin/git"
-if [[ -d "$sources/build/packages" ]]; then  # headers that scripts/install_packages.sh unpacked
-  mkdir -p "$tree/build"
-  ln -s "$sources/build/packages" "$tree/build/packages"
-fi
 (cd "$tree" && PATH="$folder/bin:$PATH" cmake --preset release -DTPM_BUILD_TESTS=OFF >"$folder/configure.log" 2>&1) ||
   { tail -n 20 "$folder/configure.log"; exit 1; }
 commands=$(ninja -C "$tree/build/release" -t commands tpm)

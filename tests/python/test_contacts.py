@@ -46,7 +46,6 @@ class Contacts(unittest.TestCase):
         self.assertTrue(np.array_equal(np.array([one.step(p) for p in positions]), forces))
         self.assertGreater(forces[:, 2].max(), 0.1)
         self.assertTrue(many.state["valid"])
-        self.assertEqual(many.state["trusted"], many.state["valid"])  # the former name, until 0.3
 
     def test_it_waits_for_the_tool_and_stops_at_a_jump(self):
         contact = tpmkit.Contact(self.file)

@@ -58,16 +58,6 @@ class Laws(unittest.TestCase):
         exact = LAW["k_inf_N_per_m"] + LAW["k1_N_per_m"] * s / (1 + s)
         np.testing.assert_allclose(storage + 1j * loss, exact, rtol=1e-12)
 
-    def test_a_former_name_of_an_argument_is_read_with_a_warning(self):
-        history = ([0.0, 1.0], [1e-3, 1e-3], "displacement")
-        law, times = tpmkit.Law("linear-1", LAW), np.array([0.5])
-        by_new = law.respond(tpmkit.Protocol.history(*history, equilibrium_at_start=True), times)
-        with self.assertWarnsRegex(FutureWarning, "equilibrium_at_start.*until version 0.3"):
-            former = tpmkit.Protocol.history(*history, relaxed_at_start=True)
-        np.testing.assert_array_equal(law.respond(former, times), by_new)
-        with self.assertRaisesRegex(tpmkit.Error, "relaxed_at_start.*equilibrium_at_start"):
-            tpmkit.Protocol.history(*history, equilibrium_at_start=True, relaxed_at_start=True)
-
     def test_what_is_wrong_is_one_line_with_a_code(self):
         for make in (
             lambda: tpmkit.Law("lienar-1", LAW),

@@ -273,50 +273,6 @@ TEST_CASE("a log that is cut, damaged or another sweep's") {
   CHECK(read_file(log_path(file)) == "what somebody else has written");
 }
 
-TEST_CASE("a sweep begun under a former name of an output goes on, under either name") {
-  const std::string former = R"({"model": "single_contact", "block": 3,
-    "material": {"eta1": "240 kPa s"}, "creep": {"duration": "10 s"},
-    "axes": [{"parameter": "load", "from": "0.1 N", "to": "0.3 N", "count": 12}],
-    "outputs": ["creep_depth_at_once", "creep_depth"]})";
-  std::string current = former;
-  const std::string word = "creep_depth_at_once";
-  current.replace(current.find(word), word.size(), "instantaneous_creep_depth");
-  const Sweep by_former = parsed(former), by_current = parsed(current);
-  CHECK(by_former.fingerprint == by_current.fingerprint);
-  CHECK(by_current.fingerprint_as_written == by_current.fingerprint);
-  CHECK(by_former.fingerprint_as_written != by_former.fingerprint);
-
-  const test::TempFolder folder;
-  const std::string expected = result_of(by_current, folder / "whole.h5");
-  Sweep before = by_former;  // as it stood when the former name was the current one
-  before.fingerprint = by_former.fingerprint_as_written;
-  for (const Sweep* begun : std::initializer_list<const Sweep*>{&before, &by_former, &by_current}) {
-    const std::string file = folder / "a.h5";
-    SweepControls stopping;
-    stopping.workers = 1;
-    std::uint64_t asked = 0;
-    stopping.interrupted = [&] { return ++asked > begun->block_cells; };
-    {
-      BlockLog log(log_path(file), *begun, {});
-      REQUIRE(run_sweep(*begun, log, stopping).interrupted);
-      REQUIRE(log.size() == 1);
-    }
-    {
-      BlockLog log(log_path(file), by_former, {});
-      const SweepRun run = run_sweep(by_former, log, {});
-      CHECK(run.resumed_blocks == 1);
-      static_cast<void>(write_sweep(by_former, {&log}, file, 1));
-    }
-    CHECK(read_file(file) == expected);
-    std::filesystem::remove(log_path(file));
-  }
-  // A log under a former name beside a file with the current one is refused, not begun anew.
-  const std::string file = folder / "b.h5";
-  { const BlockLog log(log_path(file), before, {}); }
-  CHECK_THAT(test::refusal_of([&] { const BlockLog again(log_path(file), by_current, {}); }),
-             Catch::Contains("belongs to another sweep or version of tpm"));
-}
-
 TEST_CASE("shards put together are the whole sweep, to the byte") {
   const test::TempFolder folder;
   const Sweep sweep = parsed(kMixed);

@@ -84,7 +84,7 @@ class Contact:
     @property
     def state(self) -> dict[str, Any]:
         """The newest step: time_s, position_m, force_N, tool_depth_m, surface_depth_m, model_force_N,
-        model_error_N, touching, waiting, valid (formerly trusted, until 0.3), stop."""
+        model_error_N, touching, waiting, valid, stop."""
         return self._core.state
 
     @property

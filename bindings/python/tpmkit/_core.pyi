@@ -34,11 +34,9 @@ class Protocol:
         values: npt.ArrayLike,
         drive: str = "displacement",
         equilibrium_at_start: bool = False,
-        relaxed_at_start: bool | None = None,
     ) -> Protocol:
         """A measured history of depths (drive "displacement") or loads ("force"); times increase.
-        equilibrium_at_start: the first value had been kept for ever before; relaxed_at_start is its
-        former name, read until version 0.3."""
+        equilibrium_at_start: the first value had been kept for ever before."""
     @property
     def name(self) -> str: ...
     @property

@@ -32,8 +32,4 @@ template <class Items, class Convert>
 /// Names the schema of a file for an editor. It may stand at the top of every file that has one.
 inline constexpr const char* kSchemaKey = "$schema";
 
-/// Checks `value` against the JSON Schema `schemas/NAME.schema.json` of share_dir(). Throws
-/// Error(bad_input): "where: key /a/b: what", the first violation.
-void check_schema(const Json& value, std::string_view schema_name, std::string_view where);
-
 }  // namespace tpm::files

@@ -146,7 +146,7 @@ void BlockLog::begin() {
   const std::string right = log_head(sweep_->fingerprint);
   std::string head;
   if (read_at(0, head, right.size())) {
-    if (head == right || head == log_head(sweep_->fingerprint_as_written)) return;
+    if (head == right) return;
     throw bad_input(path_.string(),
                     head.starts_with(kLogMagic) ? "belongs to another sweep or version of tpm"
                                                 : "is no log of a sweep",

@@ -46,7 +46,6 @@ struct Sweep {
   std::string title, description;
   std::string document;     ///< as read, scenes put in: what decides the results
   std::string fingerprint;  ///< of the document, of meshes it names and of this version of tpm
-  std::string fingerprint_as_written;  ///< the same before former names became the current ones
   std::vector<SweepAxis> axes;
   std::vector<SweptParameter> parameters;
   std::vector<SkipCondition> skip;

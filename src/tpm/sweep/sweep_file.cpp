@@ -11,7 +11,6 @@
 #include "tpm/base/sensitivity.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/files/renamed_names.hpp"
 #include "tpm/fit/expression/expression.hpp"
 #include "tpm/sweep/sweep.hpp"
 #include "tpm/sweep/sweep_keys.hpp"
@@ -240,23 +239,11 @@ void read_axes(const Json& document, Sweep& sweep, const DocumentPlace& place) {
   }
 }
 
-/// The document before former names became the current ones, its scene put in: how a log stands
-/// for it that was begun when they were current.
-Json as_written(const Json& with_schema, const std::filesystem::path& folder) {
-  Json written = without_schema_key(with_schema);
-  if (written.contains("scene") && written.at("scene").is_string()) {
-    written["scene"] =
-        without_schema_key(read_json(folder / written.at("scene").get<std::string>()));
-  }
-  return written;
-}
-
 /// Puts the scene in the place of its file's name. Returns the folder that its mesh is relative to.
 std::filesystem::path put_scene_in(Json& document, const std::filesystem::path& folder) {
   if (!document.contains("scene") || !document.at("scene").is_string()) return folder;
   const std::filesystem::path file = folder / document.at("scene").get<std::string>();
-  document.at("scene") =
-      with_current_names(without_schema_key(read_json(file)), "scene", file.string());
+  document.at("scene") = without_schema_key(read_json(file));
   return file.parent_path();
 }
 
@@ -340,11 +327,8 @@ Sweep parse_sweep(const Json& written, std::string_view where,
   }
   sweep.document = document.dump();
   const std::string mesh = sha256_of_mesh(document, scene_folder);
-  const auto fingerprint = [&](const std::string& text) {
-    return sha256_hex(fmt::format("{}\n{}\n{}\n{}", version(), sweep.block_cells, text, mesh));
-  };
-  sweep.fingerprint = fingerprint(sweep.document);
-  sweep.fingerprint_as_written = fingerprint(as_written(written, folder).dump());
+  sweep.fingerprint = sha256_hex(
+      fmt::format("{}\n{}\n{}\n{}", version(), sweep.block_cells, sweep.document, mesh));
   return sweep;
 }
 

@@ -17,7 +17,7 @@ struct FileKind {
   FormPtr form;
 };
 
-/// The document under its current names, without "$schema", which is for editors. Throws
+/// The document without "$schema", which is for editors. Throws
 /// Error(bad_input), at the key, for what has not the form; what is a file of another kind is
 /// called so.
 [[nodiscard]] Json checked(Json document, const FileKind& kind, std::string_view where,

@@ -12,7 +12,6 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/keys/file_kind.hpp"
-#include "tpm/files/renamed_names.hpp"
 
 namespace tpm::files {
 namespace {
@@ -204,43 +203,6 @@ class SchemaWriter {
   Json definitions_ = Json::object();
 };
 
-/// What a reference or a lone alternative stands for.
-Json& meant_by(Json& schema, Json& part) {
-  constexpr std::string_view kDefinitions = "#/definitions/";
-  if (part.contains("$ref")) {
-    const auto name = part.at("$ref").get<std::string>().substr(kDefinitions.size());
-    return meant_by(schema, schema.at("definitions").at(name));
-  }
-  if (part.contains("allOf")) return meant_by(schema, part.at("allOf").at(0));
-  if (part.contains("anyOf")) return meant_by(schema, part.at("anyOf").at(0));
-  return part;
-}
-
-/// The object at a place such as "/limits", or "/materials/*" for any item.
-Json& object_at(Json& schema, Json& part, std::string_view place) {
-  Json& here = meant_by(schema, part);
-  if (place.empty()) return here;
-  const std::size_t end = std::min(place.find('/', 1), place.size());
-  const std::string name(place.substr(1, end - 1));
-  const std::string_view rest = place.substr(end);
-  if (name != "*") return object_at(schema, here.at("properties").at(name), rest);
-  const char* items = here.contains("items") ? "items" : "additionalProperties";
-  return object_at(schema, here.at(items), rest);
-}
-
-/// Keys that have another name now are still read, and editors strike them through.
-void add_former_keys(const std::string& kind, Json& schema) {
-  for (const RenamedName& name : renamed_names()) {
-    if (name.schema != kind || name.kind != RenamedName::Kind::key) continue;
-    Json& keys = object_at(schema, schema, name.place).at("properties");
-    Json former = keys.at(std::string(name.current));
-    former["deprecated"] = true;
-    former["description"] =
-        fmt::format("former name of {}, read until version {}", name.current, name.until);
-    keys[std::string(name.former)] = std::move(former);
-  }
-}
-
 }  // namespace
 
 Json json_schema(const FileKind& kind) {
@@ -265,7 +227,6 @@ Json json_schema(const FileKind& kind) {
   schema.update(body);
   Json definitions = std::move(writer).definitions();
   if (!definitions.empty()) schema["definitions"] = std::move(definitions);
-  add_former_keys(kind.name, schema);
   return schema;
 }
 

@@ -9,7 +9,6 @@
 
 #include "tpm/data/straight_pieces.hpp"
 #include "tpm/files/blocks/law_json.hpp"
-#include "tpm/files/renamed_names.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 
@@ -201,8 +200,7 @@ OrganOfLaw organ_of_law(const Json& material, std::string_view where) {
   }
   Eigen::MatrixXd follows = matrix_of(part(material, "/uncertainty/follows_law", where),
                                       std::ssize(names), std::ssize(u.place), where);
-  Json scene =
-      with_current_names(part(material, "/scene", where), "scene", where, FormerNames::silent);
+  Json scene = part(material, "/scene", where);
   return assembled(std::move(scene), names, std::move(natural), std::move(follows), std::move(law),
                    where);
 }
@@ -212,7 +210,7 @@ bool is_organ_document(const Json& document) {
 }
 
 OrganOfLaw read_organ_of_law(const std::filesystem::path& path) {
-  const Json document = with_current_names(read_json(path), "scene", path.string());
+  const Json document = read_json(path);
   if (document.contains("scene")) return organ_of_law(document, path.string());
   const std::filesystem::path beside = path.parent_path() / "material.json";
   if (!std::filesystem::exists(beside)) {
@@ -220,8 +218,7 @@ OrganOfLaw read_organ_of_law(const std::filesystem::path& path) {
                     "a scene.json in the folder that tpm material has written");
   }
   const Json material = read_json(beside);
-  const Json fitted = with_current_names(part(material, "/scene", beside.string()), "scene",
-                                         beside.string(), FormerNames::silent);
+  const Json& fitted = part(material, "/scene", beside.string());
   for (const char* key : {"organ", "bonds", "material", "anchors", "sliders", "contacts"}) {
     const bool same = document.contains(key) == fitted.contains(key) &&
                       (!document.contains(key) || document.at(key) == fitted.at(key));

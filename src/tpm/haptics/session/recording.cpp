@@ -6,7 +6,6 @@
 
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/document_place.hpp"
-#include "tpm/files/renamed_names.hpp"
 #include "tpm/files/row_log.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
 #include "tpm/haptics/session/recording_keys.hpp"
@@ -172,8 +171,7 @@ HilRecording read_recording(const std::filesystem::path& file) {
   }
   recording.header = checked(std::move(recording.header), recording_header_kind(), at_header);
   const std::string at_session = at_header + ": session";
-  const Json session =
-      with_current_names(recording.header.at("session"), "hil", at_session, FormerNames::silent);
+  const Json& session = recording.header.at("session");
   require_written_out(session, DocumentPlace{at_session});
   recording.session = parse_session(session, at_session, {});
   if (recording.header.contains("surface_by_phase_m")) {  // before, slides went straight

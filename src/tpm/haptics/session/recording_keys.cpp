@@ -67,8 +67,6 @@ FormPtr recorded_model_form() {
       {required_text("name", "of the model"),
        required_text("error_bound", "what is known of its distance from the reference"),
        optional_key("instantaneous_stiffness_N_per_m", number().form, "at the first touch"),
-       optional_key("stiffness_at_once_N_per_m", number().form,
-                    "former name of instantaneous_stiffness_N_per_m"),
        optional_key("plan", recorded_plan_form(), "of a planned model")});
 }
 

@@ -209,14 +209,12 @@ void run_reference(Verification& v, const QuasiStatic& network, const Protocol& 
   }
 }
 
-/// Of the model, N/m. Recordings of version 0.1 name it by another key, the first of them not at
-/// all.
+/// Of the model, N/m; the first recordings do not name it.
 std::optional<double> recorded_stiffness(const Json& header) {
   const Json& model = header.at("model");
-  for (const char* key : {"instantaneous_stiffness_N_per_m", "stiffness_at_once_N_per_m"}) {
-    if (model.contains(key)) return model.at(key).get<double>();
-  }
-  return std::nullopt;
+  const char* key = "instantaneous_stiffness_N_per_m";
+  if (!model.contains(key)) return std::nullopt;
+  return model.at(key).get<double>();
 }
 
 }  // namespace
