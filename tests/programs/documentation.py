@@ -5,7 +5,8 @@
 
 - every relative link in a Markdown page leads to a file, and its anchor to a heading;
 - every docs/PAGE.md named in a source, a script or a page exists;
-- docs/README.md links every page of docs, and of docs/site every page that is not only a list of others;
+- docs/README.md links every page of docs, and of docs/site every page that is not only a list of others; the site's page
+  of evidence lists every folder of reports;
 - three questions, as a new user types them, are answered two links from README.md at most: QUESTIONS;
 - paper/paper.md shows every figure of paper/figures, cites every entry of paper/paper.bib and nothing else, and names
   only files that exist;
@@ -86,6 +87,10 @@ def unlisted_pages(root):
     for page in sorted((root / "docs/site").glob("*.md")):
         if page.name not in LISTS and not re.search(rf"\(site/{re.escape(page.name)}[)#]", index):
             yield f"docs/README.md: does not list site/{page.name}"
+    shown = (root / "docs/site/evidence.md").read_text(encoding="utf-8")
+    for folder in sorted({page.parent.relative_to(root) for page in (root / "reports").rglob("*.md")}):
+        if f"../../{folder}/*" not in shown:
+            yield f"docs/site/evidence.md: does not list the pages of {folder}"
 
 
 def unanswered(root):
