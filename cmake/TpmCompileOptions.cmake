@@ -73,6 +73,12 @@ endif()
 # folder in which it is called would be searched for each of them.
 function(tpm_load_from_fixed_places target)
   if(NOT BUILD_SHARED_LIBS)  # shared rooms are for working on them: they are not installed
-    set_target_properties(${target} PROPERTIES BUILD_WITH_INSTALL_RPATH ON INSTALL_RPATH_USE_LINK_PATH ON)
+    # Debian's libraries lie where the loader looks; its packages may name no place of their own.
+    if(TPM_PACKAGES)
+      set(by_path OFF)
+    else()
+      set(by_path ON)
+    endif()
+    set_target_properties(${target} PROPERTIES BUILD_WITH_INSTALL_RPATH ON INSTALL_RPATH_USE_LINK_PATH ${by_path})
   endif()
 endfunction()

@@ -27,9 +27,9 @@ endif()
 
 # --- linked by the component haptics --------------------------------------------------------------
 if((NOT TPM_CONSUMER OR "haptics" IN_LIST TPM_WANTED) AND NOT TARGET tpm_httplib)
-  # Debian's library of httplib; what it was compiled with changes the layout of its types, so the
+  # The library of httplib (cpp-httplib in Debian, httplib upstream); what it was compiled with changes the layout of its types, so the
   # sources that include its header take the flags of its pkg-config file.
-  find_library(TPM_HTTPLIB_LIBRARY cpp-httplib REQUIRED)
+  find_library(TPM_HTTPLIB_LIBRARY NAMES cpp-httplib httplib REQUIRED)
   mark_as_advanced(TPM_HTTPLIB_LIBRARY)
   if(NOT TPM_CONSUMER)
     find_package(PkgConfig REQUIRED)

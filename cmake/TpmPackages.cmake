@@ -2,7 +2,6 @@
 #     cmake --preset release -DTPM_PACKAGES=ON -DTPM_PYTHON=ON -DCMAKE_INSTALL_LIBDIR=lib/x86_64-linux-gnu
 #                            -DTPM_PYTHON_INSTALL:STRING=lib/python3/dist-packages
 # scripts/packages_debian.sh does so.
-option(TPM_PACKAGES "Manual pages, shell completion and cpack" OFF)
 if(NOT TPM_PACKAGES)
   return()
 endif()
@@ -22,13 +21,13 @@ install(FILES ${TPM_HELP}/tpm DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completi
 # What Debian wants beside every package: copyright and changelog.
 find_program(TPM_GZIP gzip REQUIRED)
 set(TPM_CHANGELOG ${PROJECT_BINARY_DIR}/changelog.gz)
-execute_process(COMMAND ${TPM_GZIP} -9nc ${PROJECT_SOURCE_DIR}/packaging/changelog OUTPUT_FILE ${TPM_CHANGELOG}
+execute_process(COMMAND ${TPM_GZIP} -9nc ${PROJECT_SOURCE_DIR}/packaging/debian/changelog OUTPUT_FILE ${TPM_CHANGELOG}
                 COMMAND_ERROR_IS_FATAL ANY)
 # tpm_package(COMPONENT NAME SECTION SUMMARY DESCRIPTION DEPENDS...); lines of DESCRIPTION are kept
 function(tpm_package component name section summary description)
   string(TOUPPER ${component} upper)
   string(REPLACE ";" ", " depends "${ARGN}")
-  install(FILES ${PROJECT_SOURCE_DIR}/packaging/copyright ${TPM_CHANGELOG}
+  install(FILES ${PROJECT_SOURCE_DIR}/packaging/debian/copyright ${TPM_CHANGELOG}
           DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} COMPONENT ${component})
   set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${name} PARENT_SCOPE)
   set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section} PARENT_SCOPE)

@@ -24,7 +24,7 @@ packages_debian=(
 
 # What the tests need besides.
 packages_test=(
-  catch2 python3-scipy python3-h5py python3-xarray python3-h5netcdf python3-jsonschema
+  catch2 python3-scipy python3-h5py python3-xarray python3-h5netcdf python3-jsonschema python3-yaml
 )
 
 # What checks the sources, and programs that have to read what tpm writes.

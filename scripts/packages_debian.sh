@@ -16,6 +16,9 @@ build release tpm tpmkit_component_core tpmkit_component_organ tpmkit_component_
   tpmkit_haptics tpmkit_python command_help
 
 step "packing"
+# The date of the bill of materials is that of the changelog: equal sources give equal packages.
+SOURCE_DATE_EPOCH=$(date -u -d "$(sed -n 's/^ -- .*>  //p' packaging/debian/changelog | head -n 1)" +%s)
+export SOURCE_DATE_EPOCH
 rm -f "$folder"/*.deb
 (cd "$folder" && cpack -G DEB >cpack.log 2>&1) || { tail -n 20 "$folder/cpack.log" >&2; die "cpack failed"; }
 mkdir -p dist

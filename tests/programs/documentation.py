@@ -5,7 +5,9 @@
 
 - every relative link in a Markdown page leads to a file, and its anchor to a heading;
 - every docs/PAGE.md named in a source, a script or a page exists;
-- docs/README.md links every page of docs;
+- docs/README.md links every page of docs, and of docs/site every page that is not only a list of others; the site's page
+  of evidence lists every folder of reports;
+- three questions, as a new user types them, are answered two links from README.md at most: QUESTIONS;
 - paper/paper.md shows every figure of paper/figures, cites every entry of paper/paper.bib and nothing else, and names
   only files that exist;
 - the groups of `tpm --help` and of the README hold the same commands, each once;
@@ -20,6 +22,16 @@ from pathlib import Path
 
 # Pages that scripts/make_site.py makes for the site, which checks its links itself (site_pages.py).
 MADE = "docs/site/reference/"
+
+
+# Pages of the site that only lead on, and those of its reference that docs/README.md reaches in other words.
+LISTS = {"index.md", "reference.md", "evidence.md", "c.md", "cpp.md"}
+# What is typed; a pattern for the link in docs/README.md; one for what stands below the heading that it leads to.
+QUESTIONS = {
+    "my fit says flat": (r"fit says flat", r"`flat`.*`tpm design`"),
+    "which command": (r"Which command", r"`tpm fit recording\.csv`.*`tpm hil run session\.json`"),
+    "why is my session refused": (r"session refused", r"tpm hil identify.*--device virtual"),
+}
 
 
 def tracked(root, *suffixes):
@@ -70,8 +82,33 @@ def lost_pages(root):
 def unlisted_pages(root):
     index = (root / "docs/README.md").read_text(encoding="utf-8")
     for page in sorted((root / "docs").glob("*.md")):
-        if page.name != "README.md" and f"({page.name})" not in index:
+        if page.name != "README.md" and not re.search(rf"\({re.escape(page.name)}[)#]", index):
             yield f"docs/README.md: does not list {page.name}"
+    for page in sorted((root / "docs/site").glob("*.md")):
+        if page.name not in LISTS and not re.search(rf"\(site/{re.escape(page.name)}[)#]", index):
+            yield f"docs/README.md: does not list site/{page.name}"
+    shown = (root / "docs/site/evidence.md").read_text(encoding="utf-8")
+    for folder in sorted({page.parent.relative_to(root) for page in (root / "reports").rglob("*.md")}):
+        if f"../../{folder}/*" not in shown:
+            yield f"docs/site/evidence.md: does not list the pages of {folder}"
+
+
+def unanswered(root):
+    if "](docs/README.md)" not in (root / "README.md").read_text(encoding="utf-8"):
+        yield "README.md: does not link docs/README.md"
+    links = re.findall(r"\[([^]]+)\]\(([^)#\s]+)(?:#([\w-]+))?\)", (root / "docs/README.md").read_text(encoding="utf-8"))
+    for question, (words, answer) in QUESTIONS.items():
+        target = next((t for t in links if re.search(words, " ".join(t[0].split()))), None)
+        if not target:
+            yield f"docs/README.md: no link for '{question}'"
+            continue
+        text = (root / "docs" / target[1]).read_text(encoding="utf-8")
+        if target[2]:
+            parts = re.split(r"^## +(.*)$", text, flags=re.M)
+            heading = {re.sub(r"[^\w\- ]", "", h.lower()).replace(" ", "-"): body for h, body in zip(parts[1::2], parts[2::2])}
+            text = heading.get(target[2], "")
+        if not re.search(answer, text, re.S):
+            yield f"{target[1]}: does not answer '{question}'"
 
 
 def faults_of_paper(root):
@@ -124,7 +161,7 @@ def without_example(root, program):
 
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
-    faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *faults_of_paper(root),
+    faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *unanswered(root), *faults_of_paper(root),
               *differing_groups(root, program), *without_example(root, program)]
     for fault in faults:
         print(fault)
