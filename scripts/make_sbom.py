@@ -67,30 +67,19 @@ def packages_of(files):
     return found
 
 
-def unpacked(package):
-    return ROOT / "build/packages" / package / "usr/share/doc" / package
-
-
 def version_and_source(package):
-    """Of an installed package, or of one that scripts/install_packages.sh has unpacked."""
+    """Of an installed package."""
     if shutil.which("dpkg-query"):
         match = re.match(r"installed ([^ ]+) ([^ \n]+)",
                          output("dpkg-query", "-W", "-f=${db:Status-Status} ${Version} ${source:Package}\n", package))
         if match:
             return match[1], match[2]
-    log = unpacked(package) / "changelog.Debian.gz"
-    if log.exists():
-        import gzip
-        match = re.match(r"(\S+) \(([^)]+)\)", gzip.decompress(log.read_bytes()).decode("utf-8"))
-        return match[2], match[1]
     return None
 
 
 def copyright_of(package):
-    for folder in (Path("/usr/share/doc") / package, unpacked(package)):
-        if (folder / "copyright").exists():
-            return (folder / "copyright").read_text(encoding="utf-8", errors="replace")
-    return None
+    file = Path("/usr/share/doc") / package / "copyright"
+    return file.read_text(encoding="utf-8", errors="replace") if file.exists() else None
 
 
 def sha256(file):
