@@ -116,6 +116,34 @@ TEST_CASE("odd scenes: what a schema can say the reader refuses as the schema do
   }
 }
 
+TEST_CASE("odd scenes: what no schema sees is refused with its place; a byte order mark is read",
+          "[keys]") {
+  const std::string text = read_file(TPM_TEST_SOURCE_DIR "/configs/liver_poke.json");
+  const auto with = [&](std::string_view part, std::string_view other) {
+    std::string changed = text;
+    const std::size_t at = changed.find(part);
+    REQUIRE(at != std::string::npos);
+    return changed.replace(at, part.size(), other);
+  };
+  const auto refusal = [](const std::string& scene) {
+    return test::refusal_of([&] {
+      (void)scene_block().made(checked(parse_json(scene, "s.json"), scene_kind(), "s.json"),
+                               DocumentPlace{"s.json"});
+    });
+  };
+  CHECK_THAT(refusal(with(R"("outputs")", R"("tolerance": NaN, "outputs")")),
+             StartsWith("s.json: parse error at line 12, column 16"));
+  CHECK_THAT(refusal(with(R"("count": 81})", R"("count": 81},)")),
+             StartsWith("s.json: parse error at line 13, column 1"));
+  CHECK_THAT(refusal(with("{", "{ // a scene")),
+             StartsWith("s.json: parse error at line 1, column 3"));
+  CHECK_THAT(refusal(with(R"("outputs")", R"("organ": {}, "outputs")")),
+             StartsWith("s.json: key 'organ' stands twice in one object"));
+  CHECK_THAT(refusal(with(R"("E1": "12 kPa")", R"("E1": "1e400 kPa")")),
+             StartsWith("s.json: key /material/E1: '1e400' is not a finite number"));
+  CHECK(refusal("\xEF\xBB\xBF" + text).empty());
+}
+
 TEST_CASE("schema and reader of scenes agree on 2,000 odd scenes, but for rules that are listed",
           "[keys]") {
   std::vector<Json> bases{poke(), example_of(scene_kind())};
