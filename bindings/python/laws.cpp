@@ -1,4 +1,7 @@
 // Protocols, laws, and the paper's element.
+#include <algorithm>
+#include <cmath>
+
 #include "binding.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/warning.hpp"
@@ -104,6 +107,33 @@ void bind_protocols(py::module_& module) {
           py::arg("time_s"), "The imposed value at a time; at a jump the one after it.")
       .def("scaled", &Protocol::scaled, py::arg("factor"),
            "The same history with every value times a factor.")
+      .def(py::pickle(
+          [](const Protocol& p) {
+            return py::make_tuple(p.drive() == Drive::force, knots_of(p), p.name(),
+                                  std::isinf(p.end_s()) && std::isfinite(p.knots().back().time_s),
+                                  p.equilibrium_at_start());
+          },
+          [](const py::tuple& state) {
+            const auto table = state[1].cast<Numbers>();
+            const auto at = table.unchecked<2>();
+            std::vector<Knot> knots;
+            for (py::ssize_t i = 0; i < at.shape(0); ++i) knots.push_back({at(i, 0), at(i, 1)});
+            Protocol p(state[0].cast<bool>() ? Drive::force : Drive::displacement, std::move(knots),
+                       state[2].cast<std::string>(), state[3].cast<bool>());
+            p.set_equilibrium_at_start(state[4].cast<bool>());
+            return p;
+          }))
+      .def(
+          "__eq__",
+          [](const Protocol& a, const Protocol& b) {
+            const auto same = [](const Knot& x, const Knot& y) {
+              return x.time_s == y.time_s && x.value == y.value;
+            };
+            return a.drive() == b.drive() && a.name() == b.name() && a.end_s() == b.end_s() &&
+                   a.equilibrium_at_start() == b.equilibrium_at_start() &&
+                   std::ranges::equal(a.knots(), b.knots(), same);
+          },
+          py::is_operator())
       .def("__repr__", [](const Protocol& p) {
         return "<tpmkit.Protocol " + p.name() + ", " + std::to_string(p.knots().size()) + " knots>";
       });

@@ -1,6 +1,8 @@
 """fit() of synthetic recordings."""
 
+import copy
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -94,8 +96,68 @@ class Fits(unittest.TestCase):
         with self.assertRaisesRegex(tpmkit.Error, "columns: tiem: unknown option 'tiem'"):
             tpmkit.fit(path, columns={"tiem": "a"})
 
+    def test_a_table_and_arrays_are_fitted_as_the_file_is(self):
+        import pandas as pd
+
+        table = pd.read_csv(self.file)
+        by_table = tpmkit.fit(table)
+        arrays = [table[c].to_numpy() for c in table.columns]
+        by_arrays = tpmkit.fit(time=arrays[0], depth=arrays[1], force=arrays[2], units={"time": "s", "depth": "mm", "force": "N"})
+        for fit in (by_table, by_arrays, tpmkit.fit(table.set_index("time (s)"))):
+            self.assertTrue(fit.parameters.equals(self.fit.parameters))
+        with self.assertRaisesRegex(tpmkit.Error, "save: the fit is of a table in memory"):
+            by_table.save(self.folder.name)
+
+    def test_tables_and_arrays_that_say_too_little_are_refused_in_a_sentence(self):
+        import pandas as pd
+
+        t, units = np.arange(5.0), {"time": "s", "depth": "mm", "force": "N"}
+        for said, words in (
+            ({"time": t, "depth": t, "force": t}, "units are not guessed"),
+            ({"time": t, "depth": t, "units": units}, "force missing"),
+            ({"time": t, "depth": t[:4], "force": t, "units": units}, "depth has 4 values and time 5"),
+            ({"time": t.reshape(1, 5), "depth": t, "force": t, "units": units}, r"time has the shape \(1, 5\)"),
+            ({"time": t, "depth": t, "force": [1, 2, None, 4, 5], "units": units}, "force is nan at place 2"),
+            ({"time": t, "depth": t, "force": list("abcde"), "units": units}, "expected numbers"),
+            ({"files": pd.DataFrame({"a": t, "b": t, "c": t})}, "^table: "),
+            ({"files": self.file, "starts": 0.5}, "starts is 0.5"),
+            ({"files": self.file, "contact": "1 mm"}, "contact is '1 mm'; expected a number, in m"),
+            ({}, "one of them"),
+            ({"files": self.file, "time": t}, "one of them"),
+        ):
+            with self.subTest(words=words), self.assertRaisesRegex(tpmkit.Error, words):
+                tpmkit.fit(**said)
+        with self.assertRaisesRegex(tpmkit.Error, "times_s: is NaN at place 1"):
+            self.fit.predict(tpmkit.Protocol.step_and_hold(1e-3, 5.0), [0.0, np.nan])
+
+    def test_covariance_criteria_and_residuals(self):
+        covariance, table = self.fit.covariance, self.fit.parameters
+        for name in covariance.index:
+            self.assertAlmostEqual(covariance.loc[name, name] ** 0.5 / table.loc[name, "standard_error"], 1.0)
+        count = len(covariance)
+        self.assertAlmostEqual(self.fit.bic - self.fit.aic, (np.log(501) - 2) * (count + 1), delta=0.1 * count)
+        residuals = self.fit.residuals
+        frame = self.fit.data[0]
+        np.testing.assert_array_equal(residuals.residual, frame.observed_force_N - frame.predicted_force_N)
+        self.assertAlmostEqual(residuals.residual[residuals.fitted].std() / 2e-4, 1.0, delta=0.15)
+
+    def test_its_repr_says_verdicts_and_adequacy_and_what_to_know(self):
+        text = repr(self.fit)
+        self.assertTrue(text.startswith("<tpmkit.Fit linear-1"))
+        self.assertIn(self.fit.adequacy["words"], text)
+        for words in (*self.fit.verdicts, *self.fit.warnings):
+            self.assertIn(words, text)
+
+    def test_a_fit_is_copied_as_itself_and_says_what_can_be_pickled(self):
+        self.assertIs(copy.copy(self.fit), self.fit)
+        self.assertIs(copy.deepcopy([self.fit])[0], self.fit)
+        with self.assertRaisesRegex(tpmkit.Error, "expected fit.law, fit.parameters"):
+            pickle.dumps(self.fit)
+        self.assertEqual(pickle.loads(pickle.dumps(self.fit.law)), self.fit.law)
+        self.assertTrue(pickle.loads(pickle.dumps(self.fit.parameters)).equals(self.fit.parameters))
+
     def test_errors(self):
-        for files, words in (([], "no file"), ("none.csv", "none.csv"), (self.folder.name, "is a folder")):
+        for files, words in (([], "no file"), ("none.csv", "none.csv"), ("", "no such file|cannot")):
             with self.assertRaisesRegex(tpmkit.Error, words):
                 tpmkit.fit(files)
 

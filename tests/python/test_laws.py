@@ -1,5 +1,7 @@
 """Laws, the element and protocols."""
 
+import copy
+import pickle
 import tempfile
 import unittest
 from pathlib import Path
@@ -57,6 +59,22 @@ class Laws(unittest.TestCase):
         s = 2j * np.pi * frequency * LAW["tau1_s"]
         exact = LAW["k_inf_N_per_m"] + LAW["k1_N_per_m"] * s / (1 + s)
         np.testing.assert_allclose(storage + 1j * loss, exact, rtol=1e-12)
+
+    def test_laws_protocols_and_elements_are_pickled_and_copied(self):
+        times = np.linspace(0.0, 3.0, 7)
+        law = tpmkit.Law("linear-1", LAW)
+        element = tpmkit.Element(E1_Pa=9e3)
+        for protocol in (
+            tpmkit.Protocol.step_and_hold(2e-3, np.inf), tpmkit.Protocol.ramp_and_hold(2e-3, 1e-3, 5.0),
+            tpmkit.Protocol.history([0.0, 1.0, 3.0], [1e-3, 1e-3, 2e-3], equilibrium_at_start=True),
+        ):
+            for again in (pickle.loads(pickle.dumps((law, protocol, element))), copy.deepcopy((law, protocol, element))):
+                self.assertEqual(again[:2], (law, protocol))
+                np.testing.assert_array_equal(again[0].respond(again[1], times), law.respond(protocol, times))
+            self.assertEqual(again[2].parameters, element.parameters)
+        creep = tpmkit.Protocol.creep(0.1, 4.0)
+        self.assertEqual(pickle.loads(pickle.dumps(creep)), creep)
+        self.assertNotEqual(creep, tpmkit.Protocol.creep(0.2, 4.0))
 
     def test_what_is_wrong_is_one_line_with_a_code(self):
         for make in (

@@ -9,25 +9,30 @@ Everything is SI: arguments, columns and attributes carry their unit in the name
 `tpmkit.Error` whose text is one line, "WHERE: WHAT; expected ...". Long calls release the interpreter's
 lock; Ctrl-C ends them.
 
-The package calls the library of the program `tpm`; nothing runs in another process, except where a
-docstring says so (figures drawn by `Fit.save`).
+The package calls the library of the program `tpm`. What a docstring says so of runs in another process: figures
+drawn by `Fit.save`; folders of recordings, `validate`, `design` and `view`, by the program itself.
 """
 
 from ._core import Error, Protocol, __version__, share_dir
 from ._contact import Contact, run_session
 from ._data import example, open, read_recording
-from ._fit import Fit, fit
+from ._fit import Fit, Specimens, fit
+from ._judge import Design, Validation, design, validate, view
 from ._law import Element, Law
 from ._run import Plan, plan, simulate, sweep
 
 __all__ = [
     "Contact",
+    "Design",
     "Element",
     "Error",
     "Fit",
     "Law",
     "Plan",
     "Protocol",
+    "Specimens",
+    "Validation",
+    "design",
     "example",
     "fit",
     "open",
@@ -37,5 +42,7 @@ __all__ = [
     "share_dir",
     "simulate",
     "sweep",
+    "validate",
+    "view",
     "__version__",
 ]

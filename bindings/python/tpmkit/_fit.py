@@ -4,27 +4,30 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Mapping, Sequence, Union
 
 import numpy as np
-import numpy.typing as npt
-import pandas as pd
 
-from . import _core
+from . import _core, _program
 from ._core import Protocol
-from ._law import Law
+from ._law import Law, times_of
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+    import pandas as pd
     from matplotlib.axes import Axes
 
 PathLike = Union[str, "os.PathLike[str]"]
 
 
 class Fit:
-    """What a fit found. Made by `tpmkit.fit`."""
+    """What a fit found. Made by `tpmkit.fit`; it never changes, so a copy is the fit itself."""
 
-    def __init__(self, core: _core.Fit) -> None:
+    def __init__(self, core: _core.Fit, *, of_table: bool = False) -> None:
         self._core = core
+        self._of_table = of_table
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -34,6 +37,8 @@ class Fit:
         where the data give none), unit, verdict, nuisance (belongs to the recording), only_if_described (the
         law does not describe the data: the row holds only if it did), words.
         """
+        import pandas as pd
+
         columns = ["name", "estimate", "standard_error", "lower", "upper", "unit", "verdict", "nuisance",
                    "only_if_described", "words"]
         table = pd.DataFrame(self._core.parameters, columns=columns).set_index("name")
@@ -49,9 +54,58 @@ class Fit:
     @property
     def correlation(self) -> pd.DataFrame:
         """Correlation of the free parameters (in the coordinates of the search), from the covariance."""
-        free = json.loads(self._core.to_json())
-        names = (free.get("fit") or free)["linearised"]["parameters"]
+        import pandas as pd
+
+        names = self._fitted["linearised"]["parameters"]
         return pd.DataFrame(self._core.correlation, index=names, columns=names)
+
+    @property
+    def covariance(self) -> pd.DataFrame:
+        """Covariance of the free parameters, SI times SI: their correlation times their standard errors (linearised).
+        Raises tpmkit.Error where the data leave a direction of the parameters open."""
+        if not self._fitted["linearised"]["full_rank"]:
+            raise _core.Error("covariance: the data leave a direction of the parameters open; expected fit.correlation, "
+                              "or a law with fewer parameters")
+        correlation = self.correlation
+        error = self.parameters["standard_error"].reindex(correlation.index).to_numpy()
+        return correlation * np.outer(error, error)
+
+    @property
+    def aic(self) -> float | None:
+        """Akaike's information criterion; None under a robust loss. `aicc` and `bic` likewise; six digits."""
+        return self._fitted["AIC"]
+
+    @property
+    def aicc(self) -> float | None:
+        """AIC corrected for few readings."""
+        return self._fitted["AICc"]
+
+    @property
+    def bic(self) -> float | None:
+        """Bayesian information criterion."""
+        return self._fitted["BIC"]
+
+    @property
+    def residuals(self) -> pd.DataFrame:
+        """Observed minus predicted of every sample of the recordings, SI: dataset, time_s, residual, fitted. Empty
+        for a fit without recordings."""
+        import pandas as pd
+
+        frames = []
+        for frame in self.data:
+            key = frame.attrs["response_key"]
+            frames.append(pd.DataFrame({
+                "dataset": frame.attrs["dataset"], "time_s": frame["time_s"],
+                "residual": frame["observed_" + key] - frame["predicted_" + key], "fitted": frame["fitted"]}))
+        if not frames:
+            return pd.DataFrame(columns=["dataset", "time_s", "residual", "fitted"])
+        return pd.concat(frames, ignore_index=True)
+
+    @property
+    def _fitted(self) -> dict[str, Any]:
+        """The JSON of the fit that is recommended."""
+        everything = self.to_dict()
+        return everything.get("fit") or everything
 
     @property
     def law(self) -> Law:
@@ -62,6 +116,8 @@ class Fit:
     def laws(self) -> pd.DataFrame:
         """The laws that were tried, by rising BIC: parameters, residual, delta_bic, why one is not
         identified. Empty for a configuration."""
+        import pandas as pd
+
         laws = json.loads(self._core.to_json()).get("laws", [])
         columns = ["law", "words", "parameters_estimated", "rms_over_peak", "delta_bic", "identified", "reason"]
         return pd.DataFrame(laws, columns=columns).set_index("law")
@@ -95,6 +151,8 @@ class Fit:
     def data(self) -> list[pd.DataFrame]:
         """One DataFrame per recording: time_s, drive, observed, predicted, lower, upper (where one new sample
         falls), fitted. `attrs` holds dataset, provenance, and names of drive and response with unit."""
+        import pandas as pd
+
         frames = []
         for r in self._core.recordings:
             n = len(r["time_s"])
@@ -130,7 +188,9 @@ class Fit:
         DataFrame by time_s: value, and standard_error from the parameters' covariance (delta method; NaN
         where that is not of full rank).
         """
-        times = np.ascontiguousarray(times_s, dtype=float)
+        import pandas as pd
+
+        times = times_of(times_s)
         value, error = self._core.predict(protocol, times, dataset)
         return pd.DataFrame({"value": value, "standard_error": error}, index=pd.Index(times, name="time_s"))
 
@@ -174,6 +234,9 @@ class Fit:
 
         Returns the names of the files.
         """
+        if self._of_table:
+            raise _core.Error("save: the fit is of a table in memory, and its configuration names a file; expected "
+                              "frame.to_csv(file) and tpmkit.fit(file)")
         return self._core.write(os.fspath(folder))
 
     def to_dict(self) -> dict[str, Any]:
@@ -184,16 +247,148 @@ class Fit:
         return self._core.text()
 
     def __repr__(self) -> str:
-        names = ", ".join(self.parameters.index)
-        return f"<tpmkit.Fit of {names}>"
+        lines = [f"<tpmkit.Fit {self.law.name}" if self._core.has_law else "<tpmkit.Fit"]
+        for name, row in self.parameters.iterrows():
+            interval = " .. ".join("open" if np.isnan(v) else f"{v:.4g}" for v in (row["lower"], row["upper"]))
+            lines.append(f"  {name} {row['estimate']:.5g} ({interval}) {row['unit']}, {row['verdict']}")
+        adequacy = self.adequacy
+        lines.append("  adequacy: " + (adequacy["words"] if adequacy else "not tested"))
+        doubted = adequacy["words"] if adequacy else None
+        lines += [f"  warning: {w}" for w in self.warnings if w != doubted]
+        return "\n".join(lines) + ">"
+
+    def __copy__(self) -> Fit:
+        return self
+
+    def __deepcopy__(self, memo: Any) -> Fit:
+        return self
+
+    def __reduce__(self) -> Any:
+        raise _core.Error("pickle: a Fit holds the model that it was fitted with; expected fit.law, fit.parameters, "
+                          "fit.data or fit.to_dict(), which are pickled as they are")
 
     def _repr_html_(self) -> str:
         return self.parameters.to_html(float_format=lambda v: f"{v:.4g}")
 
 
+class Specimens:
+    """Fits of the recordings of a folder, pooled. Made by `tpmkit.fit(folder)`."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self._document = document
+
+    @property
+    def law(self) -> str:
+        """The name of the law that all recordings were fitted with; `why` says how it was chosen."""
+        return self._document["law"]
+
+    @property
+    def why(self) -> str:
+        """How the law was chosen."""
+        return self._document["why"]
+
+    @property
+    def pooled(self) -> pd.DataFrame:
+        """One row per material parameter, by name, SI: typical, lower, upper, unit, specimens, left_out, identified,
+        i_squared, words."""
+        import pandas as pd
+
+        rows = []
+        for p in self._document["pooled"]:
+            lower, upper = p.get("interval_SI") or (None, None)
+            rows.append({"name": p["name"], "typical": p.get("typical_SI"), "lower": lower, "upper": upper,
+                         **{k: p.get(k) for k in ("unit", "specimens", "left_out", "identified", "i_squared", "words")}})
+        table = pd.DataFrame(rows).set_index("name")
+        for column in ("typical", "lower", "upper"):
+            table[column] = table[column].astype(float)
+        return table
+
+    @property
+    def recordings(self) -> list[dict[str, Any]]:
+        """Of each recording: `recording`, `specimen`, and its `fit` (keys in docs/fit_results.md), or why it has none."""
+        return self._document["recordings"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as `tpm fit FOLDER --format json` writes it."""
+        return self._document
+
+    def __repr__(self) -> str:
+        lines = [f"<tpmkit.Specimens {self.law}, {len(self.recordings)} recordings"]
+        lines += [f"  {name}: {row['words']}" for name, row in self.pooled.iterrows()]
+        return "\n".join(lines) + ">"
+
+
+def _options(columns: Mapping[str, Any] | None) -> list[str]:
+    """What `columns` says as options of the program."""
+    words: list[str] = []
+    for key, value in (columns or {}).items():
+        option = "--" + key.replace("_", "-")
+        if key == "units":
+            for column, unit in value.items():
+                words += ["--unit", f"{column}={unit}"]
+        elif isinstance(value, bool):
+            words += [option] if value else []
+        elif key == "segments":
+            words += [option, ",".join(value)]
+        else:
+            words += [option, str(value)]
+    return words
+
+
+def _table_of(time: Any, depth: Any, force: Any, units: Mapping[str, str] | None) -> pd.DataFrame:
+    """Arrays with units as a table that reads like a file."""
+    import pandas as pd
+
+    given = {"time": time, "depth": depth, "force": force}
+    missing = [name for name, values in given.items() if values is None]
+    if missing:
+        raise _core.Error(f"fit: {' and '.join(missing)} missing; expected time, depth and force together")
+    if set(units or {}) != set(given):
+        raise _core.Error('fit: units are not guessed; expected units={"time": "s", "depth": "mm", "force": "mN"}, one for each')
+    columns = {}
+    for name, values in given.items():
+        array = np.asarray(values)
+        if array.ndim != 1:
+            raise _core.Error(f"fit: {name} has the shape {array.shape}; expected a list of numbers")
+        if array.size != np.size(time):
+            raise _core.Error(f"fit: {name} has {array.size} values and time {np.size(time)}; expected as many of each")
+        try:
+            array = array.astype(float)
+        except (TypeError, ValueError):
+            raise _core.Error(f"fit: {name} holds {array.dtype}; expected numbers") from None
+        bad = np.flatnonzero(~np.isfinite(array))
+        if bad.size:
+            raise _core.Error(f"fit: {name} is {array[bad[0]]} at place {bad[0]}; expected finite numbers")
+        columns[f"{name} ({units[name]})"] = array  # type: ignore[index]
+    return pd.DataFrame(columns)
+
+
+def _fit_table(table: pd.DataFrame, ask: Any) -> Fit:
+    """Fits a table as the file that it would be: one reader, one answer."""
+    import pandas as pd
+
+    if not isinstance(table.index, pd.RangeIndex):
+        if table.index.name is None:
+            raise _core.Error("fit: the table's index has no name; expected frame.reset_index(), or a name with a unit")
+        table = table.reset_index()
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "table.csv"
+        table.to_csv(file, index=False)
+        try:
+            return Fit(ask([str(file)]), of_table=True)
+        except _core.Error as error:
+            told = _core.Error(str(error).replace(str(file), "table"))
+            told.code = error.code
+            raise told from None
+
+
 def fit(
-    files: PathLike | Sequence[PathLike],
+    files: PathLike | Sequence[PathLike] | pd.DataFrame | None = None,
     *,
+    time: npt.ArrayLike | None = None,
+    depth: npt.ArrayLike | None = None,
+    force: npt.ArrayLike | None = None,
+    units: Mapping[str, str] | None = None,
     law: str | None = None,
     starts: int | None = None,
     seed: int | None = None,
@@ -201,15 +396,20 @@ def fit(
     contact: float | None = None,
     zero: float | None = None,
     columns: Mapping[str, Any] | None = None,
-) -> Fit:
-    """Fits a law to recordings, or what a configuration says.
+) -> Fit | Specimens:
+    """Fits a law to recordings, or what a configuration says. The answer is that of `tpm fit`.
 
     Parameters
     ----------
     files
         A recording (any delimited text with times, depths and forces; a header that names units), several
         to be fitted together, a spectrum, a relaxation modulus, a creep compliance, or a configuration
-        (schemas/fit.schema.json).
+        (schemas/fit.schema.json). A folder: each recording in it is fitted by one law and the parameters are pooled
+        (in another process, by the program `tpm`). A DataFrame: it is read as the file that it would be, so its columns
+        name their units ("time (s)", "depth (mm)", "force (mN)").
+    time, depth, force, units
+        A recording as three arrays of one length in place of `files`; `units` names the unit of each:
+        ``{"time": "s", "depth": "mm", "force": "mN"}``.
     law
         Fit this one ("power-2") instead of the least law that the recordings support.
     starts, seed
@@ -237,7 +437,30 @@ def fit(
     >>> fit = tpmkit.fit("recording.csv")
     >>> fit.parameters.loc["tau1", ["estimate", "lower", "upper", "verdict"]]
     """
+    arrays = time is not None or depth is not None or force is not None or units is not None
+    if arrays == (files is not None):
+        raise _core.Error("fit: expected files, a table, or time, depth and force, one of them")
+    for name, value in (("starts", starts), ("seed", seed)):
+        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0):
+            raise _core.Error(f"fit: {name} is {value!r}; expected a whole number")
+    for name, value in (("reference", reference), ("contact", contact), ("zero", zero)):
+        if value is not None and not isinstance(value, (int, float, np.floating, np.integer)):
+            raise _core.Error(f"fit: {name} is {value!r}; expected a number, in m (zero: in N)")
+
+    def ask(names: list[str]) -> Any:
+        return _core.fit(names, law, starts, seed, reference, contact, zero, dict(columns or {}))
+
+    if arrays:
+        return _fit_table(_table_of(time, depth, force, units), ask)
+    if hasattr(files, "to_csv"):
+        return _fit_table(files, ask)
     if isinstance(files, (str, os.PathLike)):
+        if os.path.isdir(files):
+            words = ["fit", os.fspath(files), "--no-draw", *_options(columns)]
+            said = {"law": law, "starts": starts, "seed": seed, "reference": reference, "contact": contact, "zero": zero}
+            for key, value in said.items():
+                unit = {"reference": " m", "contact": " m", "zero": " N"}.get(key, "")
+                words += [] if value is None else ["--" + key, f"{value}{unit}"]
+            return Specimens(_program.answer(words))
         files = [files]
-    names = [os.fspath(f) for f in files]
-    return Fit(_core.fit(names, law, starts, seed, reference, contact, zero, dict(columns or {})))
+    return Fit(ask([os.fspath(f) for f in files]))  # type: ignore[union-attr]

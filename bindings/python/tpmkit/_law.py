@@ -4,15 +4,31 @@ from __future__ import annotations
 
 import json
 import os
-from typing import Any, Mapping, overload
+from typing import TYPE_CHECKING, Any, Mapping, overload
 
 import numpy as np
-import numpy.typing as npt
 
 from . import _core
 from ._core import Protocol
 
-Array = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    Array = npt.NDArray[np.float64]
+
+
+def times_of(times: npt.ArrayLike, name: str = "times_s") -> Array:
+    """A list of numbers, none of them NaN; raises tpmkit.Error in one sentence."""
+    try:
+        array = np.ascontiguousarray(times, dtype=float)
+    except (TypeError, ValueError):
+        raise _core.Error(f"{name}: {times!r:.60}; expected a list of numbers") from None
+    if array.ndim != 1:
+        raise _core.Error(f"{name}: has the shape {array.shape}; expected a list of numbers")
+    bad = np.flatnonzero(np.isnan(array))
+    if bad.size:
+        raise _core.Error(f"{name}: is NaN at place {bad[0]}; expected numbers")
+    return array
 
 
 class Law:
@@ -76,6 +92,19 @@ class Law:
         """Reads a law file (schemas/law.schema.json), as `tpm fit` and `Law.write` make it."""
         return cls._of(_core.Law.read(os.fspath(path)))
 
+    @classmethod
+    def _from_json(cls, text: str) -> Law:
+        return cls._of(_core.Law.from_json(text))
+
+    def __reduce__(self) -> Any:
+        return Law._from_json, (self._core.to_json(),)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Law) and self._core.to_json() == other._core.to_json()
+
+    def __hash__(self) -> int:
+        return hash(self._core.to_json())
+
     @staticmethod
     def describe(name: str) -> dict[str, tuple[str, str]]:
         """Parameters of a law: name to (SI unit, meaning)."""
@@ -130,11 +159,11 @@ class Law:
         `sensitivity` the answer is (values, derivatives): n times by n parameters, in the order of
         `parameters`, SI over SI. A value that the law does not predict is NaN.
         """
-        return self._core.respond(protocol, np.ascontiguousarray(times_s, dtype=float), sensitivity)
+        return self._core.respond(protocol, times_of(times_s), sensitivity)
 
     def respond_spectrum(self, frequency_Hz: npt.ArrayLike) -> tuple[Array, Array]:
         """Storage and loss at given frequencies, about the reference depth; N/m, or Pa for a strip."""
-        return self._core.respond_spectrum(np.ascontiguousarray(frequency_Hz, dtype=float))
+        return self._core.respond_spectrum(times_of(frequency_Hz, "frequency_Hz"))
 
     def __repr__(self) -> str:
         return repr(self._core)
@@ -184,7 +213,7 @@ class Element:
         self, protocol: Protocol, times_s: npt.ArrayLike, *, sensitivity: bool = False
     ) -> Array | tuple[Array, Array]:
         """The response at given times; see `Law.respond`. Derivatives are by E1, E2, E', eta1, x, A0, l0."""
-        times = np.ascontiguousarray(times_s, dtype=float)
+        times = times_of(times_s)
         values = list(self.parameters.values())
         return _core.respond_element(values, self.formulation, protocol, times, sensitivity)
 

@@ -1,0 +1,139 @@
+"""Judgements: a law against recordings that it has not seen, designs of experiments, pages to look at.
+
+These are done by the program `tpm` in another process.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Mapping, Sequence
+
+from . import _program
+from ._fit import PathLike, _options
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Validation:
+    """A comparison with recordings, in the words of ASME V&V 20. Made by `tpmkit.validate`."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self._document = document
+
+    @property
+    def verdict(self) -> str:
+        """Of all quantities together: "adequate", "not_adequate", "undetermined", or "not_asked" without a
+        requirement."""
+        return self._document["verdict"]
+
+    @property
+    def words(self) -> str:
+        """The conclusion, with its conditions."""
+        words = self._document["words"]
+        return words if isinstance(words, str) else " ".join(words)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader must know."""
+        return list(self._document["remarks"])
+
+    @property
+    def quantities(self) -> pd.DataFrame:
+        """One row per recording and quantity of interest: recording and the keys of `tpm validate --format json`, SI."""
+        import pandas as pd
+
+        rows = [{"recording": r["recording"], **q} for r in self._document["recordings"] for q in r["quantities"]]
+        return pd.DataFrame(rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as `tpm validate --format json` writes it."""
+        return self._document
+
+    def __repr__(self) -> str:
+        return "\n".join([f"<tpmkit.Validation {self.verdict}: {self.words}", *(f"  warning: {w}" for w in self.warnings)]) + ">"
+
+
+def validate(
+    law: PathLike,
+    recordings: PathLike | Sequence[PathLike],
+    *,
+    require: str | None = None,
+    placement: str | None = None,
+    instrument: PathLike | None = None,
+    columns: Mapping[str, Any] | None = None,
+) -> Validation:
+    """Compares a law, or the organ that it was put on, with recordings that it has not seen (`tpm validate`).
+
+    Parameters
+    ----------
+    law
+        law.json as `tpm fit` or `Fit.save` writes it, or the scene or material.json of `tpm material`.
+    recordings
+        One or several files. A recording that the law was fitted to is refused.
+    require
+        How large the error of the model may be: "10%" of the measured value, "20 mN", or "jnd". None: no verdict.
+    placement, instrument, columns
+        As the options of `tpm validate`; `columns` as for `tpmkit.fit`.
+
+    Raises
+    ------
+    tpmkit.Error
+        What the program refuses, in its words.
+    """
+    files = [recordings] if isinstance(recordings, (str, os.PathLike)) else list(recordings)
+    words = ["validate", os.fspath(law), *(os.fspath(f) for f in files), *_options(columns)]
+    for option, value in (("--require", require), ("--placement", placement), ("--instrument", instrument)):
+        words += [] if value is None else [option, os.fspath(value)]
+    return Validation(_program.answer(words, answers=(0, 1)))
+
+
+class Design:
+    """Experiments by what they would tell. Made by `tpmkit.design`."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self._document = document
+
+    @property
+    def ranked(self) -> pd.DataFrame:
+        """One row per candidate, the best first, with the keys of `tpm design --format json`, SI."""
+        import pandas as pd
+
+        return pd.DataFrame(self._document["ranked"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as `tpm design --format json` writes it."""
+        return self._document
+
+    def __repr__(self) -> str:
+        return f"<tpmkit.Design of {len(self._document['ranked'])} candidates>"
+
+
+def design(problem: PathLike | Mapping[str, Any], *, repetitions: int = 100, seed: int = 0) -> Design:
+    """Which experiment would identify the parameters (`tpm design`).
+
+    Parameters
+    ----------
+    problem
+        A file (schemas/design.schema.json), or the same as a dict.
+    repetitions
+        How often the best candidate is simulated and fitted: 0, or 10 and more.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        if isinstance(problem, Mapping):
+            file = Path(folder) / "design.json"
+            file.write_text(json.dumps(dict(problem)), encoding="utf-8")
+            problem = file
+        return Design(_program.answer(["design", os.fspath(problem), "--check", str(repetitions), "--seed", str(seed)]))
+
+
+def view(file: PathLike, output: PathLike) -> Path:
+    """Writes a result, a session or a fit as one interactive page, which needs nothing else (`tpm view`).
+
+    Returns the page. Raises tpmkit.Error, also where `output` is there already and not such a page.
+    """
+    _program.run(["view", os.fspath(file), "-o", os.fspath(output)])
+    return Path(output)

@@ -1,0 +1,71 @@
+"""Folders, validation, designs and pages: what the program does for Python. What is imported."""
+
+import json
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import made
+import tpmkit
+
+
+class Judgements(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = Path(cls.temporary.name)
+        for seed in (1, 2, 3):
+            made.recording(cls.folder, seed=seed, name=f"liver_{seed}.csv")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def test_a_folder_is_pooled(self):
+        pooled = tpmkit.fit(self.folder, law="linear-1", starts=3)
+        self.assertEqual(pooled.law, "linear-1")
+        self.assertEqual(len(pooled.recordings), 3)
+        row = pooled.pooled.loc["tau1"]
+        self.assertLess(row.lower, made.LAW["tau1_s"])
+        self.assertGreater(row.upper, made.LAW["tau1_s"])
+        self.assertEqual(row.unit, "s")
+        self.assertIn(row.words, repr(pooled))
+
+    def test_a_law_is_validated_by_a_recording_that_it_has_not_seen(self):
+        saved = self.folder / "saved"
+        tpmkit.fit(self.folder / "liver_1.csv", law="linear-1", starts=3).save(saved)
+        judged = tpmkit.validate(saved / "law.json", self.folder / "liver_2.csv", require="5%")
+        self.assertEqual(judged.verdict, "adequate")
+        table = judged.quantities
+        self.assertTrue((table.verdict == "adequate").all())
+        self.assertTrue({"quantity", "S", "D", "E", "U"} <= set(table.columns))
+        self.assertIn(judged.words, repr(judged))
+        for warning in judged.warnings:
+            self.assertIn(warning, repr(judged))
+        with self.assertRaises(tpmkit.Error) as raised:
+            tpmkit.validate(saved / "law.json", self.folder / "liver_1.csv")
+        self.assertIn("liver_1.csv", str(raised.exception))
+        page = tpmkit.view(saved / "law.json", self.folder / "page.html")
+        self.assertIn("<html", page.read_text()[:500])
+        with self.assertRaisesRegex(tpmkit.Error, "none.h5"):
+            tpmkit.view(self.folder / "none.h5", self.folder / "page.html")
+
+    def test_a_design(self):
+        problem = json.loads(tpmkit.example("configs/design_liver.json").read_text())
+        found = tpmkit.design(problem, repetitions=0)
+        self.assertEqual(len(found.ranked), 10)
+        self.assertIn("experiment", found.ranked)
+        with self.assertRaisesRegex(tpmkit.Error, "expected"):
+            tpmkit.design({**problem, "critreion": "D"}, repetitions=0)
+
+    def test_little_is_imported_before_it_is_used(self):
+        code = "import sys, tpmkit; print(*sorted({m.partition('.')[0] for m in sys.modules}))"
+        loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+        for module in ("pandas", "xarray", "matplotlib", "scipy", "h5py"):
+            self.assertNotIn(module, loaded)
+
+
+if __name__ == "__main__":
+    unittest.main()
