@@ -103,6 +103,26 @@ int list_plugin(const DeviceOptions& options, const Session& session) {
   return 0;
 }
 
+/// The devices of a service that is compatible with the Inverse service, or why there are none.
+std::pair<Json, std::string> listed_inverse(const InverseAddress& address) {
+  Json list = Json::array();
+  std::string text, reason;
+  try {
+    for (const InverseDeviceEntry& device : inverse_inventory(address).devices) {
+      list.push_back(
+          {{"id", device.id}, {"type", device.type}, {"simulated_device", device.simulated}});
+      text += fmt::format("inverse3 {} at port {}{}: --device inverse3 --inverse-id {}\n",
+                          printable(device.type.empty() ? "device" : device.type), address.port,
+                          device.simulated ? ", SIMULATED DEVICE" : "", printable(device.id));
+    }
+    if (list.empty()) reason = fmt::format("the service at port {} sees no device", address.port);
+  } catch (const Error& error) {
+    reason = error.what();
+  }
+  if (!reason.empty()) text = fmt::format("none     of Haply: {}\n", reason);
+  return {Json{{"port", address.port}, {"devices", list}, {"reason", reason}}, text};
+}
+
 int list_devices(const DeviceOptions& options, const Session& session) {
   if (!options.plugin.empty()) return list_plugin(options, session);
   std::vector<SeenDevice> devices;
@@ -120,16 +140,18 @@ int list_devices(const DeviceOptions& options, const Session& session) {
     list.push_back(seen_json(device));
     text += seen_text(device);
   }
+  const auto [inverse, inverse_text] = listed_inverse(options.choice.inverse);
   if (session.json()) {
     say("{}", to_text(Json{{"force_dimension", {{"devices", list}, {"reason", reason}}},
+                           {"inverse3", inverse},
                            {"virtual", {{"available", true}, {"simulated_device", true}}},
                            {"replay", {{"available", true}, {"simulated_device", true}}}}));
     return 0;
   }
   if (devices.empty()) text = fmt::format("none     of Force Dimension: {}\n", reason);
-  say("{}virtual  always there: a simulated Omega.7 and operator, no hardware\n"
+  say("{}{}virtual  always there: a simulated Omega.7 and operator, no hardware\n"
       "replay   always there: the motion of a recording, no hardware\n",
-      text);
+      text, inverse_text);
   return 0;
 }
 
@@ -383,6 +405,11 @@ void add_hil_command(CLI::App& app, Session& session) {
                       "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
   devices->add_option("--plugin", listed->plugin,
                       "Those of a device plugin instead (docs/c_interface.md)");
+  devices
+      ->add_option("--inverse-port", listed->choice.inverse.port,
+                   "Simulation channel of the Inverse service")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
   add_format_option(*devices, session);
   devices->footer("Examples:\n  tpm hil devices\n  tpm hil devices --plugin ./my_device.so");
   set_run(*devices, session, [listed, &session] { return list_devices(*listed, session); });

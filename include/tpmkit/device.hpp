@@ -97,6 +97,10 @@ struct DeviceStatus {
 struct HandState {
   float gripper_m = std::numeric_limits<float>::quiet_NaN();  ///< opening; NaN: there is none
   std::uint32_t buttons = 0;                                  ///< a bit for each that is pressed
+  /// Orientation of the grip, a unit quaternion w, x, y, z; NaN: there is none.
+  float grip[4] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN(),
+                   std::numeric_limits<float>::quiet_NaN(),
+                   std::numeric_limits<float>::quiet_NaN()};
 };
 
 /// A device with three translations that renders forces. One thread uses it; cut_forces() alone may

@@ -101,6 +101,7 @@ typedef struct tpm_device_hand {
   uint32_t version;
   float gripper_m;   /**< opening; NaN: there is none */
   uint32_t buttons;  /**< a bit for each that is pressed */
+  float grip[4];     /**< orientation of the grip, a unit quaternion w, x, y, z; NaN, as it is handed over: none */
 } tpm_device_hand;
 
 /** The functions of a plugin. All are required except hand and enable_forces. Members are added at

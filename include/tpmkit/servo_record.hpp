@@ -78,12 +78,19 @@ struct ServoRecord {
   StopCause stop = StopCause::none;
   float gripper_m = std::numeric_limits<float>::quiet_NaN();  ///< opening; NaN: there is none
   std::uint32_t buttons = 0;  ///< of the device, a bit for each that is pressed
+  /// Orientation of the grip in the device's coordinates, a unit quaternion w, x, y, z; NaN: there
+  /// is none. Gripper, buttons and grip are those last read, some milliseconds ago at most.
+  float grip[4] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN(),
+                   std::numeric_limits<float>::quiet_NaN(),
+                   std::numeric_limits<float>::quiet_NaN()};
 };
 
-static_assert(sizeof(ServoRecord) == 136);
+static_assert(sizeof(ServoRecord) == 152);
 
-/// Size of a row in recordings of the first format, which lack gripper and buttons.
-inline constexpr std::size_t kFirstRowBytes = 128;
+/// Size of a row in recordings of the first format, which lack gripper, buttons and grip, and of
+/// the second, which lack the grip.
+inline constexpr std::size_t kFirstRowBytes = 128, kSecondRowBytes = 136;
 static_assert(offsetof(ServoRecord, gripper_m) == kFirstRowBytes);
+static_assert(offsetof(ServoRecord, grip) == kSecondRowBytes);
 
 }  // namespace tpm::haptics

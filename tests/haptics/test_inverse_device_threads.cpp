@@ -103,7 +103,9 @@ TEST_CASE("A service is opened in both formats, made neutral, and what it says i
     service.press(0b10U);
     (void)device.write({0.0, 0.0, 0.5});
     (void)device.read(at_m);
-    CHECK(device.hand().buttons == 0b10U);
+    const HandState hand = device.hand();
+    CHECK(hand.buttons == 0b10U);
+    CHECK((hand.grip[0] == 0.5F && hand.grip[1] == -0.5F && hand.grip[3] == -0.5F));
     device.stop();
     for (int i = 0; i < 100 && service.last_N().norm() > 0.0; ++i) std::this_thread::sleep_for(5ms);
     CHECK(service.last_N().norm() == 0.0);
@@ -197,6 +199,7 @@ TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any
     CHECK(recording.simulated());
     CHECK_THAT(device_line(recording), Contains("SIMULATED DEVICE"));
     CHECK(recording.header.at("device").at("serial") == "049D");
+    CHECK((recording.rows.back().grip[0] == 0.5F && recording.rows.back().grip[1] == -0.5F));
     const Verification v = verify(recording, {.window_s = 0.0});
     CHECK(v.all.max_N < 0.01 * v.all.peak_N);
     CHECK(v.all.peak_N > 0.1);

@@ -343,10 +343,10 @@ TEST_CASE("A hand that a client moves into the tissue meets its force") {
 
 TEST_CASE("The example client in Python is served, and names a simulated device") {
   const test::TempFolder folder;
-  const std::string output = folder / "output";
+  const std::string output = folder / "output", listed = folder / "listed";
   Json json = test::short_session();
   json["limits"]["force"] = "3 N";
-  int status = -1;
+  int status = -1, listing = -1;
   std::thread worker;
   std::atomic<bool> done{false};
   ServeOptions options;
@@ -355,6 +355,9 @@ TEST_CASE("The example client in Python is served, and names a simulated device"
   options.interrupted = [&done] { return done.load(); };
   options.opened = [&](const InverseServer& server, const DeviceIdentity&, const LoopModel&) {
     worker = std::thread([&, port = server.port()] {
+      listing = std::system(
+          fmt::format("'" TPM_TEST_PROGRAM "' hil devices --inverse-port {} >{}", port, listed)
+              .c_str());
       status = std::system(fmt::format("python3 {}/examples/inverse_client.py --port {} "
                                        "--messages 300 >{} 2>&1",
                                        TPM_TEST_SOURCE_DIR, port, output)
@@ -369,6 +372,9 @@ TEST_CASE("The example client in Python is served, and names a simulated device"
   CHECK(status == 0);
   CHECK_THAT(said, Contains("SIMULATED DEVICE") && Contains("'x': 0.5"));
   CHECK(run.counts.states == 300);
+  CHECK(listing == 0);
+  CHECK_THAT(files::read_file(listed), Contains("inverse3") && Contains("SIMULATED DEVICE") &&
+                                           Contains("--device inverse3 --inverse-id"));
 }
 
 TEST_CASE("The simulated hand moves as the oscillator that it is") {

@@ -379,6 +379,7 @@ TEST_CASE("Gripper, buttons and what was noted stand in the recording") {
   const Ran r = ran(session, stand_in(), folder / "without");
   CHECK(std::isnan(r.recording.rows.at(500).gripper_m));
   CHECK(r.recording.rows.at(500).buttons == 0);
+  CHECK(std::isnan(r.recording.rows.at(500).grip[0]));
 }
 
 TEST_CASE("The device is told how it stands, and what cannot be told is refused") {

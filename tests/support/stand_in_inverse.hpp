@@ -257,6 +257,7 @@ inline bool StandInInverse::answer(int socket, const std::string& text, bool& ce
     state.velocity_m_per_s = plant_.velocity_m_per_s();
     state.force_N = last_N_;
     state.has_grip = true;
+    state.grip = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
     state.buttons = buttons_;
   }
   std::string id = faults_.devices.at(0);

@@ -327,9 +327,11 @@ HandState PluginDevice::hand() noexcept {
   said.size = sizeof said;
   said.version = TPM_DEVICE_PLUGIN_VERSION;
   said.gripper_m = state.gripper_m;
+  std::copy(std::begin(state.grip), std::end(state.grip), said.grip);
   if (call_.hand(device_, &said) != TPM_DEVICE_OK) return state;
   if (description_.has_gripper != 0) state.gripper_m = said.gripper_m;
   state.buttons = said.buttons;
+  std::copy(std::begin(said.grip), std::end(said.grip), state.grip);
   return state;
 }
 

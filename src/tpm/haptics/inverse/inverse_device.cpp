@@ -47,6 +47,16 @@ std::string words_of(const InverseEvent& event) {
 
 }  // namespace
 
+InverseInventory inverse_inventory(const InverseAddress& address) {
+  WebSocketClient service(address.port, "/", kPatience_s, kMostInventoryBytes);
+  const std::optional<std::string> text = service.receive(kPatience_s);
+  if (!text) {
+    throw service_fault(service.over().empty() ? "the service is silent" : service.over(),
+                        "a service that begins with its inventory");
+  }
+  return parse_inventory(*text);
+}
+
 InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits, bool said_by_user)
     : address_(std::move(address)),
       limits_(limits),
@@ -362,6 +372,12 @@ DeviceStatus InverseDevice::status() noexcept {
 HandState InverseDevice::hand() noexcept {
   HandState hand;
   hand.buttons = seen_.state.buttons;
+  if (seen_.state.has_grip) {
+    const Eigen::Quaterniond& grip = seen_.state.grip;
+    const double wxyz[4] = {grip.w(), grip.x(), grip.y(), grip.z()};
+    std::transform(std::begin(wxyz), std::end(wxyz), hand.grip,
+                   [](double v) { return static_cast<float>(v); });
+  }
   return hand;
 }
 

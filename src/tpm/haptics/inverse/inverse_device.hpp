@@ -23,6 +23,10 @@ struct InverseAddress {
   bool poll = false;          ///< the thread of the messages looks again and again, for latency
 };
 
+/// What the service says of its devices; nothing is commanded. Throws Error(environment) where
+/// nobody listens or answers, Error(bad_input) for what is no inventory.
+[[nodiscard]] InverseInventory inverse_inventory(const InverseAddress& address);
+
 /// An Inverse3 through a service that is compatible with the Inverse service: messages over
 /// loopback, no vendor library.
 ///

@@ -398,11 +398,13 @@ StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
                    kDampedWindow_s;
   count_limits(row.flags);
   if (cause != StopCause::none) return cause;
-  if (--to_status_ > 0) return StopCause::none;
-  to_status_ = settings_.status_every;
-  cause = look_at_status();
+  if (--to_status_ <= 0) {
+    to_status_ = settings_.status_every;
+    cause = look_at_status();
+  }
   row.gripper_m = hand_.gripper_m;
   row.buttons = hand_.buttons;
+  std::copy(std::begin(hand_.grip), std::end(hand_.grip), row.grip);
   return cause;
 }
 

@@ -15,8 +15,14 @@
 namespace tpm::haptics {
 namespace {
 
-constexpr const char* kFormat = "tpm hil recording 2";
-constexpr const char* kFirstFormat = "tpm hil recording 1";
+constexpr const char* kFormat = "tpm hil recording 3";
+
+/// Bytes of a row in the formats that are read; 0: none of them.
+std::size_t row_bytes_of(std::string_view format) {
+  if (format == kFormat) return sizeof(ServoRecord);
+  if (format == "tpm hil recording 2") return kSecondRowBytes;
+  return format == "tpm hil recording 1" ? kFirstRowBytes : 0;
+}
 
 Json times_json(const TimeHistogram& times) {
   return {{"p50_s", times.quantile_s(0.5)},
@@ -164,9 +170,8 @@ HilRecording read_recording(const std::filesystem::path& file) {
   HilRecording recording;
   recording.name = file.filename().string();
   recording.header = parse_json(log.header, at_header);
-  const std::string format = format_of(recording.header);
-  const std::size_t row_bytes = format == kFirstFormat ? kFirstRowBytes : sizeof(ServoRecord);
-  if ((format != kFormat && format != kFirstFormat) || log.row_bytes != row_bytes) {
+  const std::size_t row_bytes = row_bytes_of(format_of(recording.header));
+  if (row_bytes == 0 || log.row_bytes != row_bytes) {
     throw bad_input(file.string(), "is a recording of another version of tpm", kFormat);
   }
   recording.header = checked(std::move(recording.header), recording_header_kind(), at_header);

@@ -109,6 +109,12 @@ void write_rows(Hdf5Writer& file, const HilRecording& recording) {
   columns.whole<std::int64_t>(
       "buttons", "of the device, a bit for each that is pressed",
       [](const ServoRecord& row) { return static_cast<std::int64_t>(row.buttons); });
+  constexpr const char* kParts[] = {"w", "x", "y", "z"};
+  for (std::size_t k = 0; k < 4; ++k) {
+    columns.numbers(fmt::format("grip_{}", kParts[k]).c_str(), "1",
+                    "orientation of the grip, a unit quaternion; not a number: the device has none",
+                    [k](const ServoRecord& row) { return static_cast<double>(row.grip[k]); });
+  }
   for (const FlagWord& flag : kFlagWords) {
     columns.whole<std::int32_t>(flag.word, "1: so in this cycle", [&flag](const ServoRecord& row) {
       return (row.flags & flag.flag) != 0 ? 1 : 0;

@@ -102,8 +102,10 @@ const FileKind& recording_header_kind() {
         "loop. Keys of earlier versions are read as well",
         object_form(
             "hil_recording", "",
-            {required_key("format", one_of({"tpm hil recording 1", "tpm hil recording 2"}).form,
-                          "of the rows"),
+            {required_key(
+                 "format",
+                 one_of({"tpm hil recording 1", "tpm hil recording 2", "tpm hil recording 3"}).form,
+                 "of the rows"),
              required_text("version", "of the tpm that recorded"),
              optional_key("simulated_device", flag().form, "no hardware moved; true if missing"),
              required_key("device", recorded_device_form(), "what was held"),
