@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "creep_recordings.hpp"
 #include "temp_folder.hpp"
@@ -160,4 +161,55 @@ TEST_CASE("a strain that was held is imposed however noisy it is", "[creep]") {
   const PreparedRecording recording = prepare_recording("relaxation", r);
   CHECK_FALSE(recording.load_imposed);
   CHECK(recording.recording.drive_quantity == Quantity::strain);
+}
+
+TEST_CASE("a force that was held on an indentation is imposed, and the depth compared", "[creep]") {
+  for (const double power : {1.5, 2.0}) {
+    for (const double rest_s : {0.0, 4.0}) {
+      CAPTURE(power, rest_s);
+      test::PressTrial trial;
+      trial.power = power;
+      trial.creep.rest_s = rest_s;
+      if (rest_s == 0.0) trial.zero_N = 0.0;
+      const PreparedRecording recording =
+          prepare_recording("press.csv", test::press_recording_of(trial));
+      REQUIRE(recording.load_imposed);
+      CHECK(recording.recording.drive_quantity == Quantity::contact_force);
+      CHECK_THAT(recording.warnings.front(), Contains("the force was imposed") &&
+                                                 Contains("takes the force as exact and compares "
+                                                          "the depth"));
+      SetupOptions setup;
+      setup.starts = 4;
+      setup.reference = trial.reference_m;
+      setup.exponent = power;
+      const std::span<const PreparedRecording> span(&recording, 1);
+      const FitResult fit = run_fit(
+          recording_config(parse_law_name("power-1", "test"), span, setup), data_sets(span));
+      for (const auto& [name, truth] : {std::pair<std::string, double>{"k_inf", 2000.0},
+                                        {"k1", 3000.0},
+                                        {"tau1", 5.0},
+                                        {"contact", 1e-3}}) {
+        CAPTURE(name);
+        const auto p = std::ranges::find_if(
+            fit.parameters, [&](const ParameterResult& q) { return q.parameter.name == name; });
+        REQUIRE(p != fit.parameters.end());
+        REQUIRE(p->standard_error);
+        CHECK_THAT(p->estimate, WithinAbs(truth, 3.0 * *p->standard_error));
+        CHECK(*p->standard_error < 0.1 * truth);
+      }
+      CHECK_THAT(fit.recordings.front().rms_residual, WithinRel(4e-5, 0.15));
+    }
+  }
+}
+
+TEST_CASE("an indentation whose depth was held is no creep, however noisy it is", "[creep]") {
+  test::PressTrial trial;
+  Recording r = test::press_recording_of(trial);
+  Random random(6);
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    const double since = std::max(r.time_s[i] - 4.0, 0.0);
+    r.drive[i] = 2e-3 * std::min(since, 2.0) + 4e-5 * random.normal();
+    r.response[i] = std::min(since, 2.0) + std::min(since, 2.0) * std::exp(-since / 5.0);
+  }
+  CHECK_FALSE(prepare_recording("press.csv", r).load_imposed);
 }

@@ -200,10 +200,39 @@ TEST_CASE("without a rest a drift and a slow branch are not separable", "[placem
   for (const Json& p : json.at("fit").at("parameters")) {
     if (p.at("name") == "k_inf") CHECK(p.at("not_separable") == "drift or a slow branch");
   }
+  // What a drift would move has an interval that holds both answers.
+  for (const char* name : {"k1", "tau1"}) {
+    const ParameterResult& p = parameter_of(fit, name);
+    if (!p.not_separable.empty()) continue;
+    REQUIRE(p.with_drift);
+    CHECK(*p.lower <= *p.with_drift->lower);
+    CHECK(*p.upper >= *p.with_drift->upper);
+    CHECK(*p.lower < p.estimate);
+    CHECK_THAT(p.words, Contains("with a drift of the zero or without"));
+  }
   // The written configuration says the same when it is run.
   const FitResult again = run_fit(parse_fit_config(config_json(fit.config), "test"),
                                   {test::prepared(test, 4).recording});
   CHECK(verdict_text(parameter_of(again, "k_inf")) == verdict_text(k_inf));
+}
+
+TEST_CASE("a drift that no rest tells does not move k1 and tau1 out of their intervals",
+          "[placement]") {
+  for (const double drift_N_per_s : {-1e-3, 5e-4, 2e-3}) {
+    CAPTURE(drift_N_per_s);
+    PlacedTest test;
+    test.rest_s = 0.0;
+    test.drift_N_per_s = drift_N_per_s;
+    const Selection s = selected(test::prepared(test, 4), "linear-1");
+    const FitResult& fit = s.candidates.front().fit;
+    for (const auto& [name, truth] : {std::pair<const char*, double>{"k1", 45.0}, {"tau1", 2.0}}) {
+      const ParameterResult& p = parameter_of(fit, name);
+      CAPTURE(name, p.words);
+      if (p.verdict != Verdict::identified || !p.not_separable.empty()) continue;
+      CHECK(*p.lower < truth);
+      CHECK(*p.upper > truth);
+    }
+  }
 }
 
 TEST_CASE("a rest too short for the hold does not separate a drift", "[placement]") {

@@ -10,6 +10,7 @@
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/selection.hpp"
 #include "tpmkit/law.hpp"
 
 namespace tpm::test {
@@ -124,6 +125,7 @@ inline AdequacyOutcome fitted(const AdequacyTrial& trial, bool profiles = false)
   const std::span<const fit::PreparedRecording> span(&one, 1);
   fit::FitResult result = fit::run_fit(
       fit::recording_config(parse_law_name("linear-1", "law"), span, setup), fit::data_sets(span));
+  fit::give_both_drift_answers(result, span);
   fit::state_adequacy(result, span);
   AdequacyOutcome outcome;
   outcome.adequacy = result.adequacy.value();

@@ -50,4 +50,38 @@ inline Recording creep_recording_of(const CreepTrial& trial) {
   return r;
 }
 
+/// Creep of an indentation through contact: 2 and 3 kN/m at a depth of `reference_m`, times u (u /
+/// reference)^(power - 1), so that V = u^power / reference^(power - 1) creeps as a strain does.
+struct PressTrial {
+  CreepTrial creep{.rest_s = 4.0, .ramp_s = 2.0, .stress_Pa = 8.0, .noise = 0.0};
+  double power = 1.5;
+  double reference_m = 4e-3;
+  double contact_m = 1e-3;  ///< the probe comes nearer at rest
+  double zero_N = 0.02;
+  double noise_m = 4e-5;  ///< 1 % of the depth
+  double noise_N = 4e-4;
+};
+
+/// As tables have it: force over depth.
+inline Recording press_recording_of(const PressTrial& trial) {
+  Recording r;
+  r.header.id = "press";
+  r.drive_quantity = Quantity::indentation_depth;
+  r.response_quantity = Quantity::contact_force;
+  base::Random random(trial.creep.seed);
+  const double rest_s = trial.creep.rest_s;
+  for (int i = 0; 0.1 * i <= rest_s + 30.0 + 1e-9; ++i) {
+    const double t = 0.1 * i;
+    const double v = creep_strain(trial.creep, t);
+    const double nearer = rest_s > 0.0 ? std::min(t / rest_s, 1.0) : 1.0;
+    const double u = std::pow(v * std::pow(trial.reference_m, trial.power - 1.0), 1 / trial.power);
+    const double share = std::clamp((t - rest_s) / trial.creep.ramp_s, 0.0, 1.0);
+    r.time_s.push_back(t);
+    r.drive.push_back(trial.contact_m * nearer + u + trial.noise_m * random.normal());
+    r.response.push_back(trial.zero_N + trial.creep.stress_Pa * share +
+                         trial.noise_N * random.normal());
+  }
+  return r;
+}
+
 }  // namespace tpm::test

@@ -34,6 +34,12 @@ struct Condition {
   bool operator==(const Condition&) const = default;
 };
 
+/// What a fit with a drift of the zero says of a parameter; SI.
+struct WithDrift {
+  double estimate = 0.0;
+  std::optional<double> lower, upper;
+};
+
 /// Result for one estimated parameter; SI.
 struct ParameterResult {
   FitParameter parameter;
@@ -44,6 +50,9 @@ struct ParameterResult {
   /// What the recording cannot tell it from ("drift or a slow branch"); it is then not identified,
   /// whatever its profile says. See EstimatedParameter.
   std::string not_separable;
+  /// Of a fit with a drift of the zero, where no rest tells one: `lower` and `upper` then hold this
+  /// interval, too.
+  std::optional<WithDrift> with_drift = std::nullopt;
   double estimate = 0.0;
   std::optional<double> standard_error;  ///< linearised, in natural units
   std::optional<double> lower, upper;    ///< confidence limits by profile likelihood
@@ -95,7 +104,9 @@ struct RecordingFit {
   std::vector<double> time_s, drive, observed, predicted;  ///< SI; see Response for NaN
   /// Drive of the law at a sample: what was imposed, or what answers an imposed load.
   [[nodiscard]] double law_drive(std::size_t i) const {
-    return drive_quantity == Quantity::stress ? predicted[i] : drive[i];
+    const bool load =
+        drive_quantity == Quantity::stress || drive_quantity == Quantity::contact_force;
+    return load ? predicted[i] : drive[i];
   }
   std::vector<double> standardised;   ///< residuals in standard deviations
   std::vector<bool> fitted;           ///< false: outside the window, or censored

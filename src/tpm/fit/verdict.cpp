@@ -101,6 +101,13 @@ std::string exchange_words(const ParameterResult& p) {
                      : "towards larger");
 }
 
+/// Both answers, where no rest tells a drift.
+std::string drift_note(const ParameterResult& p) {
+  if (!p.with_drift) return {};
+  return fmt::format(" with a drift of the zero or without ({} with one)",
+                     in_unit(p.parameter, p.with_drift->estimate));
+}
+
 std::string range_words(const ParameterResult& p, double level) {
   const FitParameter& f = p.parameter;
   switch (p.verdict) {
@@ -116,16 +123,16 @@ std::string range_words(const ParameterResult& p, double level) {
         return fmt::format("{} = {}, {}; {} interval of this minimum {}", f.name,
                            in_unit(f, p.estimate), p.unconfirmed, percent(level), interval);
       }
-      return fmt::format("{} = {} is identified: {} interval {}{}", f.name, in_unit(f, p.estimate),
-                         percent(level), interval,
+      return fmt::format("{} = {} is identified: {} interval {}{}{}", f.name,
+                         in_unit(f, p.estimate), percent(level), interval, drift_note(p),
                          p.profile.connected ? "" : ", not all of it: separate ranges fit");
     }
     case Verdict::lower_only:
-      return fmt::format("{} is at least {} ({} interval, one-sided){}", f.name,
-                         in_unit(f, *p.lower), percent(level), bound_note(p));
+      return fmt::format("{} is at least {} ({} interval, one-sided){}{}", f.name,
+                         in_unit(f, *p.lower), percent(level), drift_note(p), bound_note(p));
     case Verdict::upper_only:
-      return fmt::format("{} is at most {} ({} interval, one-sided){}", f.name,
-                         in_unit(f, *p.upper), percent(level), bound_note(p));
+      return fmt::format("{} is at most {} ({} interval, one-sided){}{}", f.name,
+                         in_unit(f, *p.upper), percent(level), drift_note(p), bound_note(p));
     case Verdict::flat:
       if (exchanges(p, false) || exchanges(p, true)) {
         return fmt::format("{} cannot be told from these data{}", f.name, bound_note(p));

@@ -90,10 +90,12 @@ void parse_imposed(const Json& j, const FitConfig& config, DataChoice& data,
     throw bad_input(here.where, fmt::format("'{}'", printable(imposed)), "drive or response");
   }
   if (imposed == "drive") return;
-  const bool strain = config.law && config.law->drive == Quantity::strain;
-  if (data.protocol.kind != Kind::measured || !strain) {
-    throw bad_input(here.where, "'response' without a recording of stress over strain",
-                    "it only with the protocol 'measured' and a law of stress over strain");
+  const bool answers = config.law && (config.law->drive == Quantity::strain ||
+                                      config.law->drive == Quantity::indentation_depth);
+  if (data.protocol.kind != Kind::measured || !answers) {
+    throw bad_input(here.where,
+                    "'response' without a recording of stress over strain or force over depth",
+                    "it only with the protocol 'measured' and a law of one of these");
   }
   data.load_imposed = true;
 }

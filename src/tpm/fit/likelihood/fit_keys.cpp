@@ -194,8 +194,9 @@ FormPtr fit_data_form() {
        optional_key("to", of_dimension(Dimension::time),
                     "recordings: later samples are predicted, not fitted"),
        optional_key("imposed", one_of({"drive", "response"}).form,
-                    "recordings of stress over strain: response where the stress was imposed and "
-                    "the strain answers (creep); its noise is then one of strain"),
+                    "recordings of stress over strain or force over depth: response where the load "
+                    "was imposed and the strain or depth answers (creep); its noise is then one of "
+                    "what answers"),
        optional_key("clipped_above", some_quantity(),
                     "recordings: limit of the force cell; readings from here on are censored: of "
                     "each it counts only that it lay at the limit or beyond"),

@@ -9,12 +9,24 @@
 namespace tpm::fit {
 
 /// Whether a recording is one of creep: its drive is the stress of a law and its response the
-/// strain.
+/// strain, or its drive the force of an indentation and its response the depth.
 [[nodiscard]] bool is_load_imposed(const Recording& recording) noexcept;
 
-/// A recording of stress over strain in which the stress was imposed: drive and response change
-/// places. Standard deviations of the stress say nothing of the strain and are left out.
+/// "force" of an indentation, "stress" of a strain: what was imposed in creep.
+[[nodiscard]] std::string_view load_word(const Recording& recording) noexcept;
+
+/// "depth" of an indentation, or "strain": what answers.
+[[nodiscard]] std::string_view answer_word(const Recording& recording) noexcept;
+
+/// A recording of stress over strain, or of force over depth, in which the load was imposed: drive
+/// and response change places. Standard deviations of the load say nothing of what answers it and
+/// are left out. Of an indentation the force before contact becomes its mean: without a force its
+/// noise would lift the probe off.
 [[nodiscard]] Recording with_imposed_load(Recording recording);
+
+/// Samples of an indentation under an imposed force in which it rests before it rises: the probe
+/// has not touched, and no law says what the depth is. None if it rests under a preload.
+[[nodiscard]] std::size_t samples_before_load(const Recording& recording);
 
 /// Drive and response of the law that a recording is fitted with, whichever was imposed.
 [[nodiscard]] Quantity law_drive(const Recording& recording) noexcept;

@@ -9,6 +9,7 @@
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -74,11 +75,16 @@ std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecor
   return worst;
 }
 
+/// None of an indentation under an imposed force, whose probe comes nearer at rest.
+std::size_t told_at_rest(const Recording& recording, const RecordingPhases& phases) {
+  return samples_before_load(recording) > 0 ? 0 : samples_at_rest(phases);
+}
+
 std::vector<RestedRecording> rested(std::span<const PreparedRecording> recordings) {
   std::vector<RestedRecording> list;
   list.reserve(recordings.size());
   for (const PreparedRecording& r : recordings) {
-    list.push_back({&r.recording, samples_at_rest(r.phases)});
+    list.push_back({&r.recording, told_at_rest(r.recording, r.phases)});
   }
   return list;
 }
@@ -230,7 +236,7 @@ void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
     for (const RecordingFit& r : fit.recordings) {
       const auto* recording = std::get_if<Recording>(&data[r.choice]);
       if (recording == nullptr || is_step_response(recording->response_quantity)) continue;
-      rests[r.choice] = {recording, samples_at_rest(find_phases(*recording))};
+      rests[r.choice] = {recording, told_at_rest(*recording, find_phases(*recording))};
     }
     judged = worst_of(fit, rests);
   }

@@ -108,7 +108,11 @@ void find_imposed_channel(PreparedRecording& recording) {
   constexpr double kMuchLess = 3.0;  // times less noise, in parts of the range
   constexpr double kNoisy = 2e-3;    // of the range: a channel that is not exact
   const Recording& r = recording.recording;
-  if (r.drive_quantity != Quantity::strain || r.response_quantity != Quantity::stress) return;
+  const bool stretched =
+      r.drive_quantity == Quantity::strain && r.response_quantity == Quantity::stress;
+  const bool pressed = r.drive_quantity == Quantity::indentation_depth &&
+                       r.response_quantity == Quantity::contact_force;
+  if (!stretched && !pressed) return;
   if (r.drive.size() != r.response.size() || r.time_s.size() != r.drive.size()) return;
   const std::size_t end = end_of_load(r.response);
   if (end < kFewest) return;
@@ -126,19 +130,22 @@ void find_imposed_channel(PreparedRecording& recording) {
   recording.load_imposed = imposed;
   if (imposed) recording.recording = with_imposed_load(std::move(recording.recording));
   if (!imposed && !both_noisy) return;
-  const std::string_view taken = imposed ? "stress" : "strain";
+  const std::string load(load_word(recording.recording));
+  const std::string answer(answer_word(recording.recording));
+  const std::string& taken = imposed ? load : answer;
   recording.warnings.push_back(fmt::format(
-      "{}: {}; noise is {} % of the range of the strain and {} % of that of the stress. The fit "
+      "{}: {}; noise is {} % of the range of the {} and {} % of that of the {}. The fit "
       "takes the {} as exact{}",
       recording.name,
-      imposed ? "the stress was imposed (it was held while the strain went on: creep)"
+      imposed ? fmt::format("the {} was imposed (it was held while the {} went on: creep)", load,
+                            answer)
               : "both channels are noisy",
-      significant(100.0 * of_strain, 2), significant(100.0 * of_stress, 2), taken,
+      significant(100.0 * of_strain, 2), answer, significant(100.0 * of_stress, 2), load, taken,
       both_noisy
           ? fmt::format(": the noise of the {} makes fast branches look weaker and intervals "
                         "too narrow",
                         taken)
-          : std::string(" and compares the strain")));
+          : fmt::format(" and compares the {}", answer)));
 }
 
 }  // namespace tpm::fit

@@ -3,10 +3,11 @@
 
 namespace tpm::fit {
 
-/// Finds which channel of a stress-strain recording was imposed, before its phases are known: the
-/// stress if it is the less noisy one, was held, and the strain went on under it (creep). Drive and
-/// response then change places, and load_imposed is set: a fit imposes the stress and compares the
-/// strain. `warnings` say so, and what it biases if both channels are noisy.
+/// Finds which channel of a recording of stress and strain, or of force and depth, was imposed,
+/// before its phases are known: the load if it is the less noisy one, was held, and the strain or
+/// depth went on under it (creep). Drive and response then change places, and load_imposed is set:
+/// a fit imposes the load and compares the strain or depth. `warnings` say so, and what it biases
+/// if both channels are noisy.
 void find_imposed_channel(PreparedRecording& recording);
 
 /// Where the search for a law of creep begins: what fits find that take the strain as exact. The

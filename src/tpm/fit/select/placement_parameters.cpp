@@ -93,13 +93,13 @@ AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, st
   return bounds;
 }
 
-/// Strain without a load, of creep: the load itself is taken as imposed.
+/// Strain without a load, or depth of contact, of creep: the load itself is taken as imposed.
 AutomaticBounds strain_zero_bounds(const LawSpec& law, const PreparedRecording& r,
                                    std::string name) {
   constexpr double kFurther = 10.0;
   const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
-  return {readable({std::move(name), shown_unit(quantity_dimension(law.drive)), Scale::linear, 0.0,
-                    -peak, peak}),
+  return {readable({std::move(name), shown_unit(quantity_dimension(law.drive)), Scale::linear,
+                    r.phases.floor_response, -peak, peak}),
           WidestBounds{-kFurther * peak, kFurther * peak}};
 }
 
@@ -158,7 +158,27 @@ void add_drift(FitConfig& config, const LawSpec& law, const PreparedRecording& r
   config.parameters.push_back(std::move(p));
 }
 
-/// Zero and contact of recordings that are no indentations: nothing is measured beforehand.
+/// Holds the reading without a load where it was before the force rose.
+void hold_zero_of_load(FitConfig& config, const LawModel& model, const PreparedRecording& r,
+                       std::vector<std::size_t> scope) {
+  constexpr double kHeld = 1e-6;  // of the largest force
+  const std::size_t rest = samples_before_load(r.recording);
+  const double zero = rest > 0 ? r.recording.drive.front() : 0.0;
+  if (scope.empty()) {
+    config.fixed[model.index("offset")] = zero;
+    return;
+  }
+  const double off = kHeld * r.phases.peak_drive;
+  add_automatic(
+      config,
+      {{fmt::format("offset {}", r.name), shown_unit(quantity_dimension(model.spec().response)),
+        Scale::linear, zero, zero - off, zero + off},
+       std::nullopt},
+      {{model.index("offset"), std::move(scope)}});
+}
+
+/// Zero and contact of recordings that are no indentations, and of creep: nothing is measured
+/// beforehand but the force before it rises.
 void add_free_placement(FitConfig& config, const LawModel& model, const PreparedRecording& r,
                         std::size_t i, std::vector<std::size_t> scope, std::string offset,
                         Nuisance nuisance) {
@@ -237,10 +257,16 @@ void add_placement(FitConfig& config, const LawModel& model,
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     const PreparedRecording& r = recordings[i];
     const auto scope = several ? std::vector<std::size_t>{i} : std::vector<std::size_t>{};
-    if (!is_indentation(law)) {
+    if (!is_indentation(law) || r.load_imposed) {
+      const bool pressed = is_indentation(law);
+      if (pressed && !options.zero) hold_zero_of_load(config, model, r, scope);
       if (r.load_imposed ? options.contact.has_value() : options.zero.has_value()) continue;
       add_free_placement(config, model, r, i, scope,
-                         named(r.load_imposed ? "strain_zero" : "offset", r), options.nuisance);
+                         named(pressed          ? "contact"
+                               : r.load_imposed ? "strain_zero"
+                                                : "offset",
+                               r),
+                         options.nuisance);
       continue;
     }
     const MeasuredPlacement placement =

@@ -264,6 +264,10 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
     break;
   }
   if (!r.load_imposed) find_clipping(r);
+  if (const std::size_t rest = samples_before_load(r.recording); rest > 0) {
+    r.from_s = time[rest];
+    r.phases.floor_response = r.recording.response[rest];
+  }
   leave_out_start_up(r);
   if (r.to_s > r.from_s) return r;
   throw bad_input(fmt::format("recording '{}'", r.name), "no ramp and hold before the unloading",

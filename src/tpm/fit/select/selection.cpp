@@ -362,8 +362,13 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   settle_choice(s, protocol_spans(recordings),
                 options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
   Candidate& chosen = s.candidates[s.recommended];
-  s.drift = drift_answers(chosen.fit, recordings);
+  s.drift = give_both_drift_answers(chosen.fit, recordings);
   if (s.drift) chosen.fit.flags.push_back(drift_words(*s.drift, chosen.fit));
+  if (s.preferred) {
+    FitResult& preferred = s.candidates[*s.preferred].fit;
+    const auto both = give_both_drift_answers(preferred, recordings);
+    if (both) preferred.flags.push_back(drift_words(*both, preferred));
+  }
   std::ranges::move(protocol_warnings(chosen.fit, recordings), std::back_inserter(s.warnings));
   state_adequacy(s, recordings);
   describe(s);

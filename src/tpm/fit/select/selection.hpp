@@ -101,9 +101,11 @@ struct Selection {
                                       bool refusal_counts = false);
 
 /// Fits a law again with a linear drift of the zero of each recording that holds, within what its
-/// rests tell; nothing if the fit separates the two already.
-[[nodiscard]] std::optional<DriftAnswers> drift_answers(
-    const FitResult& fit, std::span<const PreparedRecording> recordings);
+/// rests tell; nothing if the fit separates the two already. The drift moves every coefficient of
+/// the law: the interval of each then holds both answers, or, where one of them has no interval,
+/// the coefficient is not identified.
+std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
+                                                    std::span<const PreparedRecording> recordings);
 
 [[nodiscard]] std::string drift_words(const DriftAnswers& answers, const FitResult& fit);
 

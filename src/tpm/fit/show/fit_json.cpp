@@ -97,6 +97,11 @@ Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimate
   j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
   j["verdict"] = verdict_text(p);
   if (!p.not_separable.empty()) j["not_separable"] = p.not_separable;
+  if (p.with_drift) {
+    j["with_drift_SI"] = {
+        {"estimate", number(p.with_drift->estimate)},
+        {"interval", {optional_number(p.with_drift->lower), optional_number(p.with_drift->upper)}}};
+  }
   if (!p.unconfirmed.empty()) j["unconfirmed"] = p.unconfirmed;
   if (estimated.prior) {
     j["prior_SI"] = {{"mean", number(estimated.prior->mean)},
