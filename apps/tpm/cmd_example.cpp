@@ -38,7 +38,7 @@ const std::vector<Example>& examples() {
        "ramp to 4 mm and hold: 60 N/m beside 45 N/m that relax in 2 s, noise 0.2 mN",
        kSynthetic,
        "configs/recording_example",
-       {"recording.csv", "make_recording.py"}},
+       {"recording.csv", "recording.json", "make_recording.py"}},
       {"spectrum",
        "fit",
        "a hold and dynamic stiffness of one law, fitted together",

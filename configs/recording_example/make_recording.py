@@ -13,7 +13,7 @@ random.seed(3)
 with open("recording.csv", "w", encoding="utf-8") as file:
     file.write("# SYNTHETIC, not measured; made by make_recording.py\n")
     file.write("# law: 60 N/m in parallel with 45 N/m that relax in 2 s; normal noise of 0.2 mN\n")
-    file.write("time [s],depth [mm],force [N]\n")
+    file.write("time_s,depth_mm,force_N\n")
     for i in range(1251):
         t = 0.02 * i - 5.0  # s after contact
         pushed = max(t, 0.0)

@@ -69,8 +69,8 @@ Panel response_panel(const RecordingFit& r, bool over_time) {
   const auto inside = [&](std::size_t i) { return r.fitted[i]; };
   const auto outside = [&](std::size_t i) { return !r.fitted[i]; };
   add_if_any(panel,
-             sampled(measured("measured, fitted", r), r, x, x_unit, r.observed, y_unit, inside));
-  add_if_any(panel, sampled(measured("measured, not fitted", r), r, x, x_unit, r.observed, y_unit,
+             sampled(measured("readings, fitted", r), r, x, x_unit, r.observed, y_unit, inside));
+  add_if_any(panel, sampled(measured("readings, not fitted", r), r, x, x_unit, r.observed, y_unit,
                             outside));
   if (over_time) add_band(panel, r, y_unit);
   add_if_any(panel, sampled(line("law", {}, {}), r, x, x_unit, r.predicted, y_unit, inside));
@@ -85,7 +85,7 @@ Panel residual_panel(const RecordingFit& r) {
   Panel panel{.x = {"time", "s"}, .y = {"residual over peak", "%"}};
   std::vector<double> residual(r.observed.size());
   for (std::size_t i = 0; i < residual.size(); ++i) residual[i] = r.predicted[i] - r.observed[i];
-  Series s{.kind = Series::Kind::points, .label = "law less measured", .provenance = "derived"};
+  Series s{.kind = Series::Kind::points, .label = "law less reading", .provenance = "derived"};
   add_if_any(panel, sampled(std::move(s), r, r.time_s, 1.0, residual, 0.01 * r.peak,
                             [&](std::size_t i) { return r.fitted[i]; }));
   return panel;
