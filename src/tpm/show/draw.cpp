@@ -206,12 +206,14 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
   if (python.empty()) return;
   std::vector<std::string> words{std::filesystem::absolute(figures_json).string(),
                                  std::filesystem::absolute(folder).string()};
-  if (drawings == Drawings::svg_and_png) words.emplace_back("--png");
+  if (drawings == Drawings::for_print) words.emplace_back("--print");
   std::vector<std::filesystem::path> files;
   for (const Json& figure : read_json(figures_json).at("figures")) {
     const auto id = figure.at("id").get<std::string>();
     files.push_back(folder / (id + ".svg"));
-    if (drawings == Drawings::svg_and_png) files.push_back(folder / (id + ".png"));
+    if (drawings == Drawings::svg) continue;
+    files.push_back(folder / (id + ".png"));
+    files.push_back(folder / (id + ".pdf"));
   }
   run_script(python, "draw_figures.py", words, files);
 }
@@ -278,11 +280,12 @@ std::vector<std::string> write_figures(const std::filesystem::path& folder,
   const std::string& json = files.emplace_back("figures.json");
   write_file(folder / json, to_text(to_json(figures)));
   const std::string python = find_drawing_python();
-  draw_figures(python, folder / json, folder, Drawings::svg_and_png);
+  draw_figures(python, folder / json, folder, Drawings::for_print);
   if (python.empty()) return files;
   for (const Figure& figure : figures) {
     files.push_back(fmt::format("{}.svg", figure.id));
     files.push_back(fmt::format("{}.png", figure.id));
+    files.push_back(fmt::format("{}.pdf", figure.id));
   }
   return files;
 }

@@ -16,7 +16,8 @@ namespace tpm::show {
 /// and write the rest.
 [[nodiscard]] std::string find_drawing_python();
 
-enum class Drawings { svg, svg_and_png };
+/// What is drawn of each figure: SVG alone, or PNG (300 dpi) and PDF too.
+enum class Drawings { svg, for_print };
 
 /// Draws every figure of a figures.json into `folder`, one file each, with
 /// scripts/draw_figures.py. Throws Error(environment) with the last words of the script if it
@@ -24,8 +25,8 @@ enum class Drawings { svg, svg_and_png };
 void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
                   const std::filesystem::path& folder, Drawings drawings = Drawings::svg);
 
-/// Writes figures.json into `folder` and draws its figures there as SVG and PNG. Returns the names
-/// of the files that were written, after those of `files`: without a Python with matplotlib
+/// Writes figures.json into `folder` and draws its figures there as SVG, PNG and PDF. Returns the
+/// names of the files that were written, after those of `files`: without a Python with matplotlib
 /// figures.json alone. Throws as draw_figures does; figures.json is then there.
 [[nodiscard]] std::vector<std::string> write_figures(const std::filesystem::path& folder,
                                                      const std::vector<Figure>& figures,

@@ -116,6 +116,17 @@ FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {
   return config;
 }
 
+/// Where the readings behind a figure come from: "data: meat.csv [measured]".
+std::string data_words(const FitResult& fit) {
+  std::vector<std::string> words;
+  for (const RecordingFit& r : fit.recordings) {
+    words.push_back(fmt::format(
+        "{} [{}]", std::filesystem::path(fit.config.data[r.choice].dataset).filename().string(),
+        provenance_name(r.provenance)));
+  }
+  return words.empty() ? "" : fmt::format("data: {}", fmt::join(words, ", "));
+}
+
 /// Each law's residual and BIC over its number of parameters, the recommended one marked.
 Figure selection_figure(const Selection& selection) {
   Figure figure{
@@ -128,7 +139,10 @@ Figure selection_figure(const Selection& selection) {
   Panel residual;
   residual.x = {"estimated parameters", ""};
   residual.y = {"rms residual over peak", "%", true};
-  Panel bic{.x = residual.x, .y = {"BIC above the best", ""}};
+  // Beyond 10 the evidence against a law is very strong: what matters lies within 30.
+  constexpr double kLargestBic = 30.0;
+  Panel bic{.x = residual.x,
+            .y = {.quantity = "BIC above the best", .lower = 0.0, .upper = kLargestBic}};
   for (const bool recommended : {false, true}) {
     add_if_any(residual, laws_at(selection, false, recommended));
     add_if_any(bic, laws_at(selection, true, recommended));
@@ -183,6 +197,7 @@ std::vector<std::string> write_selection(const std::filesystem::path& folder,
   const FitResult& fit = selection.candidates[selection.recommended].fit;
   figures.push_back(selection_figure(selection));
   figures.push_back(waterfall_figure(fit));
+  for (Figure& figure : figures) figure.note = data_words(fit);
   std::vector<std::string> files{"config.json", "selection.json", "law.json", "laws.csv"};
   write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
   write_file(folder / files[1], to_text(to_json(selection)));
