@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Draws the figures described in a figures.json of `tpm`, one SVG each.
+"""Draws the figures described in a figures.json of `tpm`: one SVG each, and for print PNG and PDF.
 
-    draw_figures.py FIGURES.json FOLDER [--png]
+    draw_figures.py FIGURES.json FOLDER [--print]
 
 Where a number comes from decides how it looks: what the model computes is a line; what was measured
 or printed is filled; what is assumed is open, hatched or dashed, and the legend says so. The same
@@ -24,6 +24,7 @@ import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
 from drawing_files import literal, save_drawing  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
+from matplotlib.patheffects import withStroke  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
 
 # Lengths in inches, so that text keeps its size whatever the number of panels.
@@ -33,20 +34,24 @@ EDGE = 0.06  # between the title of an axis and what stands left of it
 LEGEND_ROW, NOTE_ROW = 0.172, 0.16
 MOST_ACROSS = 4  # panels; more go on below
 
-# Okabe and Ito's palette: told apart by people with any of the usual colour deficiencies.
-MODEL_COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
+# After Okabe and Ito, whose colours people with any of the usual deficiencies tell apart; darkened to a contrast of
+# 3.9 or more on white, so that thin lines show.
+MODEL_COLOURS = ["#0072B2", "#C75400", "#00805E", "#B0508A", "#9C6B00", "#3A86B8"]
 DATA_COLOURS = ["#222222", "#8A5A00", "#5B2A86", "#666666"]
 # More markers than colours, so that the fifth series does not look like the first.
 DATA_MARKERS = ["o", "s", "D", "^", "v", "X", "P"]
 # Later lines are thinner: where curves coincide, all of them show.
 LINE_WIDTHS = [2.8, 1.8, 1.1, 0.8]
+# More readings than this are drawn as a grey trace, wider than the lines over it.
+DENSE, DENSE_COLOUR, DENSE_SIZE, WIDEST_OVER_DENSE = 100, "#8C8C8C", 3.6, 1.1
+PIXELS_PER_INCH = 300
 
 PROVENANCE = {
     "model": "computed by tpm",
-    "table": "printed in a table of the paper",
-    "text": "printed in the paper's text",
-    "abstract": "from the abstract of the original experiment",
-    "derived": "computed from printed numbers",
+    "table": "printed in a table of a paper",
+    "text": "printed in the text of a paper",
+    "abstract": "from the abstract of an experiment",
+    "derived": "computed from the data",
     "assumed": "chosen, not measured: open, hatched or dashed",
     "digitized": "read off a figure",
     "measured": "raw recording",
@@ -54,9 +59,10 @@ PROVENANCE = {
 }
 
 STYLE = {
-    "svg.fonttype": "path",
+    "svg.fonttype": "none",  # text: it can be searched, copied and edited
+    "pdf.fonttype": 42,
     "svg.hashsalt": "tpmkit",
-    "font.family": "DejaVu Sans",
+    "font.family": ["DejaVu Sans"],
     "font.size": 8.5,
     "axes.titlesize": 9,
     "axes.labelsize": 8.5,
@@ -84,17 +90,22 @@ def legend_text(series):
     return f"{series['label']} [{origin}]"
 
 
+def is_dense(series):
+    return series["kind"] == "points" and len(series["x"]) > DENSE
+
+
 def looks(figure):
     """Colour, marker and width of each label: one look per label throughout the figure."""
     chosen = {}
     lines = data = 0
+    dense = any(is_dense(s) for panel in figure["panels"] for s in panel["series"])
     for series in (s for panel in figure["panels"] for s in panel["series"]):
         if series["label"] in chosen:
             continue
         if series["kind"] == "line":
             chosen[series["label"]] = {
                 "color": MODEL_COLOURS[lines % len(MODEL_COLOURS)],
-                "width": LINE_WIDTHS[min(lines, len(LINE_WIDTHS) - 1)],
+                "width": min(LINE_WIDTHS[min(lines, len(LINE_WIDTHS) - 1)], WIDEST_OVER_DENSE if dense else math.inf),
             }
             lines += 1
         else:
@@ -112,12 +123,22 @@ def draw_line(axes, series, look):
     return Line2D([], [], **style)
 
 
+def inside(axes, series):
+    """Its readings below the upper limit that was set for y; how many are above it is written at the top."""
+    upper = getattr(axes, "upper_limit", None)
+    x, y, sd = series["x"], series["y"], series.get("sd")
+    kept = [i for i, value in enumerate(y) if upper is None or value <= upper]
+    axes.beyond = getattr(axes, "beyond", 0) + len(y) - len(kept)
+    return [x[i] for i in kept], [y[i] for i in kept], [sd[i] for i in kept] if sd else None
+
+
 def draw_points(axes, series, look):
-    face = "white" if is_assumed(series) else look["color"]
-    # A dense recording is drawn small and below the model's line.
-    dense = len(series["x"]) > 100
-    style = dict(marker=look["marker"], markersize=2 if dense else 5, markerfacecolor=face, markeredgecolor=look["color"], linestyle="none")
-    axes.errorbar(series["x"], series["y"], yerr=series.get("sd"), ecolor=look["color"], elinewidth=1, capsize=2.5, zorder=2 if dense else 5, clip_on=False, **style)
+    dense = is_dense(series)
+    colour = DENSE_COLOUR if dense else look["color"]
+    face = "white" if is_assumed(series) else colour
+    style = dict(marker=look["marker"], markersize=DENSE_SIZE if dense else 5, markerfacecolor=face, markeredgecolor=colour, linestyle="none")
+    x, y, sd = inside(axes, series)
+    axes.errorbar(x, y, yerr=sd, ecolor=colour, elinewidth=1, capsize=2.5, zorder=2 if dense else 5, clip_on=False, **style)
     return Line2D([], [], **style)
 
 
@@ -187,7 +208,8 @@ def draw_heat(axes, series, look, panel):
     found = [v for row in rows for v in row if not math.isnan(v)]
     if len(x) > 1 and len(y) > 1 and found and min(found) < max(found):
         lines = axes.contour(x, y, rows, levels=6, colors="white", linewidths=0.7)
-        axes.clabel(lines, fontsize=6.5, fmt="%g")
+        for text in axes.clabel(lines, fontsize=6.5, fmt="%g"):  # on dark and on bright colours
+            text.set_path_effects([withStroke(linewidth=1.6, foreground="#222222")])
     axes.figure.colorbar(mesh, ax=axes, fraction=0.16, pad=0.02, aspect=22)
     return Rectangle((0, 0), 1, 1, facecolor=mesh.get_cmap()(0.5))
 
@@ -248,15 +270,19 @@ def name_places(axes, names):
         axes.set_xlabel("")  # its place is taken by the names
 
 
-def draw_panel(axes, panel, look, handles, narrow=False):
+def draw_panel(axes, panel, look, handles, narrow=False, letter=""):
     """Draws one panel and adds a handle per new legend text to `handles`."""
+    axes.upper_limit = panel["y"].get("upper")
     for series in panel["series"]:
         if series["kind"] == "heat":
             handle = draw_heat(axes, series, look[series["label"]], panel)
         else:
             handle = DRAW[series["kind"]](axes, series, look[series["label"]])
         handles.setdefault(legend_text(series), handle)
-    axes.set_title(panel["title"], loc="left")
+    axes.set_title(lettered(letter, panel["title"]), loc="left")
+    if getattr(axes, "beyond", 0):
+        axes.annotate(f"\u25b2 {axes.beyond} above {axes.upper_limit:g}", (0.98, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7.5,
+                      color="#444444", bbox=dict(facecolor="white", edgecolor="none", alpha=0.8, pad=1.5), zorder=7)
     for name, axis in (("x", panel["x"]), ("y", panel["y"])):
         getattr(axes, f"set_{name}label")(axis_label(axis))
         if axis["logarithmic"]:
@@ -288,6 +314,18 @@ def provenance_note(figure):
     return [f"[{word}] {PROVENANCE[word]}" for word in present]
 
 
+def letter_of(panel, panels):
+    """a, b, ... for the text to refer to; none where there is one panel."""
+    return chr(ord("a") + panel) if 1 < panels <= 26 else ""
+
+
+def lettered(letter, title):
+    """A panel's title after its letter, unless it begins with one."""
+    if not letter or re.match(r"\([a-z]\) ", title):
+        return title
+    return f"({letter}) {title}".strip()
+
+
 def wrap(parts, per_row):
     return ["    ".join(parts[i:i + per_row]) for i in range(0, len(parts), per_row)]
 
@@ -312,7 +350,7 @@ def draw_figure(figure):
     """The figure, laid out from the bottom: provenance, legend, panels."""
     if any(s["kind"] == "trail" for panel in figure["panels"] for s in panel["series"]):
         import work_precision  # beside this file; other figures do without
-        return work_precision.draw_figure(figure, axis_label)
+        return work_precision.draw_figure(figure, axis_label, lambda i, n, title: lettered(letter_of(i, n), title))
     panels, look = figure["panels"], looks(figure)
     labels = {legend_text(s) for panel in panels for s in panel["series"]}
     columns = 1 if len(panels) == 1 else 2
@@ -334,7 +372,7 @@ def draw_figure(figure):
         left = LEFT + i % across * (panel_width + GAP)
         bottom = below + (stacked - 1 - i // across) * row_height
         axes = page.add_axes([left / width, bottom / height, panel_width / width, PANEL_HEIGHT / height])
-        draw_panel(axes, panel, look, handles, narrow=across > 3)
+        draw_panel(axes, panel, look, handles, narrow=across > 3, letter=letter_of(i, len(panels)))
         keep_inside(page, axes, left - (GAP if i % across else LEFT) + EDGE)
     page.legend(handles.values(), handles.keys(), loc="upper left", ncol=columns, frameon=False, borderaxespad=0,
                 bbox_to_anchor=(LEFT / width, (below - below_axis) / height), handlelength=2.2, labelspacing=0.45)
@@ -346,17 +384,22 @@ def draw_figure(figure):
 def with_own_ids(svg, name):
     """Several figures stand in one page: their ids must not meet. What XML or a style could misread is left out."""
     prefix = re.sub(r"[^A-Za-z0-9_.-]", "_", name)
-    svg = re.sub(r'\bid="', f'id="{prefix}-', svg)
-    svg = re.sub(r'href="#', f'href="#{prefix}-', svg)
-    return re.sub(r"url\(#", f"url(#{prefix}-", svg)
+
+    def own(tag):
+        text = re.sub(r'\bid="', f'id="{prefix}-', tag[0])
+        text = re.sub(r'href="#', f'href="#{prefix}-', text)
+        return re.sub(r"url\(#", f"url(#{prefix}-", text)
+
+    return re.sub(r"<[^>]*>", own, svg)  # the tags alone: what a user named stays as it is
 
 
-def save(figure, folder, png):
+def save(figure, folder, for_print):
     page = draw_figure(figure)
     save_drawing(page, folder / f"{figure['id']}.svg", lambda svg: with_own_ids(svg, figure["id"]),
                  metadata={"Date": None, "Creator": None})
-    if png:
-        save_drawing(page, folder / f"{figure['id']}.png", dpi=130, metadata={"Software": None})
+    if for_print:
+        save_drawing(page, folder / f"{figure['id']}.png", dpi=PIXELS_PER_INCH, metadata={"Software": None})
+        save_drawing(page, folder / f"{figure['id']}.pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
     plt.close(page)
 
 
@@ -364,7 +407,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("figures", type=Path, help="figures.json as written by tpm")
     parser.add_argument("folder", type=Path, help="where the drawings go")
-    parser.add_argument("--png", action="store_true", help="write a PNG beside each SVG")
+    parser.add_argument("--print", dest="for_print", action="store_true", help="write PNG (300 dpi) and PDF beside each SVG")
     arguments = parser.parse_args()
     try:
         figures = literal(json.loads(arguments.figures.read_text(encoding="utf-8"))["figures"])
@@ -374,7 +417,7 @@ def main():
     matplotlib.rcdefaults()  # not what a matplotlibrc of this machine says
     matplotlib.rcParams.update(STYLE)
     for figure in figures:
-        save(figure, arguments.folder, arguments.png)
+        save(figure, arguments.folder, arguments.for_print)
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ VIEWS = [
 # Inches.
 WIDTH, LEFT, RIGHT, ABOVE, BELOW, MOST_HIGH = 11.0, 0.7, 0.15, 0.75, 1.15, 7.0
 SLABS = 16  # of the depth, drawn one after the other
-STYLE = {"svg.fonttype": "path", "svg.hashsalt": "tpmkit", "font.family": "DejaVu Sans", "font.size": 8.5,
+STYLE = {"svg.fonttype": "none", "svg.hashsalt": "tpmkit", "font.family": "DejaVu Sans", "font.size": 8.5,
          "axes.titlesize": 9.5, "axes.spines.top": False, "axes.spines.right": False}
 
 
@@ -177,7 +177,7 @@ def main():
     matplotlib.rcParams.update(STYLE)
     page = draw(picture)
     save_drawing(page, f"{arguments.stem}.svg", metadata={"Date": None, "Creator": None})
-    save_drawing(page, f"{arguments.stem}.png", dpi=130, metadata={"Software": None})
+    save_drawing(page, f"{arguments.stem}.png", dpi=300, metadata={"Software": None})
 
 
 if __name__ == "__main__":

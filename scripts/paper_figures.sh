@@ -16,7 +16,7 @@ trap 'rm -rf "$folder"' EXIT
 
 step "the published model recomputed"
 "$program" report --output "$folder/report" >"$folder/report.txt"
-"$TPMKIT_PYTHON" scripts/draw_figures.py "$folder/report/figures.json" "$folder/drawn" --png
+"$TPMKIT_PYTHON" scripts/draw_figures.py "$folder/report/figures.json" "$folder/drawn" --print
 
 step "what is lost between the data and a hand"
 "$program" fit configs/liver_relaxation.json --folder "$folder/liver_fit" >"$folder/fit.txt"

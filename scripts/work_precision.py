@@ -13,7 +13,7 @@ LEGEND_ROW, BAND_ROW, COLUMNS = 0.172, 0.165, 4
 
 # One look per method in every chart. Colours after Okabe and Ito, and two greys.
 BLUE, RED, GREEN, PINK, ORANGE, SKY, BLACK, GREY = (
-    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222", "#8C8C8C")
+    "#0072B2", "#C75400", "#00805E", "#B0508A", "#9C6B00", "#3A86B8", "#222222", "#767676")
 LOOKS = {
     "forward_euler": (RED, "v"), "semi_implicit_euler": (RED, "<"), "rk4": (RED, "D"),
     "backward_euler": (BLUE, "o"), "implicit_midpoint": (BLUE, "s"), "newmark": (BLUE, "P"),
@@ -101,7 +101,7 @@ def limits(panel):
     return (min(xs) / 1.6, max(xs) * 1.6), (min(ys) / 3, max(max(ys), 0.3) * 3)
 
 
-def draw_panel(page, place, band_height, panel, look, rows, axis_label):
+def draw_panel(page, place, band_height, panel, look, rows, axis_label, title):
     left, bottom, width, height = place
     axes = page.add_axes([left, bottom, width, height])
     axes.set_xscale("log")
@@ -123,10 +123,10 @@ def draw_panel(page, place, band_height, panel, look, rows, axis_label):
         band.set_xlim(x_limits)
         draw_band(band, panel, rows, look)
         top = band
-    top.set_title(panel["title"], loc="left")
+    top.set_title(title, loc="left")
 
 
-def draw_figure(figure, axis_label):
+def draw_figure(figure, axis_label, title_of):
     panels, look, rows = figure["panels"], curves(figure), failure_rows(figure)
     legend_rows = -(-len(look) // COLUMNS)
     below = BELOW_AXIS + legend_rows * LEGEND_ROW + 0.12
@@ -136,7 +136,7 @@ def draw_figure(figure, axis_label):
     width = (PAGE_WIDTH - LEFT - RIGHT - (len(panels) - 1) * GAP) / len(panels)
     for i, panel in enumerate(panels):
         place = [(LEFT + i * (width + GAP)) / PAGE_WIDTH, below / height, width / PAGE_WIDTH, PANEL_HEIGHT / height]
-        draw_panel(page, place, band / height, panel, look, rows, axis_label)
+        draw_panel(page, place, band / height, panel, look, rows, axis_label, title_of(i, len(panels), panel["title"]))
     handles = [Line2D([], [], color=style[0], linewidth=0.9, **marker_style(style)) for style in look.values()]
     page.legend(handles, list(look), loc="upper left", ncol=COLUMNS, frameon=False, borderaxespad=0, handlelength=2.0, labelspacing=0.4, fontsize=7.5,
                 columnspacing=1.2, bbox_to_anchor=(0.25 / PAGE_WIDTH, (below - BELOW_AXIS) / height))

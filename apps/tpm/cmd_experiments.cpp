@@ -38,8 +38,8 @@ int experiments(const ExperimentsOptions& options, const Session& session) {
   }
   for (const std::string& sentence : cost_sentences(study)) say("- {}\n", sentence);
   say("written to {}: report.html, report.md, experiments.json, readings.csv, fits.csv, "
-      "curves.csv, figures\n",
-      options.folder);
+      "curves.csv, {}\n",
+      options.folder, python.empty() ? "figures.json" : "figures");
   return 0;
 }
 

@@ -113,7 +113,11 @@ int show(const NetworkChoice& choice, const Session& session) {
   const std::string python = find_drawing_python();
   write_file(picture, to_text(network_picture(tissue)));
   draw_network(python, picture, stem);
-  say("wrote {0}.svg, {0}.png and {0}.json\n", stem.string());
+  if (python.empty()) {
+    say("wrote {}.json\n", stem.string());
+  } else {
+    say("wrote {0}.svg, {0}.png and {0}.json\n", stem.string());
+  }
   return 0;
 }
 

@@ -17,8 +17,8 @@ int report(const std::string& folder, double requirement, const Session& session
   write_paper_report(paper, folder, python);
   for (const std::string& sentence : summary_sentences(paper)) say("- {}\n", sentence);
   say("written to {}: report.html, report.md, tables.*, audit.json, fit_*.json, validation.json, "
-      "figures\n",
-      folder);
+      "{}\n",
+      folder, python.empty() ? "figures.json" : "figures");
   return 0;
 }
 

@@ -137,6 +137,7 @@ void say_with_files(const Session& session, Json json, std::string_view text,
 void add_schema_command(CLI::App& app, Session& session);
 void add_version_command(CLI::App& app, Session& session);
 void add_view_command(CLI::App& app, Session& session);
+void add_example_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
 void add_select_command(CLI::App& app, Session& session);
 void add_budget_command(CLI::App& app, Session& session);

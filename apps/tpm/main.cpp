@@ -22,6 +22,7 @@
 #include "command.hpp"
 #include "command_words.hpp"
 #include "out_of_memory.hpp"
+#include "shipped_files.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -203,7 +204,7 @@ void add_commands(CLI::App& app, Session& session) {
   };
   const std::vector<Group> groups = {
       {"Data: recordings, laws and fits",
-       {add_data_command, add_fit_command, add_select_command, add_predict_command,
+       {add_example_command, add_data_command, add_fit_command, add_select_command, add_predict_command,
         add_validate_command, add_identify_command, add_laws_command, add_spectrum_command,
         add_export_command, add_design_command, add_view_command}},
       {"Tissue: organs of spheres",
@@ -236,6 +237,8 @@ int run(int argc, char** argv) {
   FileRoles roles;
   add_commands(app, session);
   add_force_options(app, session);
+  std::vector<ShippedFile> shipped;
+  accept_shipped_files(app, shipped);
 
   try {
     std::vector<std::string> words = command_words(argc, argv);
@@ -249,6 +252,9 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     tell_user("tpm: {}\n", refusal(app, error));
     return static_cast<int>(ExitCode::usage);
+  }
+  for (const ShippedFile& file : shipped) {
+    tell_user("tpm: {} is not here: using the one that comes with tpm, {}\n", file.word, file.path);
   }
   roles.mark_results(origin_of(app), session.force);
   announce_output(app, session);

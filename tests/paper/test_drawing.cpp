@@ -93,7 +93,7 @@ TEST_CASE("names with markup, quotes, dollars or 255 bytes are drawn as they sta
   figures.push_back(figure_of("plain"));
   figures.back().id = "a\" onload=\"alert(1)&";
   const auto files = write_figures(folder.path(), figures);
-  CHECK(files.size() == 1 + 2 * figures.size());
+  CHECK(files.size() == 1 + 3 * figures.size());
   for (const Figure& figure : figures) {
     const std::string file = folder / (figure.id + ".svg");
     CAPTURE(file);

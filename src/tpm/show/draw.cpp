@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -16,6 +17,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/warning.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/show/run_record.hpp"
@@ -165,6 +167,19 @@ void run_script(const std::string& python, const char* name,
                           printable(last_line(outcome.error_output), 200)));
 }
 
+/// With a line in place of each picture, for one that was not drawn.
+Document without_pictures(Document document) {
+  for (DocumentPart& part : document.blocks) {
+    const auto* picture = std::get_if<Picture>(&part);
+    if (picture == nullptr) continue;
+    part = Paragraph{
+        fmt::format("[{}: not drawn for want of a Python with matplotlib; its numbers are in "
+                    "figures.json under {}] {}",
+                    picture->title, picture->id, picture->caption)};
+  }
+  return document;
+}
+
 }  // namespace
 
 std::string find_drawing_python() {
@@ -179,44 +194,51 @@ std::string find_drawing_python() {
         "import sys; sys.path[:] = [p for p in sys.path if p.startswith('/')]; import matplotlib";
     if (run({python, "-c", kImport}).status == 0) return python;
   }
-  throw Error(ExitCode::environment, "figures",
-              fmt::format("no Python with matplotlib; tried {}", fmt::join(candidates, ", ")),
-              "Debian's python3-matplotlib, or TPMKIT_PYTHON naming an interpreter that has it");
+  warn(
+      fmt::format("figures are not drawn: no Python with matplotlib; tried {}; expected Debian's "
+                  "python3-matplotlib, or TPMKIT_PYTHON naming an interpreter that has it",
+                  fmt::join(candidates, ", ")));
+  return {};
 }
 
 void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
                   const std::filesystem::path& folder, Drawings drawings) {
+  if (python.empty()) return;
   std::vector<std::string> words{std::filesystem::absolute(figures_json).string(),
                                  std::filesystem::absolute(folder).string()};
-  if (drawings == Drawings::svg_and_png) words.emplace_back("--png");
+  if (drawings == Drawings::for_print) words.emplace_back("--print");
   std::vector<std::filesystem::path> files;
   for (const Json& figure : read_json(figures_json).at("figures")) {
     const auto id = figure.at("id").get<std::string>();
     files.push_back(folder / (id + ".svg"));
-    if (drawings == Drawings::svg_and_png) files.push_back(folder / (id + ".png"));
+    if (drawings == Drawings::svg) continue;
+    files.push_back(folder / (id + ".png"));
+    files.push_back(folder / (id + ".pdf"));
   }
   run_script(python, "draw_figures.py", words, files);
 }
 
-std::map<std::string, std::string> draw_into(const std::filesystem::path& folder,
-                                             const std::vector<Figure>& figures,
-                                             const std::string& python) {
+void write_document(const std::filesystem::path& folder, const Document& document,
+                    const std::vector<Figure>& figures, const std::string& python) {
   write_file(folder / "figures.json", to_text(to_json(figures)));
   draw_figures(python, folder / "figures.json", folder / "figures");
   std::map<std::string, std::string> drawings;
   for (const Figure& figure : figures) {
+    if (python.empty()) break;
     drawings[figure.id] = read_file(folder / "figures" / (figure.id + ".svg"));
   }
-  return drawings;
+  const Document written = python.empty() ? without_pictures(document) : document;
+  write_file(folder / "report.md", to_markdown(written));
+  write_file(folder / "report.html", to_html(written, drawings));
 }
 
 void write_report(const std::filesystem::path& folder, const Document& document,
                   const std::vector<Figure>& figures, const std::string& python,
                   std::map<std::string, double> seconds, const Json& more) {
-  const auto drawings =
-      timed(seconds, "drawing", [&] { return draw_into(folder, figures, python); });
-  write_file(folder / "report.md", to_markdown(document));
-  write_file(folder / "report.html", to_html(document, drawings));
+  const auto start = std::chrono::steady_clock::now();
+  write_document(folder, document, figures, python);
+  seconds["drawing"] =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   Json record = run_record(seconds);
   record["drawing_python"] = python;
   record.update(more);
@@ -225,6 +247,7 @@ void write_report(const std::filesystem::path& folder, const Document& document,
 
 void draw_network(const std::string& python, const std::filesystem::path& picture_json,
                   const std::filesystem::path& stem) {
+  if (python.empty()) return;
   run_script(
       python, "draw_network.py",
       {std::filesystem::absolute(picture_json).string(), std::filesystem::absolute(stem).string()},
@@ -234,6 +257,7 @@ void draw_network(const std::string& python, const std::filesystem::path& pictur
 std::vector<std::string> draw_deformation(const std::string& python,
                                           const std::filesystem::path& pictures_json,
                                           const std::filesystem::path& folder, bool two) {
+  if (python.empty()) return {};
   std::vector<std::string> files;
   for (const char* name :
        {"undeformed", "deformed", "displacement", "force", "validity", "side_by_side"}) {
@@ -255,10 +279,13 @@ std::vector<std::string> write_figures(const std::filesystem::path& folder,
                                        std::vector<std::string> files) {
   const std::string& json = files.emplace_back("figures.json");
   write_file(folder / json, to_text(to_json(figures)));
-  draw_figures(find_drawing_python(), folder / json, folder, Drawings::svg_and_png);
+  const std::string python = find_drawing_python();
+  draw_figures(python, folder / json, folder, Drawings::for_print);
+  if (python.empty()) return files;
   for (const Figure& figure : figures) {
     files.push_back(fmt::format("{}.svg", figure.id));
     files.push_back(fmt::format("{}.png", figure.id));
+    files.push_back(fmt::format("{}.pdf", figure.id));
   }
   return files;
 }

@@ -11,11 +11,13 @@
 namespace tpm::show {
 
 /// The Python interpreter that draws: $TPMKIT_PYTHON if it is set, else the first of python3 and
-/// /usr/bin/python3 that has matplotlib (a version manager's python3 often has not). Throws
-/// Error(environment) naming those tried.
+/// /usr/bin/python3 that has matplotlib (a version manager's python3 often has not). Without one it
+/// warns, naming those tried, and returns an empty name, for which the functions below draw nothing
+/// and write the rest.
 [[nodiscard]] std::string find_drawing_python();
 
-enum class Drawings { svg, svg_and_png };
+/// What is drawn of each figure: SVG alone, or PNG (300 dpi) and PDF too.
+enum class Drawings { svg, for_print };
 
 /// Draws every figure of a figures.json into `folder`, one file each, with
 /// scripts/draw_figures.py. Throws Error(environment) with the last words of the script if it
@@ -23,21 +25,21 @@ enum class Drawings { svg, svg_and_png };
 void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
                   const std::filesystem::path& folder, Drawings drawings = Drawings::svg);
 
-/// Writes figures.json into `folder` and draws its figures there as SVG and PNG. Returns the names
-/// of the files, after those of `files`. Throws Error(environment) if drawing is not possible;
-/// figures.json is then there.
+/// Writes figures.json into `folder` and draws its figures there as SVG, PNG and PDF. Returns the
+/// names of the files that were written, after those of `files`: without a Python with matplotlib
+/// figures.json alone. Throws as draw_figures does; figures.json is then there.
 [[nodiscard]] std::vector<std::string> write_figures(const std::filesystem::path& folder,
                                                      const std::vector<Figure>& figures,
                                                      std::vector<std::string> files = {});
 
-/// Writes figures.json into `folder` and draws its figures as figures/ID.svg below. Returns the
-/// text of each drawing by id, as to_html wants it. Throws as draw_figures does.
-[[nodiscard]] std::map<std::string, std::string> draw_into(const std::filesystem::path& folder,
-                                                           const std::vector<Figure>& figures,
-                                                           const std::string& python);
+/// Writes a document with its figures into `folder`: report.md, report.html, figures.json and
+/// figures/ID.svg. Without a Python a line stands in place of each figure. Throws as draw_figures
+/// does.
+void write_document(const std::filesystem::path& folder, const Document& document,
+                    const std::vector<Figure>& figures, const std::string& python);
 
-/// Writes a report into `folder`: report.md, report.html, figures.json, figures/ID.svg, and
-/// report.run.json with what changes from run to run. Throws as draw_figures does.
+/// Writes a report into `folder`: what write_document() writes, and report.run.json with what
+/// changes from run to run. Throws as draw_figures does.
 /// @param seconds wall time of each part of the run; that of drawing is added
 /// @param more further keys of report.run.json
 void write_report(const std::filesystem::path& folder, const Document& document,
@@ -50,7 +52,7 @@ void draw_network(const std::string& python, const std::filesystem::path& pictur
                   const std::filesystem::path& stem);
 
 /// Draws pictures.json of a simulation into `folder` with scripts/draw_deformation.py, SVG and PNG.
-/// Returns the names of the files. Throws as draw_figures does.
+/// Returns the names of the files, none without a Python. Throws as draw_figures does.
 /// @param two there are two states to be drawn side by side
 [[nodiscard]] std::vector<std::string> draw_deformation(const std::string& python,
                                                         const std::filesystem::path& pictures_json,

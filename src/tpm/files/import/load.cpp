@@ -277,8 +277,16 @@ template <typename Kind>
 Kind load_kind(const std::string& path_or_id, std::string_view wanted) {
   Curve curve = load_curve(path_or_id);
   if (auto* found = std::get_if<Kind>(&curve)) return std::move(*found);
-  throw bad_input(path_or_id, fmt::format("is a curve of kind {}", curve_kind(curve)),
-                  fmt::format("kind {}", wanted));
+  std::string expected = fmt::format("kind {}", wanted);
+  // Whoever asks for a recording wants to fit this.
+  if (wanted == "recording" && std::holds_alternative<PointSet>(curve)) {
+    expected +=
+        "; single readings are fitted through a configuration, such as: "
+        "tpm fit configs/liver_all.json";
+  } else if (wanted == "recording" && std::holds_alternative<ValueSet>(curve)) {
+    expected += fmt::format("; values are only shown: tpm data show {}", path_or_id);
+  }
+  throw bad_input(path_or_id, fmt::format("is a curve of kind {}", curve_kind(curve)), expected);
 }
 
 }  // namespace

@@ -47,6 +47,7 @@ struct PredictionComparison {
 /// A recording beside its prediction.
 struct PredictedRecording {
   std::string name;
+  Provenance provenance = Provenance::measured;
   std::vector<double> observed;           ///< SI
   std::vector<bool> was_fitted;           ///< the fit has read these samples
   double peak = 0.0;                      ///< largest |observed| in the window, SI

@@ -105,6 +105,7 @@ void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& reco
   const Recording& r = recording.recording;
   PredictedRecording own;
   own.name = recording.name;
+  own.provenance = r.provenance;
   own.observed = r.response;
   struct Sum {
     double squares = 0.0;

@@ -29,10 +29,10 @@ Series band(const LawPrediction& p, const char* label, const std::vector<double>
 }
 
 Series prediction_readings(const LawPrediction& p, bool fitted, double unit, bool residual) {
-  Series s{.kind = Series::Kind::points,
-           .label = fitted ? "measured, fitted" : "measured, not fitted",
-           .provenance = residual ? "derived" : "measured"};
   const PredictedRecording& r = p.recording.value();
+  Series s{.kind = Series::Kind::points,
+           .label = fitted ? "readings, fitted" : "readings, not fitted",
+           .provenance = std::string(residual ? "derived" : provenance_name(r.provenance))};
   for (std::size_t i = 0; i < r.observed.size(); i += stride_of(p)) {
     if (r.was_fitted[i] != fitted || !std::isfinite(p.response[i])) continue;
     s.add(p.time_s[i], (residual ? p.response[i] - r.observed[i] : r.observed[i]) / unit);

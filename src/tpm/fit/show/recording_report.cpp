@@ -69,8 +69,8 @@ Panel response_panel(const RecordingFit& r, bool over_time) {
   const auto inside = [&](std::size_t i) { return r.fitted[i]; };
   const auto outside = [&](std::size_t i) { return !r.fitted[i]; };
   add_if_any(panel,
-             sampled(measured("measured, fitted", r), r, x, x_unit, r.observed, y_unit, inside));
-  add_if_any(panel, sampled(measured("measured, not fitted", r), r, x, x_unit, r.observed, y_unit,
+             sampled(measured("readings, fitted", r), r, x, x_unit, r.observed, y_unit, inside));
+  add_if_any(panel, sampled(measured("readings, not fitted", r), r, x, x_unit, r.observed, y_unit,
                             outside));
   if (over_time) add_band(panel, r, y_unit);
   add_if_any(panel, sampled(line("law", {}, {}), r, x, x_unit, r.predicted, y_unit, inside));
@@ -85,7 +85,7 @@ Panel residual_panel(const RecordingFit& r) {
   Panel panel{.x = {"time", "s"}, .y = {"residual over peak", "%"}};
   std::vector<double> residual(r.observed.size());
   for (std::size_t i = 0; i < residual.size(); ++i) residual[i] = r.predicted[i] - r.observed[i];
-  Series s{.kind = Series::Kind::points, .label = "law less measured", .provenance = "derived"};
+  Series s{.kind = Series::Kind::points, .label = "law less reading", .provenance = "derived"};
   add_if_any(panel, sampled(std::move(s), r, r.time_s, 1.0, residual, 0.01 * r.peak,
                             [&](std::size_t i) { return r.fitted[i]; }));
   return panel;
@@ -116,6 +116,17 @@ FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {
   return config;
 }
 
+/// Where the readings behind a figure come from: "data: meat.csv [measured]".
+std::string data_words(const FitResult& fit) {
+  std::vector<std::string> words;
+  for (const RecordingFit& r : fit.recordings) {
+    words.push_back(fmt::format(
+        "{} [{}]", std::filesystem::path(fit.config.data[r.choice].dataset).filename().string(),
+        provenance_name(r.provenance)));
+  }
+  return words.empty() ? "" : fmt::format("data: {}", fmt::join(words, ", "));
+}
+
 /// Each law's residual and BIC over its number of parameters, the recommended one marked.
 Figure selection_figure(const Selection& selection) {
   Figure figure{
@@ -128,7 +139,10 @@ Figure selection_figure(const Selection& selection) {
   Panel residual;
   residual.x = {"estimated parameters", ""};
   residual.y = {"rms residual over peak", "%", true};
-  Panel bic{.x = residual.x, .y = {"BIC above the best", ""}};
+  // Beyond 10 the evidence against a law is very strong: what matters lies within 30.
+  constexpr double kLargestBic = 30.0;
+  Panel bic{.x = residual.x,
+            .y = {.quantity = "BIC above the best", .lower = 0.0, .upper = kLargestBic}};
   for (const bool recommended : {false, true}) {
     add_if_any(residual, laws_at(selection, false, recommended));
     add_if_any(bic, laws_at(selection, true, recommended));
@@ -183,6 +197,7 @@ std::vector<std::string> write_selection(const std::filesystem::path& folder,
   const FitResult& fit = selection.candidates[selection.recommended].fit;
   figures.push_back(selection_figure(selection));
   figures.push_back(waterfall_figure(fit));
+  for (Figure& figure : figures) figure.note = data_words(fit);
   std::vector<std::string> files{"config.json", "selection.json", "law.json", "laws.csv"};
   write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
   write_file(folder / files[1], to_text(to_json(selection)));

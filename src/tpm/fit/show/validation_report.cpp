@@ -73,10 +73,11 @@ Figure error_figure(const Validation& v) {
   return figure;
 }
 
-Series motion_line(const std::string& label, const Recording& r, double contact, double unit,
-                   const char* provenance) {
+Series motion_line(const std::string& label, const Recording& r, double contact, double unit) {
   const std::size_t stride = 1 + r.time_s.size() / kMostMotionPoints;
-  Series s{.kind = Series::Kind::line, .label = label, .provenance = provenance};
+  Series s{.kind = Series::Kind::line,
+           .label = label,
+           .provenance = std::string(provenance_name(r.provenance))};
   for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
     s.add(r.time_s[i] - r.time_s.front(), (r.drive[i] - contact) / unit);
   }
@@ -94,11 +95,11 @@ Figure motion_figure(const ValidationRequest& request, const Validation& v) {
     if (!file.recording) continue;
     const Recording& r = file.recording->recording;
     const double contact = file.recording->phases.contact_drive;
-    add_if_any(panel, motion_line("calibration", r, contact, unit.to_si, "measured"));
+    add_if_any(panel, motion_line("calibration", r, contact, unit.to_si));
   }
   for (std::size_t i = 0; i < v.recordings.size(); ++i) {
     add_if_any(panel, motion_line(v.recordings[i].name, request.recordings[i].recording,
-                                  v.recordings[i].placement.contact, unit.to_si, "measured"));
+                                  v.recordings[i].placement.contact, unit.to_si));
   }
   if (const auto& depth = v.applicability.front().fitted_depth) {
     double longest = v.applicability.front().fitted_duration_s.value_or(0.0);

@@ -376,8 +376,6 @@ RecordingSummary summary_of(const HilRecording& recording) {
 void write_hil_report(const HilRecording& recording, const Verification& v,
                       const std::filesystem::path& folder, const std::string& python) {
   const RecordingSummary summary = summary_of(recording);
-  const auto drawings =
-      draw_into(folder, {session_figure(recording, v), energy_figure(recording)}, python);
   Document d;
   d.title = recording.session.title;
   d.subtitle = device_line(recording);
@@ -389,8 +387,7 @@ void write_hil_report(const HilRecording& recording, const Verification& v,
   add_plan(d, recording.header.at("model").value("plan", Json()));
   add_fidelity(d, v);
   typeset(d);
-  write_file(folder / "report.md", to_markdown(d));
-  write_file(folder / "report.html", to_html(d, drawings));
+  write_document(folder, d, {session_figure(recording, v), energy_figure(recording)}, python);
   Json json = verification_json(recording, v);
   json["end"] = summary.cause;
   json["rendering"] = recording.header.value("rendering", Json());
