@@ -195,7 +195,7 @@ void add_force_options(CLI::App& app, Session& session) {
   }
 }
 
-/// The commands in the groups that `tpm --help` and README.md show.
+/// The commands in the groups that `tpm --help` and docs/commands.md show.
 void add_commands(CLI::App& app, Session& session) {
   using Adder = void (*)(CLI::App&, Session&);
   struct Group {
