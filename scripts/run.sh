@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds tpm and makes the report on the paper: its tables, figures, claims and fits, recomputed.
-# The report is out/paper/report.html; nothing outside this folder is written except packages.
+# Builds tpm, fits the example (a synthetic recording) and makes the report on the paper: its tables, figures, claims and
+# fits, recomputed. Results are in out; nothing outside this folder is written except packages.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
@@ -14,5 +14,8 @@ build release tpm
 
 step "recomputing the paper"
 build/release/tpm report --output out/paper
-step "done. The report; open it in a browser:"
+step "done. A synthetic recording and the law that it supports:"
+build/release/tpm example recording --folder out/example
+build/release/tpm fit out/example/recording.csv --folder out/example/recording_fit
+step "the report on the paper; open it in a browser:"
 echo "$PWD/out/paper/report.html"

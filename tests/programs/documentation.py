@@ -10,14 +10,17 @@
 - three questions, as a new user types them, are answered two links from README.md at most: QUESTIONS;
 - paper/paper.md shows every figure of paper/figures, cites every entry of paper/paper.bib and nothing else, and names
   only files that exist;
-- the groups of `tpm --help` and of the README hold the same commands, each once;
-- the help of every command ends with an example that calls it.
+- the groups of `tpm --help` and of docs/commands.md hold the same commands, each once;
+- the help of every command ends with an example that calls it;
+- every page of docs is at most two steps from the README;
+- the excerpt of `tpm fit` in the README is what the program prints of the shipped example, with every warning.
 """
 
 import os
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 # Pages that scripts/make_site.py makes for the site, which checks its links itself (site_pages.py).
@@ -141,12 +144,12 @@ def differing_groups(root, program):
         shown[group] = re.findall(r"^  (\S+)", rows, re.M)
     if list(shown) != ["Data", "Tissue", "Hand", "Evidence"]:
         yield f"tpm --help: has the groups {list(shown)}; expected Data, Tissue, Hand, Evidence"
-    readme = (root / "README.md").read_text(encoding="utf-8")
+    readme = (root / "docs/commands.md").read_text(encoding="utf-8")
     for group, commands in shown.items():
         row = re.search(rf"^\| \*\*{group}\*\* \|.*$", readme, re.M)
         named = re.findall(r"`tpm ([a-z-]+)`", row[0]) if row else []
         if named != commands:
-            yield f"README.md: group {group} lists {named}; tpm --help lists {commands}"
+            yield f"docs/commands.md: group {group} lists {named}; tpm --help lists {commands}"
 
 
 def without_example(root, program):
@@ -159,10 +162,55 @@ def without_example(root, program):
             yield f"{call} --help: has no example that calls it"
 
 
+def linked(page):
+    for target in re.findall(r"\]\(([^)\s#]+)", page.read_text(encoding="utf-8")):
+        if not re.match(r"[a-z]+:", target):
+            yield (page.parent / target).resolve()
+
+
+def far_pages(root):
+    near = set(linked(root / "README.md"))
+    near |= {far for page in list(near) if page.suffix == ".md" and page.exists() for far in linked(page)}
+    for page in sorted((root / "docs").glob("*.md")):
+        if page not in near:
+            yield f"{page.relative_to(root)}: more than two steps from README.md"
+
+
+def excerpt_faults(page, command, printed):
+    """The lines between `$ COMMAND` and the end of its block, in the order of the output; "..." stands for others."""
+    block = re.search(rf"^    \$ {re.escape(command)}\n((?:    (?!\$).*\n)+)", page, re.M)
+    if not block:
+        yield f"no excerpt of {command}"
+        return
+    shown = [line[4:].rstrip() for line in block[1].splitlines()]
+    rest = iter(line.rstrip() for line in printed.splitlines())
+    for line in shown:
+        if line != "..." and line not in rest:
+            yield f"{command}: does not print, or not in this order: {line}"
+            return
+    for line in printed.splitlines():
+        if line.startswith("!") and line.rstrip() not in shown:
+            yield f"{command}: the excerpt leaves out the warning: {line}"
+
+
+def false_excerpts(root, program):
+    with tempfile.TemporaryDirectory() as folder:
+        for words in (["example", "recording"], ["fit", "recording.csv", "--no-draw"]):
+            done = subprocess.run([Path(program).resolve(), *words], cwd=folder, capture_output=True, text=True, check=True)
+    page = (root / "README.md").read_text(encoding="utf-8")
+    for fault in excerpt_faults(page, "tpm fit recording.csv", done.stdout):
+        yield f"README.md: {fault}"
+    # The check itself: without its warning, and with another number, the excerpt is refused.
+    lines = page.splitlines(keepends=True)
+    for change in (lambda line: "" if line.startswith("    !") else line, lambda line: line.replace("k_inf  ", "k_inf 9")):
+        if page == (changed := "".join(map(change, lines))) or not list(excerpt_faults(changed, "tpm fit recording.csv", done.stdout)):
+            yield "README.md: a false excerpt is not noticed"
+
+
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
     faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *unanswered(root), *faults_of_paper(root),
-              *differing_groups(root, program), *without_example(root, program)]
+              *differing_groups(root, program), *without_example(root, program), *far_pages(root), *false_excerpts(root, program)]
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")

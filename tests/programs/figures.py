@@ -1,0 +1,54 @@
+#!/usr/bin/env python3
+"""What scripts/draw_figures.py makes of a small figures.json: text that is text, letters, limits, provenance, files.
+
+    figures.py TPM (not used)
+"""
+import json
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree as tree
+from pathlib import Path
+
+SCRIPT = Path(__file__).resolve().parents[2] / "scripts/draw_figures.py"
+
+
+def series(label, provenance, y):
+    return {"kind": "points", "label": label, "provenance": provenance, "x": list(range(1, len(y) + 1)), "y": y}
+
+
+def panel(title, y_axis, all_series):
+    return {"title": title, "x": {"quantity": "n", "unit": "", "logarithmic": False}, "y": y_axis, "series": all_series}
+
+
+def main():
+    axis = {"quantity": "BIC", "unit": "", "logarithmic": False}
+    figure = {"id": "a", "title": "", "caption": "", "panels": [
+        panel("one", {**axis, "lower": 0, "upper": 30}, [series('mine id="x"', "derived", [0, 5, 31, 4000])]),
+        panel("(b) two", axis, [series("readings", "measured", [float(i % 7) for i in range(200)])])]}
+    faults = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "figures.json").write_text(json.dumps({"figures": [figure]}))
+        for run in ("x", "y"):
+            subprocess.run([sys.executable, SCRIPT, folder / "figures.json", folder / run, "--print"], check=True)
+        for ending in ("svg", "png", "pdf"):
+            if (folder / f"x/a.{ending}").read_bytes() != (folder / f"y/a.{ending}").read_bytes():
+                faults.append(f"two drawings differ: {ending}")
+        words = [e.text for e in tree.parse(folder / "x/a.svg").iter() if e.tag.endswith("}text")]
+        for wanted in ("(a) one", "(b) two", "▲ 2 above 30", 'mine id="x" [derived]'):
+            if wanted not in words:
+                faults.append(f"no text '{wanted}' in the SVG: {words}")
+        if not any("[derived] computed from the data" in (w or "") for w in words) or any("printed" in (w or "") for w in words):
+            faults.append(f"provenance is not that of the data: {words}")
+        png = (folder / "x/a.png").read_bytes()
+        if int.from_bytes(png[16:20], "big") != 2670:  # 8.9 inches at 300 dpi
+            faults.append("the PNG has not 300 dpi")
+    for fault in faults:
+        print(fault)
+    print(f"{len(faults)} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
