@@ -124,6 +124,12 @@ class Runs(unittest.TestCase):
             tpmkit.open("none.h5")
         with self.assertRaisesRegex(tpmkit.Error, "expected one of .*liver_poke.json"):
             tpmkit.example("configs/none.json")
+        for workers in (0.5, -1, "all"):
+            with self.assertRaisesRegex(tpmkit.Error, "^sweep: workers is .*; expected a whole number"):
+                tpmkit.sweep("sweep.json", "sweep.h5", workers=workers)
+        for name in ("rate_Hz", "longest_s"):
+            with self.assertRaisesRegex(tpmkit.Error, f"^contact: {name} is '1 k'; expected a number, in "):
+                tpmkit.Contact("law.json", **{name: "1 k"})
 
 
 class Plans(unittest.TestCase):

@@ -136,6 +136,8 @@ def sweep(
     """
     from ._data import open_sweep
 
+    if isinstance(workers, bool) or not isinstance(workers, numbers.Integral) or workers < 0:
+        raise _core.Error(f"sweep: workers is {workers!r}; expected a whole number, 0 for all processors")
     with shown(progress, "blocks of the sweep") as told:
         _core.sweep(os.fspath(file), os.fspath(output), workers, told)
     return open_sweep(output)
