@@ -29,7 +29,7 @@ rm -rf "$stage/tpmkit/share/man" "$stage/tpmkit/share/bash-completion" "$stage/r
 cp build/release/python/tpmkit/*.py build/release/python/tpmkit/*.pyi build/release/python/tpmkit/py.typed \
    build/release/python/tpmkit/_core*.so "$stage/tpmkit/"
 strip --strip-unneeded "$stage"/tpmkit/_core*.so
-cp bindings/python/setup.py LICENSE "$stage/"
+cp bindings/python/pyproject.toml bindings/python/setup.py LICENSE "$stage/"
 "$stage/tpmkit/bin/tpm" version | cut -d' ' -f2 >"$stage/VERSION"
 mkdir -p dist
 log=build/wheel.log

@@ -57,6 +57,16 @@ class Runs(unittest.TestCase):
         np.testing.assert_allclose(again.force_N, data.force_N)
         np.testing.assert_allclose(again.position_m, data.position_m)
         np.testing.assert_allclose(again.output_s, data.output_s)
+        for opened in (data, again):
+            self.assertEqual({k: v.attrs["units"] for k, v in opened.variables.items() if k not in ("sphere", "axis")},
+                             {"time_s": "s", "output_s": "s", "depth_m": "m", "force_N": "N", "position_m": "m",
+                              "work_J": "J", "dissipated_J": "J", "stored_J": "J"})
+
+    def test_units_are_those_that_keys_end_in(self):
+        from tpmkit._data import unit_of
+        for key, unit in (("k_inf_N_per_m", "N/m"), ("rate_m_per_s", "m/s"), ("eta_Pa_s", "Pa s"), ("tool_x_m", "m"),
+                          ("phase", None), ("time_s", "s")):
+            self.assertEqual(unit_of(key), unit)
 
     def test_an_input_is_never_written_over(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -114,6 +124,12 @@ class Runs(unittest.TestCase):
             tpmkit.open("none.h5")
         with self.assertRaisesRegex(tpmkit.Error, "expected one of .*liver_poke.json"):
             tpmkit.example("configs/none.json")
+        for workers in (0.5, -1, "all"):
+            with self.assertRaisesRegex(tpmkit.Error, "^sweep: workers is .*; expected a whole number"):
+                tpmkit.sweep("sweep.json", "sweep.h5", workers=workers)
+        for name in ("rate_Hz", "longest_s"):
+            with self.assertRaisesRegex(tpmkit.Error, f"^contact: {name} is '1 k'; expected a number, in "):
+                tpmkit.Contact("law.json", **{name: "1 k"})
 
 
 class Plans(unittest.TestCase):
@@ -126,6 +142,10 @@ class Plans(unittest.TestCase):
         self.assertEqual(plan.to_dict()["tolerance"], 0.01)
         with self.assertRaisesRegex(tpmkit.Error, "tolerance"):
             tpmkit.plan(SCENE, tolerance="much")
+        self.assertEqual(tpmkit.plan(SCENE, tolerance=0.01).to_dict(), plan.to_dict())
+        for wrong in ({"tolerance": [0.01]}, {"outputs": 1}, {"wall": 0.1}, {"rate_Hz": "1 kHz"}):
+            with self.assertRaisesRegex(tpmkit.Error, f"^plan: {next(iter(wrong))} is .*; expected "):
+                tpmkit.plan(SCENE, **wrong)
 
 
 class Recordings(unittest.TestCase):
@@ -135,6 +155,8 @@ class Recordings(unittest.TestCase):
         self.assertEqual(set(data.data_vars), {"force_N", "depth_m"})
         self.assertEqual(data.sizes["time_s"], 501)
         self.assertAlmostEqual(float(data.depth_m.max()), 3e-3)
+        self.assertEqual({k: v.attrs["units"] for k, v in data.variables.items()},
+                         {"time_s": "s", "force_N": "N", "depth_m": "m"})
         self.assertEqual(data.attrs["provenance"], "measured")
         self.assertIn("separator", data.attrs["findings"])
 

@@ -58,6 +58,9 @@ class Contact:
         device: str = "",
         device_file: str | os.PathLike[str] = "",
     ) -> None:
+        for name, value in (("rate_Hz", rate_Hz), ("longest_s", longest_s)):
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.integer)):
+                raise _core.Error(f"contact: {name} is {value!r}; expected a number, in {name.rpartition('_')[2]}")
         self._core = _core.Contact(
             os.fspath(file), rate_Hz, start_gate, longest_s, accept_unstable, device, os.fspath(device_file)
         )

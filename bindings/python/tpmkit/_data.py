@@ -11,7 +11,29 @@ from . import _core
 if TYPE_CHECKING:
     import xarray
 
+_UNITS = {"N", "m", "s", "Pa", "J", "Hz", "rad", "kg"}
 
+
+def unit_of(key: str) -> str | None:
+    """The unit that a key ends in, as text: "rate_m_per_s" to "m/s"; None if it ends in none."""
+    words = key.split("_")
+    if words[-1] not in _UNITS:
+        return None
+    if len(words) > 2 and words[-2] == "per":
+        above = unit_of("_".join(words[:-2]))
+        return f"{above or '1'}/{words[-1]}"
+    if len(words) > 2 and words[-2] in _UNITS:  # Pa_s
+        return f"{words[-2]} {words[-1]}"
+    return words[-1]
+
+
+def with_units(data: xarray.Dataset) -> xarray.Dataset:
+    """The same, each variable with the unit of its name as attribute `units`, where it has none."""
+    for key, variable in data.variables.items():
+        unit = unit_of(str(key))
+        if unit is not None:
+            variable.attrs.setdefault("units", unit)
+    return data
 
 
 def example(name: str) -> Path:
@@ -41,7 +63,7 @@ def read_recording(path: str | os.PathLike[str], *, columns: Mapping[str, Any] |
         variables[r["drive_key"]] = (along, r["drive"])
     attrs = {k: r[k] for k in ("id", "title", "citation", "provenance", "sha256")}
     attrs["findings"] = "; ".join(f"{what}: {value}" for what, value in r["findings"])
-    return xarray.Dataset(variables, coords={along: r["time_s"] if timed else np.arange(n)}, attrs=attrs)
+    return with_units(xarray.Dataset(variables, coords={along: r["time_s"] if timed else np.arange(n)}, attrs=attrs))
 
 
 def open_session(path: str | os.PathLike[str]) -> xarray.Dataset:
@@ -63,7 +85,7 @@ def open_session(path: str | os.PathLike[str]) -> xarray.Dataset:
     attrs = {"device": r["device"], "simulated_device": int(r["simulated"]), "header": r["header"]}
     if r["damage"]:
         attrs["damage"] = r["damage"]
-    return xarray.Dataset(variables, coords={"time_s": time_s}, attrs=attrs)
+    return with_units(xarray.Dataset(variables, coords={"time_s": time_s}, attrs=attrs))
 
 
 def open_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
@@ -87,10 +109,10 @@ def open_simulation(path: str | os.PathLike[str]) -> xarray.Dataset:
         positions = np.stack([file["steps"][k]["position_m"][()] for k in steps])
         attrs = {k: v.decode() if isinstance(v, bytes) else v for k, v in file.attrs.items()}
     time_s = curve.pop("time_s")
-    variables: dict[str, Any] = {k: ("time_s", v, {"units": k.rpartition("_")[2]}) for k, v in curve.items()}
-    variables["position_m"] = (("output_s", "sphere", "axis"), positions, {"units": "m"})
+    variables: dict[str, Any] = {k: ("time_s", v) for k, v in curve.items()}
+    variables["position_m"] = (("output_s", "sphere", "axis"), positions)
     coords = {"time_s": time_s, "output_s": times, "sphere": np.arange(1, positions.shape[1] + 1), "axis": ["x", "y", "z"]}
-    return xarray.Dataset(variables, coords=coords, attrs=attrs)
+    return with_units(xarray.Dataset(variables, coords=coords, attrs=attrs))
 
 
 def open(path: str | os.PathLike[str]) -> xarray.Dataset:  # noqa: A001: tpmkit.open, as xarray.open_dataset

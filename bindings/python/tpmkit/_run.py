@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import numbers
 import os
 import sys
 import time
@@ -85,6 +86,8 @@ def simulate(
     import numpy as np
     import xarray
 
+    from ._data import with_units
+
     text, where, folder = scene_text(scene)
     with shown(progress, "simulating") as told:
         answer = _core.simulate(text, where, folder, "" if output is None else os.fspath(output), told)
@@ -92,10 +95,9 @@ def simulate(
     imposed, response = ("depth_m", "force_N") if by_depth else ("load_N", "depth_m")
     curves = {imposed: answer["imposed"], response: answer["response"]}
     curves.update({k: answer[k] for k in ("work_J", "dissipated_J", "stored_J") if k in answer})
-    units = {"depth_m": "m", "force_N": "N", "load_N": "N", "work_J": "J", "dissipated_J": "J", "stored_J": "J"}
-    variables: dict[str, Any] = {k: ("time_s", v, {"units": units[k]}) for k, v in curves.items()}
-    variables["position_m"] = (("output_s", "sphere", "axis"), answer["position_m"], {"units": "m"})
-    return xarray.Dataset(
+    variables: dict[str, Any] = {k: ("time_s", v) for k, v in curves.items()}
+    variables["position_m"] = (("output_s", "sphere", "axis"), answer["position_m"])
+    data = xarray.Dataset(
         variables,
         coords={
             "time_s": answer["time_s"],
@@ -110,6 +112,7 @@ def simulate(
             "scene": answer["scene"],
         },
     )
+    return with_units(data)
 
 
 def sweep(
@@ -133,6 +136,8 @@ def sweep(
     """
     from ._data import open_sweep
 
+    if isinstance(workers, bool) or not isinstance(workers, numbers.Integral) or workers < 0:
+        raise _core.Error(f"sweep: workers is {workers!r}; expected a whole number, 0 for all processors")
     with shown(progress, "blocks of the sweep") as told:
         _core.sweep(os.fspath(file), os.fspath(output), workers, told)
     return open_sweep(output)
@@ -174,7 +179,7 @@ class Plan:
 def plan(
     scene: str | os.PathLike[str] | Mapping[str, Any],
     *,
-    tolerance: str = "1%",
+    tolerance: str | float = "1%",
     outputs: str = "force",
     rate_Hz: float | None = None,
     wall: str = "",
@@ -188,7 +193,7 @@ def plan(
     scene
         A file or a dict, as for `tpmkit.simulate`.
     tolerance
-        In parts of the peak, "1%" or "0.01"; or "jnd", what a hand can feel.
+        In parts of the peak, "1%" or 0.01; or "jnd", what a hand can feel.
     outputs
         What it is about: "force" (the response) or "field" (displacements of all spheres).
     rate_Hz
@@ -198,6 +203,14 @@ def plan(
     costs
         "nominal", the same on every machine, or a file of `tpm plan --calibrate`.
     """
+    if isinstance(tolerance, float):
+        tolerance = repr(float(tolerance))
+    for name, value, wanted in (("tolerance", tolerance, '"1%", 0.01 or "jnd"'), ("outputs", outputs, '"force" or "field"'),
+                                ("wall", wall, 'a text such as "0.1 s per s"')):
+        if not isinstance(value, str):
+            raise _core.Error(f"plan: {name} is {value!r}; expected {wanted}")
+    if rate_Hz is not None and (isinstance(rate_Hz, bool) or not isinstance(rate_Hz, numbers.Real)):
+        raise _core.Error(f"plan: rate_Hz is {rate_Hz!r}; expected a number, in Hz")
     text, where, folder = scene_text(scene)
     with shown(progress, "planning") as told:
         return Plan(*_core.plan(text, where, folder, tolerance, outputs, rate_Hz, wall, os.fspath(costs), told))

@@ -1,0 +1,47 @@
+"""Python and the program answer alike, to the last printed digit."""
+
+import csv
+import json
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+import made
+import tpmkit
+
+PROGRAM = Path(tpmkit.__file__).resolve().parents[2] / "tpm"  # of the same build
+
+
+@unittest.skipUnless(PROGRAM.is_file(), "the program is not built beside the module")
+class SameAnswer(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.folder = Path(temporary.name)
+        self.file = made.recording(self.folder)
+
+    def compare(self, options, **asked):
+        told = subprocess.run([PROGRAM, "fit", self.file, "--format", "json", *options], cwd=self.folder,
+                              capture_output=True, text=True, check=True).stdout
+        here = tpmkit.fit(self.file, **asked).to_dict()
+        self.assertEqual(here, json.loads(told))
+        return here
+
+    def test_of_a_recording(self):
+        self.compare([])
+
+    def test_of_a_strip_whose_length_area_and_sign_are_told(self):
+        with self.file.open(newline="") as file:
+            rows = list(csv.reader(file))
+        with self.file.open("w", newline="") as file:
+            csv.writer(file).writerows([rows[0]] + [[t, f"-{d}", f] for t, d, f in rows[1:]])
+        here = self.compare(["--law", "linear-1", "--negate-drive", "--rest-length", "30 mm", "--area", "20 mm2"],
+                            law="linear-1", columns={"negate_drive": True, "rest_length": "30 mm", "area": "20 mm2"})
+        # k = 60 N/m of a strip of 30 mm and 20 mm2 is a modulus of k L / A
+        modulus = {p["name"]: p for p in here["fit"]["parameters"]}
+        self.assertAlmostEqual(modulus["k_inf"]["estimate_SI"] / (60.0 * 30e-3 / 20e-6), 1.0, delta=0.02)
+
+
+if __name__ == "__main__":
+    unittest.main()
