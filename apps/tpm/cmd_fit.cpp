@@ -23,11 +23,13 @@
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
 #include "tpm/fit/show/comparison_report.hpp"
+#include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
 #include "tpm/fit/show/fit_report.hpp"
 #include "tpm/fit/show/function_report.hpp"
 #include "tpm/fit/show/recording_report.hpp"
 #include "tpm/law/contact_geometry.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {
@@ -38,6 +40,7 @@ struct FitOptions {
   std::string law, times;
   std::string folder;
   bool no_draw = false;
+  bool verbose = false;
   std::string output;
   std::string rate;
   std::string hold_out_depth;
@@ -255,6 +258,30 @@ std::string with_moduli(Json json, std::string text, const std::optional<YoungMo
   return session.json() ? to_text(json) : text;
 }
 
+/// The text of the answer: the short one, or with --verbose `text`, with the files below.
+std::string answer_with_files(const FitOptions& options, const Session& session, std::string text,
+                              ShortAnswer answer, const std::string& folder,
+                              const std::vector<std::string>& files, const std::string& next) {
+  if (session.json()) return text;
+  if (options.verbose) return files.empty() ? text : text + written(session, folder, files);
+  end_answer(answer, folder, files, next);
+  return to_text(answer);
+}
+
+/// The page of the figures in a folder that was written.
+std::string next_of_figures(const std::string& folder) {
+  return fmt::format("tpm view {}",
+                     shell_word((std::filesystem::path(folder) / "figures.json").string()));
+}
+
+/// The page of the law in a folder; without one its figures.
+std::string next_of_law(const std::string& folder, const std::vector<std::string>& files) {
+  if (files.empty()) return {};
+  if (std::ranges::find(files, "law.json") == files.end()) return next_of_figures(folder);
+  return fmt::format("tpm view {}",
+                     shell_word((std::filesystem::path(folder) / "law.json").string()));
+}
+
 /// Of a fit with an organ: the organ with its material, and a session that feels it.
 void write_scene(const std::filesystem::path& folder, const FitResult& fit,
                  std::vector<std::string>& files) {
@@ -271,11 +298,17 @@ int fit_configuration(const FitOptions& options, const Session& session) {
   const FitResult result = fit_and_judge(configured(options));
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
   if (!session.json() && result.adequacy) text = result.adequacy->words + "\n\n" + text;
+  std::vector<std::string> files;
   if (!options.folder.empty() && !options.no_draw) {
-    auto files = write_fit_report(options.folder, result);
+    files = write_fit_report(options.folder, result);
     write_scene(options.folder, result, files);
-    text += written(session, options.folder, files);
   }
+  const std::string& config = options.recordings.files.front();
+  text = answer_with_files(
+      options, session, std::move(text), short_answer(result), options.folder, files,
+      files.empty() ? fmt::format("tpm fit {} --folder {}_fit", shell_word(config),
+                                  shell_word(std::filesystem::path(config).stem().string()))
+                    : next_of_law(options.folder, files));
   deliver(text, options.output);
   deliver_csv(parameters_csv(result), csv);
   return 0;
@@ -301,12 +334,16 @@ int fit_folder(const FitOptions& options, const Session& session) {
     moduli = pooled_moduli(study, *probe, options.poisson.empty());
   }
   std::string text = with_moduli(to_json(study), to_terminal_text(study), moduli, session);
+  const std::string folder = figure_folder(options, options.recordings.files.front());
+  std::vector<std::string> files;
   if (!options.no_draw) {
-    const std::string folder = figure_folder(options, options.recordings.files.front());
-    auto files = write_specimen_report(folder, study, probe_of(options));
+    files = write_specimen_report(folder, study, probe_of(options));
     write_moduli(folder, moduli, files);
-    text += written(session, folder, files);
   }
+  ShortAnswer answer = short_answer(study);
+  if (moduli) add_moduli(answer, *moduli);
+  text = answer_with_files(options, session, std::move(text), std::move(answer), folder, files,
+                           files.empty() ? "" : next_of_figures(folder));
   deliver(text, options.output);
   deliver_csv(pooled_csv(study), csv);
   return 0;
@@ -392,17 +429,19 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
   text += fmt::format("\n{}\n{}", to_terminal_text(selection), to_terminal_text(best));
   for (const std::string& words : outside_words(best)) text += fmt::format("! {}\n", words);
   text = with_moduli(to_json(selection), std::move(text), moduli, session);
+  const std::string folder = figure_folder(options, recordings.front().name);
+  std::vector<std::string> files;
   if (!options.no_draw) {
-    const std::string folder = figure_folder(options, recordings.front().name);
-    auto files = write_recording_report(folder, selection);
+    files = write_recording_report(folder, selection);
     write_moduli(folder, moduli, files);
-    text += written(session, folder, files);
   }
-  if (!session.json()) {
-    text += fmt::format("\nthe configuration (edit it and run: tpm fit {}):\n{}",
-                        options.no_draw ? "CONFIG.json" : "config.json",
-                        to_text(config_json(best.config)));
+  ShortAnswer answer = short_answer(selection);
+  for (const PreparedRecording& r : recordings) {
+    if (!r.read_as.empty()) answer.conclusion.insert(answer.conclusion.begin(), r.read_as);
   }
+  if (moduli) add_moduli(answer, *moduli);
+  text = answer_with_files(options, session, std::move(text), std::move(answer), folder, files,
+                           next_of_law(folder, files));
   deliver(text, options.output);
   deliver_csv(parameters_csv(best), csv);
   return 0;
@@ -421,10 +460,14 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
           ? to_text(to_json(selection))
           : fmt::format("{}{}{}\n{}", function.read_as, function.read_as.empty() ? "" : "\n",
                         to_terminal_text(selection), to_terminal_text(best));
-  if (!options.no_draw) {
-    const std::string folder = figure_folder(options, function.name);
-    text += written(session, folder, write_function_report(folder, function, selection));
-  }
+  const std::string folder = figure_folder(options, function.name);
+  std::vector<std::string> files;
+  if (!options.no_draw) files = write_function_report(folder, function, selection);
+  ShortAnswer answer = short_answer(selection);
+  if (!function.read_as.empty())
+    answer.conclusion.insert(answer.conclusion.begin(), function.read_as);
+  text = answer_with_files(options, session, std::move(text), std::move(answer), folder, files,
+                           next_of_law(folder, files));
   deliver(text, options.output);
   deliver_csv(parameters_csv(best), csv);
   return 0;
@@ -503,6 +546,9 @@ void add_fit_command(CLI::App& app, Session& session) {
       command->add_option("--folder", options->folder,
                           "Where figures and files go (default: NAME_fit for recordings, none are "
                           "written for a configuration)");
+  command->add_flag("--verbose", options->verbose,
+                    "Print all that was computed: every law tried, starts, readings (default: an "
+                    "answer of at most 25 lines)");
   command->add_flag("--no-draw", options->no_draw, "Write no figures and files")->excludes(folder);
   add_recording_options(*command, options->recordings);
   add_placement_options(*command, options->placement);

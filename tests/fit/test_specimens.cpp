@@ -337,7 +337,7 @@ TEST_CASE("A folder's repeats are grouped by name, column or key", "[specimens]"
   }
   const Run text = run_on(folder,
                           "fit by_name --law power-1 --no-draw --group-by animal "
-                          "--reference '3.5 mm'");
+                          "--reference '3.5 mm' --verbose");
   CHECK_THAT(text.said, Contains("[pig2]") && Contains("secants at a depth of 3.5 mm"));
   const Run unmatched = run_on(folder, "fit by_name --no-draw --group-by '(cow)'");
   CHECK(unmatched.code == 2);

@@ -8,6 +8,7 @@
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/likelihood/experiment_refit.hpp"
+#include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -321,11 +322,9 @@ Json to_json(const FitResult& result) {
   }
   j["parameters"] = std::move(parameters);
   j["linearised"] = linearised_json(result);
-  j["starts"] = {{"run", result.starts_run},
-                 {"failed", result.starts_failed},
-                 {"agreeing_to_5_digits", result.starts_agreeing},
-                 {"seed", result.config.seed},
-                 {"words", result.waterfall.words}};
+  j["starts"] = {{"run", result.starts_run},       {"looked_at", starts_looked_at(result)},
+                 {"failed", result.starts_failed}, {"agreeing_to_5_digits", result.starts_agreeing},
+                 {"seed", result.config.seed},     {"words", result.waterfall.words}};
   j["starts"]["end_deviances"] = array_json(result.waterfall.deviances, number);
   if (result.bootstrap) j["bootstrap"] = bootstrap_json(*result.bootstrap);
   j["minima"] = minima_json(result);

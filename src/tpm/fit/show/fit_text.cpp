@@ -7,6 +7,7 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -51,7 +52,12 @@ std::string data_table(const FitResult& result) {
 }
 
 std::string minima_table(const FitResult& result) {
-  std::string text = fmt::format(
+  const std::size_t looked_at = starts_looked_at(result);
+  std::string text;
+  if (looked_at > static_cast<std::size_t>(std::max(result.starts_run, 0))) {
+    text = fmt::format("{} starts looked at; followed: ", looked_at);
+  }
+  text += fmt::format(
       "{} starts, {} failed, {} agree with the best in chi-square and every parameter to 5 "
       "digits\n",
       result.starts_run, result.starts_failed, result.starts_agreeing);

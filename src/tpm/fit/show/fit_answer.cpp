@@ -1,0 +1,252 @@
+#include "tpm/fit/show/fit_answer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "tpm/base/sized_unit.hpp"
+#include "tpm/base/text.hpp"
+#include "tpm/fit/verdict.hpp"
+
+namespace tpm::fit {
+namespace {
+
+std::string answer_row(const std::string& name, const std::string& estimate,
+                       const std::string& interval, const std::string& unit,
+                       const std::string& verdict) {
+  return fmt::format("{:<12} {:>11}  {:<24} {:<8} {}", name, estimate, interval, unit, verdict);
+}
+
+std::string answer_head(double level) {
+  return answer_row("parameter", "estimate", fmt::format("{:.4g} % interval", 100.0 * level),
+                    "unit", "verdict");
+}
+
+/// The limit in `unit`, or why there is none.
+std::string sized_limit(const ParameterResult& p, bool upper, const Unit& unit) {
+  const std::optional<double>& limit = upper ? p.upper : p.lower;
+  return limit ? significant(*limit / unit.to_si, 4) : limit_text(p, upper);
+}
+
+std::string parameter_row(const ParameterResult& p) {
+  const Unit unit = sized_unit(p.parameter.unit, p.estimate);
+  const std::string interval =
+      p.verdict == Verdict::not_profiled
+          ? "-"
+          : fmt::format("{} .. {}", sized_limit(p, false, unit), sized_limit(p, true, unit));
+  return answer_row(p.parameter.name, significant(p.estimate / unit.to_si, 5), interval,
+                    unit.symbol, verdict_text(p));
+}
+
+/// The material's parameters before those of the recording.
+std::vector<const ParameterResult*> material_first(const FitResult& fit) {
+  std::vector<const ParameterResult*> sorted;
+  for (const bool nuisance : {false, true}) {
+    for (const ParameterResult& p : fit.parameters) {
+      if (p.nuisance == nuisance) sorted.push_back(&p);
+    }
+  }
+  return sorted;
+}
+
+/// "... k5, k6: identified; tau6: flat": no verdict is left out.
+std::string further_verdicts(const std::vector<std::pair<std::string, std::string>>& named,
+                             std::size_t from) {
+  std::vector<std::pair<std::string, std::string>> groups;  // verdict, names
+  for (std::size_t i = from; i < named.size(); ++i) {
+    const auto& [name, verdict] = named[i];
+    const auto group = std::ranges::find(groups, verdict, [](const auto& g) { return g.first; });
+    if (group == groups.end()) {
+      groups.emplace_back(verdict, name);
+    } else {
+      group->second += ", " + name;
+    }
+  }
+  std::string text;
+  for (const auto& [verdict, names] : groups) {
+    text += fmt::format("{}{}: {}", text.empty() ? "... " : "; ", names, verdict);
+  }
+  return text;
+}
+
+/// "liver.csv: 500 of 600 samples fitted, rms residual 1.2 mN (0.4 % of the peak)"
+std::string recording_words(const FitResult& fit, const RecordingFit& r) {
+  std::string text =
+      fmt::format("{}: {} of {} samples fitted, rms residual {}", fit.config.data[r.choice].dataset,
+                  std::count(r.fitted.begin(), r.fitted.end(), true), r.time_s.size(),
+                  sized_text(quantity_dimension(r.response_quantity), r.rms_residual, 3));
+  if (r.peak > 0.0) {
+    text += fmt::format(" ({} % of the peak)", significant(100.0 * r.rms_residual / r.peak, 3));
+  }
+  const auto add = [&](const std::vector<bool>& marks, const char* what) {
+    if (const auto count = std::ranges::count(marks, true); count > 0) {
+      text += fmt::format(", {} {}", count, what);
+    }
+  };
+  add(r.censored, "censored");
+  add(r.outlier, "outliers left out");
+  if (r.not_predicted > 0) text += fmt::format(", {} not predicted", r.not_predicted);
+  return text;
+}
+
+/// At most `most` of the lines; the last one counts the others.
+std::vector<std::string> counted(std::vector<std::string> lines, std::size_t most,
+                                 const char* what) {
+  if (lines.size() <= most) return lines;
+  const std::size_t left_out = lines.size() - (most - 1);
+  lines.resize(most - 1);
+  lines.push_back(fmt::format("... and {} more {}", left_out, what));
+  return lines;
+}
+
+std::string starts_words(const FitResult& fit) {
+  const std::size_t looked_at = starts_looked_at(fit);
+  const bool ranked = looked_at > static_cast<std::size_t>(std::max(fit.starts_run, 0));
+  return fmt::format("{}{} of {} followed starts end at this minimum",
+                     ranked ? fmt::format("{} starts looked at, ", looked_at) : "",
+                     fit.starts_agreeing, fit.starts_run);
+}
+
+bool contains(const std::vector<std::string>& lines, const std::string& words) {
+  return std::ranges::any_of(
+      lines, [&](const std::string& line) { return line.find(words) != std::string::npos; });
+}
+
+}  // namespace
+
+std::size_t starts_looked_at(const FitResult& fit) {
+  const auto run = static_cast<std::size_t>(std::max(fit.starts_run, 0));
+  return std::max(run, fit.config.starts);
+}
+
+ShortAnswer short_answer(const FitResult& fit) {
+  constexpr std::size_t kMostLines = 4;
+  ShortAnswer answer;
+  answer.conclusion.push_back(fit.config.title);
+  if (fit.adequacy) answer.conclusion.push_back(fit.adequacy->words);
+  std::vector<std::string> hypotheses;
+  for (const HypothesisResult& h : fit.hypotheses) hypotheses.push_back("- " + h.words);
+  for (std::string& words : counted(std::move(hypotheses), kMostLines, "hypotheses")) {
+    answer.conclusion.push_back(std::move(words));
+  }
+  answer.head = {answer_head(fit.config.level)};
+  std::vector<std::pair<std::string, std::string>> verdicts;
+  for (const ParameterResult* p : material_first(fit)) {
+    answer.rows.push_back(parameter_row(*p));
+    verdicts.emplace_back(p->parameter.name, verdict_text(*p));
+  }
+  answer.rest = [verdicts](std::size_t from) { return further_verdicts(verdicts, from); };
+  if (fit.config.law && depends_on_reference(*fit.config.law)) {
+    answer.limits.push_back(reference_words(*fit.config.law));
+  }
+  std::vector<std::string> recordings;
+  for (const RecordingFit& r : fit.recordings) recordings.push_back(recording_words(fit, r));
+  for (std::string& words : counted(std::move(recordings), kMostLines, "recordings")) {
+    answer.limits.push_back(std::move(words));
+  }
+  std::string search = starts_words(fit);
+  if (fit.recordings.empty()) {
+    const std::string p =
+        fit.chi_square_p ? fmt::format(", p = {}", significant(*fit.chi_square_p, 2)) : "";
+    search = fmt::format("chi-square {} from {} values{}; {}", significant(fit.chi_square, 4),
+                         fit.value_count, p, search);
+  }
+  answer.limits.push_back(std::move(search));
+  if (fit.bootstrap) answer.limits.push_back(fit.bootstrap->words);
+  if (!fit.weakest_words.empty()) answer.limits.push_back("limit: " + fit.weakest_words);
+  answer.warnings = fit.flags;
+  return answer;
+}
+
+ShortAnswer short_answer(const Selection& s) {
+  const FitResult& fit = s.candidates[s.recommended].fit;
+  ShortAnswer answer = short_answer(fit);
+  answer.conclusion = s.words;
+  if (fit.adequacy && !contains(s.words, fit.adequacy->words)) {
+    answer.conclusion.insert(answer.conclusion.begin(), fit.adequacy->words);
+  }
+  answer.warnings = s.warnings;
+  const std::vector<std::string> outside = outside_words(fit);
+  answer.warnings.insert(answer.warnings.end(), outside.begin(), outside.end());
+  answer.warnings.insert(answer.warnings.end(), fit.flags.begin(), fit.flags.end());
+  return answer;
+}
+
+ShortAnswer short_answer(const SpecimenStudy& study) {
+  ShortAnswer answer;
+  answer.conclusion = {study.why};
+  if (depends_on_reference(study.law)) answer.conclusion.push_back(reference_words(study.law));
+  std::size_t fitted = 0;
+  std::map<std::string, std::vector<std::string>> doubts;  // recordings by what is said of them
+  for (const SpecimenRow& row : study.rows) {
+    if (!row.fit) {
+      answer.warnings.push_back(fmt::format("{} is not fitted: {}", row.name, row.reason));
+      continue;
+    }
+    ++fitted;
+    if (!row.fit->adequacy || row.fit->adequacy->is_adequate()) continue;
+    doubts[row.fit->adequacy->is_rejected()
+               ? "the law does not describe them: what is pooled supposes that it did"
+               : "adequacy cannot be judged: too few samples at rest before the load"]
+        .push_back(row.name);
+  }
+  for (const auto& [words, names] : doubts) {
+    answer.conclusion.push_back(fmt::format("{} of {} recordings: {} ({})", names.size(), fitted,
+                                            words, fmt::join(names, ", ")));
+  }
+  answer.head = {answer_row("typical", "value",
+                            fmt::format("{:.4g} % interval", 100.0 * study.level), "unit",
+                            "a new specimen; recordings left out")};
+  std::vector<std::pair<std::string, std::string>> names;
+  for (const PooledParameter& p : study.pooled) {
+    const auto natural = [&](double theta) { return p.parameter.natural(theta); };
+    const Unit unit = sized_unit(p.parameter.unit, natural(p.effects.mean));
+    const auto shown = [&](double theta) { return significant(natural(theta) / unit.to_si, 4); };
+    std::string more = "-";
+    if (p.effects.new_specimen) {
+      more = fmt::format("{} .. {}", shown(p.effects.new_specimen->lower),
+                         shown(p.effects.new_specimen->upper));
+    }
+    if (p.left_out > 0) more += fmt::format("; {} left out", p.left_out);
+    if (!p.only_without.empty()) {
+      more += fmt::format("; not identified: {}: not separable", p.only_without);
+    }
+    names.emplace_back(p.parameter.name, more);
+    answer.rows.push_back(answer_row(
+        p.parameter.name, shown(p.effects.mean),
+        fmt::format("{} .. {}", shown(p.effects.interval.lower), shown(p.effects.interval.upper)),
+        unit.symbol, more));
+  }
+  answer.rest = [names](std::size_t from) { return further_verdicts(names, from); };
+  return answer;
+}
+
+void add_moduli(ShortAnswer& answer, const YoungModuli& moduli) {
+  std::vector<std::string> rows;
+  for (const YoungModulus& m : moduli.moduli) {
+    // "Pa s" of a viscosity: the prefix goes before the first unit.
+    constexpr double kKilo = 1e3;
+    const bool plain = m.unit == "Pa";
+    const Unit unit = plain ? sized_unit(shown_unit(Dimension::stress), m.estimate)
+                            : Unit{"k" + m.unit, Dimension::dimensionless, kKilo};
+    const auto limit = [&](const std::optional<double>& value) {
+      return value ? significant(*value / unit.to_si, 4) : std::string("open");
+    };
+    rows.push_back(
+        answer_row(m.name, significant(m.estimate / unit.to_si, 5),
+                   fmt::format("{} .. {}", limit(m.lower), limit(m.upper)), unit.symbol,
+                   m.verdict.empty() ? "of " + m.of : fmt::format("of {}; {}", m.of, m.verdict)));
+  }
+  answer.rest = [rest = answer.rest, rows](std::size_t from) {
+    if (from >= rows.size()) return rest(from - rows.size());
+    return fmt::format("... {} more moduli; {}", rows.size() - from, rest(0));
+  };
+  answer.rows.insert(answer.rows.begin(), rows.begin(), rows.end());
+  answer.limits.push_back(fmt::format("Young's moduli under {}; Poisson's ratio {} ({})",
+                                      moduli.geometry, shortest(moduli.poisson_ratio),
+                                      moduli.poisson_assumed ? "assumed" : "given"));
+  answer.warnings.insert(answer.warnings.end(), moduli.warnings.begin(), moduli.warnings.end());
+}
+
+}  // namespace tpm::fit
