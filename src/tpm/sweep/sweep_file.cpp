@@ -327,8 +327,8 @@ Sweep parse_sweep(const Json& written, std::string_view where,
   }
   sweep.document = document.dump();
   const std::string mesh = sha256_of_mesh(document, scene_folder);
-  sweep.fingerprint = sha256_hex(
-      fmt::format("{}\n{}\n{}\n{}", version(), sweep.block_cells, sweep.document, mesh));
+  sweep.fingerprint =
+      sha256_hex(fmt::format("{}\n{}\n{}\n{}", version(), sweep.block_cells, sweep.document, mesh));
   return sweep;
 }
 
