@@ -15,6 +15,7 @@
 #include "tpm/fit/select/material_function.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/select/young_moduli.hpp"
 #include "tpm/fit/show/fit_report.hpp"
 #include "tpm/fit/show/function_report.hpp"
 #include "tpm/fit/show/recording_report.hpp"
@@ -259,6 +260,21 @@ void bind_fits(py::module_& module) {
       .def_property_readonly("correlation",
                              [](const Fit& f) { return f.fit().covariance.correlation; })
       .def("predict", &Fit::predict)
+      .def("young_moduli",
+           [](const Fit& f, std::optional<double> sphere_radius_m,
+              std::optional<double> cone_half_angle_rad, std::optional<double> punch_radius_m,
+              std::optional<double> poisson_ratio) {
+             ContactGeometry probe;
+             probe.sphere_radius_m = sphere_radius_m;
+             probe.cone_half_angle_rad = cone_half_angle_rad;
+             probe.punch_radius_m = punch_radius_m;
+             if (poisson_ratio) probe.poisson_ratio = *poisson_ratio;
+             if (!probe.is_given()) {
+               throw Error(ExitCode::usage, "young_moduli", "no probe",
+                           "sphere_radius_m, cone_half_angle_rad or punch_radius_m");
+             }
+             return to_text(to_json(fit::young_moduli(f.fit(), probe, !poisson_ratio)));
+           })
       .def("text",
            [](const Fit& f) {
              const std::string best = to_terminal_text(f.fit());

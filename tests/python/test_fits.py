@@ -141,6 +141,17 @@ class Fits(unittest.TestCase):
         np.testing.assert_array_equal(residuals.residual, frame.observed_force_N - frame.predicted_force_N)
         self.assertAlmostEqual(residuals.residual[residuals.fitted].std() / 2e-4, 1.0, delta=0.15)
 
+    def test_young_moduli_are_those_of_the_probe(self):
+        moduli = self.fit.young_moduli(punch_radius_m=2e-3, poisson_ratio=0.5)
+        for modulus, parameter in (("E_inf", "k_inf"), ("E1", "k1")):  # F = 2 E/(1 - nu^2) r u
+            stiffness = self.fit.parameters.loc[parameter, "estimate"]
+            self.assertAlmostEqual(moduli.loc[modulus, "estimate"] / (stiffness * 0.75 / 4e-3), 1.0, places=4)
+        self.assertEqual(moduli.loc["E1", "unit"], "Pa")
+        self.assertEqual(moduli.attrs["poisson_ratio"], 0.5)
+        for wrong in ({}, {"punch_radius_m": 2e-3, "sphere_radius_m": 1e-3}, {"punch_radius_m": "2 mm"}):
+            with self.assertRaises(tpmkit.Error):
+                self.fit.young_moduli(**wrong)
+
     def test_its_repr_says_verdicts_and_adequacy_and_what_to_know(self):
         text = repr(self.fit)
         self.assertTrue(text.startswith("<tpmkit.Fit linear-1"))

@@ -60,6 +60,16 @@ class Laws(unittest.TestCase):
         exact = LAW["k_inf_N_per_m"] + LAW["k1_N_per_m"] * s / (1 + s)
         np.testing.assert_allclose(storage + 1j * loss, exact, rtol=1e-12)
 
+    def test_arguments_of_a_wrong_kind_are_told_in_a_sentence(self):
+        law = tpmkit.Law("linear-1", LAW)
+        for call in (lambda: law.respond(3, [1.0]), lambda: tpmkit.fit("a.csv", law=3), lambda: tpmkit.Law.describe(3),
+                     lambda: tpmkit.Element().respond("step", [1.0])):
+            with self.assertRaisesRegex(tpmkit.Error, r"an argument is of a wrong kind; expected what help\(tpmkit\.") as raised:
+                call()
+            self.assertNotIn("std::", str(raised.exception))
+        with self.assertRaisesRegex(tpmkit.Error, "times_s: 'now'; expected a list of numbers"):
+            law.respond(tpmkit.Protocol.step_and_hold(1e-3, 2.0), "now")
+
     def test_laws_protocols_and_elements_are_pickled_and_copied(self):
         times = np.linspace(0.0, 3.0, 7)
         law = tpmkit.Law("linear-1", LAW)

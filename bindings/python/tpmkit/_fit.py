@@ -12,6 +12,7 @@ import numpy as np
 
 from . import _core, _program
 from ._core import Protocol
+from ._kinds import told
 from ._law import Law, times_of
 
 if TYPE_CHECKING:
@@ -172,6 +173,7 @@ class Fit:
             frames.append(frame)
         return frames
 
+    @told
     def predict(self, protocol: Protocol, times_s: npt.ArrayLike, *, dataset: int = 0) -> pd.DataFrame:
         """What the fitted model answers to another protocol.
 
@@ -193,6 +195,33 @@ class Fit:
         times = times_of(times_s)
         value, error = self._core.predict(protocol, times, dataset)
         return pd.DataFrame({"value": value, "standard_error": error}, index=pd.Index(times, name="time_s"))
+
+    @told
+    def young_moduli(
+        self,
+        *,
+        sphere_radius_m: float | None = None,
+        cone_half_angle_rad: float | None = None,
+        punch_radius_m: float | None = None,
+        poisson_ratio: float | None = None,
+    ) -> pd.DataFrame:
+        """Young's modulus of each stiffness of the law under one rigid probe, as `tpm fit --radius` prints it.
+
+        One row per modulus, by name ("E_inf", "E1", "E_instantaneous"): estimate, standard_error, lower, upper, unit,
+        verdict, of. `attrs`: geometry, poisson_ratio (0.49, assumed, unless it is given), warnings.
+        """
+        import pandas as pd
+
+        said = json.loads(self._core.young_moduli(sphere_radius_m, cone_half_angle_rad, punch_radius_m, poisson_ratio))
+        rows = []
+        for m in said["moduli"]:
+            lower, upper = m.get("interval_SI") or (None, None)
+            rows.append({"name": m["name"], "estimate": m["estimate_SI"], "standard_error": m.get("standard_error_SI"),
+                         "lower": lower, "upper": upper, **{k: m[k] for k in ("unit", "verdict", "of")}})
+        table = pd.DataFrame(rows).set_index("name")
+        table[["standard_error", "lower", "upper"]] = table[["standard_error", "lower", "upper"]].astype(float)
+        table.attrs = {k: said[k] for k in ("geometry", "poisson_ratio", "poisson_ratio_provenance", "warnings")}
+        return table
 
     def plot(self, recording: int = 0, ax: Axes | None = None) -> Axes:
         """Draws a recording with the fitted law and its prediction band; samples outside the window that was
@@ -382,6 +411,7 @@ def _fit_table(table: pd.DataFrame, ask: Any) -> Fit:
             raise told from None
 
 
+@told
 def fit(
     files: PathLike | Sequence[PathLike] | pd.DataFrame | None = None,
     *,

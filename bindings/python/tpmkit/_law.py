@@ -10,6 +10,7 @@ import numpy as np
 
 from . import _core
 from ._core import Protocol
+from ._kinds import told
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -88,6 +89,7 @@ class Law:
         return law
 
     @classmethod
+    @told
     def read(cls, path: str | os.PathLike[str]) -> Law:
         """Reads a law file (schemas/law.schema.json), as `tpm fit` and `Law.write` make it."""
         return cls._of(_core.Law.read(os.fspath(path)))
@@ -106,10 +108,12 @@ class Law:
         return hash(self._core.to_json())
 
     @staticmethod
+    @told
     def describe(name: str) -> dict[str, tuple[str, str]]:
         """Parameters of a law: name to (SI unit, meaning)."""
         return {key: (unit, meaning) for key, unit, meaning in _core.law_parameters(name)}
 
+    @told
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes a law file; haptic sessions and `tpm export` read it."""
         self._core.write(os.fspath(path))
@@ -150,6 +154,7 @@ class Law:
     def respond(
         self, protocol: Protocol, times_s: npt.ArrayLike, *, sensitivity: bool
     ) -> Array | tuple[Array, Array]: ...
+    @told
     def respond(
         self, protocol: Protocol, times_s: npt.ArrayLike, *, sensitivity: bool = False
     ) -> Array | tuple[Array, Array]:
@@ -161,6 +166,7 @@ class Law:
         """
         return self._core.respond(protocol, times_of(times_s), sensitivity)
 
+    @told
     def respond_spectrum(self, frequency_Hz: npt.ArrayLike) -> tuple[Array, Array]:
         """Storage and loss at given frequencies, about the reference depth; N/m, or Pa for a strip."""
         return self._core.respond_spectrum(times_of(frequency_Hz, "frequency_Hz"))
@@ -209,6 +215,7 @@ class Element:
         """tau = eta1 / (E1 + E2), at constant elongation."""
         return self.parameters["eta1_Pa_s"] / (self.parameters["E1_Pa"] + self.parameters["E2_Pa"])
 
+    @told
     def respond(
         self, protocol: Protocol, times_s: npt.ArrayLike, *, sensitivity: bool = False
     ) -> Array | tuple[Array, Array]:
