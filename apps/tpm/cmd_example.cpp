@@ -13,6 +13,7 @@
 #include "data_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {
@@ -107,25 +108,13 @@ constexpr RealRecording kReal[] = {
     {"muscle relaxation after ramps of 1 s and 100 s, MIT",
      "github.com/beards-lab/TitinViscoelasticity, commit 6cdda21"}};
 
-/// A word as a shell takes it: in quotes where it has more than letters, digits and `_./-`.
-std::string shell_word(const std::string& word) {
-  const bool plain = std::all_of(word.begin(), word.end(), [](unsigned char c) {
-    return std::isalnum(c) != 0 ||
-           std::string_view("_./-").find(static_cast<char>(c)) != std::string_view::npos;
-  });
-  if (plain) return word;
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
-}
-
 std::string next_command(const Example& example, const fs::path& folder) {
   const fs::path file =
       folder.empty() ? fs::path(example.files.front()) : folder / example.files.front();
   return fmt::format("tpm {} {}", example.command, shell_word(file.string()));
 }
 
-int list(const Session& session) {
+int list_examples(const Session& session) {
   if (session.json()) {
     Json all = Json::array();
     for (const Example& e : examples()) {
@@ -214,7 +203,7 @@ void add_example_command(CLI::App& app, Session& session) {
       "source. Of a copy: name, provenance, files, next");
   set_run(*command, session, [options, &session] {
     if (!options->name.empty()) return copy(find_example(options->name), options->folder, session);
-    if (options->folder.empty()) return list(session);
+    if (options->folder.empty()) return list_examples(session);
     throw Error(ExitCode::usage, "--folder", "without a NAME",
                 "the name of an example: tpm example");
   });

@@ -408,7 +408,7 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
                    const Session& session) {
   const auto csv = csv_beside(options.output, session);
   announce_figures(options, recordings.front().name,
-                   {"figures.json", "config.json", "selection.json", "law.json"});
+                   {"figures.json", "config.json", "selection.json", "law.json", "fit.html"});
   SelectionOptions choices = selection_options(options);
   require_indentation(options, recordings);
   set_reference(options, recordings, choices);
@@ -452,7 +452,7 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
                  const Session& session) {
   const auto csv = csv_beside(options.output, session);
   announce_figures(options, function.name,
-                   {"figures.json", "config.json", "selection.json", "law.json"});
+                   {"figures.json", "config.json", "selection.json", "law.json", "fit.html"});
   const Selection selection = select_law(function, selection_options(options));
   const FitResult& best = selection.candidates[selection.recommended].fit;
   std::string text =

@@ -34,15 +34,16 @@ class OrganProgress {
 };
 
 int view(const ViewChoice& choice, const Session& session) {
-  const std::filesystem::path output =
-      choice.output.empty()
-          ? std::filesystem::path(choice.file).filename().replace_extension(".html")
-          : std::filesystem::path(choice.output);
+  const std::filesystem::path given = std::filesystem::path(choice.file).lexically_normal();
+  const std::filesystem::path name = given.has_filename() ? given : given.parent_path();
+  const std::filesystem::path output = choice.output.empty()
+                                           ? name.filename().replace_extension(".html")
+                                           : std::filesystem::path(choice.output);
   will_write({output}, choice.output.empty() ? Naming::by_default : Naming::file);
   ViewOptions options;
   options.organ = !choice.no_organ;
   options.progress = OrganProgress();
-  const ViewPage page = view_file(choice.file, options);
+  const ViewPage page = view_file(shown_file(choice.file), options);
   const std::string html = page.html();
   write_file(output, html);
   const Json& shown = page.description;
@@ -81,8 +82,8 @@ void add_view_command(CLI::App& app, Session& session) {
   auto choice = std::make_shared<ViewChoice>();
   command
       ->add_option("FILE", choice->file,
-                   "HDF5 of tpm simulate, a recording of tpm hil run, or law.json, figures.json or "
-                   "the JSON answer of tpm fit")
+                   "HDF5 of tpm simulate, a recording of tpm hil run, law.json, figures.json or "
+                   "the JSON answer of tpm fit; or a folder with one of them")
       ->required();
   command->add_option("-o,--output", choice->output,
                       "HTML file (default: the name of FILE ending in .html, in this folder)");

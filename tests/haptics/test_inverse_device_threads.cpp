@@ -125,6 +125,18 @@ TEST_CASE("A service that is not what it should be is refused with the reason") 
   f = {};
   f.scale = 2.0;
   CHECK_THAT(refusal(f), Contains("scales coordinates"));
+  for (const char* version : {"3.5.0.0", "3.1.0.0"}) {
+    f = {};
+    f.version = version;
+    f.preset_stays = "defaults";
+    CHECK_THAT(refusal(f), Contains("preset of the service stays at 'defaults'"));
+    f.preset_stays = {};
+    f.basis = "YXZ";
+    CHECK_THAT(refusal(f), Contains("exchanges axes: basis YXZ; expected basis XYZ"));
+    f.basis = "XYZ";
+    f.mount_turned_rad = 0.5;
+    CHECK_THAT(refusal(f), Contains("turns coordinates: a mount by 0.5"));
+  }
   f = {};
   f.version = "4.0.0.0";
   CHECK_THAT(refusal(f), Contains("of version '4.0.0.0'; expected 3.1 or later"));

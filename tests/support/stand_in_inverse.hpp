@@ -28,6 +28,8 @@ struct StandInFaults {
   bool names_no_filters = false;
   double gate_stays = 0.0, damping_stays = 0.0;  ///< what cannot be made neutral
   double scale = 1.0;                            ///< of the mount
+  std::string preset_stays, basis = "XYZ";
+  double mount_turned_rad = 0.0;  ///< about x
   std::vector<std::string> devices = {"049D"};
   std::string wrong_accept;  ///< in place of Sec-WebSocket-Accept
   /// From this message with a force on, what `how` says; 0: never.
@@ -203,6 +205,10 @@ inline InverseInventory StandInInverse::inventory(bool centred) {
     entry.simulated = faults_.simulated;
     entry.settings.handedness = "left";
     entry.settings.preset = centred ? kCentredPreset : "defaults";
+    if (!faults_.preset_stays.empty()) entry.settings.preset = faults_.preset_stays;
+    entry.settings.basis = faults_.basis;
+    entry.settings.mount_rotation =
+        Eigen::AngleAxisd(faults_.mount_turned_rad, Eigen::Vector3d::UnitX());
     entry.settings.filters_named = true;
     entry.settings.force_gate_gain = gate_open_ ? faults_.gate_stays : 0.3;
     entry.settings.damping = faults_.damping_stays;

@@ -9,6 +9,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
+#include "tpm/fit/show/view_fit.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpmkit/law_file.hpp"
 
@@ -142,7 +143,7 @@ Figure selection_figure(const Selection& selection) {
   // Beyond 10 the evidence against a law is very strong: what matters lies within 30.
   constexpr double kLargestBic = 30.0;
   Panel bic{.x = residual.x,
-            .y = {.quantity = "BIC above the best", .lower = 0.0, .upper = kLargestBic}};
+            .y = {.quantity = "BIC above the best", .unit = "", .lower = 0.0, .upper = kLargestBic}};
   for (const bool recommended : {false, true}) {
     add_if_any(residual, laws_at(selection, false, recommended));
     add_if_any(bic, laws_at(selection, true, recommended));
@@ -204,6 +205,9 @@ std::vector<std::string> write_selection(const std::filesystem::path& folder,
   write_file(folder / files[2], to_text(law_document(fit)));
   write_file(folder / files[3], laws_csv(selection));
   for (std::string& name : write_fit_csv(folder, fit)) files.push_back(std::move(name));
+  files.emplace_back("fit.html");
+  write_file(folder / files.back(),
+             fit_page(to_json(selection), to_json(figures), folder / "law.json").html());
   return write_figures(folder, figures, std::move(files));
 }
 

@@ -22,9 +22,9 @@ namespace tpm::fit {
                                                        std::vector<Figure> figures);
 
 /// Writes config.json (rerun it with tpm fit), law.json, selection.json with its tables as CSV
-/// (fit_csv.hpp), figures.json and the figures as SVG and PNG into `folder`. Returns the names of
-/// the files. Throws Error(environment) if drawing is not possible; the other files are then
-/// already there.
+/// (fit_csv.hpp), fit.html, figures.json and the figures as SVG, PNG and PDF into `folder`. Returns
+/// the names of the files. Throws Error(environment) if drawing is not possible; the other files
+/// are then already there.
 [[nodiscard]] std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
                                                               const Selection& selection);
 

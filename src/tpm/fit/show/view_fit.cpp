@@ -170,6 +170,19 @@ void add_answer(ViewPage& page, const Json& fit) {
   }
 }
 
+/// What the selection of a law concludes, before anything else.
+void add_conclusion(ViewPage& page, const Json& answer, const Json& fit) {
+  for (const Json& words : answer.value("words", Json::array())) {
+    page.fact("conclusion", words.get<std::string>());
+  }
+  const Json adequacy = fit.value("adequacy", Json());
+  page.fact("adequacy", adequacy.is_object() ? adequacy.at("words").get<std::string>()
+                                             : std::string("not tested"));
+  for (const Json& warning : answer.value("warnings", Json::array())) {
+    page.fact("warning", warning.get<std::string>());
+  }
+}
+
 bool is_law(const Json& json) {
   return json.contains("law") && json.contains("parameters") && json.contains("response");
 }
@@ -199,6 +212,11 @@ bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file
     } else if (is_law(json)) {
       add_law_and_figures(page, json, file);
     } else if (is_answer(fit)) {
+      add_conclusion(page, json, fit);
+      const std::filesystem::path figures = file.parent_path() / "figures.json";
+      if (file.filename() == "selection.json" && std::filesystem::exists(figures)) {
+        add_figures(page, read_json(figures), figures.string());
+      }
       add_answer(page, fit);
     } else {
       return false;
@@ -211,6 +229,16 @@ bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file
 }
 
 }  // namespace
+
+ViewPage fit_page(const Json& answer, const Json& figures, const std::filesystem::path& file) {
+  ViewPage page = begun_page("fit", file, read_file(file));
+  page.description["badge"] = "FIT";
+  const Json& fit = answer.contains("fit") ? answer.at("fit") : answer;
+  add_conclusion(page, answer, fit);
+  add_figures(page, figures, file.string());
+  add_answer(page, fit);
+  return page;
+}
 
 ViewPage view_fit(const std::filesystem::path& file, std::string_view bytes) {
   const Json json = parse_json(bytes, file.string());

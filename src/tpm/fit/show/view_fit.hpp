@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/files/json.hpp"
 #include "tpm/show/view_parts.hpp"
 
 namespace tpm::fit {
@@ -11,5 +12,14 @@ namespace tpm::fit {
 /// another document.
 /// @param bytes of the file, for its text and its hash
 [[nodiscard]] ViewPage view_fit(const std::filesystem::path& file, std::string_view bytes);
+
+/// The page of a whole fit: what it concludes, its adequacy and warnings, parameters with intervals
+/// and verdicts, figures and profiles. It needs nothing but a browser, and nothing that draws.
+/// @param answer the JSON answer of `tpm fit`
+/// @param figures what figures.json holds
+/// @param file law.json, or config.json of a fit without a law, which stands on the page by its
+///        SHA-256; it must be there
+[[nodiscard]] ViewPage fit_page(const Json& answer, const Json& figures,
+                                const std::filesystem::path& file);
 
 }  // namespace tpm::fit

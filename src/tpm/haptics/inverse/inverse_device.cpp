@@ -107,7 +107,6 @@ InverseInventory InverseDevice::read_back() {
 void InverseDevice::make_neutral() {
   if (!service_->send(neutral_message(device_.id, kProfile))) (void)take_text(0.0);
   device_.state = parse_state(take_text(kPatience_s), device_.id);
-  if (!device_.settings.filters_named && format_ == InverseFormat::values) return;
   const InverseInventory now = read_back();
   const auto found = std::ranges::find(now.devices, device_.id, &InverseDeviceEntry::id);
   if (found == now.devices.end()) {
@@ -115,6 +114,22 @@ void InverseDevice::make_neutral() {
   }
   device_.settings = found->settings;
   const InverseSettings& s = device_.settings;
+  if (!s.preset.empty() && s.preset != kCentredPreset) {
+    throw service_fault(
+        fmt::format("the preset of the service stays at '{}'", printable(s.preset)),
+        fmt::format("'{}': positions count from the middle of the workspace", kCentredPreset));
+  }
+  if (s.basis != "XYZ") {
+    throw service_fault(fmt::format("the service exchanges axes: basis {}", printable(s.basis)),
+                        "basis XYZ");
+  }
+  constexpr double kTurned_rad = 1e-6;
+  const double turned_rad = s.mount_rotation.angularDistance(Eigen::Quaterniond::Identity());
+  if (!(turned_rad < kTurned_rad)) {
+    throw service_fault(fmt::format("the service turns coordinates: a mount by {} rad", turned_rad),
+                        "a mount that is not turned");
+  }
+  if (!s.filters_named && format_ == InverseFormat::values) return;
   if (!s.filters_named || s.force_gate_gain != 0.0) {
     throw service_fault(
         s.filters_named

@@ -1,5 +1,7 @@
 #include "tpm/haptics/show/view_file.hpp"
 
+#include <fmt/format.h>
+
 #include "tpm/files/file.hpp"
 #include "tpm/fit/show/view_fit.hpp"
 #include "tpm/haptics/show/view_recording.hpp"
@@ -7,6 +9,16 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
+
+std::filesystem::path shown_file(const std::filesystem::path& path) {
+  if (!std::filesystem::is_directory(path)) return path;
+  constexpr const char* kShown[] = {"selection.json", "law.json", "figures.json", "simulation.h5"};
+  for (const char* name : kShown) {
+    if (std::filesystem::exists(path / name)) return path / name;
+  }
+  throw bad_input(path.string(), "is a folder without a result that tpm view shows",
+                  fmt::format("a folder with one of {}", fmt::join(kShown, ", ")));
+}
 
 ViewPage view_file(const std::filesystem::path& file, const ViewOptions& options) {
   constexpr std::string_view kHdf5 = "\x89HDF\r\n\x1a\n", kRows = "TPMROWS1";
