@@ -7,6 +7,7 @@
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/fit/show/view_fit.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/show/view_file.hpp"
@@ -155,4 +156,40 @@ TEST_CASE("a law is viewed without its figures, and says so") {
   CHECK(page.description.at("table").at("rows").size() == 5);
   CHECK(page.description.at("table").at("rows").at(2) == Json({"tau1_s", "2", "fixed"}));
   CHECK_THAT(page.description.dump(), Contains("there is no figures.json beside the law"));
+}
+
+TEST_CASE("the page of a fit says first whether the law describes the data, and runs no name") {
+  const TempFolder folder;
+  const std::string title = R"(R&D <b>"x"</b></script><script>alert(1)</script>)";
+  Json fit = Json::parse(R"({"model": "law", "chi_square": 1.0, "confidence_level": 0.95,
+    "parameters": [{"name": "k1", "estimate_SI": 45.0, "interval_SI": [44.0, null], "SI_unit": "N/m",
+                    "verdict": "no upper limit", "profile_SI_and_deviance": [[44, 4], [45, 0]]}],
+    "adequacy": {"verdict": "not_described", "words": "no law tried describes this recording"},
+    "flags": []})");
+  fit["title"] = title;
+  const Json answer{{"fit", fit}, {"words", {"the simplest is linear-1"}}, {"warnings", {title}}};
+  const Json figures = Json::parse(R"({"figures": [{"title": "fit", "panels": [{
+    "x": {"quantity": "time", "unit": "s"}, "y": {"quantity": "force", "unit": "N"},
+    "series": [{"kind": "line", "label": "law", "x": [0, 1], "y": [1, 2]}]}]}]})");
+  std::ofstream(folder / "law.json") << "{}";
+  const ViewPage page = fit::fit_page(answer, figures, folder / "law.json");
+  const Json& lead = page.description.at("lead");
+  REQUIRE(lead.size() == 3);
+  CHECK(lead[0] == Json{{"text", "no law tried describes this recording"}, {"doubt", true}});
+  CHECK(lead[2].at("text") == "warning: " + title);
+  CHECK(page.description.at("table").at("rows")[0] ==
+        Json({"k1", "45", "44 .. open", "N/m", "no upper limit"}));
+  CHECK(page.description.at("plots").size() == 2);  // the figure, and the profile
+  const std::string html = page.html();
+  CHECK(html.find("<script>alert") == std::string::npos);
+  CHECK(html.find("<b>") == std::string::npos);
+
+  // Of a folder the answer is shown with its figures.
+  std::ofstream(folder / "selection.json") << answer.dump();
+  std::ofstream(folder / "figures.json") << figures.dump();
+  const ViewPage seen = view_file(shown_file(folder.path()));
+  CHECK(seen.description.at("lead") == lead);
+  CHECK(seen.description.at("plots").size() == 2);
+  const TempFolder empty;
+  CHECK_THROWS_WITH((void)shown_file(empty.path()), Contains("a folder without a result"));
 }

@@ -172,14 +172,21 @@ void add_answer(ViewPage& page, const Json& fit) {
 
 /// What the selection of a law concludes, before anything else.
 void add_conclusion(ViewPage& page, const Json& answer, const Json& fit) {
-  for (const Json& words : answer.value("words", Json::array())) {
-    page.fact("conclusion", words.get<std::string>());
-  }
+  Json& lead = page.description["lead"] = Json::array();
+  const auto add = [&lead](const std::string& text, bool doubt) {
+    lead.push_back({{"text", text}, {"doubt", doubt}});
+  };
   const Json adequacy = fit.value("adequacy", Json());
-  page.fact("adequacy", adequacy.is_object() ? adequacy.at("words").get<std::string>()
-                                             : std::string("not tested"));
+  if (adequacy.is_object()) {
+    add(adequacy.at("words").get<std::string>(), adequacy.at("verdict") != "adequate");
+  } else {
+    add("whether the law describes the data was not tested", true);
+  }
+  for (const Json& words : answer.value("words", Json::array())) {
+    add(words.get<std::string>(), false);
+  }
   for (const Json& warning : answer.value("warnings", Json::array())) {
-    page.fact("warning", warning.get<std::string>());
+    add("warning: " + warning.get<std::string>(), false);
   }
 }
 
