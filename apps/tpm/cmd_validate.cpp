@@ -163,6 +163,7 @@ void add_rendering(ValidationRequest& request, const ValidateOptions& options) {
   presses.recordings.clear();
   presses.instruments.clear();
   presses.requirement.reset();
+  presses.at.reset();
   presses.calibration = {};
   add_presses(presses, options.session);
   request.session = options.session;
@@ -282,7 +283,11 @@ int recheck(const std::string& page, const std::string& output, const Session& s
   const ValidateOptions options = options_of(before, page);
   const ValidationRequest request = validation_request(options);
   const Json now = record_of(options, request, validate(request));
-  const std::vector<CredibilityChange> changes = changes_of(before, now);
+  std::vector<CredibilityChange> changes = changes_of(before, now);
+  if (!shows_its_record(page, before)) {
+    changes.push_back({"the page itself", "as its record prints it",
+                       "otherwise: edited, or printed by another version"});
+  }
   write_file(marked, credibility_page(before, changes));
   if (session.json()) {
     Json list = array_json(changes, [](const CredibilityChange& c) {
@@ -301,7 +306,13 @@ int recheck(const std::string& page, const std::string& output, const Session& s
 }
 
 int run_validate(const ValidateOptions& options, const Session& session) {
-  if (!options.recheck.empty()) return recheck(options.recheck, options.output, session);
+  if (!options.recheck.empty()) {
+    if (!options.law.empty() || !options.credibility.empty() || !options.folder.empty()) {
+      throw Error(ExitCode::usage, "--recheck", "beside what is to be compared",
+                  "the page alone: it names law, recordings and options");
+    }
+    return recheck(options.recheck, options.output, session);
+  }
   if (options.law.empty() || options.recordings.files.empty()) {
     throw Error(ExitCode::usage, "validate", "no law and no recording",
                 "LAW RECORDING..., or --recheck FILE");
@@ -312,12 +323,16 @@ int run_validate(const ValidateOptions& options, const Session& session) {
   const ValidationRequest request = validation_request(options);
   const Validation validation = validate(request);
   std::string text = session.json() ? to_text(to_json(validation)) : to_terminal_text(validation);
+  std::string page;
+  if (!options.credibility.empty()) {
+    page = credibility_page(record_of(options, request, validation));
+  }
   if (!options.folder.empty()) {
     text += written(session, options.folder,
                     write_validation_report(options.folder, request, validation));
   }
   if (!options.credibility.empty()) {
-    write_file(options.credibility, credibility_page(record_of(options, request, validation)));
+    write_file(options.credibility, page);
     if (!session.json()) text += fmt::format("written: {}\n", options.credibility);
   }
   deliver(text, options.output);
@@ -372,16 +387,21 @@ void add_validate_command(CLI::App& app, Session& session) {
   command->add_option("--at", options->at,
                       "Recording to whose protocol the pooled area metric is carried, where "
                       "protocols differ");
-  command->add_option("--credibility", options->credibility,
-                      "Write a page (HTML) with the evidence under the headings of V&V 40");
+  CLI::Option* credibility =
+      command->add_option("--credibility", options->credibility,
+                          "Write a page (HTML) with the evidence under the headings of V&V 40");
   command
       ->add_option("--evidence", options->evidence,
                    "Of that page: CATEGORY=FILE, such as \"code verification=checks.json\" (may be "
                    "repeated); the file is named with its SHA-256")
-      ->allow_extra_args(false);
-  command->add_option("--question", options->words.question, "Of that page: question of interest");
-  command->add_option("--context", options->words.context, "Of that page: context of use");
-  command->add_option("--risk", options->words.risk, "Of that page: model risk");
+      ->allow_extra_args(false)
+      ->needs(credibility);
+  command->add_option("--question", options->words.question, "Of that page: question of interest")
+      ->needs(credibility);
+  command->add_option("--context", options->words.context, "Of that page: context of use")
+      ->needs(credibility);
+  command->add_option("--risk", options->words.risk, "Of that page: model risk")
+      ->needs(credibility);
   command->add_option("--recheck", options->recheck,
                       "Compute a page of --credibility again and write beside it one "
                       "(_rechecked) that marks what changed; exit code 1 if anything did");

@@ -24,6 +24,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/pack.hpp"
 #include "tpmkit/curve_file.hpp"
+#include "validation_error_cases.hpp"
 
 using namespace tpm;
 using namespace tpm::files;
@@ -819,7 +820,8 @@ std::vector<ErrorCase> all_cases() {
                             test::material_error_cases(),
                             test::placement_error_cases(),
                             test::plugin_error_cases(),
-                            test::organ_law_error_cases()}) {
+                            test::organ_law_error_cases(),
+                            test::validation_error_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

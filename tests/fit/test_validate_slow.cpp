@@ -61,6 +61,67 @@ TEST_CASE("the example of the help runs, and its page finds what changed", "[val
   CHECK(run_in(folder, "validate fitted/law.json other.csv --require much") == 2);
 }
 
+TEST_CASE("a credibility page names what was tampered with, is missing or changed", "[validate]") {
+  const test::TempFolder folder;
+  Random random(6);
+  test::StudyNoise noise;
+  noise.sigma_N = 5e-4;
+  write_table(folder / "recording.csv", test::study_recording({}, noise, random));
+  const test::StudyTest protocol = test::study_validation(100, 0.0);
+  write_table(folder / "other.csv", test::study_recording(protocol, noise, random));
+  write_file(folder / "cell.json", R"({"instrument": {"id": "cell", "force": "0.5 % of reading"}})");
+  write_file(folder / "checks.json", "{}");
+  REQUIRE(run_in(folder, "fit recording.csv --folder fitted") == 0);
+  REQUIRE(run_in(folder,
+                 "validate fitted/law.json other.csv --require 10% --placement onset --quantity peak "
+                 "--quantity end --instrument cell.json --evidence 'code verification=checks.json' "
+                 "--question 'Stiff?' --context training --risk low --credibility page.html") == 0);
+  const std::string page = read_file(folder / "page.html");
+  for (const char* shown : {"Stiff?", "training", "checks.json (SHA-256", "cell.json"}) {
+    CHECK_THAT(page, Catch::Matchers::Contains(shown));
+  }
+  CHECK_THAT(page, !Catch::Matchers::Contains("relaxation ratio"));
+  const auto recheck = [&](int code, const std::string& says) {
+    CAPTURE(says);
+    CHECK(run_in(folder, "validate --recheck page.html") == code);
+    const std::string said = read_file(folder / "said");
+    CHECK_THAT(said, Catch::Matchers::Contains(says));
+    CHECK(read_file(folder / "page.html").size() > 0);
+  };
+  recheck(0, "0 of its values changed");
+  // A number that the page shows, its record left alone; then the record's.
+  std::string edited = page;
+  edited.replace(edited.find(">adequate<"), 10, ">splendid<");
+  write_file(folder / "page.html", edited);
+  recheck(1, "the page itself");
+  edited = page;
+  const auto at = edited.rfind("\"u_D\": ");
+  REQUIRE(at != std::string::npos);
+  edited.replace(at, 7, "\"u_D\": 1");
+  write_file(folder / "page.html", edited);
+  recheck(1, "/u_D: was");
+  write_file(folder / "page.html", page);
+  // Evidence, instrument and law are inputs, too.
+  write_file(folder / "checks.json", "{ }");
+  recheck(1, "/files/checks.json");
+  write_file(folder / "checks.json", "{}");
+  write_file(folder / "cell.json", R"({"instrument": {"id": "cell", "force": "2 % of reading"}})");
+  recheck(1, "/files/cell.json");
+  CHECK_THAT(read_file(folder / "said"), Catch::Matchers::Contains("/u_D: was"));
+  std::filesystem::rename(folder / "cell.json", folder / "gone.json");
+  recheck(2, "cell.json");
+  std::filesystem::rename(folder / "gone.json", folder / "cell.json");
+  write_file(folder / "cell.json", R"({"instrument": {"id": "cell", "force": "0.5 % of reading"}})");
+  std::filesystem::rename(folder / "other.csv", folder / "gone.csv");
+  recheck(2, "other.csv");
+  std::filesystem::rename(folder / "gone.csv", folder / "other.csv");
+  recheck(0, "0 of its values changed");
+  edited = page;
+  edited.replace(edited.find("\"evidence\": ["), 10, "\"evidenco\"");
+  write_file(folder / "page.html", edited);
+  recheck(2, "page.html");
+}
+
 TEST_CASE("|E| <= U without a model error, and [E - U, E + U] holds a known one", "[validate]") {
   constexpr int kExperiments = 200;
   constexpr double kStiffer = 1.05;

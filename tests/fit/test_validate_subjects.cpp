@@ -10,6 +10,7 @@
 #include "tpm/fit/predict/organ_prediction.hpp"
 #include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/select/instrument_of_recording.hpp"
+#include "tpm/fit/validate/fitted_copy.hpp"
 #include "tpm/fit/validate/grid_convergence.hpp"
 #include "validation_studies.hpp"
 
@@ -69,20 +70,22 @@ ValidationRequest request_for(const LawFile& law, PreparedRecording recording) {
 }
 
 /// The paper's star: four spheres, which answer within milliseconds.
+OrganMaterial star_with(const LawFile& law, bool fit_times) {
+  OrganMaterialOptions options;
+  options.fit_times = fit_times;
+  return put_on_organ(
+      law,
+      {motion_of_protocol(ramp_and_hold(4e-3, 1e-3, 20.0),
+                          [] {
+                            std::vector<double> t;
+                            for (int i = 0; i <= 96; ++i) t.push_back(0.25 * i);
+                            return t;
+                          }())},
+      Json::parse(R"({"organ": {"kind": "star"}, "contacts": [{"kind": "sphere"}]})"), "test", {},
+      options);
+}
 const OrganMaterial& star_of(const LawFile& law) {
-  // Relaxation times, too: those that are kept do not carry the law's uncertainty.
-  OrganMaterialOptions with_times;
-  with_times.fit_times = true;
-  static const OrganMaterial once =
-      put_on_organ(law,
-                   {motion_of_protocol(ramp_and_hold(4e-3, 1e-3, 20.0),
-                                       [] {
-                                         std::vector<double> t;
-                                         for (int i = 0; i <= 96; ++i) t.push_back(0.25 * i);
-                                         return t;
-                                       }())},
-                   Json::parse(R"({"organ": {"kind": "star"}, "contacts": [{"kind": "sphere"}]})"),
-                   "test", {}, with_times);
+  static const OrganMaterial once = star_with(law, true);
   return once;
 }
 
@@ -210,6 +213,135 @@ TEST_CASE("an organ is compared as its law is, with the numbers of its network",
   // A material 10 % stiffer is seen on the organ, too.
   request.recordings = {quiet_recording(1.1)};
   CHECK(validate(request).verdict == ModelVerdict::seen);
+}
+
+TEST_CASE("bonds that keep the law's relaxation times hide none of their uncertainty",
+          "[validate]") {
+  const LawFile law = quiet_law();
+  ValidationRequest request = request_for(law, quiet_recording(1.0));
+  request.quantities = {
+      {QuantityKind::end_of_hold}, {QuantityKind::relaxation_ratio}, {QuantityKind::half_time}};
+  const Validation by_law = validate(request);
+  request.organ = std::shared_ptr<const OrganOfLaw>(
+      new OrganOfLaw(organ_of_law(star_with(law, false), "test")));
+  REQUIRE_FALSE(request.organ->times_follow());
+  const Validation v = validate(request);
+  INFO(to_terminal_text(v));
+  for (std::size_t i = 0; i < 3; ++i) {
+    CAPTURE(v.recordings.front().quantities[i].name);
+    CHECK_THAT(v.recordings.front().quantities[i].u_input,
+               WithinRel(by_law.recordings.front().quantities[i].u_input, 0.1));
+  }
+  CHECK_THAT(v.u_input_from, Contains("which the bonds keep"));
+}
+
+TEST_CASE("parts of fitted data get no verdict, whatever was done to them", "[validate]") {
+  // 2 mN of scatter.
+  Random random(8);
+  const test::StudyNoise noise;
+  const PreparedRecording fitted =
+      prepare_recording("fitted.csv", test::study_recording({}, noise, random));
+  const PreparedRecording other =
+      prepare_recording("other.csv", test::study_recording({}, noise, random));
+  const LawFile law = test::study_fit({fitted});
+  ValidationRequest request = request_for(law, other);
+  request.calibration.files.push_back({"fitted.csv", "of the bytes", fitted, ""});
+  // The same protocol, readings of its own.
+  CHECK(share_of_readings(other.recording, fitted.recording, noise.sigma_N) < 0.1);
+  CHECK(validate(request).verdict != ModelVerdict::residual);
+  const auto refused = [&](const char* what, const auto& change) {
+    Recording r;
+    for (std::size_t i = 0; i < fitted.recording.time_s.size(); ++i) {
+      double t = fitted.recording.time_s[i], d = fitted.recording.drive[i],
+             f = fitted.recording.response[i];
+      if (!change(i, t, d, f)) continue;
+      r.time_s.push_back(t);
+      r.drive.push_back(d);
+      r.response.push_back(f);
+    }
+    request.recordings = {prepare_recording("copy.csv", std::move(r))};
+    const Validation v = validate(request);
+    CAPTURE(what, to_terminal_text(v),
+            share_of_readings(request.recordings.front().recording, fitted.recording,
+                              v.recordings.front().scatter.sigma));
+    CHECK(v.verdict == ModelVerdict::residual);
+    REQUIRE(v.remarks.size() == 1);
+    CHECK_THAT(v.remarks.front(), Contains("those of fitted.csv"));
+  };
+  refused("cut", [](std::size_t i, double&, double&, double&) { return i > 20 && i < 200; });
+  refused("later", [](std::size_t, double& t, double&, double&) {
+    t += 7.3;
+    return true;
+  });
+  refused("thinned out", [](std::size_t i, double&, double&, double&) { return i % 2 == 0; });
+  refused("rounded", [](std::size_t, double&, double&, double& f) {
+    f = 1e-5 * std::round(1e5 * f);
+    return true;
+  });
+  refused("half of it replaced", [&](std::size_t i, double&, double&, double& f) {
+    if (i % 5 < 2) f = other.recording.response[i];
+    return true;
+  });
+}
+
+TEST_CASE("a force that is counted negative is refused, not called a model error", "[validate]") {
+  PreparedRecording turned = quiet_recording(1.0);
+  for (double& f : turned.recording.response) f = -f;
+  turned = prepare_recording("turned.csv", turned.recording);
+  const LawFile law = quiet_law();
+  CHECK_THAT(test::refusal_of([&] { (void)validate(request_for(law, turned)); }),
+             Contains("--negate-response"));
+}
+
+TEST_CASE("a verdict on several recordings counts what only one of them has", "[validate]") {
+  const LawFile law = quiet_law();
+  ValidationRequest request = request_for(law, quiet_recording(1.0));
+  // The first one ends with its ramp: it has no hold to differ in.
+  Recording ramp = quiet_recording(1.0, 6).recording;
+  const auto corner = std::ranges::max_element(ramp.drive) - ramp.drive.begin();
+  for (auto* column : {&ramp.time_s, &ramp.drive, &ramp.response}) {
+    column->resize(static_cast<std::size_t>(corner) + 1);
+  }
+  request.recordings.insert(request.recordings.begin(), prepare_recording("ramp", ramp));
+  request.requirement = parse_requirement("5%", "test");
+  request.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
+  const Validation right = validate(request);
+  INFO(to_terminal_text(right));
+  CHECK(right.pooled.size() == 1);
+  REQUIRE(right.alone.size() == 1);
+  CHECK(right.verdict == ModelVerdict::adequate);
+  // The hold of the other sinks by a fifth in its course, its peak does not.
+  Recording& sunk = request.recordings.back().recording;
+  const auto peak =
+      static_cast<std::size_t>(std::ranges::max_element(sunk.response) - sunk.response.begin());
+  const auto rest = static_cast<double>(sunk.response.size() - peak);
+  for (std::size_t i = peak; i < sunk.response.size(); ++i) {
+    sunk.response[i] *= 1.0 - 0.2 * static_cast<double>(i - peak) / rest;
+  }
+  const Validation wrong = validate(request);
+  INFO(to_terminal_text(wrong));
+  CHECK(wrong.verdict == ModelVerdict::not_adequate);
+  CHECK_THAT(conclusion_words(wrong), Contains("force at end of hold"));
+  CHECK(to_json(wrong).at("in_one_only").size() == 1);
+}
+
+TEST_CASE("the whole curve expects what the instrument may be off by", "[validate]") {
+  const LawFile law = quiet_law();
+  ValidationRequest request = request_for(law, quiet_recording(1.0));
+  const double without = validate(request).recordings.front().curve.mean_square_u;
+  Instrument cell;
+  cell.id = "cell";
+  cell.force = ChannelUncertainty{0.01, 0.0};
+  request.instruments = {cell};
+  const RecordingComparison r = validate(request).recordings.front();
+  // 1 % of the readings: D's part alone, for the calibration's instrument is not stated.
+  double square = 0.0;
+  std::size_t count = 0;
+  const std::vector<double>& f = request.recordings.front().recording.response;
+  for (std::size_t i = r.parts.ramp_first; i <= *r.parts.hold_last; ++i, ++count) {
+    square += std::pow(0.01 * (f[i] - r.placement.zero), 2);
+  }
+  CHECK_THAT(r.curve.mean_square_u - without, WithinRel(square / static_cast<double>(count), 1e-6));
 }
 
 TEST_CASE("a pick answers in place of its organ, and its claim is a limit", "[validate]") {

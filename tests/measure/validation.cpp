@@ -102,9 +102,9 @@ void known_error(int experiments) {
     adequate.add(verdict == ModelVerdict::adequate);
     not_adequate.add(verdict == ModelVerdict::not_adequate);
   }
-  say("5 % stiffer, [E - U, E + U] holds delta", counts);
-  say("|delta| = R, called adequate", "end of hold", adequate);
-  say("|delta| = R, called not adequate", "end of hold", not_adequate);
+  say("5 % stiffer, [E - U, E + U] contains delta", counts);
+  say("abs(delta) = R, called adequate", "end of hold", adequate);
+  say("abs(delta) = R, called not adequate", "end of hold", not_adequate);
 }
 
 /// A branch of 12 s left out of the law: delta of the law fitted to noise-free data.
@@ -124,7 +124,7 @@ void branch_left_out(int experiments) {
     counts.add(compared(law, test, noise, random, PlacementRule::held, 1.0, kBranch), delta.peak,
                delta.end);
   }
-  say("a branch left out, [E - U, E + U] holds delta", counts);
+  say("a branch left out, [E - U, E + U] contains delta", counts);
 }
 
 /// Force cells that are off by at most 0.5 %, another one in the validation.

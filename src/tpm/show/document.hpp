@@ -39,6 +39,9 @@ struct Table {
   std::string caption;
   std::vector<Column> columns;
   std::vector<std::vector<Cell>> rows{};  ///< each as long as `columns`
+  /// In HTML on a narrow screen each row becomes a list of titles and values, in place of a table
+  /// that must be scrolled.
+  bool stacks = false;
 };
 
 struct Picture {

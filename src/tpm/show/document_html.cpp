@@ -1,6 +1,7 @@
 // Declared in tpm/show/document.hpp.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <string_view>
 
@@ -51,6 +52,23 @@ figcaption b { color: var(--ink); }
   figure svg { max-width: 100%; height: auto; }
 }
 )css";
+
+// Added where a table stacks.
+constexpr std::string_view kStackingStyle = R"css(table.stacks th, table.stacks td { padding: .3rem .5rem; }
+@media (max-width: 45rem) {
+  table.stacks, table.stacks tbody, table.stacks caption { display: block; }
+  table.stacks caption { overflow-wrap: anywhere; }
+  table.stacks thead { display: none; }
+  table.stacks tr { display: block; padding: .4rem 0; border-bottom: 1px solid var(--rule); }
+  table.stacks td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .1rem .3rem; }
+  table.stacks td::before { content: attr(data-title); color: var(--soft); }
+}
+)css";
+
+bool stacks(const DocumentPart& block) {
+  const auto* table = std::get_if<Table>(&block);
+  return table != nullptr && table->stacks;
+}
 
 /// HTML text; words between backticks become code.
 std::string html_escaped(const std::string& text) {
@@ -139,7 +157,8 @@ struct HtmlBlock {
   }
 
   std::string operator()(const Table& table) const {
-    std::string out = "<div class=\"wide\"><table>\n";
+    std::string out =
+        fmt::format("<div class=\"wide\"><table{}>\n", table.stacks ? " class=\"stacks\"" : "");
     if (!table.caption.empty()) {
       out += fmt::format("<caption>{}</caption>\n", html_escaped(table.caption));
     }
@@ -152,7 +171,12 @@ struct HtmlBlock {
     for (const auto& row : table.rows) {
       out += "<tr>";
       for (std::size_t i = 0; i < row.size(); ++i) {
-        out += fmt::format("<td{}>{}</td>", class_attribute(table.columns[i].numeric, row[i].tone),
+        const std::string title =
+            table.stacks
+                ? fmt::format(" data-title=\"{}\"", html_escaped(table.columns[i].title))
+                : "";
+        out += fmt::format("<td{}{}>{}</td>",
+                           class_attribute(table.columns[i].numeric, row[i].tone), title,
                            html_escaped(row[i].text));
       }
       out += "</tr>\n";
@@ -188,9 +212,10 @@ std::string to_html(const Document& document, const std::map<std::string, std::s
   std::string out = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n"
+      "<title>{0}</title>\n<style>{1}{4}</style>\n</head>\n<body>\n"
       "<h1>{0}</h1>\n<p class=\"subtitle\">{2}</p>\n{3}",
-      html_escaped(document.title), kStyle, html_escaped(document.subtitle), contents(document));
+      html_escaped(document.title), kStyle, html_escaped(document.subtitle), contents(document),
+      std::ranges::any_of(document.blocks, stacks) ? kStackingStyle : "");
   for (const DocumentPart& block : document.blocks) out += std::visit(HtmlBlock{drawings}, block);
   return out + "</body>\n</html>\n";
 }

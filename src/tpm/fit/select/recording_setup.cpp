@@ -14,6 +14,7 @@
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
+#include "tpm/fit/select/loading_sense.hpp"
 #include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
 #include "tpmkit/error.hpp"
@@ -51,8 +52,10 @@ bool falls_instead(const std::vector<double>& values, double noise_sd) {
   return fall > kMuch * std::max(rise, 0.0) && fall > kNoise * noise_sd;
 }
 
-/// Refuses a force or a depth that is counted negative, naming the option that turns it.
+}  // namespace
+
 void require_rise(const PreparedRecording& r) {
+  if (is_only_a_hold(r)) return;
   const std::vector<double>& drive = r.recording.drive;
   const auto loaded =
       std::max_element(drive.begin(), drive.end()) - drive.begin() + std::ptrdiff_t{1};
@@ -74,10 +77,10 @@ void require_rise(const PreparedRecording& r) {
                               both ? "them" : "it"));
 }
 
+namespace {
+
 Sizes sizes_of(std::span<const PreparedRecording> recordings) {
-  for (const PreparedRecording& r : recordings) {
-    if (!is_only_a_hold(r)) require_rise(r);
-  }
+  for (const PreparedRecording& r : recordings) require_rise(r);
   Sizes sizes;
   sizes.shortest_s = std::numeric_limits<double>::infinity();
   for (const PreparedRecording& r : recordings) {

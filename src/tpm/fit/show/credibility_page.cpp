@@ -79,6 +79,19 @@ class EvidencePage {
     return cell(place, value.is_number() ? significant(value.get<double>(), digits)
                                          : value.get<std::string>());
   }
+  /// "not_adequate" as people say it.
+  [[nodiscard]] Cell verdict_cell(const std::string& place) const {
+    std::string words = record_.at(Json::json_pointer(place)).get<std::string>();
+    std::ranges::replace(words, '_', ' ');
+    return cell(place, words);
+  }
+  /// "peak force, N"
+  [[nodiscard]] Cell quantity_cell(const std::string& at) const {
+    Cell name = number_cell(at + "quantity");
+    const std::string unit = record_.at(Json::json_pointer(at + "unit")).get<std::string>();
+    if (!unit.empty()) name.text += unit == "1" ? ", share of S" : ", " + unit;
+    return name;
+  }
 
   static void add_changes(Document& d, const std::vector<CredibilityChange>& changes) {
     d.heading(2, "Changed since this page was written");
@@ -138,7 +151,12 @@ class EvidencePage {
         table.rows.push_back({{category}, file_cell(file)});
         any = true;
       }
-      if (!any) table.rows.push_back({{category}, {"empty: nothing was given"}});
+      if (any) continue;
+      const bool code = category == kCategories.front();
+      table.rows.push_back({{category},
+                            {code ? "empty: nothing was given (`tpm accuracy verify -o "
+                                    "verification` writes it)"
+                                  : "empty: nothing was given"}});
     }
     d.table(std::move(table));
   }
@@ -175,7 +193,6 @@ class EvidencePage {
       Table table{fmt::format("{}, SHA-256 {}", recordings[i].at("recording").get<std::string>(),
                               recordings[i].at("sha256").get<std::string>()),
                   {{"quantity"},
-                   {"unit"},
                    {"S", true},
                    {"D", true},
                    {"E", true},
@@ -185,14 +202,21 @@ class EvidencePage {
                    {"u_D", true},
                    {"R", true},
                    {"verdict"}}};
+      table.stacks = true;
       const std::size_t count = recordings[i].at("quantities").size();
       for (std::size_t k = 0; k < count; ++k) {
         const std::string at = fmt::format("/validation/recordings/{}/quantities/{}/", i, k);
-        std::vector<Cell> row;
-        for (const char* key :
-             {"quantity", "unit", "S", "D", "E", "U", "u_num", "u_input", "u_D", "R", "verdict"}) {
-          row.push_back(number_cell(at + key));
-        }
+        std::vector<Cell> row{quantity_cell(at)};
+        constexpr auto kShown = std::to_array<std::pair<const char*, int>>({{"S", 4},
+                                                                            {"D", 4},
+                                                                            {"E", 3},
+                                                                            {"U", 3},
+                                                                            {"u_num", 1},
+                                                                            {"u_input", 2},
+                                                                            {"u_D", 2},
+                                                                            {"R", 3}});
+        for (const auto& [key, digits] : kShown) row.push_back(number_cell(at + key, digits));
+        row.push_back(verdict_cell(at + "verdict"));
         table.rows.push_back(std::move(row));
       }
       d.table(std::move(table));
@@ -200,20 +224,21 @@ class EvidencePage {
     if (!validation_.contains("pooled")) return;
     Table table{"mean over the recordings",
                 {{"quantity"},
-                 {"unit"},
                  {"E", true},
                  {"U", true},
                  {"R", true},
                  {"area metric", true},
                  {"95 % of draws", true},
                  {"verdict"}}};
+    table.stacks = true;
     for (std::size_t k = 0; k < validation_.at("pooled").size(); ++k) {
       const std::string at = fmt::format("/validation/pooled/{}/", k);
-      std::vector<Cell> row;
-      for (const char* key : {"quantity", "unit", "E", "U", "R", "area_metric/area",
-                              "area_metric/upper_95_of_draws", "verdict"}) {
-        row.push_back(number_cell(at + key));
+      std::vector<Cell> row{quantity_cell(at)};
+      for (const char* key :
+           {"E", "U", "R", "area_metric/area", "area_metric/upper_95_of_draws"}) {
+        row.push_back(number_cell(at + key, 3));
       }
+      row.push_back(verdict_cell(at + "verdict"));
       table.rows.push_back(std::move(row));
     }
     d.table(std::move(table));
@@ -341,6 +366,10 @@ std::vector<CredibilityChange> changes_of(const Json& before, const Json& now) {
     if (!seen.contains(place)) changes.push_back({place, "not there", value_text(value)});
   }
   return changes;
+}
+
+bool shows_its_record(const std::filesystem::path& page, const Json& record) {
+  return read_file(page) == credibility_page(record);
 }
 
 std::string credibility_page(const Json& record, const std::vector<CredibilityChange>& changes) {

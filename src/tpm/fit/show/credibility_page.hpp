@@ -48,6 +48,10 @@ struct CredibilityChange {
 [[nodiscard]] std::string credibility_page(const Json& record,
                                            const std::vector<CredibilityChange>& changes = {});
 
+/// Whether a page is what its record prints: no if someone changed a number that it shows, or if
+/// another version of this program wrote it.
+[[nodiscard]] bool shows_its_record(const std::filesystem::path& page, const Json& record);
+
 /// The record of a page. Throws Error(bad_input) for a file that is no such page.
 [[nodiscard]] Json read_credibility_record(const std::filesystem::path& page);
 

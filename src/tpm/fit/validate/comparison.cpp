@@ -36,6 +36,14 @@ struct InstrumentEffect {
   double u_validation = 0.0, u_calibration = 0.0;
 };
 
+/// How S and D follow errors of the channels: relative ones of depth, time and response, absolute
+/// ones of time, depth and response.
+struct ChannelSlopes {
+  double depth_scale, time_scale, time_shift, travel;  ///< of S
+  double simulated, by_simulated;                      ///< of S, by the law's response
+  double measured, by_measured;                        ///< of D, by the readings
+};
+
 /// What all quantities of a recording are computed from.
 class Comparer {
  public:
@@ -149,8 +157,22 @@ class Comparer {
     return result_.creep ? "the reading without a load" : "the zero of the force";
   }
 
-  [[nodiscard]] std::vector<InstrumentEffect> effects_of(const Functional& s,
-                                                         const Functional& d) const {
+  [[nodiscard]] ChannelSlopes slopes_of(const Functional& s, const Functional& d) const {
+    return {times(s.weight, depth_scale_),
+            times(s.weight, time_scale_),
+            times(s.weight, time_shift_),
+            -times(s.weight, at_.by_contact),
+            times(s.weight, at_.value),
+            s.weight.sum(),
+            times(d.weight, measured_),
+            d.weight.sum()};
+  }
+  /// Of one sample of the curve.
+  [[nodiscard]] ChannelSlopes slopes_of(Eigen::Index k) const {
+    return {depth_scale_[k], time_scale_[k], time_shift_[k], -at_.by_contact[k],
+            at_.value[k],    1.0,            measured_[k],   1.0};
+  }
+  [[nodiscard]] std::vector<InstrumentEffect> effects_of(const ChannelSlopes& by) const {
     std::vector<InstrumentEffect> effects;
     const auto add = [&](const char* name, double by_s, double by_d, auto uncertainty) {
       const double ours = options_.instrument ? uncertainty(*options_.instrument) : 0.0;
@@ -166,11 +188,6 @@ class Comparer {
     };
     // A scale error of the force is in the law as it is in the readings; one of the depth is in the
     // law with the other sign than where the law is asked.
-    const double by_depth = times(s.weight, depth_scale_);
-    const double by_time = times(s.weight, time_scale_);
-    const double by_shift = times(s.weight, time_shift_);
-    const double by_travel = -times(s.weight, at_.by_contact);
-    const double by_response = times(s.weight, at_.value);
     // Of creep the force is what is imposed, and the depth what is read.
     const bool creep = result_.creep;
     const auto& read = [creep](const Instrument& i) -> const std::optional<ChannelUncertainty>& {
@@ -179,17 +196,17 @@ class Comparer {
     const auto& imposed = [creep](const Instrument& i) -> const std::optional<ChannelUncertainty>& {
       return creep ? i.force : i.depth;
     };
-    add(creep ? "scale of the depth" : "scale of the force", by_response,
-        -times(d.weight, measured_), [&](const Instrument& i) { return relative(read(i)); });
-    add(creep ? "depth channel" : "force channel", s.weight.sum(), -d.weight.sum(),
+    add(creep ? "scale of the depth" : "scale of the force", by.simulated, -by.measured,
+        [&](const Instrument& i) { return relative(read(i)); });
+    add(creep ? "depth channel" : "force channel", by.by_simulated, -by.by_measured,
         [&](const Instrument& i) { return absolute(read(i)); });
-    add(creep ? "scale of the force" : "scale of the depth", -by_depth, by_depth,
+    add(creep ? "scale of the force" : "scale of the depth", -by.depth_scale, by.depth_scale,
         [&](const Instrument& i) { return relative(imposed(i)); });
-    add(creep ? "force channel" : "depth channel", -by_travel, by_travel,
+    add(creep ? "force channel" : "depth channel", -by.travel, by.travel,
         [&](const Instrument& i) { return absolute(imposed(i)); });
-    add("scale of the time", -by_time, by_time,
+    add("scale of the time", -by.time_scale, by.time_scale,
         [&](const Instrument& i) { return relative(i.time); });
-    add("time between channels", -by_shift, by_shift,
+    add("time between channels", -by.time_shift, by.time_shift,
         [&](const Instrument& i) { return absolute(i.time); });
     return effects;
   }
@@ -286,7 +303,7 @@ class Comparer {
   /// Effects of the same instrument add with their sign before they are squared.
   void add_instrument(QuantityComparison& q, const Functional& s, const Functional& d) const {
     if (!options_.instrument && !options_.calibration_instrument) return;
-    for (const InstrumentEffect& effect : effects_of(s, d)) {
+    for (const InstrumentEffect& effect : effects_of(slopes_of(s, d))) {
       double ours = effect.validation * effect.u_validation;
       double theirs = effect.calibration * effect.u_calibration;
       if (result_.same_instrument) {
@@ -414,6 +431,27 @@ class Comparer {
     return c(i, i) - explained > kLeast * c(i, i);
   }
 
+  /// u^2 of what is no scatter of one sample: the instruments and the numbers of S.
+  [[nodiscard]] double systematic_square(Eigen::Index k) const {
+    double square = claimed_limit_ * claimed_limit_ / 3.0;
+    for (const LawAlong::Refinement& refinement : refinements_) {
+      std::vector<double> values;
+      for (const Eigen::VectorXd& curve : refinement.values) {
+        if (std::isfinite(curve[k])) values.push_back(curve[k]);
+      }
+      if (values.size() < 2) continue;
+      square += std::pow(grid_convergence(values, refinement.ratio).u, 2);
+    }
+    if (!options_.instrument && !options_.calibration_instrument) return square;
+    for (const InstrumentEffect& effect : effects_of(slopes_of(k))) {
+      const double ours = effect.validation * effect.u_validation;
+      const double theirs = effect.calibration * effect.u_calibration;
+      square +=
+          result_.same_instrument ? std::pow(ours + theirs, 2) : ours * ours + theirs * theirs;
+    }
+    return square;
+  }
+
   void set_curve() {
     const RecordingParts& parts = result_.parts;
     const ValidationPlacement& p = result_.placement;
@@ -431,7 +469,8 @@ class Comparer {
       errors.push_back(e);
       curve.mean_square_error += e * e;
       curve.mean_square_u += sigma * sigma + contact * contact + p.zero_u * p.zero_u +
-                             (at_.by_law.row(k) * along_.root()).squaredNorm();
+                             (at_.by_law.row(k) * along_.root()).squaredNorm() +
+                             systematic_square(k);
     }
     curve.samples = times.size();
     if (times.empty()) return;

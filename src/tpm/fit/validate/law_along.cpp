@@ -123,6 +123,7 @@ LawAlong::At LawAlong::at(double contact) const {
   At result{response.value, coordinate_slopes(response, coordinates_, values), {}};
   if (!load_imposed_) {
     result.by_contact = response.sensitivity.col(response.sensitivity.cols() - 2);
+    if (organ_ != nullptr && !organ_->times_follow()) follow_times(result, values);
     return result;
   }
   const double step = kStep * motion_.peak();
@@ -131,6 +132,23 @@ LawAlong::At LawAlong::at(double contact) const {
   };
   result.by_contact = (beside(step) - beside(-step)) / (2.0 * step);
   return result;
+}
+
+/// Bonds that keep the law's relaxation times would have had those of another law. An organ is
+/// fitted to answer as its law does, so it follows the law's times as the law itself.
+void LawAlong::follow_times(At& at, std::vector<double> values) const {
+  values.back() = 0.0;
+  const bool series = law_.spec.form == BranchForm::series;  // all of it moves the times
+  const std::vector<LawParameter> parameters = law_parameters(law_.spec);
+  const Response of_law = LawModel(law_.spec).respond(motion_, recording_.time_s, values,
+                                                      Want::values_and_sensitivity);
+  const Eigen::MatrixXd by_law = coordinate_slopes(of_law, coordinates_, values);
+  for (std::size_t k = 0; k < coordinates_.place.size(); ++k) {
+    const LawParameter& p = parameters[coordinates_.place[k]];
+    if (p.nuisance || !(series || p.name.starts_with("tau"))) continue;
+    const auto column = static_cast<Eigen::Index>(k);
+    at.by_law.col(column) = by_law.col(column);
+  }
 }
 
 Eigen::VectorXd LawAlong::along(const Protocol& motion, double contact, double later_s) const {

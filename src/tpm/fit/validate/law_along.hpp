@@ -58,6 +58,7 @@ class LawAlong {
   [[nodiscard]] Protocol motion() const { return motion_; }
 
  private:
+  void follow_times(At& at, std::vector<double> values) const;
   [[nodiscard]] Eigen::VectorXd along(const Protocol& motion, double contact,
                                       double later_s = 0.0) const;
   [[nodiscard]] Response respond(const Protocol& motion, const std::vector<double>& times_s,

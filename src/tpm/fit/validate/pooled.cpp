@@ -167,24 +167,36 @@ bool equal_protocols(std::span<const Applicability> motions) {
          agree(&Applicability::duration_s);
 }
 
+std::vector<QuantityComparison> each_quantity(std::span<const RecordingComparison> recordings) {
+  std::vector<QuantityComparison> all;
+  for (const RecordingComparison& r : recordings) {
+    for (const QuantityComparison& q : r.quantities) {
+      if (std::ranges::find(all, q.quantity, &QuantityComparison::quantity) == all.end()) {
+        all.push_back(q);
+      }
+    }
+  }
+  return all;
+}
+
 std::vector<PooledQuantity> pool_recordings(std::span<const RecordingComparison> recordings,
                                             std::span<const Applicability> motions,
                                             double degrees_of_law, const PooledOptions& options) {
   std::vector<PooledQuantity> all;
   if (recordings.size() < 2) return all;
   const bool equal = equal_protocols(motions);
-  for (const QuantityComparison& of_first : recordings.front().quantities) {
+  for (const QuantityComparison& one : each_quantity(recordings)) {
     std::vector<Member> members;
     for (const RecordingComparison& r : recordings) {
       const auto found =
-          std::ranges::find(r.quantities, of_first.quantity, &QuantityComparison::quantity);
+          std::ranges::find(r.quantities, one.quantity, &QuantityComparison::quantity);
       if (found == r.quantities.end()) continue;
       members.push_back({&r, &*found, equal ? 1.0 : std::abs(found->simulated)});
     }
     if (members.size() < 2) continue;
     PooledQuantity pooled;
-    pooled.name = of_first.name;
-    pooled.unit = of_first.unit;
+    pooled.name = one.name;
+    pooled.unit = one.unit;
     pooled.recordings = static_cast<int>(members.size());
     pooled.relative = !equal;
     if (equal) {
@@ -202,12 +214,6 @@ std::vector<PooledQuantity> pool_recordings(std::span<const RecordingComparison>
     judge_pooled(pooled, members, options);
     all.push_back(std::move(pooled));
   }
-  std::vector<double> p_values;
-  for (const PooledQuantity& p : all) {
-    p_values.push_back(p.verdict == ModelVerdict::no_requirement ? 1.0 : p.p_value);
-  }
-  const std::vector<bool> rejected = holm_rejects(p_values);
-  for (std::size_t i = 0; i < all.size(); ++i) all[i].rejected = rejected[i];
   return all;
 }
 

@@ -40,10 +40,14 @@ struct PooledOptions {
 /// Whether depth, rate and duration of the recordings agree to 2 %.
 [[nodiscard]] bool equal_protocols(std::span<const Applicability> motions);
 
+/// Every quantity of the recordings once, as the first that has it has it.
+[[nodiscard]] std::vector<QuantityComparison> each_quantity(
+    std::span<const RecordingComparison> recordings);
+
 /// The mean E of each quantity that two or more recordings have, by random effects with Hartung and
 /// Knapp's modified standard error (random_effects()) over the recordings' own uncertainties, and
 /// beside it, not reduced by their number, what they share: the law, one instrument. The area
-/// metric by u-pooling, with draws that share the same.
+/// metric by u-pooling, with draws that share the same. `rejected` is left to whoever judges all.
 [[nodiscard]] std::vector<PooledQuantity> pool_recordings(
     std::span<const RecordingComparison> recordings, std::span<const Applicability> motions,
     double degrees_of_law, const PooledOptions& options);

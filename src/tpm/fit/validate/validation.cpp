@@ -12,7 +12,9 @@
 #include "tpm/files/file.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/sample_digest.hpp"
+#include "tpm/fit/select/loading_sense.hpp"
 #include "tpm/fit/validate/calibration_covariance.hpp"
+#include "tpm/fit/validate/fitted_copy.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -105,6 +107,24 @@ bool was_fitted(const ValidationRequest& request, const PreparedRecording& recor
   });
 }
 
+/// Which fitted data a recording is a part of; empty: of none that was found.
+std::string copy_words(const ValidationRequest& request, const PreparedRecording& recording,
+                       const RecordingComparison& compared) {
+  constexpr double kMostOfIndependent = 0.5;
+  const auto turned = [&](const PreparedRecording& r) {
+    return compared.creep ? as_load_imposed(r).recording : r.recording;
+  };
+  for (const CalibrationData::File& file : request.calibration.files) {
+    if (!file.recording) continue;
+    const double share =
+        share_of_readings(turned(recording), turned(*file.recording), compared.scatter.sigma);
+    if (share < kMostOfIndependent) continue;
+    return fmt::format("{} % of the readings of {} are those of {}, which the law was fitted to",
+                       significant(100.0 * share, 3), recording.name, file.name);
+  }
+  return {};
+}
+
 /// All of them, or none.
 std::vector<PreparedRecording> found_recordings(const CalibrationData& calibration) {
   std::vector<PreparedRecording> found;
@@ -115,16 +135,42 @@ std::vector<PreparedRecording> found_recordings(const CalibrationData& calibrati
   return found;
 }
 
-ModelVerdict verdict_of_pooled(const std::vector<PooledQuantity>& pooled) {
-  std::vector<QuantityComparison> each;
-  for (const PooledQuantity& p : pooled) {
+/// Of several recordings: the verdict on the means and on what only one of them has, by Holm over
+/// all of these.
+ModelVerdict judge_together(Validation& v, const std::vector<RecordingComparison>& unseen) {
+  for (const RecordingComparison& r : unseen) {
+    for (QuantityComparison q : r.quantities) {
+      const auto has = [&](const RecordingComparison& other) {
+        return std::ranges::find(other.quantities, q.quantity, &QuantityComparison::quantity) !=
+               other.quantities.end();
+      };
+      if (std::ranges::count_if(unseen, has) > 1) continue;
+      q.name = fmt::format("{}: {}", r.name, q.name);
+      v.alone.push_back(std::move(q));
+    }
+  }
+  std::vector<QuantityComparison> all = v.alone;
+  for (const PooledQuantity& p : v.pooled) {
     QuantityComparison q;
     q.verdict = p.verdict;
     q.limit = p.limit;
-    q.rejected = p.rejected;
-    each.push_back(std::move(q));
+    q.p_value = p.p_value;
+    all.push_back(std::move(q));
   }
-  return verdict_of_all(each);
+  std::vector<double> p_values;
+  for (const QuantityComparison& q : all) {
+    p_values.push_back(q.verdict == ModelVerdict::no_requirement ? 1.0 : q.p_value);
+  }
+  const std::vector<bool> rejected = holm_rejects(p_values);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    all[i].rejected = rejected[i];
+    if (i < v.alone.size()) {
+      v.alone[i].rejected = rejected[i];
+    } else {
+      v.pooled[i - v.alone.size()].rejected = rejected[i];
+    }
+  }
+  return verdict_of_all(all);
 }
 
 /// A requirement in the unit of nothing that is compared says nothing, whatever else is found.
@@ -216,12 +262,20 @@ Validation validate(const ValidationRequest& request) {
     throw bad_input(request.law_file, "carries no uncertainty of a fit",
                     "a law.json that tpm fit has written; data that determine all parameters");
   }
+  if (request.at && std::ranges::find(request.recordings, *request.at, &PreparedRecording::name) ==
+                        request.recordings.end()) {
+    throw Error(ExitCode::usage, "--at", fmt::format("'{}'", printable(*request.at)),
+                "the name of one of the recordings");
+  }
   Validation v;
   const std::optional<LawFile> again =
       with_calibration_covariance(request.law, found_recordings(request.calibration));
   const LawFile& law = again ? *again : request.law;
   v.u_input_from = again ? "the scatter of the calibration's recordings (sandwich)"
                          : "the covariance in the law file";
+  if (request.organ && !request.organ->times_follow() && law.spec.branches > 0) {
+    v.u_input_from += "; S follows the relaxation times, which the bonds keep, as the law does";
+  }
   v.spec = law.spec;
   v.subject = law_words(law.spec);
   if (request.organ)
@@ -241,6 +295,7 @@ Validation validate(const ValidationRequest& request) {
   for (std::size_t i = 0; i < request.recordings.size(); ++i) {
     const PreparedRecording& recording = request.recordings[i];
     require_imposed_motion(recording.recording, recording.name, "validation");
+    if (request.earlier.empty()) require_rise(recording);
     ComparisonOptions options;
     options.quantities = request.quantities;
     options.requirement = request.requirement;
@@ -258,6 +313,14 @@ Validation validate(const ValidationRequest& request) {
     options.calibration_instrument = request.calibration.instrument;
     options.calibration_data = was_fitted(request, recording);
     RecordingComparison comparison = compare_with_recording(law, recording, options);
+    if (!options.calibration_data) {
+      const std::string copied = copy_words(request, recording, comparison);
+      if (!copied.empty()) {
+        v.remarks.push_back(copied);
+        options.calibration_data = true;
+        comparison = compare_with_recording(law, recording, options);
+      }
+    }
     Applicability motion = motion_of(recording, comparison.parts,
                                      comparison.creep ? 0.0 : comparison.placement.contact);
     compare_with_calibration(motion, request);
@@ -278,11 +341,6 @@ Validation validate(const ValidationRequest& request) {
     v.remarks.push_back(
         fmt::format("{} stood on a bound of the fit: its uncertainty is not in u_input", name));
   }
-  if (request.organ && !request.organ->times_follow() && law.spec.branches > 0) {
-    v.remarks.emplace_back(
-        "the bonds keep the law's relaxation times: their uncertainty is in u_input only as far as "
-        "the moduli take it up (tpm material --fit-times)");
-  }
   require_fitting_unit(v, request.requirement);
   if (unseen.empty()) {
     v.verdict = ModelVerdict::residual;
@@ -295,11 +353,7 @@ Validation validate(const ValidationRequest& request) {
       unseen, unseen_motions,
       law.uncertainty->degrees_of_freedom.value_or(std::numeric_limits<double>::infinity()),
       pooling);
-  v.verdict = v.pooled.empty() ? unseen.front().verdict : verdict_of_pooled(v.pooled);
-  if (unseen.size() > 1 && v.pooled.empty()) {
-    v.remarks.push_back(
-        "the recordings have no quantity in common: the verdict is the first one's");
-  }
+  v.verdict = unseen.size() > 1 ? judge_together(v, unseen) : unseen.front().verdict;
   return v;
 }
 

@@ -64,6 +64,7 @@ struct Validation {
   std::vector<RecordingComparison> recordings;
   std::vector<Applicability> applicability;  ///< one a recording
   std::vector<PooledQuantity> pooled;        ///< over those that the law was not fitted to
+  std::vector<QuantityComparison> alone;     ///< of several recordings, what only one of them has
   std::vector<CalibrationData::File> calibration;
   ModelVerdict verdict = ModelVerdict::not_seen;
   std::vector<std::string> remarks;

@@ -94,14 +94,14 @@ std::string joint_text(const JointTest& joint) {
 
 std::string curve_text(const CurveComparison& c, const Unit& unit) {
   const double model = c.mean_square_error - c.mean_square_u;
-  const std::string size = model > 0.0 ? with_unit(number(std::sqrt(model), unit, 2), unit) + " rms"
+  const std::string size = model > 0.0 ? with_unit(number(std::sqrt(model), unit, 2), unit)
                                        : std::string("nothing");
   std::string text = fmt::format("rms E {}, expected {}: {} beyond the uncertainty",
                                  number(std::sqrt(c.mean_square_error), unit),
                                  with_unit(number(std::sqrt(c.mean_square_u), unit), unit), size);
   if (c.chi_squared > 0.0) {
-    text += fmt::format("; chi^2 of the scatter alone {} over {} samples",
-                        significant(c.chi_squared, 3), c.samples);
+    text += fmt::format("; chi^2 {} over {} samples", significant(c.chi_squared, 3),
+                        c.samples);
   }
   return text;
 }
@@ -268,7 +268,7 @@ std::string pooled_text(const Validation& v) {
 std::string each_recording_text(const Validation& v) {
   TableSection section;
   section.columns = {"recording"};
-  const std::vector<QuantityComparison>& quantities = v.recordings.front().quantities;
+  const std::vector<QuantityComparison> quantities = each_quantity(v.recordings);
   for (const QuantityComparison& q : quantities) section.columns.push_back(q.name);
   section.columns.push_back("verdict");
   for (const RecordingComparison& r : v.recordings) {
@@ -281,6 +281,10 @@ std::string each_recording_text(const Validation& v) {
     section.rows.push_back(std::move(row));
   }
   std::string text = table_text(std::move(section)) + "\n";
+  for (const QuantityComparison& q : v.alone) {
+    text += line("in one only", fmt::format("{} {}: {}", q.name, error_text(q.e, unit_of(q)),
+                                            cell_words(q.verdict)));
+  }
   // Recordings of one protocol say the same.
   const auto said = [&](std::size_t i) { return applicability_text(v.applicability[i]); };
   std::vector<std::size_t> places(v.recordings.size());
@@ -311,7 +315,8 @@ std::string conclusion_words(const Validation& v) {
     if (wanted) named.push_back(fmt::format("{} {}", name, error_text(e, unit)));
   };
   for (const PooledQuantity& p : v.pooled) add(p.name, p.e, unit_of(p), p.rejected, p.verdict);
-  if (v.pooled.empty()) {
+  for (const QuantityComparison& q : v.alone) add(q.name, q.e, unit_of(q), q.rejected, q.verdict);
+  if (v.pooled.empty() && v.alone.empty()) {
     for (const RecordingComparison& r : v.recordings) {
       if (r.calibration) continue;
       for (const QuantityComparison& q : r.quantities) {
@@ -499,6 +504,7 @@ Json to_json(const Validation& v) {
     j["recordings"].push_back(recording_json(v.recordings[i], v.applicability[i]));
   }
   if (!v.pooled.empty()) j["pooled"] = array_json(v.pooled, pooled_json);
+  if (!v.alone.empty()) j["in_one_only"] = array_json(v.alone, quantity_json);
   j["remarks"] = v.remarks;
   j["verdict"] = verdict_key(v.verdict);
   j["words"] = conclusion_words(v);

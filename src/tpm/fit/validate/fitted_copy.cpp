@@ -1,0 +1,82 @@
+#include "tpm/fit/validate/fitted_copy.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "tpm/fit/select/recording_setup.hpp"
+
+namespace tpm::fit {
+namespace {
+
+constexpr double kNear = 0.02;       // of the scatter
+constexpr double kSameTime = 0.05;   // of the sampling interval
+constexpr double kSameDrive = 1e-5;  // of the largest
+constexpr double kRounding = 1e-8;   // of the largest, where nothing scatters
+
+double largest(const std::vector<double>& values) {
+  double size = 0.0;
+  for (const double v : values) size = std::max(size, std::abs(v));
+  return size;
+}
+
+/// Compares readings at times that differ by one shift.
+class Overlay {
+ public:
+  Overlay(const Recording& of, const Recording& in, double sigma)
+      : of_(of),
+        in_(in),
+        time_(kSameTime * std::min(median_step(of.time_s), median_step(in.time_s))),
+        drive_(kSameDrive * largest(of.drive)),
+        response_(std::max(kNear * sigma, kRounding * largest(of.response))) {}
+
+  [[nodiscard]] bool same(std::size_t i, double later_s) const {
+    const double t = of_.time_s[i] + later_s;
+    auto next = static_cast<std::size_t>(
+        std::lower_bound(in_.time_s.begin(), in_.time_s.end(), t - time_) - in_.time_s.begin());
+    if (next == in_.time_s.size() || in_.time_s[next] > t + time_) return false;
+    return std::abs(in_.drive[next] - of_.drive[i]) <= drive_ &&
+           std::abs(in_.response[next] - of_.response[i]) <= response_;
+  }
+  /// Of about `most` samples over the whole recording.
+  [[nodiscard]] double share(double later_s, std::size_t most) const {
+    const std::size_t n = of_.time_s.size(), stride = std::max<std::size_t>(n / most, 1);
+    std::size_t found = 0, asked = 0;
+    for (std::size_t i = 0; i < n; i += stride, ++asked) found += same(i, later_s);
+    return static_cast<double>(found) / static_cast<double>(asked);
+  }
+
+ private:
+  const Recording& of_;
+  const Recording& in_;
+  double time_, drive_, response_;
+};
+
+}  // namespace
+
+double share_of_readings(const Recording& of, const Recording& in, double sigma) {
+  const std::size_t n = of.time_s.size();
+  const bool whole = of.drive.size() == n && of.response.size() == n &&
+                     in.drive.size() == in.time_s.size() && in.response.size() == in.time_s.size();
+  if (!whole || n < 3 || in.time_s.size() < 3) return 0.0;
+  const Overlay overlay(of, in, sigma);
+  // One reading of the recording stands somewhere in the other; which of them may have been cut off
+  // or replaced, at equal intervals perhaps: they are looked for by the golden section.
+  constexpr std::size_t kAnchors = 8, kFew = 40;
+  constexpr double kGolden = 0.6180339887498949;
+  constexpr double kWorthAll = 0.25;
+  double most = 0.0;
+  for (std::size_t k = 0; k < kAnchors; ++k) {
+    const double place = std::fmod((static_cast<double>(k) + 0.5) * kGolden, 1.0);
+    const auto anchor = static_cast<std::size_t>(place * static_cast<double>(n));
+    for (const double t : in.time_s) {
+      const double later_s = t - of.time_s[anchor];
+      if (!overlay.same(anchor, later_s) || overlay.share(later_s, kFew) < kWorthAll) continue;
+      most = std::max(most, overlay.share(later_s, n));
+    }
+    if (most > kWorthAll) return most;
+  }
+  return most;
+}
+
+}  // namespace tpm::fit

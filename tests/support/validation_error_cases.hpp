@@ -1,0 +1,109 @@
+#pragma once
+// Laws, recordings, pages and options that tpm validate refuses (test_errors.cpp).
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "error_case.hpp"
+
+namespace tpm::test {
+
+/// A ramp of 2 mm within 1 s and a hold, of 100 + 50 exp(-t / 2 s) N/m.
+inline std::string validated_recording(double sign = 1.0, int count = 120) {
+  std::string text = "time [s],depth [mm],force [N]\n";
+  for (int i = 0; i < count; ++i) {
+    const double t = 0.1 * i - 1.0, ramp = std::min(std::max(t, 0.0), 1.0);
+    const double branch =
+        50.0 * 2.0 * (1.0 - std::exp(-ramp / 2.0)) * std::exp(-std::max(t - 1.0, 0.0) / 2.0);
+    const double force = 2e-3 * (100.0 * ramp + branch) + 1e-4 * std::sin(7.0 * i * i);
+    text += std::to_string(0.1 * i) + "," + std::to_string(2.0 * ramp) + "," +
+            std::to_string(sign * force) + "\n";
+  }
+  return text;
+}
+
+inline std::vector<ErrorCase> validation_error_cases() {
+  const std::string type = "validation";
+  const auto law = [](const std::string& more) {
+    return R"({"law": "linear-1", "drive": "indentation_depth", "response": "contact_force",
+"reference_m": 0.002, "provenance": "fitted",
+"parameters": {"k_inf_N_per_m": 100, "k1_N_per_m": 50, "tau1_s": 2})" +
+           more + "}";
+  };
+  const std::string fit = R"(, "fit": {"parameters": ["k_inf_N_per_m", "k1_N_per_m", "tau1_s"],
+"coordinates": ["linear", "linear", "log"],
+"covariance": [[1e-3, 0, 0], [0, 1e-2, 0], [0, 0, 1e-5]], "level": 0.95,
+"readings_per_independent_reading": 1, "noise": {"kind": "absolute", "absolute_N": 1e-4,
+"relative": 0, "column_factor": 1, "lag_1_correlation": 0}, "data": [],
+"degrees_of_freedom": 100, "duration_s": 11})";
+  const std::string page_opens =
+      "<html><body><script type=\"application/json\" id=\"tpm-credibility\">";
+  const std::string page_closes = "</script></body></html>";
+  const auto files = [law](const std::string& recording) {
+    return with_files({{"l.json", law("")}, {"r.csv", recording}});
+  };
+  const auto page = [page_opens, page_closes](const std::string& record) {
+    return with_files({{"p.html", page_opens + record + page_closes}});
+  };
+  const std::string command = "validate {}/l.json {}/r.csv";
+  const std::string recheck = "validate --recheck {}/p.html";
+  const std::string whole =
+      R"({"tpm": "1", "words": {"question": "", "context": "", "risk": ""}, "files": {},
+"evidence": [], "law": {}, "validation": {}, "invocation": )";
+  const auto fitted = [law, fit](const std::string& recording) {
+    return with_files({{"l.json", law(fit)}, {"r.csv", recording}});
+  };
+  std::string still = "time [s],depth [mm],force [N]\n";
+  for (int i = 0; i < 40; ++i) still += std::to_string(0.1 * i) + ",1,0.1\n";
+  return {
+      {type, "neither law nor recording", "validate", with_files({})},
+      {type, "law without recording", "validate {}/l.json", with_files({{"l.json", law("")}})},
+      {type, "missing law", command, with_files({{"r.csv", validated_recording()}})},
+      {type, "missing recording", command, with_files({{"l.json", law("")}})},
+      {type, "law without uncertainty", command, files(validated_recording())},
+      {type, "requirement that is none", command + " --require much",
+       files(validated_recording())},
+      {type, "requirement of 0", command + " --require 0%", files(validated_recording())},
+      {type, "unknown placement", command + " --placement best", files(validated_recording())},
+      {type, "unknown quantity", command + " --quantity slope", files(validated_recording())},
+      {type, "--plan with a law", command + " --plan", files(validated_recording())},
+      {type, "--tolerance without --plan", command + " --tolerance 1%",
+       files(validated_recording())},
+      {type, "missing instrument", command + " --instrument {}/none.json",
+       files(validated_recording())},
+      {type, "session beside a recording", command + " {}/s.tpmrec", files(validated_recording())},
+      {type, "--session with a session", "validate {}/l.json {}/s.tpmrec --session {}/t.tpmrec",
+       with_files({{"l.json", law("")}})},
+      {type, "force counted negative", command, fitted(validated_recording(-1.0))},
+      {type, "depth that does not rise", command, fitted(still)},
+      {type, "requirement in the unit of nothing", command + " --require '20 mm'",
+       fitted(validated_recording())},
+      {type, "quantity that the recording lacks", command + " --quantity work",
+       fitted(validated_recording())},
+      {type, "--at of no recording", command + " --at other.csv", fitted(validated_recording())},
+      {type, "instrument that is none", command + " --instrument {}/i.json",
+       with_files({{"l.json", law(fit)},
+                   {"r.csv", validated_recording()},
+                   {"i.json", R"({"instrument": {"force": "much"}})"}})},
+      {type, "unknown category of evidence",
+       command + " --credibility {}/out --evidence checks={}/l.json", fitted(validated_recording())},
+      {type, "missing evidence",
+       command + " --folder {}/out --credibility {}/out2 --evidence plausibility={}/gone.json",
+       fitted(validated_recording())},
+      {type, "evidence without a page", command + " --evidence plausibility={}/l.json",
+       fitted(validated_recording())},
+      {type, "--recheck beside a law", command + " --recheck {}/p.html",
+       fitted(validated_recording())},
+      {type, "no page", recheck, with_files({{"p.html", "<html></html>"}})},
+      {type, "missing page", recheck, with_files({})},
+      {type, "page whose record is no JSON", recheck, page("{\"tpm\": ")},
+      {type, "page of an older format", recheck, page(R"({"tpm": "1", "words": {}})")},
+      {type, "page whose invocation is damaged", recheck, page(whole + "{\"law\": 3}}")},
+      {type, "page whose law is gone", recheck,
+       page(whole + R"({"law": "{}/gone.json", "recordings": ["r.csv"], "reading": {}, "units": [],
+"contact_force": "", "quantities": [], "require": "", "placement": "held", "instrument": "",
+"calibration_instrument": "", "at": ""}})")},
+  };
+}
+
+}  // namespace tpm::test
