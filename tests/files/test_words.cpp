@@ -115,7 +115,7 @@ TEST_CASE("a wrong word is named, with the nearest right one and the help to rea
         "tpm hil run --help");
   check("sweep polt x.h5", "sweep: no command 'polt'", "'plot'", "tpm sweep --help");
   check("--verison", "no option '--verison'", "'--version'", "tpm --help");
-  check("qqqqqqq", "no command 'qqqqqqq'", "expected one of data, fit", "see tpm --help");
+  check("qqqqqqq", "no command 'qqqqqqq'", "expected one of example, data", "see tpm --help");
   check("hil", "hil: no command", "expected one of", "see tpm hil --help");
   check("fit --qqqqqqq", "no option '--qqqqqqq'", "see", "tpm fit --help");
   check("tables 5", "tables: '5' is one argument too many", "", "see tpm tables --help");
