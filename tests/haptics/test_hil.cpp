@@ -313,7 +313,7 @@ TEST_CASE("An exported recording holds every column of every row, with unit, and
   CHECK(parse_json(file.texts("/header_json").at(0), "header") == recording.header);
   CHECK(parse_json(file.texts("/closing_json").at(0), "closing") == recording.closing);
   CHECK(file.texts("/phases/name").size() == recording.session.phases.size());
-  CHECK(file.members("/rows").size() == 32);
+  CHECK(file.members("/rows").size() == 36);
   for (const std::string& name : file.members("/rows")) {
     const std::string unit = file.attribute("/rows/" + name, "unit");
     const std::string tail = name.substr(name.find_last_of('_') + 1);
