@@ -168,7 +168,7 @@ class Fits(unittest.TestCase):
         self.assertTrue(pickle.loads(pickle.dumps(self.fit.parameters)).equals(self.fit.parameters))
 
     def test_errors(self):
-        for files, words in (([], "no file"), ("none.csv", "none.csv"), ("", "no such file|cannot")):
+        for files, words in (([], "no file"), ("none.csv", "none.csv"), ("", "is neither a curve file nor a known curve")):
             with self.assertRaisesRegex(tpmkit.Error, words):
                 tpmkit.fit(files)
 

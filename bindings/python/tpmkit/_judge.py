@@ -26,8 +26,9 @@ class Validation:
 
     @property
     def verdict(self) -> str:
-        """Of all quantities together: "adequate", "not_adequate", "undetermined", or "not_asked" without a
-        requirement."""
+        """Of all quantities together: "adequate", "not_adequate" or "undetermined" for a requirement; without one "seen"
+        (a model error) or "not_seen"; "calibration_residual" for data that the law was fitted to, which validate
+        nothing; "no_requirement" where none is in its unit."""
         return self._document["verdict"]
 
     @property
@@ -73,7 +74,7 @@ def validate(
     law
         law.json as `tpm fit` or `Fit.save` writes it, or the scene or material.json of `tpm material`.
     recordings
-        One or several files. A recording that the law was fitted to is refused.
+        One or several files. Of one that the law was fitted to the verdict is "calibration_residual".
     require
         How large the error of the model may be: "10%" of the measured value, "20 mN", or "jnd". None: no verdict.
     placement, instrument, columns
