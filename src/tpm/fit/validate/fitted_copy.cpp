@@ -9,10 +9,10 @@
 namespace tpm::fit {
 namespace {
 
-constexpr double kNear = 0.02;       // of the scatter
-constexpr double kSameTime = 0.05;   // of the sampling interval
-constexpr double kSameDrive = 1e-5;  // of the largest
-constexpr double kRounding = 1e-8;   // of the largest, where nothing scatters
+constexpr double kNear = 0.02;                  // of the scatter
+constexpr double kSameTime = 0.05;              // of the sampling interval
+constexpr double kSameDrive = 1e-5;             // of the largest
+constexpr double kWhereNothingScatters = 1e-8;  // of the largest, where nothing scatters
 
 double largest(const std::vector<double>& values) {
   double size = 0.0;
@@ -28,7 +28,7 @@ class Overlay {
         in_(in),
         time_(kSameTime * std::min(median_step(of.time_s), median_step(in.time_s))),
         drive_(kSameDrive * largest(of.drive)),
-        response_(std::max(kNear * sigma, kRounding * largest(of.response))) {}
+        response_(std::max(kNear * sigma, kWhereNothingScatters * largest(of.response))) {}
 
   [[nodiscard]] bool same(std::size_t i, double later_s) const {
     const double t = of_.time_s[i] + later_s;
