@@ -26,7 +26,7 @@ inline std::vector<ErrorCase> validation_error_cases() {
   const std::string type = "validation";
   const auto law = [](const std::string& more) {
     return R"({"law": "linear-1", "drive": "indentation_depth", "response": "contact_force",
-"reference_m": 0.002, "provenance": "fitted",
+"reference_m": 0.002, "provenance": "derived",
 "parameters": {"k_inf_N_per_m": 100, "k1_N_per_m": 50, "tau1_s": 2})" +
            more + "}";
   };
@@ -84,7 +84,7 @@ inline std::vector<ErrorCase> validation_error_cases() {
       {type, "instrument that is none", command + " --instrument {}/i.json",
        with_files({{"l.json", law(fit)},
                    {"r.csv", validated_recording()},
-                   {"i.json", R"({"instrument": {"force": "much"}})"}})},
+                   {"i.json", R"({"instrument": {"id": "cell", "force": "much"}})"}})},
       {type, "unknown category of evidence",
        command + " --credibility {}/out --evidence checks={}/l.json", fitted(validated_recording())},
       {type, "missing evidence",
