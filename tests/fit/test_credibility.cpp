@@ -50,6 +50,16 @@ TEST_CASE("a credibility page shows its record, and no longer once it was edited
   CHECK_FALSE(shows_its_record(folder / "page.html", record));
 }
 
+TEST_CASE("files of evidence are linked, whatever they are called", "[validate][credibility]") {
+  Json record = record_of(1.0);
+  const std::string file = "java: \"x\"/checks.json";
+  record["evidence"].push_back({{"category", "code verification"}, {"file", file}});
+  record["files"][file] = std::string(64, 'b');
+  CHECK_THAT(credibility_page(record),
+             Contains("<a href=\"java%3A%20%22x%22/checks.json\">java: &quot;x&quot;/checks.json "
+                      "(SHA-256 bbbb"));
+}
+
 TEST_CASE("every value that differs between two records is named, and red on the page",
           "[validate][credibility]") {
   const Json before = record_of(1.0);
@@ -70,9 +80,9 @@ TEST_CASE("every value that differs between two records is named, and red on the
   CHECK(named("/files/new.csv")->before == "not there");
   REQUIRE(named("/law/adequacy") != changes.end());
   CHECK(named("/law/adequacy")->now == "gone");
-  CHECK_THAT(credibility_page(before, changes), Contains("(now 0.123456)") &&
-                                                    Contains("Changed since this page was written") &&
-                                                    Contains("class=\"number bad\""));
+  CHECK_THAT(credibility_page(before, changes),
+             Contains("(now 0.123456)") && Contains("Changed since this page was written") &&
+                 Contains("class=\"number bad\""));
 }
 
 TEST_CASE("a page that lacks a part of its record names it", "[validate][credibility]") {

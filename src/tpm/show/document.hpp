@@ -12,6 +12,7 @@ enum class Tone { plain, good, fair, bad };
 struct Cell {
   std::string text;
   Tone tone = Tone::plain;
+  std::string file{};  ///< that the page links, relative to it; may be empty
 };
 
 struct Column {

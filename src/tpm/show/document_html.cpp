@@ -54,7 +54,8 @@ figcaption b { color: var(--ink); }
 )css";
 
 // Added where a table stacks.
-constexpr std::string_view kStackingStyle = R"css(table.stacks th, table.stacks td { padding: .3rem .5rem; }
+constexpr std::string_view kStackingStyle =
+    R"css(table.stacks th, table.stacks td { padding: .3rem .5rem; }
 @media (max-width: 45rem) {
   table.stacks, table.stacks tbody, table.stacks caption { display: block; }
   table.stacks caption { overflow-wrap: anywhere; }
@@ -68,6 +69,20 @@ constexpr std::string_view kStackingStyle = R"css(table.stacks th, table.stacks 
 bool stacks(const DocumentPart& block) {
   const auto* table = std::get_if<Table>(&block);
   return table != nullptr && table->stacks;
+}
+
+/// A file's name as an address relative to the page: a colon would make it a scheme.
+std::string address(const std::string& file) {
+  std::string out;
+  for (const char c : file) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0 || std::string_view("/._-~").find(c) != std::string_view::npos) {
+      out += c;
+    } else {
+      out += fmt::format("%{:02X}", byte);
+    }
+  }
+  return out;
 }
 
 /// HTML text; words between backticks become code.
@@ -172,12 +187,13 @@ struct HtmlBlock {
       out += "<tr>";
       for (std::size_t i = 0; i < row.size(); ++i) {
         const std::string title =
-            table.stacks
-                ? fmt::format(" data-title=\"{}\"", html_escaped(table.columns[i].title))
-                : "";
-        out += fmt::format("<td{}{}>{}</td>",
-                           class_attribute(table.columns[i].numeric, row[i].tone), title,
-                           html_escaped(row[i].text));
+            table.stacks ? fmt::format(" data-title=\"{}\"", html_escaped(table.columns[i].title))
+                         : "";
+        const std::string text = html_escaped(row[i].text);
+        out += fmt::format(
+            "<td{}{}>{}</td>", class_attribute(table.columns[i].numeric, row[i].tone), title,
+            row[i].file.empty() ? text
+                                : fmt::format("<a href=\"{}\">{}</a>", address(row[i].file), text));
       }
       out += "</tr>\n";
     }

@@ -149,6 +149,7 @@ class EvidencePage {
         if (e.at("category") != category) continue;
         const std::string file = e.at("file").get<std::string>();
         table.rows.push_back({{category}, file_cell(file)});
+        table.rows.back().back().file = file;  // beside the page, as it was given
         any = true;
       }
       if (any) continue;
@@ -234,8 +235,7 @@ class EvidencePage {
     for (std::size_t k = 0; k < validation_.at("pooled").size(); ++k) {
       const std::string at = fmt::format("/validation/pooled/{}/", k);
       std::vector<Cell> row{quantity_cell(at)};
-      for (const char* key :
-           {"E", "U", "R", "area_metric/area", "area_metric/upper_95_of_draws"}) {
+      for (const char* key : {"E", "U", "R", "area_metric/area", "area_metric/upper_95_of_draws"}) {
         row.push_back(number_cell(at + key, 3));
       }
       row.push_back(verdict_cell(at + "verdict"));
