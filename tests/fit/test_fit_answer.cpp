@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <string>
+#include <utility>
 
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
@@ -112,10 +113,14 @@ TEST_CASE("the short answer of a folder names the recordings that are not fitted
   study.law = parse_law_name("linear-1", "test");
   study.why = "because";
   for (int i = 0; i < 40; ++i) {
-    study.rows.push_back({.name = fmt::format("r{}.csv", i), .reason = "too short"});
+    SpecimenRow row;
+    row.name = fmt::format("r{}.csv", i);
+    row.reason = "too short";
+    study.rows.push_back(std::move(row));
   }
   const Selection s = selected(1.0);
-  SpecimenRow fitted{.name = "fitted.csv", .reason = {}};
+  SpecimenRow fitted;
+  fitted.name = "fitted.csv";
   fitted.fit = s.candidates[s.recommended].fit;
   fitted.fit->adequacy = LawAdequacy{"not_described", 9.0, "it does not"};
   study.rows.push_back(fitted);
