@@ -69,13 +69,15 @@ TEST_CASE("a credibility page names what was tampered with, is missing or change
   write_table(folder / "recording.csv", test::study_recording({}, noise, random));
   const test::StudyTest protocol = test::study_validation(100, 0.0);
   write_table(folder / "other.csv", test::study_recording(protocol, noise, random));
-  write_file(folder / "cell.json", R"({"instrument": {"id": "cell", "force": "0.5 % of reading"}})");
+  write_file(folder / "cell.json",
+             R"({"instrument": {"id": "cell", "force": "0.5 % of reading"}})");
   write_file(folder / "checks.json", "{}");
   REQUIRE(run_in(folder, "fit recording.csv --folder fitted") == 0);
-  REQUIRE(run_in(folder,
-                 "validate fitted/law.json other.csv --require 10% --placement onset --quantity peak "
-                 "--quantity end --instrument cell.json --evidence 'code verification=checks.json' "
-                 "--question 'Stiff?' --context training --risk low --credibility page.html") == 0);
+  REQUIRE(
+      run_in(folder,
+             "validate fitted/law.json other.csv --require 10% --placement onset --quantity peak "
+             "--quantity end --instrument cell.json --evidence 'code verification=checks.json' "
+             "--question 'Stiff?' --context training --risk low --credibility page.html") == 0);
   const std::string page = read_file(folder / "page.html");
   for (const char* shown : {"Stiff?", "training", "checks.json (SHA-256", "cell.json"}) {
     CHECK_THAT(page, Catch::Matchers::Contains(shown));
@@ -111,7 +113,8 @@ TEST_CASE("a credibility page names what was tampered with, is missing or change
   std::filesystem::rename(folder / "cell.json", folder / "gone.json");
   recheck(2, "cell.json");
   std::filesystem::rename(folder / "gone.json", folder / "cell.json");
-  write_file(folder / "cell.json", R"({"instrument": {"id": "cell", "force": "0.5 % of reading"}})");
+  write_file(folder / "cell.json",
+             R"({"instrument": {"id": "cell", "force": "0.5 % of reading"}})");
   std::filesystem::rename(folder / "other.csv", folder / "gone.csv");
   recheck(2, "other.csv");
   std::filesystem::rename(folder / "gone.csv", folder / "other.csv");

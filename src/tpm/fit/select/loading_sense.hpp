@@ -3,8 +3,8 @@
 
 namespace tpm::fit {
 
-/// Refuses a force or a depth that is counted negative: Error(bad_input) names the option that turns
-/// it. A hold alone passes.
+/// Refuses a force or a depth that is counted negative: Error(bad_input) names the option that
+/// turns it. A hold alone passes.
 void require_rise(const PreparedRecording& recording);
 
 }  // namespace tpm::fit

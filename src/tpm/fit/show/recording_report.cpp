@@ -142,8 +142,9 @@ Figure selection_figure(const Selection& selection) {
   residual.y = {"rms residual over peak", "%", true};
   // Beyond 10 the evidence against a law is very strong: what matters lies within 30.
   constexpr double kLargestBic = 30.0;
-  Panel bic{.x = residual.x,
-            .y = {.quantity = "BIC above the best", .unit = "", .lower = 0.0, .upper = kLargestBic}};
+  Panel bic{
+      .x = residual.x,
+      .y = {.quantity = "BIC above the best", .unit = "", .lower = 0.0, .upper = kLargestBic}};
   for (const bool recommended : {false, true}) {
     add_if_any(residual, laws_at(selection, false, recommended));
     add_if_any(bic, laws_at(selection, true, recommended));

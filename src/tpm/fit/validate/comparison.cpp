@@ -158,19 +158,17 @@ class Comparer {
   }
 
   [[nodiscard]] ChannelSlopes slopes_of(const Functional& s, const Functional& d) const {
-    return {times(s.weight, depth_scale_),
-            times(s.weight, time_scale_),
-            times(s.weight, time_shift_),
-            -times(s.weight, at_.by_contact),
-            times(s.weight, at_.value),
-            s.weight.sum(),
-            times(d.weight, measured_),
-            d.weight.sum()};
+    return {times(s.weight, depth_scale_), times(s.weight, time_scale_),
+            times(s.weight, time_shift_),  -times(s.weight, at_.by_contact),
+            times(s.weight, at_.value),    s.weight.sum(),
+            times(d.weight, measured_),    d.weight.sum()};
   }
   /// Of one sample of the curve.
   [[nodiscard]] ChannelSlopes slopes_of(Eigen::Index k) const {
-    return {depth_scale_[k], time_scale_[k], time_shift_[k], -at_.by_contact[k],
-            at_.value[k],    1.0,            measured_[k],   1.0};
+    return {depth_scale_[k], time_scale_[k],
+            time_shift_[k],  -at_.by_contact[k],
+            at_.value[k],    1.0,
+            measured_[k],    1.0};
   }
   [[nodiscard]] std::vector<InstrumentEffect> effects_of(const ChannelSlopes& by) const {
     std::vector<InstrumentEffect> effects;

@@ -140,8 +140,8 @@ void LawAlong::follow_times(At& at, std::vector<double> values) const {
   values.back() = 0.0;
   const bool series = law_.spec.form == BranchForm::series;  // all of it moves the times
   const std::vector<LawParameter> parameters = law_parameters(law_.spec);
-  const Response of_law = LawModel(law_.spec).respond(motion_, recording_.time_s, values,
-                                                      Want::values_and_sensitivity);
+  const Response of_law =
+      LawModel(law_.spec).respond(motion_, recording_.time_s, values, Want::values_and_sensitivity);
   const Eigen::MatrixXd by_law = coordinate_slopes(of_law, coordinates_, values);
   for (std::size_t k = 0; k < coordinates_.place.size(); ++k) {
     const LawParameter& p = parameters[coordinates_.place[k]];

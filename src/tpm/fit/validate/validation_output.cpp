@@ -94,14 +94,13 @@ std::string joint_text(const JointTest& joint) {
 
 std::string curve_text(const CurveComparison& c, const Unit& unit) {
   const double model = c.mean_square_error - c.mean_square_u;
-  const std::string size = model > 0.0 ? with_unit(number(std::sqrt(model), unit, 2), unit)
-                                       : std::string("nothing");
+  const std::string size =
+      model > 0.0 ? with_unit(number(std::sqrt(model), unit, 2), unit) : std::string("nothing");
   std::string text = fmt::format("rms E {}, expected {}: {} beyond the uncertainty",
                                  number(std::sqrt(c.mean_square_error), unit),
                                  with_unit(number(std::sqrt(c.mean_square_u), unit), unit), size);
   if (c.chi_squared > 0.0) {
-    text += fmt::format("; chi^2 {} over {} samples", significant(c.chi_squared, 3),
-                        c.samples);
+    text += fmt::format("; chi^2 {} over {} samples", significant(c.chi_squared, 3), c.samples);
   }
   return text;
 }
