@@ -34,7 +34,8 @@ class OrganProgress {
 };
 
 int view(const ViewChoice& choice, const Session& session) {
-  const std::filesystem::path given = std::filesystem::path(choice.file).lexically_normal();
+  // Absolute, so that "." has the name of its folder.
+  const std::filesystem::path given = std::filesystem::absolute(choice.file).lexically_normal();
   const std::filesystem::path name = given.has_filename() ? given : given.parent_path();
   const std::filesystem::path output = choice.output.empty()
                                            ? name.filename().replace_extension(".html")
