@@ -111,12 +111,12 @@ TEST_CASE("a credibility page names what was tampered with, is missing or change
   recheck(1, "/files/cell.json");
   CHECK_THAT(read_file(folder / "said"), Catch::Matchers::Contains("/u_D: was"));
   std::filesystem::rename(folder / "cell.json", folder / "gone.json");
-  recheck(2, "cell.json");
+  recheck(3, "cell.json");
   std::filesystem::rename(folder / "gone.json", folder / "cell.json");
   write_file(folder / "cell.json",
              R"({"instrument": {"id": "cell", "force": "0.5 % of reading"}})");
   std::filesystem::rename(folder / "other.csv", folder / "gone.csv");
-  recheck(2, "other.csv");
+  recheck(3, "other.csv");
   std::filesystem::rename(folder / "gone.csv", folder / "other.csv");
   recheck(0, "0 of its values changed");
   edited = page;
