@@ -184,7 +184,7 @@ RELATIVES = """## Relatives found and mended
 | `tpm sweep --shard` and `merge`, and `sweep.sbatch`, counted temporary files as shards | whole names only; shards of two counts are refused |
 | `sweep plot --at` took the nearest place of an axis silently | told |
 | reports/stability showed errors of steps that end at kinks (0.092 % for backward Euler at 1 kHz) | computed anew, on the servo's grid: 0.21 % |
-| shares of `tpm experiments` were printed `+0.0 %` below 0.05 % | three significant digits |
+| shares of `tpm paper experiments` were printed `+0.0 %` below 0.05 % | three significant digits |
 """
 
 

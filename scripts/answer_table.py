@@ -206,7 +206,7 @@ def linked_output(folder: Path) -> None:
 
 DEEP = "[" * 100_000 + "]" * 100_000
 DEEP_COMMANDS = ["network check d.json", "simulate d.json -o o.h5", "sweep d.json -o o.h5", "fit d.json", "plan d.json",
-                 "design d.json", "hil run d.json -o o.tpmrec", "spectrum d.json", "audit d.json"]
+                 "design d.json", "hil run d.json -o o.tpmrec", "spectrum d.json", "paper audit d.json"]
 SCENE_TEXT = json.dumps(LIVER)
 MACHINE = (SOURCE / "tests/fixtures/machine_french.csv").read_bytes()
 
@@ -234,12 +234,12 @@ CASES = [
     Case("6", "`data import d.csv -o d --force`", lambda folder: (folder / "d.csv").write_bytes(MACHINE) and None,
          "$TPM data import d.csv -o d --force", "test_files: No command writes over",
          lambda folder: "input whole" if (folder / "d.csv").read_bytes() == MACHINE else "**input lost**"),
-    Case("7", "`tables > /dev/full`", files(), "$TPM tables > /dev/full", "test_streams: Output that cannot be written"),
+    Case("7", "`paper tables > /dev/full`", files(), "$TPM paper tables > /dev/full", "test_streams: Output that cannot be written"),
     Case("7", "`version` with standard error closed", files(), "$TPM version > /dev/null 2>&-",
          "test_streams: Standard error that is closed"),
-    Case("7", "a wrong option, with standard error full", files(), "$TPM tables --no-such 2> /dev/full",
+    Case("7", "a wrong option, with standard error full", files(), "$TPM paper tables --no-such 2> /dev/full",
          "test_streams: Standard error that is closed"),
-    Case("8", "40 definitions of claims, each twice the one before", doubling_claims, "$TPM audit claims.json",
+    Case("8", "40 definitions of claims, each twice the one before", doubling_claims, "$TPM paper audit claims.json",
          "test_audit"),
     Case("8", "OBJ that names another file, a pipe",
          lambda folder: (files(m__obj="mtllib other.mtl\n" + TETRAHEDRON, s__json=meshed("m.obj"))(folder),
@@ -254,7 +254,7 @@ CASES = [
          "test_curve: packed curves are checked"),
     Case("8", "4294967299 cells of a block", files(s__json={"organ": {"kind": "block", "cells": [4294967299, 3, 3]}}),
          "$TPM network check s.json", "test_errors: cells"),
-    Case("8", "`tables --depths 1e300`", files(), "$TPM tables --depths 1e300", "test_errors: depth that overflows"),
+    Case("8", "`paper tables --depths 1e300`", files(), "$TPM paper tables --depths 1e300", "test_errors: depth that overflows"),
     Case("8", "`spectrum` to 1e308 Hz", files(l__json=LAW), '$TPM spectrum l.json --from "1 Hz" --to "1e308 Hz"',
          "test_errors: frequency that overflows"),
     Case("8", "a sweep of 1e12 cells",
@@ -267,12 +267,12 @@ CASES = [
          lambda folder: "**they reach the terminal**" if "\x1b[31m" in (folder / "said").read_text() else "escaped"),
     Case("9", "a message about a name with a line break", files(), "$TPM network check \"$(printf 'no\\nfile')\"",
          "test_files: Control characters"),
-    Case("9", "an output of mode 600", private_output, "$TPM tables -o t.txt", "test_files: A file that is replaced",
+    Case("9", "an output of mode 600", private_output, "$TPM paper tables -o t.txt", "test_files: A file that is replaced",
          lambda folder: f"mode {os.stat(folder / 't.txt').st_mode & 0o777:o}"),
-    Case("9", "an output that is a symbolic link", linked_output, "$TPM tables -o t.txt",
+    Case("9", "an output that is a symbolic link", linked_output, "$TPM paper tables -o t.txt",
          "test_files: A file that is replaced",
          lambda folder: "still a link" if (folder / "t.txt").is_symlink() else "**the link is replaced**"),
-    Case("9", "an output of 245 bytes of name", files(), "$TPM tables -o " + "n" * 245, "test_files: Names up to"),
+    Case("9", "an output of 245 bytes of name", files(), "$TPM paper tables -o " + "n" * 245, "test_files: Names up to"),
     Case("9", "a seed of 2^63", files(organ__json={"organ": {"kind": "liver", "count": 60, "seed": 2**63}}),
          "$TPM network check organ.json", "test_errors: seeds"),
     Case("9", "a polygon of 600,000 corners", polygon, "$TPM network check s.json", "test_mesh"),

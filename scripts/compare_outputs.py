@@ -36,7 +36,7 @@ LINES_LEFT_OUT = re.compile(r"\b(version|commit|took|computed in|computing time|
 NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 FILES_LEFT_OUT = (".png", ".run.json", ".checkpoint", ".blocks", ".pdf", ".svg", ".tpmrec")  # .tpmrec: by hil export
 
-RUNS = [shlex.split(line) for line in Path(__file__).with_suffix(".txt").read_text(encoding="utf-8").splitlines()
+RUNS = [[shlex.split(words) for words in line.split(" => ")] for line in Path(__file__).with_suffix(".txt").read_text(encoding="utf-8").splitlines()
         if not line.startswith("#")]
 INPUTS = {"liver.json": INDENTED, "session.json": SESSION, "experiments.json": EXPERIMENTS, "law.json": LAW}
 
@@ -51,6 +51,14 @@ class Program:
             (folder / "in" / name).write_text(json.dumps(content))
         for name in ("a.csv", "b.csv"):
             (folder / "in" / name).write_text(recording())
+
+    def choice(self, run):
+        """The first of the command lines of a run that the program knows; None if it knows none."""
+        def knows(words):
+            command = self.command(words)
+            named = {w.split("=")[0] for w in words if re.match(r"--?[A-Za-z]", w)}
+            return command is not None and named <= set(self.helps[command].options)
+        return next((words for words in run if knows(words)), None)
 
     def command(self, words):
         """The command that the words call; None if the program has none."""
@@ -235,13 +243,13 @@ def main():
         programs = *(Program(p, place / n, options.configs) for p, n in ((options.a, "a"), (options.b, "b"))),
         rows, renamed, details = [], {}, []
         with ThreadPoolExecutor(2) as pool:
-            for words in (run for run in RUNS if options.only in shlex.join(run)):
-                title = shlex.join(w.replace("CONFIGS/", "").lstrip("?") for w in words)
-                missing = [p for p in programs if p.command(words) is None]
+            for run in (run for run in RUNS if any(options.only in shlex.join(words) for words in run)):
+                title = " => ".join(shlex.join(w.replace("CONFIGS/", "").lstrip("?") for w in words) for words in run)
+                missing = [p for p in programs if p.choice(run) is None]
                 if missing:
                     rows.append((title, "only in B" if missing[0] is programs[0] else "only in A", ""))
                     continue
-                (code_a, a), (code_b, b) = pool.map(lambda p: p.run(words), programs)
+                (code_a, a), (code_b, b) = pool.map(lambda p: p.run(p.choice(run)), programs)
                 found = Comparison()
                 if code_a != code_b:
                     said = [str(w.get("stderr", "")).strip().splitlines()[-1:] for w in (a, b)]
@@ -260,7 +268,7 @@ def main():
         print("| " + " | ".join(" ".join(c.replace("|", "\\|").split()) for c in row) + " |")
     print("\nRenamed:\n" + "\n".join(f"- {line} ({where})" for line, where in renamed.items()))
     never = [n for n, c in programs[1].helps.items() if n and " SUBCOMMAND" not in c.usage]
-    never = sorted(set(never) - {programs[1].command(run) for run in RUNS})
+    never = sorted(set(never) - {programs[1].command(words) for run in RUNS for words in run})
     if never:
         print("\nNot run: " + ", ".join(never))
     if options.details:

@@ -29,7 +29,7 @@ COMMANDS = {
     "fit liver_relaxation": ["fit", "{configs}/liver_relaxation.json"],
     "network check liver_scene": ["network", "check", "{configs}/liver_scene.json"],
     "plan deep": ["plan", "{configs}/plan/deep.json"],
-    "tables": ["tables"],
+    "laws": ["laws"],
 }
 
 

@@ -30,7 +30,7 @@ COMMANDS = [
             ["sim.h5", "sim.xdmf"], weight=4),
     Command("fit FOLDER", "fit in/folder --law linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"], weight=4),
     Command("hil run", "hil run in/session.json -o s.tpmrec", ["s.tpmrec"], old=False),
-    Command("report", "report -o paper", [], varies=["paper/report.run.json"], weight=100),
+    Command("paper report", "paper report -o paper", [], varies=["paper/report.run.json"], weight=100),
     # Programs of Python: a drawing script, and the module (where it is on PYTHONPATH) that has figures drawn.
     Command("draw_figures.py", "draw_figures.py in/fitted/figures.json . --print", [], weight=4),
     Command("draw_network.py", "draw_network.py in/net.json net", ["net.png", "net.svg"], weight=4),

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the figures of paper/paper.md in paper/figures:
 #   scripts/paper_figures.sh [TPM]     # TPM: build/release/tpm unless given
-# relaxation.png and profiles.png are figures of `tpm report`, budget.png is that of `tpm budget`. Takes about 20 s
+# relaxation.png and profiles.png are figures of `tpm paper report`, budget.png is that of `tpm budget`. Takes about 20 s
 # of processor time. All of it starts from the numbers in data/; nothing is timed, so the same program makes the same
 # figures.
 set -euo pipefail
@@ -15,7 +15,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 step "the published model recomputed"
-"$program" report --output "$folder/report" >"$folder/report.txt"
+"$program" paper report --output "$folder/report" >"$folder/report.txt"
 "$TPMKIT_PYTHON" scripts/draw_figures.py "$folder/report/figures.json" "$folder/drawn" --print
 
 step "what is lost between the data and a hand"

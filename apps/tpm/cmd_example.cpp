@@ -89,7 +89,7 @@ const std::vector<Example>& examples() {
        "configs",
        {"hil_liver.json"}},
       {"claims",
-       "audit",
+       "paper audit",
        "the paper's claims, to be edited into those of another paper",
        kPaper,
        "data",

@@ -152,14 +152,11 @@ void add_laws_command(CLI::App& app, Session& session);
 void add_spectrum_command(CLI::App& app, Session& session);
 void add_export_command(CLI::App& app, Session& session);
 void add_coverage_command(CLI::App& app, Session& session);
-void add_tables_command(CLI::App& app, Session& session);
-void add_audit_command(CLI::App& app, Session& session);
 void add_data_command(CLI::App& app, Session& session);
 void add_network_command(CLI::App& app, Session& session);
 void add_simulate_command(CLI::App& app, Session& session);
 void add_plan_command(CLI::App& app, Session& session);
-void add_report_command(CLI::App& app, Session& session);
-void add_experiments_command(CLI::App& app, Session& session);
+void add_paper_command(CLI::App& app, Session& session);
 void add_accuracy_command(CLI::App& app, Session& session);
 void add_sweep_command(CLI::App& app, Session& session);
 void add_hil_command(CLI::App& app, Session& session);
@@ -173,6 +170,10 @@ void add_hil_hazards_command(CLI::App& hil, Session& session);     // below `tpm
 void add_verify_command(CLI::App& accuracy, Session& session);     // below `tpm accuracy`
 void add_benchmark_command(CLI::App& accuracy, Session& session);  // below `tpm accuracy`
 void add_stability_command(CLI::App& accuracy, Session& session);  // below `tpm accuracy`
+void add_report_command(CLI::App& paper, Session& session);        // below `tpm paper`
+void add_tables_command(CLI::App& paper, Session& session);        // below `tpm paper`
+void add_audit_command(CLI::App& paper, Session& session);         // below `tpm paper`
+void add_experiments_command(CLI::App& paper, Session& session);   // below `tpm paper`
 void add_data_import_command(CLI::App& data, Session& session);    // below `tpm data`
 void add_sweep_views(CLI::App& sweep, Session& session);           // below `tpm sweep`
 

@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <string_view>
-#include <utility>
+#include <vector>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
@@ -59,15 +58,21 @@ std::string_view name_of(std::string_view word) {
   return word.substr(0, word.find('='));
 }
 
-/// Commands that stand below another one now.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kMoved{
-    {{"benchmark", "tpm accuracy benchmark"}, {"stability", "tpm accuracy stability"}}};
+/// The full names of all commands below this one that are called `name`.
+std::vector<std::string> called(const CLI::App& command, const std::string& name) {
+  std::vector<std::string> found;
+  for (const CLI::App* one : command.get_subcommands({})) {
+    if (one->get_name() == name) found.push_back("'" + full_name(*one) + "'");
+    const std::vector<std::string> below = called(*one, name);
+    found.insert(found.end(), below.begin(), below.end());
+  }
+  return found;
+}
 
 std::string no_such_command(const CLI::App& command, const std::string& word) {
-  for (const auto& [old, now] : kMoved) {
-    if (command.get_parent() == nullptr && word == old) {
-      return fmt::format("no command '{}'; it is '{}' now", old, now);
-    }
+  if (const std::vector<std::string> below = called(command, word); !below.empty()) {
+    return fmt::format("{}no command '{}'; did you mean {}? See {} --help", place(command),
+                       printable(word), fmt::join(below, " or "), full_name(command));
   }
   const std::vector<std::string> known = commands_of(command);
   const std::string nearest = nearest_word(word, known);

@@ -212,8 +212,7 @@ void add_commands(CLI::App& app, Session& session) {
         add_sweep_command}},
       {"Hand: haptic devices", {add_hil_command, add_budget_command}},
       {"Evidence: the paper, and tpm itself",
-       {add_report_command, add_tables_command, add_audit_command, add_experiments_command,
-        add_accuracy_command, add_recovery_command, add_coverage_command,
+       {add_paper_command, add_accuracy_command, add_recovery_command, add_coverage_command,
         add_check_gradient_command, add_schema_command, add_version_command}}};
   for (const Group& group : groups) {
     for (const Adder add : group.commands) {
@@ -230,7 +229,7 @@ int run(int argc, char** argv) {
   CLI::App app{"tpm: check a viscoelastic soft-tissue model against data", "tpm"};
   app.require_subcommand(1);
   app.footer(
-      "Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35\n"
+      "Example:\n  tpm paper tables --depths 2,4,6,8 --spacings 20,25,30,35\n"
       "Each command explains itself: tpm COMMAND --help, or tpm help COMMAND");
   app.set_version_flag("-V,--version", fmt::format("tpm {}", version()), "Print the version");
   Session session;

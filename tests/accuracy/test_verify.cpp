@@ -161,18 +161,7 @@ TEST_CASE("tpm accuracy verify: what it refuses is one line and exit code 2") {
   CHECK(run_program("accuracy")
             .output.starts_with(
                 "tpm: accuracy: no command; expected one of verify, benchmark, stability"));
-  const Run require = run_program("report --require 200%");
+  const Run require = run_program("paper report --require 200%");
   CHECK(require.exit_code == 2);
   CHECK(require.output == "tpm: --require: '200%'; expected a share above 0 and below 100 %\n");
-}
-
-TEST_CASE("the old names of the commands below tpm accuracy name the new ones") {
-  for (const char* name : {"benchmark", "stability"}) {
-    const Run old = run_program(std::string(name) + " --help");
-    CHECK(old.exit_code == 2);
-    CHECK(old.output ==
-          "tpm: no command '" + std::string(name) + "'; it is 'tpm accuracy " + name + "' now\n");
-    const Run with_arguments = run_program(std::string(name) + " -o x");
-    CHECK(with_arguments.output == old.output);
-  }
 }

@@ -430,7 +430,7 @@ const std::string kClaims = R"({
 
 std::vector<ErrorCase> claims_cases() {
   const std::string type = "claims file";
-  const std::string audit = "audit {}/c.json -o {}/out";
+  const std::string audit = "paper audit {}/c.json -o {}/out";
   const auto claims = [](std::string text) { return with_files({{"c.json", std::move(text)}}); };
   const auto with = [&](const std::string& from, const std::string& to) {
     return claims(replaced(kClaims, from, to));
@@ -674,12 +674,12 @@ std::vector<ErrorCase> scene_cases() {
 }
 
 std::vector<ErrorCase> table_option_cases() {
-  const std::string type = "options of tpm tables";
+  const std::string type = "options of tpm paper tables";
   return {
-      {type, "depth that overflows", "tables --depths 1e300 -o {}/out", with_files({})},
-      {type, "depth in newtons", "tables --depths '2,8 N' -o {}/out", with_files({})},
-      {type, "infinite depth", "tables --depths 1e400 -o {}/out", with_files({})},
-      {type, "depth without unit", "tables --depths inf -o {}/out", with_files({})},
+      {type, "depth that overflows", "paper tables --depths 1e300 -o {}/out", with_files({})},
+      {type, "depth in newtons", "paper tables --depths '2,8 N' -o {}/out", with_files({})},
+      {type, "infinite depth", "paper tables --depths 1e400 -o {}/out", with_files({})},
+      {type, "depth without unit", "paper tables --depths inf -o {}/out", with_files({})},
   };
 }
 

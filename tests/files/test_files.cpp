@@ -169,7 +169,7 @@ TEST_CASE("files whose names come later are kept in a folder of a default name, 
   fs::create_directory(folder / "out");
   std::ofstream(folder / "out/figure.svg") << "of somebody";
   std::ofstream(folder / "figure.svg") << "of somebody";
-  roles.mark_results("tpm report", false);
+  roles.mark_results("tpm paper report", false);
   will_write_in(folder / "out", Naming::by_default);
   CHECK_THAT(test::refusal_of([&] { write_file(folder / "out/figure.svg", "x"); }),
              Contains("nothing says that tpm wrote it"));
@@ -319,7 +319,7 @@ TEST_CASE("Names up to the longest that a folder takes are written, longer ones 
     write_file(file, "text");
     CHECK(read_file(file) == "text");
   }
-  const Ran ran = run_in(folder, "$TPM tables -o " + std::string(256, 'n'));
+  const Ran ran = run_in(folder, "$TPM paper tables -o " + std::string(256, 'n'));
   CHECK(ran.code == 5);
   CHECK_THAT(ran.said, Contains("File name too long; expected a name of at most 255 bytes"));
   const Ran beside = run_in(
@@ -427,8 +427,8 @@ TEST_CASE("Inputs without an end are refused by every command that reads") {
         "budget /dev/zero a.csv",
         "budget law.json /dev/zero",
         "identify /dev/zero",
-        "audit /dev/zero",
-        "experiments /dev/zero -o o",
+        "paper audit /dev/zero",
+        "paper experiments /dev/zero -o o",
         "plan $S/configs/liver_poke.json --costs /dev/zero",
         "hil run /dev/zero -o o.tpmrec",
         "hil check /dev/zero",

@@ -34,7 +34,7 @@ int exit_code_of(const std::string& line) {
 TEST_CASE("Output that cannot be written is an error, never a success") {
   const test::TempFolder folder;
   const std::string said = folder / "said";
-  for (const char* command : {"version", "--help", "tables --format json", "laws"}) {
+  for (const char* command : {"version", "--help", "paper tables --format json", "laws"}) {
     INFO(command);
     CHECK(exit_code_of("$TPM " + std::string(command) + " > /dev/full 2> '" + said + "'") == 5);
     const std::string text = read_file(said);
@@ -56,17 +56,17 @@ TEST_CASE("Standard error that is closed or full changes no exit code") {
 TEST_CASE("Tables of depths beyond the paper's validity say so, a slip of the unit above all") {
   const test::TempFolder folder;
   const std::string said = folder / "said";
-  CHECK(exit_code_of("$TPM tables --depths 2mm,8m > /dev/null 2> '" + said + "'") == 0);
+  CHECK(exit_code_of("$TPM paper tables --depths 2mm,8m > /dev/null 2> '" + said + "'") == 0);
   CHECK(read_file(said) ==
         "tpm: warning: --depths: 8000 mm is beyond 10 mm, where the paper's validity ends\n");
-  CHECK(exit_code_of("$TPM tables --depths 2,10 > /dev/null 2> '" + said + "'") == 0);
+  CHECK(exit_code_of("$TPM paper tables --depths 2,10 > /dev/null 2> '" + said + "'") == 0);
   CHECK(std::filesystem::file_size(said) == 0);
 }
 
 TEST_CASE("A message never lands in a file that took the place of a closed stream") {
   const test::TempFolder folder;
   const std::string file = folder / "tables.json";
-  CHECK(exit_code_of("$TPM tables --format json > '" + file + "' 2>&- <&-") == 0);
+  CHECK(exit_code_of("$TPM paper tables --format json > '" + file + "' 2>&- <&-") == 0);
   CHECK_NOTHROW(parse_json(read_file(file), file));
 }
 

@@ -118,7 +118,15 @@ TEST_CASE("a wrong word is named, with the nearest right one and the help to rea
   check("qqqqqqq", "no command 'qqqqqqq'", "expected one of example, data", "see tpm --help");
   check("hil", "hil: no command", "expected one of", "see tpm hil --help");
   check("fit --qqqqqqq", "no option '--qqqqqqq'", "see", "tpm fit --help");
-  check("tables 5", "tables: '5' is one argument too many", "", "see tpm tables --help");
+  check("paper tables 5", "paper tables: '5' is one argument too many", "",
+        "see tpm paper tables --help");
+  // The name of a command that stands below another one.
+  check("benchmark --help", "no command 'benchmark'", "did you mean 'tpm accuracy benchmark'?",
+        "See tpm --help");
+  check("tables --depths 2", "no command 'tables'", "did you mean 'tpm paper tables'?",
+        "See tpm --help");
+  check("report", "no command 'report'", "did you mean 'tpm hil report' or 'tpm paper report'?",
+        "See tpm --help");
   check("fit", "fit: ", "required", "see tpm fit --help");
   check("fit --format jsn x.csv", "fit: ", "--format", "see tpm fit --help");
 }
@@ -131,7 +139,7 @@ TEST_CASE("a bad value of an option is a fault of the command line, whatever the
   const std::string law = folder / "law.json";
   const std::string sweep = TPM_TEST_SOURCE_DIR "/configs/sweep_x_depth.json";
   for (const std::string& arguments : std::vector<std::string>{
-           "tables --depths '2 N'", "tables --eta 5mm", "tables --rate 1e400",
+           "paper tables --depths '2 N'", "paper tables --eta 5mm", "paper tables --rate 1e400",
            "predict '" + law + "' --depth '4 N' --rate '1 mm/s' --hold '1 s'",
            "predict '" + law + "' --depth '4 mm' --rate '1 mm/s' --hold '1 s' --level x",
            "predict '" + law + "' --depth '4 mm' --rate '1 mm/s' --hold '1 s' --placement x",

@@ -58,7 +58,7 @@ def copies(tpm, work):
 
 
 def read_by_their_commands(tpm, work):
-    quick = {"fit": "--no-draw --starts 2", "audit": "", "design": "--check 0", "simulate": "-o out.h5", "plan": "",
+    quick = {"fit": "--no-draw --starts 2", "paper": "", "design": "--check 0", "simulate": "-o out.h5", "plan": "",
              "sweep": "-o out.h5", "hil": "-o out.tpmrec"}
     for name, folder, line in copies(tpm, work):
         more = quick[line.split()[1]]
@@ -124,7 +124,7 @@ def shipped_stand_in(tpm, work):
     check("using" not in run.stderr and "configs/nothing.json" in run.stderr, run.stderr)
     # What is written stays where the user says.
     tpm(empty, "schema", "scene")
-    tpm(empty, "audit", "-o", "configs/liver_scene.json", "--format", "json")
+    tpm(empty, "paper", "audit", "-o", "configs/liver_scene.json", "--format", "json")
     check((empty / "configs/liver_scene.json").exists(), "an output was sent elsewhere")
     check(share.read_text() == (Path(sys.argv[1]) / "configs/liver_scene.json").read_text(), "a shipped file was changed")
     run = tpm(empty, "network", "check", "configs/liver_scene.json", code=3)  # it is now the user's, and no scene

@@ -25,7 +25,7 @@ RUNS = {
     "sweep": "sweep configs/sweep_x_depth.json -o sweep.h5; sweep plot sweep.h5 -o maps",
     "session": "hil run configs/hil_law.json -o session.tpmrec; hil report session.tpmrec -o page",
     "borders": "hil stability --figures borders",
-    "report": "report -o paper",
+    "report": "paper report -o paper",
 }
 DRAWINGS = {".svg", ".png", ".pdf"}
 # They differ from run to run anyway, or hold or name the drawings.

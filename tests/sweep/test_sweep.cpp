@@ -73,7 +73,7 @@ const char* const kMixed = R"({"model": "single_contact", "block": 7,
 
 }  // namespace
 
-TEST_CASE("configs/sweep_x_depth.json holds the numbers of tpm tables to the last bit") {
+TEST_CASE("configs/sweep_x_depth.json holds the numbers of tpm paper tables to the last bit") {
   const Sweep sweep =
       read_sweep(std::filesystem::path(TPM_TEST_SOURCE_DIR) / "configs/sweep_x_depth.json");
   const CellBlock block = only_block(sweep);
@@ -92,7 +92,7 @@ TEST_CASE("configs/sweep_x_depth.json holds the numbers of tpm tables to the las
   }
 }
 
-TEST_CASE("a ramp and a hold in a sweep are those of tpm tables --consistent") {
+TEST_CASE("a ramp and a hold in a sweep are those of tpm paper tables --consistent") {
   const Sweep sweep = parsed(R"({"model": "single_contact", "material": {"eta1": "240 kPa s"},
     "indentation": {"kind": "ramp_hold", "rate": "4 mm/s", "hold": "30 s"},
     "axes": [{"parameter": "depth", "values": ["2 mm", "4 mm", "6 mm", "8 mm"]},

@@ -308,7 +308,7 @@ std::vector<StudyCondition> conditions_of(const ConditionKeys& keys) {
 
 const FileKind& organ_study_kind() {
   static const FileKind kind{
-      "organ_experiments", "Configuration of tpm experiments",
+      "organ_experiments", "Configuration of tpm paper experiments",
       "Tissues, the data that each is fitted to, and the experiments whose curves are computed. "
       "What "
       "stands under parameters, fixed, data, starts, profile and hypotheses has the form of the "

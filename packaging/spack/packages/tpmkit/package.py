@@ -58,4 +58,4 @@ class Tpmkit(CMakePackage):
     @run_after("install")
     @on_package_attributes(run_tests=True)
     def check_install(self):
-        Executable(self.prefix.bin.tpm)("audit")
+        Executable(self.prefix.bin.tpm)("paper", "audit")

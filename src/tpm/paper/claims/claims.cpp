@@ -92,7 +92,7 @@ const Block<PrintedTable>& table_block() {
       "printed_table", "a table with its numbers as printed",
       {required(key("id", &T::id, text(1), "a name for claims")),
        required(key("kind", &T::kind, one_of({"relaxation", "static_band", "other"}),
-                    "what tpm tables knows it as")),
+                    "what tpm paper tables knows it as")),
        where_key(&T::where),
        key("constants", &T::constants, map_of(text(1)), "names bound for every row"),
        required(key("columns", &T::columns, list(printed_column_block().type(), {.fewest = 1}),
@@ -250,7 +250,8 @@ std::filesystem::path paper_claims_path() {
 
 const FileKind& claims_kind() {
   static const FileKind kind{
-      "claims", "What a paper prints, so that it can be recomputed (tpm audit, tpm tables)",
+      "claims",
+      "What a paper prints, so that it can be recomputed (tpm paper audit, tpm paper tables)",
       "Numbers are texts as printed, formulas are texts", claims_block().form()};
   return kind;
 }

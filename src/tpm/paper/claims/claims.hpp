@@ -41,7 +41,7 @@ struct PrintedColumn {
 struct PrintedTable {
   std::string id;
   std::string where;
-  std::string kind;  ///< "relaxation", "static_band" (which `tpm tables` knows) or "other"
+  std::string kind;  ///< "relaxation", "static_band" (which `tpm paper tables` knows) or "other"
   std::vector<std::pair<std::string, std::string>> constants;  ///< names bound for every row
   std::vector<PrintedColumn> columns;
   std::vector<std::vector<std::string>> rows;
@@ -73,8 +73,8 @@ struct ClaimSet {
 /// What a paper prints.
 [[nodiscard]] const FileKind& claims_kind();
 
-/// Only the tables of a claims file, which is all that `tpm tables` needs. Throws Error(bad_input)
-/// as read_claims() does.
+/// Only the tables of a claims file, which is all that `tpm paper tables` needs. Throws
+/// Error(bad_input) as read_claims() does.
 [[nodiscard]] std::vector<PrintedTable> read_printed_tables(const Json& document,
                                                             std::string_view file);
 

@@ -168,7 +168,8 @@ void add_validation(Document& document, const PaperReport& report) {
       "In the words of ASME V&V 20: S is simulated, D is measured, E = S - D, u_val² = u_num² + "
       "u_input² + u_D², and the model error lies in [E - U, E + U] with 95 %, U = k u_val. The "
       "paper calls its results close and states no requirement, so R = {} of D is ours "
-      "(`tpm report --require`). Adequate: |E| + U ≤ R. Not adequate: |E| - U > R. The column "
+      "(`tpm paper report --require`). Adequate: |E| + U ≤ R. Not adequate: |E| - U > R. The "
+      "column "
       "'at other R' says what any other requirement would give.",
       share_text(report.requirement)));
   document.bullets(

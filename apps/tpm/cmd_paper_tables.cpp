@@ -1,4 +1,4 @@
-// tpm tables: Tables 1-5 of the paper, recomputed, and the same tables for other inputs.
+// tpm paper tables: Tables 1-5 of the paper, recomputed, and the same tables for other inputs.
 
 #include <algorithm>
 #include <memory>
@@ -61,8 +61,7 @@ std::vector<double> lengths(const std::string& text, std::string_view option) {
 
 TableRequest request_of(const TableOptions& options) {
   if (options.as_printed && options.consistent) {
-    throw Error(ExitCode::usage, "tables", "--as-printed and --consistent exclude each other",
-                "one of them");
+    throw Error(ExitCode::usage, "--as-printed, --consistent", "both are given", "one of them");
   }
   TableRequest request;
   request.mode = options.consistent ? TableMode::consistent : TableMode::as_printed;
@@ -134,15 +133,15 @@ void add_options(CLI::App& command, TableOptions& options) {
 
 }  // namespace
 
-void add_tables_command(CLI::App& app, Session& session) {
+void add_tables_command(CLI::App& paper, Session& session) {
   CLI::App* command =
-      app.add_subcommand("tables", "Recompute the paper's tables, cell by cell, with verdicts");
+      paper.add_subcommand("tables", "Recompute the paper's tables, cell by cell, with verdicts");
   const auto options = std::make_shared<TableOptions>();
   add_options(*command, *options);
   command->footer(
       "Plain numbers are mm, kPa, Pa s, mm^2, mm/s and s; other units go with the number.\n"
-      "Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35 --E \"12 kPa\"\n"
-      "  tpm tables --consistent --eta \"2e5 Pa s\" --rate \"2 mm/s\" --format md");
+      "Example:\n  tpm paper tables --depths 2,4,6,8 --spacings 20,25,30,35 --E \"12 kPa\"\n"
+      "  tpm paper tables --consistent --eta \"2e5 Pa s\" --rate \"2 mm/s\" --format md");
   set_run(*command, session, [options] { return run_command(*options); });
 }
 

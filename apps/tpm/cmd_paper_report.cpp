@@ -24,8 +24,8 @@ int report(const std::string& folder, double requirement, const Session& session
 
 }  // namespace
 
-void add_report_command(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand(
+void add_report_command(CLI::App& paper, Session& session) {
+  CLI::App* command = paper.add_subcommand(
       "report", "Recompute the paper: tables, audit, fits and figures in one report");
   auto folder = std::make_shared<std::string>("out/paper");
   command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
@@ -35,7 +35,8 @@ void add_report_command(CLI::App& app, Session& session) {
                    "How large a model error may be, as a share of the measured value (the section "
                    "on validation)")
       ->capture_default_str();
-  command->footer("Example:\n  tpm report --output out/paper\n  tpm report --require 20%");
+  command->footer(
+      "Example:\n  tpm paper report --output out/paper\n  tpm paper report --require 20%");
   set_run(*command, session, [folder, requirement, &session] {
     const double share = parse_share(*requirement, "--require");
     if (!(share > 0.0 && share < 1.0)) {

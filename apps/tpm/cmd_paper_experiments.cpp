@@ -1,4 +1,4 @@
-// tpm experiments: the paper's experiments on the star and on organs, fitted and compared.
+// tpm paper experiments: the paper's experiments on the star and on organs, fitted and compared.
 
 #include <chrono>
 #include <memory>
@@ -45,8 +45,8 @@ int experiments(const ExperimentsOptions& options, const Session& session) {
 
 }  // namespace
 
-void add_experiments_command(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand(
+void add_experiments_command(CLI::App& paper, Session& session) {
+  CLI::App* command = paper.add_subcommand(
       "experiments", "The paper's experiments on the star and on organs: fits, curves, one report");
   auto options = std::make_shared<ExperimentsOptions>();
   command->add_option("CONFIG", options->config,
@@ -55,7 +55,7 @@ void add_experiments_command(CLI::App& app, Session& session) {
   command->add_option("-o,--output", options->folder, "Folder to write into")
       ->capture_default_str();
   add_format_option(*command, session);
-  command->footer("Example:\n  tpm experiments --output out/experiments");
+  command->footer("Example:\n  tpm paper experiments --output out/experiments");
   set_run(*command, session, [options, &session] { return experiments(*options, session); });
 }
 

@@ -1,4 +1,4 @@
-// tpm audit: recomputes what a paper prints.
+// tpm paper audit: recomputes what a paper prints.
 
 #include <memory>
 
@@ -30,8 +30,8 @@ int run_command(const Session& session, const AuditOptions& options) {
 
 }  // namespace
 
-void add_audit_command(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand(
+void add_audit_command(CLI::App& paper, Session& session) {
+  CLI::App* command = paper.add_subcommand(
       "audit", "Recompute every claim of a paper from its own equations and numbers");
   const auto options = std::make_shared<AuditOptions>();
   command->add_option("claims", options->claims,
@@ -41,7 +41,8 @@ void add_audit_command(CLI::App& app, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Findings are results, not errors: the exit code is 0 when the audit ran.\n"
-      "Example:\n  tpm audit --all\n  tpm audit my_claims.json --format json --output audit.json");
+      "Example:\n  tpm paper audit --all\n  tpm paper audit my_claims.json --format json --output "
+      "audit.json");
   set_run(*command, session, [&session, options] { return run_command(session, *options); });
 }
 
