@@ -206,7 +206,7 @@ def linked_output(folder: Path) -> None:
 
 DEEP = "[" * 100_000 + "]" * 100_000
 DEEP_COMMANDS = ["network check d.json", "simulate d.json -o o.h5", "sweep d.json -o o.h5", "fit d.json", "plan d.json",
-                 "design d.json", "hil run d.json -o o.tpmrec", "spectrum d.json", "paper audit d.json"]
+                 "design d.json", "hil run d.json -o o.tpmrec", "predict d.json --frequencies 1Hz", "paper audit d.json"]
 SCENE_TEXT = json.dumps(LIVER)
 MACHINE = (SOURCE / "tests/fixtures/machine_french.csv").read_bytes()
 
@@ -255,7 +255,7 @@ CASES = [
     Case("8", "4294967299 cells of a block", files(s__json={"organ": {"kind": "block", "cells": [4294967299, 3, 3]}}),
          "$TPM network check s.json", "test_errors: cells"),
     Case("8", "`paper tables --depths 1e300`", files(), "$TPM paper tables --depths 1e300", "test_errors: depth that overflows"),
-    Case("8", "`spectrum` to 1e308 Hz", files(l__json=LAW), '$TPM spectrum l.json --from "1 Hz" --to "1e308 Hz"',
+    Case("8", "`predict --frequencies` to 1e308 Hz", files(l__json=LAW), '$TPM predict l.json --frequencies "1 Hz : 1e308 Hz : 16"',
          "test_errors: frequency that overflows"),
     Case("8", "a sweep of 1e12 cells",
          files(s__json={**SWEEP, "axes": [{"parameter": name, "from": low, "to": high, "count": 1_000_000}

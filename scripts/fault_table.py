@@ -98,7 +98,7 @@ COMMANDS = [
             ["select.txt"], weight=4),
     Command("data import", "data import in/folder/a1.csv -o c --force", ["c.csv", "c.json"]),
     Command("data pack", "data pack evren_static -o p.h5 --force", ["p.h5"]),
-    Command("spectrum", "spectrum in/law.json -o spectrum.txt", ["spectrum.txt"]),
+    Command("predict LAW --frequencies", "predict in/law.json --frequencies 1Hz:100Hz:16 -o spectrum.txt", ["spectrum.txt"]),
     Command("export", "export in/law.json --to febio -o law.feb", ["law.feb"]),
     Command("design", "design in/design.json --check 0 -o design.txt", ["design.txt"]),
     Command("recovery", "recovery --laws linear-1 --trials 1 -o recovery.txt", ["recovery.txt"]),

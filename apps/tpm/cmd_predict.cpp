@@ -1,11 +1,13 @@
 // tpm predict: the answer of a fitted law, or of an organ with its material, with the band of its
-// uncertainty.
+// uncertainty; or storage and loss of a law over frequency.
 #include <fmt/format.h>
 
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "command.hpp"
+#include "law_spectrum.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/json.hpp"
@@ -25,6 +27,7 @@ struct PredictOptions {
   PlacementArguments held;
   RampOptions ramp;
   std::string level, placement, samples, seed = "0";
+  std::string frequencies;
   std::string folder, output;
 };
 
@@ -56,7 +59,28 @@ LawPrediction answer_of(const std::string& subject, const std::optional<Protocol
               : predict_recording(law, *recording, options);
 }
 
+/// Storage and loss have no protocol and no band.
+void require_only_frequencies(const PredictOptions& options) {
+  const auto refuse = [](const char* given) {
+    throw Error(ExitCode::usage, "--frequencies", fmt::format("beside {}", given),
+                "a law and --depth only: no protocol, no recording, no band");
+  };
+  if (!options.recordings.files.empty()) refuse("a file");
+  for (const auto& [text, name] :
+       {std::pair{&options.ramp.rate, "--rate"}, std::pair{&options.ramp.hold, "--hold"},
+        std::pair{&options.held.contact, "--contact"}, std::pair{&options.held.zero, "--zero"},
+        std::pair{&options.level, "--level"}, std::pair{&options.placement, "--placement"},
+        std::pair{&options.samples, "--samples"}, std::pair{&options.folder, "--folder"}}) {
+    if (!text->empty()) refuse(name);
+  }
+}
+
 int predict(const PredictOptions& options, const Session& session) {
+  if (!options.frequencies.empty()) {
+    require_only_frequencies(options);
+    return write_spectrum({options.law, options.frequencies, options.ramp.depth, options.output},
+                          session);
+  }
   will_write_into(options.folder, {"prediction.csv", "prediction.json", "figures.json"});
   const auto csv = csv_beside(options.output, session);
   PredictionOptions chosen = prediction_options(options);
@@ -90,7 +114,8 @@ int predict(const PredictOptions& options, const Session& session) {
 void add_predict_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand(
       "predict",
-      "Predict the response to a protocol or a recording's motion, with an uncertainty band");
+      "Predict the response to a protocol or a recording's motion, with an uncertainty band, or "
+      "storage and loss over frequency");
   auto options = std::make_shared<PredictOptions>();
   command
       ->add_option("LAW|SCENE", options->law,
@@ -103,6 +128,13 @@ void add_predict_command(CLI::App& app, Session& session) {
                    "or a recording whose motion is answered and whose readings are compared")
       ->expected(0, 1);
   add_ramp_options(*command, options->ramp);
+  command->get_option("--depth")->description(
+      "Instead of a file: ramp to this depth, \"4 mm\"; with --frequencies the depth about which "
+      "the tissue oscillates (default: the law's reference)");
+  command->add_option("--frequencies", options->frequencies,
+                      "Instead of a protocol: storage and loss of the law over frequency, small "
+                      "oscillations: \"1 Hz, 10 Hz\", or \"0.001 Hz : 100 Hz : 16\" for 16 at "
+                      "equal ratios");
   command->add_option("--level", options->level,
                       "Of the bands, 0.9 or 90% (default: that of the fit)");
   command->add_option("--placement", options->placement,
@@ -125,6 +157,7 @@ void add_predict_command(CLI::App& app, Session& session) {
       "  tpm predict fitted/law.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"\n"
       "  tpm predict fitted/law.json other.csv --folder predicted\n"
       "  tpm predict on_liver/scene.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"\n"
+      "  tpm predict law.json --frequencies \"0.01 Hz : 1000 Hz : 31\"\n"
       "Whether the law is right for a recording: tpm validate");
   set_run(*command, session, [options, &session] { return predict(*options, session); });
 }

@@ -149,7 +149,6 @@ void add_recovery_command(CLI::App& app, Session& session);
 void add_check_gradient_command(CLI::App& app, Session& session);
 void add_design_command(CLI::App& app, Session& session);
 void add_laws_command(CLI::App& app, Session& session);
-void add_spectrum_command(CLI::App& app, Session& session);
 void add_export_command(CLI::App& app, Session& session);
 void add_coverage_command(CLI::App& app, Session& session);
 void add_data_command(CLI::App& app, Session& session);

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
@@ -69,7 +71,15 @@ std::vector<std::string> called(const CLI::App& command, const std::string& name
   return found;
 }
 
+/// What other programs call a command is an option here.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 1> kOptions{
+    {{"spectrum", "tpm predict LAW --frequencies"}}};
+
 std::string no_such_command(const CLI::App& command, const std::string& word) {
+  for (const auto& [name, here] : kOptions) {
+    if (command.get_parent() != nullptr || word != name) continue;
+    return fmt::format("no command '{}'; did you mean '{}'? See tpm --help", name, here);
+  }
   if (const std::vector<std::string> below = called(command, word); !below.empty()) {
     return fmt::format("{}no command '{}'; did you mean {}? See {} --help", place(command),
                        printable(word), fmt::join(below, " or "), full_name(command));

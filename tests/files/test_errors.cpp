@@ -523,7 +523,7 @@ const std::string kLaw = R"({"law": "linear-1", "drive": "indentation_depth",
 
 std::vector<ErrorCase> law_cases() {
   const std::string type = "law file";
-  const std::string spectrum = "spectrum {}/l.json -o {}/out";
+  const std::string spectrum = "predict {}/l.json --frequencies '1 Hz' -o {}/out";
   const auto law = [](std::string text) { return with_files({{"l.json", std::move(text)}}); };
   const auto with = [&](const std::string& from, const std::string& to) {
     return law(replaced(kLaw, from, to));
@@ -547,11 +547,15 @@ std::vector<ErrorCase> law_cases() {
                                       "relative_length"),
                              "contact_force", "stress"),
                     "reference_m", "reference"))},
-      {type, "frequency 0", "spectrum {}/l.json --from \"0 Hz\" -o {}/out", law(kLaw)},
-      {type, "frequency that overflows", "spectrum {}/l.json --to \"1e308 Hz\" -o {}/out",
-       law(kLaw)},
+      {type, "frequency 0", "predict {}/l.json --frequencies \"0 Hz\" -o {}/out", law(kLaw)},
+      {type, "frequency that overflows",
+       "predict {}/l.json --frequencies \"0.001 Hz : 1e308 Hz : 16\" -o {}/out", law(kLaw)},
       {type, "frequency the law does not reach",
-       "spectrum {}/l.json --from \"1 Hz\" --to \"1e308 Hz\" -o {}/out", law(kLaw)},
+       "predict {}/l.json --frequencies \"1 Hz : 1e308 Hz : 16\" -o {}/out", law(kLaw)},
+      {type, "frequencies that do not rise",
+       "predict {}/l.json --frequencies \"2 Hz, 1 Hz\" -o {}/out", law(kLaw)},
+      {type, "frequencies beside a protocol",
+       "predict {}/l.json --frequencies \"1 Hz\" --hold \"1 s\" -o {}/out", law(kLaw)},
       {type, "unknown program", "export {}/l.json --to nastran -o {}/out", law(kLaw)},
       {type, "tension in FEBio", to_febio,
        law(replaced(replaced(kLaw, "linear-1", "linear-1-elastic"), bar,

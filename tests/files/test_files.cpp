@@ -417,7 +417,7 @@ TEST_CASE("Inputs without an end are refused by every command that reads") {
         "data show /dev/zero",
         "data pack /dev/zero -o o.h5",
         "data import /dev/zero -o o",
-        "spectrum /dev/zero",
+        "predict /dev/zero --frequencies '1 Hz'",
         "export /dev/zero --to febio",
         "design /dev/zero",
         "coverage /dev/zero",

@@ -127,6 +127,9 @@ TEST_CASE("a wrong word is named, with the nearest right one and the help to rea
         "See tpm --help");
   check("report", "no command 'report'", "did you mean 'tpm hil report' or 'tpm paper report'?",
         "See tpm --help");
+  // The name of what is an option here.
+  check("spectrum l.json", "no command 'spectrum'", "did you mean 'tpm predict LAW --frequencies'?",
+        "See tpm --help");
   check("fit", "fit: ", "required", "see tpm fit --help");
   check("fit --format jsn x.csv", "fit: ", "--format", "see tpm fit --help");
 }
@@ -144,10 +147,11 @@ TEST_CASE("a bad value of an option is a fault of the command line, whatever the
            "predict '" + law + "' --depth '4 mm' --rate '1 mm/s' --hold '1 s' --level x",
            "predict '" + law + "' --depth '4 mm' --rate '1 mm/s' --hold '1 s' --placement x",
            "predict '" + law + "' --depth '4 mm' --rate '1 mm/s' --hold '1e200 s'",
-           "hil check --duration '4 mm'", "hil check --rate 5s", "spectrum '" + law + "' --from 1s",
-           "export '" + law + "' --to nastran", "export '" + law + "' --to json --radius '2 s'",
-           "network build --count 1", "network build --filling no -o '" + (folder / "n.h5") + "'",
-           "recovery --noise x", "laws linera", "sweep '" + sweep + "' --workers 1000000000",
+           "hil check --duration '4 mm'", "hil check --rate 5s",
+           "predict '" + law + "' --frequencies 1s", "export '" + law + "' --to nastran",
+           "export '" + law + "' --to json --radius '2 s'", "network build --count 1",
+           "network build --filling no -o '" + (folder / "n.h5") + "'", "recovery --noise x",
+           "laws linera", "sweep '" + sweep + "' --workers 1000000000",
            "sweep '" + sweep + "' --workers 1e9",
            "budget '" + law + "' --loop-rate '1 m' --depth '4 mm' --rate '1 mm/s' --hold '1 s'"}) {
     CAPTURE(arguments);

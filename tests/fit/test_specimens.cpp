@@ -186,7 +186,8 @@ TEST_CASE("Beside an answer in JSON stands its table as CSV", "[specimens]") {
            {"coverage " TPM_TEST_SOURCE_DIR "/configs/coverage_absolute.json --sets 3",
             "parameter,level,data_sets,"},
            {"recovery --laws linear-1 --trials 1", "law,noise_over_peak,margin,"},
-           {"spectrum law.json --points 3", "frequency_Hz,storage_N_per_m,"}}) {
+           {"predict law.json --frequencies '1 Hz : 100 Hz : 3'",
+            "frequency_Hz,storage_N_per_m,"}}) {
     INFO(c.command);
     const Run json = run_on(folder, std::string(c.command) + " --format json -o answer.json");
     INFO(json.said);

@@ -1,12 +1,13 @@
-// tpm spectrum: storage and loss of a law over frequency.
+#include "law_spectrum.hpp"
+
 #include <fmt/format.h>
 
 #include <cmath>
-#include <memory>
+#include <optional>
+#include <vector>
 
-#include "command.hpp"
-#include "tpm/base/evenly.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/rising_values.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/show/table_document.hpp"
@@ -17,24 +18,12 @@
 namespace tpm::app {
 namespace {
 
-struct SpectrumTexts {
-  std::string law;
-  std::string from = "0.001 Hz";
-  std::string to = "100 Hz";
-  std::string points = "16";
-  std::string depth;
-  std::string output;
-};
-
 std::vector<double> frequencies(const SpectrumTexts& texts) {
-  const double from = option_quantity(texts.from, Dimension::frequency, "--from");
-  const double to = option_quantity(texts.to, Dimension::frequency, "--to");
-  const auto points = parse_whole_number(texts.points, "--points", 2);
-  if (!(from > 0.0 && to > from && std::isfinite(to / from)) || points > 100000) {
-    throw Error(ExitCode::usage, "spectrum", "no range of frequencies",
-                "--from above 0 Hz and below --to, and at most 100000 points");
-  }
-  return evenly_in_log(from, to, static_cast<int>(points));
+  constexpr int kMost = 100'000;
+  return parse_rising(texts.frequencies,
+                      {Dimension::frequency, kMost, "frequencies",
+                       "\"0.1 Hz, 1 Hz\", or \"0.001 Hz : 100 Hz : 16\""},
+                      "--frequencies");
 }
 
 std::optional<double> operating_depth(const SpectrumTexts& texts, const LawSpec& spec) {
@@ -105,7 +94,9 @@ std::string csv_of(const LawFile& law, const std::vector<double>& frequency_Hz,
   return text;
 }
 
-int spectrum(const SpectrumTexts& texts, const Session& session) {
+}  // namespace
+
+int write_spectrum(const SpectrumTexts& texts, const Session& session) {
   const auto csv = csv_beside(texts.output, session);
   const LawFile law = read_law(texts.law);
   const std::vector<double> frequency_Hz = frequencies(texts);
@@ -116,26 +107,6 @@ int spectrum(const SpectrumTexts& texts, const Session& session) {
           texts.output);
   deliver_csv(csv_of(law, frequency_Hz, r), csv);
   return 0;
-}
-
-}  // namespace
-
-void add_spectrum_command(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand(
-      "spectrum", "Storage and loss of a law over frequency, small oscillations");
-  const auto texts = std::make_shared<SpectrumTexts>();
-  command->add_option("law", texts->law, "Law file (docs/laws.md)")->required();
-  command->add_option("--from", texts->from, "Lowest frequency")->capture_default_str();
-  command->add_option("--to", texts->to, "Highest frequency")->capture_default_str();
-  command->add_option("--points", texts->points, "Frequencies, evenly spaced in the logarithm")
-      ->capture_default_str();
-  command->add_option("--depth", texts->depth,
-                      "Depth about which the tissue oscillates; the law's reference unless set");
-  command->add_option("-o,--output", texts->output, "Write here instead of to the terminal");
-  add_format_option(*command, session);
-  command->footer(
-      "Example:\n  tpm spectrum law.json --from \"0.01 Hz\" --to \"1000 Hz\" --points 31");
-  set_run(*command, session, [texts, &session] { return spectrum(*texts, session); });
 }
 
 }  // namespace tpm::app
