@@ -1,25 +1,21 @@
+// tpm design: experiments to choose from, and what simulated data say of intervals and laws.
+#include <fmt/format.h>
 
 #include <memory>
 #include <optional>
 
 #include "command.hpp"
+#include "design_options.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/json.hpp"
 #include "tpm/fit/design/design.hpp"
 #include "tpm/fit/show/design_figures.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpm/show/json_table_csv.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {
-
-struct DesignOptions {
-  std::string design;
-  std::string check = "100";
-  std::string seed = "0";
-  std::string top = "10";
-  std::string folder;
-  std::string output;
-};
 
 void draw(const DesignResult& result, const std::filesystem::path& folder) {
   const std::string python = find_drawing_python();
@@ -27,10 +23,12 @@ void draw(const DesignResult& result, const std::filesystem::path& folder) {
   draw_figures(python, folder / "figures.json", folder);
 }
 
-int design(const DesignOptions& options, const Session& session) {
-  const auto sets = static_cast<int>(parse_whole_number(options.check, "--check", 0));
-  const std::uint64_t seed = parse_whole_number(options.seed, "--seed", 0);
-  const auto top = static_cast<std::size_t>(parse_whole_number(options.top, "--top", 1));
+int rank_candidates(const DesignOptions& options, const Session& session) {
+  const auto sets = static_cast<int>(parse_whole_number(
+      options.repetitions.empty() ? "100" : options.repetitions, "--repetitions", 0));
+  const std::uint64_t seed = design_seed(options.seed);
+  const auto top = static_cast<std::size_t>(
+      parse_whole_number(options.top.empty() ? "10" : options.top, "--top", 1));
   will_write_into(options.folder, {"figures.json"});
   const auto csv = csv_beside(options.output, session);
   const DesignResult result = fit::plan(read_design(options.design));
@@ -46,27 +44,89 @@ int design(const DesignOptions& options, const Session& session) {
   return 0;
 }
 
+/// Has data, and nothing to choose from.
+bool is_fit_configuration(const std::string& file) {
+  const Json document = read_json(file);
+  return document.contains("data") && !document.contains("candidates");
+}
+
+/// An option that this kind of input has not.
+void refuse(const char* option, bool given, const char* input, const char* expected) {
+  if (given) throw Error(ExitCode::usage, option, fmt::format("with {}", input), expected);
+}
+
+int design(const DesignOptions& options, const Session& session) {
+  const bool laws = !options.laws.empty() || !options.family.empty();
+  if (options.design.empty() && !laws) {
+    throw Error(ExitCode::usage, "FILE", "not given",
+                "a design, a configuration of a fit, or --laws or --family");
+  }
+  if (!options.design.empty()) {
+    constexpr const char* kWithoutFile = "it without a file";
+    refuse("--laws", !options.laws.empty(), "a file", kWithoutFile);
+    refuse("--family", !options.family.empty(), "a file", kWithoutFile);
+    refuse("--noise", !options.noise.empty(), "a file", kWithoutFile);
+    refuse("--order", !options.order.empty(), "a file", kWithoutFile);
+    refuse("--margin", !options.margins.empty(), "a file", kWithoutFile);
+    if (!is_fit_configuration(options.design)) return rank_candidates(options, session);
+  }
+  const char* input = options.design.empty() ? "laws" : "a configuration of a fit";
+  refuse("--top", !options.top.empty(), input, "it with a design");
+  refuse("--draw", !options.folder.empty(), input, "it with a design");
+  return options.design.empty() ? check_choice_of_law(options, session)
+                                : check_intervals(options, session);
+}
+
 }  // namespace
 
 void add_design_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand(
-      "design", "Which experiment would identify the parameters? Expected intervals beforehand");
+      "design",
+      "Which experiment would identify the parameters? And by simulation: do the intervals of a "
+      "fit contain the true values, does the selection return the law behind the data?");
   auto options = std::make_shared<DesignOptions>();
-  command->add_option("DESIGN", options->design, "JSON design (schemas/design.schema.json)")
-      ->required();
-  command
-      ->add_option("--check", options->check,
-                   "Simulate and fit the best candidate this many times; 0: not at all, else 10 "
-                   "or more")
+  command->add_option("FILE", options->design,
+                      "A design (schemas/design.schema.json), whose best experiment is simulated; "
+                      "or a configuration of tpm fit, whose start values are the true values; or "
+                      "none, with --laws or --family");
+  command->add_option("--repetitions", options->repetitions,
+                      "Simulate and fit this many data sets (default: 100 of a design, 2000 of a "
+                      "configuration, 200 of each law); of a design 0 for none, else 10 or more");
+  command->add_option("--seed", options->seed, "Seed of the simulations, 0 or more, or 'clock'")
       ->capture_default_str();
-  command->add_option("--seed", options->seed, "Seed of the simulations")->capture_default_str();
-  command->add_option("--top", options->top, "How many candidates to list")->capture_default_str();
-  command->add_option("--draw", options->folder, "Write figures into this folder");
   add_output_option(*command, options->output);
   add_format_option(*command, session);
+  const auto add_of_design = options_of_group(*command, "Of a design");
+  add_of_design("--top", options->top, "How many candidates to list (default: 10)");
+  add_of_design("--draw", options->folder, "Write figures into this folder");
+  constexpr const char* kOfLaws = "Without a file";
+  command
+      ->add_option("--laws", options->laws,
+                   "Only these laws generate data; all of the family compete")
+      ->delimiter(',')
+      ->group(kOfLaws);
+  const auto add_of_laws = options_of_group(*command, kOfLaws);
+  add_of_laws("--family", options->family, "classical (default), fractional or all")
+      ->check(CLI::IsMember({"classical", "fractional", "all"}));
+  add_of_laws("--noise", options->noise,
+              "Standard deviation of the force over its peak (default: 0.01)");
+  add_of_laws("--order", options->order,
+              "Order of the fractional elements that generate (default: 0.4)");
+  command
+      ->add_option("--margin", options->margins,
+                   "Margins of BIC, each judging the same fits (default: that of tpm fit)")
+      ->delimiter(',')
+      ->group(kOfLaws);
   command->footer(
+      "Intervals are those of the profile likelihood, as in tpm fit. Laws are recorded in a ramp "
+      "to 5 mm\nat 5 mm/s, held 20 s, contact and offset unknown.\n"
+      "Exit code 1 if a coverage differs from its level at the 0.1 % level (exact binomial test), "
+      "if a law\nis not returned (nor one within one sigma of it) in 95 % of the repetitions, or "
+      "a law with more\nparameters in over 5 %.\n"
       "Example:\n  tpm design configs/design_liver.json --draw out/design\n"
-      "  tpm design configs/design_meat.json --check 0 --format json");
+      "  tpm design configs/design_meat.json --repetitions 0 --format json\n"
+      "  tpm design configs/coverage_absolute.json --repetitions 2000\n"
+      "  tpm design --laws linear-1,power-2 --repetitions 20");
   set_run(*command, session, [options, &session] { return design(*options, session); });
 }
 

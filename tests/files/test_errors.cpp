@@ -467,7 +467,7 @@ const std::string kDesign = R"({"title": "t", "law": {"name": "linear-1", "refer
 
 std::vector<ErrorCase> design_cases() {
   const std::string type = "design";
-  const std::string run_design = "design {}/d.json --check 0 -o {}/out";
+  const std::string run_design = "design {}/d.json --repetitions 0 -o {}/out";
   const auto design = [](std::string text) { return with_files({{"d.json", std::move(text)}}); };
   const auto with = [&](const std::string& from, const std::string& to) {
     return design(replaced(kDesign, from, to));
@@ -484,7 +484,7 @@ std::vector<ErrorCase> design_cases() {
        with("\"title\"", "\"criterion\": \"tau2\", \"title\"")},
       {type, "unknown nuisance", run_design,
        with("\"title\"", "\"nuisance\": [\"offset\"], \"title\"")},
-      {type, "too few simulations", "design {}/d.json --check 3 -o {}/out", design(kDesign)},
+      {type, "too few simulations", "design {}/d.json --repetitions 3 -o {}/out", design(kDesign)},
   };
 }
 

@@ -88,7 +88,7 @@ TEST_CASE("No command writes over a file that it reads, whatever the file is cal
         "$TPM simulate x.xdmf -o x.h5", "$TPM simulate x.xdmf -o x.xdmf",
         "$TPM simulate organ.json -o organ.json", "$TPM data import d.csv -o d --force",
         "$TPM data pack c.h5 -o c.h5 --force", "$TPM sweep s.json -o s.json",
-        "$TPM sweep t.csv -o t.h5", "$TPM design figures.json --check 0 --draw ."}) {
+        "$TPM sweep t.csv -o t.h5", "$TPM design figures.json --repetitions 0 --draw ."}) {
     INFO(line);
     const Ran ran = run_in(folder, line);
     CHECK(ran.code == 2);
@@ -420,7 +420,6 @@ TEST_CASE("Inputs without an end are refused by every command that reads") {
         "predict /dev/zero --frequencies '1 Hz'",
         "export /dev/zero --to febio",
         "design /dev/zero",
-        "coverage /dev/zero",
         "check-gradient /dev/zero",
         "predict /dev/zero a.csv",
         "predict law.json /dev/zero",

@@ -130,6 +130,10 @@ TEST_CASE("a wrong word is named, with the nearest right one and the help to rea
   // The name of what is an option here.
   check("spectrum l.json", "no command 'spectrum'", "did you mean 'tpm predict LAW --frequencies'?",
         "See tpm --help");
+  check("recovery", "no command 'recovery'", "did you mean 'tpm design --laws LAWS --repetitions'?",
+        "See tpm --help");
+  check("coverage c.json", "no command 'coverage'",
+        "did you mean 'tpm design CONFIG --repetitions'?", "See tpm --help");
   check("fit", "fit: ", "required", "see tpm fit --help");
   check("fit --format jsn x.csv", "fit: ", "--format", "see tpm fit --help");
 }
@@ -150,9 +154,9 @@ TEST_CASE("a bad value of an option is a fault of the command line, whatever the
            "hil check --duration '4 mm'", "hil check --rate 5s",
            "predict '" + law + "' --frequencies 1s", "export '" + law + "' --to nastran",
            "export '" + law + "' --to json --radius '2 s'", "network build --count 1",
-           "network build --filling no -o '" + (folder / "n.h5") + "'", "recovery --noise x",
-           "laws linera", "sweep '" + sweep + "' --workers 1000000000",
-           "sweep '" + sweep + "' --workers 1e9",
+           "network build --filling no -o '" + (folder / "n.h5") + "'",
+           "design --laws linear-1 --noise x", "laws linera",
+           "sweep '" + sweep + "' --workers 1000000000", "sweep '" + sweep + "' --workers 1e9",
            "budget '" + law + "' --loop-rate '1 m' --depth '4 mm' --rate '1 mm/s' --hold '1 s'"}) {
     CAPTURE(arguments);
     const Answer answer = answer_to(arguments);

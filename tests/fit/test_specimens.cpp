@@ -183,9 +183,9 @@ TEST_CASE("Beside an answer in JSON stands its table as CSV", "[specimens]") {
            {"select pig/3mm.csv --laws power-1 --no-held-out --no-profiles", "law,recommended,"},
            {"fit pig/3mm.csv --law power-1 --no-draw", "parameter,SI_unit,estimate,"},
            {"fit pig --law power-1 --no-draw", "parameter,SI_unit,typical,"},
-           {"coverage " TPM_TEST_SOURCE_DIR "/configs/coverage_absolute.json --sets 3",
+           {"design " TPM_TEST_SOURCE_DIR "/configs/coverage_absolute.json --repetitions 3",
             "parameter,level,data_sets,"},
-           {"recovery --laws linear-1 --trials 1", "law,noise_over_peak,margin,"},
+           {"design --laws linear-1 --repetitions 1", "law,noise_over_peak,margin,"},
            {"predict law.json --frequencies '1 Hz : 100 Hz : 3'",
             "frequency_Hz,storage_N_per_m,"}}) {
     INFO(c.command);

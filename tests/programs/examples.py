@@ -58,7 +58,7 @@ def copies(tpm, work):
 
 
 def read_by_their_commands(tpm, work):
-    quick = {"fit": "--no-draw --starts 2", "paper": "", "design": "--check 0", "simulate": "-o out.h5", "plan": "",
+    quick = {"fit": "--no-draw --starts 2", "paper": "", "design": "--repetitions 0", "simulate": "-o out.h5", "plan": "",
              "sweep": "-o out.h5", "hil": "-o out.tpmrec"}
     for name, folder, line in copies(tpm, work):
         more = quick[line.split()[1]]

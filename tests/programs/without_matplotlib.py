@@ -19,7 +19,7 @@ RUNS = {
     "budget": "budget ../fit/recording_fit/law.json --depth 4mm --rate 1mm/s --hold 30s --folder budget",
     "identify": "identify ../fit/recording.csv --folder identified",
     "validate": "validate ../fit/recording_fit/law.json ../fit/recording.csv --require 10% --folder validated",
-    "design": "design configs/design_liver.json --check 0 --draw drawn",
+    "design": "design configs/design_liver.json --repetitions 0 --draw drawn",
     "network": "network show --count 100 -o liver",
     "simulate": "simulate configs/liver_poke.json -o poke.h5 --figures pictures",
     "sweep": "sweep configs/sweep_x_depth.json -o sweep.h5; sweep plot sweep.h5 -o maps",

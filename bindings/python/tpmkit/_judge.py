@@ -128,7 +128,7 @@ def design(problem: PathLike | Mapping[str, Any], *, repetitions: int = 100, see
             file = Path(folder) / "design.json"
             file.write_text(json.dumps(dict(problem)), encoding="utf-8")
             problem = file
-        return Design(_program.answer(["design", os.fspath(problem), "--check", str(repetitions), "--seed", str(seed)]))
+        return Design(_program.answer(["design", os.fspath(problem), "--repetitions", str(repetitions), "--seed", str(seed)]))
 
 
 def view(file: PathLike, output: PathLike) -> Path:

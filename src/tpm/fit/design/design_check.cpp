@@ -118,7 +118,7 @@ std::vector<double> neighbour_correlations(const DesignProblem& problem,
 DesignCheck check_design(const DesignProblem& problem, const PlannedExperiment& experiment,
                          int sets, std::uint64_t seed) {
   if (sets < kFewestSets) {
-    throw Error(ExitCode::usage, "--check", fmt::format("{} simulated data sets", sets),
+    throw Error(ExitCode::usage, "--repetitions", fmt::format("{} simulated data sets", sets),
                 fmt::format("{} or more", kFewestSets));
   }
   std::vector<PlannedExperiment> experiments = problem.previous;

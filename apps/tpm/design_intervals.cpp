@@ -1,0 +1,33 @@
+// Declared in design_options.hpp.
+#include <algorithm>
+#include <chrono>
+
+#include "design_options.hpp"
+#include "tpm/fit/coverage.hpp"
+#include "tpm/fit/show/fit_csv.hpp"
+
+namespace tpm::app {
+
+std::uint64_t design_seed(const std::string& text) {
+  if (text == "clock") {
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    return static_cast<std::uint64_t>(now.count()) % 1'000'000'007U;
+  }
+  return parse_whole_number(text, "--seed", 0);
+}
+
+int check_intervals(const DesignOptions& options, const Session& session) {
+  const auto csv = csv_beside(options.output, session);
+  const FitConfig config = read_fit_config(options.design);
+  const std::string sets = options.repetitions.empty() ? "2000" : options.repetitions;
+  const CoverageResult result =
+      check_coverage(config, static_cast<int>(parse_whole_number(sets, "--repetitions", 1)),
+                     design_seed(options.seed));
+  deliver(session.json() ? to_text(to_json(result)) : to_terminal_text(result), options.output);
+  deliver_csv(coverage_csv(result), csv);
+  constexpr double kSuspicious = 0.001;
+  return exit_code(std::ranges::none_of(
+      result.parameters, [](const ParameterCoverage& p) { return p.p_value < kSuspicious; }));
+}
+
+}  // namespace tpm::app
