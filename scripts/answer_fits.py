@@ -256,14 +256,14 @@ def timed(look):
 
 def cases(case):
     strain = "Tension test\n\nTime,Strain,Stress\ns,%,kPa"
-    given = "--drive Strain --drive-quantity relative_length --response Stress --law linear-1"
+    given = "--drive Strain --drive-quantity relative_length --response Stress --laws linear-1"
     return [
         case("1", "five recordings of one material (exponent 2), 2 to 8 mm deep", folder_of_depths,
-             f"$TPM fit in --law power-1 {JSON}", "test_specimens: unequal depths", of_json(pooled)),
+             f"$TPM fit in --laws power-1 {JSON}", "test_specimens: unequal depths", of_json(pooled)),
         case("1", "the same without a law", folder_of_depths, f"$TPM fit in {JSON}", "test_specimens: The law of a folder",
              of_json(pooled)),
         case("1", "three animals, three repeats each", folder_of_repeats,
-             f"$TPM fit in --law power-1 --group-by '(pig[0-9])_' {JSON}", "test_specimens: grouped", of_json(pooled)),
+             f"$TPM fit in --laws power-1 --group-by '(pig[0-9])_' {JSON}", "test_specimens: grouped", of_json(pooled)),
         case("2", "title, blank and unit rows, titles below; columns chosen, and the units of time and stress (2 and 3 kPa)",
              strain_file("Tension test\n\ns,%,kPa\nTime,Strain,Stress"),
              f"$TPM fit t.csv {given} --unit Time=s --unit Stress=kPa {JSON}", "test_import: any order", shown(("k_inf", "k1"), 1e-3, " kPa")),
@@ -274,13 +274,13 @@ def cases(case):
         case("2", "`strain [-]`, stress in mmHg", strain_file("time [s],strain [-],stress [mmHg]", 1.0, 1 / 133.322387415),
              f"$TPM fit t.csv {JSON}", "test_rheometer: A strain is recognised", shown(("k1",), 1e-3, " kPa")),
         case("2", "`force [nN]`", lambda f: recording(f, "r.csv", header="time [s],depth [mm],force [nN]", scale=1e9),
-             f"$TPM fit r.csv --law linear-1 {JSON}", "test_import: a unit that is not known", shown(("k1",), 1.0, " N/m")),
+             f"$TPM fit r.csv --laws linear-1 {JSON}", "test_import: a unit that is not known", shown(("k1",), 1.0, " N/m")),
         case("2", "`depth [furlong]`", lambda f: recording(f, "r.csv", header="time [s],depth [furlong],force [N]"),
              f"$TPM fit r.csv {JSON}", "test_import: a unit that is not known"),
         case("2", "a strain without a unit", strain_file("time [s],strain,stress [kPa]"), f"$TPM fit t.csv {JSON}", "test_rheometer: A strain is recognised"),
         case("3", "power kernel (exponent 3.3) in contact 2 mm before its start",
              lambda f: recording(f, "r.csv", depth_mm=4.0, exponent=3.3, contact_mm=-2.0, noise=0.002),
-             f"$TPM fit r.csv --law power-1 {JSON}", "test_fit_bounds: presses is widened", shown(("exponent", "contact"))),
+             f"$TPM fit r.csv --laws power-1 {JSON}", "test_fit_bounds: presses is widened", shown(("exponent", "contact"))),
         case("4", "exact Maxwell creep, 162 points", lambda f: creep_problem(f, noise=0.0, known=False), TIMED, "test_fit_bounds: A profile that fails",
              timed(shown(("tau1",), 1.0, " s"))),
         case("5", "classical Maxwell creep, 162 points, 1 % noise, profiles", creep_problem, TIMED, "test_imposed_load: Creep of a Maxwell element",
@@ -292,7 +292,7 @@ def cases(case):
                             ("linear-3-elastic", "test_imposed_load: with elastic tension"))],
         case("6", "two branches (40 N/m, 1 s; 20 N/m, 2 s) that 2 % noise hardly tells apart",
              lambda f: recording(f, "r.csv", branches=((40.0, 1.0), (20.0, 2.0)), noise=0.02, seed=6, ramp_s=0.5),
-             f"$TPM fit r.csv --law linear-2 {JSON}", "test_rheometer: Branches keep", shown(("k1", "k2", "tau1", "tau2"))),
+             f"$TPM fit r.csv --laws linear-2 {JSON}", "test_rheometer: Branches keep", shown(("k1", "k2", "tau1", "tau2"))),
         case("6", "default law of a 10 s hold, slow relaxation (30 s), 2 % noise",
              lambda f: recording(f, "r.csv", branches=((40.0, 30.0),), noise=0.02, hold_s=10.0, step_s=0.5),
              f"$TPM fit r.csv {JSON}", "test_select: a hold of three relaxation times", of_json(recommended)),
@@ -304,7 +304,7 @@ def cases(case):
              "$TPM export l.json --to abaqus --relaxation-only > said", "test_law_spectrum: what cannot be said is refused"),
         case("6", "laws offered for a shear strain", strain_file("time [s],shear strain [%],shear stress [kPa]"),
              f"$TPM fit t.csv --drive 2 --response 3 {JSON}", "test_rheometer: A strain is fitted", of_json(offered)),
-        case("6", "one sample after the fitted part", one_late_sample, "$TPM fit r.csv --law linear-1 --no-draw > said",
+        case("6", "one sample after the fitted part", one_late_sample, "$TPM fit r.csv --laws linear-1 --no-draw > said",
              "test_select: few samples are no prediction", peak_words),
         *[case("build", what, function_file(header, kind), f"$TPM fit f.csv {JSON}", test,
                shown(("k_inf", "k1", "tau1")))
@@ -323,7 +323,7 @@ def cases(case):
                                  branches=((6e3 * 4 / 3 / (1 - 0.45 ** 2) * math.sqrt(5e-3 * 1e-3), 3.0),)),
              f"$TPM fit r.csv --radius '5 mm' --poisson 0.45 {JSON}", "test_rheometer: Indentations answer", of_json(moduli)),
         case("build", "tables beside the JSON", lambda f: recording(f, "r.csv"),
-             "$TPM fit r.csv --law linear-1 --folder out > said", "test_rheometer: A strain is fitted", tables),
+             "$TPM fit r.csv --laws linear-1 --folder out > said", "test_rheometer: A strain is fitted", tables),
     ]
 
 

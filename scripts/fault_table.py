@@ -91,11 +91,11 @@ COMMANDS = [
     Command("paper tables, to the terminal", "paper tables", []),
     Command("paper audit", "paper audit -o audit.txt", ["audit.txt"]),
     Command("fit FILE", "fit in/fit.json --starts 2 -o fit.txt", ["fit.txt"], weight=4),
-    Command("fit RECORDING", "fit in/folder/a1.csv --law linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"],
+    Command("fit RECORDING", "fit in/folder/a1.csv --laws linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"],
             weight=4),
-    Command("fit FOLDER", "fit in/folder --law linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"], weight=4),
-    Command("select", "select in/folder/a1.csv --laws linear-1 --no-held-out --no-profiles -o select.txt",
-            ["select.txt"], weight=4),
+    Command("fit FOLDER", "fit in/folder --laws linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"], weight=4),
+    Command("fit --verbose", "fit in/folder/a1.csv --laws linear-1 --no-held-out --no-profiles --no-draw --verbose -o fit.txt",
+            ["fit.txt"], weight=4),
     Command("data import", "data import in/folder/a1.csv -o c --force", ["c.csv", "c.json"]),
     Command("data pack", "data pack evren_static -o p.h5 --force", ["p.h5"]),
     Command("predict LAW --frequencies", "predict in/law.json --frequencies 1Hz:100Hz:16 -o spectrum.txt", ["spectrum.txt"]),
@@ -148,7 +148,7 @@ def write_inputs(tpm: Path, folder: Path) -> None:
         (folder / "folder" / name).write_text(recording(stiffer))
     subprocess.run([tpm, "hil", "run", folder / "session.json", "-o", folder / "s.tpmrec"], check=True,
                    capture_output=True)
-    subprocess.run([tpm, "fit", folder / "folder" / "a1.csv", "--law", "linear-1", "--starts", "2",
+    subprocess.run([tpm, "fit", folder / "folder" / "a1.csv", "--laws", "linear-1", "--starts", "2",
                     "--folder", folder / "fitted"], check=True, capture_output=True)
 
 

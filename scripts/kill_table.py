@@ -28,7 +28,7 @@ COMMANDS = [
             varies=["sweep.run.json"]),
     Command("simulate", "simulate in/indented.json -o sim.h5 --checkpoint-every '50 ms'",
             ["sim.h5", "sim.xdmf"], weight=4),
-    Command("fit FOLDER", "fit in/folder --law linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"], weight=4),
+    Command("fit FOLDER", "fit in/folder --laws linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"], weight=4),
     Command("hil run", "hil run in/session.json -o s.tpmrec", ["s.tpmrec"], old=False),
     Command("paper report", "paper report -o paper", [], varies=["paper/report.run.json"], weight=100),
     # Programs of Python: a drawing script, and the module (where it is on PYTHONPATH) that has figures drawn.

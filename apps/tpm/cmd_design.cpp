@@ -6,6 +6,7 @@
 
 #include "command.hpp"
 #include "design_options.hpp"
+#include "recording_options.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/design/design.hpp"
@@ -106,8 +107,7 @@ void add_design_command(CLI::App& app, Session& session) {
       ->delimiter(',')
       ->group(kOfLaws);
   const auto add_of_laws = options_of_group(*command, kOfLaws);
-  add_of_laws("--family", options->family, "classical (default), fractional or all")
-      ->check(CLI::IsMember({"classical", "fractional", "all"}));
+  add_family_option(*command, options->family, kOfLaws);
   add_of_laws("--noise", options->noise,
               "Standard deviation of the force over its peak (default: 0.01)");
   add_of_laws("--order", options->order,

@@ -37,7 +37,10 @@ namespace {
 
 struct FitOptions {
   RecordingOptions recordings;  ///< its files may also be one configuration, or one folder
-  std::string law, times;
+  std::vector<std::string> laws;
+  std::string family, margin, times;
+  bool no_held_out = false;
+  bool no_profiles = false;
   std::string folder;
   bool no_draw = false;
   bool verbose = false;
@@ -125,12 +128,23 @@ bool is_configuration(const std::vector<std::string>& files) {
   return !document.contains("kind");
 }
 
+/// The law that all recordings are fitted with; none where there is a choice.
+std::optional<LawSpec> only_law(const SelectionOptions& selection) {
+  return selection.laws.size() == 1 ? std::optional(selection.laws.front()) : std::nullopt;
+}
+
 SelectionOptions selection_options(const FitOptions& options) {
   SelectionOptions selection;
-  if (!options.law.empty())
-    selection.laws = {of_option([&] { return parse_law_name(options.law, "--law"); })};
-  selection.only_listed = !options.law.empty();
+  if (!options.laws.empty()) selection.laws = chosen_laws(options.laws, {});
+  selection.only_listed = !options.laws.empty();
+  if (!options.margin.empty()) selection.margin = option_number(options.margin, "--margin");
+  selection.held_out = !options.no_held_out;
+  selection.setup.profiles = !options.no_profiles;
   if (!options.times.empty()) {
+    if (options.laws.size() > 1) {
+      throw Error(ExitCode::usage, "--times", fmt::format("with {} laws", options.laws.size()),
+                  "one law at most");
+    }
     selection.setup.times_s = parse_times(options.times, "--times");
     selection.laws = {
         law_of_times(selection.laws.empty() ? std::nullopt : std::optional(selection.laws.front()),
@@ -139,7 +153,12 @@ SelectionOptions selection_options(const FitOptions& options) {
   }
   if (const auto probe = probe_of(options)) {
     selection.setup.exponent = probe_exponent(*probe);
-    if (selection.laws.empty()) selection.laws = laws_of_probe(classical_family(), *probe);
+    if (selection.laws.empty()) {
+      selection.laws = laws_of_probe(chosen_laws({}, options.family), *probe);
+    }
+  }
+  if (selection.laws.empty() && !options.family.empty()) {
+    selection.laws = chosen_laws({}, options.family);
   }
   if (!options.starts.empty()) {
     selection.setup.starts = parse_whole_number(options.starts, "--starts", 1);
@@ -320,8 +339,7 @@ int fit_folder(const FitOptions& options, const Session& session) {
   RecordingOptions input = options.recordings;
   input.files = recordings_in(options.recordings.files.front());
   SelectionOptions selection = selection_options(options);
-  const std::optional<LawSpec> law =
-      selection.laws.empty() ? std::nullopt : std::optional<LawSpec>(selection.laws.front());
+  const std::optional<LawSpec> law = only_law(selection);
   std::vector<PreparedRecording> recordings = read_recordings(input);
   require_indentation(options, recordings);
   set_reference(options, recordings, selection);
@@ -386,8 +404,7 @@ int compare_folders(const FitOptions& options, const Session& session) {
           : options.folder;
   if (!options.no_draw) will_write_into(folder, {"figures.json", "comparison.json"});
   SelectionOptions selection = selection_options(options);
-  const std::optional<LawSpec> law =
-      selection.laws.empty() ? std::nullopt : std::optional<LawSpec>(selection.laws.front());
+  const std::optional<LawSpec> law = only_law(selection);
   set_reference(options, first.recordings, selection);
   hold_placement(options.placement, options.recordings, first.recordings, selection.setup.contact,
                  selection.setup.zero);
@@ -481,12 +498,14 @@ int fit(const FitOptions& options, const Session& session) {
     throw Error(ExitCode::usage, "FILE", "two folders", "--compare beside them, or one folder");
   }
   if (is_configuration(files)) {
+    const bool chooses = !options.laws.empty() || !options.family.empty() ||
+                         !options.margin.empty() || options.no_held_out || options.no_profiles;
     if (!options.reference.empty() || !options.times.empty() || !options.group_by.empty() ||
-        !options.placement.contact.empty() || !options.placement.zero.empty() ||
+        !options.placement.contact.empty() || !options.placement.zero.empty() || chooses ||
         probe_of(options)) {
       throw Error(ExitCode::usage,
-                  "--reference, --times, --group-by, --contact, --zero, --radius, --cone-angle, "
-                  "--punch-radius",
+                  "--laws, --family, --margin, --no-held-out, --no-profiles, --reference, --times, "
+                  "--group-by, --contact, --zero, --radius, --cone-angle, --punch-radius",
                   "with a configuration",
                   "them only with recordings; a configuration has its own reference and fixed "
                   "parameters");
@@ -536,12 +555,29 @@ void add_fit_command(CLI::App& app, Session& session) {
                    "(G', G''; |G*| and delta), a relaxation modulus G(t) or compliance J(t), or "
                    "a folder of recordings to be fitted one by one and pooled")
       ->required();
-  command->add_option(
-      "--law", options->law,
-      "Recordings: fit this law, e.g. power-2 (default: the least that they support)");
+  constexpr const char* kChoice = "The choice of a law for recordings";
+  command
+      ->add_option("--laws", options->laws,
+                   "Fit this law, e.g. power-2, or choose among these, e.g. linear-1,power-2 "
+                   "(default: the least of the family that the recordings support)")
+      ->delimiter(',')
+      ->group(kChoice);
+  const auto add_choice = options_of_group(*command, kChoice);
+  add_family_option(*command, options->family, kChoice);
+  add_choice("--margin", options->margin,
+             "BIC that a larger law must gain to be preferred (default: 3)");
+  command
+      ->add_flag("--no-held-out", options->no_held_out,
+                 "Leave out the predictions of held-out data")
+      ->group(kChoice);
+  command
+      ->add_flag(
+          "--no-profiles", options->no_profiles,
+          "Leave out the likelihood profiles of the chosen law: its intervals are linearised")
+      ->group(kChoice);
   command->add_option("--times", options->times,
                       "Relaxation times that are not fitted: \"0.1 s, 1 s, 10 s\", or \"1 ms : "
-                      "1000 s : 13\" for 13 at equal ratios (law linear-13 unless --law says)");
+                      "1000 s : 13\" for 13 at equal ratios (law linear-13 unless --laws says)");
   CLI::Option* folder =
       command->add_option("--folder", options->folder,
                           "Where figures and files go (default: NAME_fit for recordings, none are "
@@ -583,8 +619,9 @@ void add_fit_command(CLI::App& app, Session& session) {
   add_probe("--poisson", options->poisson, "Poisson's ratio, 0 to 0.5 (0.49, assumed)");
   command->footer(
       "Example:\n  tpm fit configs/liver_relaxation.json\n"
-      "  tpm fit meat.csv\n  tpm fit liver.csv --radius \"2 mm\" --poisson 0.5\n  tpm fit "
-      "folder_of_recordings --law power-2\n"
+      "  tpm fit meat.csv\n  tpm fit slow.csv fast.csv --laws linear-1,linear-2,power-2 --verbose\n"
+      "  tpm fit liver.csv --radius \"2 mm\" --poisson 0.5\n  tpm fit "
+      "folder_of_recordings --laws power-2\n"
       "  tpm fit healthy/ fibrotic/ --compare --radius \"2 mm\"\n"
       "  tpm fit configs/liver_relaxation.json --hold-out \"8 mm\" --format json -o fit.json");
   set_run(*command, session, [options, &session] { return fit(*options, session); });

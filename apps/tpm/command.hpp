@@ -139,7 +139,6 @@ void add_version_command(CLI::App& app, Session& session);
 void add_view_command(CLI::App& app, Session& session);
 void add_example_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
-void add_select_command(CLI::App& app, Session& session);
 void add_budget_command(CLI::App& app, Session& session);
 void add_material_command(CLI::App& app, Session& session);
 void add_identify_command(CLI::App& app, Session& session);

@@ -72,8 +72,9 @@ std::vector<std::string> called(const CLI::App& command, const std::string& name
 }
 
 /// What other programs call a command is an option here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kOptions{
-    {{"spectrum", "tpm predict LAW --frequencies"},
+constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kOptions{
+    {{"select", "tpm fit --verbose"},
+     {"spectrum", "tpm predict LAW --frequencies"},
      {"coverage", "tpm design CONFIG --repetitions"},
      {"recovery", "tpm design --laws LAWS --repetitions"}}};
 

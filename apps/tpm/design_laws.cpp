@@ -38,13 +38,12 @@ int check_choice_of_law(const DesignOptions& options, const Session& session) {
   for (const std::string& margin : options.margins) {
     study.margins.push_back(option_number(margin, "--margin"));
   }
-  const std::string family = options.family.empty() ? "classical" : options.family;
-  study.selection.laws = chosen_laws({}, family);
+  study.selection.laws = chosen_laws({}, options.family);
   const double order = parse_part(options.order.empty() ? "0.4" : options.order, "--order",
                                   "an order of a fractional element above 0 and below 1");
   const auto csv = csv_beside(options.output, session);
   std::vector<RecoveryResult> results;
-  for (const LawSpec& law : chosen_laws(options.laws, family)) {
+  for (const LawSpec& law : chosen_laws(options.laws, options.family)) {
     results.push_back(recover(law, visible_parameters(law, order), study));
   }
   deliver(session.json() ? to_text(results_json(results)) : to_terminal_text(results),

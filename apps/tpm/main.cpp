@@ -204,9 +204,9 @@ void add_commands(CLI::App& app, Session& session) {
   };
   const std::vector<Group> groups = {
       {"Data: recordings, laws and fits",
-       {add_example_command, add_data_command, add_fit_command, add_select_command,
-        add_predict_command, add_validate_command, add_identify_command, add_laws_command,
-        add_export_command, add_design_command, add_view_command}},
+       {add_example_command, add_data_command, add_fit_command, add_predict_command,
+        add_validate_command, add_identify_command, add_laws_command, add_export_command,
+        add_design_command, add_view_command}},
       {"Tissue: organs of spheres",
        {add_network_command, add_material_command, add_simulate_command, add_plan_command,
         add_sweep_command}},

@@ -136,10 +136,10 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
   return recordings;
 }
 
-void add_family_option(CLI::App& command, std::string& family) {
-  command.add_option("--family", family, "classical, fractional or all")
+void add_family_option(CLI::App& command, std::string& family, const char* group) {
+  command.add_option("--family", family, "classical (default), fractional or all")
       ->check(CLI::IsMember({"classical", "fractional", "all"}))
-      ->capture_default_str();
+      ->group(group);
 }
 
 std::vector<LawSpec> chosen_laws(const std::vector<std::string>& names, const std::string& family) {
@@ -149,7 +149,7 @@ std::vector<LawSpec> chosen_laws(const std::vector<std::string>& names, const st
     laws.push_back(of_option([&] { return parse_law_name(name, "--laws"); }));
   if (!laws.empty()) return laws;
   if (family != "fractional") laws = classical_family();
-  if (family == "classical") return laws;
+  if (family.empty() || family == "classical") return laws;
   for (const LawSpec& law : fractional_family()) laws.push_back(law);
   return laws;
 }

@@ -61,10 +61,11 @@ void add_recording_options(CLI::App& command, RecordingOptions& options);
 [[nodiscard]] PreparedRecording prepared(const std::string& name, RecordingFile file,
                                          const RecordingOptions& options);
 
-/// --family classical|fractional|all.
-void add_family_option(CLI::App& command, std::string& family);
+/// --family classical|fractional|all in a group of the help; classical where it is missing.
+void add_family_option(CLI::App& command, std::string& family, const char* group);
 
-/// The laws that --laws names, or those of --family if it names none. Throws Error(bad_input).
+/// The laws that --laws names, or those of --family if it names none, classical if that is empty.
+/// Throws Error(bad_input).
 [[nodiscard]] std::vector<LawSpec> chosen_laws(const std::vector<std::string>& names,
                                                const std::string& family);
 

@@ -498,7 +498,7 @@ std::vector<ErrorCase> recording_folder_cases() {
   }
   const auto folder = with_files({{"a1.csv", csv}});
   const auto fit = [](const std::string& options) {
-    return "fit {} --no-draw --law linear-1 " + options + " -o {}/out";
+    return "fit {} --no-draw --laws linear-1 " + options + " -o {}/out";
   };
   return {
       {type, "no recording", "fit {} --no-draw -o {}/out", with_files({})},

@@ -412,7 +412,6 @@ TEST_CASE("Inputs without an end are refused by every command that reads") {
         "sweep merge /dev/zero o.blocks",
         "fit /dev/zero --no-draw",
         "fit a.csv /dev/zero --no-draw",
-        "select /dev/zero",
         "data check /dev/zero",
         "data show /dev/zero",
         "data pack /dev/zero -o o.h5",

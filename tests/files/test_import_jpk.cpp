@@ -229,7 +229,7 @@ TEST_CASE("the law fitted to a JPK force curve is the law that made it") {
   const std::string curve = written_by_python(folder, "shared", folder / "c.csv");
   const std::string out = folder / "fit.json";
   const std::string fit = std::string("\"") + TPM_TEST_PROGRAM + "\" fit \"" + curve +
-                          "\" --law linear-1 --no-draw --format json >\"" + out + "\"";
+                          "\" --laws linear-1 --no-draw --format json >\"" + out + "\"";
   REQUIRE(std::system(fit.c_str()) == 0);
   const Json answer = read_json(out);
   std::map<std::string, double> estimates;

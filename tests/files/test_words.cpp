@@ -128,6 +128,8 @@ TEST_CASE("a wrong word is named, with the nearest right one and the help to rea
   check("report", "no command 'report'", "did you mean 'tpm hil report' or 'tpm paper report'?",
         "See tpm --help");
   // The name of what is an option here.
+  check("select r.csv", "no command 'select'", "did you mean 'tpm fit --verbose'?",
+        "See tpm --help");
   check("spectrum l.json", "no command 'spectrum'", "did you mean 'tpm predict LAW --frequencies'?",
         "See tpm --help");
   check("recovery", "no command 'recovery'", "did you mean 'tpm design --laws LAWS --repetitions'?",

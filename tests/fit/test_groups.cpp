@@ -118,7 +118,7 @@ TEST_CASE("tpm fit A B --compare: the ratio of what differs, 1 for what does not
   write_group(folder, "fibrotic", {1.8, 2.0, 2.2, 2.1}, 4.0, 11);
   const Said said =
       run_in(folder,
-             "fit healthy fibrotic --compare --law linear-1 --no-draw --punch-radius '2 mm' "
+             "fit healthy fibrotic --compare --laws linear-1 --no-draw --punch-radius '2 mm' "
              "--format json -o c.json");
   INFO(said.text);
   REQUIRE(said.code == 0);
@@ -136,7 +136,7 @@ TEST_CASE("tpm fit A B --compare: the ratio of what differs, 1 for what does not
   CHECK_THAT(j["young_moduli"][2]["ratio"].get<double>(), WithinRel(2.0, 0.02));
   CHECK_THAT(j["conclusion"].get<std::string>(),
              Contains("fibrotic against healthy: a difference in k_inf, k1"));
-  const Said text = run_in(folder, "fit healthy fibrotic --compare --law linear-1 --folder out");
+  const Said text = run_in(folder, "fit healthy fibrotic --compare --laws linear-1 --folder out");
   INFO(text.text);
   CHECK(text.code == 0);
   CHECK_THAT(text.text, Contains("a difference in k_inf, k1 (Holm, 95 %); none is shown in tau1"));
@@ -149,18 +149,18 @@ TEST_CASE("Groups that differ by their depths are refused, copies are no second 
   const test::TempFolder folder;
   write_group(folder, "a", {0.9, 1.0, 1.1}, 4.0, 1);
   write_group(folder, "b", {0.9, 1.0, 1.1}, 6.0, 11);
-  const Said depths = run_in(folder, "fit a b --compare --law linear-1 --no-draw");
+  const Said depths = run_in(folder, "fit a b --compare --laws linear-1 --no-draw");
   CHECK(depths.code == 3);
   CHECK_THAT(depths.text, Contains("depth and group cannot be told apart"));
   std::filesystem::copy_file(folder.path() / "a" / "liver1.csv",
                              folder.path() / "a" / "liver9.csv");
   for (const char* command :
-       {"fit a --law linear-1 --no-draw", "fit a b --compare --law linear-1 --no-draw"}) {
+       {"fit a --laws linear-1 --no-draw", "fit a b --compare --laws linear-1 --no-draw"}) {
     const Said twice = run_in(folder, command);
     CAPTURE(command, twice.text);
     CHECK(twice.code == 3);
   }
-  CHECK_THAT(run_in(folder, "fit a --law linear-1 --no-draw").text,
+  CHECK_THAT(run_in(folder, "fit a --laws linear-1 --no-draw").text,
              Contains("the same bytes as 'a/liver1.csv'"));
   CHECK_THAT(run_in(folder, "fit a b").text, Contains("--compare"));
   CHECK_THAT(run_in(folder, "fit a --compare").text, Contains("two folders of recordings"));

@@ -180,9 +180,10 @@ TEST_CASE("Beside an answer in JSON stands its table as CSV", "[specimens]") {
     const char* first;  ///< line of the CSV
   };
   for (const Case& c : std::vector<Case>{
-           {"select pig/3mm.csv --laws power-1 --no-held-out --no-profiles", "law,recommended,"},
-           {"fit pig/3mm.csv --law power-1 --no-draw", "parameter,SI_unit,estimate,"},
-           {"fit pig --law power-1 --no-draw", "parameter,SI_unit,typical,"},
+           {"fit pig/3mm.csv --laws power-1 --no-held-out --no-profiles --no-draw",
+            "parameter,SI_unit,estimate,"},
+           {"fit pig/3mm.csv --laws power-1 --no-draw", "parameter,SI_unit,estimate,"},
+           {"fit pig --laws power-1 --no-draw", "parameter,SI_unit,typical,"},
            {"design " TPM_TEST_SOURCE_DIR "/configs/coverage_absolute.json --repetitions 3",
             "parameter,level,data_sets,"},
            {"design --laws linear-1 --repetitions 1", "law,noise_over_peak,margin,"},
@@ -202,16 +203,62 @@ TEST_CASE("Beside an answer in JSON stands its table as CSV", "[specimens]") {
     CHECK(run_on(folder, std::string(c.command) + " -o answer.txt").code == json.code);
     CHECK_FALSE(std::filesystem::exists(folder.path() / "answer.csv"));
   }
-  const Run over = run_on(folder, "select pig/3mm.csv --format json -o pig/3mm.json");
+  const Run over = run_on(folder, "fit pig/3mm.csv --no-draw --format json -o pig/3mm.json");
   CHECK(over.code == 2);
   CHECK_THAT(over.said, Contains("pig/3mm.csv: this command reads it and would write over it"));
+}
+
+TEST_CASE("The choice of a law is told by options of fit", "[specimens]") {
+  const test::TempFolder folder;
+  write_folder(folder);
+  const auto answer = [&](const std::string& options) {
+    const Run run = run_on(folder, "fit pig/3mm.csv --no-draw --format json " + options);
+    INFO(run.said);
+    REQUIRE(run.code == 0);
+    return parse_json(run.said, "answer");
+  };
+  const Json of_two = answer("--laws linear-0,power-1 --margin 7.5 --no-profiles");
+  CHECK(of_two.at("laws").size() == 2);
+  CHECK(of_two.at("recommended") == "power-1");
+  CHECK(of_two.at("margin_bic") == 7.5);
+  CHECK_FALSE(of_two.at("laws").at(0).at("held_out").empty());
+  CHECK(answer("--laws power-1 --no-held-out").at("laws").at(0).at("held_out").empty());
+  const Json fractional = answer("--family fractional --no-held-out --no-profiles");
+  for (const Json& law : fractional.at("laws")) {
+    CHECK_FALSE(parse_law_name(law.at("law"), "answer").fractional == Fractional::none);
+  }
+  // So large a margin prefers the law of the fewest parameters, whatever the data say.
+  CHECK(answer("--laws linear-0,power-1 --margin 1e9 --no-held-out").at("recommended") ==
+        "linear-0");
+  const Run twice = run_on(folder, "fit pig/3mm.csv --laws linear-1,power-1 --times '1 s'");
+  CHECK(twice.code == 2);
+  CHECK_THAT(twice.said, Contains("--times: with 2 laws"));
+  for (const char* option : {"--laws power-1", "--family all", "--margin 3", "--no-profiles"}) {
+    const Run run = run_on(
+        folder, std::string("fit " TPM_TEST_SOURCE_DIR "/configs/liver_relaxation.json ") + option);
+    CHECK(run.code == 2);
+    CHECK_THAT(run.said, Contains("with a configuration"));
+  }
+}
+
+TEST_CASE("Under a sphere the law of a folder is chosen among those of Hertz' kernel",
+          "[specimens]") {
+  const test::TempFolder folder;
+  write_folder(folder);
+  const Run run = run_on(folder, "fit pig --radius '2 mm' --no-draw --format json");
+  INFO(run.said);
+  REQUIRE(run.code == 0);
+  const Json study = parse_json(run.said, "answer");
+  CHECK_THAT(study.at("why").get<std::string>(), !Contains("was asked for"));
+  CHECK(parse_law_name(study.at("law"), "answer").kernel == Kernel::hertz);
+  CHECK(parse_law_name(study.at("law"), "answer").branches > 0);
 }
 
 TEST_CASE("A folder under a probe answers in pascals", "[specimens]") {
   const test::TempFolder folder;
   write_folder(folder);
   const Run text =
-      run_on(folder, "fit pig --law power-1 --cone-angle '45 deg' --poisson 0.4 --folder out");
+      run_on(folder, "fit pig --laws power-1 --cone-angle '45 deg' --poisson 0.4 --folder out");
   INFO(text.said);
   REQUIRE(text.code == 0);
   CHECK_THAT(text.said, Contains("Young's moduli under") && Contains("typical of 2 specimens"));
@@ -321,7 +368,7 @@ TEST_CASE("A folder's repeats are grouped by name, column or key", "[specimens]"
                                                                           name, animal));
     }
   }
-  const std::string fit = "--law power-1 --no-draw --format json --group-by ";
+  const std::string fit = "--laws power-1 --no-draw --format json --group-by ";
   for (const std::string& arguments :
        std::vector<std::string>{"by_name " + fit + "'(pig[0-9])_'", "by_name " + fit + "animal",
                                 "by_key " + fit + "specimen"}) {
@@ -337,7 +384,7 @@ TEST_CASE("A folder's repeats are grouped by name, column or key", "[specimens]"
     CHECK(json.at("pooled").at(0).at("spread_p_value") < 0.05);  // they differ by 30 %
   }
   const Run text = run_on(folder,
-                          "fit by_name --law power-1 --no-draw --group-by animal "
+                          "fit by_name --laws power-1 --no-draw --group-by animal "
                           "--reference '3.5 mm' --verbose");
   CHECK_THAT(text.said, Contains("[pig2]") && Contains("secants at a depth of 3.5 mm"));
   const Run unmatched = run_on(folder, "fit by_name --no-draw --group-by '(cow)'");

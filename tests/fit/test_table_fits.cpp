@@ -73,7 +73,7 @@ TEST_CASE("marks of thousands do not scale a fit", "[tables]") {
                 : fmt::format("{},{:03}\n", force / 1000, std::abs(force) % 1000);
   }
   write_file(folder / "t.txt", text);
-  const Answer answer = answer_in(folder, "fit t.txt --law linear-1 --no-draw --format json");
+  const Answer answer = answer_in(folder, "fit t.txt --laws linear-1 --no-draw --format json");
   INFO(answer.said);
   REQUIRE(answer.code == 0);
   CHECK_THAT(estimate_in(answer.said, "k_inf"), WithinRel(60.0, 0.01));
@@ -94,7 +94,7 @@ TEST_CASE("the time of a step is an option that the configuration keeps", "[tabl
   CHECK_THAT(late.said,
              Contains("the first sample is 185.1 s after the step") && Contains("--step-time"));
   const Answer told =
-      answer_in(folder, "fit t.txt --step-time '185 s' --law linear-1 --format json");
+      answer_in(folder, "fit t.txt --step-time '185 s' --laws linear-1 --format json");
   INFO(told.said);
   REQUIRE(told.code == 0);
   CHECK_THAT(estimate_in(told.said, "k_inf"), WithinRel(2000.0, 1e-3));
@@ -137,8 +137,8 @@ TEST_CASE("a pipe is read, and what cannot be fitted says what to type", "[table
   write_file(folder / "plain.csv", plain);
   write_file(folder / "negative.csv", negative);
   write_file(folder / "held.csv", held);
-  const Answer piped =
-      answer_in(folder, "fit /dev/stdin --law linear-1 --no-draw --format json", "cat plain.csv |");
+  const Answer piped = answer_in(folder, "fit /dev/stdin --laws linear-1 --no-draw --format json",
+                                 "cat plain.csv |");
   INFO(piped.said);
   REQUIRE(piped.code == 0);
   CHECK_THAT(estimate_in(piped.said, "k_inf"), WithinRel(60.0, 0.01));
@@ -207,7 +207,7 @@ TEST_CASE("a stress that was ramped and held is what was imposed", "[tables]") {
   }
   const test::TempFolder folder;
   write_file(folder / "r.csv", text);
-  const Answer answer = answer_in(folder, "fit r.csv --law linear-1 --no-draw --format json");
+  const Answer answer = answer_in(folder, "fit r.csv --laws linear-1 --no-draw --format json");
   REQUIRE(answer.code == 0);
   CHECK_THAT(estimate_in(answer.said, "k1"), WithinRel(3000.0, 0.04));
 }
@@ -229,7 +229,7 @@ TEST_CASE("strips that were fitted together keep their slack length", "[tables]"
     }
     write_file(folder / fmt::format("s{}.csv", speed), text);
   }
-  const Answer answer = answer_in(folder, "fit s1.csv s2.csv --law linear-1");
+  const Answer answer = answer_in(folder, "fit s1.csv s2.csv --laws linear-1");
   REQUIRE(answer.code == 0);
   const Json law = parse_json(read_file(folder / "s1_fit/law.json"), "law.json");
   CHECK_THAT(law.at("parameters").at("contact").get<double>(), WithinAbs(1.0, 0.01));
@@ -242,7 +242,7 @@ TEST_CASE("a recording of a stiffer material is judged by its error and uncertai
   write_file(folder / "fitted.csv", recording_seen([](double, double force) { return force; }));
   write_file(folder / "stiffer.csv",
              recording_seen([](double, double force) { return 1.05 * force; }));
-  REQUIRE(answer_in(folder, "fit fitted.csv --law linear-1").code == 0);
+  REQUIRE(answer_in(folder, "fit fitted.csv --laws linear-1").code == 0);
   const Answer judged = answer_in(folder, "validate fitted_fit/law.json stiffer.csv");
   CHECK(judged.code <= 1);
   CHECK_THAT(judged.said, Contains("a model error of"));

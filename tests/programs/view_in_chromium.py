@@ -241,7 +241,7 @@ def look_at_fit(chromium, tpm, folder):
     force += 2e-4 * np.random.default_rng(1).standard_normal(len(times))
     lines = [f"{t:.4f},{d:.5f},{f:.6f}" for t, d, f in zip(times, depth, force)]
     (folder / "synthetic.csv").write_text("time [s],depth [mm],force [N]\n" + "\n".join(lines) + "\n")
-    fit = [tpm, "fit", folder / "synthetic.csv", "--law", "linear-1"]
+    fit = [tpm, "fit", folder / "synthetic.csv", "--laws", "linear-1"]
     subprocess.run([*fit, "--folder", folder / "fitted"], check=True, capture_output=True)
     (folder / "answer.json").write_bytes(subprocess.run([*fit, "--folder", folder / "fitted_again", "--format", "json"], check=True, capture_output=True).stdout)
     law = json.loads((folder / "fitted/law.json").read_text())["parameters"]

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 RUNS = {
-    "fit": "example recording --folder .; fit recording.csv --law linear-1 --starts 2",
+    "fit": "example recording --folder .; fit recording.csv --laws linear-1 --starts 2",
     "configuration": "fit configs/liver_relaxation.json --starts 2 --folder fitted",
     "predict": "predict ../fit/recording_fit/law.json --depth 4mm --rate 1mm/s --hold 30s --folder predicted",
     "budget": "budget ../fit/recording_fit/law.json --depth 4mm --rate 1mm/s --hold 30s --folder budget",

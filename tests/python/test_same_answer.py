@@ -36,7 +36,7 @@ class SameAnswer(unittest.TestCase):
             rows = list(csv.reader(file))
         with self.file.open("w", newline="") as file:
             csv.writer(file).writerows([rows[0]] + [[t, f"-{d}", f] for t, d, f in rows[1:]])
-        here = self.compare(["--law", "linear-1", "--negate-drive", "--rest-length", "30 mm", "--area", "20 mm2"],
+        here = self.compare(["--laws", "linear-1", "--negate-drive", "--rest-length", "30 mm", "--area", "20 mm2"],
                             law="linear-1", columns={"negate_drive": True, "rest_length": "30 mm", "area": "20 mm2"})
         # k = 60 N/m of a strip of 30 mm and 20 mm2 is a modulus of k L / A
         modulus = {p["name"]: p for p in here["fit"]["parameters"]}

@@ -69,7 +69,8 @@ inline std::vector<ErrorCase> placement_error_cases() {
        "fit {}/r.csv --contact \"3 mm\" --no-draw -o {}/out", files},
       {type, "contact beside a force of contact",
        "fit {}/r.csv --contact \"1 mm\" --contact-force \"2 mN\" --no-draw -o {}/out", files},
-      {type, "contact deeper, all laws", "select {}/r.csv --contact \"3 mm\" -o {}/out", files},
+      {type, "contact deeper, all laws", "fit {}/r.csv --no-draw --contact \"3 mm\" -o {}/out",
+       files},
       {type, "zero in another unit", "fit {}/r.csv --zero \"3 mm\" --no-draw -o {}/out", files},
       {type, "contact with a protocol",
        "predict {}/law.json --depth \"1 mm\" --rate \"1 mm/s\" --hold \"1 s\" --contact \"1 mm\" "

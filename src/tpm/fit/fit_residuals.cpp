@@ -177,7 +177,7 @@ void profile_all(const ResidualFunction& function, FitResult& result,
   }
   throw Error(ExitCode::numerical, "profiles",
               "a deeper minimum was met again and again; expected one that stays: a law of fewer "
-              "parameters (--law), or more starts (--starts 200)");
+              "parameters (--laws), or more starts (--starts 200)");
 }
 
 void describe_parameters(FitResult& result, double level, bool profiles) {

@@ -30,7 +30,7 @@ LawSpec law_of_times(const std::optional<LawSpec>& law, std::span<const double> 
   if (parallel && static_cast<std::size_t>(law->branches) == times_s.size()) return *law;
   throw Error(ExitCode::usage, option,
               fmt::format("{} times for the law {}", times_s.size(), law_name(*law)),
-              "a law with as many parallel branches, or no --law");
+              "a law with as many parallel branches, or no --laws");
 }
 
 std::optional<double> stated_time(const std::string& parameter, std::span<const double> times_s) {

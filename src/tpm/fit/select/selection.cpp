@@ -287,7 +287,7 @@ std::size_t least_within(const std::vector<Candidate>& candidates, double margin
     }
     if (chosen) return *chosen;
   }
-  throw Error(ExitCode::numerical, "select", "no law could be fitted");
+  throw Error(ExitCode::numerical, "selection", "no law could be fitted");
 }
 
 void rank_candidates(Selection& s) {
@@ -337,7 +337,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
     if (closest == nullptr || c.fit.best.deviance < closest->fit.best.deviance) closest = &c;
   }
   if (closest == nullptr) {
-    throw Error(ExitCode::numerical, "select",
+    throw Error(ExitCode::numerical, "selection",
                 fmt::format("none of {} laws could be fitted", laws.size()));
   }
   s.samples = closest->fit.value_count;
