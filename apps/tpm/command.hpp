@@ -144,7 +144,6 @@ void add_material_command(CLI::App& app, Session& session);
 void add_identify_command(CLI::App& app, Session& session);
 void add_predict_command(CLI::App& app, Session& session);
 void add_validate_command(CLI::App& app, Session& session);
-void add_check_gradient_command(CLI::App& app, Session& session);
 void add_design_command(CLI::App& app, Session& session);
 void add_laws_command(CLI::App& app, Session& session);
 void add_export_command(CLI::App& app, Session& session);

@@ -212,8 +212,7 @@ void add_commands(CLI::App& app, Session& session) {
         add_sweep_command}},
       {"Hand: haptic devices", {add_hil_command, add_budget_command}},
       {"Evidence: the paper, and tpm itself",
-       {add_paper_command, add_accuracy_command, add_check_gradient_command, add_schema_command,
-        add_version_command}}};
+       {add_paper_command, add_accuracy_command, add_schema_command, add_version_command}}};
   for (const Group& group : groups) {
     for (const Adder add : group.commands) {
       const std::size_t before = app.get_subcommands({}).size();

@@ -419,7 +419,6 @@ TEST_CASE("Inputs without an end are refused by every command that reads") {
         "predict /dev/zero --frequencies '1 Hz'",
         "export /dev/zero --to febio",
         "design /dev/zero",
-        "check-gradient /dev/zero",
         "predict /dev/zero a.csv",
         "predict law.json /dev/zero",
         "budget /dev/zero a.csv",

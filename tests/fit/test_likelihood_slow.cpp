@@ -8,11 +8,11 @@
 #include <numbers>
 
 #include "fitted_parameter.hpp"
+#include "gradient_check.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/fit/gradient_check.hpp"
 #include "tpm/fit/likelihood/experiment_refit.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpmkit/error.hpp"

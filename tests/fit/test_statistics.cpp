@@ -12,8 +12,8 @@
 #include <numbers>
 
 #include "expected_values.hpp"
+#include "gradient_check.hpp"
 #include "statistics_problems.hpp"
-#include "tpm/fit/gradient_check.hpp"
 #include "tpm/fit/likelihood/correlation.hpp"
 #include "tpm/fit/likelihood/estimated_sigma.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"

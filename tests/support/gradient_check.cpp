@@ -1,4 +1,4 @@
-#include "tpm/fit/gradient_check.hpp"
+#include "gradient_check.hpp"
 
 #include <fmt/format.h>
 
