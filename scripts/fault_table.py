@@ -111,7 +111,6 @@ COMMANDS = [
             ["budget.json", "budget.csv"]),
     Command("view", "view in/s.tpmrec -o view.html", ["view.html"], weight=4),
     Command("design CONFIG", "design in/fit.json --repetitions 10 --format json -o coverage.json", ["coverage.json", "coverage.csv"]),
-    Command("hil hazards", "hil hazards --format json -o hazards.json", ["hazards.json", "hazards.csv"], weight=20),
     Command("paper experiments", "paper experiments in/experiments.json -o experiments", [],
             varies=["experiments/report.run.json"], weight=50),
     Command("plan", "plan in/indented.json --costs nominal --brief", [], weight=20),

@@ -459,7 +459,6 @@ void add_hil_command(CLI::App& app, Session& session) {
   add_hil_verify_commands(*hil, session);
   add_hil_export_command(*hil, session);
   add_hil_stability_command(*hil, session);
-  add_hil_hazards_command(*hil, session);
 }
 
 }  // namespace tpm::app

@@ -161,7 +161,6 @@ void add_hil_identify_command(CLI::App& hil, Session& session);    // below `tpm
 void add_hil_export_command(CLI::App& hil, Session& session);      // below `tpm hil`
 void add_hil_verify_commands(CLI::App& hil, Session& session);     // below `tpm hil`
 void add_hil_stability_command(CLI::App& hil, Session& session);   // below `tpm hil`
-void add_hil_hazards_command(CLI::App& hil, Session& session);     // below `tpm hil`
 void add_verify_command(CLI::App& accuracy, Session& session);     // below `tpm accuracy`
 void add_benchmark_command(CLI::App& accuracy, Session& session);  // below `tpm accuracy`
 void add_stability_command(CLI::App& accuracy, Session& session);  // below `tpm accuracy`

@@ -4,11 +4,10 @@
 #include <cmath>
 
 #include "expected_values.hpp"
+#include "hazards/hazard_report.hpp"
 #include "tpm/haptics/border/border_study.hpp"
-#include "tpm/haptics/hazards/hazard_study.hpp"
 #include "tpm/haptics/session/rendering_check.hpp"
 #include "tpm/haptics/show/border_report.hpp"
-#include "tpm/haptics/show/hazard_report.hpp"
 
 namespace tpm::haptics {
 namespace {

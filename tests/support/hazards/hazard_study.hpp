@@ -1,5 +1,4 @@
 #pragma once
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -46,9 +45,6 @@ struct HazardStudy {
 };
 
 /// Runs all hazards, deterministic. What is refused as unstable is run once more, accepted.
-/// @param told before each row
-[[nodiscard]] HazardStudy study_hazards(const std::function<void()>& told = {});
-/// How often `told` is called.
-[[nodiscard]] std::size_t hazard_count();
+[[nodiscard]] HazardStudy study_hazards();
 
 }  // namespace tpm::haptics

@@ -1,5 +1,4 @@
 #pragma once
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,9 +31,6 @@ struct ClockHazardStudy {
 /// watchdog, interruptions, records that cannot be kept. Times differ from run to run, and other
 /// programs on the machine may stall a session as well: a row that leaves its bounds is tried
 /// again, up to `most_tries`.
-/// @param told before each row
-[[nodiscard]] ClockHazardStudy study_hazards_on_the_clock(const std::function<void()>& told = {});
-/// How often `told` is called.
-[[nodiscard]] std::size_t clock_hazard_count();
+[[nodiscard]] ClockHazardStudy study_hazards_on_the_clock();
 
 }  // namespace tpm::haptics

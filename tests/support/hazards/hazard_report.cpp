@@ -1,15 +1,14 @@
-#include "tpm/haptics/show/hazard_report.hpp"
+#include "hazards/hazard_report.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 
 namespace tpm::haptics {
 namespace {
-
-constexpr int kHazardDigits = 4;
 
 bool ran(const HazardRow& row) {
   return row.refused.empty();
@@ -29,38 +28,6 @@ std::string in(double value, double scale, bool shown) {
 }
 
 }  // namespace
-
-Json hazard_json(const HazardStudy& study) {
-  const HazardBounds& b = study.bounds;
-  Json rows = array_json(study.rows, [](const HazardRow& row) {
-    const auto number = [&](double value, bool shown) {
-      return shown ? Json(rounded(value, kHazardDigits)) : Json();
-    };
-    return Json{{"hazard", row.hazard},
-                {"setting", row.setting},
-                {"accepted_unstable", row.accepted},
-                {"refused", ran(row) ? Json() : Json(row.refused)},
-                {"cause", ran(row) ? Json(word_of(row.cause)) : Json()},
-                {"largest_force_N", number(row.largest_force_N, ran(row))},
-                {"largest_rise_N", number(row.largest_rise_N, ran(row))},
-                {"delivered_to_hand_J", number(row.delivered_J, ran(row))},
-                {"to_zero_force_s", number(row.to_zero_s, stopped(row))},
-                {"travel_m", number(row.travel_m, stopped(row))},
-                {"passive", row.passive},
-                {"within_bounds", row.within}};
-  });
-  return {{"simulated_device", true},
-          {"safe", study.safe()},
-          {"bounds",
-           {{"force_N", b.force_N},
-            {"rise_in_a_period_N", b.rise_N},
-            {"delivered_to_hand_J", b.delivered_J},
-            {"delivered_to_hand_stopped_J", b.delivered_stopped_J},
-            {"travel_m", b.travel_m},
-            {"to_zero_force_s", b.to_zero_s},
-            {"fault_to_zero_force_s", b.fault_to_zero_s}}},
-          {"rows", std::move(rows)}};
-}
 
 std::string hazard_text(const HazardStudy& study) {
   const HazardBounds& b = study.bounds;
@@ -86,26 +53,6 @@ std::string hazard_text(const HazardStudy& study) {
       within, study.rows.size(), b.force_N, b.rise_N, 1e3 * b.delivered_J,
       1e3 * b.delivered_stopped_J, 1e3 * b.to_zero_s, 1e3 * b.travel_m, 1e3 * b.fault_to_zero_s);
   return text;
-}
-
-Json clock_hazard_json(const ClockHazardStudy& study) {
-  Json rows = array_json(study.rows, [](const ClockHazardRow& row) {
-    const bool stopped_by_it = row.expected != StopCause::finished;
-    return Json{
-        {"hazard", row.hazard},
-        {"setting", row.setting},
-        {"cause", word_of(row.cause)},
-        {"expected_cause", word_of(row.expected)},
-        {"consecutive_missed_periods", row.consecutive_missed},
-        {"largest_force_N", rounded(row.largest_force_N, kHazardDigits)},
-        {"to_zero_force_s", stopped_by_it ? Json(rounded(row.to_zero_s, kHazardDigits)) : Json()},
-        {"to_zero_force_bound_s", stopped_by_it ? Json(row.bound_s) : Json()},
-        {"tries", row.tries},
-        {"within_bounds", row.within}};
-  });
-  return {{"simulated_device", true},       {"scheduling", study.scheduling},
-          {"most_tries", study.most_tries}, {"force_limit_N", study.force_limit_N},
-          {"safe", study.safe()},           {"rows", std::move(rows)}};
 }
 
 std::string clock_hazard_text(const ClockHazardStudy& study) {

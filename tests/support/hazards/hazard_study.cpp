@@ -1,4 +1,4 @@
-#include "tpm/haptics/hazards/hazard_study.hpp"
+#include "hazards/hazard_study.hpp"
 
 #include <fmt/format.h>
 
@@ -479,19 +479,14 @@ bool HazardStudy::safe() const {
   return std::all_of(rows.begin(), rows.end(), [](const HazardRow& row) { return row.within; });
 }
 
-HazardStudy study_hazards(const std::function<void()>& told) {
+HazardStudy study_hazards() {
   HazardStudy study;
   for (const Hazard& hazard : hazards()) {
-    if (told) told();
     study.rows.push_back(row_of(hazard, false, study.bounds));
     if (study.rows.back().refused_by_check)
       study.rows.push_back(row_of(hazard, true, study.bounds));
   }
   return study;
-}
-
-std::size_t hazard_count() {
-  return hazards().size();
 }
 
 }  // namespace tpm::haptics

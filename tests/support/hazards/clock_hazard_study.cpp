@@ -1,4 +1,4 @@
-#include "tpm/haptics/hazards/clock_hazard_study.hpp"
+#include "hazards/clock_hazard_study.hpp"
 
 #include <fmt/format.h>
 
@@ -265,20 +265,15 @@ bool ClockHazardStudy::safe() const {
                      [](const ClockHazardRow& row) { return row.within; });
 }
 
-ClockHazardStudy study_hazards_on_the_clock(const std::function<void()>& told) {
+ClockHazardStudy study_hazards_on_the_clock() {
   const HilSession session = parse_session(short_star_session(), "session", {});
   ClockHazardStudy study;
   study.most_tries = kMostTries;
   study.force_limit_N = session.servo.force_limit_N;
   for (const ClockHazard& hazard : clock_hazards()) {
-    if (told) told();
     study.rows.push_back(row_of(hazard, session, study.scheduling));
   }
   return study;
-}
-
-std::size_t clock_hazard_count() {
-  return clock_hazards().size();
 }
 
 }  // namespace tpm::haptics
