@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "operator_lines.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/haptics/device/replay_device.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"

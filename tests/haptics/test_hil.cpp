@@ -352,6 +352,15 @@ TEST_CASE("A recording that is cut off is exported as such") {
   CHECK(file.numbers("/rows/time_s").size() == 100);
 }
 
+/// The exact update without delay, in closed form: (T/2) (k0 + 2 G / (1 + E)), worst at the Nyquist
+/// frequency, E = exp(-T/tau), G = g (1 - E) tau / T.
+double exact_update_damping(double equilibrium_N_per_m, double relaxing_N_per_m,
+                            double relaxation_time_s, double period_s) {
+  const double z = period_s / relaxation_time_s;
+  const double gain = relaxing_N_per_m * -std::expm1(-z) / z;
+  return 0.5 * period_s * (equilibrium_N_per_m + 2.0 * gain / (1.0 + std::exp(-z)));
+}
+
 TEST_CASE("The border of the exact update is the closed form, at every relaxation time") {
   for (const double periods : {1e-3, 0.1, 1.0, 10.0, 1e3}) {
     RenderedContact contact;

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <thread>
 
+#include "operator_lines.hpp"
 #include "expected_values.hpp"
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"

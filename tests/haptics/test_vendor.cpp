@@ -9,6 +9,7 @@
 #include <fstream>
 #include <thread>
 
+#include "operator_lines.hpp"
 #include "hil_scenes.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"

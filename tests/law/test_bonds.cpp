@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "expected_values.hpp"
+#include "star_stiffness.hpp"
 #include "tpm/organ/balance/quasistatic.hpp"
 #include "tpm/organ/body/liver.hpp"
 #include "tpm/organ/body/simple_organs.hpp"

@@ -62,6 +62,14 @@ double largest_difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return (a - b).cwiseAbs().maxCoeff();
 }
 
+Eigen::VectorXd coefficients(const Prony& law) {
+  const auto n = static_cast<Eigen::Index>(law.k.size());
+  Eigen::VectorXd all(2 * n + 1);
+  all << law.k_inf, Eigen::Map<const Eigen::VectorXd>(law.k.data(), n),
+      Eigen::Map<const Eigen::VectorXd>(law.tau_s.data(), n);
+  return all;
+}
+
 }  // namespace
 
 TEST_CASE("names of laws go there and back", "[law]") {
@@ -295,18 +303,29 @@ TEST_CASE("forty units in series are forty branches, with exact derivatives", "[
       CHECK_THAT(back.k[i], WithinRel(chain.k[i], 1e-9));
       CHECK_THAT(back.T_s[i], WithinRel(chain.T_s[i], 1e-11));
     }
-    // The slopes of both conversions are each other's inverse.
-    const SeriesWithSlopes series = to_series_with_slopes(parallel.law);
-    const Eigen::MatrixXd product = series.slopes * parallel.slopes;
+    // Along every coefficient of the chain, the slopes are those of the coefficients' own change.
     const Eigen::Index size = 2 * units + 1;
-    REQUIRE(product.rows() == size);
+    REQUIRE(parallel.slopes.rows() == size);
     Eigen::VectorXd scale(size);  // relative changes in, relative changes out
     scale << chain.k0, Eigen::Map<const Eigen::VectorXd>(chain.k.data(), units),
         Eigen::Map<const Eigen::VectorXd>(chain.T_s.data(), units);
-    const Eigen::MatrixXd relative =
-        scale.cwiseInverse().asDiagonal() * product * scale.asDiagonal();
+    constexpr double kStep = 1e-5;
+    const auto changed = [&](Eigen::Index at, double by) {
+      KelvinChain near = chain;
+      const auto unit = static_cast<std::size_t>((at - 1) % units);
+      (at == 0 ? near.k0 : at <= units ? near.k[unit] : near.T_s[unit]) *= 1.0 + by;
+      return coefficients(to_parallel(near));
+    };
+    const Eigen::VectorXd law = coefficients(parallel.law);
+    Eigen::MatrixXd differences(size, size);
+    for (Eigen::Index j = 0; j < size; ++j) {
+      differences.col(j) =
+          (changed(j, kStep) - changed(j, -kStep)).cwiseQuotient(2.0 * kStep * law);
+    }
+    const Eigen::MatrixXd slopes =
+        law.cwiseInverse().asDiagonal() * parallel.slopes * scale.asDiagonal();
     INFO(units << " units");
-    CHECK((relative - Eigen::MatrixXd::Identity(size, size)).cwiseAbs().maxCoeff() < 1e-6);
+    CHECK((slopes - differences).cwiseAbs().maxCoeff() < 1e-6);
   }
   KelvinChain long_chain{1.0, std::vector<double>(41, 1.0), {}, 0.0};
   for (int i = 1; i <= 41; ++i) long_chain.T_s.push_back(i);

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "expected_values.hpp"
-#include "tpm/law/relaxation.hpp"
+#include "step_response.hpp"
 #include "tpm/law/relaxation/exponential_sum.hpp"
 #include "tpm/law/tension_creep.hpp"
 #include "tpmkit/law_model.hpp"

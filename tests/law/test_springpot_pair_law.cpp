@@ -10,11 +10,11 @@
 #include <sstream>
 
 #include "expected_values.hpp"
+#include "step_response.hpp"
 #include "tpm/files/blocks/law_export.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/law/prony_table.hpp"
-#include "tpm/law/relaxation.hpp"
 #include "tpm/law/relaxation/mittag_leffler.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_file.hpp"

@@ -58,6 +58,13 @@ Eigen::Matrix3Xd random_displacement(Eigen::Index n, std::uint64_t seed) {
   return u;
 }
 
+/// Of all spheres.
+Eigen::VectorXd normal_unevenness_m(const Network& network, const Eigen::Matrix3Xd& displacement) {
+  std::vector<std::size_t> all(network.organ.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return Unevenness(network, all).of(displacement);
+}
+
 }  // namespace
 
 TEST_CASE("the contact stiffness of the star is that of its radial bond") {

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "star_stiffness.hpp"
 #include "expected_values.hpp"
 #include "random_plan_scene.hpp"
 #include "refusal.hpp"

@@ -35,6 +35,7 @@
 #include <thread>
 #include <vector>
 
+#include "operator_lines.hpp"
 #include "tpm/haptics/device/virtual_plant.hpp"
 
 namespace {

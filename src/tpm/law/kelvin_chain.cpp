@@ -289,23 +289,6 @@ ParallelWithSlopes parallel_with_slopes(const KelvinChain& chain) {
   return result;
 }
 
-template <int Units>
-SeriesWithSlopes series_with_slopes(const Prony& law) {
-  const auto c = series_of(as_jets<SlopeJet<Units>>(law.k_inf, law.k, law.tau_s));
-  SeriesWithSlopes result;
-  const auto units = static_cast<Eigen::Index>(c.k.size());
-  result.slopes.resize(2 * units + 1 + (c.fluid ? 1 : 0),
-                       2 * static_cast<Eigen::Index>(law.k.size()) + 1);
-  result.chain.k0 = c.first.a;
-  put_row(result.slopes, 0, c.first);
-  take_units(c, result.chain.k, result.chain.T_s, result.slopes);
-  if (c.fluid) {
-    result.chain.eta = c.eta.a;
-    put_row(result.slopes, 2 * units + 1, c.eta);
-  }
-  return result;
-}
-
 /// Calls f with a number of units, known when compiled, that is at least `units`.
 template <class Function>
 auto with_enough_units(std::size_t units, const Function& f) {
@@ -327,13 +310,6 @@ ParallelWithSlopes to_parallel_with_slopes(const KelvinChain& chain) {
   require_units(chain.k.size(), "Kelvin chain");
   return with_enough_units(chain.k.size(),
                            [&](auto units) { return parallel_with_slopes<units>(chain); });
-}
-
-SeriesWithSlopes to_series_with_slopes(const Prony& law) {
-  require_coefficients(law.k_inf, law.k, law.tau_s, "Prony law");
-  require_units(law.k.size(), "Prony law");
-  return with_enough_units(law.k.size(),
-                           [&](auto units) { return series_with_slopes<units>(law); });
 }
 
 }  // namespace tpm::law

@@ -82,14 +82,4 @@ SlopedNumber StepResponse::creep(double t_s) const {
   throw no_compliance(spec_);
 }
 
-SlopedNumber law_relaxation(const LawSpec& spec, std::span<const double> values, double t_s) {
-  LawModel(spec).require_in_range(values);
-  return StepResponse(spec, values).relaxation(t_s);
-}
-
-SlopedNumber law_creep(const LawSpec& spec, std::span<const double> values, double t_s) {
-  LawModel(spec).require_in_range(values);
-  return StepResponse(spec, values).creep(t_s);
-}
-
 }  // namespace tpm::law

@@ -15,29 +15,21 @@ struct SlopedNumber {
   Eigen::VectorXd by;
 };
 
-/// G(t) of a law, N/m (or Pa): the response at t > 0 to a unit step of V(u), without tension.
-/// The contour sum of laplace_contour.hpp over the law's operational stiffness; the error is some
-/// 1e-13 of |s L[G](s)| at s = 1/t. (relaxation_stiffness has the closed forms, without slopes.)
-/// @param values all of law_parameters(spec)
-/// Throws Error(bad_input) for values out of range, or a time that is not above 0 and finite.
-[[nodiscard]] SlopedNumber law_relaxation(const LawSpec& spec, std::span<const double> values,
-                                          double t_s);
-
-/// The creep compliance J(t), m/N (or 1/Pa): V(u) at t > 0 under a unit load from t = 0 on, without
-/// tension. The integral of J(t - s) dG(s) from 0 to t is 1. Computed as law_relaxation.
-/// Throws Error(bad_input) also for a law without any stiffness.
-[[nodiscard]] SlopedNumber law_creep(const LawSpec& spec, std::span<const double> values,
-                                     double t_s);
-
-/// law_relaxation and law_creep at many times: what does not depend on the time is computed once.
+/// Responses of a law without tension to a step, with their derivatives by its parameters.
 class StepResponse {
  public:
   /// @param values all of law_parameters(spec), in range (LawModel::require_in_range); they must
   /// outlive this
   StepResponse(const LawSpec& spec, std::span<const double> values);
 
-  /// Throws Error(bad_input) as the functions above, for the time and for a law without stiffness.
+  /// G(t), N/m (or Pa), at t > 0 after a unit step of V(u). The contour sum of laplace_contour.hpp
+  /// over the law's operational stiffness; the error is some 1e-13 of |s L[G](s)| at s = 1/t.
+  /// (relaxation_stiffness has the closed forms, without slopes.)
+  /// Throws Error(bad_input) for a time that is not above 0 and finite.
   [[nodiscard]] SlopedNumber relaxation(double t_s) const;
+  /// The creep compliance J(t), m/N (or 1/Pa): V(u) at t > 0 under a unit load from t = 0 on. The
+  /// integral of J(t - s) dG(s) from 0 to t is 1.
+  /// Throws Error(bad_input) also for a law without any stiffness.
   [[nodiscard]] SlopedNumber creep(double t_s) const;
   /// J just after the step, of a fractional law: 0 where a spring-pot stands in no spring's series.
   [[nodiscard]] SlopedNumber creep_at_once() const;

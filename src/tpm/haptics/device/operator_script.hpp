@@ -1,7 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <filesystem>
-#include <string>
 #include <vector>
 
 namespace tpm::haptics {
@@ -43,11 +41,5 @@ class OperatorScript {
   std::size_t now_ = 0;
   double start_s_ = 0.0;
 };
-
-/// One line a piece: "place|force END FROM TO X Y Z X Y Z", the last six from where to where
-/// across; numbers that read back as they are.
-[[nodiscard]] std::string to_lines(const OperatorScript& script);
-/// Throws std::runtime_error for a file that is not such lines.
-[[nodiscard]] OperatorScript read_operator_script(const std::filesystem::path& file);
 
 }  // namespace tpm::haptics

@@ -159,13 +159,6 @@ double predicted_passive_damping(const RenderedContact& contact) {
   return most;
 }
 
-double exact_update_damping(double equilibrium_N_per_m, double relaxing_N_per_m,
-                            double relaxation_time_s, double period_s) {
-  const double z = period_s / relaxation_time_s;
-  const double gain = relaxing_N_per_m * -std::expm1(-z) / z;
-  return 0.5 * period_s * (equilibrium_N_per_m + 2.0 * gain / (1.0 + std::exp(-z)));
-}
-
 double largest_passive_stiffness(RenderedContact contact, double damping_N_s_per_m, BorderBy by) {
   return last_that_holds(1e-3, 1e8, [&](double stiffness) {
     contact.stiffness_N_per_m = stiffness;

@@ -34,11 +34,6 @@ struct RenderedContact {
 /// frequencies.
 [[nodiscard]] double predicted_passive_damping(const RenderedContact& contact);
 
-/// The exact update without delay, in closed form: (T/2) (k0 + 2 G / (1 + E)), worst at the Nyquist
-/// frequency, E = exp(-T/tau), G = g (1 - E) tau / T.
-[[nodiscard]] double exact_update_damping(double equilibrium_N_per_m, double relaxing_N_per_m,
-                                          double relaxation_time_s, double period_s);
-
 /// Which of the two ways to find a border.
 enum class BorderBy { measurement, prediction };
 

@@ -17,9 +17,4 @@ ContactStiffness held_stiffness(const BondSystem& bonds, const Positions& rest, 
   return {stiffness(0.0), stiffness(1.0)};
 }
 
-ContactStiffness star_stiffness(const BondMaterial& material) {
-  const double length = material.modulus_to_stiffness_m();
-  return {material.instantaneous_Pa() * length, material.equilibrium_Pa * length};
-}
-
 }  // namespace tpm::organ

@@ -14,8 +14,4 @@ struct ContactStiffness {
 [[nodiscard]] ContactStiffness held_stiffness(const BondSystem& bonds, const Positions& rest,
                                               std::size_t sphere, const Eigen::Vector3d& direction);
 
-/// The same of the four-sphere star along its radial bond: its moduli times A0/l0 (its lateral
-/// bonds are square to the displacement).
-[[nodiscard]] ContactStiffness star_stiffness(const BondMaterial& material);
-
 }  // namespace tpm::organ

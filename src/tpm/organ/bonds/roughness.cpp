@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/namespaces.hpp"
@@ -68,12 +67,6 @@ Eigen::VectorXd Unevenness::of(const Eigen::Matrix3Xd& displacement) const {
     }
   }
   return r;
-}
-
-Eigen::VectorXd normal_unevenness_m(const Network& network, const Eigen::Matrix3Xd& displacement) {
-  std::vector<std::size_t> all(network.organ.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  return Unevenness(network, all).of(displacement);
 }
 
 double roughness(const Unevenness& spheres, const Eigen::Matrix3Xd& displacement) {

@@ -20,15 +20,13 @@ namespace tpm::organ {
 ///
 /// Spheres without lateral neighbours have 0; where neighbours do not determine the gradient it is
 /// the smallest that fits.
-/// @param displacement from the organ's positions, m
-[[nodiscard]] Eigen::VectorXd normal_unevenness_m(const Network& network,
-                                                  const Eigen::Matrix3Xd& displacement);
-
-/// The unevenness of some spheres, linear in displacements: its shares are found once.
+///
+/// Linear in displacements: the shares of the neighbours are found once.
 class Unevenness {
  public:
   Unevenness(const Network& network, std::span<const std::size_t> spheres);
-  /// One number a sphere, m, in the order of the spheres.
+  /// @param displacement from the organ's positions, m
+  /// @return one number a sphere, m, in the order of the spheres
   [[nodiscard]] Eigen::VectorXd of(const Eigen::Matrix3Xd& displacement) const;
 
  private:
