@@ -265,7 +265,7 @@ TEST_CASE("a setting may answer a part of the response, in vectors, and claim an
         std::string::npos);
 }
 
-TEST_CASE("contact models are asked in servo problems as docs/benchmark.md says") {
+TEST_CASE("contact models are asked in servo problems as docs/accuracy.md says") {
   for (const BenchmarkProblem& problem : {servo_normal_problem(), servo_space_problem()}) {
     CAPTURE(problem.name);
     std::set<std::string> curves;
