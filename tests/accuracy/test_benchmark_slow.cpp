@@ -40,7 +40,7 @@ struct Element {
   [[nodiscard]] static double depth(double time_s) {
     return time_s < kHoldFrom_s ? kRate_m_per_s * time_s : kDepth_m;
   }
-  /// w in closed form (docs/notation.md).
+  /// w in closed form (docs/theory.md).
   [[nodiscard]] double viscous(double time_s) const {
     const auto ramp = [&](double t) {
       return kRate_m_per_s * (t + tau_s * std::expm1(-t / tau_s));
