@@ -1,4 +1,4 @@
-# tpm_peers: other engines on one problem (docs/benchmark.md). Optional: nothing else needs them.
+# tpm_peers: other engines on one problem (docs/accuracy.md). Optional: nothing else needs them.
 # Debian: libmujoco-dev, libbullet-dev.
 option(TPM_PEERS "Build tpm_peers, which runs MuJoCo and Bullet beside tpm" OFF)
 if(TPM_PEERS)

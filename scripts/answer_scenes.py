@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What two versions of the program answer to scenes, plans and sweeps whose numbers were wrong or misleading.
 
-    python3 scripts/answer_scenes.py OLD/build/release/tpm build/release/tpm -o reports/scenes/answers.md
+    python3 scripts/answer_scenes.py OLD/build/release/tpm build/release/tpm -o out/answers.md
 
 Cases as in scripts/answer_table.py: each in a folder of its own, with the program's own source tree for data and
 scripts. An answer is the exit code, what was said on standard error, and what the case looks at. Needs numpy and h5py.
@@ -176,7 +176,7 @@ RELATIVES = """## Relatives found and mended
 
 | found | mended |
 | --- | --- |
-| a contact of 1,500 kN/m and more was passed through by the tool without a word (-0.0096 N; reports/scenes/contacts.md) | the root of the gap is found, and the tool strikes the sphere |
+| a contact of 1,500 kN/m and more was passed through by the tool without a word (-0.0096 N; reports/methods/report.md) | the root of the gap is found, and the tool strikes the sphere |
 | the inertia that `tpm plan` estimates for scenes with tools held the ringing of spheres on their contacts, and a drag of the tool | left out (src/tpm/plan/inertia_estimate.cpp; test_plan): the reference of a ball at 4 mm/s rang, and `timeout 60 tpm plan` of it was stopped, which now ends in 3 s |
 | a time at which an impact falls was answered with the force of the dashpot before the impact | answered after it (`InertialEquation::meets`) |
 | forces of tools in files came from overlaps alone | from springs and dashpots (`contact_pushes_N`) |

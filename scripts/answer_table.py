@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Gives the same hostile inputs to two versions of the program and makes one table of both answers.
 
-    python3 scripts/answer_table.py inputs OLD/build/release/tpm build/release/tpm -o reports/faults/inputs.md
-    python3 scripts/answer_table.py sessions OLD/build/release/tpm build/release/tpm -o reports/safety/sessions.md
-    python3 scripts/answer_table.py fits OLD/build/release/tpm build/release/tpm -o reports/fits/answers.md
+    python3 scripts/answer_table.py inputs OLD/build/release/tpm build/release/tpm -o out/inputs.md
+    python3 scripts/answer_table.py sessions OLD/build/release/tpm build/release/tpm -o out/sessions.md
+    python3 scripts/answer_table.py fits OLD/build/release/tpm build/release/tpm -o out/answers.md
 
 `inputs`: files, names and disks; `sessions`: the haptic loop, on the simulated device and through the stand-in for
 the vendor's library: each version's own, but where a case is about the library's strictness the new one's; `fits`:

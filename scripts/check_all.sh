@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Sanitizers over all of the code: every test but the slow ones under AddressSanitizer and
 # UndefinedBehaviorSanitizer (preset asan-ubsan), all that has threads under ThreadSanitizer (preset tsan), all
-# failing system calls and kills (docs/faults.md), clang-tidy on every source. Takes hours; not part of CI.
+# failing system calls and kills (docs/architecture.md), clang-tidy on every source. Takes hours; not part of CI.
 # Stops at the first failure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -24,7 +24,7 @@ configure release -DTPM_BUILD_TESTS=ON
 cmake --build build/release --target tpm fault_at
 python3 scripts/kill_table.py build/release/tpm build/release/tests/libfault_at.so -o build/kills.md
 python3 scripts/fault_table.py build/release/tpm build/release/tests/libfault_at.so -o build/faults.md ||
-  echo "build/faults.md lists what docs/faults.md says of libraries, or more: compare"
+  echo "build/faults.md lists what docs/architecture.md says of libraries, or more: compare"
 
 step "clang-tidy on all sources"
 configure tidy

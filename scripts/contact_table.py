@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The largest force of a ball with mass against the stiffness of its contacts, by two versions of the program.
 
-    python3 scripts/contact_table.py OLD/build/release/tpm build/release/tpm -o reports/scenes/contacts.md
+    python3 scripts/contact_table.py OLD/build/release/tpm build/release/tpm -o out/contacts.md
 
 The paper's liver, a ball of 2 mm radius and 10 g driven 8 mm deep at 200 mm/s, held 20 ms and taken off; last, the same
 with sphere 71 driven itself, which has no contact. A number that grows with the stiffness is one of the contact, not of

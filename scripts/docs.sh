@@ -44,6 +44,10 @@ END
 step "building (sphinx)"
 TPMKIT_VERSION=$("$tpm" version | cut -d' ' -f2) TPMKIT_DOXYGEN=$PWD/$folder/doxygen/xml \
   /usr/bin/python3 -m sphinx -q -W --keep-going -b html -d "$folder/doctrees" "$folder/source" "$folder/html"
+mathjax=/usr/share/javascript/mathjax
+mkdir -p "$folder/html/_static/mathjax"
+(cd "$mathjax" && cp -rL --parents MathJax.js config/TeX-AMS_SVG-full.js extensions jax/element jax/input/TeX jax/output/SVG/*.js \
+  jax/output/SVG/autoload jax/output/SVG/fonts/TeX "$OLDPWD/$folder/html/_static/mathjax")
 cat >"$folder/html/index.html" <<'END'
 <!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>tpmkit</title>
 <meta http-equiv="refresh" content="0; url=docs/site/index.html"></head>

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Fails the n-th system call of every command that writes, for each kind of call, and makes one table.
 
-    python3 scripts/fault_table.py build/release/tpm build/release/tests/libfault_at.so -o reports/faults/faults.md
+    python3 scripts/fault_table.py build/release/tpm build/release/tests/libfault_at.so -o out/faults.md
 
 After each fault the answer has to be one line that begins with "tpm: ", exit code 5 (environment), no file
 besides those of an undisturbed run, and each of those either as it was or as an undisturbed run writes it. A

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures how the direct solvers grow with the number of spheres, and draws the chart of reports/growth.
+"""Measures how the direct solvers grow with the number of spheres, and draws the chart of reports/networks.
 
     growth_chart.py measure RECORD --after PROGRAM [--before PROGRAM] [--cholmod PROGRAM] [--growth PROGRAM]
                     [--shell COUNT...] [--solid COUNT...] [--most-s S] [--most-GiB G]

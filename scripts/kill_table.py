@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills each command at the calls that change a file, runs it again and makes one table.
 
-    python3 scripts/kill_table.py build/release/tpm build/release/tests/libfault_at.so -o reports/faults/kills.md
+    python3 scripts/kill_table.py build/release/tpm build/release/tests/libfault_at.so -o out/kills.md
 
 SIGKILL comes at the n-th call that opens a file for writing, writes (before it and half-way), syncs, renames, cuts
 or removes: every n to --first, then --spread more. Before the second run, a file of a wanted name is either as it

@@ -34,5 +34,5 @@ packages_check=(
 
 # What builds the site (scripts/docs.sh). CI installs it only where the site is wanted.
 packages_docs=(
-  python3-sphinx furo python3-breathe python3-myst-parser doxygen
+  python3-sphinx furo python3-breathe python3-myst-parser libjs-mathjax doxygen
 )

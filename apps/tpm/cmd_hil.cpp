@@ -404,7 +404,7 @@ void add_hil_command(CLI::App& app, Session& session) {
   devices->add_option("--dhd-library", listed->library,
                       "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
   devices->add_option("--plugin", listed->plugin,
-                      "Those of a device plugin instead (docs/c_interface.md)");
+                      "Those of a device plugin instead (docs/library.md)");
   devices
       ->add_option("--inverse-port", listed->choice.inverse.port,
                    "Simulation channel of the Inverse service")

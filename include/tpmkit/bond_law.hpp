@@ -12,7 +12,7 @@ namespace tpm {
 ///     f = sum_i c_i W_i(l) + sum_j g_j (V(l) - m_j),     dm_j/dt = (V(l) - m_j) / tau_j
 ///
 /// in N, N/m, m, s. The first sum is the equilibrium force U'(l) of a convex potential U. The
-/// branches are linear where V(l) = l; otherwise they act on the kernel V (docs/network_method.md).
+/// branches are linear where V(l) = l; otherwise they act on the kernel V (docs/theory.md).
 /// With c_i, g_j >= 0 and tau_j > 0 the bond stores
 ///
 ///     U(l) + sum_j g_j [P(l) + P*(m_j) - l m_j],   P the integral of V, P* its Legendre transform

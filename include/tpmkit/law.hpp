@@ -70,7 +70,7 @@ enum class Fractional {
 /// The most branches of a law.
 inline constexpr int kMostBranches = 40;
 
-/// One member of the family of laws (docs/notation.md):
+/// One member of the family of laws (docs/theory.md):
 ///
 ///     F(t) = offset + integral G(t - s) dV(u(s)) + k_tension T(u(t)),   u = max(drive - contact,
 ///     0) G(t) = k_inf + sum_i k_i exp(-t/tau_i)     (or a fractional G)

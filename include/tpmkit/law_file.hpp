@@ -10,7 +10,7 @@
 
 namespace tpm {
 
-/// A law with its parameters, as fits write it and simulations read it (docs/law_files.md).
+/// A law with its parameters, as fits write it and simulations read it (docs/laws.md).
 struct LawFile {
   LawSpec spec;
   std::vector<double> values;  ///< in the order of law_parameters(spec), SI

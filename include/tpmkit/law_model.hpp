@@ -30,7 +30,7 @@ struct LawAtParameters;
 /// that.
 ///
 /// The error of fractional laws at knots and output times is 1e-10 of G at their smallest spacing,
-/// times the total variation of the drive (docs/fractional.md); of creep 1e-9 of the depth
+/// times the total variation of the drive (docs/theory.md); of creep 1e-9 of the depth
 /// (spring-pots 5e-6). A single step that stays constant uses G(t) and J(t) themselves
 /// (law/relaxation.hpp): a step of depth with a linear kernel, a step of load without elastic
 /// tension. Any other jump of the depth of a spring-pot throws Error(bad_input). Under a jump of

@@ -14,7 +14,7 @@
 
 namespace tpm::organ {
 
-/// A tissue, its contacts and loads, and its network, from a scene file (docs/simulation_files.md).
+/// A tissue, its contacts and loads, and its network, from a scene file (docs/data_formats.md).
 /// Copies share one immutable scene; several threads may use it.
 ///
 ///     const Scene scene("liver_fig3.json");

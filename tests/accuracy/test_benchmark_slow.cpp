@@ -40,7 +40,7 @@ struct Element {
   [[nodiscard]] static double depth(double time_s) {
     return time_s < kHoldFrom_s ? kRate_m_per_s * time_s : kDepth_m;
   }
-  /// w in closed form (docs/notation.md).
+  /// w in closed form (docs/theory.md).
   [[nodiscard]] double viscous(double time_s) const {
     const auto ramp = [&](double t) {
       return kRate_m_per_s * (t + tau_s * std::expm1(-t / tau_s));
@@ -265,7 +265,7 @@ TEST_CASE("a setting may answer a part of the response, in vectors, and claim an
         std::string::npos);
 }
 
-TEST_CASE("contact models are asked in servo problems as docs/benchmark.md says") {
+TEST_CASE("contact models are asked in servo problems as docs/accuracy.md says") {
   for (const BenchmarkProblem& problem : {servo_normal_problem(), servo_space_problem()}) {
     CAPTURE(problem.name);
     std::set<std::string> curves;

@@ -1,4 +1,4 @@
-// Intervals of fits whose zero, contact and drift were measured: reports/placement has more of
+// Intervals of fits whose zero, contact and drift were measured: reports/fits has more of
 // them.
 #include <catch2/catch.hpp>
 

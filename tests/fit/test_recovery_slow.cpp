@@ -1,4 +1,4 @@
-// Selection and intervals checked by simulation on a few laws; docs/recovery.md has the whole
+// Selection and intervals checked by simulation on a few laws; docs/selection.md has the whole
 // family with 200 trials each.
 #include <boost/math/distributions/binomial.hpp>
 #include <catch2/catch.hpp>

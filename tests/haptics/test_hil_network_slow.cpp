@@ -179,7 +179,7 @@ TEST_CASE("Twenty minutes of one motion: nothing grows, and the end feels like t
   CHECK(run.drift.peak_N > 0.05);
   CHECK(run.drift.late_rounds_N == 0.0);
   // Its guard keeps a viscous state whose energy can no longer be told from rest
-  // (docs/reduction.md).
+  // (docs/theory.md).
   CHECK(run.drift.end_start_N <
         test::allowed_error("session.drift_in_twenty_minutes") * run.drift.peak_N);
   CHECK(run.grown_bytes < test::allowed_cost("session.memory_growth_in_twenty_minutes"));

@@ -165,7 +165,7 @@ TEST_CASE("creep with frozen lambda1 is Eq. 14 with its limits") {
 
 TEST_CASE("creep with the true lambda1 ends where the springs balance the load") {
   TpmParameters paper;
-  // Ends of creep (docs/notation.md): 10.59 mm at 0.98 N, 2.56 mm at 0.196 N
+  // Ends of creep (docs/theory.md): 10.59 mm at 0.98 N, 2.56 mm at 0.196 N
   CHECK_THAT(CreepUnderConstantLoad(paper, 0.98).final_depth_m(),
              test::expected("paper.creep_end_at_0.98_N"));
   CHECK_THAT(CreepUnderConstantLoad(paper, 0.196).final_depth_m(),

@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/haptics/2026-11-23.md, "The network beside the loop", as
+// Prints the measured numbers of reports/haptics/report.md, "The network beside the loop", as
 // CSV:
 //     measure_beside SCENE STEPS SEED
 // The whole network in the loop at 1 kHz, and beside it (without a thread: its answer is used 5 ms

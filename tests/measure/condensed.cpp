@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/scenes/condensed.md: build/release/tests/measure_condensed
+// Prints the measured numbers of reports/methods/report.md: build/release/tests/measure_condensed
 // [SCENE]...
 #include <fmt/format.h>
 

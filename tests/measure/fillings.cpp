@@ -1,4 +1,4 @@
-// Prints the tables of reports/organ_fillings: how evenly the surface of a solid ball answers.
+// Prints the tables of reports/networks: how evenly the surface of a solid ball answers.
 //     build/release/tests/measure_fillings [FROM TO]
 // For 20 numbers of spheres (or those between FROM and TO) and each lattice: spheres that were
 // added, the least outer support, and over five pushes spread over the surface the largest over the

@@ -1,4 +1,4 @@
-// Prints the numbers of reports/fits/exponential_sums.md: errors, rates and times of the
+// Prints the numbers of reports/fits/report.md: errors, rates and times of the
 // exponential sums, and the time of a response: build/release/tests/measure_fractional
 #include <fmt/format.h>
 

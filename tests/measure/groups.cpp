@@ -1,6 +1,6 @@
 // measure_groups STUDIES SEED: how often two groups of specimens that do not differ are found to
 // differ, and how often those that do are, over sizes, spreads and standard errors
-// (reports/fits/groups.md).
+// (reports/fits/report.md).
 #include <cstdio>
 #include <string>
 

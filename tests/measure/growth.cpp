@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/growth/2026-11-23.md and writes its figure:
+// Prints the measured numbers of reports/networks/report.md and writes its figure:
 //
 //     measure_growth FOLDER                         everything; FOLDER/figures.json
 //     measure_growth KIND COUNT SOLVER [STRIDES]    one case

@@ -1,4 +1,4 @@
-// Prints the measured numbers of the newest reports/safety/hands_*.md as CSV:
+// Prints the measured numbers of reports/haptics/report.md, "Six hands", as CSV:
 //     measure_hands gate     what the gate lets pass, delay wrong by half a period, with jitter
 //     measure_hands grown    a delay that grows unseen, beside an oracle
 //     measure_hands passive  the same where the rendering is passive with the friction of the

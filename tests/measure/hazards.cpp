@@ -1,5 +1,5 @@
-// What can go wrong in a session, and what becomes of it; prints reports/safety/hazards.md, or
-// with --wall-clock reports/safety/clock.md, which takes half a minute:
+// What can go wrong in a session, and what becomes of it; prints the tables of hazards in
+// reports/haptics/report.md, with --wall-clock those by the clock, which takes half a minute:
 //   measure_hazards [--wall-clock]
 // Exit code 1 if force, energy, travel or time leave their bounds.
 #include "hazards/hazard_report.hpp"

@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/haptics/2026-11-23.md, "Ten hours":
+// Prints the measured numbers of reports/haptics/report.md, "Ten hours":
 //     measure_hil_long SESSION HOURS FOLDER
 // One motion again and again in virtual time through the whole servo step, with the session's
 // model; every row is written, the log starting anew each simulated hour. Resident memory after

@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/haptics/2026-11-23.md, "What a cycle takes", as CSV:
+// Prints the measured numbers of reports/haptics/report.md, "What a cycle takes", as CSV:
 //     measure_hil_step SESSION... [ROUNDS]
 // A whole cycle (simulated device with its operator, model, contact, passivity, limits,
 // row into the log) in virtual time, on the first 12 s of each session. Each cycle's time is the

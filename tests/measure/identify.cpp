@@ -1,4 +1,4 @@
-// Prints the measured numbers of the newest reports/safety/device_*.md, "Identification", as CSV:
+// Prints the measured numbers of reports/haptics/report.md, "Identification", as CSV:
 //     measure_identify
 // A handle with the given mass, friction, delay and encoder, simulated apart from the library's own
 // simulated device, moved by the forces of tpm hil identify for 20 s at 1 kHz.

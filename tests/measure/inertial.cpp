@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/network/2026-11-21-mass.md:
+// Prints the measured numbers of reports/networks/report.md:
 // build/release/tests/measure_inertial
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // measure_intervals STUDY SETS SEED: how many 95 % intervals of tpm fit hold the true value
-// (reports/fits/coverage.md). Each set is a recording of 300 samples with a rest before contact,
+// (reports/fits/report.md). Each set is a recording of 300 samples with a rest before contact,
 // fitted from the true values; the interval holds a value if the deviance, minimised with the
 // parameter fixed there, rises by no more than the interval allows. Studies:
 //   correlated  six laws, white noise and autoregressions of 0.5 and 0.9

@@ -1,4 +1,4 @@
-// Prints the measured numbers on the mass-spring model in reports/network/2026-11-21-mass.md:
+// Prints the measured numbers on the mass-spring model in reports/networks/report.md:
 // build/release/tests/measure_mass_spring
 #include <fmt/format.h>
 

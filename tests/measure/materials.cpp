@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/materials: measure_materials written|cost|servo|zones|lag
+// Prints the measured numbers of reports/networks: measure_materials written|cost|servo|zones|lag
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/organ/geometry.md: build/release/tests/measure_organ
+// Prints the measured numbers of reports/networks/report.md: build/release/tests/measure_organ
 #include <fmt/format.h>
 
 #include <chrono>

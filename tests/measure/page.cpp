@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/haptics/2026-11-23.md, "The page", as CSV: what the servo
+// Prints the measured numbers of reports/haptics/report.md, "The page", as CSV: what the servo
 // loop's wake-ups and cycles take on the clock with and without a page and those who ask for it.
 //     measure_page SESSION SECONDS ROUNDS
 // Cases take turns, so that what else the machine does meets all of them; `least` is the least over

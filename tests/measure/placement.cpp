@@ -1,6 +1,6 @@
 // measure_placement onset|drift SIMULATIONS SEED: errors of the onset of contact, and how often the
 // intervals of fits with a measured zero, contact and drift hold the true value
-// (reports/placement).
+// (reports/fits).
 #include <cstdio>
 #include <string>
 

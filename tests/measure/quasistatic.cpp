@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/network/2026-11-21.md:
+// Prints the measured numbers of reports/networks/report.md:
 // build/release/tests/measure_quasistatic [all | two [E1]]
 // With "two" only the ends of the ramp and of the hold are asked for; E1 in Pa, 12000 if none.
 #include <fmt/format.h>

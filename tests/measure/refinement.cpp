@@ -1,4 +1,4 @@
-// Prints the tables of refinement and moduli of reports/growth/2026-11-23.md:
+// Prints the tables of refinement and moduli of reports/networks/report.md:
 // build/release/tests/measure_refinement
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/scenes/servo_network.md as CSV:
+// Prints the measured numbers of reports/methods/report.md as CSV:
 //     measure_servo SCENE errors [TAU_S ...]     error, estimate and step time of each motion
 //     measure_servo SCENE energy STEPS SEED [TAU_S ...]
 //                                                work drawn over random motions in space

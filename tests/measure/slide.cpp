@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/haptics/2026-11-23.md, "Over the surface", of slides that
+// Prints the measured numbers of reports/haptics/report.md, "Over the surface", of slides that
 // follow it:
 //     measure_slide SESSION
 // The slides of a session of the kind `surface` by the simulated device in virtual time, following

@@ -2,7 +2,7 @@
 // (SofaCUDA/scenes/benchmarks/MeshSpringForceField_beam10x10x40_cpu.scn: implicit Euler with steps
 // of 10 ms, at most 20 iterations of conjugate gradients to 1e-6) and compares that setting, and
 // others, with a converged solution: build/release/tests/measure_spring_beam beam.json prints the
-// table in reports/growth/2026-11-25.md and writes what draw_spring_beam.py draws.
+// table in reports/networks/report.md and writes what draw_spring_beam.py draws.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/haptics/2026-11-23.md, "Over the surface":
+// Prints the measured numbers of reports/haptics/report.md, "Over the surface":
 //     measure_surface SESSION STEPS SEED
 // The ball of a session of the kind `surface` over its organ. First it is pressed, held, and slid
 // 20 mm there and back in three directions, at three depths: the force

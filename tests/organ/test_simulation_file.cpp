@@ -117,9 +117,8 @@ TEST_CASE("the file of a run holds its scene, version, tolerance, and what was f
   CHECK(read_file(folder / "a.h5") == read_file(folder / "b.h5"));
 }
 
-TEST_CASE("every key of the JSON answer is described in docs/simulation_files.md", "[heavy]") {
-  const std::string page =
-      read_file(std::string(TPM_TEST_SOURCE_DIR) + "/docs/simulation_files.md");
+TEST_CASE("every key of the JSON answer is described in docs/data_formats.md", "[heavy]") {
+  const std::string page = read_file(std::string(TPM_TEST_SOURCE_DIR) + "/docs/data_formats.md");
   const ExperimentScene deep = small_scene(
       R"("protocol": {"kind": "ramp_hold", "depth": "13 mm", "rate": "4 mm/s", "hold": "1 s"})");
   for (const std::string& key :

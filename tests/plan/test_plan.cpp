@@ -69,7 +69,7 @@ TEST_CASE("a scalar model is the closed form of the paper's element under any st
     ScalarModel model(equilibrium, relaxing, {{1.0, tau}}, rise / steps);
     double force = 0.0;
     for (int i = 1; i <= steps; ++i) force = model.step_to(depth * i / steps);
-    // Ramp: the viscous elongation is v (t - tau (1 - exp(-t/tau))), docs/notation.md.
+    // Ramp: the viscous elongation is v (t - tau (1 - exp(-t/tau))), docs/theory.md.
     const double v = depth / rise;
     const double viscous = v * (rise - tau * -std::expm1(-rise / tau));
     CHECK_THAT(force, WithinRel(75.0 * depth + 50.0 * (depth - viscous), 1e-12));

@@ -1,6 +1,6 @@
 #pragma once
 // How often intervals with a measured placement hold the true value, and how far an onset is off.
-// Shared by a slow test and by the program that prints reports/placement.
+// Shared by a slow test and by the program that prints reports/fits.
 #include <algorithm>
 #include <string>
 #include <utility>

@@ -1,5 +1,5 @@
 #pragma once
-// The four-sphere star of docs/notation.md as a network.
+// The four-sphere star of docs/theory.md as a network.
 #include "tpm/organ/balance/quasistatic.hpp"
 #include "tpm/organ/bonds/network.hpp"
 #include "tpmkit/tpm_element.hpp"

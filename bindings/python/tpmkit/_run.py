@@ -166,7 +166,7 @@ class Plan:
         return pd.DataFrame(self._dict["frontier"]).set_index("name")
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as `tpm plan --format json` writes it (keys in docs/plan_results.md)."""
+        """Everything, as `tpm plan --format json` writes it (keys in docs/json.md)."""
         return self._dict
 
     def __str__(self) -> str:

@@ -25,14 +25,14 @@ struct ZoneNetworkOptions {
 };
 
 /// The network near a contact, and what surrounds it as a linear tissue
-/// (docs/notation.md). Bonds of which every movable end lies within some rings of the contact are
+/// (docs/theory.md). Bonds of which every movable end lies within some rings of the contact are
 /// kept as they are; all others have the stiffness that they have at a depth, and no force at rest.
 ///
 /// The spheres outside follow those at the edge of the zone as they do in a step of the linear
 /// tissue, and have a few displacements of their own beside that: those by which the fields of the
 /// contact, instantaneous and relaxed, differ from it. On these the linear tissue is projected
 /// symmetrically, its viscous part with the same viscous state as every bond has, so that it stores
-/// and dissipates as a tissue does (docs/reduction_servo.md).
+/// and dissipates as a tissue does (docs/theory.md).
 ///
 /// `error_N` is the sum of what the linear surroundings cost, measured when the model is built: the
 /// zone is compared with the quasi-static network along motions on the normal and at equilibria

@@ -127,7 +127,7 @@ struct OrganStudy {
 [[nodiscard]] StudyCurve study_curve(const OrganStudyConfig& config, std::size_t condition,
                                      std::size_t tissue, const TpmVector& parameters);
 
-/// Machine-readable, keys in docs/organ_experiments.md; 5 significant digits, which is what the
+/// Machine-readable, keys in docs/json.md; 5 significant digits, which is what the
 /// organ's runs and searches are good for.
 [[nodiscard]] Json to_json(const OrganStudy& study);
 

@@ -102,7 +102,7 @@ struct TablesResult {
 [[nodiscard]] TablesResult make_tables(const TableRequest& request,
                                        const std::vector<PrintedTable>& printed);
 
-/// docs/json_tables_audit.md lists the keys.
+/// docs/json.md lists the keys.
 [[nodiscard]] Json to_json(const TablesResult& result);
 
 }  // namespace tpm::paper

@@ -201,7 +201,7 @@ class ContactCandidate : public PlanModel {
   }
 };
 
-/// The network on its slow manifold (docs/reduction.md).
+/// The network on its slow manifold (docs/theory.md).
 class CondensedCandidate final : public ContactCandidate {
  public:
   [[nodiscard]] std::string name() const override { return "condensed"; }
@@ -246,7 +246,7 @@ class CondensedCandidate final : public ContactCandidate {
 };
 
 /// The network near the contact, and what surrounds it as a linear tissue
-/// (docs/reduction_servo.md).
+/// (docs/theory.md).
 class ZoneCandidate final : public ContactCandidate {
  public:
   explicit ZoneCandidate(int rings) : rings_(rings) {}

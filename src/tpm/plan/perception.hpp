@@ -4,7 +4,7 @@
 namespace tpm::plan {
 
 /// Just noticeable difference of force, a share of it: between thumb and finger (Pang, Tan and
-/// Durlach 1991: about 7 %). docs/plan_method.md lists the sources.
+/// Durlach 1991: about 7 %). docs/theory.md lists the sources.
 inline constexpr double kForceJnd = 0.07;
 
 /// Just noticeable difference of stiffness, a share of it: 8 to 23 %, depending on whether work and

@@ -29,7 +29,7 @@ struct ScalarBranch {
 ///
 /// where R is the relaxed force and B the relaxing part of the instantaneous force. Over a step
 /// B(u) is taken as linear in time, under which the w_i are advanced exactly. With B rising and the
-/// shares not negative it is passive (docs/notation.md, passivity, with W = B).
+/// shares not negative it is passive (docs/theory.md, passivity, with V = B).
 class ScalarModel {
  public:
   /// @param period_s of a step, > 0

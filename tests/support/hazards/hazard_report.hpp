@@ -6,7 +6,7 @@
 
 namespace tpm::haptics {
 
-/// Tables in Markdown: reports/safety/hazards.md and clock.md, described in docs/safety.md.
+/// Tables in Markdown, of reports/haptics/report.md, described in docs/safety.md.
 [[nodiscard]] std::string hazard_text(const HazardStudy& study);
 [[nodiscard]] std::string clock_hazard_text(const ClockHazardStudy& study);
 

@@ -22,7 +22,7 @@ struct BenchmarkRecord {
 /// of wall time are left out, and two runs give the same bytes.
 [[nodiscard]] std::string benchmark_csv(const BenchmarkResult& result, bool timing);
 
-/// The same for a program (docs/benchmark_files.md lists the keys).
+/// The same for a program (docs/accuracy.md lists the keys).
 [[nodiscard]] Json to_json(const BenchmarkRecord& record);
 
 /// What such a record may hold.

@@ -18,7 +18,7 @@ struct VerificationLine {
 /// A table for a terminal, then verification_words().
 [[nodiscard]] std::vector<VerificationLine> verification_lines(const VerificationRun& verification);
 
-/// Keys: docs/verify.md.
+/// Keys: docs/accuracy.md.
 [[nodiscard]] Json to_json(const VerificationRun& verification);
 
 /// One line a check.

@@ -1,5 +1,5 @@
 #pragma once
-// Where each step rule fails: maps, limits, degenerate corners, servo rates. See docs/stability.md.
+// Where each step rule fails: maps, limits, degenerate corners, servo rates. See docs/accuracy.md.
 #include <optional>
 #include <string>
 #include <vector>

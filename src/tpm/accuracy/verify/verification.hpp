@@ -1,6 +1,6 @@
 #pragma once
 // Verification that a user can run: what the program computes beside what is known otherwise.
-// See docs/verify.md.
+// See docs/accuracy.md.
 #include <Eigen/Core>
 #include <cmath>
 #include <functional>

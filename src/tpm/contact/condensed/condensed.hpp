@@ -26,7 +26,7 @@ struct CondensedViscousState {
   double spread_J = 0.0;  ///< energy stored in the differences of the branches from their mean
 };
 
-/// A network whose bonds relax alike seen from one contact sphere (docs/reduction_method.md): the
+/// A network whose bonds relax alike seen from one contact sphere (docs/theory.md): the
 /// viscous state of all bonds is held on that of the equilibrium under a fictitious displacement w
 /// of the contact, and one linear mode q more for each direction. Each branch has a w and a q of
 /// its own (CondensedBranches).
@@ -61,7 +61,7 @@ class CondensedContact final : public ContactModel {
   [[nodiscard]] Eigen::Vector3d force_N(const Eigen::Vector3d& displacement_m,
                                         const CondensedViscousState& viscous) const noexcept;
   /// Within a step the contact moves straight, and the viscous state relaxes while it is at this
-  /// share of the way (docs/reduction_method.md), 0.5 to 1.
+  /// share of the way (docs/theory.md), 0.5 to 1.
   [[nodiscard]] double relaxation_point() const noexcept {
     return several() ? of_branches_->relaxation_point() : rates_.relaxation_point;
   }

@@ -39,7 +39,7 @@ struct CondensedModes {
 ///     S = Psi(u, w) - z' N q + q' G q/2 + sum gamma_j (|a_j|^2 + p_j' N p_j)/2
 ///
 /// a_j keeps its value while w, and with it C, moves: so dS/dt = work - sum gamma_j |C^-1 (v_w -
-/// C a_j)|^2/tau_j - (terms of q), without derivatives of M (docs/reduction_method.md).
+/// C a_j)|^2/tau_j - (terms of q), without derivatives of M (docs/theory.md).
 ///
 /// A step is linear in the difference from the motion's linear part, which is solved exactly for
 /// all branches together. No call allocates but the constructor.

@@ -76,7 +76,7 @@ struct CondensedRates {
   double relaxation_point = 1.0;
 };
 
-/// One step to state.u -> to (m, in the axes of the contact), docs/reduction_method.md.
+/// One step to state.u -> to (m, in the axes of the contact), docs/theory.md.
 void step_condensed(const CondensedTables& tables, const CondensedRates& rates,
                     CondensedState& state, const Eigen::Vector3d& to) noexcept;
 

@@ -11,7 +11,7 @@
 
 namespace tpm::files {
 
-/// The programs that a relaxation can be written for; docs/law_files.md has their conventions.
+/// The programs that a relaxation can be written for; docs/laws.md has their conventions.
 enum class ExportTarget { abaqus, ansys, febio, json };
 
 /// Throws Error(bad_input) naming the known words.

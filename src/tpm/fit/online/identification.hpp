@@ -55,7 +55,7 @@ struct Identification {
 /// told from a relaxing one by nothing. It looks at widths, never at estimates or at how well they
 /// fit. A fixed-sample interval at the first time its own estimated width is small enough would
 /// contain the true value too rarely (Chow & Robbins, Ann. Math. Stat. 36 (1965) 457: only in the
-/// limit of narrow widths); `patience` takes most of that away (reports/chain/coverage.md counts
+/// limit of narrow widths); `patience` takes most of that away (reports/chain/report.md counts
 /// the rest). While contact or offset stands on a bound the intervals hold only there, and it
 /// waits. Throws Error(bad_input) for options out of range or a recording without a ramp.
 [[nodiscard]] Identification identify(const PreparedRecording& recording,

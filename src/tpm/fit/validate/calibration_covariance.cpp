@@ -119,7 +119,7 @@ std::optional<LawFile> with_calibration_covariance(const LawFile& law,
   const Eigen::Index p = all.front().by_law.cols();
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(p + own, p + own), b = a;
   // Where the size of the noise is estimated, a prior weighs against the variance of an independent
-  // reading (docs/fit_intervals.md).
+  // reading (docs/theory.md).
   const double of_independent = u.noise.absolute * u.noise.absolute * u.readings_per_independent;
   Eigen::Index place = p;
   for (std::size_t i = 0; i < all.size(); ++i) {

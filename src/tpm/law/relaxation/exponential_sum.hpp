@@ -52,7 +52,7 @@ struct FractionalWeights {
 /// grid by cardinal functions sin/sinh, which turns it into a change of the weights. Nothing
 /// switches at any alpha, and alpha = 1 is exp(-t/tau) like the rest. Rates below the grid go into
 /// `constant` and the first weight with total and mean rate kept, rates above it into `dashpot_s`.
-/// docs/fractional.md has the derivation and measured errors.
+/// docs/theory.md has the derivation and measured errors.
 class ExponentialSum {
  public:
   /// @param t_min_s smallest time between knots, > 0

@@ -98,7 +98,7 @@ struct InertialRun {
   InertialState end;
 };
 
-/// The inertial network (docs/inertial.md): spheres with mass, joined by bonds
+/// The inertial network (docs/network.md): spheres with mass, joined by bonds
 /// with viscous elongations m_j (BondSystem), damped:
 ///
 ///     dx/dt = v,   m dv/dt = f(x, y) - alpha m v - beta sum of k_w (dl/dt) along the bond,
@@ -111,7 +111,7 @@ struct InertialRun {
 /// As k rises, forces tend to those of rigid tools: the error falls with 1/k.
 ///
 /// Integrated by CVODES (BDF, Newton), restarted at every kink of the protocol and every impact.
-/// See docs/inertial.md.
+/// See docs/network.md.
 class Inertial {
  public:
   /// @param constraints of the network without the probe: fixed and guided spheres

@@ -95,7 +95,7 @@ struct QuasiStaticRun {
 };
 
 /// The quasi-static network: force balance on every free sphere at each instant
-/// (docs/notation.md). What the bonds follow within a step, V(l), is a polynomial through its Radau
+/// (docs/theory.md). What the bonds follow within a step, V(l), is a polynomial through its Radau
 /// nodes, under which every viscous elongation is advanced exactly; the stages are balanced
 /// together with one factorisation, that many steps share. Steps follow an estimate of the error of
 /// the response, found with the displacement field of the probe as its own adjoint.

@@ -18,7 +18,7 @@ struct LandingSite {
 /// Moves a sphere of the outer layer and its neighbours, along the normal of the surface at the
 /// sphere, into the one plane square to that normal that moves them least (their mean height). Then
 /// the lateral bonds of the sphere are square to its normal and do not resist a small indentation,
-/// as in the star (docs/notation.md). Neighbours are those within kLandingReach spacings of it
+/// as in the star (docs/theory.md). Neighbours are those within kLandingReach spacings of it
 /// in the plane whose normal is less than 90 degrees off its own: the other face of a thin body
 /// stays where it is. Nothing moves if one of them would have to by more than a quarter of a
 /// spacing: the organ is too small for its spheres to have a flat site.

@@ -50,7 +50,7 @@ struct ViscousState {
 /// The law of a bond (viscous_law.hpp) says u, V and gamma_j, tau_j, with u(l) = V(l) = l where
 /// nothing stiffens; laws are shared by bonds whose k and g differ. For the paper's element N = k l
 /// - g y with k = w E2 A0/l0, g = w E2^2/(E1 + E2) A0/l0 and y = e1 (E1 + E2)/E2
-/// (docs/notation.md), for its lateral bonds k = w E' A0/l0 and g = 0; w is the bond's factor. The
+/// (docs/theory.md), for its lateral bonds k = w E' A0/l0 and g = 0; w is the bond's factor. The
 /// force acts along the bond as it lies now.
 ///
 /// Force and tangent stiffness depend on the m_j of a bond through the mean y alone (ViscousState).

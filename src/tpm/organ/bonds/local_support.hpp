@@ -15,7 +15,7 @@ inline constexpr double kLooseSupport = 0.05;
 /// its bonded neighbours fixed, over that with the neighbours fixed too. 1 for a sphere that cannot
 /// move along its normal; 0 where nothing resists. Unlike the lowest eigenvalue of the network it
 /// does not fall with the number of spheres, and so tells a near mechanism (a shell whose curvature
-/// alone resists, docs/notation.md) from a large organ that bends.
+/// alone resists, docs/theory.md) from a large organ that bends.
 [[nodiscard]] std::vector<double> local_support(const BondSystem& bonds, const Organ& organ,
                                                 const Constraints& constraints);
 

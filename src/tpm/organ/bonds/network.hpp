@@ -14,7 +14,7 @@ enum class BondKind {
   lateral,  ///< within a layer: elastic, modulus E'
 };
 
-/// How stiff a bond is against the paper's E A0/l0 (docs/notation.md).
+/// How stiff a bond is against the paper's E A0/l0 (docs/theory.md).
 enum class StiffnessRule {
   /// A radial bond carries the mean over its ends of 1/S, S the sum of cos^2 (angle to the local
   /// normal) over the sphere's radial bonds; a lateral bond the mean over its ends of 2/n, n the
@@ -33,7 +33,7 @@ enum class SpacingLaw {
 struct NetworkOptions {
   double support = 1.5;  ///< neighbours are within this many spacings, > 1
   /// Without: of the bonds of a sphere with the next deeper layer only the one nearest to its
-  /// normal (one radial bond per sphere; usually a mechanism, docs/notation.md).
+  /// normal (one radial bond per sphere; usually a mechanism, docs/theory.md).
   bool diagonals = true;
   StiffnessRule rule = StiffnessRule::normalised;
   SpacingLaw spacing_law = SpacingLaw::paper;

@@ -93,7 +93,7 @@ struct ExperimentScene {
 /// pulls away from the outermost sphere.
 [[nodiscard]] double tissue_behind_m(const Organ& organ, const Probe& probe);
 
-/// Reads all blocks of a scene (docs/simulation_files.md). Without a block `protocol` there is
+/// Reads all blocks of a scene (docs/data_formats.md). Without a block `protocol` there is
 /// nothing to do, which is an error.
 /// @param where for messages, usually the file
 /// @param folder that a mesh path is relative to

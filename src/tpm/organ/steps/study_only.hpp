@@ -7,7 +7,7 @@ namespace tpm::organ {
 
 /// Whether a formulation is there for studies of step rules alone, and no scene should choose it:
 /// explicit rules, whose stability limits the step on stiff tissue whatever accuracy is asked for
-/// (docs/stability.md).
+/// (docs/accuracy.md).
 [[nodiscard]] inline bool is_study_only(std::string_view formulation) {
   constexpr std::array<std::string_view, 4> kExplicit{"forward_euler", "semi_implicit_euler", "rk4",
                                                       "cvode_adams"};

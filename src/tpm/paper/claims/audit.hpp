@@ -112,14 +112,14 @@ struct AuditReport {
   [[nodiscard]] int count(AuditVerdict verdict) const noexcept;
 };
 
-/// Recomputes every claim of a claims file (docs/json_tables_audit.md describes the kinds). Every
+/// Recomputes every claim of a claims file (docs/json.md describes the kinds). Every
 /// verdict follows from a printed string and a recomputed number.
 /// @param claims the document; checked against schemas/claims.schema.json
 /// @param file its name, for messages
 /// Throws Error(bad_input) naming file and claim, Error(numerical) if a formula gives no number.
 [[nodiscard]] AuditReport run_audit(const Json& claims, std::string_view file);
 
-/// docs/json_tables_audit.md lists the keys.
+/// docs/json.md lists the keys.
 [[nodiscard]] Json to_json(const AuditReport& report);
 
 }  // namespace tpm::paper

@@ -12,7 +12,7 @@ namespace tpm::plan {
 /// What planning will take (`tpm plan --estimate`).
 [[nodiscard]] Json expected_plan_json(const ExpectedPlanWork& work);
 [[nodiscard]] std::string expected_plan_text(const ExpectedPlanWork& work);
-/// A plan, as docs/plan_results.md describes the keys.
+/// A plan, as docs/json.md describes the keys.
 [[nodiscard]] Json plan_json(const Plan& plan);
 [[nodiscard]] std::string plan_text(const Plan& plan);
 

@@ -7,7 +7,7 @@
 
 namespace tpm::plan {
 
-/// What a run has shown, as docs/simulation_files.md describes the keys. Spheres are numbered
+/// What a run has shown, as docs/data_formats.md describes the keys. Spheres are numbered
 /// from 1.
 [[nodiscard]] Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
                                    const SimulationRun& run);
