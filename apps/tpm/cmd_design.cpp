@@ -83,8 +83,8 @@ int design(const DesignOptions& options, const Session& session) {
 void add_design_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand(
       "design",
-      "Which experiment would identify the parameters? And by simulation: do the intervals of a "
-      "fit contain the true values, does the selection return the law behind the data?");
+      "Find the experiment that would identify the parameters; test the intervals of a fit, or the "
+      "choice of a law, on simulated data");
   auto options = std::make_shared<DesignOptions>();
   command->add_option("FILE", options->design,
                       "A design (schemas/design.schema.json), whose best experiment is simulated; "

@@ -423,7 +423,7 @@ void add_hil_command(CLI::App& app, Session& session) {
                   "default: real with a real device or a page, else virtual")
       ->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("-o,--output", choice->output, "Recording")->capture_default_str();
-  run->add_option("--laws", choice->changes.law,
+  run->add_option("--law", choice->changes.law,
                   "Feel this law instead of the session's tissue (tpm fit writes law.json)");
   run->add_option("--replay-motion", choice->changes.motion,
                   "Go through the motion of this recording of a depth instead of the session's "

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 namespace {
 
 /// Options, besides arguments without a name, whose value is a file that the command reads.
-constexpr std::array<std::string_view, 8> kReading{"--scene",       "--session",   "--laws",
+constexpr std::array<std::string_view, 8> kReading{"--scene",       "--session",   "--law",
                                                    "--budget",      "--costs",     "--fit",
                                                    "--device-file", "--instrument"};
 

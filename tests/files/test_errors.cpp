@@ -485,6 +485,10 @@ std::vector<ErrorCase> design_cases() {
       {type, "unknown nuisance", run_design,
        with("\"title\"", "\"nuisance\": [\"offset\"], \"title\"")},
       {type, "too few simulations", "design {}/d.json --repetitions 3 -o {}/out", design(kDesign)},
+      {type, "no file and no laws", "design -o {}/out", with_files({})},
+      {type, "noise of laws beside a design", "design {}/d.json --noise 0.1 -o {}/out",
+       design(kDesign)},
+      {type, "candidates of laws", "design --laws linear-1 --top 3 -o {}/out", with_files({})},
   };
 }
 
@@ -512,6 +516,8 @@ std::vector<ErrorCase> recording_folder_cases() {
       {type, "the same file twice", fit(""), with_files({{"a1.csv", csv}, {"a2.csv", csv}})},
       {type, "times that do not rise", fit("--times '1 s, 1 s'"), folder},
       {type, "times of another law", fit("--times '1 s, 2 s'"), folder},
+      {type, "times of two laws",
+       "fit {} --no-draw --laws linear-1,linear-2 --times '1 s' -o {}/out", folder},
       {type, "group of one recording", "fit {}/a1.csv --no-draw --group-by animal -o {}/out",
        folder},
   };

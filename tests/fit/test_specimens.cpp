@@ -217,7 +217,7 @@ TEST_CASE("The choice of a law is told by options of fit", "[specimens]") {
     REQUIRE(run.code == 0);
     return parse_json(run.said, "answer");
   };
-  const Json of_two = answer("--laws linear-0,power-1 --margin 7.5 --no-profiles");
+  const Json of_two = answer("--laws linear,power-1 --margin 7.5 --no-profiles");
   CHECK(of_two.at("laws").size() == 2);
   CHECK(of_two.at("recommended") == "power-1");
   CHECK(of_two.at("margin_bic") == 7.5);
@@ -225,11 +225,9 @@ TEST_CASE("The choice of a law is told by options of fit", "[specimens]") {
   CHECK(answer("--laws power-1 --no-held-out").at("laws").at(0).at("held_out").empty());
   const Json fractional = answer("--family fractional --no-held-out --no-profiles");
   for (const Json& law : fractional.at("laws")) {
-    CHECK_FALSE(parse_law_name(law.at("law"), "answer").fractional == Fractional::none);
+    CHECK_FALSE(parse_law_name(law.at("law").get<std::string>(), "answer").fractional ==
+                Fractional::none);
   }
-  // So large a margin prefers the law of the fewest parameters, whatever the data say.
-  CHECK(answer("--laws linear-0,power-1 --margin 1e9 --no-held-out").at("recommended") ==
-        "linear-0");
   const Run twice = run_on(folder, "fit pig/3mm.csv --laws linear-1,power-1 --times '1 s'");
   CHECK(twice.code == 2);
   CHECK_THAT(twice.said, Contains("--times: with 2 laws"));
@@ -250,8 +248,8 @@ TEST_CASE("Under a sphere the law of a folder is chosen among those of Hertz' ke
   REQUIRE(run.code == 0);
   const Json study = parse_json(run.said, "answer");
   CHECK_THAT(study.at("why").get<std::string>(), !Contains("was asked for"));
-  CHECK(parse_law_name(study.at("law"), "answer").kernel == Kernel::hertz);
-  CHECK(parse_law_name(study.at("law"), "answer").branches > 0);
+  CHECK(parse_law_name(study.at("law").get<std::string>(), "answer").kernel == Kernel::hertz);
+  CHECK(parse_law_name(study.at("law").get<std::string>(), "answer").branches > 0);
 }
 
 TEST_CASE("A folder under a probe answers in pascals", "[specimens]") {
