@@ -13,7 +13,11 @@ myst_enable_extensions = ["deflist", "dollarmath"]
 # Formulas are set by the MathJax 2 that scripts/docs.sh puts beside the pages: no network is needed to read them.
 myst_update_mathjax = False
 mathjax_path = "mathjax/MathJax.js?config=TeX-AMS_SVG-full"
-mathjax2_config = {"messageStyle": "none", "tex2jax": {"inlineMath": [["\\(", "\\)"]], "displayMath": [["\\[", "\\]"]]}}
+mathjax2_config = {
+    "messageStyle": "none",
+    "TeX": {"noUndefined": {"disabled": True}},  # a misspelt command is an error, which site_pages.py counts
+    "tex2jax": {"inlineMath": [["\\(", "\\)"]], "displayMath": [["\\[", "\\]"]]},
+}
 # Pages are read on GitHub as well: their first heading may follow a note, and levels may be left out.
 suppress_warnings = ["myst.header", "misc.highlighting_failure"]
 highlight_language = "none"

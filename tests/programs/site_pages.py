@@ -3,7 +3,7 @@
 
     site_pages.py links HTML_FOLDER             every link and picture leads to a file, every anchor to an element
     site_pages.py TPM                           builds the site, then checks links, and in Chromium that no page is
-                                                wider than a window of 400 or 1400 pixels
+                                                wider than a window of 400 or 1400 pixels and every formula is set
     site_pages.py sheet HTML_FOLDER SHEET.png   all pages, small, on one picture
 """
 
@@ -90,16 +90,32 @@ def loaded(chromium, page):
         time.sleep(0.01)
 
 
+def unset_formulas(chromium, page):
+    """What MathJax could not set, or did not within a minute; formulas are set after a page has loaded."""
+    start = time.monotonic()
+    count = """[document.querySelectorAll('.math').length, document.querySelectorAll('script[type^="math/tex"]').length,
+                document.querySelectorAll('.MathJax_SVG').length, window.MathJax && MathJax.Hub ? MathJax.Hub.getAllJax().filter(f => f.texError).length : 0]"""
+    while True:
+        marked, read, drawn, wrong = chromium.call("Runtime.evaluate", returnByValue=True, expression=count)["result"]["value"]
+        if marked <= read == drawn:
+            return f"{wrong} of {read} formulas are wrong" if wrong else ""
+        if time.monotonic() - start > 60:
+            return f"{drawn} of {marked} formulas are set"
+        time.sleep(0.05)
+
+
 def check_widths(folder, chromium):
     chromium.open("about:blank")
     pages = pages_of(folder)
-    wide = []
+    wide = []  # and what else a page shows wrong
     for width in (400, 1400):
         chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
         for page in pages:
             if page == folder / "index.html":  # leads on to the first page
                 continue
             loaded(chromium, page)
+            if 'class="math' in page.read_text(encoding="utf-8") and (fault := unset_formulas(chromium, page)):
+                wide.append(f"{page.relative_to(folder)}: {fault}")
             found = chromium.call("Runtime.evaluate", returnByValue=True,
                                   expression="document.documentElement.scrollWidth")["result"]["value"]
             if found > width:
