@@ -11,12 +11,13 @@ set(TPM_HELP ${PROJECT_BINARY_DIR}/command_help)
 add_custom_command(OUTPUT ${TPM_HELP}/tpm
   COMMAND ${CMAKE_COMMAND} -E rm -rf ${TPM_HELP}/man
   COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/scripts/command_help.py $<TARGET_FILE:tpm> man ${TPM_HELP}/man
-  COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/scripts/command_help.py $<TARGET_FILE:tpm> completion
-          ${TPM_HELP}/tpm
+  COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/scripts/command_help.py $<TARGET_FILE:tpm> completion ${TPM_HELP}
   DEPENDS tpm ${PROJECT_SOURCE_DIR}/scripts/command_help.py VERBATIM)
 add_custom_target(command_help ALL DEPENDS ${TPM_HELP}/tpm)
 install(DIRECTORY ${TPM_HELP}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program)
 install(FILES ${TPM_HELP}/tpm DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT program)
+install(FILES ${TPM_HELP}/_tpm DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT program)
+install(FILES ${TPM_HELP}/tpm.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT program)
 
 # What Debian wants beside every package: copyright and changelog.
 find_program(TPM_GZIP gzip REQUIRED)

@@ -2,12 +2,13 @@
 """Manual pages and shell completion of tpm, from what its commands say of themselves.
 
     command_help.py TPM man FOLDER          tpm.1.gz, tpm-fit.1.gz, tpm-hil-run.1.gz, ...
-    command_help.py TPM completion FILE     for bash
+    command_help.py TPM completion FOLDER   tpm for bash, _tpm for zsh, tpm.fish
 
 Equal programs give equal bytes.
 """
 
 import gzip
+import json
 import re
 import subprocess
 import sys
@@ -83,6 +84,18 @@ def troff(text):
     return "\\&" + text if text.startswith((".", "'")) else text
 
 
+ENVIRONMENT = (
+    ("TPMKIT_SHARE", "Folder of the shipped curves, configurations and schemas, in place of the installed one."),
+    ("TPMKIT_PYTHON", "Python with matplotlib, for figures; without it figures are left out."),
+    ("NO_COLOR", "Not empty: no colour on a terminal."),
+    ("FDSDK", "Folder of the SDK of Force Dimension, where its library is looked for."),
+)
+FILES = (
+    ("PREFIX/share/tpmkit", "Curves, configurations and schemas that come with tpm (tpm example lists them)."),
+    ("NAME_fit/, simulation.h5, session.tpmrec, ...", "Results under names that were not given; --force replaces changed ones."),
+)
+
+
 def man_page(command, version, others):
     name = "-".join(["tpm", *command.words])
     lines = [
@@ -108,6 +121,10 @@ def man_page(command, version, others):
         ("5", "Something outside: cannot write, no Python with matplotlib."),
     ):
         lines += [".TP", f".B {code}", meaning]
+    for title, rows in (("ENVIRONMENT", ENVIRONMENT), ("FILES", FILES)):
+        lines += [f".SH {title}"]
+        for name_of_row, meaning in rows:
+            lines += [".TP", f".B {troff(name_of_row)}", troff(meaning)]
     if others:
         lines += [".SH SEE ALSO", ", ".join(f"{troff(o)}(1)" for o in others)]
     return "\n".join(lines) + "\n"
@@ -127,11 +144,12 @@ def write_man(program, folder):
     print(f"{len(found)} pages in {folder}")
 
 
-COMPLETION = """# bash completion of tpm {version}; made by scripts/command_help.py
+BASH = """# bash completion of tpm {version}; made by scripts/command_help.py
 _tpm() {{
-  local word=${{COMP_WORDS[COMP_CWORD]}} path= at=1 next
+  local word=${{COMP_WORDS[COMP_CWORD]}} path= at=1 next before=${{COMP_WORDS[COMP_CWORD-1]}} list
   local -A commands=( {commands} )
   local -A options=( {options} )
+  local -A values=( {values} )
   while (( at < COMP_CWORD )); do
     next="${{path:+$path }}${{COMP_WORDS[at]}}"
     [[ -v options["$next"] ]] || break
@@ -139,10 +157,13 @@ _tpm() {{
     (( ++at ))
   done
   COMPREPLY=()
-  if [[ $word == -* ]]; then
+  list="${{values["${{path:-.}} $before"]}}"
+  if [[ -n $list ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$list" -- "$word")
+  elif [[ $word == -* ]]; then
     mapfile -t COMPREPLY < <(compgen -W "${{options[${{path:-.}}]}}" -- "$word")
-  elif (( at == COMP_CWORD )) && [[ -n ${{commands[${{path:-.}}]}} ]]; then
-    mapfile -t COMPREPLY < <(compgen -W "${{commands[${{path:-.}}]}}" -- "$word")
+  elif (( at == COMP_CWORD )); then
+    mapfile -t COMPREPLY < <(compgen -W "${{commands[${{path:-.}}]}} ${{values["${{path:-.}} ."]}}" -- "$word")
   fi
   if (( ${{#COMPREPLY[@]}} == 0 )); then
     compopt -o filenames 2>/dev/null
@@ -152,20 +173,125 @@ _tpm() {{
 complete -F _tpm tpm
 """
 
+ZSH = """#compdef tpm
+# zsh completion of tpm {version}; made by scripts/command_help.py
+_tpm() {{
+  local where= at=2 next before=$words[CURRENT-1]
+  local -A commands options values
+  commands=( {commands} )
+  options=( {options} )
+  values=( {values} )
+  while (( at < CURRENT )); do
+    next="${{where:+$where }}$words[at]"
+    (( $+options[$next] )) || break
+    where=$next
+    (( ++at ))
+  done
+  local here=${{where:-.}}
+  local of_option="$here $before" of_argument="$here ."
+  if [[ -n $values[$of_option] ]]; then
+    compadd -- ${{=values[$of_option]}}
+  elif [[ $words[CURRENT] == -* ]]; then
+    compadd -- ${{=options[$here]}}
+  elif (( at == CURRENT )) && [[ -n $commands[$here]$values[$of_argument] ]]; then
+    compadd -- ${{=commands[$here]}} ${{=values[$of_argument]}}
+  else
+    _files
+  fi
+}}
+_tpm "$@"
+"""
 
-def write_completion(program, file):
-    version = subprocess.run([program, "version"], capture_output=True, text=True, check=True).stdout.split()[1]
-    found = commands(program)
-    key = lambda c: " ".join(c.words) or "."
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(
-        COMPLETION.format(
-            version=version,
-            commands=" ".join(f'["{key(c)}"]="{" ".join(c.subcommands)}"' for c in found),
-            options=" ".join(f'["{key(c)}"]="{" ".join(c.options)}"' for c in found),
+
+def fish_word(text):
+    return "'" + text.replace("\\", "\\\\").replace("'", "\\'") + "'"
+
+
+def first_sentence(text):
+    """Of a help text, short enough for a list of completions."""
+    text = re.split(r"[;:(]|\. ", text)[0].strip()
+    return text if len(text) <= 70 else text[:67].rsplit(" ", 1)[0] + "..."
+
+
+class Usage:
+    """All commands as `tpm --json-usage` prints them, by their words."""
+
+    def __init__(self, program):
+        ask = lambda *words: subprocess.run([program, *words], capture_output=True, text=True, check=True).stdout
+        self.version = ask("version").split()[1]
+        self.laws = [entry["law"] for entry in json.loads(ask("laws", "--format", "json"))["laws"]]
+        self.kinds = [line.split()[0] for line in ask("schema").splitlines() if re.match(r"[a-z_]+  ", line)]
+        self.examples = [line.split()[0] for line in ask("example").splitlines() if re.match(r"[a-z_-]+  ", line)]
+        self.commands = {}
+        self._read(json.loads(ask("--json-usage")), "")
+
+    def _read(self, command, path):
+        self.commands[path] = command
+        for below in command.get("commands", []):
+            self._read(below, f"{path} {below['name']}".strip())
+
+    def values(self, path, option):
+        """What an option or argument may be, where that is a list."""
+        if "values" in option:
+            return option["values"]
+        name = option["names"][-1]
+        if name in ("--laws", "--law"):
+            return self.laws
+        if name == "--device":
+            return ["virtual", "replay", "plugin", "inverse3", "omega7"]
+        return {("schema", "NAME"): self.kinds, ("example", "NAME"): self.examples, ("laws", "name"): self.laws}.get(
+            (path, name), []
         )
-    )
-    print(f"completion of {len(found)} commands in {file}")
+
+
+def shell_tables(usage):
+    """Of bash and zsh: words by command, and values by command and option."""
+    entry = lambda key, words: f'["{key}"]="{" ".join(words)}"'
+    commands, options, values = [], [], []
+    for path, command in usage.commands.items():
+        key = path or "."
+        commands.append(entry(key, [c["name"] for c in command.get("commands", [])]))
+        options.append(entry(key, sorted(n for o in command["options"] for n in o["names"])))
+        for option in command["options"] + command.get("arguments", []):
+            listed = usage.values(path, option)
+            for name in option["names"] if listed else []:
+                values.append(entry(f"{key} {name if name.startswith('-') else '.'}", listed))
+    return {"commands": " ".join(commands), "options": " ".join(options), "values": " ".join(values)}
+
+
+def fish(usage):
+    lines = [f"# fish completion of tpm {usage.version}; made by scripts/command_help.py"]
+    for path, command in usage.commands.items():
+        words = path.split()
+        here = " and ".join(f"__fish_seen_subcommand_from {word}" for word in words) or "__fish_use_subcommand"
+        below = [c["name"] for c in command.get("commands", [])]
+        if words and below:
+            here_for_commands = f"{here}; and not __fish_seen_subcommand_from {' '.join(below)}"
+        else:
+            here_for_commands = here
+        condition = lambda text: "-n " + fish_word(text.replace(" and ", "; and "))
+        for c in command.get("commands", []):
+            lines.append(f"complete -c tpm -f {condition(here_for_commands)} -a {c['name']} -d {fish_word(first_sentence(c['text']))}")
+        for option in command["options"] + command.get("arguments", []):
+            listed = usage.values(path, option)
+            names = [f"-s {n[1:]}" if len(n) == 2 else f"-l {n[2:]}" for n in option["names"] if n.startswith("-")]
+            if not names and not listed:
+                continue
+            line = f"complete -c tpm {condition(here)} {' '.join(names)}".rstrip()
+            line += "" if option.get("flag") or not names else " -r"
+            line += f" -f -a {fish_word(' '.join(listed))}" if listed else ""
+            lines.append(f"{line} -d {fish_word(first_sentence(option['text']))}")
+    return "\n".join(lines) + "\n"
+
+
+def write_completion(program, folder):
+    usage = Usage(program)
+    folder.mkdir(parents=True, exist_ok=True)
+    tables = shell_tables(usage)
+    (folder / "tpm").write_text(BASH.format(version=usage.version, **tables))
+    (folder / "_tpm").write_text(ZSH.format(version=usage.version, **{k: v.replace('["', '"').replace('"]=', '" ') for k, v in tables.items()}))
+    (folder / "tpm.fish").write_text(fish(usage))
+    print(f"completion of {len(usage.commands)} commands for bash, zsh and fish in {folder}")
 
 
 def main():

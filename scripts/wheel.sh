@@ -25,7 +25,7 @@ mkdir -p "$stage"
 cmake --install build/release --component program --prefix "$PWD/$stage/root" --strip >/dev/null
 mkdir -p "$stage/tpmkit"
 cp -r "$stage/root/bin" "$stage/root/share" "$stage/tpmkit/"
-rm -rf "$stage/tpmkit/share/man" "$stage/tpmkit/share/bash-completion" "$stage/root"  # share/doc has the notices
+rm -rf "$stage/tpmkit/share/man" "$stage/tpmkit/share/bash-completion" "$stage/tpmkit/share/zsh" "$stage/tpmkit/share/fish" "$stage/root"  # share/doc has the notices
 cp build/release/python/tpmkit/*.py build/release/python/tpmkit/*.pyi build/release/python/tpmkit/py.typed \
    build/release/python/tpmkit/_core*.so "$stage/tpmkit/"
 strip --strip-unneeded "$stage"/tpmkit/_core*.so

@@ -21,6 +21,7 @@
 
 #include "command.hpp"
 #include "command_words.hpp"
+#include "json_usage.hpp"
 #include "out_of_memory.hpp"
 #include "shipped_files.hpp"
 #include "tpm/base/quantity_text.hpp"
@@ -235,6 +236,13 @@ int run(int argc, char** argv) {
   FileRoles roles;
   add_commands(app, session);
   add_force_options(app, session);
+  app.add_flag_callback(
+      "--json-usage",
+      [&app] {
+        write_output(to_text(json_usage(app)));
+        throw CLI::Success();
+      },
+      "Print all commands and their options as JSON");
   std::vector<ShippedFile> shipped;
   accept_shipped_files(app, shipped);
 
