@@ -254,16 +254,27 @@ void InverseDevice::prepare(const DevicePreparation& preparation) {
   prepared_ = true;
   preparation_.max_force_N = std::min(preparation.max_force_N, limits_.force_N);
   status_ = {};
-  // A position of now: open() may be long ago.
-  while (service_->receive(0.0)) {
+  if (preparation.real_time) {
+    messages_ = std::thread([this] { exchange_in_turn(); });
+    // Its stack is locked before it begins, which takes longer than a watchdog forgives.
+    constexpr timespec kLook{0, 100'000};
+    while (!begun_ && !over_) (void)::nanosleep(&kLook, nullptr);
+  } else {
+    ask_for_first_state();
   }
-  waiting_ = {};
-  if (!exchange(probe_message(device_.id), kPatience_s) || !answer_.refresh()) {
+  if (!answer_.refresh()) {
     throw service_fault(service_->over().empty() ? "the service sends no state" : service_->over(),
                         "a service that answers each message");
   }
   seen_ = answer_.latest();
-  if (preparation.real_time) messages_ = std::thread([this] { exchange_in_turn(); });
+}
+
+/// A position of now: open() may be long ago.
+void InverseDevice::ask_for_first_state() {
+  while (service_->receive(0.0)) {
+  }
+  waiting_ = {};
+  (void)exchange(probe_message(device_.id), kPatience_s);
 }
 
 void InverseDevice::enable_forces() {
@@ -369,6 +380,8 @@ void InverseDevice::wait_for_order() noexcept {
 void InverseDevice::exchange_in_turn() noexcept {
   try {
     if (!address_.poll) (void)become_real_time(RealTimeWish::ignore);
+    ask_for_first_state();
+    begun_ = true;
     while (!ending_ && service_->over().empty()) {
       const Eigen::Vector3d force_N = force_to_send();
       (void)exchange(force_message(format_, device_.id, force_N), kMostUnanswered_s);

@@ -97,6 +97,7 @@ class InverseDevice final : public HapticDevice {
   [[nodiscard]] InverseInventory read_back();
   [[nodiscard]] std::string take_text(double timeout_s);
   void exchange_in_turn() noexcept;
+  void ask_for_first_state();
   bool exchange(const std::string& message, double timeout_s);
   void take_state(const std::string& text);
   [[nodiscard]] Eigen::Vector3d force_to_send() noexcept;
@@ -125,6 +126,7 @@ class InverseDevice final : public HapticDevice {
   TripleBuffer<Seen> answer_;
   std::atomic<std::uint32_t> orders_{0};
   std::atomic<bool> forces_on_{false}, cut_{false}, zero_sent_{false}, ending_{false}, over_{false};
+  std::atomic<bool> begun_{false};  ///< the thread of the messages has asked once
   std::atomic<bool> failing_{false};
   std::atomic<ForcesOff> fault_{ForcesOff::none};
   std::array<char, sizeof DeviceStatus::error_text> fault_words_{};  ///< before fault_ is set
