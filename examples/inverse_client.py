@@ -9,6 +9,8 @@ import argparse, base64, json, os, socket
 options = argparse.ArgumentParser()
 options.add_argument("--port", type=int, default=10001)
 options.add_argument("--messages", type=int, default=1000)
+options.add_argument("--format", choices=["vector", "values"], default="vector",
+                     help="of a force: vector from version 3.5 of the service on, values before")
 options = options.parse_args()
 
 link = socket.create_connection(("127.0.0.1", options.port), timeout=5)
@@ -37,7 +39,7 @@ def send(message):  # a text of one frame, masked
 device = receive()["inverse3"][0]
 print(device["device_id"], device["config"].get("simulated_device", "hardware"))
 for i in range(options.messages):  # a state comes for each message, none without
-    force = {"vector": {"x": 0.5, "y": 0, "z": 0}}
+    force = {options.format: {"x": 0.5, "y": 0, "z": 0}}
     send({"inverse3": [{"device_id": device["device_id"], "commands": {"set_cursor_force": force}}]})
     state = receive()["inverse3"][0]["state"]
 print("position", state["cursor_position"], "m; force", state["current_cursor_force"], "N")

@@ -365,6 +365,11 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
       ->capture_default_str();
   command.add_option("--inverse-id", options.choice.inverse.device_id,
                      "The same: which device, where there are several");
+  command
+      .add_option("--inverse-gravity", options.choice.inverse.gravity_carried,
+                  "The same: share of the device's weight that the service is to carry")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   command.add_option("--recording", options.replay, "What --device replay plays");
   command.add_flag("--may-move", options.choice.may_move,
                    "The device may move by itself to initialise");

@@ -1,5 +1,6 @@
 // --device inverse3 on a stand-in service: sessions, delays, and each way in which a service fails.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -118,7 +119,18 @@ TEST_CASE("A service that is not what it should be is refused with the reason") 
   CHECK_THAT(refusal(f), Contains("force gate of the service stays at 0.3"));
   f = {};
   f.names_no_filters = true;
-  CHECK_THAT(refusal(f), Contains("does not say what its force gate does"));
+  for (const char* version : {"3.5.0.0", "3.1.0.0"}) {
+    f = {};
+    f.version = version;
+    f.names_no_filters = true;
+    CHECK_THAT(refusal(f), Contains(fmt::format("the service of version {} does not say what its "
+                                                "force gate does to a force; expected a service "
+                                                "that lists both filters: install version 3.5",
+                                                version)));
+    f.names_no_filters = false;
+    f.names_no_damping = true;
+    CHECK_THAT(refusal(f), Contains("does not say what its damping does to a force"));
+  }
   f = {};
   f.damping_stays = 0.5;
   CHECK_THAT(refusal(f), Contains("damping of the service stays at 0.5"));
@@ -159,6 +171,120 @@ TEST_CASE("A service that is not what it should be is refused with the reason") 
   InverseDevice nobody({1, 1, 1, ""}, limits_of("inverse3"), false);
   CHECK_THAT(error_of([&] { (void)nobody.open(); }),
              Contains("port 1 of this machine: nobody answers"));
+}
+
+TEST_CASE("What no message sets is set over HTTP, read back and recorded") {
+  for (const char* version : {"3.5.0.0", "3.1.0.0"}) {
+    CAPTURE(version);
+    StandInFaults f;
+    f.version = version;
+    StandInInverse service(PlantSettings{}, {}, false, f);
+    const InverseAddress address{service.port(), service.events_port(), service.port(), ""};
+    InverseDevice device(address, limits_of("inverse3"), false);
+    const std::vector<std::string> lines = device.open().assumptions;
+    CHECK(service.carried() == 1.0);
+    CHECK_THAT(fmt::format("{}", fmt::join(lines, "\n")),
+               Contains("gravity compensation on, factor 1"));
+    CHECK(service.posts().size() == 1);
+    InverseAddress half = address;
+    half.gravity_carried = 0.5;
+    InverseDevice again(half, limits_of("inverse3"), false);
+    CHECK_THAT(fmt::format("{}", fmt::join(again.open().assumptions, "\n")),
+               Contains("gravity compensation on, factor 0.5"));
+    InverseAddress none = address;
+    none.gravity_carried = 0.0;
+    InverseDevice last(none, limits_of("inverse3"), false);
+    (void)last.open();
+    CHECK(service.carried() == 0.0);
+    f.no_posts = true;
+    CHECK_THAT(refusal(f), Contains("stays at carrying 0 of the device's weight; expected 1, or "
+                                    "--inverse-gravity with what it keeps"));
+  }
+  // Settings of the session, where the message is not heard.
+  StandInFaults f;
+  f.settings_by_http = true;
+  StandInInverse service(PlantSettings{}, {}, false, f);
+  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                       limits_of("inverse3"), false);
+  (void)device.open();
+  CHECK_THAT(service.posts(), Catch::Matchers::UnorderedEquals(std::vector<std::string>{
+                                  "/inverse3/049D/config/gravity_compensation",
+                                  "/inverse3/049D/config/preset?session=%237",
+                                  "/inverse3/049D/config/force_gate?session=%237"}));
+  f.no_posts = true;
+  CHECK_THAT(refusal(f), Contains("preset of the service stays at 'defaults'"));
+}
+
+/// In real time, at 1 kHz.
+DevicePreparation in_real_time(double watchdog_s) {
+  DevicePreparation preparation;
+  preparation.real_time = true;
+  preparation.watchdog_s = watchdog_s;
+  return preparation;
+}
+
+TEST_CASE("The first position is one of now, not one that was waiting") {
+  StandInFaults f;
+  f.unasked_states = 3;
+  StandInInverse service(PlantSettings{}, {}, false, f);
+  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                       limits_of("inverse3"), false);
+  (void)device.open();
+  device.prepare({});
+  device.enable_forces();
+  Eigen::Vector3d at_m;
+  for (int i = 0; i < 5; ++i) {
+    CHECK(device.read(at_m) == DeviceAnswer::ok);
+    CHECK(at_m.norm() < 0.01);  // and not test::stand_in::kElsewhere_m
+    CHECK(device.write(Eigen::Vector3d::Zero()) == DeviceAnswer::ok);
+  }
+  // A service that falls silent after it was opened has no position to begin with.
+  f = {};
+  f.answers = 1;
+  for (const bool real_time : {false, true}) {
+    StandInInverse silent(PlantSettings{}, {}, true, f);
+    InverseDevice opened({silent.port(), silent.events_port(), silent.port(), ""},
+                         limits_of("inverse3"), false);
+    (void)opened.open();
+    std::this_thread::sleep_for(50ms);
+    DevicePreparation preparation = in_real_time(0.016);
+    preparation.real_time = real_time;
+    CHECK_THAT(error_of([&] { opened.prepare(preparation); }), Contains("sends no state"));
+  }
+}
+
+TEST_CASE("A state is as old as the message that it answers") {
+  UnansweredMessages messages;
+  CHECK_FALSE(messages.answered());
+  for (std::int64_t at = 1; at <= 2000; ++at) messages.sent(at);
+  CHECK(messages.answered() == 977);  // of the last 1024
+  messages.forget_before(1999);
+  CHECK(messages.answered() == 1999);
+  CHECK(messages.answered() == 2000);
+  CHECK_FALSE(messages.answered());
+
+  // Answers that take 6 periods are late, each of them, and positions all the same.
+  StandInFaults f;
+  f.late_s = 0.006;
+  StandInInverse service(PlantSettings{}, {}, true, f);
+  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                       limits_of("inverse3"), false);
+  (void)device.open();
+  device.prepare(in_real_time(2.0));
+  device.enable_forces();
+  int fresh = 0;
+  Eigen::Vector3d at_m;
+  for (int i = 0; i < 200; ++i) {
+    const DeviceAnswer answer = device.read(at_m);
+    REQUIRE(answer != DeviceAnswer::failed);
+    fresh += answer == DeviceAnswer::ok;
+    CHECK(device.write({0.0, 0.0, 0.1}) == DeviceAnswer::ok);
+    std::this_thread::sleep_for(1ms);
+  }
+  device.stop();
+  CHECK(fresh == 0);
+  CHECK(device.status().time_guards == 200);
+  CHECK(device.traffic().messages > 20);
 }
 
 TEST_CASE("A device that keeps the clock has no virtual time") {

@@ -2,6 +2,7 @@
 // way.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cstdlib>
@@ -341,7 +342,8 @@ TEST_CASE("A hand that a client moves into the tissue meets its force") {
   CHECK(run.outcome.cause == StopCause::signal);
 }
 
-TEST_CASE("The example client in Python is served, and names a simulated device") {
+TEST_CASE("The example client in Python is served in both formats, and names a simulated device") {
+  const std::string format = GENERATE("vector", "values");
   const test::TempFolder folder;
   const std::string output = folder / "output", listed = folder / "listed";
   Json json = test::short_session();
@@ -359,8 +361,8 @@ TEST_CASE("The example client in Python is served, and names a simulated device"
           fmt::format("'" TPM_TEST_PROGRAM "' hil devices --inverse-port {} >{}", port, listed)
               .c_str());
       status = std::system(fmt::format("python3 {}/examples/inverse_client.py --port {} "
-                                       "--messages 300 >{} 2>&1",
-                                       TPM_TEST_SOURCE_DIR, port, output)
+                                       "--messages 300 --format {} >{} 2>&1",
+                                       TPM_TEST_SOURCE_DIR, port, format, output)
                                .c_str());
       done = true;
     });
@@ -377,9 +379,11 @@ TEST_CASE("The example client in Python is served, and names a simulated device"
                                            Contains("--device inverse3 --inverse-id"));
 }
 
-TEST_CASE("The simulated hand moves as the oscillator that it is") {
+TEST_CASE("The simulated hand moves as the oscillator that it is, as late as the session says") {
+  const int late = GENERATE(0, 5);
   SimulatedHandSettings settings;
   settings.plant.encoder_step_m = 0.0;
+  settings.plant.delay_periods = late;
   SimulatedHand hand(settings);
   (void)hand.open();
   hand.prepare({});
@@ -394,12 +398,26 @@ TEST_CASE("The simulated hand moves as the oscillator that it is") {
     (void)hand.write({force_N, 0.0, 0.0});
     hand.advance(plant.period_s);
     (void)hand.read(at_m);
-    const double t = i * plant.period_s;
+    const double t = std::max(0, i - late) * plant.period_s;
     const double exact =
         force_N / stiffness *
         (1.0 - std::exp(-half_rate * t) * (std::cos(w * t) + half_rate / w * std::sin(w * t)));
     REQUIRE_THAT(at_m.x(), WithinAbs(exact, 1e-12));
   }
+}
+
+TEST_CASE("The simulated hand stays at the set point of its arm, if it has one") {
+  SimulatedHandSettings settings;
+  settings.plant.arm_set_point_m = 0.004;
+  settings.plant.encoder_step_m = 0.0;
+  SimulatedHand hand(settings);
+  (void)hand.open();
+  hand.prepare({});
+  hand.enable_forces();
+  hand.advance(5.0);
+  Eigen::Vector3d at_m;
+  (void)hand.read(at_m);
+  CHECK_THAT(at_m.dot(settings.plant.push), WithinAbs(0.004, 1e-9));
 }
 
 }  // namespace

@@ -5,12 +5,15 @@
 
 #include <atomic>
 #include <cerrno>
+#include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "tpm/files/json.hpp"
 #include "tpm/haptics/device/virtual_plant.hpp"
 #include "tpm/haptics/inverse/loopback.hpp"
 #include "tpm/haptics/inverse/messages.hpp"
@@ -25,13 +28,18 @@ struct StandInFaults {
   bool simulated = true;      ///< it says so
   bool no_inventory = false;  ///< it accepts and is silent
   bool no_events = false;     ///< nobody listens there
-  bool names_no_filters = false;
+  bool names_no_filters = false, names_no_damping = false;
   double gate_stays = 0.0, damping_stays = 0.0;  ///< what cannot be made neutral
   double scale = 1.0;                            ///< of the mount
   std::string preset_stays, basis = "XYZ";
   double mount_turned_rad = 0.0;  ///< about x
   std::vector<std::string> devices = {"049D"};
-  std::string wrong_accept;  ///< in place of Sec-WebSocket-Accept
+  std::string wrong_accept;       ///< in place of Sec-WebSocket-Accept
+  bool settings_by_http = false;  ///< what a message configures is not heard
+  bool no_posts = false;          ///< what HTTP sets stays
+  int unasked_states = 0;         ///< behind the inventory, of a hand at kElsewhere_m
+  int answers = 1'000'000;        ///< after so many it is silent
+  double late_s = 0.0;            ///< from a message to its state
   /// From this message with a force on, what `how` says; 0: never.
   int from = 0;
   enum class How { silence, garbage, other_device, close, drop_every_third } how = How::silence;
@@ -59,18 +67,26 @@ class StandInInverse {
   [[nodiscard]] Eigen::Vector3d last_N();
   [[nodiscard]] std::string last_profile();
   [[nodiscard]] InverseFormat last_format();
+  /// Share of the weight that it carries.
+  [[nodiscard]] double carried();
+  /// Targets of what was posted.
+  [[nodiscard]] std::vector<std::string> posts();
 
  private:
   void accept_all();
   void talk(Socket socket, bool events);
-  [[nodiscard]] std::string http(const HttpHead& head);
-  [[nodiscard]] bool answer(int socket, const std::string& text, bool& centred);
+  [[nodiscard]] std::string http(const HttpHead& head, const std::string& body);
+  void post(const std::string& target, const std::string& body);
+  /// The texts that answer; nothing: this connection is over.
+  [[nodiscard]] std::optional<std::vector<std::string>> answer(const std::string& text,
+                                                               bool& centred);
   [[nodiscard]] InverseInventory inventory(bool centred);
   void live();
 
   StandInFaults faults_;
   bool on_the_clock_;
   PlantSettings settings_;
+  std::atomic<int> answers_left_;
   Socket service_, events_;
   std::mutex mutex_;  ///< of what follows
   VirtualPlant plant_;
@@ -81,6 +97,8 @@ class StandInInverse {
   InverseFormat last_format_ = InverseFormat::vector;
   std::uint32_t buttons_ = 0;
   bool gate_open_ = false, centred_ = false;
+  double carried_ = 0.0;
+  std::vector<std::string> posts_;
   std::vector<int> listeners_;
   std::atomic<int> forces_{0};
   std::atomic<bool> ending_{false};
@@ -90,7 +108,7 @@ class StandInInverse {
 
 namespace stand_in {
 
-inline const Eigen::Vector3d kCentre_m(0.0, -0.12, 0.15);
+inline const Eigen::Vector3d kCentre_m(0.0, -0.12, 0.15), kElsewhere_m(0.05, 0.0, 0.0);
 
 inline void send_bytes(int socket, std::string_view bytes) {
   while (!bytes.empty()) {
@@ -120,6 +138,7 @@ inline StandInInverse::StandInInverse(const PlantSettings& plant, OperatorScript
     : faults_(std::move(faults)),
       on_the_clock_(on_the_clock),
       settings_(plant),
+      answers_left_(faults_.answers),
       service_(listen_on_loopback(0)),
       events_(listen_on_loopback(0)),
       plant_(stand_in::never_cut(plant), std::move(script)),
@@ -169,6 +188,16 @@ inline InverseFormat StandInInverse::last_format() {
   return last_format_;
 }
 
+inline double StandInInverse::carried() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return carried_;
+}
+
+inline std::vector<std::string> StandInInverse::posts() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return posts_;
+}
+
 inline void StandInInverse::accept_all() {
   while (!ending_) {
     pollfd wanted[] = {{service_.handle(), POLLIN, 0}, {events_.handle(), POLLIN, 0}};
@@ -212,6 +241,8 @@ inline InverseInventory StandInInverse::inventory(bool centred) {
     entry.settings.filters_named = true;
     entry.settings.force_gate_gain = gate_open_ ? faults_.gate_stays : 0.3;
     entry.settings.damping = faults_.damping_stays;
+    entry.settings.gravity_compensation = carried_ > 0.0;
+    entry.settings.gravity_scaling = carried_;
     entry.settings.mount_scale *= faults_.scale;
     entry.state.position_m = plant_.measured_m();
     if (!centred) entry.state.position_m += stand_in::kCentre_m;
@@ -220,7 +251,27 @@ inline InverseInventory StandInInverse::inventory(bool centred) {
   return all;
 }
 
-inline std::string StandInInverse::http(const HttpHead& head) {
+inline void StandInInverse::post(const std::string& target, const std::string& body) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  posts_.push_back(target);
+  if (faults_.no_posts) return;
+  const auto sets = [&target](const char* name) { return target.find(name) != target.npos; };
+  const auto set = files::parse_json(body, "body");
+  if (sets("gravity_compensation")) {
+    const bool old = faults_.version < "3.5";
+    carried_ = set.at(old ? "enable" : "enabled").get<bool>()
+                   ? set.at(old ? "gravity_scaling_factor" : "scaling_factor").get<double>()
+                   : 0.0;
+  }
+  if (sets("/config/preset")) centred_ = set.at("preset") == std::string(kCentredPreset);
+  if (sets("/config/force_gate")) gate_open_ = set.at("gain") == 0;
+}
+
+inline std::string StandInInverse::http(const HttpHead& head, const std::string& body) {
+  if (head.start[0] == "POST") {
+    post(head.start[1], body);
+    return http_answer("200 OK", "application/json", R"({"ok":true})");
+  }
   const std::string path = head.start[1].substr(0, head.start[1].find('?'));
   const bool old = faults_.version < "3.5";
   if (path == (old ? "/3.0/version" : "/version")) {
@@ -233,20 +284,24 @@ inline std::string StandInInverse::http(const HttpHead& head) {
       const std::size_t at = text.find("\"filters\"");
       text.replace(at, 9, "\"unnamed\"");
     }
+    if (faults_.names_no_damping) text.replace(text.find("\"damping\""), 9, "\"unnamed\"");
     return http_answer("200 OK", "application/json", text);
   }
   return http_answer("404 Not Found", "text/plain", "no\n");
 }
 
-/// False: this connection is over.
-inline bool StandInInverse::answer(int socket, const std::string& text, bool& centred) {
+inline std::optional<std::vector<std::string>> StandInInverse::answer(const std::string& text,
+                                                                      bool& centred) {
   using How = StandInFaults::How;
+  const std::vector<std::string> none;
   const InverseCommand command = parse_command(text, faults_.devices.at(0));
   InverseState state;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (command.force_gate_gain) gate_open_ = true;
-    if (!command.preset.empty()) centred = centred_ = command.preset == kCentredPreset;
+    if (command.force_gate_gain && !faults_.settings_by_http) gate_open_ = true;
+    if (faults_.settings_by_http) centred = centred_;
+    if (!command.preset.empty() && !faults_.settings_by_http)
+      centred = centred_ = command.preset == kCentredPreset;
     if (!command.profile.empty()) last_profile_ = command.profile;
     live();
     if (command.force_N) {
@@ -268,27 +323,30 @@ inline bool StandInInverse::answer(int socket, const std::string& text, bool& ce
   }
   std::string id = faults_.devices.at(0);
   if (faults_.from > 0 && forces_ >= faults_.from) {
-    if (faults_.how == How::silence) return true;
-    if (faults_.how == How::close) return false;
+    if (faults_.how == How::silence) return none;
+    if (faults_.how == How::close) return std::nullopt;
     if (faults_.how == How::garbage) {
-      stand_in::send_text(socket, R"({"inverse3": [{"device_id": )");
-      return true;
+      return std::vector<std::string>{R"({"inverse3": [{"device_id": )"};
     }
-    if (faults_.how == How::drop_every_third && forces_ % 3 == 0) return true;
+    if (faults_.how == How::drop_every_third && forces_ % 3 == 0) return none;
     if (faults_.how == How::other_device) id = "FFFF";
   }
-  stand_in::send_text(socket, state_message(7, id, state, faults_.simulated));
-  return true;
+  if (--answers_left_ < 0) return none;
+  return std::vector<std::string>{state_message(7, id, state, faults_.simulated)};
 }
 
 inline void StandInInverse::talk(Socket socket, bool events) {
   std::string head;
   WebSocketReader reader(WebSocketSide::server, 65'536);
   bool open = false, centred = false;
+  std::deque<std::pair<std::int64_t, std::string>> late;  // when to send what
   if (events && faults_.no_events) return;
   while (!ending_) {
+    for (; !late.empty() && late.front().first <= now_ns(); late.pop_front()) {
+      stand_in::send_text(socket.handle(), late.front().second);
+    }
     pollfd wanted{socket.handle(), POLLIN, 0};
-    if (::poll(&wanted, 1, 20) <= 0) continue;
+    if (::poll(&wanted, 1, late.empty() ? 20 : 1) <= 0) continue;
     char block[16'384];
     const ssize_t count = ::recv(socket.handle(), block, sizeof block, 0);
     if (count == 0 || (count < 0 && errno != EAGAIN)) break;
@@ -296,10 +354,15 @@ inline void StandInInverse::talk(Socket socket, bool events) {
     const std::string_view bytes(block, static_cast<std::size_t>(count));
     if (!open) {
       head.append(bytes);
-      const auto request = parse_http_head(head);
+      const std::size_t end = head.find("\r\n\r\n");
+      const auto request =
+          parse_http_head(std::string_view(head).substr(0, end == head.npos ? end : end + 4));
       if (!request) continue;
       if (request->count("upgrade") == 0) {
-        stand_in::send_bytes(socket.handle(), http(*request));
+        const std::string length = request->value("content-length");
+        const std::string body = head.substr(end + 4);
+        if (!length.empty() && body.size() < std::stoul(length)) continue;
+        stand_in::send_bytes(socket.handle(), http(*request, body));
         break;
       }
       std::string upgrade = answer_upgrade(*request, events ? events_port() : port(), {}).bytes;
@@ -314,6 +377,12 @@ inline void StandInInverse::talk(Socket socket, bool events) {
         listeners_.push_back(socket.handle());
       } else if (!faults_.no_inventory) {
         stand_in::send_text(socket.handle(), inventory_message(inventory(false)));
+        InverseState elsewhere;
+        elsewhere.position_m = stand_in::kElsewhere_m;
+        for (int i = 0; i < faults_.unasked_states; ++i) {
+          stand_in::send_text(socket.handle(),
+                              state_message(7, faults_.devices.at(0), elsewhere, true));
+        }
       }
       continue;
     }
@@ -322,7 +391,15 @@ inline void StandInInverse::talk(Socket socket, bool events) {
     while (const auto message = reader.next()) {
       if (message->kind == FrameKind::close) goes_on = false;
       if (message->kind == FrameKind::text && !events) {
-        goes_on = answer(socket.handle(), message->payload, centred);
+        const auto texts = answer(message->payload, centred);
+        goes_on = texts.has_value();
+        for (const std::string& text : texts.value_or(std::vector<std::string>())) {
+          if (faults_.late_s > 0.0) {
+            late.emplace_back(now_ns() + static_cast<std::int64_t>(faults_.late_s * 1e9), text);
+          } else {
+            stand_in::send_text(socket.handle(), text);
+          }
+        }
       }
       if (!goes_on) break;
     }

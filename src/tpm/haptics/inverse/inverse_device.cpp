@@ -57,6 +57,23 @@ InverseInventory inverse_inventory(const InverseAddress& address) {
   return parse_inventory(*text);
 }
 
+void UnansweredMessages::sent(std::int64_t at_ns) noexcept {
+  if (count_ == at_ns_.size()) (void)answered();
+  at_ns_[(first_ + count_++) % at_ns_.size()] = at_ns;
+}
+
+std::optional<std::int64_t> UnansweredMessages::answered() noexcept {
+  if (count_ == 0) return std::nullopt;
+  const std::int64_t at_ns = at_ns_[first_];
+  first_ = (first_ + 1) % at_ns_.size();
+  --count_;
+  return at_ns;
+}
+
+void UnansweredMessages::forget_before(std::int64_t at_ns) noexcept {
+  while (count_ > 0 && at_ns_[first_] < at_ns) (void)answered();
+}
+
 InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits, bool said_by_user)
     : address_(std::move(address)),
       limits_(limits),
@@ -105,14 +122,37 @@ InverseInventory InverseDevice::read_back() {
 }
 
 void InverseDevice::make_neutral() {
+  while (service_->receive(0.0)) {
+    // States that nobody has asked for answer nothing.
+  }
   if (!service_->send(neutral_message(device_.id, kProfile))) (void)take_text(0.0);
   device_.state = parse_state(take_text(kPatience_s), device_.id);
+  learn_settings();
+  const std::vector<InverseRequest> requests =
+      neutral_requests(format_, device_.id, session_, device_.settings, address_.gravity_carried);
+  for (const InverseRequest& request : requests) {
+    try {
+      (void)http_exchange(format_ == InverseFormat::vector ? address_.port : address_.old_http_port,
+                          request.target, request.body, kPatience_s);
+    } catch (const Error&) {
+      // What the service says below counts, not what it answers here.
+    }
+  }
+  if (!requests.empty()) learn_settings();
+  require_neutral();
+}
+
+/// What acts on a force or a coordinate, as the service says now.
+void InverseDevice::learn_settings() {
   const InverseInventory now = read_back();
   const auto found = std::ranges::find(now.devices, device_.id, &InverseDeviceEntry::id);
   if (found == now.devices.end()) {
     throw service_fault("the settings cannot be read back: the device is not listed", "");
   }
   device_.settings = found->settings;
+}
+
+void InverseDevice::require_neutral() const {
   const InverseSettings& s = device_.settings;
   if (!s.preset.empty() && s.preset != kCentredPreset) {
     throw service_fault(
@@ -129,13 +169,21 @@ void InverseDevice::make_neutral() {
     throw service_fault(fmt::format("the service turns coordinates: a mount by {} rad", turned_rad),
                         "a mount that is not turned");
   }
-  if (!s.filters_named && format_ == InverseFormat::values) return;
-  if (!s.filters_named || s.force_gate_gain != 0.0) {
+  if (!s.filters_named || !s.damping_named) {
     throw service_fault(
-        s.filters_named
-            ? fmt::format("the force gate of the service stays at {}", s.force_gate_gain)
-            : "the service does not say what its force gate does",
+        fmt::format("the service of version {} does not say what its {} does to a force", version_,
+                    s.filters_named ? "damping" : "force gate"),
+        "a service that lists both filters: install version 3.5 or later");
+  }
+  if (s.force_gate_gain != 0.0) {
+    throw service_fault(
+        fmt::format("the force gate of the service stays at {}", s.force_gate_gain),
         "a service whose force gate can be set to 0: it changes forces on their way to the hand");
+  }
+  if (s.gravity_named && s.carried() != address_.gravity_carried) {
+    throw service_fault(
+        fmt::format("the service stays at carrying {} of the device's weight", s.carried()),
+        fmt::format("{}, or --inverse-gravity with what it keeps", address_.gravity_carried));
   }
   if (s.damping != 0.0 || !s.directional_damping.isZero()) {
     throw service_fault(fmt::format("the damping of the service stays at {}", s.damping),
@@ -155,11 +203,6 @@ void InverseDevice::identify() {
   identity_.left_handed = device_.settings.handedness == "left";
   identity_.hardware = !device_.simulated;
   identity_.assumptions = device_.settings.lines();
-  if (!device_.settings.filters_named) {
-    identity_.assumptions.push_back(
-        "no filter of the service acts on a force (assumed: it names "
-        "none)");
-  }
   if (events_ == nullptr) {
     identity_.assumptions.push_back("events of the service are not heard: its version has none");
   }
@@ -211,8 +254,27 @@ void InverseDevice::prepare(const DevicePreparation& preparation) {
   prepared_ = true;
   preparation_.max_force_N = std::min(preparation.max_force_N, limits_.force_N);
   status_ = {};
-  seen_ = {device_.state, now_ns()};
-  if (preparation.real_time) messages_ = std::thread([this] { exchange_in_turn(); });
+  if (preparation.real_time) {
+    messages_ = std::thread([this] { exchange_in_turn(); });
+    // Its stack is locked before it begins, which takes longer than a watchdog forgives.
+    constexpr timespec kLook{0, 100'000};
+    while (!begun_ && !over_) (void)::nanosleep(&kLook, nullptr);
+  } else {
+    ask_for_first_state();
+  }
+  if (!answer_.refresh()) {
+    throw service_fault(service_->over().empty() ? "the service sends no state" : service_->over(),
+                        "a service that answers each message");
+  }
+  seen_ = answer_.latest();
+}
+
+/// A position of now: open() may be long ago.
+void InverseDevice::ask_for_first_state() {
+  while (service_->receive(0.0)) {
+  }
+  waiting_ = {};
+  (void)exchange(probe_message(device_.id), kPatience_s);
 }
 
 void InverseDevice::enable_forces() {
@@ -245,9 +307,14 @@ Eigen::Vector3d InverseDevice::force_to_send() noexcept {
 }
 
 /// One message and the states that come; false if none came in time.
-bool InverseDevice::exchange(const Eigen::Vector3d& force_N, double timeout_s) {
+bool InverseDevice::exchange(const std::string& message, double timeout_s) {
   ++sent_;
-  if (!service_->send(force_message(format_, device_.id, force_N))) {
+  const std::int64_t asked_ns = now_ns();
+  if (preparation_.real_time) {
+    waiting_.forget_before(asked_ns - static_cast<std::int64_t>(preparation_.watchdog_s * 1e9));
+  }
+  waiting_.sent(asked_ns);
+  if (!service_->send(message)) {
     fail(ForcesOff::unplugged, service_->over());
     return false;
   }
@@ -257,18 +324,22 @@ bool InverseDevice::exchange(const Eigen::Vector3d& force_N, double timeout_s) {
     if (!service_->over().empty()) fail(ForcesOff::unplugged, service_->over());
     return false;
   }
-  // A state that came late belongs to a message that was given up: the newest counts.
-  while (std::optional<std::string> newer = service_->receive(0.0)) text = std::move(newer);
+  for (; text; text = service_->receive(0.0)) take_state(*text);
+  return true;
+}
+
+void InverseDevice::take_state(const std::string& text) {
+  const std::optional<std::int64_t> asked_ns = waiting_.answered();
   try {
-    answer_.write({parse_state(*text, device_.id), now_ns()});
+    const InverseState state = parse_state(text, device_.id);
     unreadable_in_a_row_ = 0;
+    if (asked_ns) answer_.write({state, *asked_ns});  // else it came after all patience
   } catch (const Error&) {
     ++unreadable_;
     if (++unreadable_in_a_row_ >= kMostUnreadable) {
       fail(ForcesOff::unknown, "the service sends what is no state");
     }
   }
-  return true;
 }
 
 void InverseDevice::look_for_events() {
@@ -309,9 +380,11 @@ void InverseDevice::wait_for_order() noexcept {
 void InverseDevice::exchange_in_turn() noexcept {
   try {
     if (!address_.poll) (void)become_real_time(RealTimeWish::ignore);
+    ask_for_first_state();
+    begun_ = true;
     while (!ending_ && service_->over().empty()) {
       const Eigen::Vector3d force_N = force_to_send();
-      (void)exchange(force_N, kMostUnanswered_s);
+      (void)exchange(force_message(format_, device_.id, force_N), kMostUnanswered_s);
       if (cut_) zero_sent_ = true;
       look_for_events();
       wait_for_order();
@@ -338,14 +411,15 @@ void InverseDevice::say_goodbye() noexcept {
 }
 
 DeviceAnswer InverseDevice::read(Eigen::Vector3d& position_m) noexcept {
-  const bool fresh = answer_.refresh();
-  if (fresh) seen_ = answer_.latest();
-  const double age_s = seconds_between(seen_.at_ns, now_ns());
+  const bool newer = answer_.refresh();
+  if (newer) seen_ = answer_.latest();
+  const double age_s = seconds_between(seen_.asked_ns, now_ns());
   if (preparation_.real_time && age_s > preparation_.watchdog_s) {
     fail(ForcesOff::unplugged, "the service sends no state");
     return DeviceAnswer::failed;
   }
   position_m = seen_.state.position_m;
+  const bool fresh = newer && age_s <= preparation_.period_s;
   if (fresh || !preparation_.real_time) return DeviceAnswer::ok;
   ++status_.time_guards;
   return DeviceAnswer::time_guard;
@@ -361,7 +435,7 @@ DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
     if (!address_.poll) wake();
   } else {
     try {
-      if (!exchange(force_to_send(), kPatience_s)) {
+      if (!exchange(force_message(format_, device_.id, force_to_send()), kPatience_s)) {
         fail(ForcesOff::unplugged, "the service is silent");
         return DeviceAnswer::failed;
       }

@@ -2,6 +2,7 @@
 #include <array>
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -17,10 +18,27 @@ namespace tpm::haptics {
 /// of its devices is meant.
 struct InverseAddress {
   int port = 10001;
-  int events_port = 10020;    ///< of versions from 3.5 on
-  int old_http_port = 10000;  ///< of versions before 3.5
-  std::string device_id;      ///< empty: the only one
-  bool poll = false;          ///< the thread of the messages looks again and again, for latency
+  int events_port = 10020;       ///< of versions from 3.5 on
+  int old_http_port = 10000;     ///< of versions before 3.5
+  std::string device_id;         ///< empty: the only one
+  double gravity_carried = 1.0;  ///< share of the device's weight that the service is to carry
+  bool poll = false;             ///< the thread of the messages looks again and again, for latency
+};
+
+/// When the messages were sent that wait for their state. A service answers each by one state, in
+/// their order: a state belongs to the oldest of them. One that was never answered makes the states
+/// after it look older by a message, never younger, until it is forgotten.
+class UnansweredMessages {
+ public:
+  void sent(std::int64_t at_ns) noexcept;
+  /// When the message was sent that a state answers; empty: nobody has asked for it.
+  [[nodiscard]] std::optional<std::int64_t> answered() noexcept;
+  /// Nobody waits any more for what was sent before.
+  void forget_before(std::int64_t at_ns) noexcept;
+
+ private:
+  std::array<std::int64_t, 1024> at_ns_{};
+  std::size_t first_ = 0, count_ = 0;
 };
 
 /// What the service says of its devices; nothing is commanded. Throws Error(environment) where
@@ -32,12 +50,14 @@ struct InverseAddress {
 ///
 /// In real time a thread of its own exchanges messages, at least four times a period, and always
 /// with the newest force. The loop meets it in two mailboxes and never waits. A force that the loop
-/// has not renewed for the watchdog's time is replaced by zero, for good; a state that is older
-/// than that is a failed read. In virtual time each write is one message and its state, which only
+/// has not renewed for the watchdog's time is replaced by zero, for good. A state is as old as the
+/// message that it answers: older than a period it is no fresh position, older than the watchdog's
+/// time a failed read. In virtual time each write is one message and its state, which only
 /// a simulated device allows.
 ///
-/// open() makes force gate and damping of the service 0 and reads them back; a service in which one
-/// of them stays, or in another scale, is refused.
+/// open() makes force gate and damping of the service 0, lets it carry the device's weight, and
+/// reads all back; a service in which one of them stays or is not told, or in another scale, is
+/// refused.
 class InverseDevice final : public HapticDevice {
  public:
   /// @param limits ceilings of the force, marked as assumed in the identity unless `said_by_user`
@@ -67,15 +87,19 @@ class InverseDevice final : public HapticDevice {
   };
   struct Seen {
     InverseState state;
-    std::int64_t at_ns = 0;
+    std::int64_t asked_ns = 0;  ///< when the message was sent that it answers
   };
   void choose(const InverseInventory& inventory);
   void make_neutral();
+  void require_neutral() const;
+  void learn_settings();
   void identify();
   [[nodiscard]] InverseInventory read_back();
   [[nodiscard]] std::string take_text(double timeout_s);
   void exchange_in_turn() noexcept;
-  bool exchange(const Eigen::Vector3d& force_N, double timeout_s);
+  void ask_for_first_state();
+  bool exchange(const std::string& message, double timeout_s);
+  void take_state(const std::string& text);
   [[nodiscard]] Eigen::Vector3d force_to_send() noexcept;
   void wait_for_order() noexcept;
   void look_for_events();
@@ -102,12 +126,14 @@ class InverseDevice final : public HapticDevice {
   TripleBuffer<Seen> answer_;
   std::atomic<std::uint32_t> orders_{0};
   std::atomic<bool> forces_on_{false}, cut_{false}, zero_sent_{false}, ending_{false}, over_{false};
+  std::atomic<bool> begun_{false};  ///< the thread of the messages has asked once
   std::atomic<bool> failing_{false};
   std::atomic<ForcesOff> fault_{ForcesOff::none};
   std::array<char, sizeof DeviceStatus::error_text> fault_words_{};  ///< before fault_ is set
   Socket wake_;                                                      ///< an eventfd
   // Of the thread of the messages.
   std::thread messages_;
+  UnansweredMessages waiting_;
   std::atomic<std::uint64_t> sent_{0}, unanswered_{0}, unreadable_{0};
   std::uint32_t orders_seen_ = 0;
   std::int64_t next_look_ns_ = 0;

@@ -148,14 +148,16 @@ InverseSettings settings_of(const Part& config) {
   if (config.has(key::filters)) {
     const Part filters = config.at(key::filters);
     if (filters.has(key::gate)) s.force_gate_gain = filters.at(key::gate).at(key::gain).number();
-    if (filters.has(key::damping)) {
+    s.damping_named = filters.has(key::damping);
+    if (s.damping_named) {
       const Part damping = filters.at(key::damping);
       if (damping.has(key::scalar)) s.damping = damping.at(key::scalar).number();
       s.directional_damping = vector_or_zero(damping, key::vector);
     }
     s.filters_named = filters.has(key::gate);
   }
-  if (config.has(key::gravity)) {
+  s.gravity_named = config.has(key::gravity);
+  if (s.gravity_named) {
     const Part gravity = config.at(key::gravity);
     s.gravity_compensation = gravity.at(key::enabled).flag();
     if (gravity.has(key::factor)) s.gravity_scaling = gravity.at(key::factor).number();
@@ -276,18 +278,21 @@ std::vector<std::string> InverseSettings::lines() const {
   const auto triple = [](const Eigen::Vector3d& v) {
     return fmt::format("{} {} {}", v.x(), v.y(), v.z());
   };
-  return {fmt::format("the service says: force gate {}",
-                      filters_named ? fmt::format("{}", force_gate_gain) : "not named"),
-          fmt::format("the service says: damping {}, by direction {}", damping,
-                      triple(directional_damping)),
-          fmt::format("the service says: preset '{}', basis {}", preset, basis),
-          fmt::format("the service says: mount at {} m, turned by {} rad, scale {}",
-                      triple(mount_position_m),
-                      mount_rotation.angularDistance(Eigen::Quaterniond::Identity()),
-                      triple(mount_scale)),
-          fmt::format("the service says: gravity compensation {}, factor {}; torque scaling {}",
-                      gravity_compensation ? "on" : "off", gravity_scaling,
-                      torque_scaling ? "on" : "off")};
+  return {
+      fmt::format("the service says: force gate {}",
+                  filters_named ? fmt::format("{}", force_gate_gain) : "not named"),
+      damping_named ? fmt::format("the service says: damping {}, by direction {}", damping,
+                                  triple(directional_damping))
+                    : "the service says: damping not named",
+      fmt::format("the service says: preset '{}', basis {}", preset, basis),
+      fmt::format(
+          "the service says: mount at {} m, turned by {} rad, scale {}", triple(mount_position_m),
+          mount_rotation.angularDistance(Eigen::Quaterniond::Identity()), triple(mount_scale)),
+      fmt::format("the service says: gravity compensation {}; torque scaling {}",
+                  gravity_named ? fmt::format("{}, factor {}", gravity_compensation ? "on" : "off",
+                                              gravity_scaling)
+                                : "not named",
+                  torque_scaling ? "on" : "off")};
 }
 
 InverseInventory parse_inventory(std::string_view text) {
@@ -390,6 +395,54 @@ std::string neutral_message(std::string_view device_id, std::string_view profile
                      R"("commands":{{"probe_position":{{}}}}}}]}})",
                      session_text(profile), json_text(device_id), kCentredPreset,
                      vector_text(Eigen::Vector3d::Zero()));
+}
+
+std::string probe_message(std::string_view device_id) {
+  return fmt::format(R"({{"inverse3":[{{"device_id":{},"commands":{{"probe_position":{{}}}}}}]}})",
+                     json_text(device_id));
+}
+
+std::vector<InverseRequest> neutral_requests(InverseFormat format, std::string_view device_id,
+                                             std::int64_t session, const InverseSettings& settings,
+                                             double carried) {
+  const InverseSettings& s = settings;
+  std::vector<InverseRequest> all;
+  if (s.gravity_named && s.carried() != carried) {
+    // Before 3.5 under other names, and none of them in the device's path.
+    if (format == InverseFormat::values) {
+      all.push_back({"/gravity_compensation",
+                     fmt::format(R"({{"device_id":{},"enable":{},"gravity_scaling_factor":{}}})",
+                                 json_text(device_id), carried > 0.0, carried)});
+    } else {
+      all.push_back(
+          {fmt::format("/inverse3/{}/config/gravity_compensation", device_id),
+           fmt::format(R"({{"enabled":{},"scaling_factor":{}}})", carried > 0.0, carried)});
+    }
+  }
+  if (format == InverseFormat::values) return all;
+  const auto of_session = [&](const char* name, std::string body) {
+    all.push_back({fmt::format("/inverse3/{}/config/{}?session=%23{}", device_id, name, session),
+                   std::move(body)});
+  };
+  if (!s.preset.empty() && s.preset != kCentredPreset) {
+    of_session(key::preset, fmt::format(R"({{"preset":"{}"}})", kCentredPreset));
+  }
+  if (s.basis != "XYZ") of_session(key::basis, R"({"permutation":"XYZ"})");
+  const bool turned = s.mount_rotation.angularDistance(Eigen::Quaterniond::Identity()) != 0.0;
+  // A mount beside a preset is ambiguous to the service.
+  if (s.preset.empty() && (turned || !s.true_to_scale())) {
+    of_session(key::mount,
+               fmt::format(R"({{"transform":{{"position":{},"rotation":{},"scale":{}}}}})",
+                           vector_text(s.mount_position_m),
+                           quaternion_text(Eigen::Quaterniond::Identity()),
+                           vector_text(Eigen::Vector3d::Ones())));
+  }
+  if (s.force_gate_gain != 0.0) of_session(key::gate, R"({"gain":0})");
+  if (s.damping != 0.0 || !s.directional_damping.isZero()) {
+    of_session(key::damping,
+               fmt::format(R"({{"scalar":0,"vector":{}}})", vector_text(Eigen::Vector3d::Zero())));
+  }
+  return all;
 }
 
 std::string inventory_message(const InverseInventory& inventory) {

@@ -38,14 +38,17 @@ struct InverseSettings {
   Eigen::Quaterniond mount_rotation = Eigen::Quaterniond::Identity();
   bool filters_named = false;    ///< false: the service says nothing of a force gate
   double force_gate_gain = 0.0;  ///< of the oscillation guard; 0: it changes no force
+  bool damping_named = false;
   double damping = 0.0;
   Eigen::Vector3d directional_damping = Eigen::Vector3d::Zero();
-  bool gravity_compensation = false, torque_scaling = false;
+  bool gravity_named = false, gravity_compensation = false, torque_scaling = false;
   double gravity_scaling = 0.0;
 
   /// A metre of the program is one of the device: a mount or workspace in another scale changes
   /// every stiffness.
   [[nodiscard]] bool true_to_scale() const;
+  /// Share of the device's weight that the service carries.
+  [[nodiscard]] double carried() const { return gravity_compensation ? gravity_scaling : 0.0; }
   /// One line for each thing that a recording names.
   [[nodiscard]] std::vector<std::string> lines() const;
 };
@@ -101,6 +104,22 @@ struct InverseEvent {
                                         std::string_view profile = {});
 /// Makes neutral what a session may set: force gate and damping 0, the origin by kCentredPreset.
 [[nodiscard]] std::string neutral_message(std::string_view device_id, std::string_view profile);
+/// Asks for a state and commands nothing.
+[[nodiscard]] std::string probe_message(std::string_view device_id);
+
+/// A POST to the service.
+struct InverseRequest {
+  std::string target, body;
+};
+/// What makes neutral, over HTTP, the settings that are not: those of the session as
+/// neutral_message() does, from 3.5 on; gravity compensation, which is the device's and has no
+/// message, in each version.
+/// @param carried share of the device's weight, 0 to 1
+[[nodiscard]] std::vector<InverseRequest> neutral_requests(InverseFormat format,
+                                                           std::string_view device_id,
+                                                           std::int64_t session,
+                                                           const InverseSettings& settings,
+                                                           double carried);
 /// @param simulated adds SIMULATED DEVICE to the device and its status
 [[nodiscard]] std::string inventory_message(const InverseInventory& inventory);
 [[nodiscard]] std::string state_message(std::int64_t session, std::string_view device_id,

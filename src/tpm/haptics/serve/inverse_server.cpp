@@ -72,6 +72,8 @@ void InverseServer::say(Connection& c, const std::string& line) {
 }
 
 void InverseServer::serve() {
+  // Clients' watchdogs count in milliseconds. One that never sleeps would leave nothing to others.
+  if (!settings_.poll) (void)become_real_time(RealTimeWish::ignore);
   std::vector<pollfd> wanted;
   while (!ending_) {
     wanted = {{listening_.handle(), POLLIN, 0}, {events_.handle(), POLLIN, 0}};

@@ -45,7 +45,10 @@ InverseServerSettings server_settings(const ServeOptions& options) {
   settings.device.simulated = true;
   settings.device.settings.handedness = "right";
   settings.device.settings.preset = "defaults";
-  settings.device.settings.filters_named = true;
+  settings.device.settings.filters_named = settings.device.settings.damping_named = true;
+  // The simulated hand has no weight.
+  settings.device.settings.gravity_named = settings.device.settings.gravity_compensation = true;
+  settings.device.settings.gravity_scaling = 1.0;
   return settings;
 }
 

@@ -16,7 +16,10 @@ Eigen::Vector3d no_longer_than(const Eigen::Vector3d& v, double most) {
 }  // namespace
 
 SimulatedHand::SimulatedHand(SimulatedHandSettings settings)
-    : settings_(std::move(settings)), propagator_(place_propagator(settings_.plant)) {
+    : settings_(std::move(settings)),
+      propagator_(place_propagator(settings_.plant)),
+      on_their_way_(static_cast<std::size_t>(settings_.plant.delay_periods) + 1,
+                    Eigen::Vector3d::Zero()) {
   force_limit_N_ = settings_.force_limit_N;
   identity_.kind = "virtual";
   identity_.name = "simulated device of tpm hil serve";
@@ -73,11 +76,15 @@ void SimulatedHand::step() noexcept {
   const Eigen::Vector3d wanted_N = tissue_N_ + client_force_N();
   const double limit_N = std::min(force_limit_N_.load(), plant.motor_limit_N);
   if (wanted_N.norm() > limit_N) ++saturations_;
-  rendered_N_ = forces_on_ ? no_longer_than(wanted_N, limit_N) : Eigen::Vector3d::Zero();
+  on_their_way_[oldest_] = no_longer_than(wanted_N, limit_N);
+  oldest_ = (oldest_ + 1) % on_their_way_.size();
+  rendered_N_ = forces_on_ ? on_their_way_[oldest_] : Eigen::Vector3d::Zero();
   largest_N_ = std::max(largest_N_, rendered_N_.norm());
   const OperatorAim aim = settings_.script.at(time_s_);
   Eigen::Vector3d goal_m = wish.goal_m, force_N = rendered_N_;
-  if (!wish.guided) {
+  if (!wish.guided && plant.arm_set_point_m) {
+    goal_m = plant.origin_m + *plant.arm_set_point_m * plant.push;
+  } else if (!wish.guided) {
     goal_m = plant.origin_m + aim.value * plant.push + aim.across_m;
     if (aim.aim == OperatorPiece::Aim::force) {
       goal_m += (plant.push.dot(at_m_ - plant.origin_m) - aim.value) * plant.push;

@@ -1,6 +1,7 @@
 #pragma once
 #include <atomic>
 #include <optional>
+#include <vector>
 
 #include "tpm/haptics/device/virtual_plant.hpp"
 #include "tpm/haptics/loop/triple_buffer.hpp"
@@ -23,8 +24,8 @@ struct SimulatedHandSettings {
 ///
 ///     m x'' + b x' + k (x - goal) = F_tissue + F_client
 ///
-/// along each axis. Where the script asks for a push in place of a place, the goal is where the
-/// hand is and the push is added.
+/// along each axis; the forces are those of `delay_periods` ago. Where the script asks for a push
+/// in place of a place, the goal is where the hand is and the push is added.
 class SimulatedHand final : public HapticDevice, public ServedHand {
  public:
   explicit SimulatedHand(SimulatedHandSettings settings);
@@ -65,6 +66,8 @@ class SimulatedHand final : public HapticDevice, public ServedHand {
   Eigen::Vector3d at_m_, speed_m_per_s_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero(), rendered_N_ = Eigen::Vector3d::Zero();
   double time_s_ = 0.0, owed_s_ = 0.0, largest_N_ = 0.0;
+  std::vector<Eigen::Vector3d> on_their_way_;  ///< forces, a ring
+  std::size_t oldest_ = 0;
   std::uint64_t saturations_ = 0;
   std::atomic<bool> forces_on_{false};
   /// Of what a client may push with; lowered by prepare() while the server's thread may already
