@@ -53,8 +53,8 @@ def main(tpm):
                 if os.path.exists(output):
                     os.remove(output)
                 text = said(tpm, "simulate", path, "-o", output)
-                print(f"| {name} | simulate, {kind} | largest force {line(text, 'largest force: ([0-9.]+ N)')},"
-                      f" at the end {line(text, '^at the end, [^:]*: ([0-9.]+ N)')} |")
+                print(f"| {name} | simulate, {kind} | largest force {line(text, 'largest force: ([0-9.]+ [munk]?N)')},"
+                      f" at the end {line(text, '^at the end, [^:]*: ([0-9.]+ [munk]?N)')} |")
             for kind in ("condensed", "network", "zone", "planned"):
                 session = read("hil_planned.json")
                 session["model"] = {"kind": kind, "scene": {k: scene[k] for k in ("organ", "material")}}
@@ -65,7 +65,7 @@ def main(tpm):
                 recording = os.path.join(folder, "session.tpmrec")
                 text = said(tpm, "hil", "run", path, "-o", recording, "--force")
                 model = line(text, r"^model: ([a-z_0-9]+)")
-                verified = line(said(tpm, "hil", "verify", recording, "--window", "0 s"),
+                verified = line(said(tpm, "hil", "verify", recording, "--window", "0 s", "--verbose"),
                                 r"^all +[0-9]+ +[0-9.e-]+ +[0-9.e-]+ +([0-9.e-]+ %)")
                 print(f"| {name} | hil, {kind} ({model}) | {line(text, '^end: (.*)')}; largest difference from the"
                       f" quasi-static network {verified} of the peak |")

@@ -1,17 +1,22 @@
 // tpm budget: what is lost between a recording and a hand.
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include <memory>
 
 #include "command.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/fit/predict/error_budget.hpp"
+#include "tpm/fit/show/budget_answer.hpp"
 #include "tpm/fit/show/budget_report.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/units.hpp"
+#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {
@@ -23,6 +28,7 @@ struct BudgetCommand {
   std::string scene, finer, tolerance = "1%";
   std::string loop_rate = "1 kHz", encoder = "10 um", delay = "1", samples = "1000", seed = "0";
   std::string folder, output;
+  bool verbose = false;
 };
 
 BudgetOptions budget_options(const BudgetCommand& command) {
@@ -72,15 +78,32 @@ ErrorBudget budget_of_contact(const BudgetCommand& command, const LawFile& law) 
   return contact_budget(law, read_recordings(command.recordings).front(), options);
 }
 
+/// A plan whose tolerance is what the data know; without a folder, the command that writes one.
+std::string next_of_budget(const BudgetCommand& command) {
+  if (command.folder.empty()) return "the same with --folder budget";
+  return fmt::format("tpm plan {} --tolerance data --budget {}",
+                     command.scene.empty() ? std::string("SCENE.json") : shell_word(command.scene),
+                     shell_word((std::filesystem::path(command.folder) / "budget.json").string()));
+}
+
 int run_budget(const BudgetCommand& command, const Session& session) {
   will_write_into(command.folder, {"budget.json", "budget.csv", "figures.json"});
   const auto csv = csv_beside(command.output, session);
   const LawFile law = read_law(command.law);
   const ErrorBudget budget =
       command.scene.empty() ? budget_of_contact(command, law) : budget_of_organ(command, law);
-  std::string text = session.json() ? to_text(to_json(budget)) : to_terminal_text(budget);
-  if (!command.folder.empty()) {
-    text += written(session, command.folder, write_budget_report(command.folder, budget));
+  std::vector<std::string> files;
+  if (!command.folder.empty()) files = write_budget_report(command.folder, budget);
+  std::string text;
+  if (session.json()) {
+    text = to_text(to_json(budget));
+  } else if (command.verbose) {
+    text = to_terminal_text(budget);
+    if (!files.empty()) text += written(session, command.folder, files);
+  } else {
+    ShortAnswer answer = short_answer(budget);
+    end_answer(answer, command.folder, files, next_of_budget(command));
+    text = to_text(answer);
   }
   deliver(text, command.output);
   deliver_csv(to_csv(budget), csv);
@@ -122,6 +145,7 @@ void add_budget_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--folder", options->folder,
                       "Write budget.json, budget.csv and the waterfall into this folder");
+  add_verbose_option(*command, options->verbose, "from which stage to which, what a hand can feel");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);

@@ -11,6 +11,7 @@
 
 #include "command.hpp"
 #include "data_text.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/show/short_answer.hpp"
@@ -146,9 +147,10 @@ const Example& find_example(const std::string& name) {
   const auto found =
       std::find_if(all.begin(), all.end(), [&](const Example& e) { return e.name == name; });
   if (found != all.end()) return *found;
-  std::vector<std::string_view> names;
-  for (const Example& e : all) names.push_back(e.name);
-  throw Error(ExitCode::usage, "NAME", fmt::format("no example '{}'", printable(name)),
+  std::vector<std::string> names;
+  for (const Example& e : all) names.emplace_back(e.name);
+  throw Error(ExitCode::usage, "NAME",
+              fmt::format("no example '{}'{}", printable(name), did_you_mean(name, names)),
               fmt::format("one of {}", fmt::join(names, ", ")));
 }
 

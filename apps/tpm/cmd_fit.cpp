@@ -31,6 +31,7 @@
 #include "tpm/law/contact_geometry.hpp"
 #include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
+#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {
@@ -413,9 +414,10 @@ int compare_folders(const FitOptions& options, const Session& session) {
   const std::optional<ContactGeometry> probe = probe_of(options);
   const GroupComparison comparison = compare_groups(first, second, law, selection, probe);
   std::string text = session.json() ? to_text(to_json(comparison)) : to_terminal_text(comparison);
-  if (!options.no_draw) {
-    text += written(session, folder, write_comparison_report(folder, comparison, probe));
-  }
+  std::vector<std::string> files;
+  if (!options.no_draw) files = write_comparison_report(folder, comparison, probe);
+  text = answer_with_files(options, session, std::move(text), short_answer(comparison), folder,
+                           files, files.empty() ? "" : next_of_figures(folder));
   deliver(text, options.output);
   deliver_csv(comparison_csv(comparison), csv);
   return 0;
@@ -582,9 +584,7 @@ void add_fit_command(CLI::App& app, Session& session) {
       command->add_option("--folder", options->folder,
                           "Where figures and files go (default: NAME_fit for recordings, none are "
                           "written for a configuration)");
-  command->add_flag("--verbose", options->verbose,
-                    "Print all that was computed: every law tried, starts, readings (default: an "
-                    "answer of at most 25 lines)");
+  add_verbose_option(*command, options->verbose, "every law tried, starts, readings");
   command->add_flag("--no-draw", options->no_draw, "Write no figures and files")->excludes(folder);
   add_recording_options(*command, options->recordings);
   add_placement_options(*command, options->placement);

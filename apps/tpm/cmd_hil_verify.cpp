@@ -5,8 +5,10 @@
 #include "command.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 #include "tpm/show/draw.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
+#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {
@@ -14,6 +16,7 @@ namespace {
 struct VerifyChoice {
   std::string recording;
   std::string output = "hil_report";
+  bool verbose = false;
   std::string motion_tolerance = "5 um", spacing = "10 ms", window = "10 s";
 };
 
@@ -33,8 +36,16 @@ VerifyOptions options_of(const VerifyChoice& choice) {
 int verify_hil(const VerifyChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));
-  say("{}",
-      session.json() ? to_text(verification_json(recording, v)) : verification_text(recording, v));
+  if (session.json()) {
+    say("{}", to_text(verification_json(recording, v)));
+  } else if (choice.verbose) {
+    say("{}", verification_text(recording, v));
+  } else {
+    ShortAnswer answer = short_answer(recording, v);
+    end_answer(answer, "", {},
+               fmt::format("tpm hil report {} -o hil_report", shell_word(choice.recording)));
+    say("{}", to_text(answer));
+  }
   // What is left of a damaged recording is verified; the answer is no all the same.
   return exit_code(recording.damaged == 0);
 }
@@ -49,8 +60,13 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
   if (session.json()) {
     say("{}", to_text(verification_json(recording, v)));
   } else {
-    say("{}wrote {}/report.html, report.md and report.json\n", verification_text(recording, v),
-        choice.output);
+    ShortAnswer answer = short_answer(recording, v);
+    end_answer(answer, choice.output, {"report.html", "report.md", "report.json"},
+               "tpm view " + shell_word(choice.recording));
+    say("{}", choice.verbose ? verification_text(recording, v) +
+                                   fmt::format("wrote {}/report.html, report.md and report.json\n",
+                                               choice.output)
+                             : to_text(answer));
   }
   return exit_code(recording.damaged == 0);
 }
@@ -80,12 +96,16 @@ void add_hil_verify_commands(CLI::App& hil, Session& session) {
   CLI::App* verify_command = hil.add_subcommand(
       "verify", "Compare the forces of a recording with the full network under the same motion");
   const auto to_verify = add_choice(*verify_command, session);
+  add_verbose_option(*verify_command, to_verify->verbose,
+                     "every cross-check and reading of the experiment");
   verify_command->footer("Example:\n  tpm hil verify session.tpmrec");
   set_run(*verify_command, session,
           [to_verify, &session] { return verify_hil(*to_verify, session); });
 
   CLI::App* report = hil.add_subcommand("report", "One page on a session, with figures");
   const auto to_report = add_choice(*report, session);
+  add_verbose_option(*report, to_report->verbose,
+                     "every cross-check and reading of the experiment");
   report->add_option("-o,--output", to_report->output, "Folder")->capture_default_str();
   report->footer("Example:\n  tpm hil report session.tpmrec -o hil_report");
   set_run(*report, session, [to_report, &session] { return report_hil(*to_report, session); });

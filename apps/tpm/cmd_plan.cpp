@@ -16,8 +16,10 @@
 #include "tpm/fit/predict/error_budget.hpp"
 #include "tpm/plan/show/plan_report.hpp"
 #include "tpm/show/json_table_csv.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
+#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;
@@ -120,6 +122,7 @@ struct PlanCommand {
   bool brief = false;
   bool thorough = false;
   bool estimate = false;
+  bool verbose = false;
   PlanChoice choice;
 };
 
@@ -185,6 +188,46 @@ PlannedScene planned_scene(const PlanCommand& command) {
   return planned;
 }
 
+/// Runs the pick; where none meets the budget, the scene is planned without it.
+std::string next_of_plan(const PlanCommand& command, const Plan& plan) {
+  const PlanChoice& choice = command.choice;
+  if (!command.spheres.empty() && command.scene_output.empty()) {
+    return "the same with --write-scene planned.json";
+  }
+  const std::string scene =
+      shell_word(command.spheres.empty() ? command.scene : command.scene_output);
+  std::string options = " --tolerance " + shell_word(choice.tolerance);
+  const auto add = [&](const char* name, const std::string& value) {
+    if (!value.empty()) options += fmt::format(" {} {}", name, shell_word(value));
+  };
+  add("--budget", choice.budget);
+  if (choice.outputs != "force") add("--outputs", choice.outputs);
+  if (!plan.choice) {
+    if (plan.without_budget) return fmt::format("tpm plan {}{}", scene, options);
+    return fmt::format("tpm simulate {}", scene);
+  }
+  add("--rate", choice.rate);
+  add("--wall", choice.wall);
+  add("--costs", choice.costs);
+  return fmt::format("tpm simulate {} --plan{} -o planned.h5", scene, options);
+}
+
+/// The answer, with the number of spheres before it if that was asked for.
+std::string answer_of_plan(const PlanCommand& command, const PlannedScene& chosen,
+                           const Plan& plan) {
+  if (command.verbose) {
+    return (chosen.spheres ? spheres_text(*chosen.spheres) : std::string()) + plan_text(plan);
+  }
+  ShortAnswer answer = short_answer(plan);
+  if (chosen.spheres) {
+    answer.conclusion.insert(answer.conclusion.begin(), spheres_words(*chosen.spheres));
+  }
+  const bool wrote = chosen.spheres && !command.scene_output.empty();
+  if (wrote) answer.end.push_back("wrote " + command.scene_output);
+  end_answer(answer, "", {}, next_of_plan(command, plan));
+  return to_text(answer);
+}
+
 int run_plan(const PlanCommand& command, const Session& session) {
   if (command.calibrate) return calibrate(command, session);
   if (command.scene.empty()) {
@@ -208,12 +251,8 @@ int run_plan(const PlanCommand& command, const Session& session) {
   }
   const Plan plan = planned(*chosen.scene, std::move(request));
   Json json = plan_json(plan);
-  std::string text = plan_text(plan);
-  if (chosen.spheres) {
-    json["spheres_choice"] = spheres_json(*chosen.spheres);
-    text = spheres_text(*chosen.spheres) + text;
-  }
-  deliver(session.json() ? to_text(json) : text, command.output);
+  if (chosen.spheres) json["spheres_choice"] = spheres_json(*chosen.spheres);
+  deliver(session.json() ? to_text(json) : answer_of_plan(command, chosen, plan), command.output);
   deliver_csv(json_table_csv(json.at("frontier")), csv);
   return exit_code(plan.choice.has_value());
 }
@@ -245,6 +284,8 @@ void add_plan_command(CLI::App& app, Session& session) {
                     "Say what planning would take, from one coarse run, and do no more");
   command->add_flag("--calibrate", choice->calibrate,
                     "Measure what operations cost on this machine, and keep it");
+  add_verbose_option(*command, choice->verbose,
+                     "every candidate and number of spheres, the work of planning");
   command->add_option("-o,--output", choice->output,
                       "Write here instead of to the terminal; beside JSON the candidates as .csv");
   add_format_option(*command, session);

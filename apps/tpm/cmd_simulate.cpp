@@ -19,9 +19,11 @@
 #include "tpm/plan/show/simulation_figures.hpp"
 #include "tpm/plan/show/simulation_report.hpp"
 #include "tpm/plan/show/trajectory_report.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
+#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;
@@ -36,6 +38,7 @@ struct SimulateChoice {
   std::string checkpoint_every = "5 s";
   bool planned = false;
   bool list = false;
+  bool verbose = false;
   bool list_materials = false;
   PlanChoice plan;
 };
@@ -208,6 +211,17 @@ int list_materials(const Session& session) {
   return 0;
 }
 
+/// What the mass-spring model answers, below what the tissue does.
+void add_beside(ShortAnswer& answer, const ShortAnswer& mass_spring) {
+  const auto append = [](std::vector<std::string>& to, const std::vector<std::string>& lines,
+                         const char* before) {
+    for (const std::string& line : lines) to.push_back(before + line);
+  };
+  append(answer.conclusion, {mass_spring.conclusion.begin() + 1, mass_spring.conclusion.end()},
+         "mass-spring model: ");
+  append(answer.warnings, mass_spring.warnings, "mass-spring model: ");
+}
+
 int simulate_and_report(const SimulateChoice& choice, const Session& session) {
   ExperimentScene scene = read_experiment(choice.scene);
   require_runnable(scene);
@@ -218,12 +232,24 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
   const std::vector<std::string> files = write_all(choice, all);
   Json json;
   std::string text;
+  ShortAnswer answer;
   for (const Simulated& s : all) {
     Json of_one = simulation_json(s.scene, s.network, s.run);
     (json.is_null() ? json : json["mass_spring"]) = std::move(of_one);
     text += simulation_text(s.scene, s.network, s.run);
+    if (&s == &all.front()) {
+      answer = short_answer(s.scene, s.network, s.run);
+    } else {
+      add_beside(answer, short_answer(s.scene, s.network, s.run));
+    }
   }
-  say_with_files(session, std::move(json), text, files);
+  if (session.json() || choice.verbose) {
+    say_with_files(session, std::move(json), text, files);
+    return 0;
+  }
+  answer.end.push_back(fmt::format("wrote {}", fmt::join(files, ", ")));
+  end_answer(answer, "", {}, "tpm view " + shell_word(choice.output));
+  say("{}", to_text(answer));
   return 0;
 }
 
@@ -239,7 +265,13 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   request.relevance = request.changes = false;
   const Plan plan = planned(scene, std::move(request));
   if (!plan.choice) {
-    say("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
+    if (session.json() || choice.verbose) {
+      say("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
+      return exit_code(false);
+    }
+    ShortAnswer answer = short_answer(plan);
+    end_answer(answer, "", {}, "tpm simulate " + shell_word(choice.scene));
+    say("{}", to_text(answer));
     return exit_code(false);
   }
   const std::vector<double> times = times_to_watch(scene);
@@ -291,6 +323,7 @@ void add_simulate_command(CLI::App& app, Session& session) {
                     "List what a scene's key 'formulation' can name, with what each can do");
   command->add_flag("--list-materials", choice->list_materials,
                     "List the shapes that a scene's keys 'potential' and 'kernel' can name");
+  add_verbose_option(*command, choice->verbose, "contacts, equations, limits of every model");
   add_plan_options(*command, choice->plan);
   for (const char* of_plan :
        {"--tolerance", "--budget", "--outputs", "--rate", "--wall", "--costs"}) {

@@ -133,6 +133,28 @@ def check_turning(page):
     assert page.js("document.getElementById('scene').dataset.eye") != turned
 
 
+def check_peak(page, result):
+    """A simulation opens at its largest force, the tool (or the push) drawn where the file has it."""
+    with h5py.File(result) as file:
+        times, force = file["curve/time_s"][:], file["curve/force_N"][:]
+        states = file["steps/time_s"][:]
+        peak = times[np.argmax(np.abs(force))]
+        assert page.js("now") == peak, (page.js("now"), peak)
+        state = int(page.js("document.getElementById('scene').dataset.state"))
+        assert abs(states[state] - peak) == np.abs(states - peak).min(), (states[state], peak)
+        assert page.js("document.getElementById('scene').dataset.axes") == "x,y,z"
+        told = page.js("document.getElementById('scene').dataset.tool")
+        if "tools" not in file:
+            assert told == "push", told
+            return
+        want = file[f"steps/{state:05}/tools/position_m"][:]
+        np.testing.assert_allclose(np.array(page.js("Array.from(organ.toolPlaces)")).reshape(len(states), -1, 3)[state], want, rtol=1e-6)
+        x, y, radius = (float(v) for v in told.split(";")[0].split(","))
+        sphere = [float(v) for v in page.js("document.getElementById('scene').dataset.chosen").split(",")]
+        # The ball touches the contact sphere: their centres are drawn at most both radii apart.
+        assert np.hypot(x - sphere[0], y - sphere[1]) <= radius + page.js("organ.o.radius_m * organ.seen[3 * organ.chosen + 2]") + 2
+
+
 def look_at_result(chromium, tpm, folder, picture):
     (folder / "scene.json").write_text(json.dumps(SCENE))
     result = folder / "result.h5"
@@ -141,6 +163,7 @@ def look_at_result(chromium, tpm, folder, picture):
     page = Page(chromium, folder / "result.html")
     assert page.text("title") == SCENE["title"], page.text("title")
     assert page.text("badge") == "SIMULATED", page.text("badge")
+    check_peak(page, result)
     check_turning(page)
     seen = set()
     for part in (0.0, 0.1, 0.5, 1.0):
@@ -168,6 +191,21 @@ def look_at_result(chromium, tpm, folder, picture):
         page.js("(c => { c.value = 'displacement'; c.dispatchEvent(new Event('change')); })(document.getElementById('colour'))")
         page.frame()
         chromium.picture(picture)
+    page.check_whole()
+
+
+def look_at_tool(chromium, tpm, folder, picture):
+    contact = {"kind": "ball", "radius": "6 mm"}
+    (folder / "ball.json").write_text(json.dumps({**SCENE, "contacts": [contact]}))
+    result = folder / "ball.h5"
+    subprocess.run([tpm, "simulate", folder / "ball.json", "-o", result], check=True, capture_output=True)
+    subprocess.run([tpm, "view", result, "-o", folder / "ball.html"], check=True, capture_output=True)
+    page = Page(chromium, folder / "ball.html")
+    check_peak(page, result)
+    for width in (400, 1400) if picture else ():
+        chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+        page.frame()
+        chromium.picture(picture.replace(".png", f"_{width}.png"))
     page.check_whole()
 
 
@@ -271,6 +309,7 @@ def main():
             sys.exit(77)
         try:
             look_at_result(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
+            look_at_tool(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
             look_at_recording(chromium, sys.argv[1], folder)
             look_at_fit(chromium, sys.argv[1], folder)
         finally:

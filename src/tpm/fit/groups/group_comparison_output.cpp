@@ -98,6 +98,8 @@ std::string line_of(const ComparedQuantity& q, bool tested) {
   return text + "\n";
 }
 
+}  // namespace
+
 std::string conclusion(const GroupComparison& c) {
   std::vector<std::string> differ, open;
   const double alpha = 1.0 - c.study.level;
@@ -120,8 +122,6 @@ std::string conclusion(const GroupComparison& c) {
       100.0 * c.study.level,
       open.empty() ? std::string() : fmt::format("; none is shown in {}", fmt::join(open, ", ")));
 }
-
-}  // namespace
 
 Json to_json(const GroupComparison& c) {
   Json study = to_json(c.study);

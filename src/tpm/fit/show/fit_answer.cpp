@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "tpm/base/sized_unit.hpp"
@@ -113,6 +114,28 @@ bool contains(const std::vector<std::string>& lines, const std::string& words) {
       lines, [&](const std::string& line) { return line.find(words) != std::string::npos; });
 }
 
+/// Recordings that were not fitted, as warnings, and those whose law is in doubt.
+void add_recordings(ShortAnswer& answer, const SpecimenStudy& study) {
+  std::size_t fitted = 0;
+  std::map<std::string, std::vector<std::string>> doubts;  // recordings by what is said of them
+  for (const SpecimenRow& row : study.rows) {
+    if (!row.fit) {
+      answer.warnings.push_back(fmt::format("{} is not fitted: {}", row.name, row.reason));
+      continue;
+    }
+    ++fitted;
+    if (!row.fit->adequacy || row.fit->adequacy->is_adequate()) continue;
+    doubts[row.fit->adequacy->is_rejected()
+               ? "the law does not describe them: what is pooled supposes that it did"
+               : "adequacy cannot be judged: too few samples at rest before the load"]
+        .push_back(row.name);
+  }
+  for (const auto& [words, names] : doubts) {
+    answer.conclusion.push_back(fmt::format("{} of {} recordings: {} ({})", names.size(), fitted,
+                                            words, fmt::join(names, ", ")));
+  }
+}
+
 }  // namespace
 
 std::size_t starts_looked_at(const FitResult& fit) {
@@ -177,24 +200,7 @@ ShortAnswer short_answer(const SpecimenStudy& study) {
   ShortAnswer answer;
   answer.conclusion = {study.why};
   if (depends_on_reference(study.law)) answer.conclusion.push_back(reference_words(study.law));
-  std::size_t fitted = 0;
-  std::map<std::string, std::vector<std::string>> doubts;  // recordings by what is said of them
-  for (const SpecimenRow& row : study.rows) {
-    if (!row.fit) {
-      answer.warnings.push_back(fmt::format("{} is not fitted: {}", row.name, row.reason));
-      continue;
-    }
-    ++fitted;
-    if (!row.fit->adequacy || row.fit->adequacy->is_adequate()) continue;
-    doubts[row.fit->adequacy->is_rejected()
-               ? "the law does not describe them: what is pooled supposes that it did"
-               : "adequacy cannot be judged: too few samples at rest before the load"]
-        .push_back(row.name);
-  }
-  for (const auto& [words, names] : doubts) {
-    answer.conclusion.push_back(fmt::format("{} of {} recordings: {} ({})", names.size(), fitted,
-                                            words, fmt::join(names, ", ")));
-  }
+  add_recordings(answer, study);
   answer.head = {answer_row("typical", "value",
                             fmt::format("{:.4g} % interval", 100.0 * study.level), "unit",
                             "a new specimen; recordings left out")};
@@ -219,6 +225,63 @@ ShortAnswer short_answer(const SpecimenStudy& study) {
         unit.symbol, more));
   }
   answer.rest = [names](std::size_t from) { return further_verdicts(names, from); };
+  return answer;
+}
+
+ShortAnswer short_answer(const GroupComparison& c) {
+  ShortAnswer answer;
+  answer.conclusion = {conclusion(c), c.study.why};
+  if (depends_on_reference(c.study.law)) {
+    answer.conclusion.push_back(reference_words(c.study.law));
+  }
+  add_recordings(answer, c.study);
+  const auto row = [](const std::string& name, const std::string& first, const std::string& second,
+                      const std::string& difference, const std::string& p) {
+    return fmt::format("{:<16} {:>11} {:>11}  {:<30} {}", name, first, second, difference, p);
+  };
+  answer.head = {row("typical", c.names[0], c.names[1],
+                     fmt::format("second against first, {:.4g} %", 100.0 * c.study.level),
+                     "p (Holm)")};
+  std::vector<std::pair<std::string, std::string>> verdicts;
+  const auto add = [&](const ComparedQuantity& q, bool tested) {
+    const bool ratio = q.parameter.scale == Scale::log;
+    const auto typical = [&](std::size_t group) {
+      if (!q.typical[group]) return std::string("-");
+      const double si = q.parameter.natural(q.typical[group]->mean);
+      const Unit unit = sized_unit(q.parameter.unit, si);
+      return fmt::format("{} {}", significant(si / unit.to_si, 4), unit.symbol);
+    };
+    std::string difference = q.reason, p, verdict = q.reason;
+    if (q.difference) {
+      const GroupDifference& d = *q.difference;
+      const Unit unit = sized_unit(q.parameter.unit, d.difference);
+      const auto shown = [&](double theta) {
+        return significant(ratio ? std::exp(theta) : theta / unit.to_si, 4);
+      };
+      difference = fmt::format("{} {} ({} .. {}){}", ratio ? "x" : "+", shown(d.difference),
+                               shown(d.interval.lower), shown(d.interval.upper),
+                               ratio ? "" : " " + unit.symbol);
+      p = tested ? significant(q.p_holm, 2) : std::string("as its parts");
+      verdict = tested ? fmt::format("p (Holm) {}", p) : p;
+    }
+    if (const int left_out = q.left_out[0] + q.left_out[1]; left_out > 0) {
+      p += fmt::format("; left out: {}", left_out);
+    }
+    if (!q.only_without.empty()) {
+      const std::string doubt = fmt::format("; not identified: {}: not separable", q.only_without);
+      p += doubt;
+      verdict += doubt;
+    }
+    answer.rows.push_back(row(q.parameter.name, typical(0), typical(1), difference, p));
+    verdicts.emplace_back(q.parameter.name, verdict);
+  };
+  for (const ComparedQuantity& q : c.parameters) add(q, true);
+  for (const ComparedQuantity& q : c.moduli) add(q, false);
+  answer.rest = [verdicts](std::size_t from) { return further_verdicts(verdicts, from); };
+  answer.limits.push_back(
+      fmt::format("{} and {} recordings; a typical specimen and its ratio (x) or difference (+) by "
+                  "random effects",
+                  c.first, c.study.rows.size() - c.first));
   return answer;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 
+#include "tpm/fit/groups/group_comparison.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
@@ -17,6 +18,9 @@ namespace tpm::fit {
 
 /// Of a folder: the typical specimen, and which recordings do not support it.
 [[nodiscard]] ShortAnswer short_answer(const SpecimenStudy& study);
+
+/// Of two groups: which parameters differ and by how much, and which recordings do not support it.
+[[nodiscard]] ShortAnswer short_answer(const GroupComparison& comparison);
 
 /// Adds Young's moduli to an answer, before its other rows, and their warnings.
 void add_moduli(ShortAnswer& answer, const YoungModuli& moduli);

@@ -7,6 +7,7 @@
 #include "tpm/haptics/verify/verify.hpp"
 #include "tpm/show/document.hpp"
 #include "tpm/show/figure.hpp"
+#include "tpm/show/short_answer.hpp"
 
 namespace tpm::haptics {
 
@@ -23,6 +24,9 @@ namespace tpm::haptics {
 [[nodiscard]] std::string motion_cost(const Verification& v, double per_newton,
                                       std::string_view unit);
 [[nodiscard]] std::string verification_text(const HilRecording& recording, const Verification& v);
+/// The short answer of a verification: how far the forces are off, where, what limits the
+/// comparison, and every note.
+[[nodiscard]] ShortAnswer short_answer(const HilRecording& recording, const Verification& v);
 
 /// What a recording says about energy and limits, from its rows.
 struct RecordingSummary {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "tpm/base/printed_number.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
@@ -124,6 +125,30 @@ Json fidelity_json(const ForceFidelity& f) {
 
 std::string share(double part_N, double peak_N) {
   return peak_N > 0.0 ? significant(100.0 * part_N / peak_N, 3) + " %" : "-";
+}
+
+/// The errors of all phases of one kind.
+struct PhaseKindErrors {
+  int count = 0;
+  double squares = 0.0, max_N = 0.0;
+  std::size_t instants = 0;
+  [[nodiscard]] double rms_N() const { return std::sqrt(squares / static_cast<double>(instants)); }
+};
+
+std::map<std::string, PhaseKindErrors> errors_by_kind(const Verification& v) {
+  std::map<std::string, PhaseKindErrors> kinds;
+  for (const PhaseFidelity& p : v.phases) {
+    PhaseKindErrors& kind = kinds[std::string(word_of(p.phase.kind))];
+    ++kind.count;
+    kind.squares += p.force.rms_N * p.force.rms_N * static_cast<double>(p.force.instants);
+    kind.instants += p.force.instants;
+    kind.max_N = std::max(kind.max_N, p.force.max_N);
+  }
+  return kinds;
+}
+
+std::string newtons(double force_N, int digits = 3) {
+  return sized_text(Dimension::force, force_N, digits);
 }
 
 }  // namespace
@@ -299,24 +324,11 @@ std::string verification_text(const HilRecording& recording, const Verification&
       significant(v.reference_error_N, 3));
   text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", "phase", "count", "rms mN", "max mN",
                       "max/peak");
-  struct Kind {
-    int count = 0;
-    double squares = 0.0, max_N = 0.0;
-    std::size_t instants = 0;
-  };
-  std::map<std::string, Kind> kinds;
-  for (const PhaseFidelity& p : v.phases) {
-    Kind& kind = kinds[std::string(word_of(p.phase.kind))];
-    ++kind.count;
-    kind.squares += p.force.rms_N * p.force.rms_N * static_cast<double>(p.force.instants);
-    kind.instants += p.force.instants;
-    kind.max_N = std::max(kind.max_N, p.force.max_N);
-  }
+  const std::map<std::string, PhaseKindErrors> kinds = errors_by_kind(v);
   for (const auto& [name, kind] : kinds) {
-    text += fmt::format(
-        "{:<10} {:>7} {:>10} {:>10} {:>10}\n", name, kind.count,
-        significant(1e3 * std::sqrt(kind.squares / static_cast<double>(kind.instants)), 3),
-        significant(1e3 * kind.max_N, 3), share(kind.max_N, v.all.peak_N));
+    text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", name, kind.count,
+                        significant(1e3 * kind.rms_N(), 3), significant(1e3 * kind.max_N, 3),
+                        share(kind.max_N, v.all.peak_N));
   }
   text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}   peak {} N\n", "all", v.phases.size(),
                       significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
@@ -335,6 +347,59 @@ std::string verification_text(const HilRecording& recording, const Verification&
                         percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1));
   }
   return text;
+}
+
+ShortAnswer short_answer(const HilRecording& recording, const Verification& v) {
+  ShortAnswer answer;
+  answer.conclusion = {
+      fmt::format("{}: the force commanded differs from the reference by {} at most ({} of the "
+                  "peak of {}), rms {}",
+                  recording.session.title, newtons(v.all.max_N), share(v.all.max_N, v.all.peak_N),
+                  newtons(v.all.peak_N, 4), newtons(v.all.rms_N)),
+      device_line(recording),
+      fmt::format("reference: {}; {} s, {} instants", v.reference, significant(v.end_s, 6),
+                  v.all.instants)};
+  const auto row = [](const std::string& phase, const std::string& count, const std::string& rms,
+                      const std::string& most, const std::string& of_peak) {
+    return fmt::format("{:<10} {:>7} {:>12} {:>12} {:>10}", phase, count, rms, most, of_peak);
+  };
+  answer.head = {row("phase", "count", "rms", "max", "max/peak")};
+  for (const auto& [name, kind] : errors_by_kind(v)) {
+    answer.rows.push_back(row(name, std::to_string(kind.count), newtons(kind.rms_N()),
+                              newtons(kind.max_N), share(kind.max_N, v.all.peak_N)));
+  }
+  answer.limits = {
+      fmt::format("limit: motion through {} knots within {}, {}; the reference's own error "
+                  "estimate {}; the model's {}",
+                  v.knots, sized_text(Dimension::length, v.motion_tolerance_m, 3),
+                  v.motion_error_N ? fmt::format("which can cost {}", newtons(*v.motion_error_N))
+                                   : motion_cost(v, 1.0, "N"),
+                  newtons(v.reference_error_N), newtons(v.model_error_N))};
+  constexpr std::size_t kShown = 3;  // of cross-checks
+  for (std::size_t i = 0; i < std::min(v.others.size(), kShown); ++i) {
+    const CrossCheck& o = v.others[i];
+    answer.limits.push_back(fmt::format("beside: {}, {} to {} s: {} from the reference", o.name,
+                                        significant(o.start_s, 4), significant(o.end_s, 4),
+                                        newtons(o.apart_N)));
+  }
+  if (v.others.size() > kShown) {
+    answer.limits.push_back(fmt::format("... and {} more comparisons", v.others.size() - kShown));
+  }
+  if (!v.experiment.empty()) {
+    const auto off = [](const BesideExperiment& e) {
+      return std::abs(e.commanded_N / e.measured_N - 1.0);
+    };
+    const BesideExperiment& worst = *std::ranges::max_element(v.experiment, {}, off);
+    answer.limits.push_back(
+        fmt::format("experiment: {} readings; farthest at {}, {}: measured {}, commanded {} ({})",
+                    v.experiment.size(), sized_text(Dimension::length, worst.depth_m, 3),
+                    worst.label, newtons(worst.measured_N), newtons(worst.commanded_N),
+                    percent_text(100.0 * (worst.commanded_N / worst.measured_N - 1.0), 1)));
+  }
+  if (!v.whole) answer.warnings.push_back(damage_line(recording));
+  if (recording.damaged > 0) answer.warnings.push_back(damage_line(recording));
+  answer.warnings.insert(answer.warnings.end(), v.notes.begin(), v.notes.end());
+  return answer;
 }
 
 }  // namespace tpm::haptics

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/version.hpp"
 
@@ -170,22 +171,107 @@ std::string choice_text(const Plan& plan) {
   return text;
 }
 
+std::string candidate_row(const Plan& plan, const PlannedCandidate& c) {
+  const auto or_dash = [](const std::optional<double>& value, auto&& words) {
+    return value ? words(*value) : std::string("-");
+  };
+  return fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}  {}", c.name,
+                     or_dash(c.cost_s_per_s, time_text), or_dash(c.period_s, time_text),
+                     or_dash(shown_error(plan, c.claimed_error), share_text),
+                     or_dash(shown_error(plan, c.verified_error), share_text),
+                     !c.feasible            ? c.reason
+                     : plan.masses_left_out ? "meets both but for masses"
+                                            : "meets both");
+}
+
+std::string frontier_head() {
+  return fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}", "candidate", "per s", "a period",
+                     "claimed", "verified");
+}
+
 std::string frontier_text(const Plan& plan) {
-  std::string text = fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}\n", "candidate", "per s",
-                                 "a period", "claimed", "verified");
+  std::string text = frontier_head() + "\n";
   for (const PlannedCandidate& c : plan.candidates) {
-    const auto or_dash = [](const std::optional<double>& value, auto&& words) {
-      return value ? words(*value) : std::string("-");
-    };
-    text += fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}  {}\n", c.name,
-                        or_dash(c.cost_s_per_s, time_text), or_dash(c.period_s, time_text),
-                        or_dash(shown_error(plan, c.claimed_error), share_text),
-                        or_dash(shown_error(plan, c.verified_error), share_text),
-                        !c.feasible            ? c.reason
-                        : plan.masses_left_out ? "meets both but for masses"
-                                               : "meets both");
+    text += candidate_row(plan, c) + "\n";
   }
   return text;
+}
+
+/// What is planned, and what is asked for.
+std::string subject_text(const Plan& plan) {
+  const PlanRequest& request = plan.request;
+  std::string text = fmt::format("{}: {} spheres, {} bonds, {} s\n", plan.title, plan.spheres,
+                                 plan.bonds, significant(plan.duration_s, 4));
+  text +=
+      fmt::format("{} within {} of the peak{}, {}; operations cost what {} says\n",
+                  claim_of(plan).quantity, share_text(request.tolerance),
+                  request.tolerance_source.empty() ? std::string()
+                                                   : fmt::format(" ({})", request.tolerance_source),
+                  budget_text(request.budget),
+                  request.costs.source == "nominal"
+                      ? "a usual machine has (nominal; tpm plan --calibrate measures this one)"
+                      : request.costs.source);
+  return text;
+}
+
+std::vector<std::string> plan_warnings(const Plan& plan) {
+  std::vector<std::string> warnings;
+  if (plan.masses_left_out) {
+    warnings.push_back(fmt::format(
+        "inertia matters, and scene and reference leave it out: masses would change the "
+        "answer by {} of the peak{}, which exceeds the tolerance; all errors above count that. "
+        "{}",
+        share_text(*plan.masses_left_out), masses_note(plan),
+        plan.request.for_loop ? "Nothing that a loop steps has masses."
+                              : "For a model with masses, write \"formulation\": {\"kind\": "
+                                "\"inertial\"} in the scene."));
+  }
+  warnings.insert(warnings.end(), plan.validity.begin(), plan.validity.end());
+  return warnings;
+}
+
+/// The lines of a text, without those that are empty and without blanks before them.
+std::vector<std::string> text_lines(const std::string& text) {
+  std::vector<std::string> lines;
+  for (std::size_t from = 0; from < text.size();) {
+    const std::size_t end = std::min(text.find('\n', from), text.size());
+    const std::size_t word = text.find_first_not_of(' ', from);
+    if (word < end) lines.push_back(text.substr(word, end - word));
+    from = end + 1;
+  }
+  return lines;
+}
+
+/// What matters and what does not, each in one line.
+std::vector<std::string> relevance_lines(const Plan& plan) {
+  std::string matters, not_found, rest;
+  const auto add = [](std::string& to, const std::string& words) {
+    to += to.empty() ? words : ", " + words;
+  };
+  for (const PlanRelevance& r : plan.relevance) {
+    // Of masses that scene and reference leave out there is a warning.
+    if (r.part == "inertia" && !plan.inertial && r.matters) continue;
+    if (!r.error) {
+      add(not_found, fmt::format("{} ({})", r.part, r.note));
+    } else {
+      add(r.matters ? matters : rest, fmt::format("{} {}", r.part, share_text(*r.error)));
+    }
+  }
+  std::vector<std::string> lines;
+  if (!matters.empty()) lines.push_back("matters, in parts of the peak: " + matters);
+  if (!rest.empty()) lines.push_back("does not matter: " + rest);
+  if (!not_found.empty()) lines.push_back("not known whether it matters: " + not_found);
+  return lines;
+}
+
+/// The candidates that were run, the pick first.
+std::vector<const PlannedCandidate*> run_candidates(const Plan& plan) {
+  std::vector<const PlannedCandidate*> run;
+  if (plan.choice) run.push_back(&plan.chosen());
+  for (const PlannedCandidate& c : plan.candidates) {
+    if (c.verified_error && (run.empty() || &c != run.front())) run.push_back(&c);
+  }
+  return run;
 }
 
 }  // namespace
@@ -209,17 +295,20 @@ Json spheres_json(const SpheresPlan& plan) {
           {"tried", std::move(tried)}};
 }
 
+std::string spheres_words(const SpheresPlan& plan) {
+  return plan.choice
+             ? fmt::format(
+                   "spheres: {}, at most {} of the peak from the limit of many small ones "
+                   "({} allowed)",
+                   plan.chosen().filling.spheres, share_text(*plan.chosen().claimed_error),
+                   share_text(plan.request.tolerance))
+             : fmt::format(
+                   "spheres: no number up to {} is within {} of the limit of many small ones",
+                   plan.request.most, share_text(plan.request.tolerance));
+}
+
 std::string spheres_text(const SpheresPlan& plan) {
-  std::string text =
-      plan.choice
-          ? fmt::format(
-                "spheres: {}, at most {} of the peak from the limit of many small ones "
-                "({} allowed)\n",
-                plan.chosen().filling.spheres, share_text(*plan.chosen().claimed_error),
-                share_text(plan.request.tolerance))
-          : fmt::format(
-                "spheres: no number up to {} is within {} of the limit of many small ones\n",
-                plan.request.most, share_text(plan.request.tolerance));
+  std::string text = spheres_words(plan) + "\n";
   text += fmt::format("\n{:>9} {:>11} {:>10} {:>12} {:>10} {:>10}\n", "spheres", "spacing, mm",
                       "area", "peak", "claimed", "a run");
   for (const TriedSpheres& t : plan.tried) {
@@ -300,23 +389,12 @@ Json plan_json(const Plan& plan) {
   json["relevance"] = relevance_json(plan);
   json["changes"] = changes_json(plan);
   json["validity_passed"] = plan.validity;
+  json["warnings"] = plan_warnings(plan);
   return json;
 }
 
 std::string plan_text(const Plan& plan) {
-  const PlanRequest& request = plan.request;
-  std::string text = fmt::format("{}: {} spheres, {} bonds, {} s\n", plan.title, plan.spheres,
-                                 plan.bonds, significant(plan.duration_s, 4));
-  text +=
-      fmt::format("{} within {} of the peak{}, {}; operations cost what {} says\n",
-                  claim_of(plan).quantity, share_text(request.tolerance),
-                  request.tolerance_source.empty() ? std::string()
-                                                   : fmt::format(" ({})", request.tolerance_source),
-                  budget_text(request.budget),
-                  request.costs.source == "nominal"
-                      ? "a usual machine has (nominal; tpm plan --calibrate measures this one)"
-                      : request.costs.source);
-  text += choice_text(plan);
+  std::string text = subject_text(plan) + choice_text(plan);
   text += "\n" + frontier_text(plan);
   text +=
       fmt::format("\nreference: {}; peak {} {}; differs from its cross-check ({}) by {}\n",
@@ -336,18 +414,38 @@ std::string plan_text(const Plan& plan) {
   for (const PlanChange& c : plan.changes) {
     text += change_text(c);
   }
-  if (plan.masses_left_out) {
-    text += fmt::format(
-        "WARNING: inertia matters, and scene and reference leave it out: masses would change the "
-        "answer by {} of the peak{}, which exceeds the tolerance; all errors above count that. "
-        "{}\n",
-        share_text(*plan.masses_left_out), masses_note(plan),
-        plan.request.for_loop ? "Nothing that a loop steps has masses."
-                              : "For a model with masses, write \"formulation\": {\"kind\": "
-                                "\"inertial\"} in the scene.");
-  }
-  for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
+  for (const std::string& words : plan_warnings(plan)) text += fmt::format("WARNING: {}\n", words);
   return text;
+}
+
+ShortAnswer short_answer(const Plan& plan) {
+  constexpr std::size_t kShown = 4;  // candidates
+  ShortAnswer answer;
+  answer.conclusion = text_lines(subject_text(plan) + choice_text(plan));
+  const std::vector<const PlannedCandidate*> run = run_candidates(plan);
+  answer.head = {frontier_head()};
+  for (const PlannedCandidate* c : run) {
+    if (answer.rows.size() == kShown && run.size() > kShown + 1) break;
+    answer.rows.push_back(candidate_row(plan, *c));
+  }
+  const std::size_t shown = answer.rows.size();
+  const auto others = [count = plan.candidates.size(), run = run.size()](std::size_t from) {
+    return fmt::format("... {} more candidates, {} of them were run", count - from, run - from);
+  };
+  if (shown < plan.candidates.size()) answer.rows.push_back(others(shown));
+  answer.rest = others;
+  answer.limits.push_back(fmt::format(
+      "reference: {}; peak {}; differs from its cross-check by {}", plan.reference.method,
+      sized_text(plan.by_depth ? Dimension::force : Dimension::length, plan.reference.peak, 6),
+      share_text(plan.reference.difference)));
+  for (std::string& line : relevance_lines(plan)) answer.limits.push_back(std::move(line));
+  for (const PlanChange& c : plan.changes) {
+    for (const std::string& line : text_lines(change_text(c))) {
+      answer.limits.push_back(c.factor ? "limit: " + line : line);
+    }
+  }
+  answer.warnings = plan_warnings(plan);
+  return answer;
 }
 
 }  // namespace tpm::plan

@@ -6,6 +6,7 @@
 #include "tpm/files/json.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/plan/spheres_plan.hpp"
+#include "tpm/show/short_answer.hpp"
 
 namespace tpm::plan {
 
@@ -15,10 +16,15 @@ namespace tpm::plan {
 /// A plan, as docs/json.md describes the keys.
 [[nodiscard]] Json plan_json(const Plan& plan);
 [[nodiscard]] std::string plan_text(const Plan& plan);
+/// The short answer: the pick with its errors and cost, the candidates that were run, what matters,
+/// what would break first, and every warning.
+[[nodiscard]] ShortAnswer short_answer(const Plan& plan);
 
 /// The choice of the number of spheres: the key `spheres_choice` of a plan.
 [[nodiscard]] Json spheres_json(const SpheresPlan& plan);
 [[nodiscard]] std::string spheres_text(const SpheresPlan& plan);
+/// The first line of it: how many spheres, and how far from the limit.
+[[nodiscard]] std::string spheres_words(const SpheresPlan& plan);
 
 /// That the network itself takes less than a second, where no loop and no budget asks for less;
 /// else empty.

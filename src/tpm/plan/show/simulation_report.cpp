@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/organ/run/smoothness.hpp"
@@ -194,7 +195,7 @@ std::string contacts_text(const ExperimentScene& scene, const RunNetwork& networ
     }
     text += fmt::format("{}", word_of(contact.kind));
     if (contact.kind != ContactKind::sphere) {
-      text += fmt::format(" of {} mm radius", significant(1e3 * contact.radius_m, 4));
+      text += fmt::format(" of {} radius", sized_text(Dimension::length, contact.radius_m, 4));
     }
     text += fmt::format(" at sphere {}", contact.probe.sphere + 1);
     if (contact.probe.share != 1.0) {
@@ -206,25 +207,26 @@ std::string contacts_text(const ExperimentScene& scene, const RunNetwork& networ
     }
     if (contact.is_tool()) {
       const ToolState& state = states[tool++];
-      text += fmt::format(": at the end it touches {} sphere{} with {} N", state.touching,
-                          state.touching == 1 ? "" : "s", significant(state.force.norm(), 6));
+      text += fmt::format(": at the end it touches {} sphere{} with {}", state.touching,
+                          state.touching == 1 ? "" : "s",
+                          sized_text(Dimension::force, state.force.norm(), 6));
     }
     if (own) {
-      const char* unit = own->depth ? "N" : "mm";
-      const double scale = own->depth ? 1.0 : 1e3;
-      text += fmt::format(
-          "; by its own protocol: largest {} {} {}, at the end {} {} {} {} {}",
-          own->depth ? "force" : "depth", significant(scale * own->largest, 6), unit,
-          significant(scale * own->last, 6), unit, own->depth ? "at a depth of" : "under a load of",
-          significant((own->depth ? 1e3 : 1.0) * own->last_imposed, 4), own->depth ? "mm" : "N");
+      const Dimension of = own->depth ? Dimension::force : Dimension::length;
+      const Dimension by = own->depth ? Dimension::length : Dimension::force;
+      text += fmt::format("; by its own protocol: largest {} {}, at the end {} {} {}",
+                          own->depth ? "force" : "depth", sized_text(of, own->largest, 6),
+                          sized_text(of, own->last, 6),
+                          own->depth ? "at a depth of" : "under a load of",
+                          sized_text(by, own->last_imposed, 4));
     }
     text += "\n";
   }
   double overlap = 0.0;
   for (const CurvePoint& p : run.record.curve) overlap = std::max(overlap, p.overlap_m);
   if (tool > 0) {
-    text += fmt::format("tools come into spheres by at most {} um: contacts are stiff, not rigid\n",
-                        significant(1e6 * overlap, 3));
+    text += fmt::format("tools come into spheres by at most {}: contacts are stiff, not rigid\n",
+                        sized_text(Dimension::length, overlap, 3));
   }
   return text;
 }
@@ -261,8 +263,8 @@ std::string named(const std::vector<std::size_t>& spheres) {
 
 std::string validity_text(const Validity& validity, bool depth_limits) {
   std::string text =
-      fmt::format("deepest indentation of a sphere {} mm, most turned lateral bond {} degrees\n",
-                  significant(1e3 * validity.deepest_m, 4),
+      fmt::format("deepest indentation of a sphere {}, most turned lateral bond {} degrees\n",
+                  sized_text(Dimension::length, validity.deepest_m, 4),
                   significant(validity.most_turned_rad * 180.0 / std::numbers::pi, 4));
   for (std::size_t k = 0; k < kValidityLimits; ++k) {
     const auto limit = static_cast<ValidityLimit>(k);
@@ -284,8 +286,9 @@ std::string motion_text(const ExperimentScene& scene, const SimulationRun& run) 
   std::string text;
   if (!by_depth(scene)) {
     const CurvePoint& most = hardest(run.record);
-    text += fmt::format("largest force on the tissue: {} N, at {} s\n",
-                        significant(most.force_on_tissue_N, 6), significant(most.time_s, 4));
+    text += fmt::format("largest force on the tissue: {}, at {} s\n",
+                        sized_text(Dimension::force, most.force_on_tissue_N, 6),
+                        significant(most.time_s, 4));
   }
   const std::vector<ProbeBlow>& blows = run.record.blows;
   if (const ProbeBlow* most = largest_blow(blows)) {
@@ -297,10 +300,9 @@ std::string motion_text(const ExperimentScene& scene, const SimulationRun& run) 
   }
   if (!run.contact_check) return text;
   const ContactCheck& check = *run.contact_check;
-  const double unit = by_depth(scene) ? 1.0 : 1e3;
+  const Dimension of = by_depth(scene) ? Dimension::force : Dimension::length;
   const auto pair = [&](double here, double softer) {
-    return fmt::format("{} {} instead of {}", significant(unit * softer, 6),
-                       by_depth(scene) ? "N" : "mm", significant(unit * here, 6));
+    return fmt::format("{} instead of {}", sized_text(of, softer, 6), sized_text(of, here, 6));
   };
   text += fmt::format("with contacts {} times softer the largest {} is {}, that at the end {}",
                       shortest(ContactCheck::kSofter), by_depth(scene) ? "force" : "depth",
@@ -351,6 +353,48 @@ std::string solver_text(const SolverChoice& solver) {
   return text + "\n";
 }
 
+/// What is done to which sphere, and the loads of the scene.
+std::string scene_text(const ExperimentScene& scene) {
+  std::string text = fmt::format("{}: sphere {} of {} is {}\n", scene.tissue.title,
+                                 scene.probe().sphere + 1, scene.tissue.network.organ.size(),
+                                 by_depth(scene) ? "pushed to a depth" : "loaded");
+  for (const std::string& load : scene.load_words) {
+    text += fmt::format("before and all along: {}\n", load);
+  }
+  return text;
+}
+
+/// The largest response, and the last one.
+std::string response_text(const ExperimentScene& scene, const SimulationRecord& record) {
+  const bool depth = by_depth(scene);
+  const auto response = [&](const CurvePoint& p) {
+    return fmt::format("{} {} {}",
+                       sized_text(depth ? Dimension::force : Dimension::length, p.response, 6),
+                       depth ? "at a depth of" : "under a load of",
+                       sized_text(depth ? Dimension::length : Dimension::force, p.imposed, 4));
+  };
+  const CurvePoint& most = largest(record, scene.formulation.tolerance);
+  return fmt::format("largest {}: {}, at {} s\nat the end, {} s: {}\n", depth ? "force" : "depth",
+                     response(most), significant(most.time_s, 4),
+                     significant(record.curve.back().time_s, 4), response(record.curve.back()));
+}
+
+constexpr std::string_view kWarning = "WARNING: ";
+
+/// Adds the lines of a text, warnings apart from the others.
+void add_lines(std::vector<std::string>& lines, std::vector<std::string>& warnings,
+               std::string_view text) {
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+    if (line.starts_with(kWarning)) {
+      warnings.emplace_back(line.substr(kWarning.size()));
+    } else {
+      lines.emplace_back(line);
+    }
+  }
+}
+
 }  // namespace
 
 Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
@@ -386,25 +430,14 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
       f.kind == "quasi_static" ? Json(rounded(record.error_estimate, 3)) : Json(nullptr);
   json["resumed_at_s"] = run.resumed_at_s ? Json(*run.resumed_at_s) : Json(nullptr);
   json["validity"] = validity_json(record.validity, depth_limits_apply(scene.tissue));
+  json["warnings"] = short_answer(scene, network, run).warnings;
   return json;
 }
 
 std::string simulation_text(const ExperimentScene& scene, const RunNetwork& network,
                             const SimulationRun& run) {
   const SimulationRecord& record = run.record;
-  const bool depth = by_depth(scene);
-  const auto response = [&](const CurvePoint& p) {
-    return depth ? fmt::format("{} N at a depth of {} mm", significant(p.response, 6),
-                               significant(1e3 * p.imposed, 4))
-                 : fmt::format("{} mm under a load of {} N", significant(1e3 * p.response, 6),
-                               significant(p.imposed, 4));
-  };
-  std::string text =
-      fmt::format("{}: sphere {} of {} is {}\n", scene.tissue.title, scene.probe().sphere + 1,
-                  scene.tissue.network.organ.size(), depth ? "pushed to a depth" : "loaded");
-  for (const std::string& load : scene.load_words) {
-    text += fmt::format("before and all along: {}\n", load);
-  }
+  std::string text = scene_text(scene);
   text += contacts_text(scene, network, run);
   text += equations_text(scene, run);
   if (scene.formulation.masses) text += motion_text(scene, run);
@@ -412,13 +445,33 @@ std::string simulation_text(const ExperimentScene& scene, const RunNetwork& netw
   if (run.resumed_at_s) {
     text += fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));
   }
-  const CurvePoint& most = largest(record, scene.formulation.tolerance);
-  text += fmt::format("largest {}: {}, at {} s\n", depth ? "force" : "depth", response(most),
-                      significant(most.time_s, 4));
-  text += fmt::format("at the end, {} s: {}\n", significant(record.curve.back().time_s, 4),
-                      response(record.curve.back()));
+  text += response_text(scene, record);
   text += smoothness_text(smoothness_of(scene, record.outputs.back().position));
   return text + validity_text(record.validity, depth_limits_apply(scene.tissue));
+}
+
+ShortAnswer short_answer(const ExperimentScene& scene, const RunNetwork& network,
+                         const SimulationRun& run) {
+  const SimulationRecord& record = run.record;
+  ShortAnswer answer;
+  const auto add = [&](std::vector<std::string>& lines, const std::string& text) {
+    add_lines(lines, answer.warnings, text);
+  };
+  add(answer.conclusion, scene_text(scene) + response_text(scene, record));
+  add(answer.rows, contacts_text(scene, network, run));
+  answer.rest = [count = answer.rows.size()](std::size_t from) {
+    return fmt::format("... and {} more lines on contacts", count - from);
+  };
+  add(answer.limits, equations_text(scene, run));
+  if (scene.formulation.masses) add(answer.limits, motion_text(scene, run));
+  if (run.solver && !run.solver->direct) add(answer.limits, solver_text(*run.solver));
+  if (run.resumed_at_s) {
+    answer.limits.push_back(
+        fmt::format("resumed at {} s from a checkpoint", significant(*run.resumed_at_s, 4)));
+  }
+  add(answer.limits, smoothness_text(smoothness_of(scene, record.outputs.back().position)));
+  add(answer.limits, validity_text(record.validity, depth_limits_apply(scene.tissue)));
+  return answer;
 }
 
 }  // namespace tpm::plan

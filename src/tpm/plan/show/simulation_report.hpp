@@ -4,6 +4,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/organ/run/simulation.hpp"
+#include "tpm/show/short_answer.hpp"
 
 namespace tpm::plan {
 
@@ -13,5 +14,9 @@ namespace tpm::plan {
                                    const SimulationRun& run);
 [[nodiscard]] std::string simulation_text(const ExperimentScene& scene, const RunNetwork& network,
                                           const SimulationRun& run);
+/// The short answer: the largest and the last response, what touches, how far the run can be relied
+/// on, and every warning.
+[[nodiscard]] ShortAnswer short_answer(const ExperimentScene& scene, const RunNetwork& network,
+                                       const SimulationRun& run);
 
 }  // namespace tpm::plan

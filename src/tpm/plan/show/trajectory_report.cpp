@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "tpm/base/lists.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpmkit/model.hpp"
@@ -59,8 +60,9 @@ std::string trajectory_text(bool by_depth, const std::vector<double>& times_s,
                             const Trajectory& answer) {
   const auto point = [&](Eigen::Index i) {
     const double value = answer.response[i];
-    return fmt::format("{} {} at {} s", significant(by_depth ? value : 1e3 * value, 6),
-                       by_depth ? "N" : "mm", significant(times_s[static_cast<std::size_t>(i)], 4));
+    return fmt::format("{} at {} s",
+                       sized_text(by_depth ? Dimension::force : Dimension::length, value, 6),
+                       significant(times_s[static_cast<std::size_t>(i)], 4));
   };
   return fmt::format("largest {}: {}; at the end: {}\n", by_depth ? "force" : "depth",
                      point(largest_of(answer)), point(answer.response.size() - 1));

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/show/view_parts.hpp"
 #include "tpmkit/error.hpp"
@@ -66,6 +70,40 @@ std::vector<std::size_t> shown_states(std::size_t states, std::size_t spheres, s
   return shown;
 }
 
+/// The tools in the shown states: a ball is placed by its centre, a punch by its face.
+void add_tools(const Hdf5Reader& file, const std::filesystem::path& path,
+               const std::vector<std::size_t>& shown, ViewPage& page, Json& organ) {
+  if (!file.has("/tools/kind")) return;
+  constexpr std::uint64_t kKinds = 2;
+  const std::vector<std::uint32_t> kind = whole_numbers(file, path, "/tools/kind", kKinds);
+  std::vector<float> places;
+  for (const std::size_t step : shown) {
+    for (const double v :
+         table_of(file, path, step_name(step, "tools/position_m"), 3 * kind.size())) {
+      places.push_back(static_cast<float>(v));
+    }
+  }
+  organ["tools"] = {{"punch", kind},
+                    {"radius_m", file.numbers("/tools/radius_m")},
+                    {"direction", table_of(file, path, "/tools/direction", 3 * kind.size())},
+                    {"position_m", page.put(places)}};
+  if (organ["tools"]["radius_m"].size() != kind.size()) {
+    throw bad_input(path.string() + ": /tools/radius_m", "has another length than /tools/kind",
+                    kExpectedResult);
+  }
+}
+
+/// When the response is largest: the force, or the depth under a load.
+std::optional<double> time_of_peak(const Hdf5Reader& file) {
+  const char* const response = file.has("/curve/force_N") ? "/curve/force_N" : "/curve/depth_m";
+  if (!file.has(response)) return std::nullopt;
+  const std::vector<double> values = file.numbers(response);
+  const std::vector<double> times = file.numbers("/curve/time_s");
+  if (values.empty() || values.size() != times.size()) return std::nullopt;
+  const auto peak = std::ranges::max_element(values, {}, [](double v) { return std::abs(v); });
+  return times[static_cast<std::size_t>(peak - values.begin())];
+}
+
 void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::size_t most,
                ViewPage& page) {
   const std::vector<double> rest = file.table("/spheres/position_m");
@@ -94,6 +132,7 @@ void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::s
   }
   if (file.has("/probe/sphere")) organ["contact"] = file.numbers("/probe/sphere").at(0) - 1.0;
   if (file.has("/probe/direction")) organ["push"] = file.numbers("/probe/direction");
+  add_tools(file, path, shown, page, organ);
   page.description["organ"] = std::move(organ);
 }
 
@@ -152,6 +191,7 @@ ViewPage view_simulation(const std::filesystem::path& path, std::string_view byt
   } else {
     page.fact("organ", "this formulation does not show whole states: there is no organ to turn");
   }
+  if (const auto peak = time_of_peak(file)) page.description["start_s"] = *peak;
   add_curves(file, page);
   return page;
 }

@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+"""Runs shipped examples: an answer has at most 25 lines, none of them of JSON, says every warning that the JSON has, and
+names the next command; `--verbose` says more.
+
+    short_answers.py ROOT TPM
+"""
+
+import json
+import math
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+MOST = 25
+PLANS = (("shallow.json", "--tolerance", "1%", "--rate", "1000"), ("servo.json",), ("star.json",), ("creep.json",), ("deep.json",),
+         ("servo.json", "--wall", "1e-9 s per s"), ("tool.json", "--brief"), ("patch_field.json", "--outputs", "field", "--brief"))
+SCENES = ("liver_poke.json", "grasp.json", "sagging_liver.json", "two_indenters.json", "plan/fast_poke.json")
+
+
+class Checks:
+    def __init__(self, program, folder):
+        self.program, self.folder, self.faults, self.answers = program, folder, [], 0
+
+    def run(self, *words):
+        return subprocess.run([self.program, *map(str, words)], cwd=self.folder, capture_output=True, text=True, check=False,
+                              timeout=500)
+
+    def check(self, words, warnings, codes=(0,), verbose=True):
+        """@param warnings  of the JSON: a function of the document"""
+        said, told = self.run(*words), self.run(*words, "--format", "json")
+        name = " ".join(map(str, words))
+        if said.returncode not in codes or told.returncode != said.returncode:
+            self.faults.append(f"{name}: ends with {said.returncode} and {told.returncode}: {said.stderr[-300:]}")
+            return
+        self.answers += 1
+        lines = said.stdout.splitlines()
+        if len(lines) > MOST:
+            self.faults.append(f"{name}: {len(lines)} lines")
+        if any(line.startswith(("{", "}")) for line in lines):
+            self.faults.append(f"{name}: prints JSON")
+        if "more: --verbose" not in lines[-1]:
+            self.faults.append(f"{name}: ends with '{lines[-1]}'")
+        for words_of_one in warnings(json.loads(told.stdout)):
+            if words_of_one not in said.stdout:
+                self.faults.append(f"{name}: leaves out the warning '{words_of_one}'")
+        if verbose and len(self.run(*words, "--verbose").stdout) <= 0.5 * len(said.stdout):
+            self.faults.append(f"{name}: says less with --verbose")
+
+
+def make_group(folder, factors):
+    folder.mkdir()
+    for number, factor in enumerate(factors):
+        lines = ["time [s],depth [mm],force [N]"]
+        for i in range(440):
+            t = max(0.05 * i - 2.0, 0.0)
+            ramp = min(t, 2.0)
+            force = 0.12 * ramp + 0.18 * (math.exp((ramp - t) / 2.0) - math.exp(-t / 2.0))
+            noise = 2e-4 * math.sin(7919.0 * (i + 1) * (number + 2))
+            lines.append(f"{0.05 * i:.2f},{2.0 * ramp:.5f},{factor * force + noise:.7f}")
+        (folder / f"liver{number + 1}.csv").write_text("\n".join(lines) + "\n")
+
+
+def main():
+    root, program = Path(sys.argv[1]).resolve(), str(Path(sys.argv[2]).resolve())
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        checks = Checks(program, folder)
+        for plan, *options in PLANS:
+            checks.check(["plan", root / "configs/plan" / plan, "--costs", "nominal", *options], lambda d: d["warnings"], (0, 1))
+        for scene in SCENES:
+            checks.check(["simulate", root / "configs" / scene, "-o", "run.h5"], lambda d: d["warnings"])
+        subprocess.run([program, "hil", "run", root / "configs/hil_liver.json", "-o", "session.tpmrec"], cwd=folder, check=True,
+                       capture_output=True)
+        checks.check(["hil", "verify", "session.tpmrec"], lambda d: d["notes"])
+        make_group(folder / "healthy", (0.9, 1.0, 1.1))
+        make_group(folder / "fibrotic", (1.8, 2.0, 2.2))
+        checks.check(["fit", "healthy", "fibrotic", "--compare", "--law", "linear-1", "--no-draw", "--punch-radius", "2 mm"],
+                     lambda d: [])
+        checks.check(["fit", "healthy/liver1.csv", "--law", "linear-1", "--folder", "fitted"], lambda d: d["warnings"])
+        checks.check(["budget", "fitted/law.json", "healthy/liver1.csv", "--folder", "budget"], lambda d: d["flags"])
+        checks.check(["budget", "fitted/law.json", "--depth", "4 mm", "--rate", "2 mm/s", "--hold", "5 s", "--scene",
+                      root / "configs/budget_liver.json"], lambda d: d["flags"])
+    for fault in checks.faults:
+        print(fault)
+    print(f"{checks.answers} answers, {len(checks.faults)} faults")
+    return 1 if checks.faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
