@@ -289,13 +289,15 @@ Validation validate(const ValidationRequest& request) {
   for (const CalibrationData::File& file : request.calibration.files) {
     v.calibration.push_back(file);
   }
-  v.remarks = request.calibration.remarks;
+  v.remarks = request.remarks;
+  v.remarks.insert(v.remarks.end(), request.calibration.remarks.begin(),
+                   request.calibration.remarks.end());
   std::vector<RecordingComparison> unseen;
   std::vector<Applicability> unseen_motions;
   for (std::size_t i = 0; i < request.recordings.size(); ++i) {
     const PreparedRecording& recording = request.recordings[i];
     require_imposed_motion(recording.recording, recording.name, "validation");
-    if (request.earlier.empty()) require_rise(recording);
+    if (request.presses.empty()) require_rise(recording);
     ComparisonOptions options;
     options.quantities = request.quantities;
     options.requirement = request.requirement;
@@ -303,8 +305,8 @@ Validation validate(const ValidationRequest& request) {
     options.organ = request.organ.get();
     options.pick = request.pick;
     options.rendering = request.rendering;
-    if (!request.earlier.empty()) {
-      options.earlier = request.earlier.at(i);
+    if (!request.presses.empty()) {
+      options.motion = request.presses.at(i);
       options.known = KnownPlacement::surface;
     } else if (request.contact_by_threshold) {
       options.known = KnownPlacement::threshold;
