@@ -335,6 +335,14 @@ TEST_CASE("parts of fitted data get no verdict, whatever was done to them", "[va
     return true;
   });
   refused("thinned out", [](std::size_t i, double&, double&, double&) { return i % 2 == 0; });
+  refused("sampled again between its samples", [&](std::size_t i, double& t, double& d, double& f) {
+    const Recording& r = fitted.recording;
+    if (i + 1 == r.time_s.size()) return false;
+    t = std::lerp(t, r.time_s[i + 1], 0.3);
+    d = std::lerp(d, r.drive[i + 1], 0.3);
+    f = std::lerp(f, r.response[i + 1], 0.3);
+    return true;
+  });
   refused("rounded", [](std::size_t, double&, double&, double& f) {
     f = 1e-5 * std::round(1e5 * f);
     return true;
@@ -343,6 +351,16 @@ TEST_CASE("parts of fitted data get no verdict, whatever was done to them", "[va
     if (i % 5 < 2) f = other.recording.response[i];
     return true;
   });
+}
+
+TEST_CASE("a force in the wrong unit is a model error with a hint", "[validate]") {
+  const LawFile law = quiet_law();
+  PreparedRecording wrong = quiet_recording(1.0);
+  for (double& f : wrong.recording.response) f *= 1e3;
+  const Validation v = validate(request_for(law, wrong));
+  CHECK(v.verdict == ModelVerdict::seen);
+  CHECK_THAT(to_terminal_text(v), Contains("1e+03 times S") && Contains("units"));
+  CHECK(validate(request_for(law, quiet_recording(1.5))).remarks.empty());
 }
 
 TEST_CASE("a force that is counted negative is refused, not called a model error", "[validate]") {

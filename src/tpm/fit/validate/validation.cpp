@@ -125,6 +125,20 @@ std::string copy_words(const ValidationRequest& request, const PreparedRecording
   return {};
 }
 
+/// A measured value that is hundreds of times the simulated one, or less; empty: it is not.
+std::string unit_words(const RecordingComparison& r) {
+  constexpr double kFar = 300.0;
+  for (const QuantityComparison& q : r.quantities) {
+    if (q.quantity.kind != QuantityKind::peak || q.simulated == 0.0) continue;
+    const double ratio = std::abs(q.measured / q.simulated);
+    const bool clear = std::abs(q.measured) > q.e.expanded();
+    if (ratio < kFar && (ratio * kFar > 1.0 || !clear)) continue;
+    return fmt::format("{}: D of the {} is {} times S; look at the units of its columns", r.name,
+                       q.name, significant(ratio, 2));
+  }
+  return {};
+}
+
 /// All of them, or none.
 std::vector<PreparedRecording> found_recordings(const CalibrationData& calibration) {
   std::vector<PreparedRecording> found;
@@ -323,6 +337,8 @@ Validation validate(const ValidationRequest& request) {
         comparison = compare_with_recording(law, recording, options);
       }
     }
+    if (const std::string words = unit_words(comparison); !words.empty())
+      v.remarks.push_back(words);
     Applicability motion = motion_of(recording, comparison.parts,
                                      comparison.creep ? 0.0 : comparison.placement.contact);
     compare_with_calibration(motion, request);

@@ -309,10 +309,18 @@ void add_each_recording(BriefText& text, const Validation& v) {
         fmt::format("{} {}: {}", q.name, error_text(q.e, unit_of(q)), cell_words(q.verdict)),
         Rank::context);
   }
+  bool whole_said = false;
   for (const RecordingComparison& r : v.recordings) {
-    if (!part_is_said(r)) continue;
+    whole_said = whole_said || (r.part.whole() && part_is_said(r));
+    if (r.part.whole()) continue;
     text.add_line("compared", fmt::format("{}: {}", r.name, part_words(r.part, v.spec)),
-                  r.part.whole() ? Rank::recording : Rank::context);
+                  Rank::context);
+  }
+  if (whole_said) {
+    const bool all =
+        std::ranges::all_of(v.recordings, [](const auto& r) { return r.part.whole(); });
+    text.add_line("compared", all ? "the whole of each press" : "the whole of all other presses",
+                  Rank::context);
   }
   // Recordings of one protocol say the same.
   const auto said = [&](std::size_t i) { return applicability_text(v.applicability[i]); };
