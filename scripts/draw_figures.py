@@ -42,6 +42,7 @@ DATA_COLOURS = ["#222222", "#8A5A00", "#5B2A86", "#666666"]
 DATA_MARKERS = ["o", "s", "D", "^", "v", "X", "P"]
 # Later lines are thinner: where curves coincide, all of them show.
 LINE_WIDTHS = [2.8, 1.8, 1.1, 0.8]
+THIN_LINE = 0.9
 # More readings than this are drawn as a grey trace, wider than the lines over it.
 DENSE, DENSE_COLOUR, DENSE_SIZE, WIDEST_OVER_DENSE = 100, "#8C8C8C", 3.6, 1.1
 PIXELS_PER_INCH = 300
@@ -117,10 +118,18 @@ def looks(figure):
     return chosen
 
 
-def draw_line(axes, series, look):
+def draw_line(axes, series, look, one_of_many=False):
     style = dict(color=look["color"], linewidth=look["width"], linestyle="--" if is_assumed(series) else "-")
+    if one_of_many:
+        style.update(linewidth=THIN_LINE, alpha=0.55)
     axes.plot(series["x"], series["y"], zorder=3, **style)
-    return Line2D([], [], **style)
+    return Line2D([], [], **{**style, "alpha": None})
+
+
+def repeated_lines(panel):
+    """Labels of recordings that are drawn as several lines: thin ones, which do not hide each other."""
+    labels = [s["label"] for s in panel["series"] if s["kind"] == "line" and s["provenance"] == "measured"]
+    return {label for label in labels if labels.count(label) > 1}
 
 
 def inside(axes, series):
@@ -214,7 +223,7 @@ def draw_heat(axes, series, look, panel):
     return Rectangle((0, 0), 1, 1, facecolor=mesh.get_cmap()(0.5))
 
 
-DRAW = {"line": draw_line, "points": draw_points, "band": draw_band, "bracket": draw_bracket, "mark": draw_mark}
+DRAW = {"points": draw_points, "band": draw_band, "bracket": draw_bracket, "mark": draw_mark}
 
 
 def axis_label(axis):
@@ -273,9 +282,12 @@ def name_places(axes, names):
 def draw_panel(axes, panel, look, handles, narrow=False, letter=""):
     """Draws one panel and adds a handle per new legend text to `handles`."""
     axes.upper_limit = panel["y"].get("upper")
+    many = repeated_lines(panel)
     for series in panel["series"]:
         if series["kind"] == "heat":
             handle = draw_heat(axes, series, look[series["label"]], panel)
+        elif series["kind"] == "line":
+            handle = draw_line(axes, series, look[series["label"]], series["label"] in many)
         else:
             handle = DRAW[series["kind"]](axes, series, look[series["label"]])
         handles.setdefault(legend_text(series), handle)

@@ -125,13 +125,13 @@ bool is_session(const std::string& file) {
 }
 
 void add_presses(ValidationRequest& request, const std::string& file) {
-  const std::vector<SessionPress> presses =
-      session_presses(read_recording(file), sha256_hex(read_file(file)));
-  for (const SessionPress& press : presses) {
-    request.recordings.push_back(press.recording);
-    request.earlier.push_back(press.earlier);
+  SessionPresses presses = session_presses(read_recording(file), sha256_hex(read_file(file)));
+  for (SessionPress& press : presses.made) {
+    request.recordings.push_back(std::move(press.recording));
+    request.presses.push_back(std::move(press.motion));
     request.instruments.emplace_back();
   }
+  for (std::string& words : presses.left_out) request.remarks.push_back(std::move(words));
 }
 
 /// Recordings, or the presses of sessions: not both, for a press has no zero to be found.
@@ -167,7 +167,13 @@ void add_rendering(ValidationRequest& request, const ValidateOptions& options) {
   presses.calibration = {};
   add_presses(presses, options.session);
   request.session = options.session;
-  request.rendering = rendering_errors(validate(presses));
+  const Validation rendered = validate(presses);
+  request.rendering = rendering_errors(rendered);
+  request.remarks = presses.remarks;
+  for (const RecordingComparison& r : rendered.recordings) {
+    if (r.part.whole()) continue;
+    request.remarks.push_back(fmt::format("{}: {}", r.name, part_words(r.part, presses.law.spec)));
+  }
 }
 
 ValidationRequest validation_request(const ValidateOptions& options) {

@@ -179,6 +179,13 @@ TEST_CASE("a requirement is a share, an amount or what a hand can tell", "[valid
   CHECK(amount.value == Approx(0.02));
   CHECK(amount.dimension == Dimension::force);
   CHECK(parse_requirement("jnd", "--require").value == Approx(0.07));
+  for (const char* bare : {"20", "1", "1e3"}) {
+    CHECK_THAT(test::refusal_of([&] { (void)parse_requirement(bare, "--require"); }),
+               Contains("has no unit"));
+  }
+  for (const char* none : {"0", "0%", "-5%", "-3 mN", "20 kg"}) {
+    CHECK_THROWS(parse_requirement(none, "--require"));
+  }
   CHECK_THAT(test::refusal_of([] { (void)parse_requirement("big", "--require"); }),
              Contains("10%"));
   CHECK_THAT(test::refusal_of([] { (void)parse_requirement("0%", "--require"); }),

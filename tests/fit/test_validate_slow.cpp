@@ -47,6 +47,22 @@ TEST_CASE("the example of the help runs, and its page finds what changed", "[val
     CHECK(std::filesystem::exists(folder / (std::string("validated/") + file)));
   }
   CHECK(read_json(folder / "validated/validation.json").at("verdict") == "adequate");
+  // On a narrow screen every table of the page with a SHA-256 stacks.
+  const std::string credible = read_file(folder / "page.html");
+  CHECK_THAT(credible, Catch::Matchers::Contains("data-title=\"standard uncertainty\"") &&
+                           Catch::Matchers::Contains("data-title=\"SHA-256\"") &&
+                           Catch::Matchers::Contains("overflow-wrap: anywhere"));
+  // Recordings of one protocol are one line of the figure, with how many they are.
+  write_table(folder / "again.csv", test::study_recording(protocol, noise, random));
+  CHECK(run_in(folder, "validate fitted/law.json other.csv again.csv --folder two") == 0);
+  std::vector<std::string> labels;
+  for (const Json& series :
+       read_json(folder / "two/figures.json")["figures"][1]["panels"][0]["series"]) {
+    labels.push_back(series.at("label"));
+  }
+  CHECK(labels == std::vector<std::string>{"calibration", "other.csv and 1 of its protocol",
+                                           "other.csv and 1 of its protocol",
+                                           "deepest of the calibration"});
   CHECK(run_in(folder, "validate --recheck page.html") == 0);
   // Another recording under the same name.
   write_table(folder / "other.csv", test::study_recording(protocol, noise, random, 1.3));

@@ -145,6 +145,67 @@ TEST_CASE("creep of the same material is as predicted, of a stiffer one it is no
   CHECK(validate(request_for(law, creep_recording(law, 1.1, 6))).verdict == ModelVerdict::seen);
 }
 
+TEST_CASE("the text takes 25 lines at most and ends in the verdict", "[validate]") {
+  const LawFile law = quiet_law();
+  const auto lines_of = [](const Validation& v) {
+    const std::string text = to_terminal_text(v);
+    INFO(text);
+    CHECK(text.ends_with("\n"));
+    // The verdict is the last item, of three lines at most.
+    const auto verdict = text.rfind("\nverdict        ");
+    REQUIRE(verdict != std::string::npos);
+    CHECK(std::count(text.begin() + static_cast<std::ptrdiff_t>(verdict), text.end(), '\n') <= 4);
+    const auto lines = std::count(text.begin(), text.end(), '\n');
+    CHECK(lines <= 25);
+    CHECK((to_json(v)["recordings"].size() == v.recordings.size()));
+    return lines;
+  };
+  SECTION("creep with five undetermined quantities") {
+    PreparedRecording creep = creep_recording(law, 1.0, 5);
+    // No reading before the load tells the depth without one.
+    Recording& r = creep.recording;
+    const std::ptrdiff_t rest = 80;
+    r.time_s.erase(r.time_s.begin(), r.time_s.begin() + rest);
+    r.drive.erase(r.drive.begin(), r.drive.begin() + rest);
+    r.response.erase(r.response.begin(), r.response.begin() + rest);
+    r.drive.front() = 0.01;
+    ValidationRequest request = request_for(law, creep);
+    request.requirement = parse_requirement("0.000001%", "test");
+    for (int i = 0; i < 8; ++i) request.remarks.push_back("something that is to be said with it");
+    const Validation v = validate(request);
+    CHECK(v.recordings.front().quantities.size() == 5);
+    CHECK(std::ranges::all_of(v.recordings.front().quantities, [](const QuantityComparison& q) {
+      return q.verdict == ModelVerdict::undetermined || q.remark.empty();
+    }));
+    (void)lines_of(v);
+  }
+  SECTION("thirty quantities, each with a remark of its own") {
+    ValidationRequest request = request_for(law, quiet_recording(1.0));
+    for (int i = 0; i < 30; ++i) {
+      request.quantities.push_back({QuantityKind::at_time, 20.5 + 0.5 * i});
+    }
+    request.requirement = parse_requirement("0.1%", "test");
+    const Validation v = validate(request);
+    CHECK(lines_of(v) == 25);
+    CHECK_THAT(to_terminal_text(v), Contains("left out") && Contains("quantities ("));
+  }
+  SECTION("forty recordings with long names") {
+    ValidationRequest request = request_for(law, quiet_recording(1.0, 1));
+    for (std::uint64_t i = 2; i <= 40; ++i) {
+      request.recordings.push_back(quiet_recording(1.0, i));
+      request.recordings.back().name = std::string(60, 'a') + std::to_string(i);
+    }
+    const Validation v = validate(request);
+    CHECK(lines_of(v) >= 24);
+    CHECK_THAT(to_terminal_text(v), Contains("recordings (") && !Contains("aaa9"));
+  }
+  SECTION("an ordinary answer is printed whole") {
+    const Validation v = validate(request_for(law, quiet_recording(1.05)));
+    CHECK(lines_of(v) < 25);
+    CHECK_THAT(to_terminal_text(v), !Contains("left out"));
+  }
+}
+
 TEST_CASE("a requirement in the unit of nothing is refused, also of fitted data", "[validate]") {
   const LawFile law = quiet_law();
   ValidationRequest request = request_for(law, quiet_recording(1.0));
@@ -274,6 +335,14 @@ TEST_CASE("parts of fitted data get no verdict, whatever was done to them", "[va
     return true;
   });
   refused("thinned out", [](std::size_t i, double&, double&, double&) { return i % 2 == 0; });
+  refused("sampled again between its samples", [&](std::size_t i, double& t, double& d, double& f) {
+    const Recording& r = fitted.recording;
+    if (i + 1 == r.time_s.size()) return false;
+    t = std::lerp(t, r.time_s[i + 1], 0.3);
+    d = std::lerp(d, r.drive[i + 1], 0.3);
+    f = std::lerp(f, r.response[i + 1], 0.3);
+    return true;
+  });
   refused("rounded", [](std::size_t, double&, double&, double& f) {
     f = 1e-5 * std::round(1e5 * f);
     return true;
@@ -282,6 +351,16 @@ TEST_CASE("parts of fitted data get no verdict, whatever was done to them", "[va
     if (i % 5 < 2) f = other.recording.response[i];
     return true;
   });
+}
+
+TEST_CASE("a force in the wrong unit is a model error with a hint", "[validate]") {
+  const LawFile law = quiet_law();
+  PreparedRecording wrong = quiet_recording(1.0);
+  for (double& f : wrong.recording.response) f *= 1e3;
+  const Validation v = validate(request_for(law, wrong));
+  CHECK(v.verdict == ModelVerdict::seen);
+  CHECK_THAT(to_terminal_text(v), Contains("1e+03 times S") && Contains("units"));
+  CHECK(validate(request_for(law, quiet_recording(1.5))).remarks.empty());
 }
 
 TEST_CASE("a force that is counted negative is refused, not called a model error", "[validate]") {

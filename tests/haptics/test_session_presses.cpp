@@ -14,21 +14,24 @@ namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
 
 /// Two presses on 60 + 45 exp(-t / 2 s) N/m, the second before the first is forgotten.
-Json law_session() {
-  return Json::parse(R"({
+Json law_session(const char* rate = "2 mm/s") {
+  Json json = Json::parse(R"({
     "model": {"kind": "law", "law": {"law": "linear-1", "drive": "indentation_depth",
       "response": "contact_force", "reference_m": 0.004, "fitted_to_m": 0.004,
       "parameters": {"k_inf_N_per_m": 60, "k1_N_per_m": 45, "tau1_s": 2}, "provenance": "assumed"}},
-    "indentations": {"depths": ["2 mm", "3 mm"], "rates": ["2 mm/s"], "hold": "3 s", "rest": "1 s"}
+    "indentations": {"depths": ["2 mm", "3 mm"], "rates": [], "hold": "3 s", "rest": "1 s"}
   })");
+  json["indentations"]["rates"].push_back(rate);
+  return json;
 }
 
-HilRecording law_recording(const test::TempFolder& folder) {
+HilRecording law_recording(const test::TempFolder& folder, const char* rate = "2 mm/s") {
   SessionRunOptions options;
   options.recording = folder / "r";
-  (void)run_session(test::parsed(law_session()), {}, options);
+  (void)run_session(test::parsed(law_session(rate)), {}, options);
   return read_recording(folder / "r");
 }
 
@@ -50,23 +53,31 @@ LawFile rendered_law(double stiffer) {
 
 TEST_CASE("A session's presses are those that it asked for, each with what came before") {
   const test::TempFolder folder;
-  const std::vector<SessionPress> presses = session_presses(law_recording(folder), "abc");
+  const SessionPresses found = session_presses(law_recording(folder), "abc");
+  CHECK(found.left_out.empty());
+  const std::vector<SessionPress>& presses = found.made;
   REQUIRE(presses.size() == 2);
   for (std::size_t i = 0; i < 2; ++i) {
     const Recording& r = presses[i].recording.recording;
     CHECK(r.header.sha256 == "abc");
     CHECK(r.time_s.size() >= 2000);
-    REQUIRE_FALSE(presses[i].earlier.empty());
-    CHECK(presses[i].earlier.back().time_s < r.time_s.front());
+    const std::vector<Knot>& earlier = presses[i].motion.earlier;
+    REQUIRE_FALSE(earlier.empty());
+    CHECK(earlier.back().time_s < r.time_s.front());
+    CHECK_THAT(r.time_s.back() - presses[i].motion.hold_asked_s.value(), WithinAbs(3.0, 0.01));
     const double deepest = *std::ranges::max_element(r.drive);
     CHECK_THAT(deepest, WithinAbs(i == 0 ? 2e-3 : 3e-3, 2e-4));
   }
-  CHECK(presses[1].earlier.size() > presses[0].recording.recording.time_s.size());
+  CHECK(presses[1].motion.earlier.size() > presses[0].recording.recording.time_s.size());
 }
 
 TEST_CASE("The law that was rendered answers the hand's motion, and a stiffer one does not") {
   const test::TempFolder folder;
-  const std::vector<SessionPress> presses = session_presses(law_recording(folder), "abc");
+  // The slower hand pauses where it meets the surface.
+  const char* rate = GENERATE("2 mm/s", "1 mm/s");
+  CAPTURE(rate);
+  const std::vector<SessionPress> presses =
+      session_presses(law_recording(folder, rate), "abc").made;
   const auto compared = [&](double stiffer) {
     fit::ValidationRequest request;
     request.law = rendered_law(stiffer);
@@ -75,7 +86,7 @@ TEST_CASE("The law that was rendered answers the hand's motion, and a stiffer on
     request.requirement = fit::parse_requirement("2%", "test");
     for (const SessionPress& press : presses) {
       request.recordings.push_back(press.recording);
-      request.earlier.push_back(press.earlier);
+      request.presses.push_back(press.motion);
     }
     return fit::validate(request);
   };
@@ -86,8 +97,13 @@ TEST_CASE("The law that was rendered answers the hand's motion, and a stiffer on
       // A millisecond or two late, at 2 mm/s: well below 1 % of the force.
       CHECK(std::abs(q.e.error) < 0.01 * q.measured);
     }
+    CHECK(r.part.whole());
   }
   CHECK(same.verdict == fit::ModelVerdict::adequate);
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    const double largest = *std::ranges::max_element(presses[i].recording.recording.response);
+    CHECK_THAT(same.recordings[i].quantities.front().measured, WithinRel(largest, 0.05));
+  }
   for (const fit::RenderingError& e : rendering_errors(same)) {
     CHECK(e.presses == 2);
     CHECK(std::abs(e.mean) < 0.01);

@@ -61,7 +61,8 @@ constexpr std::string_view kStackingStyle =
   table.stacks caption { overflow-wrap: anywhere; }
   table.stacks thead { display: none; }
   table.stacks tr { display: block; padding: .4rem 0; border-bottom: 1px solid var(--rule); }
-  table.stacks td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .1rem .3rem; }
+  table.stacks td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .1rem .3rem;
+                    overflow-wrap: anywhere; }
   table.stacks td::before { content: attr(data-title); color: var(--soft); }
 }
 )css";

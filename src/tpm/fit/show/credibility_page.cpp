@@ -175,6 +175,7 @@ class EvidencePage {
     Table table{
         fmt::format("{}, SHA-256 {}", file, validation_.at("law_sha256").get<std::string>()),
         {{"parameter"}, {"value", true}, {"standard uncertainty", true}}};
+    table.stacks = true;  // its caption is long
     const Json& parameters = record_.at("law").at("parameters");
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       const std::string at = fmt::format("/law/parameters/{}/", i);
@@ -263,6 +264,7 @@ class EvidencePage {
 
   void add_files(Document& d) const {
     Table table{"", {{"file"}, {"SHA-256"}}};
+    table.stacks = true;
     for (const auto& [name, sha256] : record_.at("files").items()) {
       Json::json_pointer place("/files");
       place /= name;

@@ -73,6 +73,31 @@ Figure error_figure(const Validation& v) {
   return figure;
 }
 
+/// "a.csv", or "a.csv and 4 of its protocol": the figure would show these as one line.
+std::vector<std::string> motion_labels(const Validation& v) {
+  constexpr double kSame = 0.02;
+  const auto close = [](double a, double b) { return std::abs(a - b) <= kSame * std::abs(b); };
+  std::vector<std::size_t> first(v.recordings.size());
+  std::vector<int> count(v.recordings.size(), 0);
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const auto alike = [&](const Applicability& a) {
+      const Applicability& b = v.applicability[i];
+      return &a == &b || (close(a.depth, b.depth) && close(a.duration_s, b.duration_s) &&
+                          close(a.rate, b.rate));
+    };
+    first[i] = static_cast<std::size_t>(std::ranges::find_if(v.applicability, alike) -
+                                        v.applicability.begin());
+    ++count[first[i]];
+  }
+  std::vector<std::string> labels;
+  for (const std::size_t k : first) {
+    labels.push_back(
+        count[k] > 1 ? fmt::format("{} and {} of its protocol", v.recordings[k].name, count[k] - 1)
+                     : v.recordings[k].name);
+  }
+  return labels;
+}
+
 Series motion_line(const std::string& label, const Recording& r, double contact, double unit) {
   const std::size_t stride = 1 + r.time_s.size() / kMostMotionPoints;
   Series s{.kind = Series::Kind::line,
@@ -91,14 +116,19 @@ Figure motion_figure(const ValidationRequest& request, const Validation& v) {
   Panel panel{
       .x = {"time", "s"},
       .y = {fmt::format("{} beyond contact", spaced(quantity_name(v.spec.drive))), unit.symbol}};
+  const auto found = std::ranges::count_if(
+      v.calibration, [](const CalibrationData::File& f) { return f.recording.has_value(); });
+  const std::string calibration =
+      found > 1 ? fmt::format("calibration, {} recordings", found) : "calibration";
   for (const CalibrationData::File& file : v.calibration) {
     if (!file.recording) continue;
     const Recording& r = file.recording->recording;
     const double contact = file.recording->phases.contact_drive;
-    add_if_any(panel, motion_line("calibration", r, contact, unit.to_si));
+    add_if_any(panel, motion_line(calibration, r, contact, unit.to_si));
   }
+  const std::vector<std::string> labels = motion_labels(v);
   for (std::size_t i = 0; i < v.recordings.size(); ++i) {
-    add_if_any(panel, motion_line(v.recordings[i].name, request.recordings[i].recording,
+    add_if_any(panel, motion_line(labels[i], request.recordings[i].recording,
                                   v.recordings[i].placement.contact, unit.to_si));
   }
   if (const auto& depth = v.applicability.front().fitted_depth) {

@@ -51,7 +51,7 @@ class Comparer {
       : options_(options),
         prepared_(recording),
         r_(prepared_.recording),
-        along_(law, prepared_, options.organ, options.earlier),
+        along_(law, prepared_, options.organ, options.motion.earlier),
         degrees_of_law_(law.uncertainty->degrees_of_freedom.value_or(kInfinity)) {}
 
   RecordingComparison compare() {
@@ -63,7 +63,9 @@ class Comparer {
     const auto& theirs = options_.calibration_instrument;
     result_.same_instrument = ours && theirs && ours->id == theirs->id;
     result_.creep = along_.load_imposed();
-    result_.parts = parts_of(prepared_);
+    const std::optional<double>& asked_s = options_.motion.hold_asked_s;
+    result_.parts = asked_s ? parts_of_press(prepared_, *asked_s) : parts_of(prepared_);
+    result_.part = compared_part(r_, result_.parts, asked_s);
     result_.scatter = scatter_of(prepared_, result_.parts);
     result_.placement = place_for_validation(along_, prepared_, result_.parts, result_.scatter,
                                              options_.placement, known_placement());

@@ -62,6 +62,7 @@ struct RecordingComparison {
   std::string name, sha256;
   bool calibration = false;  ///< the law was fitted to these data
   RecordingParts parts;
+  ComparedPart part;
   ReadingScatter scatter;
   ValidationPlacement placement;
   std::optional<Instrument> instrument;
@@ -93,6 +94,13 @@ struct RenderingError {
   int presses = 0;
 };
 
+/// What a session knows of one of its presses.
+struct SessionMotion {
+  std::vector<Knot> earlier;  ///< motion from the session's start to the press
+  /// When the hand was asked to hold, of the recording's clock; none: it was not.
+  std::optional<double> hold_asked_s;
+};
+
 struct ComparisonOptions {
   std::vector<QuantityOfInterest> quantities;  ///< empty: default_quantities()
   std::optional<Requirement> requirement;
@@ -100,7 +108,7 @@ struct ComparisonOptions {
   KnownPlacement known = KnownPlacement::nothing;
   const OrganOfLaw* organ = nullptr;  ///< answers in place of the law
   PickAnswer pick = nullptr;          ///< answers in place of the organ
-  std::vector<Knot> earlier;          ///< motion before the recording
+  SessionMotion motion;               ///< of a session's press
   std::vector<RenderingError> rendering;
   std::optional<Instrument> instrument, calibration_instrument;
   bool calibration_data = false;

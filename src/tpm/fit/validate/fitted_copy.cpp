@@ -34,9 +34,12 @@ class Overlay {
     const double t = of_.time_s[i] + later_s;
     auto next = static_cast<std::size_t>(
         std::lower_bound(in_.time_s.begin(), in_.time_s.end(), t - time_) - in_.time_s.begin());
-    if (next == in_.time_s.size() || in_.time_s[next] > t + time_) return false;
-    return std::abs(in_.drive[next] - of_.drive[i]) <= drive_ &&
-           std::abs(in_.response[next] - of_.response[i]) <= response_;
+    if (next == in_.time_s.size()) return false;
+    if (in_.time_s[next] <= t + time_) return same(i, in_.drive[next], in_.response[next]);
+    if (next == 0) return false;
+    const double share = (t - in_.time_s[next - 1]) / (in_.time_s[next] - in_.time_s[next - 1]);
+    return same(i, std::lerp(in_.drive[next - 1], in_.drive[next], share),
+                std::lerp(in_.response[next - 1], in_.response[next], share));
   }
   /// Of about `most` samples over the whole recording.
   [[nodiscard]] double share(double later_s, std::size_t most) const {
@@ -47,6 +50,11 @@ class Overlay {
   }
 
  private:
+  [[nodiscard]] bool same(std::size_t i, double drive, double response) const {
+    return std::abs(drive - of_.drive[i]) <= drive_ &&
+           std::abs(response - of_.response[i]) <= response_;
+  }
+
   const Recording& of_;
   const Recording& in_;
   double time_, drive_, response_;
@@ -66,6 +74,11 @@ double share_of_readings(const Recording& of, const Recording& in, double sigma)
   constexpr double kGolden = 0.6180339887498949;
   constexpr double kWorthAll = 0.25;
   double most = 0.0;
+  // Readings between those of the other one, at its clock or from its start on.
+  for (const double later_s : {0.0, in.time_s.front() - of.time_s.front()}) {
+    if (overlay.share(later_s, kFew) > kWorthAll) most = std::max(most, overlay.share(later_s, n));
+  }
+  if (most > kWorthAll) return most;
   for (std::size_t k = 0; k < kAnchors; ++k) {
     const double place = std::fmod((static_cast<double>(k) + 0.5) * kGolden, 1.0);
     const auto anchor = static_cast<std::size_t>(place * static_cast<double>(n));

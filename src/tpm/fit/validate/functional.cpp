@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/median.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/data/drive_pieces.hpp"
@@ -18,6 +19,7 @@ constexpr std::size_t kFewestOfLine = 5;
 constexpr double kPeakPart = 0.05;    // of the hold, at most as long as the ramp
 constexpr double kEndPart = 0.1;      // of the hold
 constexpr double kLocalPart = 0.025;  // of the ramp or the hold, on each side of a place
+constexpr std::size_t kFewestOfHold = 10;
 
 /// Samples [first, last], both included, of one window.
 struct Stretch {
@@ -205,6 +207,32 @@ double corner_of(const Recording& r, const RecordingParts& parts) {
   return std::clamp(meets, t.back(), r.time_s[*parts.hold_first + 1]);
 }
 
+void set_corner(RecordingParts& parts, const Recording& r) {
+  parts.corner_s = corner_of(r, parts);
+  while (parts.has_hold() && *parts.hold_first < *parts.hold_last &&
+         r.time_s[*parts.hold_first] < parts.corner_s) {
+    ++*parts.hold_first;
+  }
+}
+
+using PieceIterator = std::vector<DrivePiece>::const_iterator;
+
+/// Whether the drive goes on after a piece in which it stood still for a moment.
+bool is_pause(PieceIterator piece, PieceIterator end, const RecordingParts& parts,
+              const Recording& r) {
+  constexpr double kRisesOn = 0.1;  // of the drive's range
+  if (end - piece < 2 || piece->motion != Motion::still) return false;
+  const DrivePiece& on = *(piece + 1);
+  if (on.motion != Motion::rising) return false;
+  const auto [low, high] = std::ranges::minmax_element(r.drive);
+  if (r.drive[on.last] - r.drive[on.first] < kRisesOn * (*high - *low)) return false;
+  const auto lasts = [&](std::size_t first, std::size_t last) {
+    return r.time_s[last] - r.time_s[first];
+  };
+  return lasts(piece->first, piece->last) <
+         std::max(lasts(parts.ramp_first, parts.ramp_last), lasts(on.first, on.last));
+}
+
 double parse_place(std::string_view text, Quantity drive, std::string_view where,
                    QuantityKind& kind) {
   const std::string expected =
@@ -283,22 +311,97 @@ RecordingParts parts_of(const PreparedRecording& recording) {
   }
   parts.ramp_first = ramp->first;
   parts.ramp_last = parts.loop_last = ramp->last;
-  const auto next = ramp + 1;
-  constexpr std::size_t kFewestOfHold = 10;
+  auto next = ramp + 1;
+  for (; is_pause(next, pieces.end(), parts, r); next += 2) {
+    parts.ramp_last = parts.loop_last = (next + 1)->last;
+  }
   if (next != pieces.end() && next->motion == Motion::still &&
       next->last - next->first >= kFewestOfHold) {
     parts.hold_first = next->first;
     parts.hold_last = next->last;
   }
-  parts.corner_s = corner_of(r, parts);
-  while (parts.has_hold() && *parts.hold_first < *parts.hold_last &&
-         r.time_s[*parts.hold_first] < parts.corner_s) {
-    ++*parts.hold_first;
-  }
+  set_corner(parts, r);
   const auto falling = std::find_if(
       ramp, pieces.end(), [](const DrivePiece& p) { return p.motion == Motion::falling; });
   if (falling != pieces.end()) parts.loop_last = falling->last;
   return parts;
+}
+
+RecordingParts parts_of_press(const PreparedRecording& recording, double hold_asked_s) {
+  constexpr double kNear = 0.02, kAway = 0.1;  // of the level
+  constexpr double kTremor = 3.0;              // standard deviations of the depth in the hold
+  const Recording& r = recording.recording;
+  const std::vector<double>& depth = r.drive;
+  const auto deepest = std::ranges::max_element(depth);
+  if (deepest == depth.end() || !(*deepest > depth.front())) {
+    throw bad_input(fmt::format("recording '{}'", recording.name), "its drive never rises",
+                    "a press into the tissue");
+  }
+  const auto place = [&](auto where) { return static_cast<std::size_t>(where - depth.begin()); };
+  const auto asked =
+      depth.begin() + (std::ranges::lower_bound(r.time_s, hold_asked_s) - r.time_s.begin());
+  const double level = asked == depth.end() ? 0.0 : median(std::vector<double>(asked, depth.end()));
+  RecordingParts parts;
+  parts.ramp_last = place(deepest);
+  if (level > 0.0) {
+    std::vector<double> away;
+    for (auto d = asked; d != depth.end(); ++d) away.push_back(std::abs(*d - level));
+    constexpr double kMedianToSd = 1.4826;  // of a normal distribution
+    const double near =
+        std::clamp(kTremor * kMedianToSd * median(std::move(away)), kNear * level, kAway * level);
+    const auto arrived = std::ranges::find_if(depth, [&](double d) { return d >= level - near; });
+    const auto left = std::find_if(depth.rbegin(), depth.rend(),
+                                   [&](double d) { return d >= level - near - kAway * level; });
+    const std::size_t last = depth.size() - 1 - static_cast<std::size_t>(left - depth.rbegin());
+    if (place(arrived) + kFewestOfHold <= last) {
+      parts.ramp_last = place(arrived);
+      parts.hold_first = parts.ramp_last;
+      parts.hold_last = last;
+    }
+  }
+  constexpr double kStill = 1e-3;  // of what the ramp reaches
+  const double rest = depth.front();
+  while (parts.ramp_first + 1 < parts.ramp_last &&
+         depth[parts.ramp_first + 1] <= rest + kStill * (depth[parts.ramp_last] - rest)) {
+    ++parts.ramp_first;
+  }
+  parts.loop_last = parts.ramp_last;
+  set_corner(parts, r);
+  return parts;
+}
+
+bool ComparedPart::whole() const {
+  constexpr double kMost = 0.9;
+  return depth >= kMost * depth_of_all && left_out_s <= (1.0 - kMost) * loaded_s;
+}
+
+ComparedPart compared_part(const Recording& recording, const RecordingParts& parts,
+                           std::optional<double> hold_asked_s) {
+  const std::vector<double>& t = recording.time_s;
+  const std::vector<double>& drive = recording.drive;
+  const std::size_t last = std::max(parts.hold_last.value_or(parts.ramp_last), parts.loop_last);
+  const double rest = drive[parts.ramp_first];
+  ComparedPart part;
+  part.from_s = t[parts.ramp_first];
+  part.corner_s = parts.corner_s;
+  part.to_s = t[last];
+  const auto begin = drive.begin();
+  part.depth = *std::max_element(begin + static_cast<std::ptrdiff_t>(parts.ramp_first),
+                                 begin + static_cast<std::ptrdiff_t>(last) + 1) -
+               rest;
+  part.depth_of_all = *std::ranges::max_element(drive) - rest;
+  if (parts.has_hold()) part.hold_s = t[*parts.hold_last] - parts.corner_s;
+  if (hold_asked_s) {
+    part.hold_asked_s = part.loaded_s = t.back() - *hold_asked_s;
+    part.left_out_s = parts.has_hold() ? t.back() - part.to_s : part.loaded_s;
+    return part;
+  }
+  for (std::size_t i = 1; i < t.size(); ++i) {
+    if (drive[i] - rest < 0.5 * part.depth_of_all) continue;
+    part.loaded_s += t[i] - t[i - 1];
+    if (i > last) part.left_out_s += t[i] - t[i - 1];
+  }
+  return part;
 }
 
 std::vector<QuantityOfInterest> default_quantities(const RecordingParts& parts, bool creep) {

@@ -55,8 +55,37 @@ struct RecordingParts {
   [[nodiscard]] bool has_hold() const { return hold_first.has_value(); }
 };
 
-/// Throws Error(bad_input) naming the recording if its drive never rises.
+/// The first ramp and the hold after it. A pause on the way is part of the ramp: it is shorter than
+/// a motion beside it, and the drive rises on by a tenth of its range or more. Throws
+/// Error(bad_input) naming the recording if its drive never rises.
 [[nodiscard]] RecordingParts parts_of(const PreparedRecording& recording);
+
+/// The same of a press by a hand that was asked to hold from a time on. A hand may start early or
+/// late, pause, tremble, overshoot and slip: the level is the median of the depth from that time
+/// on, the ramp ends where the depth first comes near it, and the hold lasts until the hand leaves
+/// it for good.
+/// @param hold_asked_s of the recording's clock; the recording ends with the hold
+[[nodiscard]] RecordingParts parts_of_press(const PreparedRecording& recording,
+                                            double hold_asked_s);
+
+/// What part of a recording its quantities are read from.
+struct ComparedPart {
+  double from_s = 0.0, corner_s = 0.0, to_s = 0.0;  ///< of the recording's clock
+  double depth = 0.0;                               ///< largest drive within it, SI
+  double depth_of_all = 0.0;                        ///< largest drive of the recording, SI
+  double hold_s = 0.0;
+  std::optional<double> hold_asked_s;  ///< how long a hand was asked to hold
+  double loaded_s = 0.0;    ///< how long the drive stays above half of its largest, or was asked to
+  double left_out_s = 0.0;  ///< of that, after to_s
+
+  /// Nine tenths of the largest drive, and of the time under load. A hand that comes late makes a
+  /// longer ramp.
+  [[nodiscard]] bool whole() const;
+};
+
+/// @param hold_asked_s see parts_of_press
+[[nodiscard]] ComparedPart compared_part(const Recording& recording, const RecordingParts& parts,
+                                         std::optional<double> hold_asked_s);
 
 /// The quantities that a recording of these parts has: peak, end of the hold, relaxation ratio and
 /// half time of a ramp and hold, of creep the rate, too; the work where it is unloaded.

@@ -36,6 +36,39 @@ Eigen::MatrixXd smooth_shapes(std::span<const double> x, bool hold) {
   return shapes;
 }
 
+/// Whether a drive that is said to be held moves.
+bool trembles(std::span<const double> drive, double travel) {
+  constexpr double kSmall = 1e-3;  // of the travel
+  const auto [low, high] = std::ranges::minmax_element(drive);
+  return *high - *low > kSmall * travel;
+}
+
+/// What a viscoelastic material may answer to a drive that does not stay: the drive itself and its
+/// memories, int exp(-(t - s) / tau) dx(s), with times a factor of four apart.
+Eigen::MatrixXd answers_to(std::span<const double> time_s, std::span<const double> drive) {
+  constexpr Eigen::Index kMemories = 6;
+  const auto n = static_cast<Eigen::Index>(time_s.size());
+  Eigen::MatrixXd answers(n, kMemories + 1);
+  double tau_s = 0.5 * (time_s.back() - time_s.front());
+  for (Eigen::Index k = 0; k < kMemories; ++k, tau_s *= 0.25) {
+    double memory = 0.0;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      if (i > 0) {
+        const double x = (time_s[at] - time_s[at - 1]) / tau_s;
+        memory = memory * std::exp(-x) - (drive[at] - drive[at - 1]) * std::expm1(-x) / x;
+      }
+      answers(i, k) = memory;
+    }
+  }
+  answers.col(kMemories) = Eigen::VectorXd::Map(drive.data(), n);
+  for (auto column : answers.colwise()) {  // of the size of the other shapes
+    const double size = column.cwiseAbs().maxCoeff();
+    if (size > 0.0) column /= size;
+  }
+  return answers;
+}
+
 /// A smooth curve and the noise about it.
 struct SmoothFit {
   AutoregressionEstimate noise;
@@ -66,12 +99,12 @@ SmoothFit fitted_curve(std::span<const double> time_s, const Eigen::VectorXd& y,
 
 /// Takes in shapes one by one as long as BIC falls: each follows a little of the noise, too.
 SmoothFit smooth_fit(std::span<const double> time_s, const Eigen::VectorXd& y,
-                     const Eigen::MatrixXd& shapes, double step_s) {
+                     const Eigen::MatrixXd& shapes, double step_s, Eigen::Index most) {
   Eigen::MatrixXd columns = Eigen::VectorXd::Ones(y.size());
   SmoothFit best = fitted_curve(time_s, y, columns, step_s);
-  constexpr Eigen::Index kMost = 5, kReadingsOfColumn = 5;
+  constexpr Eigen::Index kReadingsOfColumn = 5;
   std::vector<bool> taken(static_cast<std::size_t>(shapes.cols()), false);
-  while (columns.cols() < kMost && kReadingsOfColumn * (columns.cols() + 1) <= y.size() &&
+  while (columns.cols() < most && kReadingsOfColumn * (columns.cols() + 1) <= y.size() &&
          std::isfinite(best.criterion)) {
     SmoothFit next = best;
     Eigen::Index place = -1;
@@ -154,8 +187,19 @@ ReadingScatter scatter_of(const PreparedRecording& recording, const RecordingPar
   scatter.step_s = median_step(t);
   scatter.count = n;
   const bool rest = scatter.told_by == "before contact";
-  const SmoothFit fit = smooth_fit(
-      t, y, rest ? Eigen::MatrixXd(y.size(), 0) : smooth_shapes(x, hold), scatter.step_s);
+  constexpr Eigen::Index kMostShapes = 5, kMostAnswers = 6;
+  Eigen::MatrixXd shapes = rest ? Eigen::MatrixXd(y.size(), 0) : smooth_shapes(x, hold);
+  Eigen::Index most = kMostShapes;
+  const std::span<const double> drive(r.drive.data() + first, n);
+  const double travel = r.drive[parts.ramp_last] - r.drive[parts.ramp_first];
+  if (hold && trembles(drive, travel)) {
+    const Eigen::MatrixXd answers = answers_to(t, drive);
+    const Eigen::Index smooth = shapes.cols();
+    shapes.conservativeResize(Eigen::NoChange, smooth + answers.cols());
+    shapes.rightCols(answers.cols()) = answers;
+    most += kMostAnswers;
+  }
+  const SmoothFit fit = smooth_fit(t, y, shapes, scatter.step_s, most);
   scatter.phi = fit.noise.phi;
   scatter.sigma = std::sqrt(fit.noise.variance);
   const double independent = (static_cast<double>(n) - static_cast<double>(fit.columns)) *

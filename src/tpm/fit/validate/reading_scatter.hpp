@@ -27,7 +27,8 @@ struct ReadingScatter {
 
 /// From the longest stretch that tells it: the hold's residuals about a smooth curve that is fitted
 /// to this recording alone (a constant and up to four decaying exponentials, taken in by BIC from
-/// times that are a factor of two apart), never about a prediction; without a hold the readings
+/// times that are a factor of two apart; where the drive does not stay, as under a hand, also the
+/// drive and its fading memories), never about a prediction; without a hold the readings
 /// before contact about their mean, or the ramp about a polynomial. phi and sigma by restricted
 /// maximum likelihood (estimate_autoregression). Readings that are rounded to steps q scatter by q
 /// / sqrt(12) at least. Throws Error(bad_input) if fewer than 10 readings could tell it.

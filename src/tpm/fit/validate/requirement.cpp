@@ -48,6 +48,9 @@ Requirement parse_requirement(std::string_view text, std::string_view where) {
   if (const auto share = find_share(text)) {
     r.value = *share;
     if (text.find('%') == std::string_view::npos) {
+      if (r.value >= 1.0) {  // the 20 of "20 mN" would allow anything
+        throw bad_input(where, fmt::format("'{}' has no unit", printable(text)), expected);
+      }
       r.stated = fmt::format("{} %", significant(100.0 * *share, 6));
     }
   } else {

@@ -125,6 +125,20 @@ std::string copy_words(const ValidationRequest& request, const PreparedRecording
   return {};
 }
 
+/// A measured value that is hundreds of times the simulated one, or less; empty: it is not.
+std::string unit_words(const RecordingComparison& r) {
+  constexpr double kFar = 300.0;
+  for (const QuantityComparison& q : r.quantities) {
+    if (q.quantity.kind != QuantityKind::peak || q.simulated == 0.0) continue;
+    const double ratio = std::abs(q.measured / q.simulated);
+    const bool clear = std::abs(q.measured) > q.e.expanded();
+    if (ratio < kFar && (ratio * kFar > 1.0 || !clear)) continue;
+    return fmt::format("{}: D of the {} is {} times S; look at the units of its columns", r.name,
+                       q.name, significant(ratio, 2));
+  }
+  return {};
+}
+
 /// All of them, or none.
 std::vector<PreparedRecording> found_recordings(const CalibrationData& calibration) {
   std::vector<PreparedRecording> found;
@@ -289,13 +303,15 @@ Validation validate(const ValidationRequest& request) {
   for (const CalibrationData::File& file : request.calibration.files) {
     v.calibration.push_back(file);
   }
-  v.remarks = request.calibration.remarks;
+  v.remarks = request.remarks;
+  v.remarks.insert(v.remarks.end(), request.calibration.remarks.begin(),
+                   request.calibration.remarks.end());
   std::vector<RecordingComparison> unseen;
   std::vector<Applicability> unseen_motions;
   for (std::size_t i = 0; i < request.recordings.size(); ++i) {
     const PreparedRecording& recording = request.recordings[i];
     require_imposed_motion(recording.recording, recording.name, "validation");
-    if (request.earlier.empty()) require_rise(recording);
+    if (request.presses.empty()) require_rise(recording);
     ComparisonOptions options;
     options.quantities = request.quantities;
     options.requirement = request.requirement;
@@ -303,8 +319,8 @@ Validation validate(const ValidationRequest& request) {
     options.organ = request.organ.get();
     options.pick = request.pick;
     options.rendering = request.rendering;
-    if (!request.earlier.empty()) {
-      options.earlier = request.earlier.at(i);
+    if (!request.presses.empty()) {
+      options.motion = request.presses.at(i);
       options.known = KnownPlacement::surface;
     } else if (request.contact_by_threshold) {
       options.known = KnownPlacement::threshold;
@@ -321,6 +337,8 @@ Validation validate(const ValidationRequest& request) {
         comparison = compare_with_recording(law, recording, options);
       }
     }
+    if (const std::string words = unit_words(comparison); !words.empty())
+      v.remarks.push_back(words);
     Applicability motion = motion_of(recording, comparison.parts,
                                      comparison.creep ? 0.0 : comparison.placement.contact);
     compare_with_calibration(motion, request);

@@ -47,9 +47,10 @@ struct ValidationRequest {
   std::optional<std::string> at;            ///< see PooledOptions::at
   std::shared_ptr<const OrganOfLaw> organ;  ///< answers in place of the law
   PickAnswer pick = nullptr;                ///< answers in place of the organ
-  /// The recordings are presses of a session: what its hand did before each.
-  std::vector<std::vector<Knot>> earlier;
-  std::string session;  ///< file whose rendering is part of S; empty: none
+  /// The recordings are presses of a session: what it knows of each. Empty: they are none.
+  std::vector<SessionMotion> presses;
+  std::vector<std::string> remarks;  ///< what is to be said with the result, one sentence each
+  std::string session;               ///< file whose rendering is part of S; empty: none
   std::vector<RenderingError> rendering;
 };
 
@@ -83,6 +84,9 @@ struct Validation {
 /// What rendering changes of each quantity: the rendered force over that of the subject along the
 /// hand's own motion, from a validation whose recordings are presses of a session.
 [[nodiscard]] std::vector<RenderingError> rendering_errors(const Validation& presses);
+
+/// "ramp from 1 s to 5.1 s, 4.04 mm deep, hold to 25 s: the whole press"
+[[nodiscard]] std::string part_words(const ComparedPart& part, const LawSpec& law);
 
 /// "no model error is seen above the uncertainty", "a model error: peak force -14.2 +- 2.3 mN", ...
 [[nodiscard]] std::string conclusion_words(const Validation& validation);

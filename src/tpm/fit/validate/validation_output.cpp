@@ -8,6 +8,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/validate/brief_text.hpp"
 #include "tpm/fit/validate/validation.hpp"
 #include "tpm/show/table_document.hpp"
 
@@ -15,7 +16,7 @@ namespace tpm::fit {
 namespace {
 
 constexpr int kStoredDigits = 6;
-constexpr std::size_t kWidth = 118;
+using Rank = BriefText::Rank;
 
 double stored(double value) {
   return rounded(value, kStoredDigits);
@@ -65,19 +66,18 @@ std::vector<std::string> budget_row(const QuantityComparison& q) {
           cell_words(q.verdict)};
 }
 
-std::string table_text(TableSection section) {
+/// A row each, below two lines of titles; an empty line follows.
+void add_table(BriefText& text, TableSection section, Rank rank, std::string_view rows) {
   section.right_aligned.assign(section.columns.size(), true);
   section.right_aligned.front() = section.right_aligned.back() = false;
   TableDocument document;
   document.sections.push_back(std::move(section));
-  std::string text = render(document, TableStyle::text);
-  while (!text.empty() && text.front() == '\n') text.erase(0, 1);
-  return text;
-}
-
-std::string line(std::string_view title, const std::string& words) {
-  constexpr std::size_t kIndent = 15;
-  return wrapped(fmt::format("{:<15}{}", title, words), kWidth, kIndent) + "\n";
+  std::string table = render(document, TableStyle::text);
+  while (!table.empty() && table.front() == '\n') table.erase(0, 1);
+  const std::size_t body = table.find('\n', table.find('\n') + 1) + 1;
+  text.add(table.substr(0, body), Rank::always);
+  text.add(table.substr(body), rank, rows);
+  text.add("\n", Rank::always);
 }
 
 std::string joint_text(const JointTest& joint) {
@@ -181,54 +181,77 @@ Unit response_unit(const RecordingComparison& r) {
   return r.quantities.front().unit;
 }
 
-std::string header_text(const Validation& v) {
-  std::string text = fmt::format("{}: {}\n", v.law_file, v.subject);
+/// "a, b, c", or the first of them and how many more there are.
+std::string first_names(std::vector<std::string> names) {
+  constexpr std::size_t kMost = 6;
+  if (names.size() > kMost) {
+    const std::size_t more = names.size() - kMost + 1;
+    names.resize(kMost - 1);
+    names.push_back(fmt::format("{} more", more));
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+void add_header(BriefText& text, const Validation& v) {
+  text.add(fmt::format("{}: {}\n", v.law_file, v.subject), Rank::always);
   const std::string fitted =
       v.calibration.empty()
           ? std::string("files that the law does not name")
-          : listed(v.calibration, [](const CalibrationData::File& f) { return f.name; });
+          : first_names(mapped<std::string>(v.calibration, &CalibrationData::File::name));
   const bool residual = v.verdict == ModelVerdict::residual;
-  text +=
-      wrapped(fmt::format("{} with {}, fitted to {}; {}",
-                          residual ? "compared (calibration residual, no validation)" : "validated",
-                          listed(v.recordings, [](const auto& r) { return r.name; }), fitted,
-                          v.requirement.empty() ? std::string("no requirement")
-                                                : fmt::format("requirement: {}", v.requirement)),
-              kWidth, 2) +
-      "\n\n";
-  return text;
+  text.add_words(fmt::format(
+      "{} with {}, fitted to {}; {}",
+      residual ? "compared (calibration residual, no validation)" : "validated",
+      first_names(mapped<std::string>(v.recordings, &RecordingComparison::name)), fitted,
+      v.requirement.empty() ? std::string("no requirement")
+                            : fmt::format("requirement: {}", v.requirement)));
+  text.add("\n", Rank::always);
 }
 
-std::string remarks_of(const RecordingComparison& r) {
-  std::string text;
-  for (const QuantityComparison& q : r.quantities) {
-    if (q.remark.empty()) continue;
-    const bool shrink = q.limit && q.verdict == ModelVerdict::undetermined &&
-                        q.remark.find(" from u = ") != std::string::npos;
-    text += line(shrink ? "must shrink" : "undetermined", fmt::format("{}: {}", q.name, q.remark));
+void add_remarks(BriefText& text, const RecordingComparison& r) {
+  const std::vector<std::string> remarks =
+      each_once(r.quantities, [](const QuantityComparison& q) { return q.remark; });
+  for (const std::string& remark : remarks) {
+    if (remark.empty()) continue;
+    bool shrink = false;
+    std::vector<std::string> names;  // several may say the same
+    for (const QuantityComparison& q : r.quantities) {
+      if (q.remark != remark) continue;
+      names.push_back(q.name);
+      shrink = q.limit && q.verdict == ModelVerdict::undetermined &&
+               q.remark.find(" from u = ") != std::string::npos;
+    }
+    text.add_line(shrink ? "must shrink" : "undetermined",
+                  fmt::format("{}: {}", fmt::join(names, ", "), remark), Rank::remark);
   }
-  for (const std::string& words : r.without) text += line("not compared", words);
-  return text;
+  for (const std::string& words : r.without) text.add_line("not compared", words, Rank::remark);
 }
 
-std::string recording_text(const Validation& v, std::size_t index) {
+/// Said of a press that a hand was asked for, and of what is only a part.
+bool part_is_said(const RecordingComparison& r) {
+  return r.part.hold_asked_s || !r.part.whole();
+}
+
+void add_recording(BriefText& text, const Validation& v, std::size_t index) {
   const RecordingComparison& r = v.recordings[index];
   TableSection section;
   section.columns = {"quantity", "S",   "D", "E", "U",      "u_num",
                      "u_input",  "u_D", "k", "R", "verdict"};
   for (const QuantityComparison& q : r.quantities) section.rows.push_back(budget_row(q));
-  std::string text = table_text(std::move(section)) + "\n" + remarks_of(r);
+  add_table(text, std::move(section), Rank::quantity, "quantities");
+  add_remarks(text, r);
   const Unit unit = response_unit(r);
-  text += line("together", joint_text(r.joint));
-  text += line("whole curve", curve_text(r.curve, unit));
-  if (!r.pick.empty()) text += line("S from", answer_text(r));
-  text +=
-      line("placement",
-           placement_text(r, unit, quantity_dimension(r.creep ? v.spec.response : v.spec.drive)));
-  text += line("scatter", scatter_text(r.scatter, unit));
-  text += line("instrument", instrument_text(r));
-  text += line("applicability", applicability_text(v.applicability[index]));
-  return text;
+  if (part_is_said(r)) text.add_line("compared", part_words(r.part, v.spec), Rank::context);
+  text.add_line("together", joint_text(r.joint), Rank::detail);
+  text.add_line("whole curve", curve_text(r.curve, unit), Rank::detail);
+  if (!r.pick.empty()) text.add_line("S from", answer_text(r), Rank::context);
+  text.add_line(
+      "placement",
+      placement_text(r, unit, quantity_dimension(r.creep ? v.spec.response : v.spec.drive)),
+      Rank::context);
+  text.add_line("scatter", scatter_text(r.scatter, unit), Rank::detail);
+  text.add_line("instrument", instrument_text(r), Rank::detail);
+  text.add_line("applicability", applicability_text(v.applicability[index]), Rank::context);
 }
 
 std::string area_text(const PooledQuantity& p) {
@@ -244,7 +267,7 @@ std::string area_text(const PooledQuantity& p) {
   return text;
 }
 
-std::string pooled_text(const Validation& v) {
+void add_pooled(BriefText& text, const Validation& v) {
   TableSection section;
   section.columns = {"mean over recordings", "n",      "S", "D", "E", "U", "shared u", "R",
                      "area metric",          "verdict"};
@@ -257,14 +280,14 @@ std::string pooled_text(const Validation& v) {
                             p.limit ? number(*p.limit, unit, 2) : "-", area_text(p),
                             cell_words(p.verdict)});
   }
-  std::string text = table_text(std::move(section)) + "\n";
+  add_table(text, std::move(section), Rank::quantity, "quantities");
   for (const PooledQuantity& p : v.pooled) {
-    if (!p.remark.empty()) text += line("must shrink", fmt::format("{}: {}", p.name, p.remark));
+    if (p.remark.empty()) continue;
+    text.add_line("must shrink", fmt::format("{}: {}", p.name, p.remark), Rank::remark);
   }
-  return text;
 }
 
-std::string each_recording_text(const Validation& v) {
+void add_each_recording(BriefText& text, const Validation& v) {
   TableSection section;
   section.columns = {"recording"};
   const std::vector<QuantityComparison> quantities = each_quantity(v.recordings);
@@ -279,10 +302,25 @@ std::string each_recording_text(const Validation& v) {
     row.push_back(cell_words(r.verdict));
     section.rows.push_back(std::move(row));
   }
-  std::string text = table_text(std::move(section)) + "\n";
+  add_table(text, std::move(section), Rank::recording, "recordings");
   for (const QuantityComparison& q : v.alone) {
-    text += line("in one only", fmt::format("{} {}: {}", q.name, error_text(q.e, unit_of(q)),
-                                            cell_words(q.verdict)));
+    text.add_line(
+        "in one only",
+        fmt::format("{} {}: {}", q.name, error_text(q.e, unit_of(q)), cell_words(q.verdict)),
+        Rank::context);
+  }
+  bool whole_said = false;
+  for (const RecordingComparison& r : v.recordings) {
+    whole_said = whole_said || (r.part.whole() && part_is_said(r));
+    if (r.part.whole()) continue;
+    text.add_line("compared", fmt::format("{}: {}", r.name, part_words(r.part, v.spec)),
+                  Rank::context);
+  }
+  if (whole_said) {
+    const bool all =
+        std::ranges::all_of(v.recordings, [](const auto& r) { return r.part.whole(); });
+    text.add_line("compared", all ? "the whole of each press" : "the whole of all other presses",
+                  Rank::context);
   }
   // Recordings of one protocol say the same.
   const auto said = [&](std::size_t i) { return applicability_text(v.applicability[i]); };
@@ -294,13 +332,32 @@ std::string each_recording_text(const Validation& v) {
       if (said(i) == words) names.push_back(v.recordings[i].name);
     }
     const bool all = names.size() == places.size();
-    text +=
-        line("applicability", all ? words : fmt::format("{}: {}", fmt::join(names, ", "), words));
+    text.add_line("applicability", all ? words : fmt::format("{}: {}", first_names(names), words),
+                  Rank::context);
   }
-  return text;
 }
 
 }  // namespace
+
+std::string part_words(const ComparedPart& part, const LawSpec& law) {
+  const Unit unit = shown_unit(quantity_dimension(law.drive));
+  const auto deep = [&](double si) { return significant(si / unit.to_si, 3); };
+  const auto seconds = [](double s) { return significant(s, 4); };
+  std::string text = fmt::format("ramp from {} s to {} s, {} deep, ", seconds(part.from_s),
+                                 seconds(part.corner_s), with_unit(deep(part.depth), unit));
+  text += part.hold_s > 0.0 ? fmt::format("and hold to {} s", seconds(part.to_s)) : "no hold";
+  if (part.whole()) return text + ": the whole press";
+  text += ": only a part";
+  if (part.depth < part.depth_of_all) {
+    text += fmt::format(", of {}", with_unit(deep(part.depth_of_all), unit));
+  }
+  if (part.left_out_s > 0.0) {
+    text += fmt::format(", without {} s of the {} s {}", seconds(part.left_out_s),
+                        seconds(part.loaded_s),
+                        part.hold_asked_s ? "that the hold was asked for" : "under load");
+  }
+  return text;
+}
 
 std::string conclusion_words(const Validation& v) {
   if (v.verdict == ModelVerdict::residual) {
@@ -346,17 +403,19 @@ std::string conclusion_words(const Validation& v) {
 }
 
 std::string to_terminal_text(const Validation& v) {
-  std::string text = header_text(v);
+  BriefText text;
+  add_header(text, v);
   if (v.recordings.size() == 1) {
-    text += recording_text(v, 0);
+    add_recording(text, v, 0);
   } else {
-    if (!v.pooled.empty()) text += pooled_text(v);
-    text += each_recording_text(v);
+    if (!v.pooled.empty()) add_pooled(text, v);
+    add_each_recording(text, v);
   }
-  if (!v.session.empty()) text += line("rendered by", rendering_text(v));
-  text += line("u_input", "from " + v.u_input_from);
-  for (const std::string& remark : v.remarks) text += line("note", remark);
-  return text + line("verdict", conclusion_words(v));
+  if (!v.session.empty()) text.add_line("rendered by", rendering_text(v), Rank::context);
+  text.add_line("u_input", "from " + v.u_input_from, Rank::detail);
+  for (const std::string& remark : v.remarks) text.add_line("note", remark, Rank::context);
+  text.add_line("verdict", conclusion_words(v), Rank::always);
+  return text.text();
 }
 
 namespace {
@@ -409,6 +468,19 @@ Json recording_json(const RecordingComparison& r, const Applicability& a) {
   Json j{{"recording", r.name}, {"sha256", r.sha256}, {"fitted", r.calibration}};
   if (r.creep) j["load_imposed"] = true;
   if (!r.pick.empty()) j["pick"] = r.pick;
+  Json part{{"from_s", stored(r.part.from_s)},
+            {"corner_s", stored(r.part.corner_s)},
+            {"to_s", stored(r.part.to_s)},
+            {"depth_SI", stored(r.part.depth)},
+            {"depth_of_all_SI", stored(r.part.depth_of_all)},
+            {"hold_s", stored(r.part.hold_s)},
+            {"loaded_s", stored(r.part.loaded_s)},
+            {"left_out_s", stored(r.part.left_out_s)},
+            {"whole", r.part.whole()}};
+  if (r.part.hold_asked_s) {
+    part["hold_asked_s"] = stored(*r.part.hold_asked_s);
+  }
+  j["compared"] = std::move(part);
   j["quantities"] = array_json(r.quantities, quantity_json);
   j["not_compared"] = r.without;
   Json joint{{"rank", r.joint.rank}};

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "tpm/base/text.hpp"
+#include "tpm/data/phases.hpp"
 #include "tpm/haptics/verify/verify_parts.hpp"
 #include "tpmkit/error.hpp"
 
@@ -33,49 +35,90 @@ double depth_of(const ServoRecord& row) {
   return std::max(row.tool_depth_m, 0.0);
 }
 
-}  // namespace
+/// A motion of the hand, which no other program has touched: nothing in it is censored or turned.
+fit::PreparedRecording press_recording(Recording r) {
+  fit::PreparedRecording press;
+  press.name = r.header.id;
+  press.phases = find_phases(r);
+  press.from_s = r.time_s.front();
+  press.to_s = r.time_s.back();
+  press.recording = std::move(r);
+  return press;
+}
 
-std::vector<SessionPress> session_presses(const HilRecording& recording,
-                                          const std::string& sha256) {
-  const HilSession& session = recording.session;
-  if (session.model == "surface") {
-    throw bad_input(recording.name, "is a session of a tool that moved in space",
-                    "one whose tool moved along its push");
+/// Takes a session apart.
+class PressReader {
+ public:
+  PressReader(const HilRecording& recording, const std::string& sha256)
+      : recording_(recording),
+        session_(recording.session),
+        sha256_(sha256),
+        rows_(moved_rows(recording)) {}
+
+  SessionPresses read() {
+    for (const PressPhases& of : press_phases(session_.phases)) add(of);
+    return std::move(presses_);
   }
-  const RowList rows = moved_rows(recording);
-  std::vector<SessionPress> presses;
-  for (const PressPhases& of : press_phases(session.phases)) {
+
+ private:
+  [[nodiscard]] double begin_s(std::size_t phase) const {
+    return phase == 0 ? 0.0 : session_.phases[phase - 1].end_s;
+  }
+
+  void add(const PressPhases& of) {
     const auto in_press = [&](const ServoRecord* row) {
       return row->phase >= static_cast<std::int32_t>(of.first) &&
              row->phase <= static_cast<std::int32_t>(of.last);
     };
-    const auto begin = std::find_if(rows.begin(), rows.end(), in_press);
-    const auto end = std::find_if_not(begin, rows.end(), in_press);
+    const auto begin = std::find_if(rows_.begin(), rows_.end(), in_press);
+    const auto end = std::find_if_not(begin, rows_.end(), in_press);
     const auto count = static_cast<std::size_t>(end - begin);
+    const std::string name = fmt::format("{}: {}", recording_.name, session_.phases[of.first].name);
     constexpr double kWhole = 0.98;  // of its time
-    const double asked_s =
-        session.phases[of.last].end_s - (of.first == 0 ? 0.0 : session.phases[of.first - 1].end_s);
-    if (static_cast<double>(count) * session.servo.period_s < kWhole * asked_s) continue;
+    const double asked_s = session_.phases[of.last].end_s - begin_s(of.first);
+    const double made_s = static_cast<double>(count) * session_.servo.period_s;
+    if (made_s < kWhole * asked_s) {
+      presses_.left_out.push_back(fmt::format("{} is not compared: {} s of its {} s were recorded",
+                                              name, significant(made_s, 3),
+                                              significant(asked_s, 3)));
+      return;
+    }
     const std::size_t stride = std::max<std::size_t>(count / kEnoughRows, 1);
     Recording r;
-    r.header.id = fmt::format("{}: {}", recording.name, session.phases[of.first].name);
-    r.header.sha256 = sha256;
+    r.header.id = name;
+    r.header.sha256 = sha256_;
     for (auto row = begin; row < end; row += static_cast<std::ptrdiff_t>(stride)) {
-      r.time_s.push_back(recording.time_s(**row));
+      r.time_s.push_back(recording_.time_s(**row));
       r.drive.push_back(depth_of(**row));
-      r.response.push_back(recording.commanded_N(**row));
+      r.response.push_back(recording_.commanded_N(**row));
       if (static_cast<std::size_t>(end - row) <= stride) break;
     }
     SessionPress press;
-    for (auto row = rows.begin(); row < begin; row += static_cast<std::ptrdiff_t>(stride)) {
-      press.earlier.push_back({recording.time_s(**row), depth_of(**row)});
+    for (auto row = rows_.begin(); row < begin; row += static_cast<std::ptrdiff_t>(stride)) {
+      press.motion.earlier.push_back({recording_.time_s(**row), depth_of(**row)});
       if (static_cast<std::size_t>(begin - row) <= stride) break;
     }
-    std::string name = r.header.id;
-    press.recording = fit::prepare_recording(std::move(name), std::move(r));
-    presses.push_back(std::move(press));
+    if (of.last > of.first) press.motion.hold_asked_s = begin_s(of.last);
+    press.recording = press_recording(std::move(r));
+    presses_.made.push_back(std::move(press));
   }
-  if (presses.empty()) {
+
+  const HilRecording& recording_;
+  const HilSession& session_;
+  const std::string& sha256_;
+  RowList rows_;
+  SessionPresses presses_;
+};
+
+}  // namespace
+
+SessionPresses session_presses(const HilRecording& recording, const std::string& sha256) {
+  if (recording.session.model == "surface") {
+    throw bad_input(recording.name, "is a session of a tool that moved in space",
+                    "one whose tool moved along its push");
+  }
+  SessionPresses presses = PressReader(recording, sha256).read();
+  if (presses.made.empty()) {
     throw bad_input(recording.name, "holds no press that was made to its end",
                     "a session with indentations");
   }

@@ -2,9 +2,8 @@
 #include <string>
 #include <vector>
 
-#include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/validate/comparison.hpp"
 #include "tpm/haptics/session/recording.hpp"
-#include "tpmkit/protocol.hpp"
 
 namespace tpm::haptics {
 
@@ -12,14 +11,19 @@ namespace tpm::haptics {
 /// the surface as the device read it, and the force that was sent to the hand.
 struct SessionPress {
   fit::PreparedRecording recording;  ///< "session.tpmrec: indent to 4 mm at 2 mm/s", with its hold
-  std::vector<Knot> earlier;         ///< the motion from the session's start to the press
+  fit::SessionMotion motion;         ///< what came before, and when the hand was asked to hold
 };
 
-/// All presses that a session asked for and that were made to their end; of longer ones every few
-/// rows, at least 2,000. Throws Error(bad_input) for a session without one, and for a tool that
-/// moved in space.
+struct SessionPresses {
+  std::vector<SessionPress> made;     ///< to their end
+  std::vector<std::string> left_out;  ///< those that were not, and why; one sentence each
+};
+
+/// All presses that a session asked for; of longer ones every few rows, at least 2,000. Throws
+/// Error(bad_input) for a session of which none was made to its end, and for a tool that moved in
+/// space.
 /// @param sha256 of the recording's bytes
-[[nodiscard]] std::vector<SessionPress> session_presses(const HilRecording& recording,
-                                                        const std::string& sha256);
+[[nodiscard]] SessionPresses session_presses(const HilRecording& recording,
+                                             const std::string& sha256);
 
 }  // namespace tpm::haptics

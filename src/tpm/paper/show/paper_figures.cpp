@@ -172,9 +172,12 @@ Figure creep_figure(const PaperFigureData& data, const PrintedCreep& printed) {
   return {
       fmt::format("figure_{:0>2}", printed.figure),
       fmt::format("Figure {}. Creep under {:.4g} N", printed.figure, printed.load_N),
-      "The paper's parameters. The same curves twice: on the logarithmic axis the creep of the "
-      "stated 5 Pa s is seen to be over within milliseconds. The end value of Eq. 18 counts "
-      "the instantaneous depth twice. That the range belongs to t = 300 s is assumed.",
+      printed.figure == data.printed_creep.front().figure
+          ? "The paper's parameters, on a linear and a logarithmic axis: the latter shows that "
+            "the creep of the stated 5 Pa s is over within milliseconds. The end value of Eq. 18 "
+            "counts the instantaneous depth twice. That the range belongs to t = 300 s is "
+            "assumed."
+          : "As the figure before, under the larger load.",
       {panel("(a) linear time", {"time under load", "s", false, -8.0, 380.0}, linear_times, 352.0),
        panel("(b) logarithmic time", {"time under load", "s", true, 1e-5, 1e5}, log_times, 8e3)}};
 }
