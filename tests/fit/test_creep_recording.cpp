@@ -118,6 +118,39 @@ TEST_CASE("a law of creep says what it was fitted to, and predicts it as it was 
   }
 }
 
+TEST_CASE("creep of an indentation is predicted as it was fitted", "[creep]") {
+  for (const double power : {1.5, 2.0}) {
+    for (const std::size_t count : {1, 2}) {
+      CAPTURE(power, count);
+      std::vector<PreparedRecording> recordings;
+      for (std::size_t i = 0; i < count; ++i) {
+        test::PressTrial trial;
+        trial.power = power;
+        trial.creep.seed = 60 + i;
+        trial.contact_m = 1e-3 * static_cast<double>(i + 1);
+        Recording r = test::press_recording_of(trial);
+        r.header.sha256 = std::string(64, static_cast<char>('a' + i));
+        recordings.push_back(prepare_recording(fmt::format("press{}.csv", i), std::move(r)));
+        REQUIRE(recordings.back().load_imposed);
+      }
+      SetupOptions setup;
+      setup.starts = 4;
+      setup.profiles = false;
+      setup.reference = 4e-3;
+      setup.exponent = power;
+      const FitResult fit =
+          run_fit(recording_config(parse_law_name("power-1", "test"), recordings, setup),
+                  data_sets(recordings));
+      const LawFile law = fitted_law(fit);
+      for (std::size_t i = 0; i < count; ++i) {
+        const LawPrediction p = predict_recording(law, recordings[i], {});
+        CHECK(p.placement == Placement::fitted);
+        CHECK_THAT(p.recording.value().fitted.rms, WithinRel(fit.recordings[i].rms_residual, 1e-6));
+      }
+    }
+  }
+}
+
 TEST_CASE("the written configuration of a creep fit is read as it was", "[creep]") {
   const test::TempFolder folder;
   const Recording r = test::creep_recording_of({});
