@@ -16,7 +16,7 @@ endmacro()
 
 # Folders that only arrange and write: they are optimised little (TPM_ARRANGING_FLAGS), for the compiler's time.
 set(TPM_ARRANGING accuracy accuracy/show accuracy/stability accuracy/verify fit/design fit/expression fit/online fit/predict fit/select
-    fit/show haptics/border haptics/formulations haptics/serve haptics/session haptics/show haptics/verify organ/scene paper paper/claims
+    fit/show haptics/boundary haptics/formulations haptics/serve haptics/session haptics/show haptics/verify organ/scene paper paper/claims
     paper/show plan plan/formulations plan/show show sweep/show)
 if(TPM_QUICK_TO_BUILD)
   list(APPEND TPM_ARRANGING data files files/blocks files/hdf5 files/import organ/run)

@@ -341,7 +341,7 @@ RELATIVES = """## Relatives found and mended
 | import | negative compression: "the drive never rises" | names `--negate-drive`, `--negate-response` |
 | pooling | a spread of a linear parameter stood under `between_specimens_sd_of_log`, "in theta" | `between_specimens_sd_SI`, "in the natural logarithm" or with its unit |
 | pooling | typical specimens without the level of their interval; new specimens without a unit | both stand there |
-| selection | "the least law that the data support" though no law was identified | "identify none of the laws"; laws that the protocol contradicts come last |
+| selection | "the simplest law that the data support" though no law was identified | "identify none of the laws"; laws that the protocol contradicts come last |
 | text of fits | chi-square of a noise whose size was estimated, without a word | the factor by which the stated noise was multiplied |
 | profiles | walks of one branch went on into the values of another | kept in their order (`ExchangeOrder`), also in starts, minima, bootstrap and coverage |
 | export | `--` in a comment of FEBio's XML, which is not well-formed | worded without |

@@ -78,7 +78,7 @@ ErrorBudget budget_of_contact(const BudgetCommand& command, const LawFile& law) 
   return contact_budget(law, read_recordings(command.recordings).front(), options);
 }
 
-/// A plan whose tolerance is what the data know; without a folder, the command that writes one.
+/// A plan whose tolerance is the data uncertainty; without a folder, the command that writes one.
 std::string next_of_budget(const BudgetCommand& command) {
   if (command.folder.empty()) return "the same with --folder budget";
   return fmt::format("tpm plan {} --tolerance data --budget {}",

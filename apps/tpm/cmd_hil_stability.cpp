@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/haptics/show/border_report.hpp"
+#include "tpm/haptics/show/boundary_report.hpp"
 #include "tpm/show/draw.hpp"
 
 namespace tpm::app {
@@ -16,12 +16,12 @@ void add_hil_stability_command(CLI::App& hil, Session& session) {
   add_format_option(*command, session);
   command->footer("Example:\n  tpm hil stability --figures hil_borders");
   set_run(*command, session, [figures, &session] {
-    const BorderStudy study = study_borders({});
+    const BoundaryStudy study = study_boundaries({});
     std::vector<std::string> files;
-    if (!figures->empty()) files = write_figures(*figures, border_figures(study));
-    Json json = border_json(study);
+    if (!figures->empty()) files = write_figures(*figures, boundary_figures(study));
+    Json json = boundary_json(study);
     json["files"] = files;
-    say("{}", session.json() ? to_text(json) : border_text(study));
+    say("{}", session.json() ? to_text(json) : boundary_text(study));
     return 0;
   });
 }

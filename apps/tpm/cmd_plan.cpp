@@ -1,4 +1,4 @@
-// tpm plan: the least model for a scene.
+// tpm plan: the cheapest model for a scene.
 #include <fmt/format.h>
 #include <cstdio>
 
@@ -28,7 +28,7 @@ void add_plan_options(CLI::App& command, PlanChoice& choice) {
   command
       .add_option("--tolerance", choice.tolerance,
                   "Error in parts of the peak, such as 1% or 0.01; jnd: what a hand can feel; "
-                  "data: what the data know (with --budget)")
+                  "data: the data uncertainty (with --budget)")
       ->capture_default_str();
   command.add_option("--budget", choice.budget, "budget.json of tpm budget, for --tolerance data");
   command
@@ -45,7 +45,7 @@ void add_plan_options(CLI::App& command, PlanChoice& choice) {
 
 namespace {
 
-/// No finer than the data know, and no coarser than a plan may be.
+/// No finer than the data uncertainty, and no coarser than a plan may be.
 void set_tolerance_of_data(PlanRequest& request, const PlanChoice& choice) {
   if (choice.budget.empty()) {
     throw Error(ExitCode::usage, "--tolerance data", "without a budget",
@@ -54,7 +54,7 @@ void set_tolerance_of_data(PlanRequest& request, const PlanChoice& choice) {
   constexpr double kMost = 0.5, kLeast = 1e-6;
   const double part = tolerance_of_data(read_json(choice.budget), choice.budget);
   request.tolerance = std::clamp(part, kLeast, kMost);
-  request.tolerance_source = fmt::format("what the data know, {} % of the peak, after {}",
+  request.tolerance_source = fmt::format("the data uncertainty, {} % of the peak, after {}",
                                          significant(100.0 * part, 3), choice.budget);
 }
 
@@ -260,7 +260,7 @@ int run_plan(const PlanCommand& command, const Session& session) {
 }  // namespace
 
 void add_plan_command(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand("plan", "The least model that a scene needs, verified");
+  CLI::App* command = app.add_subcommand("plan", "The cheapest model that a scene needs, verified");
   auto choice = std::make_shared<PlanCommand>();
   command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)");
   add_plan_options(*command, choice->choice);
@@ -275,7 +275,7 @@ void add_plan_command(CLI::App& app, Session& session) {
   command->add_option("--write-scene", choice->scene_output,
                       "Of --spheres: write the scene with the number chosen");
   command->add_flag("--brief", choice->brief,
-                    "Leave out what does not matter and what would break");
+                    "Leave out what does not matter and the robustness margins");
   command
       ->add_flag("--thorough", choice->thorough,
                  "Try everything, also where that takes more than twice as long as the reference")

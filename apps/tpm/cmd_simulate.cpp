@@ -318,7 +318,7 @@ void add_simulate_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   CLI::Option* planned = command->add_flag(
       "--plan", choice->planned,
-      "Run the least model that tpm plan finds, instead of the scene's formulation");
+      "Run the cheapest model that tpm plan finds, instead of the scene's formulation");
   command->add_flag("--list-formulations", choice->list,
                     "List what a scene's key 'formulation' can name, with what each can do");
   command->add_flag("--list-materials", choice->list_materials,
@@ -332,7 +332,7 @@ void add_simulate_command(CLI::App& app, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5 --figures pictures\n"
-      "An interrupted run goes on from its last checkpoint when the same command is given again.");
+      "An interrupted run resumes when the same command is given again.");
   set_run(*command, session, [choice, &session] { return run_command(*choice, session); });
 }
 

@@ -68,7 +68,7 @@ ImportOptions reading_of(const ReadingArguments& arguments) {
 }
 
 void add_recording_options(CLI::App& command, RecordingOptions& options) {
-  const char* group = "What the files do not say";
+  const char* group = "Columns and units";
   add_reading_options(command, options.reading, group);
   options_of_group(command, group)(
       "--contact-force", options.contact_response,

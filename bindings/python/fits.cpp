@@ -1,4 +1,4 @@
-// Fits: of recordings and material functions by the least law, of configurations.
+// Fits: of recordings and material functions by the simplest law, of configurations.
 #include <filesystem>
 #include <map>
 

@@ -156,7 +156,7 @@ TEST_CASE("Groups that differ by their depths are refused, copies are no second 
   write_group(folder, "b", {0.9, 1.0, 1.1}, 6.0, 11);
   const Said depths = run_in(folder, "fit a b --compare --laws linear-1 --no-draw");
   CHECK(depths.code == 3);
-  CHECK_THAT(depths.text, Contains("depth and group cannot be told apart"));
+  CHECK_THAT(depths.text, Contains("depth and group are confounded"));
   std::filesystem::copy_file(folder.path() / "a" / "liver1.csv",
                              folder.path() / "a" / "liver9.csv");
   for (const char* command :

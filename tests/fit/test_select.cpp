@@ -1,4 +1,4 @@
-// From a recording to the least law, its configuration and its figures' data.
+// From a recording to the simplest law, its configuration and its figures' data.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -241,7 +241,7 @@ TEST_CASE("a law with a relaxation time that the sampling cannot support is not 
   CHECK_THAT(fmt::format("{}", fmt::join(s.words, "\n")),
              Catch::Contains("the data prefer linear-2, by ") &&
                  Catch::Contains(" in BIC, but do not identify its parameters (tau1 is sampled by "
-                                 "fewer than 3 points); the least law whose parameters they "
+                                 "fewer than 3 points); the simplest law whose parameters they "
                                  "identify is linear-1"));
   REQUIRE(s.preferred);
   CHECK(law_name(s.candidates[*s.preferred].law) == "linear-2");

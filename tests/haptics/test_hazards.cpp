@@ -1,13 +1,13 @@
-// What can go wrong in a session, in virtual time; borders with impact and limits of the rise.
+// What can go wrong in a session, in virtual time; boundaries with impact and limits of the rise.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "expected_values.hpp"
 #include "hazards/hazard_report.hpp"
-#include "tpm/haptics/border/border_study.hpp"
+#include "tpm/haptics/boundary/boundary_study.hpp"
 #include "tpm/haptics/session/rendering_check.hpp"
-#include "tpm/haptics/show/border_report.hpp"
+#include "tpm/haptics/show/boundary_report.hpp"
 
 namespace tpm::haptics {
 namespace {
@@ -36,7 +36,7 @@ TEST_CASE("No hazard leaves its bounds, and nothing that is passive is refused")
 }
 
 TEST_CASE("Up to what a session is allowed, impacts come to rest whatever limits the rise") {
-  const BorderStudy study = study_borders({});
+  const BoundaryStudy study = study_boundaries({});
   REQUIRE_FALSE(study.impacts.empty());
   std::size_t restless = 0;
   for (const ImpactPoint& p : study.impacts) {
@@ -50,9 +50,9 @@ TEST_CASE("Up to what a session is allowed, impacts come to rest whatever limits
     if (p.share > 1.2) CHECK_FALSE(p.rests[static_cast<std::size_t>(RiseLimit::none)]);
   }
   CHECK(restless > 50);
-  const Json json = border_json(study);
-  CHECK(json.at("worst_passive").get<double>() < test::allowed_error("borders.passive"));
-  CHECK(json.at("worst_stable").get<double>() < test::allowed_error("borders.stable"));
+  const Json json = boundary_json(study);
+  CHECK(json.at("worst_passive").get<double>() < test::allowed_error("boundaries.passive"));
+  CHECK(json.at("worst_stable").get<double>() < test::allowed_error("boundaries.stable"));
   for (const Json& corner : json.at("device_corners")) {
     CHECK(corner.at("passive").is_null() == corner.at("assumed_friction_N_s_per_m").is_null());
   }

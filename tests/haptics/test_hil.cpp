@@ -1,4 +1,4 @@
-// Sessions: what a file leads to, bad files, verification and its honesty, borders of rendering.
+// Sessions: what a file leads to, bad files, verification and its honesty, boundaries of rendering.
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -8,7 +8,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/haptics/session/recording_export.hpp"
-#include "tpm/haptics/session/rendering_border.hpp"
+#include "tpm/haptics/session/rendering_boundary.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/session/surface_scene.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
@@ -361,7 +361,7 @@ double exact_update_damping(double equilibrium_N_per_m, double relaxing_N_per_m,
   return 0.5 * period_s * (equilibrium_N_per_m + 2.0 * gain / (1.0 + std::exp(-z)));
 }
 
-TEST_CASE("The border of the exact update is the closed form, at every relaxation time") {
+TEST_CASE("The boundary of the exact update is the closed form, at every relaxation time") {
   for (const double periods : {1e-3, 0.1, 1.0, 10.0, 1e3}) {
     RenderedContact contact;
     contact.relaxation_time_s = periods * contact.period_s;
@@ -377,7 +377,7 @@ TEST_CASE("The border of the exact update is the closed form, at every relaxatio
   CHECK_THAT(exact_update_damping(100.0, 50.0, 1e3, 1e-3), WithinRel(150.0 * 5e-4, 1e-6));
 }
 
-TEST_CASE("The measured border of passivity is the predicted one") {
+TEST_CASE("The measured boundary of passivity is the predicted one") {
   for (const int delay : {0, 1, 4}) {
     for (const ElementRule rule :
          {ElementRule::exact, ElementRule::forward_euler, ElementRule::mass_spring}) {
@@ -414,8 +414,8 @@ TEST_CASE("Device and arm are stable up to the stiffness that the spectral radiu
     RenderedContact contact;
     contact.delay_periods = delay;
     CAPTURE(delay);
-    const double predicted = largest_stable_stiffness(contact, {}, BorderBy::prediction);
-    CHECK_THAT(largest_stable_stiffness(contact, {}, BorderBy::measurement),
+    const double predicted = largest_stable_stiffness(contact, {}, BoundaryBy::prediction);
+    CHECK_THAT(largest_stable_stiffness(contact, {}, BoundaryBy::measurement),
                WithinRel(predicted, 0.02));
     contact.stiffness_N_per_m = 0.9 * predicted;
     CHECK(loop_spectral_radius(contact, {}) < 1.0);

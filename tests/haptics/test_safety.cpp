@@ -168,7 +168,7 @@ std::string refused(const Json& json, const DeviceChoice& choice = {}, bool acce
   return "nothing was refused";
 }
 
-TEST_CASE("What would be unstable is refused before a device is opened, with the border") {
+TEST_CASE("What would be unstable is refused before a device is opened, with the boundary") {
   CHECK_THAT(refused(stiff_session("1e6 kPa")),
              Contains("stability: unstable: stiffness 1.26e+07 N/m at 1000 Hz"));
   CHECK_THAT(refused(stiff_session("3 MPa")), Contains("unstable"));
@@ -223,7 +223,7 @@ TEST_CASE(
   CHECK(refused(limited("12 kPa", 2.0)) == "nothing was refused");
 }
 
-TEST_CASE("The borders of a set-up are those of the theory") {
+TEST_CASE("The boundaries of a set-up are those of the theory") {
   const HilSession session = test::parsed(test::short_session());
   const LoopModel loop = make_loop_model(session);
   const RenderingCheck check = check_rendering(session, *loop.model, loop, "virtual");
@@ -389,7 +389,7 @@ TEST_CASE("The device is asked for no more than the session's limit") {
 
 TEST_CASE("A slip takes energy and never gives any: a stiff spring, limits that act, random ways") {
   // The tissue is a pure spring: whatever the hand gets back beyond the leak of the held force,
-  // which friction above the border takes up, would come from the slip.
+  // which friction above the boundary takes up, would come from the slip.
   Random random(3);
   for (int way = 0; way < 20; ++way) {
     ElementContact model = spring_of(2000.0);

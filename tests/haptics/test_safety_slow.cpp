@@ -43,8 +43,8 @@ TEST_CASE("No motion of a million of passive set-ups is stopped") {
     plant.delay_periods = i % 4 == 0 ? 1 : 0;
     plant.damping_N_s_per_m = 0.1 + 0.9 * random.uniform();
     plant.encoder_step_m = i % 2 == 0 ? 1e-5 : 0.0;
-    const double border = plant.damping_N_s_per_m / (period_s * (0.5 + plant.delay_periods));
-    const double stiffness = border * (0.05 + 0.9 * random.uniform());
+    const double boundary = plant.damping_N_s_per_m / (period_s * (0.5 + plant.delay_periods));
+    const double stiffness = boundary * (0.05 + 0.9 * random.uniform());
     const double tau_s = std::pow(10.0, -3.0 + 4.0 * random.uniform());
     TpmParameters p;
     const double deepest_m = 8e-3;

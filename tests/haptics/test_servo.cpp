@@ -305,12 +305,12 @@ TEST_CASE("The observer's deficit is the predicted leak of the held force") {
   CHECK_THAT(row.leak_J, WithinRel(leak_J, 0.1));  // with the stiffness at rest
 }
 
-TEST_CASE("With friction above the border, observer and device never lose energy") {
+TEST_CASE("With friction above the boundary, observer and device never lose energy") {
   // Motion is straight between samples, which is the least that friction can take.
   const TpmParameters p = slow_liver();
   const double period = 1e-3;
   ElementContact model(p, period);
-  const double border = 0.5 * period * 185.0;  // tangent stiffness at 8 mm, at once
+  const double boundary = 0.5 * period * 185.0;  // tangent stiffness at 8 mm, at once
   const auto least_J = [&](double friction) {
     model.reset();
     Puppet device;
@@ -327,8 +327,8 @@ TEST_CASE("With friction above the border, observer and device never lose energy
     }
     return least;
   };
-  CHECK(least_J(1.02 * border) >= -1e-12);
-  CHECK(least_J(0.5 * border) < -1.0);
+  CHECK(least_J(1.02 * boundary) >= -1e-12);
+  CHECK(least_J(0.5 * boundary) < -1.0);
 }
 
 TEST_CASE("The passivity controller takes back what a delay gives away") {

@@ -122,7 +122,7 @@ void print_passive() {
     ServoSettings settings = told(delay_s + kPeriod_s);
     for (const double grown_s : {0.0, 5e-3, 10e-3, 20e-3}) {  // 0: it does not grow
       for (const double stiffness : kStiffnesses) {
-        // 0.01 % above the border of passivity at the delay told.
+        // 0.01 % above the boundary of passivity at the delay told.
         const double friction = 1.0001 * stiffness * (0.5 + settings.delay_periods) * kPeriod_s;
         settings.friction_N_s_per_m = friction;
         for (const SafeHand& hand : kSafeHands) {

@@ -309,7 +309,7 @@ TEST_CASE("a run with mass in two halves is one run") {
       CHECK((rest.position - whole.position).cwiseAbs().maxCoeff() < 1e-7);
       CHECK_THAT(rest.energy->work, WithinRel(whole.energy->work, 1e-4));
       CHECK_THAT(rest.energy->damping_heat, WithinRel(whole.energy->damping_heat, 1e-4));
-      CHECK(rest.blows.size() + first.blows.size() == whole.blows.size());
+      CHECK(rest.impacts.size() + first.impacts.size() == whole.impacts.size());
       CHECK_THROWS_WITH(inertial.run(protocol, std::vector{0.0}, {}, &first.end),
                         Catch::Matchers::Contains("times from"));
       InertialState cut_short = first.end;
@@ -358,7 +358,7 @@ TEST_CASE("a preload starts in equilibrium and a release rings down to rest") {
   CHECK(std::abs(run.energy->missing()) < 1e-2 * -run.energy->stored);
 }
 
-TEST_CASE("the force on the driven sphere itself is stated apart, and so are blows") {
+TEST_CASE("the force on the driven sphere itself is stated apart, and so are impacts") {
   const Star star(slow_tissue());
   const Inertial inertial = inertial_star(star, {});
   const std::vector<double> times{0.1, 0.5};
@@ -367,10 +367,10 @@ TEST_CASE("the force on the driven sphere itself is stated apart, and so are blo
   const double drag = 0.2 * inertial.lowest().angular_frequency();
   CHECK_THAT(run.of_driven_sphere[0], WithinRel(kMass * drag * 4e-3, 1e-12));
   CHECK(run.of_driven_sphere[1] == 0.0);
-  REQUIRE(run.blows.size() == 2);
-  CHECK_THAT(run.blows[0].impulse_N_s, WithinRel(kMass * 4e-3, 1e-12));
-  CHECK_THAT(run.blows[1].impulse_N_s, WithinRel(-kMass * 4e-3, 1e-12));
-  CHECK(run.blows[1].time_s == 0.25);
+  REQUIRE(run.impacts.size() == 2);
+  CHECK_THAT(run.impacts[0].impulse_N_s, WithinRel(kMass * 4e-3, 1e-12));
+  CHECK_THAT(run.impacts[1].impulse_N_s, WithinRel(-kMass * 4e-3, 1e-12));
+  CHECK(run.impacts[1].time_s == 0.25);
 }
 
 TEST_CASE("the motion depends neither on the numbering nor on a rigid motion of the scene") {

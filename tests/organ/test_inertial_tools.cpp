@@ -157,10 +157,10 @@ TEST_CASE("a tool that moves evenly pushes with the spring's force, and its mass
       CAPTURE(tool_kg, i);
       CHECK_THAT(run.response[i], WithinRel(expected, 3e-5));
     }
-    REQUIRE(run.blows.size() == 1);
-    CHECK(run.blows[0].time_s == 0.0);
-    CHECK_THAT(run.blows[0].impulse_N_s, WithinRel((tool_kg + kSphere_kg) * speed, 1e-12));
-    CHECK_THAT(run.blows[0].impulse_on_tissue_N_s, WithinRel(kSphere_kg * speed, 1e-12));
+    REQUIRE(run.impacts.size() == 1);
+    CHECK(run.impacts[0].time_s == 0.0);
+    CHECK_THAT(run.impacts[0].impulse_N_s, WithinRel((tool_kg + kSphere_kg) * speed, 1e-12));
+    CHECK_THAT(run.impacts[0].impulse_on_tissue_N_s, WithinRel(kSphere_kg * speed, 1e-12));
   }
 }
 
@@ -217,7 +217,7 @@ TEST_CASE("with tools, too, the work of the probe is stored, moves or becomes he
       const InertialEnergy energy = run.energy.value();
       CAPTURE(protocol.drive() == Drive::force, tolerance, energy.work, energy.contact_heat);
       // The second and third sphere are met at speed.
-      CHECK(run.blows.size() >= 2);
+      CHECK(run.impacts.size() >= 2);
       CHECK(energy.contact_heat > 0.0);
       const double missing = std::abs(energy.missing()) / energy.work;
       CHECK(missing < 2e-3);
@@ -232,9 +232,9 @@ TEST_CASE("a sphere met at speed takes it over: half m v squared becomes heat") 
   const Springs springs(2, 1e-3, 1e5, 0.01, kNever_s);
   const InertialRun run =
       springs.inertial(tight()).run({Drive::displacement, {{0.0, 0.0}, {0.01, 0.01 * speed}}}, {});
-  REQUIRE(run.blows.size() == 2);
-  CHECK_THAT(run.blows[1].time_s, WithinRel(1e-3 / speed, 1e-9));
-  CHECK_THAT(run.blows[1].impulse_on_tissue_N_s, WithinRel(kSphere_kg * speed, 1e-4));
+  REQUIRE(run.impacts.size() == 2);
+  CHECK_THAT(run.impacts[1].time_s, WithinRel(1e-3 / speed, 1e-9));
+  CHECK_THAT(run.impacts[1].impulse_on_tissue_N_s, WithinRel(kSphere_kg * speed, 1e-4));
   CHECK_THAT(run.energy->contact_heat, WithinRel(0.5 * kSphere_kg * speed * speed, 1e-2));
 }
 
@@ -268,7 +268,7 @@ TEST_CASE("a run with tools and mass in two halves is one run") {
     CAPTURE(cut);
     CHECK((rest.response - whole.response).cwiseAbs().maxCoeff() <
           1e-3 * whole.response.cwiseAbs().maxCoeff());
-    CHECK(first.blows.size() + rest.blows.size() == whole.blows.size());
+    CHECK(first.impacts.size() + rest.impacts.size() == whole.impacts.size());
     CHECK_THAT(rest.energy->work, WithinRel(whole.energy->work, 1e-3));
     CHECK_THAT(
         rest.energy->contact_heat,

@@ -170,14 +170,14 @@ TEST_CASE("a tool with mass reports what the tissue feels, and what its contacts
   CHECK(run.record.curve.back().touching == 0);
   REQUIRE(run.contact_check.has_value());
   CHECK_FALSE(run.contact_check->depends_on_stiffness());
-  CHECK(run.record.blows.size() >= 3);
+  CHECK(run.record.impacts.size() >= 3);
   const InertialEnergy energy = run.record.inertial_energy.value();
   CHECK(energy.contact_heat > 0.0);
   CHECK(std::abs(energy.missing()) < 0.02 * energy.work);
   const TempFolder folder;
   (void)write_simulation(scene, network, run, folder / "a.h5");
   const Hdf5Reader file(folder / "a.h5");
-  CHECK(file.numbers("/blows/time_s").size() == run.record.blows.size());
+  CHECK(file.numbers("/impacts/time_s").size() == run.record.impacts.size());
   CHECK(file.numbers("/contact_check/difference").front() == run.contact_check->difference);
   // So soft that the numbers are those of the contact: the run says so.
   ExperimentScene soft = scene;
@@ -195,7 +195,7 @@ TEST_CASE("a heavy tool under a load pushes with more than the load as it comes 
   double largest = 0.0;
   for (const CurvePoint& p : run.record.curve) largest = std::max(largest, p.force_on_tissue_N);
   CHECK(largest > 0.12);
-  // A run that was stopped goes on to the bit, blows and forces on tissue among it.
+  // A run that was stopped goes on to the bit, impacts and forces on tissue among it.
   const SimulationRun rest = stopped_and_resumed(scene);
   REQUIRE(rest.record.curve.size() == run.record.curve.size());
   for (std::size_t i = 0; i < run.record.curve.size(); ++i) {
@@ -205,5 +205,5 @@ TEST_CASE("a heavy tool under a load pushes with more than the load as it comes 
   for (std::size_t i = 0; i < run.record.contact_pushes_N.size(); ++i) {
     CHECK(rest.record.contact_pushes_N[i] == run.record.contact_pushes_N[i]);
   }
-  CHECK(rest.record.blows.size() == run.record.blows.size());
+  CHECK(rest.record.impacts.size() == run.record.impacts.size());
 }

@@ -230,7 +230,7 @@ TEST_CASE("items 6 to 13") {
   CHECK(finding(printed_paper(), "fit-with-ramp").recomputed->value > 100.0);
   CHECK(finding(printed_paper(), "gap").verdict == AuditVerdict::holds);
   CHECK(finding(printed_paper(), "distance-as-x").verdict == AuditVerdict::contradicted);
-  CHECK(finding(printed_paper(), "close-to-experiment").verdict == AuditVerdict::cannot_be_told);
+  CHECK(finding(printed_paper(), "close-to-experiment").verdict == AuditVerdict::undetermined);
   CHECK_THAT(finding(printed_paper(), "creep-probe").recomputed->value,
              test::expected("paper_audit.creep_probe"));
 }

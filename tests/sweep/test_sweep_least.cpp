@@ -1,5 +1,5 @@
-// The least model per cell: claims against the network, the choice, and bits that do not depend on
-// the order.
+// The cheapest model per cell: claims against the network, the choice, and bits that do not depend
+// on the order.
 #include <catch2/catch.hpp>
 #include <set>
 
@@ -164,7 +164,7 @@ TEST_CASE("claims that would take far longer than the cells are not made", "[hea
   const Json scene = creeping_liver("0.06 kPa", "120 kPa", "412912.5 Pa s", "30 s");
   const Sweep sweep = over_depths(scene, "2.7 mm", "2.82 mm", "30 s", "5 %");
   const std::string choice = sweep.model->choice_of_models(sweep.swept());
-  CHECK(choice.find("the least model") != std::string::npos);
+  CHECK(choice.find("the cheapest model") != std::string::npos);
   const CellBlock found = CellRunner(sweep).run(0);
   for (std::size_t i = 0; i < found.cells(); ++i) {
     REQUIRE(found.status[i] == CellStatus::done);

@@ -1,7 +1,7 @@
 """Soft tissue: laws from recordings, organs of spheres, contacts for haptic loops.
 
     import tpmkit
-    fit = tpmkit.fit("recording.csv")     # the least law that the recording supports
+    fit = tpmkit.fit("recording.csv")     # the simplest law that the recording supports
     fit.parameters                        # a DataFrame: estimates, intervals, verdicts
     fit.plot()
 

@@ -441,7 +441,7 @@ def fit(
         A recording as three arrays of one length in place of `files`; `units` names the unit of each:
         ``{"time": "s", "depth": "mm", "force": "mN"}``.
     law
-        Fit this one ("power-2") instead of the least law that the recordings support.
+        Fit this one ("power-2") instead of the simplest law that the recordings support.
     starts, seed
         Number of starts and seed of the search; equal seeds give equal answers.
     reference

@@ -186,7 +186,7 @@ def plan(
     costs: str | os.PathLike[str] = "nominal",
     progress: bool | Progress = False,
 ) -> Plan:
-    """The least model for a scene, verified against the nonlinear network (`tpm plan`, docs/plan.md).
+    """The cheapest model for a scene, verified against the nonlinear network (`tpm plan`, docs/plan.md).
 
     Parameters
     ----------

@@ -135,9 +135,9 @@ std::string range_words(const ParameterResult& p, double level) {
                          in_unit(f, *p.upper), percent(level), drift_note(p), bound_note(p));
     case Verdict::flat:
       if (exchanges(p, false) || exchanges(p, true)) {
-        return fmt::format("{} cannot be told from these data{}", f.name, bound_note(p));
+        return fmt::format("{} is undetermined by these data{}", f.name, bound_note(p));
       }
-      return fmt::format("{} cannot be told from these data: every value from {} to {} fits{}",
+      return fmt::format("{} is undetermined by these data: every value from {} to {} fits{}",
                          f.name, in_unit(f, f.lower), in_unit(f, f.upper), bound_note(p));
     case Verdict::failed:
       return failure_words(p, level);

@@ -23,7 +23,7 @@ namespace tpm::fit {
 /// One sentence for a reader, made from the numbers.
 [[nodiscard]] std::string parameter_words(const ParameterResult& parameter, double level);
 
-/// "eta1 = 5 Pa s is excluded by these data (...)" or "cannot be told ...".
+/// "eta1 = 5 Pa s is excluded by these data (...)" or "undetermined ...".
 [[nodiscard]] std::string hypothesis_words(const HypothesisResult& result, double level);
 
 /// What the data know of parameters that trade off along a direction, "their product E eta1",

@@ -32,8 +32,8 @@ struct InertiaEstimate {
 /// -u' K z. The modes are gathered by Lanczos' method from M^(1/2) u (24 steps), which needs no
 /// eigenvectors; every change of rate starts them anew, and they are summed over the protocol. K is
 /// that of the lowest mode's frequency, alpha the damping of the scene. What the driven sphere's
-/// own mass weighs in the drag is in it, its blows are not, as in InertialRun::response. Throws as
-/// lowest_mode and masses_kg do.
+/// own mass weighs in the drag is in it, its impacts are not, as in InertialRun::response. Throws
+/// as lowest_mode and masses_kg do.
 [[nodiscard]] InertiaEstimate estimate_inertia(const PlanScene& scene);
 
 /// What of it no protocol changes. Throws as estimate_inertia does.

@@ -125,7 +125,7 @@ class Planning {
       settle_masses_left_out();
     }
     if (plan_.request.changes && plan_.choice) {
-      tell("what would break first");
+      tell("robustness margins");
       plan_.changes = plan_changes(*surrogate_, model_of(plan_.chosen()), plan_.request,
                                    plan_.work.reference_s, allowance_);
     }

@@ -37,7 +37,7 @@ struct PlanRequest {
   /// the loop has; what they would change is in masses_left_out. Needs a rate.
   bool for_loop = false;
   bool relevance = true;  ///< find out what does not matter
-  bool changes = true;    ///< find out what would break first
+  bool changes = true;    ///< find out robustness margins
   /// Try everything, however long it takes. Else, by nominal costs, a plan takes about twice as
   /// long as its reference and cross-check at most, or 1.5 s without masses.
   bool thorough = false;
@@ -145,7 +145,7 @@ struct PlanClaim {
 };
 [[nodiscard]] PlanClaim claim_of(const Plan& plan);
 
-/// The least model for a scene. Throws Error(bad_input) for scenes and requests that no plan is
+/// The cheapest model for a scene. Throws Error(bad_input) for scenes and requests that no plan is
 /// made for, Error(numerical) where the reference itself cannot be computed or its cross-check
 /// disagrees.
 [[nodiscard]] Plan make_plan(const ExperimentScene& scene, const PlanRequest& request);

@@ -1,5 +1,5 @@
 // Declared in tpm/plan/plan_relevance.hpp.
-// What would break first if the scene changed.
+// Robustness margins: how far the scene may change before the plan breaks.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -387,7 +387,7 @@ class OrganSweepModel final : public SweepModel {
         "{} cells share organ and moduli; claims of reduced models for them cost {} "
         "runs of the network: {}",
         significant(cost.cells, 6), significant(cost.runs, 3),
-        cost.pays() ? "the least model that claims to be within the tolerance"
+        cost.pays() ? "the cheapest model that claims to be within the tolerance"
                     : "the network, at the coarsest tolerance that is enough");
   }
 

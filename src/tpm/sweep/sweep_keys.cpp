@@ -187,7 +187,7 @@ FormPtr sweep_form() {
             optional_key("tolerance",
                          quantity_form(Dimension::dimensionless, {.least = 1e-6, .most = 0.5}),
                          "of the response, in parts of its peak, such as \"1 %\"; each cell then "
-                         "runs on the least model that claims to be within it. Default: the "
+                         "runs on the cheapest model that claims to be within it. Default: the "
                          "network at the scene's own tolerance"),
             optional_key("integrator", integrator,
                          "instead of steps that follow the tolerance; its keys can be swept as "

@@ -43,9 +43,10 @@ struct Exported {
 void require_sayable(const LawFile& law, const ExportOptions& options) {
   if (options.relaxation_only) return;
   const auto refuse = [&](std::string_view what) {
-    throw bad_input(fmt::format("export to {}", entry_of(kTargets, options.target).text),
-                    fmt::format("the {} of {} cannot be said there", what, law_name(law.spec)),
-                    "a linear or Hertz kernel without tension, or --relaxation-only");
+    throw bad_input(
+        fmt::format("export to {}", entry_of(kTargets, options.target).text),
+        fmt::format("the {} of {} has no counterpart in that format", what, law_name(law.spec)),
+        "a linear or Hertz kernel without tension, or --relaxation-only");
   };
   if (law.spec.kernel == Kernel::power) refuse("power kernel");
   if (law.spec.tension != Tension::none) refuse("tension");

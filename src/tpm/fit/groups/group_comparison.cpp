@@ -171,11 +171,10 @@ void require_comparable_depths(const RecordingGroup& first, const RecordingGroup
   constexpr double kMillimetre = 1e-3;
   throw bad_input(
       fmt::format("groups '{}' and '{}'", printable(first.name), printable(second.name)),
-      fmt::format(
-          "depth and group cannot be told apart: contact is followed to {} mm in one and {} mm "
-          "in the other (geometric means)",
-          significant(std::exp(mean_a) / kMillimetre, 3),
-          significant(std::exp(mean_b) / kMillimetre, 3)),
+      fmt::format("depth and group are confounded: contact is followed to {} mm in one and {} mm "
+                  "in the other (geometric means)",
+                  significant(std::exp(mean_a) / kMillimetre, 3),
+                  significant(std::exp(mean_b) / kMillimetre, 3)),
       "recordings to the same depths in both groups, or the deeper ones cut (--until) at the depth "
       "that all reach");
 }

@@ -43,7 +43,7 @@ struct GroupComparison {
 /// material parameter how far the groups lie apart (group_difference()), and of Young's moduli
 /// where a probe is given. Repeats of a specimen (PreparedRecording::specimen) become its mean
 /// first. Error(bad_input): two files with the same bytes; groups that were indented to different
-/// depths, so that depth and group cannot be told apart (see require_comparable_depths); as
+/// depths, so that depth and group are confounded (see require_comparable_depths); as
 /// study_specimens().
 [[nodiscard]] GroupComparison compare_groups(const RecordingGroup& first,
                                              const RecordingGroup& second,

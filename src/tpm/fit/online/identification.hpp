@@ -14,7 +14,7 @@ struct IdentifyOptions {
   /// elastic tension.
   std::vector<LawSpec> laws;
   double level = 0.95;
-  /// Stop when the interval of every material parameter of the least law is at most this part of
+  /// Stop when the interval of every material parameter of the simplest law is at most this part of
   /// its estimate to each side; in (0, 1).
   double target = 0.1;
   /// And stays so, with the same law, until there are this many times as many samples: a width that

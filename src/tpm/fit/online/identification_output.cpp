@@ -96,7 +96,7 @@ Json to_json(const Identification& id) {
 std::string to_terminal_text(const Identification& id) {
   constexpr std::size_t kRows = 10;
   std::string text = fmt::format("{:>9} {:>8} {:>18} {:>12} {:>12}\n", "time s", "samples",
-                                 "least law", "widest +- %", "correlation");
+                                 "simplest law", "widest +- %", "correlation");
   const std::size_t n = id.history.size();
   for (std::size_t row = 0; row < std::min(n, kRows); ++row) {
     const IdentifiedSample& s = id.history[n <= kRows ? row : row * (n - 1) / (kRows - 1)];

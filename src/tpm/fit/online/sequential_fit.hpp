@@ -102,8 +102,8 @@ class SequentialFit {
   int passes_ = 0;
 };
 
-/// The least law among estimates: of those identified (if none is, of all) the one with the fewest
-/// parameters whose BIC is within the margin of their least. None if there are no estimates.
+/// The simplest law among estimates: of those identified (if none is, of all) the one with the
+/// fewest parameters whose BIC is within the margin of their least. None if there are no estimates.
 [[nodiscard]] std::optional<std::size_t> least_law(std::span<const SequentialFit> fits,
                                                    double margin);
 

@@ -58,14 +58,15 @@ std::string hand_sentence(const ErrorBudget& budget) {
   const double all = budget.combined;
   if (all < kForceJnd) {
     return fmt::format(
-        "the whole chain ({}) stays below what a hand tells of a force ({}): measuring or "
-        "computing finer would not be felt",
+        "the whole chain ({}) stays below the just noticeable difference of a force ({}): "
+        "measuring "
+        "or computing finer would not be felt",
         part_text(all), part_text(kForceJnd));
   }
   if (all < kStiffnessThroughTool) {
     return fmt::format(
-        "the whole chain ({}) may be felt as a force (from {} on); of a stiffness felt through a "
-        "tool a hand tells {}",
+        "the whole chain ({}) may be felt as a force (from {} on); the just noticeable "
+        "difference of a stiffness felt through a tool is {}",
         part_text(all), part_text(kForceJnd), part_text(kStiffnessThroughTool));
   }
   return fmt::format("the whole chain ({}) is above every threshold of a hand listed here",
@@ -74,15 +75,14 @@ std::string hand_sentence(const ErrorBudget& budget) {
 
 std::string waste_sentence(const ErrorBudget& budget) {
   constexpr double kFiner = 0.3;  // of the data's part: in quadrature 4 % of it
-  if (!(budget.data_part > 0.0)) return "what the data know is not known: no fit stands behind it";
+  if (!(budget.data_part > 0.0))
+    return "the data uncertainty is not known: no fit stands behind it";
   if (budget.computed_part < kFiner * budget.data_part) {
-    return fmt::format(
-        "the data know the force to {}, and what is lost by computing is {}: computing finer "
-        "would be wasted",
-        part_text(budget.data_part), part_text(budget.computed_part));
+    return fmt::format("data uncertainty {}, lost by computing {}: computing finer would be wasted",
+                       part_text(budget.data_part), part_text(budget.computed_part));
   }
   return fmt::format(
-      "what is lost by computing ({}) is not small against what the data know ({}): computing "
+      "what is lost by computing ({}) is not small against the data uncertainty ({}): computing "
       "finer pays",
       part_text(budget.computed_part), part_text(budget.data_part));
 }

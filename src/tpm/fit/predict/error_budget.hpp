@@ -133,8 +133,8 @@ void conclude(ErrorBudget& budget);
 /// time_s, each stage's force and each line's difference, SI.
 [[nodiscard]] std::string to_csv(const ErrorBudget& budget);
 
-/// `data_part` of a budget.json: the tolerance below which computing is finer than the data know.
-/// Throws Error(bad_input) for a file that is no budget.
+/// `data_part` of a budget.json: the tolerance below which computing is finer than the data
+/// uncertainty. Throws Error(bad_input) for a file that is no budget.
 [[nodiscard]] double tolerance_of_data(const Json& budget, std::string_view where);
 
 }  // namespace tpm::fit

@@ -168,7 +168,8 @@ std::string least_law_words(const Selection& s, const std::string& data) {
   if (s.preferred) {
     const Candidate& best = s.candidates[*s.preferred];
     return fmt::format(
-        "{} prefer {}, by {} in BIC, but do not identify its parameters ({}); the least law {} is",
+        "{} prefer {}, by {} in BIC, but do not identify its parameters ({}); the simplest law {} "
+        "is",
         data, law_name(best.law), significant(chosen.delta_bic, 3), best.reason,
         chosen.identified     ? "whose parameters they identify"
         : chosen.contradicted ? "near the best BIC"
@@ -179,7 +180,7 @@ std::string least_law_words(const Selection& s, const std::string& data) {
     return fmt::format("no law that is identified describes {}; the least of {} is", data,
                        s.candidates.size());
   }
-  if (chosen.identified) return fmt::format("the least law that {} support is", data);
+  if (chosen.identified) return fmt::format("the simplest law that {} support is", data);
   return fmt::format("{} identify none of the {} laws; near the best BIC the least{} is", data,
                      s.candidates.size(),
                      chosen.contradicted ? "" : " that the protocol does not contradict");

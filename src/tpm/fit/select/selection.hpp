@@ -145,7 +145,7 @@ struct ProtocolSpans {
 /// Of the fitted parts.
 [[nodiscard]] ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings);
 
-/// "the least law that the data support is", or what else the recommended law is.
+/// "the simplest law that the data support is", or what else the recommended law is.
 [[nodiscard]] std::string least_law_words(const Selection& s, const std::string& data);
 
 /// The first reason why a material parameter of a fit is not known; empty if all are. By the

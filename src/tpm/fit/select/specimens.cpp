@@ -79,13 +79,14 @@ std::pair<LawSpec, std::string> common_law(std::span<const PreparedRecording> re
           "; the data prefer {}, by {} in that sum, but identify its parameters in {} of them",
           law_name(ahead->law), significant(chosen->bic - ahead->bic, 3), ahead->identified);
     }
-    return {chosen->law,
-            fmt::format("{} is the least law within {} of the least sum of BIC over {} recordings"
-                        "{}; its parameters are identified in {} of them{}",
-                        law_name(chosen->law), significant(margin, 3), recordings.size(),
-                        only_identified ? " among the laws that most of them identify"
-                                        : ", but no law is identified in most of them",
-                        chosen->identified, preferred)};
+    return {
+        chosen->law,
+        fmt::format("{} is the simplest law within {} of the least sum of BIC over {} recordings"
+                    "{}; its parameters are identified in {} of them{}",
+                    law_name(chosen->law), significant(margin, 3), recordings.size(),
+                    only_identified ? " among the laws that most of them identify"
+                                    : ", but no law is identified in most of them",
+                    chosen->identified, preferred)};
   }
   throw Error(ExitCode::numerical, "fit", "no law could be fitted to every recording");
 }

@@ -67,9 +67,9 @@ Panel width_panel(const Identification& id) {
 }
 
 Panel law_panel(const Identification& id) {
-  Panel panel{
-      .x = {"time", "s"},
-      .y = {"least law, by its place", "", false, 0.5, 0.5 + static_cast<double>(id.laws.size())}};
+  Panel panel{.x = {"time", "s"},
+              .y = {"simplest law, by its place", "", false, 0.5,
+                    0.5 + static_cast<double>(id.laws.size())}};
   for (std::size_t law = 0; law < id.laws.size(); ++law) {
     Series s{
         .kind = Series::Kind::points, .label = law_name(id.laws[law]), .provenance = "derived"};
@@ -88,7 +88,7 @@ Figure identification_figure(const Identification& id) {
   return {"identification",
           fmt::format("{}, sample by sample", name),
           fmt::format("Half width of the {} % intervals of {} while the recording is replayed, and "
-                      "the least law at each sample.",
+                      "the simplest law at each sample.",
                       significant(100.0 * id.options.level, 3), law_name(id.laws[id.result().law])),
           {width_panel(id), law_panel(id)}};
 }

@@ -25,8 +25,8 @@ struct EnergyWatchSettings {
 /// (forces against the motion). What the tissue stores and gives back is on both sides, so an
 /// honest release leaves Q as it is, and energy put in earlier is no credit for later activity.
 /// What is left is the leak of the constant force, K dx^2/2 a period, less the friction b of the
-/// device. With b > K T/2 (the border of passivity) Q never falls; each fall of Q from its largest
-/// value of the last second is energy that the hand received from the rendering alone.
+/// device. With b > K T/2 (the boundary of passivity) Q never falls; each fall of Q from its
+/// largest value of the last second is energy that the hand received from the rendering alone.
 ///
 /// The work on the tissue is counted beside it: a contact that starts at rest can never give back
 /// more than it got, so its sum must not fall below zero by more than the allowance either.

@@ -162,8 +162,9 @@ ServoStep::Cap ServoStep::cap() const noexcept {
   const double ramp = time < settings_.ramp_in_s ? time / settings_.ramp_in_s : 1.0;
   const double limit = ramp * settings_.force_limit_N;
   // The model comes back to its validity at the force that is being sent.
-  const double rising =
-      doubted_before_ ? before_N : before_N + settings_.slew_limit_N_per_s * settings_.period_s;
+  const double rising = was_outside_validity_
+                            ? before_N
+                            : before_N + settings_.slew_limit_N_per_s * settings_.period_s;
   if (rising < limit) return {rising, kSlipping};
   return {limit, ramp < 1.0 ? kRampingIn : kForceLimited};
 }
@@ -174,7 +175,7 @@ double ServoStep::recovery_m() const noexcept {
   return settings_.slew_limit_N_per_s * settings_.period_s / stiffness_N_per_m_;
 }
 
-/// The stiffness that the next slip is foretold with, from a motion into the tissue.
+/// The stiffness that the next slip is predicted with, from a motion into the tissue.
 void ServoStep::learn_stiffness(double rise_N, double moved_m) noexcept {
   constexpr double kLeastMove_m = 1e-7, kMost = 10.0;
   if (!(moved_m > kLeastMove_m)) return;
@@ -183,15 +184,16 @@ void ServoStep::learn_stiffness(double rise_N, double moved_m) noexcept {
 }
 
 /// What is sent of a force that the model answers.
-double ServoStep::felt_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept {
+double ServoStep::rendered_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept {
   constexpr double kForgetting = 0.1;
-  doubted_before_ = !felt.valid;
+  was_outside_validity_ = !felt.valid;
   if (felt.valid) {
-    doubted_ = std::max(0.0, doubted_ - kForgetting * static_cast<double>(felt.steps));
+    outside_validity_steps_ =
+        std::max(0.0, outside_validity_steps_ - kForgetting * static_cast<double>(felt.steps));
     if (felt.model_N > cap.force_N) row.flags |= cap.flag;
     return std::min(felt.model_N, cap.force_N);
   }
-  doubted_ += static_cast<double>(felt.steps);
+  outside_validity_steps_ += static_cast<double>(felt.steps);
   row.flags |= kBeyondModel;
   if (!felt.touching) return 0.0;
   const double before_N = tissue_size_N_;
@@ -206,10 +208,10 @@ void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
   const double from_m = tool_m_ - slip_m_;
   tool_m_ = settings_.push.dot(position_m_ - settings_.surface_m);
   if (model_N_ == 0.0 && slip_m_ > 0.0) slip_m_ = std::max(0.0, slip_m_ - recovery_m());
-  const double foretold_N =
+  const double predicted_N =
       model_N_ + stiffness_N_per_m_ * (tool_m_ - slip_m_ - contact_.surface_m());
-  if (foretold_N > most.force_N && !doubted_before_) {
-    slip_m_ += (foretold_N - most.force_N) / stiffness_N_per_m_;
+  if (predicted_N > most.force_N && !was_outside_validity_) {
+    slip_m_ += (predicted_N - most.force_N) / stiffness_N_per_m_;
     row.flags |= most.flag;
   }
   const double to_m = tool_m_ - slip_m_;
@@ -220,13 +222,13 @@ void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
     answer = contact_.press(begun_ ? from_m + part * (to_m - from_m) : to_m);
   }
   answer = contact_.press(to_m);
-  if (touched && answer.touching && answer.valid && !doubted_before_) {
+  if (touched && answer.touching && answer.valid && !was_outside_validity_) {
     learn_stiffness(answer.force_N - model_N_, to_m - from_m);
   }
   const double before_N = tissue_size_N_;
   const double moved = answer.surface_m - surface_m_;
   const double now_N =
-      felt_N({answer.force_N, from_m - to_m, steps, answer.touching, answer.valid}, most, row);
+      rendered_N({answer.force_N, from_m - to_m, steps, answer.touching, answer.valid}, most, row);
   if (answer.touching) leak_J_ += 0.5 * contact_.stiffness_N_per_m() * moved * moved;
   tissue_work_J_ = 0.5 * (before_N + now_N) * moved;
   surface_m_ = answer.surface_m;
@@ -248,11 +250,11 @@ void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
   Eigen::Vector3d to_m = hand_m - slip_in_space_m_;
   const Eigen::Vector3d from_m = begun_ ? model_tool_m_ : to_m;
   const bool touched = model_N_ > 0.0;
-  if (touched && !doubted_before_) {
+  if (touched && !was_outside_validity_) {
     const Eigen::Vector3d into = -model_force_N_ / model_N_;
-    const double foretold_N = model_N_ + stiffness_N_per_m_ * into.dot(to_m - from_m);
-    if (foretold_N > most.force_N) {
-      const Eigen::Vector3d slip = into * ((foretold_N - most.force_N) / stiffness_N_per_m_);
+    const double predicted_N = model_N_ + stiffness_N_per_m_ * into.dot(to_m - from_m);
+    if (predicted_N > most.force_N) {
+      const Eigen::Vector3d slip = into * ((predicted_N - most.force_N) / stiffness_N_per_m_);
       slip_in_space_m_ += slip;
       to_m -= slip;
       row.flags |= most.flag;
@@ -265,14 +267,14 @@ void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
   }
   const Eigen::Vector3d force_N = settings_.to_model->transpose() * answer.force_N;
   const double size_N = force_N.norm();
-  if (touched && size_N > 0.0 && answer.valid && !doubted_before_) {
+  if (touched && size_N > 0.0 && answer.valid && !was_outside_validity_) {
     learn_stiffness(size_N - model_N_, (-model_force_N_ / model_N_).dot(to_m - from_m));
   }
   const Eigen::Vector3d before_N = tissue_N_;
   const Eigen::Vector3d along =
       before_N.isZero(0.0) ? Eigen::Vector3d::Zero() : Eigen::Vector3d(before_N.normalized());
   const double now_N =
-      felt_N({size_N, along.dot(to_m - from_m), steps, size_N > 0.0, answer.valid}, most, row);
+      rendered_N({size_N, along.dot(to_m - from_m), steps, size_N > 0.0, answer.valid}, most, row);
   // Only the size is limited; a force outside validity keeps the last valid direction.
   tissue_N_ = !answer.valid  ? Eigen::Vector3d(now_N * along)
               : size_N > 0.0 ? Eigen::Vector3d(force_N * (now_N / size_N))
@@ -329,7 +331,8 @@ StopCause ServoStep::check_rendering(int periods) noexcept {
     if (oscillation_.found() || late) return StopCause::oscillation;
     if (damped_share_ > kMostDamped) return StopCause::damping;
   }
-  return doubted_ > outside_validity_periods_ ? StopCause::outside_validity : StopCause::none;
+  return outside_validity_steps_ > outside_validity_periods_ ? StopCause::outside_validity
+                                                             : StopCause::none;
 }
 
 StopCause ServoStep::write(const Eigen::Vector3d& force_N, ServoRecord& row) noexcept {

@@ -25,7 +25,7 @@ namespace tpm::haptics {
 /// the model's tool is set back by d >= 0 along the push so that F <= C as far as the stiffness
 /// foretells; what is sent is min(F, C). The work of the hand is that of the model's tool plus
 /// F d >= 0: a slip takes energy and never gives any (exact where F <= C; where the tissue is
-/// stiffer than foretold, F - C lasts one period). While the force is zero the model's tool
+/// stiffer than predicted, F - C lasts one period). While the force is zero the model's tool
 /// recovers towards the hand, which costs nothing.
 ///
 /// **Damping.** Once the rendering has given energy away, the passivity controller adds damping.
@@ -81,7 +81,7 @@ class ServoStep {
   [[nodiscard]] Cap cap() const noexcept;
   [[nodiscard]] double recovery_m() const noexcept;
   void learn_stiffness(double rise_N, double moved_m) noexcept;
-  [[nodiscard]] double felt_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept;
+  [[nodiscard]] double rendered_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept;
   void count_limits(std::uint32_t flags) noexcept;
   [[nodiscard]] Eigen::Vector3d with_damping(ServoRecord& row) noexcept;
   [[nodiscard]] StopCause check_rendering(int periods) noexcept;
@@ -115,7 +115,7 @@ class ServoStep {
   int to_status_ = 0;           ///< cycles until the device is asked for its status
   Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero();  ///< on the hand, after slip and fading
   double tool_m_ = 0.0, surface_m_ = 0.0, leak_J_ = 0.0;
-  double stiffness_N_per_m_;        ///< that a slip is foretold with
+  double stiffness_N_per_m_;        ///< that a slip is predicted with
   double least_stiffness_N_per_m_;  ///< at rest
   double model_N_ = 0.0;            ///< size of the model's last force, valid or not
   double slip_m_ = 0.0;             ///< of the model's tool behind the hand, along the push
@@ -124,8 +124,9 @@ class ServoStep {
   Eigen::Vector3d model_force_N_ = Eigen::Vector3d::Zero();  ///< on it, device coordinates
   double tissue_work_J_ = 0.0;                               ///< on the surface in this cycle
   double damped_share_ = 0.0;  ///< of the cycles of the last kDampedWindow_s
-  double doubted_ = 0.0;       ///< periods outside validity, forgotten ten times as slowly
-  bool doubted_before_ = false;
+  double outside_validity_steps_ =
+      0.0;  ///< periods outside validity, forgotten ten times as slowly
+  bool was_outside_validity_ = false;
   int owed_ = 0;     ///< periods that the model has not lived through yet
   int stale_ = 0;    ///< periods for which the position is that of an earlier call
   ServoRecord row_;  ///< of this cycle; what it does not know anew is from the one before

@@ -90,7 +90,7 @@ std::string instruction_of(const SessionPhase& phase) {
     case SessionPhaseKind::creep:
       break;
   }
-  return fmt::format("Keep pushing with {} N while the tissue gives way", significant(phase.to, 4));
+  return fmt::format("Keep pushing with {} N while the tissue creeps", significant(phase.to, 4));
 }
 
 std::string instruction_of(const ServoRecord& waiting) {

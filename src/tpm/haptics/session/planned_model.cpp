@@ -149,8 +149,8 @@ namespace {
 
 /// For how many periods of its slowest push to a depth forces are outside a session's model.
 /// The model is at rest after it.
-int doubted_on_push(ContactModel& model, const HilSession& session, const Eigen::Vector3d& push,
-                    double depth_m) {
+int outside_validity_on_push(ContactModel& model, const HilSession& session,
+                             const Eigen::Vector3d& push, double depth_m) {
   double slowest_m_per_s = std::numeric_limits<double>::infinity();
   for (const SessionPhase& phase : session.phases) {
     if (phase.rate_m_per_s > 0.0) {
@@ -191,7 +191,7 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
     loop.model = std::move(models.front());
     if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());
     const int doubted =
-        doubted_on_push(*loop.model, session, pushed.probe().direction, pushed.deepest_m);
+        outside_validity_on_push(*loop.model, session, pushed.probe().direction, pushed.deepest_m);
     if (doubted >= least_doubted) continue;
     least_doubted = doubted;
     found = std::move(loop);

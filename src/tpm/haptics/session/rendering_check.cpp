@@ -7,7 +7,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
-#include "tpm/haptics/session/rendering_border.hpp"
+#include "tpm/haptics/session/rendering_boundary.hpp"
 #include "tpm/haptics/session/six_hands.hpp"
 
 namespace tpm::haptics {
@@ -144,7 +144,7 @@ std::string RenderingCheck::verdict() const {
         "operator up to {} N/m; of six hands stable with: {}",
         significant(stable_N_per_m, 3), what, significant(passive_N_per_m, 3), stable_hands);
   }
-  return fmt::format("passive: {}; the border is {} N/m, that of stability {} N/m", what,
+  return fmt::format("passive: {}; the boundary is {} N/m, that of stability {} N/m", what,
                      significant(passive_N_per_m, 3), significant(stable_N_per_m, 3));
 }
 
@@ -189,8 +189,8 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
   for (const double relaxation_s : times_s) {
     const RenderedContact contact = contact_of(check, relaxation_s);
     check.spectral_radius = std::max(check.spectral_radius, loop_spectral_radius(contact, plant));
-    check.stable_N_per_m = std::min(check.stable_N_per_m,
-                                    largest_stable_stiffness(contact, plant, BorderBy::prediction));
+    check.stable_N_per_m = std::min(
+        check.stable_N_per_m, largest_stable_stiffness(contact, plant, BoundaryBy::prediction));
   }
   warn_of_rests(check, session);
   return check;
@@ -212,11 +212,11 @@ Json to_json(const RenderingCheck& check) {
             {"stiffness_N_per_m", rounded(check.stiffness_N_per_m, kDigits)},
             {"at_depth_m", rounded(check.depth_m, kDigits)},
             {"passive_friction_N_s_per_m", rounded(check.passive_friction_N_s_per_m, kDigits)},
-            {"passive_border_N_per_m", rounded(check.passive_N_per_m, kDigits)},
-            {"stable_border_N_per_m", rounded(check.stable_N_per_m, kDigits)},
+            {"passive_boundary_N_per_m", rounded(check.passive_N_per_m, kDigits)},
+            {"stable_boundary_N_per_m", rounded(check.stable_N_per_m, kDigits)},
             {"spectral_radius", rounded(check.spectral_radius, kDigits)},
-            {"device_border_N_per_m", rounded(check.largest_N_per_m, kDigits)},
-            {"hands_border_N_per_m", rounded(check.hands_N_per_m, kDigits)},
+            {"device_boundary_N_per_m", rounded(check.largest_N_per_m, kDigits)},
+            {"hands_boundary_N_per_m", rounded(check.hands_N_per_m, kDigits)},
             {"stable_hands", check.stable_hands},
             {"warnings", check.warnings}};
   if (check.delay_at_start_s) {

@@ -34,7 +34,7 @@ struct RenderingCheck {
   std::vector<std::string> warnings;
 
   [[nodiscard]] bool passive() const { return stiffness_N_per_m <= passive_N_per_m; }
-  /// With room: the border is that of small motions, and impacts and limits take away from it.
+  /// With room: the boundary is that of small motions, and impacts and limits take away from it.
   [[nodiscard]] bool stable() const {
     return spectral_radius < 1.0 && stiffness_N_per_m <= kRoom * stable_N_per_m;
   }

@@ -2,7 +2,7 @@
 #include <array>
 #include <string>
 
-#include "tpm/haptics/session/rendering_border.hpp"
+#include "tpm/haptics/session/rendering_boundary.hpp"
 
 namespace tpm::haptics {
 

@@ -141,9 +141,9 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
       size_N.push_back(kNoReference);
       continue;
     }
-    const Eigen::Vector3d felt_N = surface.to_model.transpose() * *fine[k];
-    v.reference_N.push_back(-recording.session.servo.push.dot(felt_N));
-    v.error_N.push_back((commanded_N - felt_N).norm());
+    const Eigen::Vector3d rendered_N = surface.to_model.transpose() * *fine[k];
+    v.reference_N.push_back(-recording.session.servo.push.dot(rendered_N));
+    v.error_N.push_back((commanded_N - rendered_N).norm());
     size_N.push_back(fine[k]->norm());
     // The error falls with the square of the step.
     if (k % 2 == 0 && coarse[k / 2]) {

@@ -130,7 +130,7 @@ class MotionRun {
   void go_on_from(const InertialState& from) {
     started_ = true;
     begin_s_ = from.time_s;
-    blow_work_ = from.blow_work_J;
+    impact_work_ = from.impact_work_J;
     stored_at_start_ = from.stored_at_start_J;
   }
 
@@ -166,7 +166,7 @@ class MotionRun {
     equation_.set_piece(from, to);
     if (!started_) begin(from.time_s);
     const double begin_s = std::max(from.time_s, begin_s_);
-    if (begin_s == from.time_s) blow(from.time_s, speed_before, velocity_before);
+    if (begin_s == from.time_s) change_speed(from.time_s, speed_before, velocity_before);
     integration_->restart(begin_s, to.time_s);
     while (next_ < order_.size() && times_s_[order_[next_]] < to.time_s) {
       const double time = times_s_[order_[next_]];
@@ -191,7 +191,7 @@ class MotionRun {
       integration_->spend(impact.work_J, impact.lost_J);
       const double of_probe = tissue_.depth_driven() ? impact.on_tissue_N_s : 0.0;
       if (impact.on_tissue_N_s != 0.0) {
-        result_.blows.push_back({reached, of_probe, impact.on_tissue_N_s});
+        result_.impacts.push_back({reached, of_probe, impact.on_tissue_N_s});
       }
       if (reached < stop_s) integration_->restart(reached, stop_s);
       if (!(time_s - reached > 1e-14 * std::max(std::abs(time_s), stop_s))) return;
@@ -203,18 +203,19 @@ class MotionRun {
     stored_at_start_ = equation_.stored_J(time_s, integration_->state());
   }
 
-  void blow(double time_s, double speed_before, const Eigen::Matrix3Xd& velocity_before) {
+  void change_speed(double time_s, double speed_before, const Eigen::Matrix3Xd& velocity_before) {
     const double speed = equation_.imposed_speed();
     const Eigen::Matrix3Xd velocity = equation_.imposed_velocity();
     if (velocity == velocity_before) return;
     const double impulse = equation_.driven_mass_kg() * (speed - speed_before);
-    blow_work_ += 0.5 * (velocity.colwise().squaredNorm() - velocity_before.colwise().squaredNorm())
-                            .dot(equation_.inertia().mass_kg.transpose());
+    impact_work_ +=
+        0.5 * (velocity.colwise().squaredNorm() - velocity_before.colwise().squaredNorm())
+                  .dot(equation_.inertia().mass_kg.transpose());
     // Spheres that the tool touches are taken along as it gains speed, so that nothing is lost.
     const ToolImpact impact = integration_->strike(time_s);
-    blow_work_ += impact.work_J - impact.lost_J;
+    impact_work_ += impact.work_J - impact.lost_J;
     const double on_driven_spheres = equation_.driven_sphere_mass_kg() * (speed - speed_before);
-    result_.blows.push_back(
+    result_.impacts.push_back(
         {time_s, impulse + impact.on_tissue_N_s, on_driven_spheres + impact.on_tissue_N_s});
   }
 
@@ -241,7 +242,7 @@ class MotionRun {
     if (options_.energy) {
       const Eigen::Vector4d spent = integration_->spent_J();
       InertialEnergy energy;
-      energy.work = spent[0] + blow_work_;
+      energy.work = spent[0] + impact_work_;
       energy.stored = equation_.stored_J(end, integration_->state()) - stored_at_start_;
       energy.kinetic = equation_.kinetic_J(end, integration_->state());
       energy.bond_heat = spent[1];
@@ -254,8 +255,8 @@ class MotionRun {
     result_.velocity = last.velocity;
     result_.viscous = last.viscous;
     result_.end = {end, integration_->state(),
-                   options_.energy ? integration_->spent_J() : Eigen::Vector4d::Zero(), blow_work_,
-                   stored_at_start_};
+                   options_.energy ? integration_->spent_J() : Eigen::Vector4d::Zero(),
+                   impact_work_, stored_at_start_};
   }
 
   const InertialOptions& options_;
@@ -271,7 +272,7 @@ class MotionRun {
   bool started_ = false;
   double begin_s_ = -std::numeric_limits<double>::infinity();  ///< where an earlier run has ended
   double stored_at_start_ = 0.0;
-  double blow_work_ = 0.0;
+  double impact_work_ = 0.0;
   InertialRun result_;
 };
 

@@ -58,9 +58,9 @@ struct InertialEnergy {
   }
 };
 
-/// A blow: speeds that change in an instant. The probe changes that of what it drives where an
+/// An impact: speeds that change in an instant. The probe changes that of what it drives where an
 /// imposed depth changes its rate, and a tool that of the spheres that it meets.
-struct ProbeBlow {
+struct ProbeImpact {
   double time_s = 0.0;
   double impulse_N_s = 0.0;            ///< of the probe, on tool and tissue
   double impulse_on_tissue_N_s = 0.0;  ///< the part of it that the tissue takes
@@ -72,7 +72,7 @@ struct InertialState {
   Eigen::VectorXd motion;  ///< the integrator's: displacements, velocities, viscous elongations
   /// Work, heat of bonds, of damping and of contacts.
   Eigen::Vector4d spent_J = Eigen::Vector4d::Zero();
-  double blow_work_J = 0.0;
+  double impact_work_J = 0.0;
   double stored_at_start_J = 0.0;
 };
 
@@ -83,13 +83,13 @@ using InertialObserver =
 
 struct InertialRun {
   /// Contact force, N, or depth, m, at each asked time. The force is what the probe exerts on the
-  /// tissue, blows left out: on the driven sphere, which is tissue, or through the contacts of a
+  /// tissue, impacts left out: on the driven sphere, which is tissue, or through the contacts of a
   /// tool, whose own inertia is not in it.
   Eigen::VectorXd response;
   /// The part of the contact force that the driven sphere itself takes, N: its mass times (its
   /// acceleration, which is 0 between kinks, + alpha its velocity). 0 under a load, and for tools.
   Eigen::VectorXd of_driven_sphere;
-  std::vector<ProbeBlow> blows;
+  std::vector<ProbeImpact> impacts;
   InertialWork work;
   std::optional<InertialEnergy> energy;
   Positions position;         ///< where the run ended
@@ -129,7 +129,7 @@ class Inertial {
   /// turn
   /// @param from if any, where to go on in the protocol instead of beginning at rest: the end of a
   ///        run of the same network and options. No time before it can be asked for; the account of
-  ///        the energy and `stored_at_start_J` go on, the blows and the work counted do not.
+  ///        the energy and `stored_at_start_J` go on, the impacts and the work counted do not.
   [[nodiscard]] InertialRun run(const Protocol& protocol, std::span<const double> times_s,
                                 const InertialObserver& observer = {},
                                 const InertialState* from = nullptr) const;

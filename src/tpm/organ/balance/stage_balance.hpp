@@ -1,5 +1,5 @@
 #pragma once
-// The inside of QuasiStatic: the balance of the stages of a step.
+// The inside of QuasiStatic: the collocation solve of a step.
 #include <array>
 #include <optional>
 #include <vector>

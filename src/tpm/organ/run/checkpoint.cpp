@@ -136,17 +136,17 @@ Validity read_validity(const ListReader& file) {
 void write_motion(Hdf5Writer& file, const InertialState& s, const InertialEnergy& e) {
   file.numbers("/motion/state", {s.motion.begin(), s.motion.end()});
   file.numbers("/motion/scalars", {s.time_s, s.spent_J[0], s.spent_J[1], s.spent_J[2], s.spent_J[3],
-                                   s.blow_work_J, s.stored_at_start_J});
+                                   s.impact_work_J, s.stored_at_start_J});
   file.numbers("/motion/energy",
                {e.work, e.stored, e.kinetic, e.bond_heat, e.damping_heat, e.contact_heat});
 }
 
-void write_blows(Hdf5Writer& file, const std::vector<ProbeBlow>& blows) {
+void write_impacts(Hdf5Writer& file, const std::vector<ProbeImpact>& impacts) {
   std::vector<double> numbers;
-  for (const ProbeBlow& b : blows) {
+  for (const ProbeImpact& b : impacts) {
     numbers.insert(numbers.end(), {b.time_s, b.impulse_N_s, b.impulse_on_tissue_N_s});
   }
-  file.numbers("/motion/blows", numbers);
+  file.numbers("/motion/impacts", numbers);
 }
 
 void write_pushes(Hdf5Writer& file, const std::vector<Eigen::VectorXd>& pushes) {
@@ -180,9 +180,9 @@ void read_motion(const ListReader& file, Checkpoint& checkpoint) {
       s.at(6)};
   checkpoint.record.inertial_energy =
       InertialEnergy{e.at(0), e.at(1), e.at(2), e.at(3), e.at(4), e.at(5)};
-  const std::vector<double> blows = file.list("/motion/blows", 3);
-  for (std::size_t i = 0; i + 3 <= blows.size(); i += 3) {
-    checkpoint.record.blows.push_back({blows[i], blows[i + 1], blows[i + 2]});
+  const std::vector<double> impacts = file.list("/motion/impacts", 3);
+  for (std::size_t i = 0; i + 3 <= impacts.size(); i += 3) {
+    checkpoint.record.impacts.push_back({impacts[i], impacts[i + 1], impacts[i + 2]});
   }
 }
 
@@ -227,7 +227,7 @@ void write_checkpoint(const fs::path& path, const std::string& identity,
   write_validity(file, record.validity);
   if (checkpoint.motion) {
     write_motion(file, *checkpoint.motion, record.inertial_energy.value());
-    write_blows(file, record.blows);
+    write_impacts(file, record.impacts);
     write_pushes(file, record.contact_pushes_N);
   }
   file.commit();

@@ -128,8 +128,8 @@ void Recorder::close_part(double error_estimate) {
 }
 
 void Recorder::close_part(InertialState motion, const InertialEnergy& energy,
-                          const std::vector<ProbeBlow>& blows) {
-  record_.blows.insert(record_.blows.end(), blows.begin(), blows.end());
+                          const std::vector<ProbeImpact>& impacts) {
+  record_.impacts.insert(record_.impacts.end(), impacts.begin(), impacts.end());
   record_.inertial_energy = energy;
   whole_.motion = std::move(motion);
   close();

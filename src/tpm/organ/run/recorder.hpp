@@ -36,7 +36,7 @@ class Recorder {
   void close_part(double error_estimate);
   /// The same where spheres have mass.
   void close_part(InertialState motion, const InertialEnergy& energy,
-                  const std::vector<ProbeBlow>& blows);
+                  const std::vector<ProbeImpact>& impacts);
 
   /// The state at the end of the last part; none before the first.
   [[nodiscard]] const QuasiStaticState* latest() const {

@@ -53,7 +53,7 @@ struct SimulationRecord {
   Validity validity;
   double error_estimate = 0.0;  ///< quasi-static: sum of the steps' error estimates, N or m
   std::optional<InertialEnergy> inertial_energy;
-  std::vector<ProbeBlow> blows;  ///< where spheres have mass
+  std::vector<ProbeImpact> impacts;  ///< where spheres have mass
 };
 
 /// What the stiffness of contacts changes: a run with mass against one whose contacts are softer.

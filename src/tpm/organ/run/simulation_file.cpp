@@ -87,18 +87,18 @@ void write_tool_states(const DrivenNetwork& network, const QuasiStaticState& sta
   file.integers(group + "/tools/touching", touching, 1);
 }
 
-/// What spheres with mass have besides a curve: blows, and what contacts do to the numbers.
+/// What spheres with mass have besides a curve: impacts, and what contacts do to the numbers.
 void write_motion(const SimulationRun& run, Hdf5Writer& file) {
   std::vector<double> time, impulse, on_tissue;
-  for (const ProbeBlow& blow : run.record.blows) {
-    time.push_back(blow.time_s);
-    impulse.push_back(blow.impulse_N_s);
-    on_tissue.push_back(blow.impulse_on_tissue_N_s);
+  for (const ProbeImpact& impact : run.record.impacts) {
+    time.push_back(impact.time_s);
+    impulse.push_back(impact.impulse_N_s);
+    on_tissue.push_back(impact.impulse_on_tissue_N_s);
   }
-  file.numbers("/blows/time_s", time);
-  file.numbers("/blows/impulse_of_probe_N_s", impulse);
-  file.numbers("/blows/impulse_on_tissue_N_s", on_tissue);
-  file.attribute("/blows", "meaning",
+  file.numbers("/impacts/time_s", time);
+  file.numbers("/impacts/impulse_of_probe_N_s", impulse);
+  file.numbers("/impacts/impulse_on_tissue_N_s", on_tissue);
+  file.attribute("/impacts", "meaning",
                  "speeds that change in an instant: where an imposed depth changes its rate, and "
                  "where a tool meets a sphere (inelastic); not in the forces of /curve");
   if (!run.contact_check) return;

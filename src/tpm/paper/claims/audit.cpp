@@ -89,7 +89,7 @@ std::string fill(const std::string& text, const Placeholders& values, std::strin
 
 /// The template that belongs to the verdict.
 std::string_view consequence_key(const Finding& finding) {
-  if (finding.verdict == AuditVerdict::cannot_be_told) return "if_open";
+  if (finding.verdict == AuditVerdict::undetermined) return "if_open";
   return finding.stands() ? "if_holds" : "if_fails";
 }
 

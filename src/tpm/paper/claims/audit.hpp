@@ -16,7 +16,7 @@ enum class AuditVerdict {
   last_digit_off,       ///< a neighbour of the printed last digit
   differs,              ///< another number; Finding::difference_percent says by how much
   contradicted,         ///< a statement that the paper's own equations or numbers refute
-  cannot_be_told,       ///< the paper gives no number to hold it to
+  undetermined,         ///< the paper gives no number to hold it to
 };
 
 inline constexpr auto kAuditVerdicts = std::to_array<Word<AuditVerdict>>({
@@ -25,7 +25,7 @@ inline constexpr auto kAuditVerdicts = std::to_array<Word<AuditVerdict>>({
     {AuditVerdict::last_digit_off, "last digit off"},
     {AuditVerdict::differs, "differs"},
     {AuditVerdict::contradicted, "contradicted"},
-    {AuditVerdict::cannot_be_told, "cannot be told"},
+    {AuditVerdict::undetermined, "undetermined"},
 });
 [[nodiscard]] std::string_view verdict_name(AuditVerdict verdict) noexcept;
 
@@ -85,7 +85,7 @@ struct Finding {
   std::optional<AuditQuantity> bound;       ///< right-hand side of an inequality
   std::string expression;                   ///< what was evaluated
   std::vector<AuditInput> inputs;
-  AuditVerdict verdict = AuditVerdict::cannot_be_told;
+  AuditVerdict verdict = AuditVerdict::undetermined;
   std::optional<double> difference_percent;
   std::vector<AuditCause> causes;  ///< most plausible first: printed values, then few digits
   std::vector<AuditDetail> details;

@@ -96,7 +96,7 @@ AuditVerdict audit_verdict(DigitVerdict verdict) noexcept {
     case DigitVerdict::differs:
       return AuditVerdict::differs;
   }
-  return AuditVerdict::cannot_be_told;
+  return AuditVerdict::undetermined;
 }
 
 }  // namespace

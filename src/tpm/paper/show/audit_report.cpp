@@ -40,7 +40,7 @@ std::string details_text(const Finding& finding) {
 }
 
 std::string finding_text(const Finding& finding) {
-  const bool open = finding.verdict == AuditVerdict::cannot_be_told;
+  const bool open = finding.verdict == AuditVerdict::undetermined;
   const std::string_view mark = finding.stands() ? "ok" : open ? "??" : "!!";
   std::string out = fmt::format("{}  {}  [{}]\n", mark, finding.id, finding.verdict_words());
   // "paper" first: the reader knows the paper, not our names.

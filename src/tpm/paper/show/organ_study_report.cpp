@@ -122,7 +122,7 @@ Table readings_table(const OrganStudy& study, const StudyCurves& set, Kind kind,
   return table;
 }
 
-/// The largest depth that any tissue gives way to, m.
+/// The largest depth that any tissue creeps to, m.
 double deepest_m(const OrganStudy& study, const StudyCurves& set) {
   double deepest = 0.0;
   for (const StudyCurve& curve : set.curves) {
@@ -159,7 +159,7 @@ void add_readings(Document& document, const OrganStudy& study, const StudyCurves
   if (!remarks.empty()) document.bullets(std::move(remarks));
 }
 
-/// "13.2 kPa (11.6 to 14.6)", "above 21.1 mm (best 1000)", "cannot be told".
+/// "13.2 kPa (11.6 to 14.6)", "above 21.1 mm (best 1000)", "undetermined".
 Cell estimate_cell(const FitResult& fit, const ParameterResult& p) {
   const double unit = p.parameter.unit.to_si;
   const auto text = [&](double value) { return significant(value / unit, 4); };
@@ -180,7 +180,7 @@ Cell estimate_cell(const FitResult& fit, const ParameterResult& p) {
     case Verdict::upper_only:
       return {fmt::format("below {} {}{}", text(*p.upper), symbol, best), tone};
     case Verdict::flat:
-      return {"cannot be told" + best, tone};
+      return {"undetermined" + best, tone};
     case Verdict::failed:
       return {"profile failed" + best, tone};
     case Verdict::not_profiled:

@@ -16,7 +16,7 @@ Tone tone_of_finding(AuditVerdict verdict) {
     case AuditVerdict::holds_by_truncation:
       return Tone::good;
     case AuditVerdict::last_digit_off:
-    case AuditVerdict::cannot_be_told:
+    case AuditVerdict::undetermined:
       return Tone::fair;
     case AuditVerdict::differs:
     case AuditVerdict::contradicted:

@@ -27,10 +27,10 @@ Cell audit_sentence(const AuditReport& audit) {
   return {fmt::format(
               "Audit: of {} claims {} stand, {} differ from their recomputation, {} are "
               "contradicted by the paper's own equations or numbers; off in the last digit: "
-              "{}; cannot be told: {}.",
+              "{}; undetermined: {}.",
               audit.findings.size(), stand, audit.count(AuditVerdict::differs),
               audit.count(AuditVerdict::contradicted), audit.count(AuditVerdict::last_digit_off),
-              audit.count(AuditVerdict::cannot_be_told)),
+              audit.count(AuditVerdict::undetermined)),
           audit.count(AuditVerdict::contradicted) > 0 ? Tone::bad : Tone::good};
 }
 

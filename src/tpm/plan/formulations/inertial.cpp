@@ -33,7 +33,7 @@ SimulationRun run_with_mass(const ExperimentScene& scene, const RunNetwork& netw
       recorder.see(state, pushes);
     };
     const InertialRun run = equations.run(part.protocol, times, see, recorder.motion());
-    recorder.close_part(run.end, run.energy.value(), run.blows);
+    recorder.close_part(run.end, run.energy.value(), run.impacts);
   };
   SimulationRun result = run_in_parts(scene, network, controls, run_part);
   const Positions& unloaded = driven.probes.loading().unloaded;

@@ -410,7 +410,7 @@ std::string plan_text(const Plan& plan) {
     // Of masses that scene and reference leave out there is one sentence, below.
     if (r.part != "inertia" || plan.inertial || !r.matters) text += relevance_text(r);
   }
-  if (!plan.changes.empty()) text += "what would break first:\n";
+  if (!plan.changes.empty()) text += "robustness margins:\n";
   for (const PlanChange& c : plan.changes) {
     text += change_text(c);
   }

@@ -17,7 +17,7 @@ namespace tpm::plan {
 [[nodiscard]] Json plan_json(const Plan& plan);
 [[nodiscard]] std::string plan_text(const Plan& plan);
 /// The short answer: the pick with its errors and cost, the candidates that were run, what matters,
-/// what would break first, and every warning.
+/// robustness margins, and every warning.
 [[nodiscard]] ShortAnswer short_answer(const Plan& plan);
 
 /// The choice of the number of spheres: the key `spheres_choice` of a plan.

@@ -34,11 +34,11 @@ const CurvePoint& largest(const SimulationRecord& record, double tolerance) {
   });
 }
 
-/// The blow that the tissue feels most; none if there is none.
-const ProbeBlow* largest_blow(const std::vector<ProbeBlow>& blows) {
+/// The impact that the tissue feels most; none if there is none.
+const ProbeImpact* largest_impact(const std::vector<ProbeImpact>& impacts) {
   const auto most = std::ranges::max_element(
-      blows, {}, [](const ProbeBlow& a) { return std::abs(a.impulse_on_tissue_N_s); });
-  return most == blows.end() ? nullptr : &*most;
+      impacts, {}, [](const ProbeImpact& a) { return std::abs(a.impulse_on_tissue_N_s); });
+  return most == impacts.end() ? nullptr : &*most;
 }
 
 /// The point of the largest force on the tissue.
@@ -79,15 +79,16 @@ Json energy_json(const SimulationRun& run) {
           {"dissipated_J", nine_digits(e.dissipated_J)}};
 }
 
-/// What spheres with mass have besides: blows, forces that a load does not name, and what the
+/// What spheres with mass have besides: impacts, forces that a load does not name, and what the
 /// stiffness of contacts changes.
 Json motion_json(const ExperimentScene& scene, const SimulationRun& run) {
-  const std::vector<ProbeBlow>& blows = run.record.blows;
-  Json json{{"blows", {{"count", blows.size()}}}};
-  if (const ProbeBlow* most = largest_blow(blows)) {
-    json["blows"]["largest"] = {{"time_s", nine_digits(most->time_s)},
-                                {"impulse_on_tissue_N_s", nine_digits(most->impulse_on_tissue_N_s)},
-                                {"impulse_of_probe_N_s", nine_digits(most->impulse_N_s)}};
+  const std::vector<ProbeImpact>& impacts = run.record.impacts;
+  Json json{{"impacts", {{"count", impacts.size()}}}};
+  if (const ProbeImpact* most = largest_impact(impacts)) {
+    json["impacts"]["largest"] = {
+        {"time_s", nine_digits(most->time_s)},
+        {"impulse_on_tissue_N_s", nine_digits(most->impulse_on_tissue_N_s)},
+        {"impulse_of_probe_N_s", nine_digits(most->impulse_N_s)}};
   }
   if (!by_depth(scene)) {
     const CurvePoint& most = hardest(run.record);
@@ -290,12 +291,13 @@ std::string motion_text(const ExperimentScene& scene, const SimulationRun& run) 
                         sized_text(Dimension::force, most.force_on_tissue_N, 6),
                         significant(most.time_s, 4));
   }
-  const std::vector<ProbeBlow>& blows = run.record.blows;
-  if (const ProbeBlow* most = largest_blow(blows)) {
+  const std::vector<ProbeImpact>& impacts = run.record.impacts;
+  if (const ProbeImpact* most = largest_impact(impacts)) {
     text += fmt::format(
-        "{} blow{} (a speed that changes in an instant; not in the forces), the largest {} N s on "
+        "{} impact{} (a speed that changes in an instant; not in the forces), the largest {} N s "
+        "on "
         "the tissue, at {} s\n",
-        blows.size(), blows.size() == 1 ? "" : "s", significant(most->impulse_on_tissue_N_s, 3),
+        impacts.size(), impacts.size() == 1 ? "" : "s", significant(most->impulse_on_tissue_N_s, 3),
         significant(most->time_s, 4));
   }
   if (!run.contact_check) return text;

@@ -1,4 +1,4 @@
-#include "tpm/haptics/border/border_study.hpp"
+#include "tpm/haptics/boundary/boundary_study.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,13 +16,13 @@ constexpr double kRates_Hz[] = {500.0, 1000.0, 2000.0, 4000.0};
 constexpr int kDelays[] = {0, 1, 2, 5, 10, 20, 50};
 constexpr double kFrictions[] = {0.1, 0.3, 1.0};
 
-BorderPoint point_of(const RenderedContact& contact, double damping) {
+BoundaryPoint point_of(const RenderedContact& contact, double damping) {
   return {
       1.0 / contact.period_s, contact.delay_periods, damping, contact.relaxation_time_s, 0.0, 0.0};
 }
 
-void vary_rate_and_delay(BorderStudy& study) {
-  Progress progress("borders", std::size(kRates_Hz) * std::size(kDelays));
+void vary_rate_and_delay(BoundaryStudy& study) {
+  Progress progress("boundaries", std::size(kRates_Hz) * std::size(kDelays));
   for (const double rate : kRates_Hz) {
     for (const int delay : kDelays) {
       RenderedContact contact;
@@ -30,21 +30,21 @@ void vary_rate_and_delay(BorderStudy& study) {
       contact.delay_periods = delay;
       contact.relaxation_time_s = study.relaxation_time_s;
       for (const double friction : kFrictions) {
-        BorderPoint p = point_of(contact, friction);
-        p.measured = largest_passive_stiffness(contact, friction, BorderBy::measurement);
-        p.predicted = largest_passive_stiffness(contact, friction, BorderBy::prediction);
+        BoundaryPoint p = point_of(contact, friction);
+        p.measured = largest_passive_stiffness(contact, friction, BoundaryBy::measurement);
+        p.predicted = largest_passive_stiffness(contact, friction, BoundaryBy::prediction);
         study.passive.push_back(p);
       }
-      BorderPoint p = point_of(contact, study.plant.damping_N_s_per_m);
-      p.measured = largest_stable_stiffness(contact, study.plant, BorderBy::measurement);
-      p.predicted = largest_stable_stiffness(contact, study.plant, BorderBy::prediction);
+      BoundaryPoint p = point_of(contact, study.plant.damping_N_s_per_m);
+      p.measured = largest_stable_stiffness(contact, study.plant, BoundaryBy::measurement);
+      p.predicted = largest_stable_stiffness(contact, study.plant, BoundaryBy::prediction);
       study.stable.push_back(p);
       progress.advance();
     }
   }
 }
 
-void vary_relaxation_time(BorderStudy& study) {
+void vary_relaxation_time(BoundaryStudy& study) {
   constexpr double kPeriods[] = {0.05, 0.1, 0.208, 0.3, 0.45, 0.55,
                                  0.7,  1.0, 2.0,   5.0, 20.0, 100.0};
   for (const ElementRule rule :
@@ -60,7 +60,7 @@ void vary_relaxation_time(BorderStudy& study) {
   }
 }
 
-void find_shortest(BorderStudy& study) {
+void find_shortest(BoundaryStudy& study) {
   for (const double rate : kRates_Hz) {
     for (const ElementRule rule : {ElementRule::forward_euler, ElementRule::exact}) {
       RenderedContact contact;
@@ -68,9 +68,9 @@ void find_shortest(BorderStudy& study) {
       contact.period_s = 1.0 / rate;
       contact.stiffness_N_per_m = study.stiffness_N_per_m;
       const double friction = study.plant.damping_N_s_per_m;
-      BorderPoint p = point_of(contact, friction);
-      p.measured = smallest_passive_relaxation_time(contact, friction, BorderBy::measurement);
-      p.predicted = smallest_passive_relaxation_time(contact, friction, BorderBy::prediction);
+      BoundaryPoint p = point_of(contact, friction);
+      p.measured = smallest_passive_relaxation_time(contact, friction, BoundaryBy::measurement);
+      p.predicted = smallest_passive_relaxation_time(contact, friction, BoundaryBy::prediction);
       (rule == ElementRule::exact ? study.shortest_exact : study.shortest).push_back(p);
     }
   }
@@ -125,7 +125,7 @@ void run_impact(const RenderedContact& contact, const PlantSettings& plant, Rise
   point.delivered_J[which] = step.energy().most_delivered_J();
 }
 
-void vary_impact(BorderStudy& study) {
+void vary_impact(BoundaryStudy& study) {
   constexpr double kSpeeds_m_per_s[] = {0.01, 0.03, 0.1, 0.3, 1.0};
   constexpr double kShares[] = {0.25, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 4.0};
   constexpr int kImpactDelays[] = {0, 1, 2, 5, 10};
@@ -134,14 +134,14 @@ void vary_impact(BorderStudy& study) {
     RenderedContact contact;
     contact.delay_periods = delay;
     contact.relaxation_time_s = study.relaxation_time_s;
-    const double border = largest_stable_stiffness(contact, study.plant, BorderBy::prediction);
+    const double boundary = largest_stable_stiffness(contact, study.plant, BoundaryBy::prediction);
     for (const double share : kShares) {
       for (const double speed : kSpeeds_m_per_s) {
         ImpactPoint point;
         point.delay_periods = delay;
         point.speed_m_per_s = speed;
         point.share = share;
-        point.stiffness_N_per_m = contact.stiffness_N_per_m = share * border;
+        point.stiffness_N_per_m = contact.stiffness_N_per_m = share * boundary;
         for (const RiseLimit limit : kRiseLimits) run_impact(contact, study.plant, limit, point);
         study.impacts.push_back(point);
       }
@@ -150,7 +150,7 @@ void vary_impact(BorderStudy& study) {
   }
 }
 
-void list_corners(BorderStudy& study) {
+void list_corners(BoundaryStudy& study) {
   constexpr double kPeriod_s = 1e-3;
   study.corners = {{"omega.7", 5000.0, 30.0, 0.0, 0.0, std::pair{0.1, 1.0}},
                    {"lambda.7", 8000.0, 30.0, 0.0, 0.0, std::nullopt},
@@ -178,8 +178,8 @@ std::string_view word_of(RiseLimit limit) {
   return "none";
 }
 
-BorderStudy study_borders(const PlantSettings& plant) {
-  BorderStudy study;
+BoundaryStudy study_boundaries(const PlantSettings& plant) {
+  BoundaryStudy study;
   study.plant = plant;
   vary_rate_and_delay(study);
   vary_relaxation_time(study);

@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
-#include "tpm/haptics/session/rendering_border.hpp"
+#include "tpm/haptics/session/rendering_boundary.hpp"
 
 namespace tpm::haptics {
 
-/// A border measured on the simulated device, beside what theory says of it.
-struct BorderPoint {
+/// A boundary measured on the simulated device, beside what theory says of it.
+struct BoundaryPoint {
   double rate_Hz = 0.0;
   int delay_periods = 0;
   double damping_N_s_per_m = 0.0;  ///< of the device
@@ -56,21 +56,21 @@ struct DeviceCorner {
 };
 
 /// What `tpm hil stability` computes.
-struct BorderStudy {
+struct BoundaryStudy {
   PlantSettings plant;
-  double relaxation_time_s = 0.01;          ///< where rate, delay and friction vary
-  double stiffness_N_per_m = 300.0;         ///< instantaneous, where the relaxation time varies
-  std::vector<BorderPoint> passive;         ///< largest instantaneous stiffness, N/m
-  std::vector<BorderPoint> stable;          ///< the same, of device and arm together
-  std::vector<RulePoint> rules;             ///< at 1 kHz
-  std::vector<BorderPoint> shortest;        ///< smallest relaxation time, s, forward Euler
-  std::vector<BorderPoint> shortest_exact;  ///< the same of the exact update: 0, all are passive
-  std::vector<ImpactPoint> impacts;         ///< at 1 kHz
+  double relaxation_time_s = 0.01;            ///< where rate, delay and friction vary
+  double stiffness_N_per_m = 300.0;           ///< instantaneous, where the relaxation time varies
+  std::vector<BoundaryPoint> passive;         ///< largest instantaneous stiffness, N/m
+  std::vector<BoundaryPoint> stable;          ///< the same, of device and arm together
+  std::vector<RulePoint> rules;               ///< at 1 kHz
+  std::vector<BoundaryPoint> shortest;        ///< smallest relaxation time, s, forward Euler
+  std::vector<BoundaryPoint> shortest_exact;  ///< the same of the exact update: 0, all are passive
+  std::vector<ImpactPoint> impacts;           ///< at 1 kHz
   std::vector<DeviceCorner> corners;
 };
 
 [[nodiscard]] std::string_view word_of(RiseLimit limit);
 
-[[nodiscard]] BorderStudy study_borders(const PlantSettings& plant);
+[[nodiscard]] BoundaryStudy study_boundaries(const PlantSettings& plant);
 
 }  // namespace tpm::haptics

@@ -1,4 +1,4 @@
-#include "tpm/haptics/session/rendering_border.hpp"
+#include "tpm/haptics/session/rendering_boundary.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -84,9 +84,9 @@ double last_that_holds(double low, double high, const std::function<bool(double)
   return std::sqrt(low * high);
 }
 
-double needed_damping(const RenderedContact& contact, BorderBy by) {
-  return by == BorderBy::measurement ? measured_passive_damping(contact)
-                                     : predicted_passive_damping(contact);
+double needed_damping(const RenderedContact& contact, BoundaryBy by) {
+  return by == BoundaryBy::measurement ? measured_passive_damping(contact)
+                                       : predicted_passive_damping(contact);
 }
 
 /// The simulated device and arm on the contact, let go 1 mm from rest: does it come to rest?
@@ -159,7 +159,7 @@ double predicted_passive_damping(const RenderedContact& contact) {
   return most;
 }
 
-double largest_passive_stiffness(RenderedContact contact, double damping_N_s_per_m, BorderBy by) {
+double largest_passive_stiffness(RenderedContact contact, double damping_N_s_per_m, BoundaryBy by) {
   return last_that_holds(1e-3, 1e8, [&](double stiffness) {
     contact.stiffness_N_per_m = stiffness;
     return needed_damping(contact, by) <= damping_N_s_per_m;
@@ -167,7 +167,7 @@ double largest_passive_stiffness(RenderedContact contact, double damping_N_s_per
 }
 
 double smallest_passive_relaxation_time(RenderedContact contact, double damping_N_s_per_m,
-                                        BorderBy by) {
+                                        BoundaryBy by) {
   const auto passive = [&](double periods) {
     contact.relaxation_time_s = periods * contact.period_s;
     return needed_damping(contact, by) <= damping_N_s_per_m;
@@ -219,11 +219,12 @@ double loop_spectral_radius(const RenderedContact& contact, const PlantSettings&
   return spectral_radius(loop);
 }
 
-double largest_stable_stiffness(RenderedContact contact, const PlantSettings& plant, BorderBy by) {
+double largest_stable_stiffness(RenderedContact contact, const PlantSettings& plant,
+                                BoundaryBy by) {
   return last_that_holds(1.0, 1e8, [&](double stiffness) {
     contact.stiffness_N_per_m = stiffness;
-    return by == BorderBy::measurement ? comes_to_rest(contact, plant)
-                                       : loop_spectral_radius(contact, plant) < 1.0;
+    return by == BoundaryBy::measurement ? comes_to_rest(contact, plant)
+                                         : loop_spectral_radius(contact, plant) < 1.0;
   });
 }
 

@@ -1,4 +1,4 @@
-#include "tpm/haptics/show/border_report.hpp"
+#include "tpm/haptics/show/boundary_report.hpp"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 namespace tpm::haptics {
 namespace {
 
-constexpr int kBorderDigits = 6;
+constexpr int kBoundaryDigits = 6;
 const Axis kRate{"rate", "Hz", true};
 
 constexpr auto kRuleWords =
@@ -19,23 +19,23 @@ constexpr auto kRuleWords =
                                       {ElementRule::mass_spring, "MSM"}});
 
 Json number_or_null(double value) {
-  return std::isfinite(value) ? Json(rounded(value, kBorderDigits)) : Json(nullptr);
+  return std::isfinite(value) ? Json(rounded(value, kBoundaryDigits)) : Json(nullptr);
 }
 
-Json points_json(const std::vector<BorderPoint>& points, const char* measured,
+Json points_json(const std::vector<BoundaryPoint>& points, const char* measured,
                  const char* predicted) {
-  return array_json(points, [&](const BorderPoint& p) {
-    return Json{{"rate_Hz", rounded(p.rate_Hz, kBorderDigits)},
-                {"delay_s", rounded(p.delay_periods / p.rate_Hz, kBorderDigits)},
-                {"damping_N_s_per_m", rounded(p.damping_N_s_per_m, kBorderDigits)},
+  return array_json(points, [&](const BoundaryPoint& p) {
+    return Json{{"rate_Hz", rounded(p.rate_Hz, kBoundaryDigits)},
+                {"delay_s", rounded(p.delay_periods / p.rate_Hz, kBoundaryDigits)},
+                {"damping_N_s_per_m", rounded(p.damping_N_s_per_m, kBoundaryDigits)},
                 {measured, number_or_null(p.measured)},
                 {predicted, number_or_null(p.predicted)}};
   });
 }
 
-double worst_difference(const std::vector<BorderPoint>& points) {
+double worst_difference(const std::vector<BoundaryPoint>& points) {
   double worst = 0.0;
-  for (const BorderPoint& p : points) {
+  for (const BoundaryPoint& p : points) {
     if (p.predicted > 0.0) worst = std::max(worst, std::abs(p.measured / p.predicted - 1.0));
   }
   return worst;
@@ -52,11 +52,11 @@ Series measured_beside(const Series& predicted) {
 }
 
 /// One curve and its measured points, over the rate, for one delay.
-void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int delay,
+void add_rate_curve(Panel& panel, const std::vector<BoundaryPoint>& points, int delay,
                     double damping) {
   Series predicted = line(delay == 0 ? "no delay" : fmt::format("delay {} periods", delay), {}, {});
   Series measured = measured_beside(predicted);
-  for (const BorderPoint& p : points) {
+  for (const BoundaryPoint& p : points) {
     if (p.delay_periods != delay || p.damping_N_s_per_m != damping) continue;
     predicted.add(p.rate_Hz, p.predicted);
     measured.add(p.rate_Hz, p.measured);
@@ -65,16 +65,16 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
   panel.series.push_back(std::move(measured));
 }
 
-Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
+Series colgate_line(const std::vector<BoundaryPoint>& points, double damping) {
   Series s = line("Colgate-Schenkel 2b/T, all taut", {}, {});
-  for (const BorderPoint& p : points) {
+  for (const BoundaryPoint& p : points) {
     if (p.delay_periods != 0 || p.damping_N_s_per_m != damping) continue;
     s.add(p.rate_Hz, 2.0 * damping * p.rate_Hz);
   }
   return s;
 }
 
-Figure border_figure(const BorderStudy& study) {
+Figure boundary_figure(const BoundaryStudy& study) {
   const double damping = study.plant.damping_N_s_per_m;
   const Axis stiffness{"largest instantaneous stiffness", "N/m", true};
   Panel passive{fmt::format("passive, device with {} N s/m", significant(damping, 3)), kRate,
@@ -86,7 +86,7 @@ Figure border_figure(const BorderStudy& study) {
   }
   passive.series.push_back(colgate_line(study.passive, damping));
   return {
-      "borders",
+      "boundaries",
       "Passivity and stability of the contact (simulated device)",
       "Lines: passivity by the condition of Colgate and Schenkel with the discrete transfer "
       "function of the exactly updated Zener contact, stability by the spectral radius of the "
@@ -96,7 +96,7 @@ Figure border_figure(const BorderStudy& study) {
       {std::move(passive), std::move(stable)}};
 }
 
-Figure rule_figure(const BorderStudy& study) {
+Figure rule_figure(const BoundaryStudy& study) {
   Panel panel{"friction that the device needs at 1 kHz",
               {"relaxation time over period", "", true},
               {"friction over T/2", "N/m", true}};
@@ -133,12 +133,12 @@ Figure rule_figure(const BorderStudy& study) {
 
 namespace {
 
-Json impacts_json(const BorderStudy& study) {
+Json impacts_json(const BoundaryStudy& study) {
   return array_json(study.impacts, [&](const ImpactPoint& p) {
     Json json{{"delay_periods", p.delay_periods},
               {"speed_m_per_s", p.speed_m_per_s},
-              {"share_of_linear_border", p.share},
-              {"stiffness_N_per_m", rounded(p.stiffness_N_per_m, kBorderDigits)}};
+              {"share_of_linear_boundary", p.share},
+              {"stiffness_N_per_m", rounded(p.stiffness_N_per_m, kBoundaryDigits)}};
     Json by_limit = Json::object();
     for (const RiseLimit limit : kRiseLimits) {
       const auto which = static_cast<std::size_t>(limit);
@@ -151,7 +151,7 @@ Json impacts_json(const BorderStudy& study) {
   });
 }
 
-Json corners_json(const BorderStudy& study) {
+Json corners_json(const BoundaryStudy& study) {
   return array_json(study.corners, [](const DeviceCorner& c) {
     Json json{{"device", c.device},
               {"stiffness_N_per_m", c.stiffness_N_per_m},
@@ -170,13 +170,13 @@ Json corners_json(const BorderStudy& study) {
 }
 
 /// A letter for each limit of the rise: the tool comes to rest, or it does not.
-std::string impact_text(const BorderStudy& study) {
+std::string impact_text(const BoundaryStudy& study) {
   std::string text =
       "\na hand runs into the contact and stays 4 mm deep, at 1 kHz: r comes to rest (0.1 mm "
       "within 5 s), O goes on to "
       "oscillate;\nfirst letter without a limit of the rise, second with the slip of a session "
       "(400 "
-      "N/s, 8 N), third with ramp-in besides;\nstiffness over that of the border of the linear, "
+      "N/s, 8 N), third with ramp-in besides;\nstiffness over that of the boundary of the linear, "
       "two-sided loop\n";
   int delay = -1;
   double share = -1.0;
@@ -184,7 +184,7 @@ std::string impact_text(const BorderStudy& study) {
     if (p.delay_periods != delay) {
       delay = p.delay_periods;
       share = -1.0;
-      text += fmt::format("delay {} periods, border {} N/m\n{:>9}", delay,
+      text += fmt::format("delay {} periods, boundary {} N/m\n{:>9}", delay,
                           significant(p.stiffness_N_per_m / p.share, 4), "m/s");
       double last = 0.0;
       for (const ImpactPoint& other : study.impacts) {
@@ -208,7 +208,7 @@ std::string impact_text(const BorderStudy& study) {
   return text;
 }
 
-std::string corner_text(const BorderStudy& study) {
+std::string corner_text(const BoundaryStudy& study) {
   std::string text = fmt::format(
       "\nfriction that a device needs to be passive at 1 kHz with all of its maker's stiffness and "
       "damping (software limits of CHAI3D), N s/m\n{:<10}{:>8}{:>8}{:>10}{:>16}  verdict\n",
@@ -230,7 +230,7 @@ std::string corner_text(const BorderStudy& study) {
 }
 
 /// Where impacts come to rest with the slip of a session, a panel for each delay.
-Figure impact_figure(const BorderStudy& study) {
+Figure impact_figure(const BoundaryStudy& study) {
   Figure figure{
       "impacts", "Impacts with the slip of a session (simulated device)",
       "A hand runs into the one-sided contact and stays 4 mm deep; stiffness over that at which "
@@ -241,7 +241,7 @@ Figure impact_figure(const BorderStudy& study) {
     if (figure.panels.empty() || figure.panels.back().title != title) {
       Panel panel{title,
                   {"speed of the hand", "m/s", true},
-                  {"stiffness over the linear border", "", true}};
+                  {"stiffness over the linear boundary", "", true}};
       for (const char* label : {"comes to rest", "oscillates"}) {
         Series series{.kind = Series::Kind::points, .label = label, .provenance = "simulated"};
         panel.series.push_back(std::move(series));
@@ -259,17 +259,17 @@ Figure impact_figure(const BorderStudy& study) {
 
 }  // namespace
 
-Json border_json(const BorderStudy& study) {
+Json boundary_json(const BoundaryStudy& study) {
   const Json rules = array_json(study.rules, [](const RulePoint& p) {
     return Json{{"rule", word_for(kRuleWords, p.rule)},
-                {"relaxation_time_s", rounded(p.relaxation_time_s, kBorderDigits)},
+                {"relaxation_time_s", rounded(p.relaxation_time_s, kBoundaryDigits)},
                 {"measured_N_s_per_m", number_or_null(p.measured_N_s_per_m)},
                 {"predicted_N_s_per_m", number_or_null(p.predicted_N_s_per_m)}};
   });
   return {{"simulated_device", true},
           {"assumptions", assumptions_of(study.plant)},
-          {"relaxation_time_s", rounded(study.relaxation_time_s, kBorderDigits)},
-          {"stiffness_N_per_m", rounded(study.stiffness_N_per_m, kBorderDigits)},
+          {"relaxation_time_s", rounded(study.relaxation_time_s, kBoundaryDigits)},
+          {"stiffness_N_per_m", rounded(study.stiffness_N_per_m, kBoundaryDigits)},
           {"passive", points_json(study.passive, "measured_N_per_m", "predicted_N_per_m")},
           {"stable", points_json(study.stable, "measured_N_per_m", "predicted_N_per_m")},
           {"rules", rules},
@@ -277,11 +277,11 @@ Json border_json(const BorderStudy& study) {
           {"shortest_exact", points_json(study.shortest_exact, "measured_s", "predicted_s")},
           {"impacts", impacts_json(study)},
           {"device_corners", corners_json(study)},
-          {"worst_passive", rounded(worst_difference(study.passive), kBorderDigits)},
-          {"worst_stable", rounded(worst_difference(study.stable), kBorderDigits)}};
+          {"worst_passive", rounded(worst_difference(study.passive), kBoundaryDigits)},
+          {"worst_stable", rounded(worst_difference(study.stable), kBoundaryDigits)}};
 }
 
-std::string border_text(const BorderStudy& study) {
+std::string boundary_text(const BoundaryStudy& study) {
   std::string text = fmt::format(
       "SIMULATED DEVICE\nlargest instantaneous stiffness, N/m, half of it at equilibrium, "
       "relaxation time {} "
@@ -289,9 +289,9 @@ std::string border_text(const BorderStudy& study) {
       "{:>7} {:>6} {:>9} {:>22} {:>22}\n",
       significant(1e3 * study.relaxation_time_s, 3), "Hz", "delay", "b N s/m",
       "passive: measured/theory", "stable: measured/theory");
-  for (const BorderPoint& p : study.passive) {
+  for (const BoundaryPoint& p : study.passive) {
     std::string stable;
-    for (const BorderPoint& s : study.stable) {
+    for (const BoundaryPoint& s : study.stable) {
       if (s.rate_Hz == p.rate_Hz && s.delay_periods == p.delay_periods &&
           s.damping_N_s_per_m == p.damping_N_s_per_m) {
         stable = value(s.measured) + " / " + value(s.predicted);
@@ -313,7 +313,7 @@ std::string border_text(const BorderStudy& study) {
                         value(p.predicted_N_s_per_m));
   }
   for (std::size_t i = 0; i < study.shortest.size(); ++i) {
-    const BorderPoint& euler = study.shortest[i];
+    const BoundaryPoint& euler = study.shortest[i];
     text += fmt::format(
         "{:>7} Hz: shortest passive relaxation time: forward Euler {} / {} ms, exact update {}\n",
         significant(euler.rate_Hz, 4), value(1e3 * euler.measured), value(1e3 * euler.predicted),
@@ -322,8 +322,8 @@ std::string border_text(const BorderStudy& study) {
   return text + impact_text(study) + corner_text(study);
 }
 
-std::vector<Figure> border_figures(const BorderStudy& study) {
-  return {border_figure(study), rule_figure(study), impact_figure(study)};
+std::vector<Figure> boundary_figures(const BoundaryStudy& study) {
+  return {boundary_figure(study), rule_figure(study), impact_figure(study)};
 }
 
 }  // namespace tpm::haptics

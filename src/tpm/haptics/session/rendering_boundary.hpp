@@ -34,18 +34,18 @@ struct RenderedContact {
 /// frequencies.
 [[nodiscard]] double predicted_passive_damping(const RenderedContact& contact);
 
-/// Which of the two ways to find a border.
-enum class BorderBy { measurement, prediction };
+/// Which of the two ways to find a boundary.
+enum class BoundaryBy { measurement, prediction };
 
 /// Largest instantaneous stiffness that is passive on a device with that friction, N/m, by
 /// bisection.
 [[nodiscard]] double largest_passive_stiffness(RenderedContact contact, double damping_N_s_per_m,
-                                               BorderBy by);
+                                               BoundaryBy by);
 
 /// Smallest relaxation time that is passive on a device with that friction, s, by bisection between
 /// a thousandth and a thousand periods; 0 if all of them are, infinite if none is.
 [[nodiscard]] double smallest_passive_relaxation_time(RenderedContact contact,
-                                                      double damping_N_s_per_m, BorderBy by);
+                                                      double damping_N_s_per_m, BoundaryBy by);
 
 // --- stability: of one device and one operator --------------------------------------------------
 
@@ -56,6 +56,6 @@ enum class BorderBy { measurement, prediction };
 /// Largest instantaneous stiffness at which device, arm and contact come to rest, N/m, by
 /// bisection: on the simulated device, or by the spectral radius.
 [[nodiscard]] double largest_stable_stiffness(RenderedContact contact, const PlantSettings& plant,
-                                              BorderBy by);
+                                              BoundaryBy by);
 
 }  // namespace tpm::haptics

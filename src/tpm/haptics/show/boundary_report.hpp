@@ -1,0 +1,17 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/haptics/boundary/boundary_study.hpp"
+#include "tpm/show/figure.hpp"
+
+namespace tpm::haptics {
+
+/// What `tpm hil stability` shows; keys are described in docs/haptics.md.
+[[nodiscard]] Json boundary_json(const BoundaryStudy& study);
+[[nodiscard]] std::string boundary_text(const BoundaryStudy& study);
+/// The boundaries of passivity and of stability, and the three rules.
+[[nodiscard]] std::vector<Figure> boundary_figures(const BoundaryStudy& study);
+
+}  // namespace tpm::haptics
