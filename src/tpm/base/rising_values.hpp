@@ -9,7 +9,7 @@ namespace tpm::base {
 /// What an option that takes a list of rising values accepts.
 struct RisingValues {
   Dimension dimension = Dimension::dimensionless;
-  int most = 0;  ///< values of a range
+  int most = 0;                      ///< values of a range
   std::string_view called, example;  ///< for messages: "times", "\"0.1 s, 1 s\""
 };
 
