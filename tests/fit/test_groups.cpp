@@ -143,7 +143,7 @@ TEST_CASE("tpm fit A B --compare: the ratio of what differs, 1 for what does not
   CHECK(std::ranges::count(text.text, '\n') <= 25);
   CHECK_THAT(text.text, !Contains("Hartung-Knapp") && Contains("next: tpm view out/figures.json"));
   const Said all =
-      run_in(folder, "fit healthy fibrotic --compare --law linear-1 --folder out --verbose");
+      run_in(folder, "fit healthy fibrotic --compare --laws linear-1 --folder out --verbose");
   CHECK_THAT(all.text, Contains("modified Hartung-Knapp") && !Contains("more: --verbose"));
   CHECK(std::filesystem::exists(folder.path() / "out" / "comparison.svg"));
   CHECK_THAT(read_file(folder.path() / "out" / "specimens.csv"), Contains("fibrotic/liver4.csv"));
