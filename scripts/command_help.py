@@ -235,7 +235,7 @@ class Usage:
         if "values" in option:
             return option["values"]
         name = option["names"][-1]
-        if name in ("--laws", "--law"):
+        if name == "--laws":
             return self.laws
         if name == "--device":
             return ["virtual", "replay", "plugin", "inverse3", "omega7"]

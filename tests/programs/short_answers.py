@@ -75,9 +75,9 @@ def main():
         checks.check(["hil", "verify", "session.tpmrec"], lambda d: d["notes"])
         make_group(folder / "healthy", (0.9, 1.0, 1.1))
         make_group(folder / "fibrotic", (1.8, 2.0, 2.2))
-        checks.check(["fit", "healthy", "fibrotic", "--compare", "--law", "linear-1", "--no-draw", "--punch-radius", "2 mm"],
+        checks.check(["fit", "healthy", "fibrotic", "--compare", "--laws", "linear-1", "--no-draw", "--punch-radius", "2 mm"],
                      lambda d: [])
-        checks.check(["fit", "healthy/liver1.csv", "--law", "linear-1", "--folder", "fitted"], lambda d: d["warnings"])
+        checks.check(["fit", "healthy/liver1.csv", "--laws", "linear-1", "--folder", "fitted"], lambda d: d["warnings"])
         checks.check(["budget", "fitted/law.json", "healthy/liver1.csv", "--folder", "budget"], lambda d: d["flags"])
         checks.check(["budget", "fitted/law.json", "--depth", "4 mm", "--rate", "2 mm/s", "--hold", "5 s", "--scene",
                       root / "configs/budget_liver.json"], lambda d: d["flags"])
