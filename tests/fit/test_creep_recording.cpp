@@ -246,3 +246,50 @@ TEST_CASE("an indentation whose depth was held is no creep, however noisy it is"
   }
   CHECK_FALSE(prepare_recording("press.csv", r).load_imposed);
 }
+
+TEST_CASE("where no rest tells a drift of a strain or a stress, k_inf is not identified",
+          "[creep]") {
+  SetupOptions setup;
+  setup.starts = 4;
+  const LawSpec law = parse_law_name("linear-1", "test");
+  {
+    // Creep whose strain drifts by 1e-4/s: 6 % of what it reaches.
+    Recording r = test::creep_recording_of({});
+    for (std::size_t i = 0; i < r.time_s.size(); ++i) r.drive[i] += 1e-4 * r.time_s[i];
+    const PreparedRecording one = prepare_recording("creep.csv", r);
+    REQUIRE(one.load_imposed);
+    const std::span<const PreparedRecording> span(&one, 1);
+    FitResult fit = run_fit(recording_config(law, span, setup), data_sets(span));
+    CHECK(std::abs(estimate_of(fit, "k_inf") - 2000.0) > 50.0);  // the drift is in the plateau
+    for (const ParameterResult& p : fit.parameters) {
+      CHECK(p.not_separable == (p.parameter.name == "k_inf" ? "drift or a slow branch" : ""));
+    }
+    CHECK_FALSE(give_both_drift_answers(fit, span));
+  }
+  for (const double rest_s : {0.0, 10.0}) {
+    CAPTURE(rest_s);
+    // Relaxation under a held strain, stress drifting by 0.5 Pa/s.
+    Recording r;
+    r.drive_quantity = Quantity::strain;
+    r.response_quantity = Quantity::stress;
+    Random random(9);
+    for (int i = 0; 0.1 * i <= rest_s + 30.0; ++i) {
+      const double t = 0.1 * i - rest_s;
+      const double ramp = std::clamp(t, 0.0, 2.0);
+      const double since = std::max(t, 0.0);
+      r.time_s.push_back(0.1 * i);
+      r.drive.push_back(0.02 * ramp);
+      r.response.push_back(0.02 * (2000.0 * ramp + 3000.0 * 2.0 * (1.0 - std::exp(-ramp / 2.0)) *
+                                                       std::exp(-(since - ramp) / 2.0)) +
+                           0.5 * r.time_s.back() + 0.1 * random.normal());
+    }
+    const PreparedRecording one = prepare_recording("strain.csv", r);
+    const std::span<const PreparedRecording> span(&one, 1);
+    FitResult fit = run_fit(recording_config(law, span, setup), data_sets(span));
+    const auto both = give_both_drift_answers(fit, span);
+    REQUIRE(both);
+    CHECK_THAT(both->drifting.value(), WithinRel(2000.0, 0.05));
+    CHECK_THAT(both->drift_per_s.front(), WithinRel(0.5, 0.2));
+    CHECK_THAT(drift_words(*both, fit), Contains("kPa/s") || Contains(" Pa/s"));
+  }
+}

@@ -92,6 +92,74 @@ TEST_CASE("times of the noise are written as people write them", "[adequacy]") {
   CHECK(times_text(1204.4) == "1204");
 }
 
+TEST_CASE("a drift that the rests do not show is lack of fit", "[adequacy][wired]") {
+  // A branch of 12 s that linear-1 does not have, most of which a drift takes up.
+  AdequacyTrial trial;
+  trial.at_rest = 30;
+  trial.defect = Defect::slow_branch;
+  trial.defect_N = test::amplitude_for(trial, 3.0);
+  int found = 0;
+  constexpr int kRecordings = 20;
+  for (int i = 0; i < kRecordings; ++i) {
+    trial.seed = 300 + static_cast<std::uint64_t>(i);
+    const LawAdequacy adequacy = test::fitted(trial).adequacy;
+    if (!adequacy.is_rejected()) continue;
+    ++found;
+    if (adequacy.words.find("it takes a drift of ") == std::string::npos) continue;
+    CHECK_THAT(adequacy.words, Contains("and the rests tell") &&
+                                   Contains("a slow branch that the law does not have"));
+  }
+  CHECK(found >= 14);  // 8 of 40 by the residual alone
+}
+
+TEST_CASE("a drift that the rests show is none", "[adequacy][wired]") {
+  AdequacyTrial trial;
+  trial.at_rest = 60;
+  trial.defect = Defect::drift;
+  trial.defect_N = 50.0 * test::kNoise_N;
+  int rejected = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    trial.seed = seed;
+    const test::AdequacyOutcome outcome = test::fitted(trial);
+    CHECK(outcome.drift_fitted);
+    rejected += outcome.adequacy.is_rejected();
+  }
+  CHECK(rejected <= 1);
+}
+
+TEST_CASE("a law that another beats decisively holds nothing for identified", "[adequacy][wired]") {
+  // A branch of 60 s in a hold of 7 s: linear-1 takes half of it for its plateau.
+  Recording r;
+  r.drive_quantity = Quantity::indentation_depth;
+  r.response_quantity = Quantity::contact_force;
+  base::Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    const double t = 0.05 * i - 1.0;
+    const double ramp = std::clamp(t, 0.0, 2.0);
+    const double since = std::max(t, 0.0);
+    const auto branch = [&](double k, double tau) {
+      return k * tau * (1.0 - std::exp(-ramp / tau)) * std::exp(-(since - ramp) / tau);
+    };
+    r.time_s.push_back(t + 1.0);
+    r.drive.push_back(2e-3 * ramp);
+    r.response.push_back(2e-3 * (60.0 * ramp + branch(45.0, 2.0) + branch(40.0, 60.0)) +
+                         2e-4 * random.normal());
+  }
+  const PreparedRecording recording = prepare_recording("slow.csv", r);
+  SelectionOptions options;
+  options.laws = {parse_law_name("linear-1", "test"), parse_law_name("linear-2", "test")};
+  options.only_listed = true;
+  options.setup.starts = 10;
+  const Selection s = select_law(std::span(&recording, 1), options);
+  REQUIRE(s.preferred);
+  const FitResult& fit = best_of(s);
+  CHECK(law_name(s.candidates[s.recommended].law) == "linear-1");
+  CHECK(fit.adequacy.value().is_rejected());
+  CHECK_THAT(s.words.front(), StartsWith("linear-1 does not describe "));
+  for (const ParameterResult& p : fit.parameters) CHECK(p.only_if_described);
+  CHECK(fitted_law(fit).adequacy.value().is_rejected());
+}
+
 TEST_CASE("without a rest adequacy cannot be judged", "[adequacy][wired]") {
   AdequacyTrial trial;
   trial.at_rest = 4;

@@ -168,6 +168,24 @@ TEST_CASE("A relaxation modulus that falls by a power of time is fitted by a spr
   }
 }
 
+TEST_CASE("A spectrum of a few readings does not get as many parameters") {
+  const test::TempFolder folder;
+  // Near a spring-pot beside a spring, written to two or three digits.
+  write_file(folder / "s.txt",
+             "Frequency\tG'\tG\"\nHz\tPa\tPa\n0.1\t120\t15\n0.3\t130\t17\n1\t145\t22\n3\t160\t31\n"
+             "10\t190\t45\n30\t220\t60\n");
+  const Selection s = select_law(read(folder / "s.txt"), quick());
+  CHECK(s.samples == 12);
+  CHECK(chosen(s).parameters.size() <= 5);
+  CHECK(s.candidates[s.recommended].rms_over_peak < 0.01);
+  // Exact readings of a branch are no fewer than it takes.
+  write_file(folder / "J.csv",
+             "time [s],J [1/Pa]\n0.1,0.000506600\n1,0.000560423\n5,0.000710707\n20,0.000827228\n"
+             "50,0.000833318\n");
+  CHECK(law_name(chosen(select_law(read(folder / "J.csv"), quick())).config.law.value()) ==
+        "linear-1");
+}
+
 TEST_CASE("A spectrum is fitted from magnitude and phase over an angular frequency") {
   const test::TempFolder folder;
   std::string text = "omega [1/s],|G*| [Pa],delta [deg]\n";

@@ -216,6 +216,51 @@ TEST_CASE("without a rest a drift and a slow branch are not separable", "[placem
   CHECK(verdict_text(parameter_of(again, "k_inf")) == verdict_text(k_inf));
 }
 
+TEST_CASE("pools, law files and written configurations hold both answers of a drift",
+          "[placement]") {
+  PlacedTest test;
+  test.rest_s = 0.0;
+  test.drift_N_per_s = 5e-4;
+  const PreparedRecording recording = test::prepared(test, 4);
+  const LawSpec law = parse_law_name("linear-1", "test");
+  SetupOptions setup;
+  setup.starts = 8;
+  const std::span<const PreparedRecording> span(&recording, 1);
+  FitResult fit = run_fit(recording_config(law, span, setup), data_sets(span));
+  const LawFile narrow = fitted_law(fit);
+  const FitResult alone = fit;
+  const auto both = give_both_drift_answers(fit, span);
+  REQUIRE(both);
+  REQUIRE(both->drifting);
+  CHECK_THAT(*both->drifting, WithinRel(60.0, 0.02));
+  // 0.5 mN/s over the recording moves k_inf by more than its standard error.
+  const double before = parameter_of(alone, "k_inf").standard_error.value();
+  const double after = parameter_of(fit, "k_inf").standard_error.value();
+  CHECK(std::abs(both->k_inf - *both->drifting) > before);
+  CHECK(1.96 * after > std::abs(both->k_inf - *both->drifting));
+  const LawFile wide = fitted_law(fit);
+  const Eigen::Index k = 0;  // k_inf, linear
+  CHECK_THAT(std::sqrt(wide.uncertainty.value().covariance(k, k) /
+                       narrow.uncertainty.value().covariance(k, k)),
+             WithinRel(after / before, 1e-9));
+  const Eigen::VectorXd eigenvalues =
+      wide.uncertainty->covariance.selfadjointView<Eigen::Lower>().eigenvalues();
+  CHECK(eigenvalues.minCoeff() >= -1e-12 * eigenvalues.maxCoeff());
+  CHECK(wide.uncertainty->not_separable.front() == "k_inf");
+  // The configuration that was written.
+  const FitConfig written = parse_fit_config(config_json(alone.config), "test");
+  FitResult again = run_fit(written, data_sets(span));
+  give_both_drift_answers(again, data_sets(span));
+  for (const char* name : {"k_inf", "k1", "tau1"}) {
+    CAPTURE(name);
+    CHECK_THAT(parameter_of(again, name).standard_error.value(),
+               WithinRel(parameter_of(fit, name).standard_error.value(), 1e-3));
+    CHECK(parameter_of(again, name).with_drift.has_value() ==
+          parameter_of(fit, name).with_drift.has_value());
+  }
+  CHECK_THAT(again.flags.back(), Contains("drift or a slow branch: not separable"));
+}
+
 TEST_CASE("a drift that no rest tells does not move k1 and tau1 out of their intervals",
           "[placement]") {
   for (const double drift_N_per_s : {-1e-3, 5e-4, 2e-3}) {

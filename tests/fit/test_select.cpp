@@ -241,8 +241,10 @@ TEST_CASE("a law with a relaxation time that the sampling cannot support is not 
   CHECK_THAT(fmt::format("{}", fmt::join(s.words, "\n")),
              Catch::Contains("the data prefer linear-2, by ") &&
                  Catch::Contains(" in BIC, but do not identify its parameters (tau1 is sampled by "
-                                 "fewer than 3 points); the simplest law whose parameters they "
-                                 "identify is linear-1"));
+                                 "fewer than 3 points); the simplest law that the protocol "
+                                 "does not contradict is linear-1"));
+  CHECK_THAT(s.candidates[s.recommended].fit.adequacy.value().words,
+             Catch::Contains("linear-1 does not describe these data: linear-2 does better, by "));
   REQUIRE(s.preferred);
   CHECK(law_name(s.candidates[*s.preferred].law) == "linear-2");
   CHECK(to_json(s)["preferred"]["law"] == "linear-2");

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/text.hpp"
@@ -59,22 +60,79 @@ void hold_both(ParameterResult& p, const ParameterResult* other, const std::stri
   change_and_say(p, level, [&] { p.not_separable = doubt; });
 }
 
+/// Covariance of the free parameters by the fit with a drift, in the order of those without one;
+/// the own one where it does not tell all of them.
+Eigen::MatrixXd drifting_covariance(const Covariance& own, const Covariance& drifting) {
+  if (!drifting.full_rank) return own.theta_covariance();
+  std::vector<Eigen::Index> places;
+  for (const std::size_t parameter : own.free) {
+    const auto at = std::ranges::find(drifting.free, parameter);
+    if (at == drifting.free.end()) return own.theta_covariance();
+    places.push_back(at - drifting.free.begin());
+  }
+  return drifting.theta_covariance()(places, places);
+}
+
+/// What pools and law files know of a fit is its covariance. It becomes that of the fit with a
+/// drift and d d', d the difference of both answers, and each standard error at least so large that
+/// the interval that it stands for holds both.
+void hold_both_in_covariance(FitResult& fit, const FitResult& drifting, double spread) {
+  Covariance& own = fit.covariance;
+  if (!own.full_rank) return;
+  const auto n = std::ssize(own.free);
+  Eigen::MatrixXd both = drifting_covariance(own, drifting.covariance);
+  Eigen::VectorXd apart(n), least(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const std::size_t i = own.free[static_cast<std::size_t>(k)];
+    const ParameterResult& p = fit.parameters[i];
+    const ParameterResult& other = drifting.parameters[i];
+    apart[k] = p.parameter.theta(other.estimate) - p.parameter.theta(p.estimate);
+    least[k] = own.theta_sd[k];
+    if (!p.standard_error || !other.standard_error || !(*p.standard_error > 0.0)) continue;
+    const double needed = std::abs(other.estimate - p.estimate) / spread + *other.standard_error;
+    least[k] = std::max(1.0, needed / *p.standard_error) * own.theta_sd[k];
+  }
+  both += apart * apart.transpose();
+  const Eigen::VectorXd sd = both.diagonal().cwiseSqrt();
+  if (!(sd.minCoeff() > 0.0) || !sd.allFinite()) return;
+  const Eigen::VectorXd inverse = sd.cwiseInverse();
+  own.correlation = inverse.asDiagonal() * both * inverse.asDiagonal();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    ParameterResult& p = fit.parameters[own.free[static_cast<std::size_t>(k)]];
+    const double wider = std::max(sd[k], least[k]);
+    if (p.standard_error) *p.standard_error *= wider / own.theta_sd[k];
+    own.theta_sd[k] = wider;
+  }
+}
+
 }  // namespace
 
 std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
                                                     std::span<const PreparedRecording> recordings) {
+  return give_both_drift_answers(fit, recordings, data_sets(recordings));
+}
+
+std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
+                                                    std::span<const PreparedRecording> recordings,
+                                                    const std::vector<DataSet>& data) {
   const ParameterResult* lasting = not_separable_in(fit);
-  if (lasting == nullptr) return std::nullopt;
+  // Of a strain that answers a stress there is no second answer: the search for it does not move
+  // the drift from 0.
+  const bool strain = std::ranges::any_of(recordings, [](const PreparedRecording& r) {
+    return r.load_imposed && r.recording.response_quantity == Quantity::strain;
+  });
+  if (lasting == nullptr || strain) return std::nullopt;
   DriftAnswers answers;
   answers.k_inf = lasting->estimate;
   FitConfig config = fit.config;
   for (std::size_t i = 0; i < recordings.size(); ++i) add_possible_drift(config, recordings[i], i);
   std::optional<FitResult> drifting;
-  const std::string failure = gave_up([&] { drifting = run_fit(config, data_sets(recordings)); });
+  const std::string failure = gave_up([&] { drifting = run_fit(config, data); });
   if (!failure.empty()) drifting.reset();
   const std::string doubt = lasting->not_separable;
   const double spread = student_quantile(0.5 + 0.5 * fit.config.level, fit.degrees_of_freedom);
   const std::string& name = lasting->parameter.name;
+  if (drifting) hold_both_in_covariance(fit, *drifting, spread);
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
     ParameterResult& p = fit.parameters[i];
     const ParameterResult* other = drifting ? &drifting->parameters[i] : nullptr;
@@ -86,10 +144,26 @@ std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
   if (!drifting) return answers;
   for (std::size_t i = 0; i < drifting->parameters.size(); ++i) {
     if (config.parameters[i].drift) {
+      answers.rate = config.parameters[i].fit.unit;
       answers.drift_per_s.push_back(drifting->parameters[i].estimate);
     }
   }
   return answers;
+}
+
+void give_both_drift_answers(FitResult& fit, const std::vector<DataSet>& data) {
+  if (not_separable_in(fit) == nullptr) return;
+  std::vector<PreparedRecording> recordings;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const auto* recording = std::get_if<Recording>(&data[i]);
+    if (recording == nullptr || is_step_response(recording->response_quantity)) return;
+    const DataChoice& choice = fit.config.data[i];
+    recordings.push_back(prepare_recording(choice.dataset, *recording));
+    recordings.back().from_s = choice.from_s;
+    recordings.back().to_s = choice.to_s;
+  }
+  const auto both = give_both_drift_answers(fit, recordings, data);
+  if (both) fit.flags.push_back(drift_words(*both, fit));
 }
 
 std::string drift_words(const DriftAnswers& answers, const FitResult& fit) {
@@ -97,13 +171,12 @@ std::string drift_words(const DriftAnswers& answers, const FitResult& fit) {
   if (lasting == nullptr) return {};
   const FitParameter& k = lasting->parameter;
   std::string words = fmt::format(
-      "{}: not separable, for no rest before contact or after withdrawal tells the "
-      "drift well enough: {} = {} without a drift of the zero",
+      "{}: not separable, for no rest without a load tells the drift well enough: {} = {} without "
+      "a "
+      "drift of the zero",
       lasting->not_separable, k.name, in_unit(k, answers.k_inf));
   if (!answers.drifting) return words + "; no fit with one was found";
-  const bool force = fit.config.law->response == Quantity::contact_force;
-  const Unit rate = per_second(force ? parse_unit("mN", Dimension::force, "drift")
-                                     : shown_unit(quantity_dimension(fit.config.law->response)));
+  const Unit& rate = answers.rate;
   std::string drifts;
   for (const double drift : answers.drift_per_s) {
     drifts += fmt::format("{}{}", drifts.empty() ? "" : ", ", significant(drift / rate.to_si, 3));

@@ -10,6 +10,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -21,6 +22,7 @@ struct Judged {
   Adequacy adequacy;
   std::optional<std::size_t> choice;  ///< the recording; none: all data together
   bool noise_was_stated = false;
+  std::string drift_off = {};  ///< what its drift is beside that of the rests, if they disagree
 };
 
 /// Order of what must be said: rejected before not judged before adequate, then by the ratio.
@@ -56,6 +58,34 @@ Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int
   return judge_adequacy({rest_time, rest, time, reading, residual, parameters}, level);
 }
 
+/// The drift of a recording that the fit takes, where it is further from what the rests tell than
+/// both uncertainties allow: what the law cannot follow then went into the drift. With the noise
+/// of the fit and of the rests independent, the difference of both has the sum of their variances;
+/// the weight of the rests in the fit only makes it smaller.
+/// @return empty if they agree, or if there is no such drift
+std::string drift_off(const FitResult& fit, std::size_t choice, double level) {
+  const double far = normal_quantile(1.0 - 0.5 * level);
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+    const EstimatedParameter& estimated = fit.config.parameters[i];
+    const ParameterResult& p = fit.parameters[i];
+    if (!estimated.drift || estimated.drift->choice != choice) continue;
+    if (!estimated.prior || !p.standard_error) continue;
+    const Prior& rests = *estimated.prior;
+    if (std::abs(p.estimate - rests.mean) <= far * std::hypot(rests.sd, *p.standard_error))
+      return {};
+    return fmt::format("it takes a drift of {}, and the rests tell {} +- {}",
+                       in_unit(p.parameter, p.estimate), in_unit(p.parameter, rests.mean),
+                       in_unit(p.parameter, rests.sd));
+  }
+  return {};
+}
+
+bool has_measured_drift(const FitResult& fit, std::size_t choice) {
+  return std::ranges::any_of(fit.config.parameters, [&](const EstimatedParameter& p) {
+    return p.prior && p.drift && p.drift->choice == choice;
+  });
+}
+
 /// Parameters that a recording's residuals have to pay for: an equal share of all.
 int parameters_each(const FitResult& fit) {
   const auto count = static_cast<int>(std::max<std::size_t>(fit.recordings.size(), 1));
@@ -69,7 +99,15 @@ std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecor
       kLevel / static_cast<double>(std::max<std::size_t>(fit.recordings.size(), 1));
   for (const RecordingFit& r : fit.recordings) {
     if (rested[r.choice].recording == nullptr) continue;
-    Judged one{adequacy_of(r, rested[r.choice], parameters_each(fit), level), r.choice, false};
+    // Two tests share the level where a drift was measured.
+    const double each = has_measured_drift(fit, r.choice) ? 0.5 * level : level;
+    Judged one{adequacy_of(r, rested[r.choice], parameters_each(fit), each), r.choice};
+    one.drift_off = drift_off(fit, r.choice, each);
+    if (!one.drift_off.empty()) {
+      Adequacy& a = one.adequacy;
+      a.described = Described::not_described;
+      a.causes.emplace_back("a slow branch that the law does not have, or a drift that changes");
+    }
     if (!worst || rank(one) > rank(*worst)) worst = std::move(one);
   }
   return worst;
@@ -119,7 +157,7 @@ std::optional<Judged> against_stated_noise(const FitResult& fit) {
     degrees += degrees_of(r);
   }
   degrees = std::max(degrees - static_cast<double>(fit.parameters.size()), 1.0);
-  Judged judged{{}, std::nullopt, true};
+  Judged judged{{}, std::nullopt, true, {}};
   Adequacy& a = judged.adequacy;
   a.residual_over_noise = std::sqrt(squares / fit.degrees_of_freedom);
   a.noise_sd = 1.0;
@@ -129,6 +167,7 @@ std::optional<Judged> against_stated_noise(const FitResult& fit) {
 }
 
 std::string times_the_noise(const Judged& judged) {
+  if (!judged.drift_off.empty()) return judged.drift_off;
   return fmt::format("residual {} times the noise {}",
                      times_text(judged.adequacy.residual_over_noise),
                      judged.noise_was_stated ? "that is stated" : "at rest");
@@ -154,7 +193,7 @@ LawAdequacy stated(const FitResult& fit, const Judged& judged, std::size_t tried
         "adequacy cannot be judged: too few samples at rest before the load to tell the noise";
     return result;
   }
-  result.residual_over_noise = a.residual_over_noise;
+  if (a.noise_sd > 0.0) result.residual_over_noise = a.residual_over_noise;
   if (a.described == Described::adequate) {
     result.words =
         fmt::format("the law describes {}: {}", subject(fit, judged), times_the_noise(judged));
@@ -190,26 +229,7 @@ void state(FitResult& fit, LawAdequacy adequacy) {
   fit.adequacy = std::move(adequacy);
 }
 
-}  // namespace
-
-std::size_t samples_at_rest(const RecordingPhases& phases) {
-  std::size_t end = 0;
-  if (phases.contact_found && !phases.preloaded) {
-    end = phases.contact_index;
-  } else if (phases.phases.size() > 1 && phases.phases.front().kind == PhaseKind::hold) {
-    end = phases.phases.front().last;
-  }
-  const std::size_t late = end / 10 + 2;
-  return end > late ? end - late : 0;
-}
-
-void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings) {
-  const std::vector<RestedRecording> rests = rested(recordings);
-  const auto worst = worst_of(fit, rests);
-  if (worst) state(fit, stated(fit, *worst, 1, {}));
-}
-
-void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
+void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings) {
   Candidate& chosen = s.candidates[s.recommended];
   const std::vector<RestedRecording> rests = rested(recordings);
   const auto worst = worst_of(chosen.fit, rests);
@@ -229,6 +249,44 @@ void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings)
   chosen.reason = "does not describe the data";
 }
 
+}  // namespace
+
+std::size_t samples_at_rest(const RecordingPhases& phases) {
+  std::size_t end = 0;
+  if (phases.contact_found && !phases.preloaded) {
+    end = phases.contact_index;
+  } else if (phases.phases.size() > 1 && phases.phases.front().kind == PhaseKind::hold) {
+    end = phases.phases.front().last;
+  }
+  const std::size_t late = end / 10 + 2;
+  return end > late ? end - late : 0;
+}
+
+void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings) {
+  const std::vector<RestedRecording> rests = rested(recordings);
+  const auto worst = worst_of(fit, rests);
+  if (worst) state(fit, stated(fit, *worst, 1, {}));
+}
+
+void state_preferred(Selection& s) {
+  if (!s.preferred) return;
+  Candidate& chosen = s.candidates[s.recommended];
+  if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
+  LawAdequacy adequacy = chosen.fit.adequacy.value_or(LawAdequacy{});
+  adequacy.verdict = described_name(Described::not_described);
+  adequacy.words = fmt::format("{} does not describe these data: {} does better, by {} in BIC",
+                               law_name(chosen.law), law_name(s.candidates[*s.preferred].law),
+                               significant(chosen.delta_bic, 3));
+  state(chosen.fit, std::move(adequacy));
+  chosen.identified = false;
+  chosen.reason = "does not describe the data";
+}
+
+void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
+  state_of_rests(s, recordings);
+  state_preferred(s);
+}
+
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
   std::optional<Judged> judged = against_stated_noise(fit);
   if (!judged && !fit.recordings.empty()) {
@@ -246,6 +304,7 @@ void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
 FitResult fit_and_judge(const FitProblem& problem) {
   const std::vector<DataSet> data = problem.data.empty() ? load_data(problem.config) : problem.data;
   FitResult fit = run_fit(problem.config, data);
+  give_both_drift_answers(fit, data);
   state_adequacy(fit, data);
   return fit;
 }

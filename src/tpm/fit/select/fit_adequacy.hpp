@@ -15,11 +15,16 @@ namespace tpm::fit {
 [[nodiscard]] std::size_t samples_at_rest(const RecordingPhases& phases);
 
 /// Tests whether the recommended law describes the recordings (judge_adequacy at 1 %, shared among
-/// them) and states it in its fit: FitResult::adequacy. If it does not, the law counts as not
+/// them, and of a recording whose rests tell a drift with a test that the fitted one agrees) and
+/// states it in its fit: FitResult::adequacy. If it does not, the law counts as not
 /// identified, and each of its parameters as known only if the law described the data.
 void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings);
 
-/// The same for one fit.
+/// Where the data prefer another law decisively (Selection::preferred), the recommended one does
+/// not describe them, whatever its residual is beside the noise.
+void state_preferred(Selection& s);
+
+/// The same as state_adequacy() for one fit.
 /// @param recordings those that were fitted, in the order of the fit's data
 void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings);
 

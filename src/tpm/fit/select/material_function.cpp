@@ -9,6 +9,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/fixed_times.hpp"
 #include "tpm/fit/select/function_starts.hpp"
 #include "tpm/fit/select/gate.hpp"
@@ -304,13 +305,15 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   }
   s.samples = fitted->fit.value_count;
   s.effective_count = s.samples;
-  rank_candidates(s);
+  rank_candidates(s, true);
   const auto with_profiles = [&](const LawSpec& law) {
     return run_fit(function_config(law, function, options.setup), data_set_of(function));
   };
   settle_choice(s, kEndlessHold, options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
+  state_preferred(s);
   const Candidate& chosen = s.candidates[s.recommended];
   s.warnings = range_warnings(chosen.fit, sizes_of_function(function));
+  if (chosen.fit.adequacy) s.words.push_back(chosen.fit.adequacy->words);
   s.words.push_back(fmt::format(
       "{} of {} readings; {} {} ({}): {} parameters, rms residual {} % of the largest "
       "reading",

@@ -134,20 +134,26 @@ Prior contact_prior(const Onset& onset) {
 }
 
 /// "mN/s": drifts of a force are small.
-Unit drift_unit_of(const LawSpec& law) {
-  const Dimension response = quantity_dimension(law.response);
+Unit drift_unit_of(const PreparedRecording& r) {
+  const Dimension response = quantity_dimension(r.recording.response_quantity);
   return per_second(response == Dimension::force ? parse_unit("mN", response, "drift")
                                                  : shown_unit(response));
 }
 
-void add_drift(FitConfig& config, const LawSpec& law, const PreparedRecording& r, std::size_t i,
+/// Whether the rests of a recording tell its drift: those of an indentation under an imposed depth.
+/// What is measured of a strip or a creeping specimen at rest may be the tissue.
+bool rests_unloaded(const LawSpec& law, const PreparedRecording& r) {
+  return is_indentation(law) && !r.load_imposed;
+}
+
+void add_drift(FitConfig& config, const PreparedRecording& r, std::size_t i,
                const RestReadings& rests, std::string name) {
   constexpr double kWide = 20.0;  // standard deviations
   const Measured drift = rests.drift.value_or(Measured{});
   const double duration = r.to_s - r.from_s;
   const double most = std::max(kWide * drift.sd, std::abs(r.phases.peak_response) / duration);
   EstimatedParameter p;
-  p.fit = readable({std::move(name), drift_unit_of(law), Scale::linear, drift.value,
+  p.fit = readable({std::move(name), drift_unit_of(r), Scale::linear, drift.value,
                     drift.value - most, drift.value + most});
   if (rests.drift) {
     p.prior = Prior{drift.value, drift.sd,
@@ -235,10 +241,10 @@ void require_contact_within(double contact, std::span<const PreparedRecording> r
 }
 
 void add_possible_drift(FitConfig& config, const PreparedRecording& r, std::size_t place) {
-  const RestReadings rests = read_rests(r);
+  const RestReadings rests = rests_unloaded(config.law.value(), r) ? read_rests(r) : RestReadings{};
   if (drift_finding(r, rests) != DriftFinding::not_separable) return;
   const bool several = config.data.size() > 1;
-  add_drift(config, config.law.value(), r, place, rests,
+  add_drift(config, r, place, rests,
             several ? fmt::format("drift {}", r.name) : std::string("drift"));
 }
 
@@ -258,6 +264,7 @@ void add_placement(FitConfig& config, const LawModel& model,
     const PreparedRecording& r = recordings[i];
     const auto scope = several ? std::vector<std::size_t>{i} : std::vector<std::size_t>{};
     if (!is_indentation(law) || r.load_imposed) {
+      held += options.measured && drift_finding(r, {}) != DriftFinding::no_hold;
       const bool pressed = is_indentation(law);
       if (pressed && !options.zero) hold_zero_of_load(config, model, r, scope);
       if (r.load_imposed ? options.contact.has_value() : options.zero.has_value()) continue;
@@ -290,7 +297,7 @@ void add_placement(FitConfig& config, const LawModel& model,
     held += placement.drift != DriftFinding::no_hold;
     told += placement.drift == DriftFinding::told;
     if (placement.drift == DriftFinding::told)
-      add_drift(config, law, r, i, placement.rests, named("drift", r));
+      add_drift(config, r, i, placement.rests, named("drift", r));
   }
   if (held == 0 || told > 0) return;
   for (EstimatedParameter& p : config.parameters) {

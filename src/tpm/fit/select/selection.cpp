@@ -83,12 +83,16 @@ double floored_deviance(const Candidate& c, int samples) {
   return std::max(c.fit.best.deviance, kRoundingSigma * kRoundingSigma * samples);
 }
 
-void score(Candidate& c, int samples, double effective) {
+void score(Candidate& c, int samples, double effective, bool few_readings) {
   const double k = c.parameters;
   const double log_likelihood = effective * std::log(floored_deviance(c, samples) / samples);
   const double spare = std::max(effective - k - 1.0, 1e-3);
   c.aicc = log_likelihood + 2.0 * k + 2.0 * k * (k + 1.0) / spare;
-  c.bic = log_likelihood + k * std::log(effective);
+  // McQuarrie's small-sample form, whose n - p - 2 counts no noise. Half a reading is the least
+  // that is left over: so a law through every reading has to be much nearer than one beside them.
+  constexpr double kLeastSpare = 0.5;
+  const double share = few_readings ? effective / std::max(effective - k - 1.0, kLeastSpare) : 1.0;
+  c.bic = log_likelihood + k * std::log(effective) * share;
 }
 
 }  // namespace
@@ -290,12 +294,12 @@ std::size_t least_within(const std::vector<Candidate>& candidates, double margin
   throw Error(ExitCode::numerical, "selection", "no law could be fitted");
 }
 
-void rank_candidates(Selection& s) {
+void rank_candidates(Selection& s, bool few_readings) {
   double best_aicc = std::numeric_limits<double>::infinity();
   double best_bic = best_aicc;
   for (Candidate& c : s.candidates) {
     if (c.failed) continue;
-    score(c, s.samples, s.effective_count);
+    score(c, s.samples, s.effective_count, few_readings);
     best_aicc = std::min(best_aicc, c.aicc);
     best_bic = std::min(best_bic, c.bic);
   }

@@ -45,6 +45,7 @@ struct DriftAnswers {
   double k_inf = 0.0;               ///< without a drift, SI
   std::optional<double> drifting;   ///< with one of each recording, SI; none if no fit was found
   std::vector<double> drift_per_s;  ///< of each recording that has one, SI
+  Unit rate;                        ///< in which a drift is shown
 };
 
 struct SelectionOptions {
@@ -107,6 +108,15 @@ struct Selection {
 std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
                                                     std::span<const PreparedRecording> recordings);
 
+/// @param data what was fitted, one for each of the recordings
+std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
+                                                    std::span<const PreparedRecording> recordings,
+                                                    const std::vector<DataSet>& data);
+
+/// The same for a configuration whose parameters say `not_separable`, with a flag that says both.
+/// Nothing if one of its data is no recording of a motion.
+void give_both_drift_answers(FitResult& fit, const std::vector<DataSet>& data);
+
 [[nodiscard]] std::string drift_words(const DriftAnswers& answers, const FitResult& fit);
 
 /// The law that select_law recommends with a given margin of BIC.
@@ -119,7 +129,10 @@ std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
 
 /// Scores the candidates by s.samples and s.effective_count, sorts them by BIC and recommends one
 /// (least_within s.margin).
-void rank_candidates(Selection& s);
+/// @param few_readings the penalty k ln n of BIC is k ln n times n / (n - k - 1), k with the size
+/// of
+///        the noise: McQuarrie, Statistics & Probability Letters 44 (1999) 79
+void rank_candidates(Selection& s, bool few_readings = false);
 
 /// What the fitted law does with the samples outside the window: "unloading and after: rms 12 % of
 /// the peak; the law does not describe it", and which of them it does not predict. Empty if there
