@@ -56,8 +56,8 @@ TEST_CASE("the example of the help runs, and its page finds what changed", "[val
   write_table(folder / "again.csv", test::study_recording(protocol, noise, random));
   CHECK(run_in(folder, "validate fitted/law.json other.csv again.csv --folder two") == 0);
   std::vector<std::string> labels;
-  for (const Json& series :
-       read_json(folder / "two/figures.json")["figures"][1]["panels"][0]["series"]) {
+  const Json figures = read_json(folder / "two/figures.json");
+  for (const Json& series : figures["figures"][1]["panels"][0]["series"]) {
     labels.push_back(series.at("label"));
   }
   CHECK(labels == std::vector<std::string>{"calibration", "other.csv and 1 of its protocol",

@@ -2,14 +2,11 @@
 #include <fmt/format.h>
 
 #include <catch2/catch.hpp>
-#include <map>
-#include <set>
 
 #include "expected_values.hpp"
 #include "tpm/fit/expression/expression.hpp"
 #include "tpm/paper/claims/audit.hpp"
 #include "tpm/paper/show/study_report.hpp"
-#include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
@@ -180,33 +177,6 @@ TEST_CASE("item 5: with lambda1(e) one creep claim survives, the other does not"
   const Finding& small = finding(printed_paper(), "creep-small-self-consistent");
   CHECK(small.verdict == AuditVerdict::contradicted);
   CHECK_THAT(1e-3 * small.recomputed->value, test::expected("paper.creep_end_at_0.196_N"));
-}
-
-TEST_CASE("findings and captions say a thing once, in words") {
-  std::map<std::string, int> said;
-  const auto add = [&](const std::string& text) {
-    constexpr std::size_t kShort = 40;  // such sentences may recur
-    std::size_t begin = 0;
-    while (begin < text.size()) {
-      const std::size_t end =
-          std::min({text.find(". ", begin), text.find("; ", begin), text.size()});
-      if (end - begin > kShort) ++said[text.substr(begin, end - begin)];
-      begin = end + 2;
-    }
-  };
-  std::set<std::string> consequences;  // two claims may have one and the same
-  for (const Finding& f : printed_paper().findings) consequences.insert(f.consequence);
-  for (const std::string& text : consequences) add(text);
-  for (const auto& [sentence, times] : said) {
-    CAPTURE(sentence);
-    // The forces of the tables are checked three times.
-    CHECK((times == 1 || sentence.find("the largest deviation of the others") == 0));
-  }
-  for (const char* id : {"amy_creep", "evren_relaxation", "evren_static"}) {
-    const std::string note =
-        std::visit([](const auto& curve) { return curve.header.note; }, load_curve(id));
-    CHECK(note.find('_') == std::string::npos);
-  }
 }
 
 TEST_CASE("items 6 to 13") {

@@ -63,6 +63,7 @@ inline std::vector<ErrorCase> validation_error_cases() {
       {type, "law without uncertainty", command, files(validated_recording())},
       {type, "requirement that is none", command + " --require much", files(validated_recording())},
       {type, "requirement of 0", command + " --require 0%", files(validated_recording())},
+      {type, "requirement without a unit", command + " --require 20", files(validated_recording())},
       {type, "unknown placement", command + " --placement best", files(validated_recording())},
       {type, "unknown quantity", command + " --quantity slope", files(validated_recording())},
       {type, "--plan with a law", command + " --plan", files(validated_recording())},
