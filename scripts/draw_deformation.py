@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the organ that `tpm simulate --figures FOLDER` describes, as SVG and PNG.
+"""Draws the organ that `tpm simulate --figures FOLDER` describes, as SVG, PNG and PDF.
 
     draw_deformation.py PICTURES.json FOLDER
 
@@ -331,6 +331,7 @@ def main():
     for name, page in pages(picture):
         save_drawing(page, arguments.folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
         save_drawing(page, arguments.folder / f"{name}.png", dpi=110, metadata={"Software": None})
+        save_drawing(page, arguments.folder / f"{name}.pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
         plt.close(page)
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the network of spheres that `tpm network show` describes, as STEM.svg and STEM.png.
+"""Draws the network of spheres that `tpm network show` describes, as STEM.svg, STEM.png and STEM.pdf.
 
     draw_network.py PICTURE.json STEM
 
@@ -178,6 +178,7 @@ def main():
     page = draw(picture)
     save_drawing(page, f"{arguments.stem}.svg", metadata={"Date": None, "Creator": None})
     save_drawing(page, f"{arguments.stem}.png", dpi=300, metadata={"Software": None})
+    save_drawing(page, f"{arguments.stem}.pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
 
 
 if __name__ == "__main__":

@@ -106,9 +106,11 @@ int check(const NetworkChoice& choice, const Session& session) {
 
 int show(const NetworkChoice& choice, const Session& session) {
   fs::path stem = choice.output;
-  if (stem.extension() == ".png" || stem.extension() == ".svg") stem.replace_extension();
+  const fs::path ending = stem.extension();
+  if (ending == ".png" || ending == ".svg" || ending == ".pdf") stem.replace_extension();
   const fs::path picture = stem.string() + ".json";
-  will_write({picture, stem.string() + ".svg", stem.string() + ".png"}, session.output_naming);
+  will_write({picture, stem.string() + ".svg", stem.string() + ".png", stem.string() + ".pdf"},
+             session.output_naming);
   const Tissue tissue = tissue_of(choice);
   const std::string python = find_drawing_python();
   write_file(picture, to_text(network_picture(tissue)));
@@ -116,7 +118,7 @@ int show(const NetworkChoice& choice, const Session& session) {
   if (python.empty()) {
     say("wrote {}.json\n", stem.string());
   } else {
-    say("wrote {0}.svg, {0}.png and {0}.json\n", stem.string());
+    say("wrote {0}.svg, {0}.png, {0}.pdf and {0}.json\n", stem.string());
   }
   return 0;
 }

@@ -16,6 +16,7 @@
 #include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
+#include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/fit_report.hpp"
 #include "tpm/fit/show/function_report.hpp"
 #include "tpm/fit/show/recording_report.hpp"
@@ -274,6 +275,11 @@ void bind_fits(py::module_& module) {
                            "sphere_radius_m, cone_half_angle_rad or punch_radius_m");
              }
              return to_text(to_json(fit::young_moduli(f.fit(), probe, !poisson_ratio)));
+           })
+      .def("answer",
+           [](const Fit& f) {
+             return show::to_text(f.selection() ? fit::short_answer(*f.selection())
+                                                : fit::short_answer(f.fit()));
            })
       .def("text",
            [](const Fit& f) {

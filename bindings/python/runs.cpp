@@ -146,7 +146,7 @@ py::tuple plan_of(const std::string& text, const std::string& where, const fs::p
     if (interrupted()) throw Interrupted("plan: interrupted");
   };
   const Plan plan = call.run([&] { return make_plan(scene, request); });
-  return py::make_tuple(to_text(plan_json(plan)), plan_text(plan));
+  return py::make_tuple(to_text(plan_json(plan)), show::to_text(short_answer(plan)));
 }
 
 }  // namespace

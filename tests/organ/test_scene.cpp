@@ -183,5 +183,7 @@ TEST_CASE("tpm network show draws the liver as PNG and SVG, twice the same") {
   REQUIRE(std::system((show + (folder / "b.png") + "\" >/dev/null").c_str()) == 0);
   CHECK(read_file(folder / "a.svg") == read_file(folder / "b.svg"));
   CHECK(read_file(folder / "a.png").starts_with("\x89PNG"));
+  CHECK(read_file(folder / "a.pdf").starts_with("%PDF"));
+  CHECK(read_file(folder / "a.pdf") == read_file(folder / "b.pdf"));
   CHECK_THAT(read_file(folder / "a.svg"), Contains("<svg"));
 }

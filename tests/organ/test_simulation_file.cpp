@@ -188,5 +188,6 @@ TEST_CASE("tissue and mass-spring model are run and drawn beside each other, twi
     CHECK(read_file((folder / "a") + picture + ".svg") ==
           read_file((folder / "b") + picture + ".svg"));
     CHECK(read_file((folder / "a") + picture + ".png").starts_with("\x89PNG"));
+    CHECK(read_file((folder / "a") + picture + ".pdf").starts_with("%PDF"));
   }
 }

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Runs the commands of pages and compares what they print with what the page shows.
 
-    page_commands.py ROOT TPM
+    page_commands.py ROOT TPM [PAGE ...]
 
-The pages are those of PAGES. In an indented block a line `$ COMMAND` is run, in a folder of the page's own with the
+The pages are those of PAGES, or those named. In an indented block a line `$ COMMAND` is run, in a folder of the page's own with the
 project's configs beside it; the lines up to the next command have to be printed, in this order: `...` stands for any
 lines, and at the end of a line for its rest. `# not run: REASON` behind a command leaves it out. A block "```LANGUAGE NAME"
 becomes the file NAME. What a table quotes in its column "message" is printed on this page, or stands in the
@@ -17,7 +17,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-PAGES = ("docs/which_command.md", "docs/troubleshooting.md")
+PAGES = ("docs/which_command.md", "docs/troubleshooting.md", "docs/site/start_recording.md", "docs/site/start_organ.md",
+         "docs/site/start_device.md", "docs/budget.md", "docs/simulate.md")
 
 
 def files_of(text):
@@ -28,10 +29,12 @@ def calls_of(text):
     """[(command, lines it prints)]"""
     calls = []
     for block in re.findall(r"(?:^    .*\n|^\n(?=    ))+", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M):
+        own = False  # a block that does not begin with a command shows something else
         for line in (b[4:] for b in block.splitlines() if b.strip()):
             if line.startswith("$ "):
                 calls.append((line[2:], []))
-            elif calls:
+                own = True
+            elif own:
                 calls[-1][1].append(line)
     return calls
 
@@ -68,7 +71,7 @@ def faults_of(root, name, program):
                 continue
             run = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, check=False, timeout=300,
                                  env={**os.environ, "PATH": path, "MPLBACKEND": "Agg"})
-            lines = (run.stdout + run.stderr).splitlines()
+            lines = [line for line in (run.stdout + run.stderr).splitlines() if line.strip()]  # as calls_of()
             printed += lines
             refused = any(line.startswith("tpm: ") for line in shown)
             if (run.returncode != 0) != refused:
@@ -94,7 +97,7 @@ def sources_of(root):
 
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
-    faults = [fault for name in PAGES for fault in faults_of(root, name, program)]
+    faults = [fault for name in sys.argv[3:] or PAGES for fault in faults_of(root, name, program)]
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")

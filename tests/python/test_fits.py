@@ -159,11 +159,44 @@ class Fits(unittest.TestCase):
         for words in (*self.fit.verdicts, *self.fit.warnings):
             self.assertIn(words, text)
 
-    def test_a_fit_is_copied_as_itself_and_says_what_can_be_pickled(self):
+    def test_its_str_is_the_short_answer(self):
+        text = str(self.fit)
+        self.assertLessEqual(text.count("\n"), 25)
+        for words in (self.fit.adequacy["words"], *self.fit.warnings):
+            self.assertIn(words, text)
+        self.assertGreater(self.fit.details().count("\n"), text.count("\n"))
+
+    def test_a_fit_is_copied_as_itself_and_pickled_with_its_inputs(self):
         self.assertIs(copy.copy(self.fit), self.fit)
         self.assertIs(copy.deepcopy([self.fit])[0], self.fit)
-        with self.assertRaisesRegex(tpmkit.Error, "expected fit.law, fit.parameters"):
-            pickle.dumps(self.fit)
+        again = pickle.loads(pickle.dumps(self.fit))
+        self.assertEqual((repr(again), str(again), again.details()), (repr(self.fit), str(self.fit), self.fit.details()))
+        self.assertEqual(again.to_dict(), self.fit.to_dict())
+        self.assertEqual(again.law, self.fit.law)
+        for ours, theirs in zip(again.data, self.fit.data):
+            self.assertTrue(ours.equals(theirs))
+        self.assertTrue(again.covariance.equals(self.fit.covariance))
+        protocol = tpmkit.Protocol.ramp_and_hold(2e-3, 1e-3, 10.0)
+        times = np.linspace(0.0, 12.0, 25)
+        self.assertTrue(again.predict(protocol, times).equals(self.fit.predict(protocol, times)))  # fits again
+        twice = pickle.loads(pickle.dumps(again))
+        self.assertEqual(repr(twice), repr(self.fit))
+
+    def test_an_unpickled_fit_refuses_inputs_that_have_changed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = made.recording(folder)
+            pickled = pickle.dumps(tpmkit.fit(file, law="linear-1", starts=2))
+            protocol = tpmkit.Protocol.ramp_and_hold(2e-3, 1e-3, 10.0)
+            made.recording(folder, seed=7)
+            with self.assertRaisesRegex(tpmkit.Error, "gives other parameters than the fit that was pickled"):
+                pickle.loads(pickled).predict(protocol, [1.0])
+            os.remove(file)
+            again = pickle.loads(pickled)
+            with self.assertRaises(tpmkit.Error):
+                again.predict(protocol, [1.0])
+            self.assertEqual(again.law.name, "linear-1")
+
+    def test_parts_of_a_fit_are_pickled(self):
         self.assertEqual(pickle.loads(pickle.dumps(self.fit.law)), self.fit.law)
         self.assertTrue(pickle.loads(pickle.dumps(self.fit.parameters)).equals(self.fit.parameters))
 

@@ -32,6 +32,11 @@ class Judgements(unittest.TestCase):
         self.assertGreater(row.upper, made.LAW["tau1_s"])
         self.assertEqual(row.unit, "s")
         self.assertIn(row.words, repr(pooled))
+        self.assertEqual(pooled.adequacy["verdict"], "not_judged")  # nothing rests before contact
+        self.assertEqual(len(pooled.adequacy["not_judged"]), 3)
+        for words in (pooled.adequacy["words"], *pooled.warnings):
+            self.assertIn(words, repr(pooled))
+        self.assertTrue(any("liver_1.csv: " in w for w in pooled.warnings), pooled.warnings)
 
     def test_a_law_is_validated_by_a_recording_that_it_has_not_seen(self):
         saved = self.folder / "saved"
@@ -56,6 +61,10 @@ class Judgements(unittest.TestCase):
         found = tpmkit.design(problem, repetitions=0)
         self.assertEqual(len(found.ranked), 10)
         self.assertIn("experiment", found.ranked)
+        self.assertEqual(found.adequacy["verdict"], "not_judged")
+        self.assertTrue(found.words)
+        for words in (found.adequacy["words"], *found.warnings):
+            self.assertIn(words, repr(found))
         with self.assertRaisesRegex(tpmkit.Error, "expected"):
             tpmkit.design({**problem, "critreion": "D"}, repetitions=0)
 

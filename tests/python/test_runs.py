@@ -137,6 +137,12 @@ class Plans(unittest.TestCase):
         plan = tpmkit.plan(SCENE, tolerance="1%")
         self.assertIsNotNone(plan.choice)
         chosen = plan.candidates.loc[plan.choice]
+        self.assertIn(plan.adequacy["verdict"], ("adequate", "not_adequate"))
+        self.assertLessEqual(str(plan).count("\n"), 25)
+        for words in plan.warnings:
+            self.assertIn(words, str(plan))
+        for words in (plan.adequacy["words"], *plan.warnings):
+            self.assertIn(words, repr(plan))
         self.assertTrue(chosen.feasible)
         self.assertLess(chosen.verified_error, 0.01)
         self.assertEqual(plan.to_dict()["tolerance"], 0.01)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Mapping, Sequence, Union
 
@@ -23,12 +24,81 @@ if TYPE_CHECKING:
 PathLike = Union[str, "os.PathLike[str]"]
 
 
+@dataclass(frozen=True)
+class _Inputs:
+    """What `_core.fit` was given: files, or one table as CSV, and the options behind them."""
+
+    files: tuple[str, ...]
+    options: tuple[Any, ...]
+    table: str | None = None
+
+    def fitted(self) -> Any:
+        if self.table is None:
+            return _core.fit(list(self.files), *self.options)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "table.csv"
+            file.write_text(self.table, encoding="utf-8", newline="")
+            try:
+                return _core.fit([str(file)], *self.options)
+            except _core.Error as error:
+                told = _core.Error(str(error).replace(str(file), "table"))
+                told.code = error.code
+                raise told from None
+
+
+_VALUES = ("parameters", "recordings", "has_law", "adequacy_json", "flags", "words", "warnings", "correlation")
+_TEXTS = ("answer", "text", "to_json")
+
+
+def _answers_of(core: Any) -> dict[str, Any]:
+    """All that a fit answers without its model."""
+    answers = {name: getattr(core, name) for name in _VALUES}
+    answers.update({name: getattr(core, name)() for name in _TEXTS})
+    try:
+        answers["law_json"] = core.law_json
+    except _core.Error as error:
+        answers["no_law"] = str(error)
+    return answers
+
+
+class _Unpickled:
+    """Stands for `_core.Fit`: the answers that were kept, and the model by another fit of the same inputs."""
+
+    def __init__(self, answers: dict[str, Any], inputs: _Inputs) -> None:
+        self._answers, self._inputs, self._core = answers, inputs, None
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        answers = self._answers
+        if name in _TEXTS:
+            return lambda: answers[name]
+        if name in answers:
+            return answers[name]
+        if name == "law_json":
+            raise _core.Error(answers["no_law"])
+        return getattr(self._again(), name)
+
+    def _again(self) -> Any:
+        if self._core is None:
+            core = self._inputs.fitted()
+            if core.parameters != self._answers["parameters"]:
+                raise _core.Error(f"{self._inputs.files[0]}: gives other parameters than the fit that was pickled; expected "
+                                  "the file as it was, or another tpmkit.fit")
+            self._core = core
+        return self._core
+
+
+def _unpickled(answers: dict[str, Any], inputs: _Inputs) -> Fit:
+    return Fit(_Unpickled(answers, inputs), inputs)
+
+
 class Fit:
     """What a fit found. Made by `tpmkit.fit`; it never changes, so a copy is the fit itself."""
 
-    def __init__(self, core: _core.Fit, *, of_table: bool = False) -> None:
+    def __init__(self, core: Any, inputs: _Inputs) -> None:
         self._core = core
-        self._of_table = of_table
+        self._inputs = inputs
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -263,7 +333,7 @@ class Fit:
 
         Returns the names of the files.
         """
-        if self._of_table:
+        if self._inputs.table is not None:
             raise _core.Error("save: the fit is of a table in memory, and its configuration names a file; expected "
                               "frame.to_csv(file) and tpmkit.fit(file)")
         return self._core.write(os.fspath(folder))
@@ -272,8 +342,13 @@ class Fit:
         """Everything, as `tpm fit --format json` writes it (keys in docs/fit_results.md)."""
         return json.loads(self._core.to_json())
 
-    def __str__(self) -> str:
+    def details(self) -> str:
+        """All that was computed, as `tpm fit --verbose` prints it."""
         return self._core.text()
+
+    def __str__(self) -> str:
+        """At most 25 lines, as `tpm fit` prints them."""
+        return self._core.answer()
 
     def __repr__(self) -> str:
         lines = [f"<tpmkit.Fit {self.law.name}" if self._core.has_law else "<tpmkit.Fit"]
@@ -293,8 +368,9 @@ class Fit:
         return self
 
     def __reduce__(self) -> Any:
-        raise _core.Error("pickle: a Fit holds the model that it was fitted with; expected fit.law, fit.parameters, "
-                          "fit.data or fit.to_dict(), which are pickled as they are")
+        """Keeps all answers, and the inputs: `predict`, `young_moduli` and `save` of a Fit that was unpickled fit the
+        same files again, and raise tpmkit.Error if they are gone or give another answer."""
+        return _unpickled, (_answers_of(self._core), self._inputs)
 
     def _repr_html_(self) -> str:
         return self.parameters.to_html(float_format=lambda v: f"{v:.4g}")
@@ -333,6 +409,34 @@ class Specimens:
         return table
 
     @property
+    def adequacy(self) -> dict[str, Any]:
+        """Whether the law describes the recordings: `verdict` (not_described if one recording says so, else not_judged
+        if one cannot be judged, else adequate), `words`, and the names of the recordings by verdict."""
+        names: dict[str, list[str]] = {}
+        for r in self.recordings:
+            said = (r.get("fit") or {}).get("adequacy")
+            if "fit" in r:
+                names.setdefault(said["verdict"] if said else "not_judged", []).append(r["recording"])
+        verdict = next((v for v in ("not_described", "not_judged", "adequate") if v in names), "not_judged")
+        words = "; ".join(f"{len(rows)} of {len(self.recordings)} recordings {v.replace('_', ' ')}" for v, rows in names.items())
+        return {"verdict": verdict, "words": words or "no recording is fitted", **names}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader must know: recordings that are not fitted, or that the law does not describe."""
+        found = []
+        for r in self.recordings:
+            fit = r.get("fit")
+            if not fit:
+                found.append(f"{r['recording']} is not fitted: {r.get('reason', 'no reason is stored')}")
+                continue
+            adequacy = fit.get("adequacy")
+            if adequacy and adequacy["verdict"] != "adequate":
+                found.append(f"{r['recording']}: {adequacy['words']}")
+            found += [f"{r['recording']}: {flag}" for flag in fit.get("flags", [])]
+        return found
+
+    @property
     def recordings(self) -> list[dict[str, Any]]:
         """Of each recording: `recording`, `specimen`, and its `fit` (keys in docs/fit_results.md), or why it has none."""
         return self._document["recordings"]
@@ -344,6 +448,8 @@ class Specimens:
     def __repr__(self) -> str:
         lines = [f"<tpmkit.Specimens {self.law}, {len(self.recordings)} recordings"]
         lines += [f"  {name}: {row['words']}" for name, row in self.pooled.iterrows()]
+        lines.append(f"  adequacy: {self.adequacy['words']}")
+        lines += [f"  warning: {w}" for w in self.warnings]
         return "\n".join(lines) + ">"
 
 
@@ -392,7 +498,7 @@ def _table_of(time: Any, depth: Any, force: Any, units: Mapping[str, str] | None
     return pd.DataFrame(columns)
 
 
-def _fit_table(table: pd.DataFrame, ask: Any) -> Fit:
+def _fit_table(table: pd.DataFrame, options: tuple[Any, ...]) -> Fit:
     """Fits a table as the file that it would be: one reader, one answer."""
     import pandas as pd
 
@@ -400,15 +506,8 @@ def _fit_table(table: pd.DataFrame, ask: Any) -> Fit:
         if table.index.name is None:
             raise _core.Error("fit: the table's index has no name; expected frame.reset_index(), or a name with a unit")
         table = table.reset_index()
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "table.csv"
-        table.to_csv(file, index=False)
-        try:
-            return Fit(ask([str(file)]), of_table=True)
-        except _core.Error as error:
-            told = _core.Error(str(error).replace(str(file), "table"))
-            told.code = error.code
-            raise told from None
+    inputs = _Inputs(("table",), options, table.to_csv(index=False))
+    return Fit(inputs.fitted(), inputs)
 
 
 @told
@@ -477,13 +576,11 @@ def fit(
         if value is not None and not isinstance(value, (int, float, np.floating, np.integer)):
             raise _core.Error(f"fit: {name} is {value!r}; expected a number, in m (zero: in N)")
 
-    def ask(names: list[str]) -> Any:
-        return _core.fit(names, law, starts, seed, reference, contact, zero, dict(columns or {}))
-
+    options = (law, starts, seed, reference, contact, zero, dict(columns or {}))
     if arrays:
-        return _fit_table(_table_of(time, depth, force, units), ask)
+        return _fit_table(_table_of(time, depth, force, units), options)
     if hasattr(files, "to_csv"):
-        return _fit_table(files, ask)
+        return _fit_table(files, options)
     if isinstance(files, (str, os.PathLike)):
         if os.path.isdir(files):
             words = ["fit", os.fspath(files), "--no-draw", *_options(columns)]
@@ -493,4 +590,5 @@ def fit(
                 words += [] if value is None else ["--" + key, f"{value}{unit}"]
             return Specimens(_program.answer(words))
         files = [files]
-    return Fit(ask([os.fspath(f) for f in files]))  # type: ignore[union-attr]
+    names = [os.fspath(f) for f in files]  # type: ignore[union-attr]
+    return Fit(_core.fit(names, *options), _Inputs(tuple(os.path.abspath(n) for n in names), options))

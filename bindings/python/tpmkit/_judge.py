@@ -38,6 +38,11 @@ class Validation:
         return words if isinstance(words, str) else " ".join(words)
 
     @property
+    def adequacy(self) -> dict[str, Any]:
+        """`verdict` and `words`, as other results have them."""
+        return {"verdict": self.verdict, "words": self.words}
+
+    @property
     def warnings(self) -> list[str]:
         """What a reader must know."""
         return list(self._document["remarks"])
@@ -109,8 +114,33 @@ class Design:
         """Everything, as `tpm design --format json` writes it."""
         return self._document
 
+    @property
+    def words(self) -> list[str]:
+        """What the best experiment would tell, and what it would not."""
+        return list(self._document["words"])
+
+    @property
+    def adequacy(self) -> dict[str, Any]:
+        """Whether simulated repetitions of the best candidate confirm its expected intervals: `verdict` (adequate,
+        not_adequate if one of its parameters is covered too rarely or too often, not_judged without repetitions) and
+        `words`."""
+        check = self._document["check"]
+        if not check:
+            return {"verdict": "not_judged", "words": "the expected intervals were not checked by simulated repetitions"}
+        doubts = len(check["warnings"])
+        return {"verdict": "not_adequate" if doubts else "adequate",
+                "words": f"{check['data_sets']} simulated repetitions, {check['failed']} of them not fitted: "
+                         + (f"{doubts} warnings" if doubts else "they confirm the expected intervals")}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was left out, and what the check of the expected intervals found against them."""
+        left_out = [f"left out: {words}" for words in self._document["left_out"]]
+        return left_out + list((self._document["check"] or {}).get("warnings", []))
+
     def __repr__(self) -> str:
-        return f"<tpmkit.Design of {len(self._document['ranked'])} candidates>"
+        lines = [f"<tpmkit.Design of {len(self._document['ranked'])} candidates", f"  adequacy: {self.adequacy['words']}"]
+        return "\n".join(lines + [f"  warning: {w}" for w in self.warnings]) + ">"
 
 
 def design(problem: PathLike | Mapping[str, Any], *, repetitions: int = 100, seed: int = 0) -> Design:

@@ -158,6 +158,23 @@ class Plan:
         return choice["name"] if choice else None
 
     @property
+    def adequacy(self) -> dict[str, Any]:
+        """Whether a model keeps to the tolerance: `verdict` (adequate or not_adequate) and `words`. What scene and
+        reference leave out, masses, counts."""
+        tolerance = self._dict["tolerance"]
+        if self.choice is None:
+            return {"verdict": "not_adequate", "words": "no model meets tolerance and budget"}
+        error = self._dict["choice"]["verified_error"]
+        verdict = "adequate" if error <= tolerance else "not_adequate"
+        return {"verdict": verdict,
+                "words": f"{self.choice}: verified error {100 * error:.3g} % of the peak, {100 * tolerance:.3g} % allowed"}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader must know: masses that are left out, limits of validity that the scene passes."""
+        return list(self._dict["warnings"])
+
+    @property
     def candidates(self) -> pd.DataFrame:
         """By name: claimed and verified error in parts of the peak, cost in seconds per simulated second,
         whether it is feasible, and why not."""
@@ -173,7 +190,9 @@ class Plan:
         return self._words
 
     def __repr__(self) -> str:
-        return f"<tpmkit.Plan: {self.choice or 'nothing meets tolerance and budget'}>"
+        lines = [f"<tpmkit.Plan: {self.choice or 'nothing meets tolerance and budget'}",
+                 f"  adequacy: {self.adequacy['words']}"]
+        return "\n".join(lines + [f"  warning: {w}" for w in self.warnings]) + ">"
 
 
 def plan(

@@ -251,7 +251,7 @@ void draw_network(const std::string& python, const std::filesystem::path& pictur
   run_script(
       python, "draw_network.py",
       {std::filesystem::absolute(picture_json).string(), std::filesystem::absolute(stem).string()},
-      {stem.string() + ".svg", stem.string() + ".png"});
+      {stem.string() + ".svg", stem.string() + ".png", stem.string() + ".pdf"});
 }
 
 std::vector<std::string> draw_deformation(const std::string& python,
@@ -264,6 +264,7 @@ std::vector<std::string> draw_deformation(const std::string& python,
     if (std::string_view(name) == "side_by_side" && !two) continue;
     files.push_back(fmt::format("{}.svg", name));
     files.push_back(fmt::format("{}.png", name));
+    files.push_back(fmt::format("{}.pdf", name));
   }
   std::vector<std::filesystem::path> drawings;
   for (const std::string& file : files) drawings.push_back(folder / file);

@@ -46,8 +46,8 @@ void write_report(const std::filesystem::path& folder, const Document& document,
                   const std::vector<Figure>& figures, const std::string& python,
                   std::map<std::string, double> seconds, const Json& more = Json::object());
 
-/// Draws a network_picture() as STEM.svg and STEM.png with scripts/draw_network.py. Throws as
-/// draw_figures does.
+/// Draws a network_picture() as STEM.svg, STEM.png and STEM.pdf with scripts/draw_network.py.
+/// Throws as draw_figures does.
 void draw_network(const std::string& python, const std::filesystem::path& picture_json,
                   const std::filesystem::path& stem);
 
