@@ -10,9 +10,9 @@
 #include <fstream>
 #include <thread>
 
-#include "operator_lines.hpp"
 #include "expected_values.hpp"
 #include "hil_scenes.hpp"
+#include "operator_lines.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"

@@ -9,8 +9,8 @@
 #include <fstream>
 #include <thread>
 
-#include "operator_lines.hpp"
 #include "hil_scenes.hpp"
+#include "operator_lines.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"

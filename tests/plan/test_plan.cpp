@@ -2,11 +2,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "star_stiffness.hpp"
 #include "expected_values.hpp"
 #include "random_plan_scene.hpp"
 #include "refusal.hpp"
 #include "simulated_scene.hpp"
+#include "star_stiffness.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"

@@ -1,8 +1,8 @@
 #pragma once
 #include <span>
 
-#include "tpmkit/law_model.hpp"
 #include "tpm/law/relaxation.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm::law {
 
