@@ -352,8 +352,10 @@ const Block<MaterialKeys>& material_block() {
         key("E", &MaterialKeys::E_Pa, quantity(Dimension::stress, kAboveZero),
             "Young's modulus of the tissue at equilibrium, of a solid: all moduli of the "
             "bonds are multiplied so that a block of them has it"));
-    keys.push_back(key("nu", &MaterialKeys::nu, number({.least = -1.0, .most = 0.5}),
-                       "Poisson ratio of the tissue, beside E: only the network's own, about 1/4"));
+    keys.push_back(
+        key("nu", &MaterialKeys::nu, number({.least = -1.0, .most = 0.5}),
+            "Poisson ratio of the tissue, beside E: only the network's own, 1/4 if it is "
+            "isotropic, 0.15 along the axes of an fcc solid"));
     keys.push_back(key("regions", &MaterialKeys::regions,
                        list(region_kinds().type(), {.fewest = 1, .most = 1000}),
                        "places of another stiffness or material, each on top of those before it"));
