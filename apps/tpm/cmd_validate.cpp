@@ -241,7 +241,7 @@ ValidateOptions options_of(const Json& record, const std::string& page) {
     o.calibration_instrument = i.at("calibration_instrument");
     o.at = i.at("at");
     o.session = i.value("session", "");
-    o.evidence = i.value("evidence", std::vector<std::string>{});
+    o.evidence = i.at("evidence").get<std::vector<std::string>>();
     const std::string tolerance = i.value("plan", "");
     o.plan = !tolerance.empty();
     if (o.plan) o.planned.tolerance = tolerance;

@@ -26,13 +26,13 @@ LawSpec quadratic() {
   return spec;
 }
 
-/// Rest 0.5 mm above the specimen, ramp at 2 mm/s, hold.
-Recording clean_recording(double depth_m) {
-  constexpr double kAbove_m = 0.5e-3;
+/// Rest 0.5 mm above the specimen, ramp at 2 mm/s, hold until 9 s after the rest.
+Recording clean_recording(double depth_m, double rest_s) {
+  constexpr double kAbove_m = 0.5e-3, kAfter_s = 9.0, kPeriod_s = 0.06;
   Recording r;
-  for (int i = 0; i < 160; ++i) {
-    r.time_s.push_back(0.06 * i);
-    r.drive.push_back(std::clamp(2e-3 * (r.time_s.back() - 0.5), 0.0, depth_m + kAbove_m));
+  for (int i = 0; kPeriod_s * i < rest_s + kAfter_s; ++i) {
+    r.time_s.push_back(kPeriod_s * i);
+    r.drive.push_back(std::clamp(2e-3 * (r.time_s.back() - rest_s), 0.0, depth_m + kAbove_m));
   }
   const std::vector<double> values{100.0, 120.0, 2.0, 2.0, kAbove_m, 0.0};
   const Protocol history = measured_history(Drive::displacement, r.time_s, r.drive);
@@ -50,17 +50,19 @@ Recording with_noise(Recording r, Random& random) {
 
 }  // namespace
 
-TEST_CASE("folders of unequal depths: the test of spread rejects as often as it says") {
-  constexpr int kFolders = 500;
+namespace {
+
+/// Of folders of one material, by parameter: how often the test of spread rejects, and of how many.
+std::map<std::string, std::pair<int, int>> spread_rejections(double rest_s, int folders) {
   std::vector<Recording> clean;
   for (const double depth_mm : {2.0, 3.0, 4.5, 6.0, 8.0}) {
-    clean.push_back(clean_recording(1e-3 * depth_mm));
+    clean.push_back(clean_recording(1e-3 * depth_mm, rest_s));
   }
   SelectionOptions options;
   options.setup.profiles = false;
   Random random(20261123);
-  std::map<std::string, int> rejected, tested;
-  for (int folder = 0; folder < kFolders; ++folder) {
+  std::map<std::string, std::pair<int, int>> counts;
+  for (int folder = 0; folder < folders; ++folder) {
     std::vector<PreparedRecording> recordings;
     for (const Recording& r : clean) {
       recordings.push_back(
@@ -69,17 +71,41 @@ TEST_CASE("folders of unequal depths: the test of spread rejects as often as it 
     const SpecimenStudy study = study_specimens(recordings, quadratic(), options);
     for (const PooledParameter& p : study.pooled) {
       if (p.effects.specimens != clean.size()) continue;
-      ++tested[p.parameter.name];
-      rejected[p.parameter.name] += *p.effects.q_p_value < 1.0 - kLevel ? 1 : 0;
+      auto& [rejected, tested] = counts[p.parameter.name];
+      ++tested;
+      rejected += *p.effects.q_p_value < 1.0 - kLevel ? 1 : 0;
     }
   }
-  REQUIRE(tested.size() == 4);
-  for (const auto& [name, count] : tested) {
-    const double p = binomial_test(rejected[name], count, 1.0 - kLevel);
-    INFO(name << ": " << rejected[name] << " of " << count
-              << " rejected, exact binomial p = " << p);
-    CHECK(count > kFolders * 9 / 10);
+  return counts;
+}
+
+}  // namespace
+
+TEST_CASE("folders of unequal depths: the test of spread rejects as often as it says") {
+  constexpr int kFolders = 500;
+  constexpr double kTellsDrift_s = 6.0;
+  const auto counts = spread_rejections(kTellsDrift_s, kFolders);
+  REQUIRE(counts.size() == 4);
+  for (const auto& [name, count] : counts) {
+    const auto [rejected, tested] = count;
+    const double p = binomial_test(rejected, tested, 1.0 - kLevel);
+    INFO(name << ": " << rejected << " of " << tested << " rejected, exact binomial p = " << p);
+    CHECK(tested > kFolders * 9 / 10);
     CHECK(p > kTest);
+  }
+}
+
+TEST_CASE("what a drift may be is no spread of specimens") {
+  constexpr int kFolders = 60;
+  constexpr double kTellsNoDrift_s = 0.5;
+  const auto counts = spread_rejections(kTellsNoDrift_s, kFolders);
+  REQUIRE(counts.size() == 4);
+  for (const auto& [name, count] : counts) {
+    const auto [rejected, tested] = count;
+    INFO(name << ": " << rejected << " of " << tested << " rejected");
+    CHECK(tested > kFolders * 9 / 10);
+    CHECK((rejected < (1.0 - kLevel) * tested ||
+           binomial_test(rejected, tested, 1.0 - kLevel) > kTest));
   }
 }
 

@@ -138,7 +138,7 @@ TEST_CASE("a credibility page names what was tampered with, is missing or change
   edited = page;
   edited.replace(edited.find("\"evidence\": ["), 10, "\"evidenco\"");
   write_file(folder / "page.html", edited);
-  recheck(2, "page.html");
+  recheck(3, "page.html");
 }
 
 TEST_CASE("|E| <= U without a model error, and [E - U, E + U] holds a known one", "[validate]") {

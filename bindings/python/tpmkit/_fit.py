@@ -584,7 +584,7 @@ def fit(
     if isinstance(files, (str, os.PathLike)):
         if os.path.isdir(files):
             words = ["fit", os.fspath(files), "--no-draw", *_options(columns)]
-            said = {"law": law, "starts": starts, "seed": seed, "reference": reference, "contact": contact, "zero": zero}
+            said = {"laws": law, "starts": starts, "seed": seed, "reference": reference, "contact": contact, "zero": zero}
             for key, value in said.items():
                 unit = {"reference": " m", "contact": " m", "zero": " N"}.get(key, "")
                 words += [] if value is None else ["--" + key, f"{value}{unit}"]
