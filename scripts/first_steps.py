@@ -26,8 +26,7 @@ def main():
     out = [f"# The four paths typed, {datetime.date.today().isoformat()}", "",
            "Each command as a new user types it, in an empty folder, with its exit code, wall time and last ten lines. The",
            "machine was shared with other work, so times are upper bounds. Written by", "",
-           f"    python3 scripts/first_steps.py build/release/tpm {page}", "",
-           "run here with a build of the preset `work` (same sources and optimisation, shared libraries)."]
+           f"    python3 scripts/first_steps.py build/release/tpm reports/first_steps/{page.name}"]
     with tempfile.TemporaryDirectory() as folder:
         for name, commands in PATHS.items():
             out += ["", f"## {name}"]
