@@ -90,7 +90,7 @@ def never_written_over(tpm, work):
     tpm(mine, "example", "recording", "--force")
     check((mine / "recording.csv").read_text().startswith("# SYNTHETIC"), "--force did not replace")
     run = tpm(mine, "example", "nothing", code=2)
-    misspelt = subprocess.run([program, "example", "recroding"], capture_output=True, text=True, check=False)
+    misspelt = tpm(mine, "example", "recroding", code=2)
     check("no example 'recroding' (did you mean 'recording'?)" in misspelt.stderr, misspelt.stderr)
     check("no example 'nothing'; expected one of recording, " in run.stderr, run.stderr)
     tpm(mine, "example", "--folder", "x", code=2)
