@@ -103,7 +103,7 @@ inline std::vector<ErrorCase> validation_error_cases() {
       {type, "page whose law is gone", recheck,
        page(whole + R"({"law": "{}/gone.json", "recordings": ["r.csv"], "reading": {}, "units": [],
 "contact_force": "", "quantities": [], "require": "", "placement": "held", "instrument": "",
-"calibration_instrument": "", "at": ""}})")},
+"calibration_instrument": "", "at": "", "evidence": []}})")},
   };
 }
 
