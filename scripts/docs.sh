@@ -24,7 +24,7 @@ step "reading the comments of the interfaces (doxygen)"
 mkdir -p "$folder/doxygen"
 doxygen - >"$folder/doxygen.log" 2>&1 <<END || { tail -n 15 "$folder/doxygen.log" >&2; die "doxygen failed"; }
 PROJECT_NAME = tpmkit
-INPUT = include/tpmkit $(sed -n 's/^## .*`\(tpm\/.*\.hpp\)`$/src\/\1/p' docs/site/cpp.md | tr '\n' ' ')
+INPUT = include/tpmkit
 FULL_PATH_NAMES = YES
 STRIP_FROM_PATH = include src
 OUTPUT_DIRECTORY = $folder/doxygen

@@ -17,6 +17,18 @@ from pathlib import Path
 from command_help import commands
 
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
+TABLES = "reports/paper/tables.md"  # an output of `tpm paper report`, as tables.csv and tables.tex; report.md shows it
+C_HEADERS = ("haptics.h", "haptic_device.h")
+CPP = (  # what is explained, its header, the kind and name of what doxygen describes
+    ("Models", "model.hpp", ("class tpm::Model", "class tpm::ModelMaker")),
+    ("Formulations", "formulation.hpp", ("class tpm::Formulation", "struct tpm::Capabilities")),
+    ("Protocols", "protocol.hpp", ("class tpm::Protocol",)),
+    ("Scenes", "scene.hpp", ("class tpm::organ::Scene",)),
+    ("Fits", "fit.hpp", ("struct tpm::fit::FitSummary",)),
+    ("Sessions", "session.hpp", ("class tpm::haptics::Session",)),
+    ("Contact models of a servo loop", "contact_model.hpp", ("class tpm::ContactModel", "struct tpm::ContactAnswer")),
+    ("Errors", "error.hpp", ("class tpm::Error",)),
+)
 LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
@@ -181,6 +193,23 @@ def described(node, owner=""):
     return ["```python", first, "```", "", "```text", text, "```", ""] if text else []
 
 
+def interface_pages(site):
+    library = "../../library.md"
+    lines = ["# C", "", "Two headers: a tissue in your own haptic loop, and your own device for `tpm hil`. [The C",
+             f"interface]({library}#tissue-in-a-haptic-loop-of-your-own) has examples of both.", ""]
+    for header in C_HEADERS:
+        lines += [f"## tpmkit/{header}", "", f"```{{doxygenfile}} tpmkit/{header}", "```", ""]
+    site.write("docs/site/reference/c.md", "\n".join(lines))
+    lines = ["# C++", "", "The interfaces to implement or to call. [The library](../../library.md) lists all public headers and says how",
+             "a project depends on it.", ""]
+    for title, header, names in CPP:
+        lines += [f"## {title}: `tpmkit/{header}`", ""]
+        for kind, name in (entry.split() for entry in names):
+            members = ":members: code, within" if name == "tpm::Error" else ":members:"
+            lines += [f"```{{doxygen{kind}}} {name}", members, "```", ""]
+    site.write("docs/site/reference/cpp.md", "\n".join(lines))
+
+
 def python_page(site):
     package = site.root / "bindings/python/tpmkit"
     lines = ["# Python", "", "The package `tpmkit`: signatures and docstrings of its sources. [tpmkit in Python](../../python.md) shows it at work.", ""]
@@ -208,11 +237,13 @@ def main():
         site.page(root / name)
     for folder in ("docs", "reports"):
         for page in sorted((root / folder).rglob("*.md")):
-            site.page(page)
+            if page != root / TABLES:
+                site.page(page)
     site.put(source / "conf.py", (root / "docs/site/conf.py").read_bytes())
     site.put(source / "docs/site/static/site.css", (root / "docs/site/static/site.css").read_bytes())
     command_pages(site, program)
     schema_pages(site)
+    interface_pages(site)
     python_page(site)
     site.finish()
     print(f"{len(list(source.rglob('*.md')))} pages in {source}")

@@ -64,7 +64,7 @@ struct FitSummary {
   std::optional<LawAdequacy> adequacy;    ///< whether the law describes the data, if it was tested
   std::vector<std::string> flags;         ///< warnings and assumptions, one sentence each
   std::string text;                       ///< for a terminal
-  std::string json;                       ///< everything, keys in docs/fit_results.md
+  std::string json;                       ///< everything, keys in docs/fit_files.md
 };
 
 /// Options of a fit.

@@ -158,7 +158,7 @@ struct LineRun {
   std::string said;
 };
 
-/// Identifies, runs and verifies, by the commands of docs/inverse.md.
+/// Identifies, runs and verifies, by the commands of docs/haptics.md.
 LineRun run_on_the_line(int late_ms) {
   const test::TempFolder folder;
   LineRun run;

@@ -1,5 +1,5 @@
 // Compares the derivatives of a configuration of a fit with finite differences
-// (reports/fits/gradients.md):
+// (reports/fits/report.md):
 //   measure_gradients CONFIG [RANDOM_POINTS [SEED]]
 // Exit code 1 if a derivative is wrong, or more than half of them are undecided.
 #include <charconv>

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks the worked examples of docs/adding.md, the diffs in docs/changes:
+"""Checks the worked examples of docs/architecture.md, the diffs in docs/changes:
 
 - each applies to the sources as they are, in a copy and with `patch`, so that no git is needed (lines may have moved,
   those next to a change may not differ);
@@ -43,12 +43,12 @@ def what_patch_says(root, diff):
 
 
 def faults(root):
-    page = (root / "docs/adding.md").read_text(encoding="utf-8")
+    page = (root / "docs/architecture.md").read_text(encoding="utf-8")
     stated = {name: int(count) for name, count in
               re.findall(r"^\| \[[^]]+\]\(changes/(\w+)\.diff\) \|.*\| (\d+) \|$", page, re.M)}
     diffs = sorted((root / "docs/changes").glob("*.diff"))
     for name in sorted(set(stated) ^ {diff.stem for diff in diffs}):
-        yield f"{name}: stands in docs/changes or in the table of docs/adding.md, not in both"
+        yield f"{name}: stands in docs/changes or in the table of docs/architecture.md, not in both"
     for diff in diffs:
         files = files_of(diff)
         if not files:
@@ -64,7 +64,7 @@ def faults(root):
         if not any(name.startswith("tests/") for name in names):
             yield f"{diff.name}: has no test"
         if len(outside) != stated.get(diff.stem, len(outside)):
-            yield f"{diff.name}: changes {len(outside)} files besides tests and pages; docs/adding.md states {stated[diff.stem]}"
+            yield f"{diff.name}: changes {len(outside)} files besides tests and pages; docs/architecture.md states {stated[diff.stem]}"
 
 
 def main():

@@ -5,14 +5,14 @@
 
 - every relative link in a Markdown page leads to a file, and its anchor to a heading;
 - every docs/PAGE.md named in a source, a script or a page exists;
-- docs/README.md links every page of docs, and of docs/site every page that is not only a list of others; the site's page
-  of evidence lists every folder of reports;
+- docs/README.md links every page of docs, docs/site and reports, and the site's start lists every page of docs once;
+- docs has at most 35 pages beside those of docs/site, and reports at most 16, one in each folder: MOST;
 - three questions, as a new user types them, are answered two links from README.md at most: QUESTIONS;
 - paper/paper.md shows every figure of paper/figures, cites every entry of paper/paper.bib and nothing else, and names
   only files that exist;
 - the groups of `tpm --help` and of docs/commands.md hold the same commands, each once;
 - the help of every command ends with an example that calls it;
-- every page of docs is at most two steps from the README;
+- every page of docs, docs/site and reports is at most two steps from the README;
 - the excerpt of `tpm fit` in the README is what the program prints of the shipped example, with every warning.
 """
 
@@ -27,8 +27,9 @@ from pathlib import Path
 MADE = "docs/site/reference/"
 
 
-# Pages of the site that only lead on, and those of its reference that docs/README.md reaches in other words.
-LISTS = {"index.md", "reference.md", "evidence.md", "c.md", "cpp.md"}
+# Written by `tpm paper report` beside tables.csv; the page is report.md.
+TABLES = "reports/paper/tables.md"
+MOST = {"docs": 35, "docs/site": 7, "reports": 16}
 # What is typed; a pattern for the link in docs/README.md; one for what stands below the heading that it leads to.
 QUESTIONS = {
     "my fit says flat": (r"fit says flat", r"`flat`.*`tpm design`"),
@@ -88,12 +89,36 @@ def unlisted_pages(root):
         if page.name != "README.md" and not re.search(rf"\({re.escape(page.name)}[)#]", index):
             yield f"docs/README.md: does not list {page.name}"
     for page in sorted((root / "docs/site").glob("*.md")):
-        if page.name not in LISTS and not re.search(rf"\(site/{re.escape(page.name)}[)#]", index):
+        if not re.search(rf"\(site/{re.escape(page.name)}[)#]", index):
             yield f"docs/README.md: does not list site/{page.name}"
-    shown = (root / "docs/site/evidence.md").read_text(encoding="utf-8")
-    for folder in sorted({page.parent.relative_to(root) for page in (root / "reports").rglob("*.md")}):
-        if f"../../{folder}/*" not in shown:
-            yield f"docs/site/evidence.md: does not list the pages of {folder}"
+    for page in report_pages(root):
+        if not re.search(rf"\(\.\./{re.escape(str(page))}[)#]", index):
+            yield f"docs/README.md: does not list {page}"
+    start = (root / "docs/site/index.md").read_text(encoding="utf-8").split("## ")[0]
+    for page in sorted((root / "docs").glob("*.md")):
+        if start.split().count(f"../{page.stem}") != 1:
+            yield f"docs/site/index.md: does not list {page.name} once"
+    if "../../reports/*/*" not in start.split():
+        yield "docs/site/index.md: does not list the pages of reports"
+
+
+def report_pages(root):
+    return [page.relative_to(root) for page in sorted((root / "reports").rglob("*.md")) if page != root / TABLES]
+
+
+def too_many_pages(root):
+    counts = {folder: len(list((root / folder).glob("*.md"))) for folder in ("docs", "docs/site")}
+    reports = report_pages(root)
+    counts["reports"] = len(reports)
+    for folder, count in counts.items():
+        if count > MOST[folder]:
+            yield f"{folder}: has {count} pages; expected at most {MOST[folder]}: join two that are read together"
+    folders = [page.parent for page in reports]
+    for folder in sorted({f for f in folders if folders.count(f) > 1}):
+        yield f"{folder}: has several pages; expected one a subject"
+    for page in reports:
+        if len(page.parts) != 3:
+            yield f"{page}: expected reports/SUBJECT/PAGE.md"
 
 
 def unanswered(root):
@@ -171,7 +196,8 @@ def linked(page):
 def far_pages(root):
     near = set(linked(root / "README.md"))
     near |= {far for page in list(near) if page.suffix == ".md" and page.exists() for far in linked(page)}
-    for page in sorted((root / "docs").glob("*.md")):
+    pages = [*(root / "docs").glob("*.md"), *(root / "docs/site").glob("*.md"), *(root / page for page in report_pages(root))]
+    for page in sorted(pages):
         if page not in near:
             yield f"{page.relative_to(root)}: more than two steps from README.md"
 
@@ -209,7 +235,7 @@ def false_excerpts(root, program):
 
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
-    faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *unanswered(root), *faults_of_paper(root),
+    faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *too_many_pages(root), *unanswered(root), *faults_of_paper(root),
               *differing_groups(root, program), *without_example(root, program), *far_pages(root), *false_excerpts(root, program)]
     for fault in faults:
         print(fault)

@@ -17,7 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-PAGES = ("docs/which_command.md", "docs/troubleshooting.md", "docs/site/start_recording.md", "docs/site/start_organ.md",
+PAGES = ("docs/commands.md", "docs/troubleshooting.md", "docs/site/start_recording.md", "docs/site/start_organ.md",
          "docs/site/start_device.md", "docs/budget.md", "docs/simulate.md")
 
 

@@ -339,7 +339,7 @@ class Fit:
         return self._core.write(os.fspath(folder))
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as `tpm fit --format json` writes it (keys in docs/fit_results.md)."""
+        """Everything, as `tpm fit --format json` writes it (keys in docs/fit_files.md)."""
         return json.loads(self._core.to_json())
 
     def details(self) -> str:
@@ -438,7 +438,7 @@ class Specimens:
 
     @property
     def recordings(self) -> list[dict[str, Any]]:
-        """Of each recording: `recording`, `specimen`, and its `fit` (keys in docs/fit_results.md), or why it has none."""
+        """Of each recording: `recording`, `specimen`, and its `fit` (keys in docs/fit_files.md), or why it has none."""
         return self._document["recordings"]
 
     def to_dict(self) -> dict[str, Any]:

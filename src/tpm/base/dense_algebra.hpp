@@ -5,7 +5,7 @@
 namespace tpm::base {
 
 // Decompositions of small dense matrices, compiled once: Eigen's templates for them cost the
-// compiler seconds in every source that uses one (docs/adding.md). Singular systems are
+// compiler seconds in every source that uses one (reports/house/report.md). Singular systems are
 // answered where a function says so; matrices that are not finite give results that are not.
 
 /// Eigenvalues in ascending order; the columns of `vectors` belong to them.

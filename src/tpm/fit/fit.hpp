@@ -182,7 +182,7 @@ using NoiseRule = std::function<void(std::span<const double>, Threshold&)>;
 void linear_intervals(FitResult& result, std::span<const FitParameter> parameters,
                       const Threshold& threshold);
 
-/// Machine-readable result, keys in docs/fit_results.md, numbers rounded to 6 significant digits so
+/// Machine-readable result, keys in docs/fit_files.md, numbers rounded to 6 significant digits so
 /// that they agree between machines.
 [[nodiscard]] Json to_json(const FitResult& result);
 

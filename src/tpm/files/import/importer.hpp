@@ -29,7 +29,7 @@ class ImportInput {
   std::optional<DelimitedTable> table_;
 };
 
-/// A kind of foreign file. The list in import.cpp holds all (docs/adding.md, "An
+/// A kind of foreign file. The list in import.cpp holds all (docs/architecture.md, "An
 /// importer").
 struct Importer {
   std::string_view name;  ///< as --from takes it
