@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Runs the commands of pages and compares what they print with what the page shows.
 
-    page_commands.py ROOT TPM [PAGE ...]
+    page_commands.py ROOT TPM [PAGE ...]    runs the commands of docs, docs/site and README.md, or of the pages named
+    page_commands.py ROOT marked            each command of these pages is one that is run, or is marked (runs nothing)
 
-The pages are those of PAGES, or those named. In an indented block a line `$ COMMAND` is run, in a folder of the page's own with the
-project's configs beside it; the lines up to the next command have to be printed, in this order: `...` stands for any
-lines, and at the end of a line for its rest. `# not run: REASON` behind a command leaves it out. A block "```LANGUAGE NAME"
-becomes the file NAME. What a table quotes in its column "message" is printed on this page, or stands in the
-sources or in docs/errors.md, which tests write.
+In an indented block a line `$ COMMAND` is run, in a folder of the page's own with the project's configs beside it; the
+lines up to the next command have to be printed, in this order: `...` stands for any lines, and at the end of a line for
+its rest. `# not run: REASON` behind a command leaves it out; `<!-- not run: REASON -->` above a block leaves out the
+block. A block "```LANGUAGE NAME" becomes the file NAME. What a table quotes in its column "message" is printed on this
+page, or stands in the sources or in docs/errors.md, which tests write.
 """
 
 import os
@@ -17,26 +18,49 @@ import sys
 import tempfile
 from pathlib import Path
 
-PAGES = ("docs/commands.md", "docs/troubleshooting.md", "docs/site/start_recording.md", "docs/site/start_organ.md",
-         "docs/site/start_device.md", "docs/budget.md", "docs/simulate.md")
+CALL = re.compile(r"(tpm|scripts/\S+|build/\S+|\./[\w/-]+(?:\.\w+)?|python3|cmake|ctest|ninja|cc|g\+\+|patch|apt|apt-get|docker|spack|conda) ")
+NOT_RUN = re.compile(r"<!-- not run: \S.*-->\s*\Z")
+
+
+def pages_of(root):
+    return [str(page.relative_to(root)) for page in [root / "README.md", *sorted((root / "docs").glob("*.md")),
+                                                      *sorted((root / "docs/site").glob("*.md"))]]
 
 
 def files_of(text):
     return re.findall(r"^```\w+ (\S+)\n(.*?)^```", text, re.M | re.S)
 
 
+def blocks_of(text):
+    """[(lines of an indented block, is it marked as not run)]"""
+    text = re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+    for match in re.finditer(r"(?:^    .*\n|^\n(?=    ))+", text, re.M):
+        yield [line[4:] for line in match[0].splitlines() if line.strip()], bool(NOT_RUN.search(text[: match.start()]))
+
+
 def calls_of(text):
     """[(command, lines it prints)]"""
     calls = []
-    for block in re.findall(r"(?:^    .*\n|^\n(?=    ))+", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M):
+    for lines, left_out in blocks_of(text):
         own = False  # a block that does not begin with a command shows something else
-        for line in (b[4:] for b in block.splitlines() if b.strip()):
+        for line in lines:
             if line.startswith("$ "):
-                calls.append((line[2:], []))
-                own = True
+                own = not left_out
+                if own:
+                    calls.append((line[2:], []))
             elif own:
                 calls[-1][1].append(line)
     return calls
+
+
+def unmarked(name, text):
+    for lines, left_out in blocks_of(text):
+        for line in lines:
+            if CALL.match(line) and not left_out:
+                yield f"{name}: {line}: is not run; expected '$ ' before it, or <!-- not run: REASON --> above"
+    for match in re.finditer(r"^```(?:sh|bash|console)\n", text, re.M):
+        if not NOT_RUN.search(text[: match.start()]):
+            yield f"{name}: a block of a shell is not run; expected <!-- not run: REASON --> above it"
 
 
 def missing_line(shown, printed):
@@ -64,8 +88,6 @@ def faults_of(root, name, program):
             (Path(folder) / file).write_text(content, encoding="utf-8")
         path = os.pathsep.join([str(Path(program).resolve().parent), os.environ["PATH"]])
         calls = calls_of(text)
-        if not calls:
-            yield f"{name}: no command"
         for command, shown in calls:
             if re.search(r"# not run: \S", command):
                 continue
@@ -97,7 +119,14 @@ def sources_of(root):
 
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
-    faults = [fault for name in sys.argv[3:] or PAGES for fault in faults_of(root, name, program)]
+    if program == "marked":
+        faults = [fault for name in [*pages_of(root), "CONTRIBUTING.md"]
+                  for fault in unmarked(name, (root / name).read_text(encoding="utf-8"))]
+        # The check itself: a command without its sign is noticed.
+        assert list(unmarked("", "\n    tpm fit a.csv\n")) and not list(unmarked("", "\n    $ tpm fit a.csv\n"))
+        assert not list(unmarked("", "\n<!-- not run: why -->\n\n    tpm fit a.csv\n"))
+    else:
+        faults = [fault for name in sys.argv[3:] or pages_of(root) for fault in faults_of(root, name, program)]
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")
