@@ -18,6 +18,7 @@
 #include "hil_page.hpp"
 #include "interrupt_watch.hpp"
 #include "out_of_memory.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/device/plugin_device.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
@@ -332,8 +333,8 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
         std::vector<std::string> kinds = device_kinds();
         if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return std::string();
         kinds.emplace_back("plugin");
-        return fmt::format("'{}' is none; expected one of {}", printable(kind),
-                           fmt::join(kinds, ", "));
+        return fmt::format("'{}' is none{}; expected one of {}", printable(kind),
+                           did_you_mean(kind, kinds), fmt::join(kinds, ", "));
       })
       ->capture_default_str();
   command.add_option("--serial", options.serial, "Of the device, where there are several")

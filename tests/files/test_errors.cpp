@@ -257,6 +257,7 @@ std::vector<ErrorCase> hdf5_cases() {
       {type, "100 MB line", show, with_files({{"p.h5", long_line()}})},
       {type, "curve twice", "data pack evren_static evren_static -o {}/out.h5", with_files({})},
       {type, "unknown curve", "data pack evren_static nobody -o {}/out.h5", with_files({})},
+      {type, "misspelt curve", "data pack evren_statc -o {}/out.h5", with_files({})},
   };
 }
 

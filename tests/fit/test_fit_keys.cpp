@@ -24,24 +24,25 @@ TEST_CASE("schema and reader of a fit's configuration agree on odd ones", "[keys
       fit_kind(),
       {of_source("configs/liver_all.json"), of_source("configs/liver_relaxation.json"),
        of_source("configs/oscillation_example/fit.json"), example_of(fit_kind())},
-      500);
+      test::kOddDocuments);
 }
 
 TEST_CASE("schema and reader of a fit in tables agree on odd ones", "[keys]") {
   test::compare_schema_and_form(fit_tables_kind(), {of_source("configs/liver_tables/problem.json")},
-                                200);
+                                test::kOddDocuments);
 }
 
 TEST_CASE("schema and reader of a design agree on odd ones", "[keys]") {
   test::compare_schema_and_form(design_kind(),
                                 {of_source("configs/design_liver.json"),
                                  of_source("configs/design_meat.json"), example_of(design_kind())},
-                                400);
+                                test::kOddDocuments);
 }
 
 TEST_CASE("schema and reader of a law agree on odd ones", "[keys]") {
   test::compare_schema_and_form(
-      law_kind(), {of_source("tests/fuzz/corpus/law/linear_1.json"), example_of(law_kind())}, 300);
+      law_kind(), {of_source("tests/fuzz/corpus/law/linear_1.json"), example_of(law_kind())},
+      test::kOddDocuments);
 }
 
 TEST_CASE("schema and reader of a curve's description agree on odd ones", "[keys]") {
@@ -50,7 +51,7 @@ TEST_CASE("schema and reader of a curve's description agree on odd ones", "[keys
       {of_source("data/amy_creep.json"), of_source("data/evren_static.json"),
        of_source("data/literature_values.json"), of_source("configs/oscillation_example/hold.json"),
        of_source("configs/oscillation_example/spectrum.json"), example_of(curve_kind())},
-      300);
+      test::kOddDocuments);
 }
 
 TEST_CASE("examples of fits, designs and laws are read", "[keys]") {

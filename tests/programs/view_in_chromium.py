@@ -290,9 +290,45 @@ def look_at_fit(chromium, tpm, folder):
         assert page.js("plots[0].canvas.focus(), plots[0].reading.textContent") != ""
         page.js("plots[0].move(5.0)")
         assert abs(numbers(page.text("reading-0"))[0] - 5.0) < 0.1 or name == "answer", page.text("reading-0")
+        if name == "answer":
+            answer = json.loads((folder / "answer.json").read_text())
+            lead = page.js("document.getElementById('lead') ? document.getElementById('lead').textContent : document.body.textContent")
+            for words in (*answer["words"], *answer["warnings"], *answer["fit"]["flags"]):
+                assert lead.count(words) == 1, (words, lead)
         if name == "law":
             assert f"{law['tau1_s']:.6g}" in page.text("table"), page.text("table")
         page.check_whole()
+
+
+def look_at_lines(chromium, tpm, folder):
+    """A line of many values that begins late is not drawn before; names of all series fit into a narrow window; an axis
+    ends where the figure's does, and the page says what is beyond."""
+    late, early = np.linspace(50, 100, 4000), np.linspace(0, 100, 50)
+    axes = {"x": {"quantity": "time", "unit": "s"}, "y": {"quantity": "force", "unit": "N", "lower": 0.0, "upper": 30.0}}
+    series = [{"kind": "points", "label": "readings that were fitted", "x": list(early), "y": [5.0] * 49 + [900.0]},
+              {"kind": "points", "label": "readings that were not fitted", "x": list(early), "y": [3.0] * 50},
+              {"kind": "line", "label": "the law that was found", "x": list(late), "y": list(10 + 0.2 * (late - 50))}]
+    figures = {"figures": [{"name": "late", "title": "late", "panels": [{**axes, "series": series}]}]}
+    (folder / "figures.json").write_text(json.dumps(figures))
+    subprocess.run([tpm, "view", folder / "figures.json", "-o", folder / "late.html"], check=True, capture_output=True)
+    page = Page(chromium, folder / "late.html")
+    for width in (400, 1400):
+        chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+        page.frame()
+        page.js("plots[0].draw()")
+        ends = page.js("(g => plots[0].labels.map(([s, x]) => x + 16 + g.measureText(s.label).width))(plots[0].canvas.getContext('2d'))")
+        assert len(ends) == 3 and max(ends) <= page.js("plots[0].width"), (width, ends)
+        drawn = page.js("""(() => {
+            const p = plots[0], c = p.canvas, ratio = c.width / p.width, d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+            const [r, g, b] = [1, 3, 5].map(i => parseInt(p.series[2].colour.slice(i, i + 2), 16)), n = [0, 0];
+            for (let y = Math.ceil(ratio * p.frame.T); y < c.height; ++y) for (let x = 0; x < c.width; ++x) {
+              const i = 4 * (y * c.width + x);
+              if (Math.abs(d[i] - r) + Math.abs(d[i + 1] - g) + Math.abs(d[i + 2] - b) < 12) ++n[x / ratio < p.X(50) - 3 ? 0 : 1];
+            }
+            return n; })()""")
+        assert drawn[0] == 0 and drawn[1] > 10, (width, drawn)
+        assert page.js("plots[0].y[1]") < 33.0 and "above 30" in page.js("plots[0].said.textContent"), page.js("plots[0].y")
+    page.check_whole()
 
 
 def main():
@@ -312,6 +348,7 @@ def main():
             look_at_tool(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
             look_at_recording(chromium, sys.argv[1], folder)
             look_at_fit(chromium, sys.argv[1], folder)
+            look_at_lines(chromium, sys.argv[1], folder)
         finally:
             chromium.close()
     print("looked at a result, a recording and three files of a fit")

@@ -179,6 +179,8 @@ class OddDocuments {
   std::mt19937 random_{20};  // NOLINT(cert-msc51-cpp): the same in every run
 };
 
+inline constexpr std::size_t kOddDocuments = 2000;
+
 /// Compares the schema of a kind with its form, of odd changes of some documents. What the schema
 /// accepts and the form refuses is a quantity out of range, of another unit or not finite: a
 /// pattern does not weigh.

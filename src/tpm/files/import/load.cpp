@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/base/time_range.hpp"
 #include "tpm/files/delimited.hpp"
@@ -54,7 +55,8 @@ CurveFiles find_files(const std::string& path_or_id) {
   }
   const auto ids = known_ids();
   if (std::find(ids.begin(), ids.end(), path_or_id) == ids.end()) {
-    throw bad_input(printable(path_or_id), "is neither a curve file nor a known curve",
+    throw bad_input(printable(path_or_id),
+                    "is neither a curve file nor a known curve" + did_you_mean(path_or_id, ids),
                     fmt::format("a .csv or .json file, or one of {}", fmt::join(ids, ", ")));
   }
   const fs::path stem = share_dir() / "data" / path_or_id;

@@ -101,7 +101,7 @@ std::string to_terminal_text(const ErrorBudget& b) {
   text += fmt::format("{:<54} {:>9}\n\n", b.instrument ? "all in quadrature" : "both in quadrature",
                       in_percent(b.combined));
   for (const std::string& sentence : b.sentences) text += sentence + "\n";
-  text += "\na hand tells:";
+  text += "\njust noticeable differences:";
   for (const Json& t : thresholds()) {
     text += fmt::format("\n  {:>4} %  {} ({})", in_percent(t.at("share").get<double>()),
                         t.at("of").get<std::string>(), t.at("source").get<std::string>());

@@ -45,8 +45,8 @@ ShortAnswer short_answer(const ErrorBudget& b) {
   answer.limits.push_back(budget_row(b.instrument ? "all in quadrature" : "both in quadrature",
                                      share_of_peak(b.combined), ""));
   answer.limits.push_back(
-      fmt::format("a hand tells {} of a force, {} of a stiffness that it touches, {} of one felt "
-                  "through a tool",
+      fmt::format("just noticeable differences: {} of a force, {} of a stiffness that is touched, "
+                  "{} of one felt through a tool",
                   share_of_peak(kForceJnd), share_of_peak(plan::kStiffnessTouched),
                   share_of_peak(kStiffnessThroughTool)));
   for (std::string& line : answer.limits) line.erase(line.find_last_not_of(' ') + 1);

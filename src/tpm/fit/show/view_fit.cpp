@@ -2,13 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/show/view_parts.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -34,9 +37,13 @@ Json series_of(ViewPage& page, const Json& series) {
 }
 
 Json axis_of(const Json& axis) {
-  return {{"quantity", axis.at("quantity")},
-          {"unit", axis.at("unit")},
-          {"logarithmic", axis.value("logarithmic", false)}};
+  Json json{{"quantity", axis.at("quantity")},
+            {"unit", axis.at("unit")},
+            {"logarithmic", axis.value("logarithmic", false)}};
+  for (const char* end : {"lower", "upper"}) {  // what the decision is made on
+    if (axis.contains(end)) json[end] = axis.at(end);
+  }
+  return json;
 }
 
 /// The panels of figures.json as plots. Maps of colours are figures of their own and left out.
@@ -115,9 +122,15 @@ void add_law(ViewPage& page, const Json& law, const std::filesystem::path& file)
                                {"rows", std::move(rows)}};
 }
 
-std::string interval_text(const Json& interval) {
-  const auto end = [](const Json& v) {
-    return v.is_number() ? significant(v.get<double>(), 4) : std::string("open");
+/// The unit in which a parameter is read, from that of SI.
+Unit read_unit(const std::string& si_unit, double si) {
+  if (!is_unit(si_unit)) return {si_unit, Dimension::dimensionless, 1.0};
+  return sized_unit(shown_unit(parse_unit(si_unit, {}).dimension), si);
+}
+
+std::string interval_text(const Json& interval, const Unit& unit) {
+  const auto end = [&unit](const Json& v) {
+    return v.is_number() ? significant(v.get<double>() / unit.to_si, 4) : std::string("open");
   };
   return interval.is_array() && interval.size() == 2
              ? fmt::format("{} .. {}", end(interval[0]), end(interval[1]))
@@ -149,8 +162,10 @@ void add_answer(ViewPage& page, const Json& fit) {
   page.fact("model", fit.at("model").get<std::string>());
   Json rows = Json::array();
   for (const Json& p : fit.at("parameters")) {
-    rows.push_back({p.at("name"), significant(p.at("estimate_SI").get<double>(), kShownDigits),
-                    interval_text(p.value("interval_SI", Json())), p.at("SI_unit"),
+    const double estimate = p.at("estimate_SI").get<double>();
+    const Unit unit = read_unit(p.at("SI_unit").get<std::string>(), estimate);
+    rows.push_back({p.at("name"), significant(estimate / unit.to_si, kShownDigits),
+                    interval_text(p.value("interval_SI", Json()), unit), unit.symbol,
                     p.value("verdict", "")});
     add_profile(page, p);
   }
@@ -165,16 +180,14 @@ void add_answer(ViewPage& page, const Json& fit) {
               fmt::format("{}, {}: {}, {}", data.value("dataset", ""), data.value("label", ""),
                           data.value("provenance", ""), data.value("role", "")));
   }
-  for (const Json& flag : fit.value("flags", Json::array())) {
-    page.fact("note", flag.get<std::string>());
-  }
 }
 
 /// What the selection of a law concludes, before anything else.
 void add_conclusion(ViewPage& page, const Json& answer, const Json& fit) {
   Json& lead = page.description["lead"] = Json::array();
   const auto add = [&lead](const std::string& text, bool doubt) {
-    lead.push_back({{"text", text}, {"doubt", doubt}});
+    const auto same = [&text](const Json& said) { return said.at("text") == text; };
+    if (std::ranges::none_of(lead, same)) lead.push_back({{"text", text}, {"doubt", doubt}});
   };
   const Json adequacy = fit.value("adequacy", Json());
   if (adequacy.is_object()) {
@@ -187,6 +200,9 @@ void add_conclusion(ViewPage& page, const Json& answer, const Json& fit) {
   }
   for (const Json& warning : answer.value("warnings", Json::array())) {
     add("warning: " + warning.get<std::string>(), false);
+  }
+  for (const Json& flag : fit.value("flags", Json::array())) {
+    add("warning: " + flag.get<std::string>(), false);
   }
 }
 
