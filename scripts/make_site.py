@@ -240,7 +240,8 @@ def main():
             if page != root / TABLES:
                 site.page(page)
     site.put(source / "conf.py", (root / "docs/site/conf.py").read_bytes())
-    site.put(source / "docs/site/static/site.css", (root / "docs/site/static/site.css").read_bytes())
+    for file in sorted((root / "docs/site/static").iterdir()):
+        site.put(source / file.relative_to(root), file.read_bytes())
     command_pages(site, program)
     schema_pages(site)
     interface_pages(site)

@@ -31,6 +31,7 @@ html_theme = "furo"
 html_title = f"tpmkit {version}"
 html_static_path = ["docs/site/static"]
 html_css_files = ["site.css"]
+html_search_scorer = "docs/site/static/scorer.js"
 html_copy_source = False
 html_show_sphinx = False
 html_last_updated_fmt = None

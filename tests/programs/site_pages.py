@@ -3,7 +3,10 @@
 
     site_pages.py links HTML_FOLDER             every link and picture leads to a file, every anchor to an element
     site_pages.py TPM                           builds the site, then checks links, and in Chromium that no page is
-                                                wider than a window of 400 or 1400 pixels and every formula is set
+                                                wider than a window of 400 or 1400 pixels, no heading lies under another
+                                                part, every picture is there, every formula is set, and the search finds
+                                                the page for questions as a new user types them
+    site_pages.py look HTML_FOLDER              the checks in Chromium alone, on a site that is built
     site_pages.py sheet HTML_FOLDER SHEET.png   all pages, small, on one picture
 """
 
@@ -18,6 +21,9 @@ import urllib.parse
 from html.parser import HTMLParser
 from pathlib import Path
 
+# What is typed into the search of the site; the page that has to be among the first results.
+SEARCHES = {"my fit says flat": "troubleshooting", "which command": "commands", "why is my session refused": "troubleshooting"}
+FIRST = 5
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -104,6 +110,35 @@ def unset_formulas(chromium, page):
         time.sleep(0.05)
 
 
+# Headings that something else covers in their middle, and pictures that are not drawn.
+FAULTS = """(() => {
+  const found = [];
+  for (const h of document.querySelectorAll('article h1, article h2, article h3, article h4')) {
+    h.scrollIntoView({block: 'center', behavior: 'instant'});
+    const range = document.createRange(); range.selectNodeContents(h);
+    const box = range.getClientRects()[0];
+    if (!box) continue;
+    const top = document.elementFromPoint(box.left + Math.min(box.width, innerWidth - box.left) / 2, box.top + box.height / 2);
+    if (top && !h.contains(top) && !top.contains(h)) found.push('covered: ' + h.textContent.trim());
+  }
+  for (const i of document.images) { i.loading = 'eager'; if (i.complete && i.naturalWidth === 0) found.push('not drawn: ' + i.getAttribute('src')); }
+  return found;
+})()"""
+
+
+def check_search(folder, chromium):
+    """Typed into the search as a new user would: the page with the answer is among the first results."""
+    listed = "[...document.querySelectorAll('#search-results li > a')].map(a => a.getAttribute('href'))"
+    for words, wanted in SEARCHES.items():
+        chromium.call("Page.navigate", url=f"{(folder / 'search.html').as_uri()}?q={urllib.parse.quote_plus(words)}")
+        start, found = time.monotonic(), []
+        while not any(f"/{wanted}.html" in link for link in found[:FIRST]):
+            assert time.monotonic() - start < 30, f"the search for '{words}' finds {found[:FIRST]}; expected {wanted}.html"
+            time.sleep(0.2)
+            found = chromium.call("Runtime.evaluate", returnByValue=True, expression=listed)["result"].get("value") or []
+    print(f"{len(SEARCHES)} questions find their page among the first {FIRST} results")
+
+
 def check_widths(folder, chromium):
     chromium.open("about:blank")
     pages = pages_of(folder)
@@ -120,6 +155,8 @@ def check_widths(folder, chromium):
                                   expression="document.documentElement.scrollWidth")["result"]["value"]
             if found > width:
                 wide.append(f"{page.relative_to(folder)}: {found} px wide in a window of {width} px")
+            faults = chromium.call("Runtime.evaluate", returnByValue=True, expression=FAULTS)["result"]["value"]
+            wide += [f"{page.relative_to(folder)}: {fault} (in a window of {width} px)" for fault in faults]
     strangers = {u for u in chromium.asked() if not u.startswith(("file:", "data:", "about:"))}
     assert not strangers, strangers
     assert not wide, "\n".join(wide)
@@ -154,6 +191,12 @@ def main():
         check_links(Path(sys.argv[2]).resolve())
         return
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
+        if sys.argv[1] == "look":
+            chromium = chromium_or_skip(name)
+            check_widths(Path(sys.argv[2]).resolve(), chromium)
+            check_search(Path(sys.argv[2]).resolve(), chromium)
+            chromium.close()
+            return
         if sys.argv[1] == "sheet":
             chromium = chromium_or_skip(name)
             make_sheet(Path(sys.argv[2]).resolve(), sys.argv[3], chromium)
@@ -169,6 +212,7 @@ def main():
         subprocess.run([ROOT / "scripts/docs.sh", sys.argv[1]], check=True)
         folder = ROOT / "build/site/html"
         check_widths(folder, chromium)
+        check_search(folder, chromium)
         chromium.close()
 
 
