@@ -18,7 +18,7 @@ import tempfile
 from pathlib import Path
 
 PAGES = ("docs/which_command.md", "docs/troubleshooting.md", "docs/site/start_recording.md", "docs/site/start_organ.md",
-         "docs/site/start_device.md", "docs/budget.md", "docs/simulate.md")
+         "docs/site/start_device.md", "docs/site/start_paper.md", "docs/budget.md", "docs/simulate.md")
 
 
 def files_of(text):
