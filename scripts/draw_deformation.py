@@ -17,7 +17,7 @@ import draw_network as net
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
-from drawing_files import literal, save_drawing
+from drawing_files import literal
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
@@ -240,6 +240,7 @@ def place(page, row, sizes, legend_rows):
 def decorate(page, row, sizes, picture, colouring, words):
     """Places the axes and writes around them."""
     handles = legend_of(picture, colouring)
+    net.letter(row)
     height = place(page, row, sizes, -(-len(handles) // LEGEND_COLUMNS))
     page.text(LEFT / WIDTH, 1 - 0.28 / height, picture["title"], fontsize=11, fontweight="bold")
     page.text(LEFT / WIDTH, 1 - 0.5 / height, f"{colouring.title}; {words}", fontsize=9)
@@ -329,9 +330,7 @@ def main():
     matplotlib.rcParams.update(net.STYLE)
     picture["normal"][picture["contact"]] = [-d for d in picture["direction"]]  # the arrow comes along the push
     for name, page in pages(picture):
-        save_drawing(page, arguments.folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
-        save_drawing(page, arguments.folder / f"{name}.png", dpi=110, metadata={"Software": None})
-        save_drawing(page, arguments.folder / f"{name}.pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
+        net.save_all(page, arguments.folder / name, [arguments.pictures])
         plt.close(page)
 
 

@@ -405,13 +405,14 @@ def with_own_ids(svg, name):
     return re.sub(r"<[^>]*>", own, svg)  # the tags alone: what a user named stays as it is
 
 
-def save(figure, folder, for_print):
+def save(figure, folder, for_print, reads):
     page = draw_figure(figure)
-    save_drawing(page, folder / f"{figure['id']}.svg", lambda svg: with_own_ids(svg, figure["id"]),
+    save_drawing(page, folder / f"{figure['id']}.svg", lambda svg: with_own_ids(svg, figure["id"]), reads,
                  metadata={"Date": None, "Creator": None})
     if for_print:
-        save_drawing(page, folder / f"{figure['id']}.png", dpi=PIXELS_PER_INCH, metadata={"Software": None})
-        save_drawing(page, folder / f"{figure['id']}.pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
+        save_drawing(page, folder / f"{figure['id']}.png", reads=reads, dpi=PIXELS_PER_INCH, metadata={"Software": None})
+        save_drawing(page, folder / f"{figure['id']}.pdf", reads=reads,
+                     metadata={"CreationDate": None, "Creator": None, "Producer": None})
     plt.close(page)
 
 
@@ -429,7 +430,7 @@ def main():
     matplotlib.rcdefaults()  # not what a matplotlibrc of this machine says
     matplotlib.rcParams.update(STYLE)
     for figure in figures:
-        save(figure, arguments.folder, arguments.for_print)
+        save(figure, arguments.folder, arguments.for_print, [arguments.figures])
 
 
 if __name__ == "__main__":

@@ -158,10 +158,23 @@ def draw(picture):
     for one, extent in zip(axes, extents):
         one.set_position([left / WIDTH, BELOW / height, scale * extent[0] / WIDTH, scale * extent[1] / height])
         left += scale * extent[0] + LEFT
+    letter(axes)
     page.text(LEFT / WIDTH, 1 - 0.3 / height, picture["title"], fontsize=11, fontweight="bold")
     legend(page, picture, 0.27 / height)
     page.text(LEFT / WIDTH, 0.1 / height, picture["provenance"], fontsize=7, color="#555555")
     return page
+
+
+def save_all(page, stem, reads):
+    save_drawing(page, f"{stem}.svg", reads=reads, metadata={"Date": None, "Creator": None})
+    save_drawing(page, f"{stem}.png", reads=reads, dpi=300, metadata={"Software": None})
+    save_drawing(page, f"{stem}.pdf", reads=reads, metadata={"CreationDate": None, "Creator": None, "Producer": None})
+
+
+def letter(row):
+    """Panels are called (a), (b), ... before what they show."""
+    for k, axes in enumerate(row):
+        axes.set_title(f"({chr(ord('a') + k)}) {axes.get_title(loc='left')}", loc="left")
 
 
 def main():
@@ -176,9 +189,7 @@ def main():
     matplotlib.rcdefaults()  # not what a matplotlibrc of this machine says
     matplotlib.rcParams.update(STYLE)
     page = draw(picture)
-    save_drawing(page, f"{arguments.stem}.svg", metadata={"Date": None, "Creator": None})
-    save_drawing(page, f"{arguments.stem}.png", dpi=300, metadata={"Software": None})
-    save_drawing(page, f"{arguments.stem}.pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
+    save_all(page, arguments.stem, [arguments.picture])
 
 
 if __name__ == "__main__":

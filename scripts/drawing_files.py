@@ -8,6 +8,7 @@ import fcntl
 import io
 import os
 import re
+import sys
 from pathlib import Path
 
 LONGEST_NAME = 255  # bytes; of all usual file systems
@@ -15,8 +16,9 @@ ROOM_FOR_ENDING = 24
 MARK = "user.tpm.origin"  # as files/origin_mark.hpp says
 
 
-def save_drawing(page, path, change=None, **options):
-    """Writes a figure of matplotlib to `path`, which is complete or as it was before.
+def save_drawing(page, path, change=None, reads=(), **options):
+    """Writes a figure of matplotlib to `path`, which is complete or as it was before; never over a file that the
+    script `reads`, through links neither. What fails ends the script in one line.
 
     The format follows the ending of `path`. `change` makes of the text of an SVG what is kept.
     """
@@ -26,7 +28,13 @@ def save_drawing(page, path, change=None, **options):
     content = drawn.getvalue()
     if change is not None:
         content = change(content.decode("utf-8")).encode("utf-8")
-    replace_file(path, content)
+    script = Path(sys.argv[0]).name
+    if path.exists() and any(path.samefile(read) for read in reads):
+        sys.exit(f"{script}: {path}: this script reads it and would write over it; expected another place")
+    try:
+        replace_file(path, content)
+    except OSError as error:
+        sys.exit(f"{script}: {path}: {error.strerror}; expected a file that can be written")
 
 
 def replace_file(path, content):

@@ -277,8 +277,16 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   const std::vector<double> times = times_to_watch(scene);
   const Trajectory answer = run_planned(plan, scene, times);
   write_planned_run(plan, scene, times, answer, choice.output);
-  say_with_files(session, planned_run_json(plan, scene, times, answer),
-                 planned_run_text(plan, times, answer), {choice.output});
+  if (session.json() || choice.verbose) {
+    // Verbose: also which candidates were considered, and what the plan says of them.
+    say_with_files(session, planned_run_json(plan, scene, times, answer),
+                   plan_text(plan) + "\n" + planned_run_text(plan, times, answer), {choice.output});
+    return 0;
+  }
+  ShortAnswer brief = short_answer(plan, times, answer);
+  brief.end.push_back(fmt::format("wrote {}", choice.output));
+  end_answer(brief, "", {}, "tpm view " + shell_word(choice.output));
+  say("{}", to_text(brief));
   return 0;
 }
 

@@ -87,8 +87,10 @@ py::dict info_of(const LoopContact& contact) {
       py::arg("stiffness_N_per_m") = check.stiffness_N_per_m,
       py::arg("stable_N_per_m") = check.stable_N_per_m,
       py::arg("passive_N_per_m") = check.passive_N_per_m, py::arg("verdict") = check.verdict(),
-      py::arg("surface_m") = servo.surface_m, py::arg("push") = servo.push,
-      py::arg("force_limit_N") = servo.force_limit_N, py::arg("spheres") = contact.spheres());
+      py::arg("passive") = check.passive(), py::arg("acceptable") = check.acceptable(),
+      py::arg("warnings") = check.warnings, py::arg("surface_m") = servo.surface_m,
+      py::arg("push") = servo.push, py::arg("force_limit_N") = servo.force_limit_N,
+      py::arg("spheres") = contact.spheres());
 }
 
 /// Column by column, as numpy takes them.
@@ -117,17 +119,26 @@ py::dict session_of(const std::filesystem::path& file) {
   column("observed_J", [](const ServoRecord& r) { return r.observed_J; });
   column("busy_s", [](const ServoRecord& r) { return r.busy_s; });
   column("flags", [](const ServoRecord& r) { return r.flags; });
+  std::vector<std::string> warnings;
+  if (recording.damaged > 0 || !recording.closed) warnings.push_back(damage_line(recording));
+  if (recording.closed && recording.closing.at("cause") != "finished") {
+    warnings.push_back("ended: " + recording.closing.at("cause").get<std::string>());
+  }
+  const Json rendering = recording.header.value("rendering", Json());
+  if (rendering.is_object()) {
+    for (const Json& words : rendering.at("warnings")) warnings.push_back(words);
+  }
   py::list phases;
   double start_s = 0.0;
   for (const SessionPhase& phase : recording.session.phases) {
     phases.append(py::make_tuple(phase.name, start_s, phase.end_s));
     start_s = phase.end_s;
   }
-  return py::dict(py::arg("columns") = columns, py::arg("phases") = phases,
-                  py::arg("header") = to_text(recording.header),
-                  py::arg("simulated") = recording.simulated(),
-                  py::arg("device") = device_line(recording),
-                  py::arg("damage") = damage_line(recording), py::arg("name") = recording.name);
+  return py::dict(
+      py::arg("columns") = columns, py::arg("phases") = phases,
+      py::arg("header") = to_text(recording.header), py::arg("simulated") = recording.simulated(),
+      py::arg("device") = device_line(recording), py::arg("damage") = damage_line(recording),
+      py::arg("warnings") = warnings, py::arg("name") = recording.name);
 }
 
 /// A session on the simulated device, as fast as it goes.

@@ -272,6 +272,60 @@ TEST_CASE("Verification finds a force that is wrong by one percent of the peak i
   CHECK(v.phases[1].force.max_N < 0.005 * v.all.peak_N);
 }
 
+TEST_CASE("What makes a session differ from a reading is named") {
+  struct Case {
+    double measured_N, commanded_N, reference_N, reached_m;
+    std::uint32_t flags;
+    std::vector<std::string> words, not_words;
+  };
+  const Case cases[] = {
+      // The tissue of the scene, which the full network shows as well.
+      {2.0,
+       0.5,
+       0.501,
+       8e-3,
+       kTouching,
+       {"no limit acted", "answers 501 mN", "(E1 12 kPa) are 4 times softer"},
+       {"pushed to"}},
+      {1.0, 2.0, 2.0, 8e-3, 0, {"no limit acted", "2 times stiffer"}, {"of it"}},
+      // The session's limit: the network reaches the reading.
+      {2.0,
+       0.5,
+       2.0,
+       8e-3,
+       kForceLimited,
+       {"1.5 N of it is the loop's, where limits acted: the session's force limit"},
+       {"softer"}},
+      {2.0,
+       0.5,
+       1.0,
+       4e-3,
+       kSaturated | kSlipping,
+       {"pushed to 4 mm of 8 mm", "the motors' force, the allowed rise", "2 times softer"},
+       {}},
+      // The model in the loop.
+      {2.0,
+       1.5,
+       2.0,
+       8e-3,
+       0,
+       {"500 mN of it is the error of the model in the loop; no limit acted"},
+       {"softer"}},
+      {2.0, 2.01, 2.01, 8e-3, 0, {"the reading is met"}, {"limit"}}};
+  for (const Case& c : cases) {
+    BesideExperiment e;
+    e.depth_m = 8e-3;
+    e.measured_N = c.measured_N;
+    e.commanded_N = c.commanded_N;
+    e.reference_N = c.reference_N;
+    e.reached_m = c.reached_m;
+    e.flags = c.flags;
+    const std::string cause = cause_of_difference(e, "E1 12 kPa");
+    for (const std::string& words : c.words) CHECK_THAT(cause, Contains(words));
+    for (const std::string& words : c.not_words) CHECK_THAT(cause, !Contains(words));
+  }
+}
+
 TEST_CASE("A thinned motion stays within its tolerance, and keeps its ends") {
   std::vector<double> time, value;
   for (int i = 0; i < 5000; ++i) {

@@ -310,6 +310,13 @@ TEST_CASE("a claim names its quantity, and what is not claimed stands beside it"
   tight.tolerance = 1e-9;
   const Trajectory reference = PlanScene(scene).quasi_static(tight, times, false);
   CHECK(trajectory_error(answer, reference, {}) <= 1.05 * *plan.chosen().verified_response_error);
+  const std::string said = show::to_text(short_answer(plan, times, answer));
+  CHECK(std::ranges::count(said, '\n') <= 25);
+  CHECK_THAT(said, Contains("planned model " + plan.chosen().name) &&
+                       Contains("nothing claimed, verified error"));
+  for (const auto& words : plan_json(plan)["warnings"]) {
+    CHECK_THAT(said, Contains(words.get<std::string>()));
+  }
   const test::TempFolder folder;
   write_planned_run(plan, scene, times, answer, folder / "p.h5");
   const Hdf5Reader file(folder / "p.h5");

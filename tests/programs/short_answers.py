@@ -70,6 +70,9 @@ def main():
             checks.check(["plan", root / "configs/plan" / plan, "--costs", "nominal", *options], lambda d: d["warnings"], (0, 1))
         for scene in SCENES:
             checks.check(["simulate", root / "configs" / scene, "-o", "run.h5"], lambda d: d["warnings"])
+        for plan in ("servo.json", "creep.json"):
+            checks.check(["simulate", root / "configs/plan" / plan, "--plan", "--costs", "nominal", "-o", "planned.h5"],
+                         lambda d: d["warnings"])
         subprocess.run([program, "hil", "run", root / "configs/hil_liver.json", "-o", "session.tpmrec"], cwd=folder, check=True,
                        capture_output=True)
         checks.check(["hil", "verify", "session.tpmrec"], lambda d: d["notes"])

@@ -37,6 +37,10 @@ class Contacts(unittest.TestCase):
         self.assertTrue(contact.state["touching"])
         self.assertEqual(contact.info["period_s"], 1e-3)
         self.assertIn("element", repr(contact))
+        self.assertEqual(contact.adequacy["verdict"], "adequate")
+        self.assertIn(contact.adequacy["words"], repr(contact))
+        for words in contact.warnings:
+            self.assertIn(words, repr(contact))
 
     def test_single_steps_and_many_agree(self):
         one, many = (tpmkit.Contact(self.file, start_gate=False) for _ in range(2))
@@ -57,7 +61,9 @@ class Contacts(unittest.TestCase):
             contact.step([0.0, 0.0, -0.05])
         with self.assertRaises(tpmkit.Error):
             contact.step([0.0, 0.0, 0.0])
+        self.assertTrue(any("position jumped" in w for w in contact.warnings))
         contact.reset()
+        self.assertFalse(any("has stopped" in w for w in contact.warnings))
         self.assertEqual(contact.step([0.0, 0.0, 0.0]).tolist(), [0.0, 0.0, 0.0])
         with self.assertRaisesRegex(tpmkit.Error, "three columns"):
             contact.steps([1.0, 2.0])
@@ -76,6 +82,12 @@ class Contacts(unittest.TestCase):
         data = tpmkit.open(output)
         self.assertEqual(data.attrs["simulated_device"], 1)
         self.assertIn("SIMULATED DEVICE", data.attrs["device"])
+        self.assertIn("tpm hil verify", data.attrs["adequacy"])
+        rendering = json.loads(data.attrs["header"])["rendering"]
+        self.assertEqual(data.attrs["warnings"], rendering["warnings"])
+        cut = Path(self.folder.name) / "cut.tpmrec"
+        cut.write_bytes(output.read_bytes()[:-3000])
+        self.assertIn("closing record", " ".join(tpmkit.open(cut).attrs["warnings"]))
         self.assertGreater(float(data.commanded_N.max()), 0.3)
         deepest = float(data.tool_depth_m.max())
         self.assertAlmostEqual(deepest, 4e-3, delta=2e-4)

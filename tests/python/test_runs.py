@@ -57,10 +57,34 @@ class Runs(unittest.TestCase):
         np.testing.assert_allclose(again.force_N, data.force_N)
         np.testing.assert_allclose(again.position_m, data.position_m)
         np.testing.assert_allclose(again.output_s, data.output_s)
+        self.assertEqual([data.attrs["warnings"], again.attrs["warnings"]], [[], []])
+        for opened in (data, again):
+            self.assertIn("adequacy", repr(opened))
         for opened in (data, again):
             self.assertEqual({k: v.attrs["units"] for k, v in opened.variables.items() if k not in ("sphere", "axis")},
                              {"time_s": "s", "output_s": "s", "depth_m": "m", "force_N": "N", "position_m": "m",
                               "work_J": "J", "dissipated_J": "J", "stored_J": "J"})
+
+    def test_limits_that_a_run_passes_are_warnings_of_the_answer_and_of_the_file(self):
+        deep = json.loads(json.dumps(SCENE))
+        deep["organ"] = {"kind": "liver", "count": 60, "layers": 2, "spacing": "20 mm", "seed": 1}
+        deep["contacts"] = [{"kind": "sphere", "number": 20}]
+        deep["anchors"] = [{"kind": "far_side", "fraction": 0.3}]
+        deep["protocol"]["depth"] = "11 mm"
+        with tempfile.TemporaryDirectory() as folder:
+            data = tpmkit.simulate(deep, output=Path(folder) / "run.h5")
+            again = tpmkit.open(Path(folder) / "run.h5")
+        for opened in (data, again):
+            self.assertTrue(any("more than 30 degrees" in w for w in opened.attrs["warnings"]), opened.attrs["warnings"])
+            self.assertIn("more than 30 degrees", repr(opened))
+
+    def test_cells_without_an_answer_are_warned_of(self):
+        holed = {**SWEEP, "skip": [{"when": "depth > 0.0075"}]}
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "sweep.json"
+            file.write_text(json.dumps(holed))
+            with tpmkit.sweep(file, Path(folder) / "sweep.h5", workers=1) as data:
+                self.assertEqual(data.attrs["warnings"], ["5 of 40 cells have no answer; status and reason say why"])
 
     def test_units_are_those_that_keys_end_in(self):
         from tpmkit._data import unit_of

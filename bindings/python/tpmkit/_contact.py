@@ -94,9 +94,26 @@ class Contact:
 
     @property
     def info(self) -> dict[str, Any]:
-        """What does not change: model, period_s, stiffness and its borders of stability and passivity,
-        surface_m, push, force_limit_N, spheres."""
+        """What does not change: model, error_bound, period_s, stiffness and its borders of stability and passivity,
+        verdict, warnings, surface_m, push, force_limit_N, spheres."""
         return self._core.info
+
+    @property
+    def adequacy(self) -> dict[str, Any]:
+        """Whether the contact can be rendered on the device: `verdict` (adequate: passive or stable, within the
+        device and safe in six hands; not_adequate) and `words`. Whether its forces are those of the tissue only
+        `tpm hil verify` and `tpmkit.validate` say."""
+        info = self.info
+        verdict = "adequate" if info["passive"] or info["acceptable"] else "not_adequate"
+        return {"verdict": verdict, "words": f"{info['verdict']}; error of the model: {info['error_bound']}"}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader must know of the device and of this rendering; once the contact has stopped, why."""
+        found = list(self.info["warnings"])
+        if self.state["stop"] not in ("", "none", "still running"):
+            found.append(f"has stopped: {self.state['stop']}; reset() before the next step")
+        return found
 
     @property
     def positions_m(self) -> Array:
@@ -104,7 +121,8 @@ class Contact:
         return self._core.positions()
 
     def __repr__(self) -> str:
-        return f"<tpmkit.Contact {self.info['model']}>"
+        lines = [f"<tpmkit.Contact {self.info['model']}", f"  adequacy: {self.adequacy['words']}"]
+        return "\n".join(lines + [f"  warning: {w}" for w in self.warnings]) + ">"
 
 
 def run_session(

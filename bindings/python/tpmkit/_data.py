@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping
+from typing import TYPE_CHECKING, Any, Iterator, Mapping
 
 from . import _core
 
 if TYPE_CHECKING:
     import xarray
 
+COMPUTED = "undetermined: a computed answer, compared with no measurement (tpmkit.validate)"
 _UNITS = {"N", "m", "s", "Pa", "J", "Hz", "rad", "kg"}
 
 
@@ -69,7 +70,8 @@ def read_recording(path: str | os.PathLike[str], *, columns: Mapping[str, Any] |
 def open_session(path: str | os.PathLike[str]) -> xarray.Dataset:
     """A recording of `tpm hil run` as a Dataset over time_s: positions, forces, depths, flags. The phases
     are in `phase_name`, `phase_start_s` and `phase_end_s`. attrs: `device` (SIMULATED DEVICE where no motor is
-    known to have moved), `simulated_device`, `header` (JSON)."""
+    known to have moved), `simulated_device`, `header` (JSON), `adequacy`, and `warnings`, a list: damage, how it
+    ended if not as planned, what was known of the rendering."""
     import xarray
 
     r = _core.read_session_recording(os.fspath(path))
@@ -85,6 +87,8 @@ def open_session(path: str | os.PathLike[str]) -> xarray.Dataset:
     attrs = {"device": r["device"], "simulated_device": int(r["simulated"]), "header": r["header"]}
     if r["damage"]:
         attrs["damage"] = r["damage"]
+    attrs["adequacy"] = "undetermined: tpm hil verify compares the forces with the full network"
+    attrs["warnings"] = list(r["warnings"])
     return with_units(xarray.Dataset(variables, coords={"time_s": time_s}, attrs=attrs))
 
 
@@ -92,7 +96,21 @@ def open_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
     """Results of `tpm sweep`: variables over the axes, with units; status 0 where a cell has an answer."""
     import xarray
 
-    return xarray.open_dataset(os.fspath(path), engine="h5netcdf")
+    data = xarray.open_dataset(os.fspath(path), engine="h5netcdf")
+    wrong = int((data["status"] != 0).sum())
+    data.attrs["adequacy"] = "undetermined: computed answers, compared with no measurement"
+    data.attrs["warnings"] = [f"{wrong} of {data['status'].size} cells have no answer; status and reason say why"] if wrong else []
+    return data
+
+
+def _passed_limits(file: Any) -> Iterator[str]:
+    """Limits of validity that a run passed, of its file."""
+    for limit in file["validity"].values():
+        if "passed" not in limit.attrs:
+            continue
+        meaning, passed = (v.decode() if isinstance(v, bytes) else v for v in (limit.attrs["meaning"], limit.attrs["passed"]))
+        if passed == "yes":
+            yield f"{meaning}: from {limit['first_time_s'][()].ravel()[0]:.4g} s on"
 
 
 def open_simulation(path: str | os.PathLike[str]) -> xarray.Dataset:
@@ -108,10 +126,12 @@ def open_simulation(path: str | os.PathLike[str]) -> xarray.Dataset:
         steps = sorted(k for k in file["steps"] if k != "time_s")
         positions = np.stack([file["steps"][k]["position_m"][()] for k in steps])
         attrs = {k: v.decode() if isinstance(v, bytes) else v for k, v in file.attrs.items()}
+        attrs["warnings"] = list(_passed_limits(file)) if "validity" in file else []
     time_s = curve.pop("time_s")
     variables: dict[str, Any] = {k: ("time_s", v) for k, v in curve.items()}
     variables["position_m"] = (("output_s", "sphere", "axis"), positions)
     coords = {"time_s": time_s, "output_s": times, "sphere": np.arange(1, positions.shape[1] + 1), "axis": ["x", "y", "z"]}
+    attrs["adequacy"] = COMPUTED
     return with_units(xarray.Dataset(variables, coords=coords, attrs=attrs))
 
 

@@ -81,12 +81,13 @@ def simulate(
     Returns
     -------
     Dataset. Over time_s: what was imposed and the response (depth_m and force_N, or load_N and depth_m),
-    work_J, dissipated_J, stored_J. Over (output_s, sphere, axis): position_m of the spheres.
+    work_J, dissipated_J, stored_J. Over (output_s, sphere, axis): position_m of the spheres. attrs: formulation,
+    error_estimate, scene, `adequacy`, and `warnings`, a list.
     """
     import numpy as np
     import xarray
 
-    from ._data import with_units
+    from ._data import COMPUTED, with_units
 
     text, where, folder = scene_text(scene)
     with shown(progress, "simulating") as told:
@@ -110,6 +111,8 @@ def simulate(
             "provenance": "model",
             "error_estimate": answer["error_estimate"],
             "scene": answer["scene"],
+            "adequacy": COMPUTED,
+            "warnings": list(answer["warnings"]),
         },
     )
     return with_units(data)

@@ -273,14 +273,16 @@ void add_experiment(Document& d, const Verification& v) {
                {"reading"},
                {"measured N", true},
                {"commanded N", true},
-               {"difference", true}}};
+               {"difference", true},
+               {"because"}}};
   for (const BesideExperiment& e : v.experiment) {
     table.rows.push_back({{significant(1e3 * e.depth_m, 3)},
                           {significant(1e3 * e.rate_m_per_s, 3)},
                           {e.label},
                           {significant(e.measured_N, 3)},
                           {significant(e.commanded_N, 3)},
-                          {percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1)}});
+                          {percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1)},
+                          {cause_of_difference(e, v.material)}});
   }
   d.table(std::move(table));
 }

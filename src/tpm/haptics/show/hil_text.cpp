@@ -281,11 +281,15 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
     others.push_back(std::move(json));
   }
   for (const BesideExperiment& e : v.experiment) {
-    experiment.push_back({{"depth_m", rounded(e.depth_m, kHilDigits)},
-                          {"rate_m_per_s", rounded(e.rate_m_per_s, kHilDigits)},
-                          {"label", e.label},
-                          {"measured_N", e.measured_N},
-                          {"commanded_N", rounded(e.commanded_N, kHilDigits)}});
+    experiment.push_back(
+        {{"depth_m", rounded(e.depth_m, kHilDigits)},
+         {"rate_m_per_s", rounded(e.rate_m_per_s, kHilDigits)},
+         {"label", e.label},
+         {"measured_N", e.measured_N},
+         {"commanded_N", rounded(e.commanded_N, kHilDigits)},
+         {"reference_N", e.reference_N ? Json(rounded(*e.reference_N, kHilDigits)) : Json()},
+         {"reached_m", rounded(e.reached_m, kHilDigits)},
+         {"cause", cause_of_difference(e, v.material)}});
   }
   return {
       {"simulated_device", recording.simulated()},
@@ -341,10 +345,12 @@ std::string verification_text(const HilRecording& recording, const Verification&
                         significant(1e3 * o.commanded.max_N, 3), significant(1e3 * o.apart_N, 3));
   }
   for (const BesideExperiment& e : v.experiment) {
-    text += fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, commanded {} N ({})\n",
-                        significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3),
-                        e.label, significant(e.measured_N, 3), significant(e.commanded_N, 3),
-                        percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1));
+    text +=
+        fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, commanded {} N ({}): {}\n",
+                    significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3), e.label,
+                    significant(e.measured_N, 3), significant(e.commanded_N, 3),
+                    percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1),
+                    cause_of_difference(e, v.material));
   }
   return text;
 }
@@ -395,6 +401,7 @@ ShortAnswer short_answer(const HilRecording& recording, const Verification& v) {
                     v.experiment.size(), sized_text(Dimension::length, worst.depth_m, 3),
                     worst.label, newtons(worst.measured_N), newtons(worst.commanded_N),
                     percent_text(100.0 * (worst.commanded_N / worst.measured_N - 1.0), 1)));
+    answer.limits.push_back("because " + cause_of_difference(worst, v.material));
   }
   if (!v.whole) answer.warnings.push_back(damage_line(recording));
   if (recording.damaged > 0) answer.warnings.push_back(damage_line(recording));

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,7 +45,16 @@ struct BesideExperiment {
   double depth_m = 0.0, rate_m_per_s = 0.0;
   std::string label;  ///< "peak", "end"
   double measured_N = 0.0, commanded_N = 0.0;
+  /// Of the reference at the same place of the session; none where it has no equilibrium.
+  std::optional<double> reference_N;
+  double reached_m = 0.0;   ///< largest depth of the surface in the phases that repeat the reading
+  std::uint32_t flags = 0;  ///< of all their cycles (ServoFlag)
 };
+
+/// Why a session differs from a reading: a depth that was not reached, a limit that acted, the
+/// model in the loop, or the scene's tissue, which the full network shows under the same motion.
+[[nodiscard]] std::string cause_of_difference(const BesideExperiment& e,
+                                              const std::string& material);
 
 struct Verification {
   std::string reference;
@@ -54,6 +64,7 @@ struct Verification {
   std::vector<PhaseFidelity> phases;
   std::vector<CrossCheck> others;
   std::vector<BesideExperiment> experiment;
+  std::string material;   ///< of the session's scene, as it stands there; for words
   std::size_t knots = 0;  ///< of the motion that the reference was moved through
   /// How far what was recorded lies from the lines between the knots, at most.
   double motion_tolerance_m = 0.0;

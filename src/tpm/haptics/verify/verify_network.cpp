@@ -1,4 +1,5 @@
 // Declared in tpm/haptics/verify/verify_parts.hpp.
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -110,6 +111,30 @@ bool repeats_experiment(const std::vector<SessionPhase>& phases, std::size_t p) 
   return std::abs(phases[hold].end_s - begin_s - kHeld_s) <= kAbout_s;
 }
 
+/// The reference in a part of the session: its largest force, or the last.
+std::optional<double> reference_in(const Verification& v, double from_s, double to_s,
+                                   bool largest) {
+  std::optional<double> found;
+  for (std::size_t k = 0; k < v.time_s.size(); ++k) {
+    if (v.time_s[k] < from_s || v.time_s[k] > to_s || !std::isfinite(v.reference_N[k])) continue;
+    found = largest && found ? std::max(*found, v.reference_N[k]) : v.reference_N[k];
+  }
+  return found;
+}
+
+/// Moduli of a scene's material as they stand there, or the name of what it is.
+std::string material_words(const Json& scene) {
+  const Json material = scene.value("material", Json());
+  if (material.is_string()) return material.get<std::string>();
+  std::vector<std::string> words;
+  for (const auto& [key, value] : material.items()) {
+    if (key.starts_with("E") && value.is_string()) {
+      words.push_back(key + " " + value.get<std::string>());
+    }
+  }
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
 /// Puts the largest commanded force of a ramp, and the one at the end of a hold, beside the
 /// readings of the same depth: of sessions on the paper's star or liver that repeat that
 /// experiment.
@@ -133,11 +158,19 @@ void put_beside_experiment(Verification& v, const HilRecording& recording, const
         commanded_N = std::max(commanded_N, recording.commanded_N(**row));
       }
     }
+    double reached_m = 0.0;
+    std::uint32_t flags = 0;
+    for (auto row = first; row != past; ++row) {
+      reached_m = std::max(reached_m, (*row)->surface_depth_m);
+      flags |= (*row)->flags;
+    }
+    const auto reference =
+        reference_in(v, recording.time_s(**first), recording.time_s(**(past - 1)), ramp);
     for (const Datum& datum : readings.data) {
       if (datum.label != (ramp ? "peak" : "end") || !datum.value || !datum.depth_m) continue;
       if (std::abs(*datum.depth_m - phases[p].depth_m) > 1e-9) continue;
-      v.experiment.push_back(
-          {phases[p].depth_m, phases[p].rate_m_per_s, datum.label, *datum.value, commanded_N});
+      v.experiment.push_back({phases[p].depth_m, phases[p].rate_m_per_s, datum.label, *datum.value,
+                              commanded_N, reference, reached_m, flags});
     }
   }
 }
@@ -261,6 +294,7 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
   if (const auto stiffness_N_per_m = recorded_stiffness(recording.header)) {
     v.motion_error_N = options.motion_tolerance_m * *stiffness_N_per_m;
   }
+  v.material = material_words(recording.session.scene);
   put_beside_experiment(v, recording, rows);
   leave_out_what_has_no_reference(v);
   return v;

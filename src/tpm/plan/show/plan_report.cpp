@@ -214,22 +214,6 @@ std::string subject_text(const Plan& plan) {
   return text;
 }
 
-std::vector<std::string> plan_warnings(const Plan& plan) {
-  std::vector<std::string> warnings;
-  if (plan.masses_left_out) {
-    warnings.push_back(fmt::format(
-        "inertia matters, and scene and reference leave it out: masses would change the "
-        "answer by {} of the peak{}, which exceeds the tolerance; all errors above count that. "
-        "{}",
-        share_text(*plan.masses_left_out), masses_note(plan),
-        plan.request.for_loop ? "Nothing that a loop steps has masses."
-                              : "For a model with masses, write \"formulation\": {\"kind\": "
-                                "\"inertial\"} in the scene."));
-  }
-  warnings.insert(warnings.end(), plan.validity.begin(), plan.validity.end());
-  return warnings;
-}
-
 /// The lines of a text, without those that are empty and without blanks before them.
 std::vector<std::string> text_lines(const std::string& text) {
   std::vector<std::string> lines;
@@ -349,6 +333,22 @@ std::string expected_plan_text(const ExpectedPlanWork& work) {
 Json claim_json(const Plan& plan) {
   const PlanClaim claim = claim_of(plan);
   return {{"quantity", claim.quantity}, {"norm", claim.norm}, {"protocol", claim.protocol}};
+}
+
+std::vector<std::string> plan_warnings(const Plan& plan) {
+  std::vector<std::string> warnings;
+  if (plan.masses_left_out) {
+    warnings.push_back(fmt::format(
+        "inertia matters, and scene and reference leave it out: masses would change the "
+        "answer by {} of the peak{}, which exceeds the tolerance; all errors above count that. "
+        "{}",
+        share_text(*plan.masses_left_out), masses_note(plan),
+        plan.request.for_loop ? "Nothing that a loop steps has masses."
+                              : "For a model with masses, write \"formulation\": {\"kind\": "
+                                "\"inertial\"} in the scene."));
+  }
+  warnings.insert(warnings.end(), plan.validity.begin(), plan.validity.end());
+  return warnings;
 }
 
 Json plan_json(const Plan& plan) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
@@ -19,6 +20,8 @@ namespace tpm::plan {
 /// The short answer: the pick with its errors and cost, the candidates that were run, what matters,
 /// robustness margins, and every warning.
 [[nodiscard]] ShortAnswer short_answer(const Plan& plan);
+/// What a user must know: masses that are left out, limits of validity that the scene passes.
+[[nodiscard]] std::vector<std::string> plan_warnings(const Plan& plan);
 
 /// The choice of the number of spheres: the key `spheres_choice` of a plan.
 [[nodiscard]] Json spheres_json(const SpheresPlan& plan);
@@ -38,6 +41,9 @@ namespace tpm::plan {
                                     const std::vector<double>& times_s, const Trajectory& answer);
 [[nodiscard]] std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,
                                            const Trajectory& answer);
+/// The same as a short answer; files and the next command are the caller's.
+[[nodiscard]] ShortAnswer short_answer(const Plan& plan, const std::vector<double>& times_s,
+                                       const Trajectory& answer);
 
 /// HDF5 with the answer and, as attributes of /, the scene, the model and its errors.
 void write_planned_run(const Plan& plan, const ExperimentScene& scene,

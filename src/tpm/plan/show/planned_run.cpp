@@ -65,30 +65,42 @@ Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
       {"masses_matter", plan.inertial || plan.masses_left_out.has_value()}};
   add_trajectory(json, scene, times_s, answer);
   json["validity_passed"] = plan.validity;
+  json["warnings"] = plan_warnings(plan);
   return json;
 }
 
 std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,
                              const Trajectory& answer) {
-  const PlannedCandidate& c = plan.chosen();
-  std::string text =
-      fmt::format("{}: planned model {}\n{}: claimed error at most {} %, verified {} % ({})\n{}{}",
-                  plan.title, model_words(c), claim_of(plan).quantity,
-                  significant(100.0 * shown_error(plan, *c.claimed_error), 3),
-                  significant(100.0 * shown_error(plan, *c.verified_error), 3), claim_of(plan).norm,
-                  response_words(plan), trajectory_text(plan.by_depth, times_s, answer));
-  if (plan.request.measure.output == PlanOutput::force) {
-    text += "outputs: the response alone; --outputs field plans and stores the whole network\n";
-  }
-  text += offline_text(plan);
-  if (plan.masses_left_out) {
-    text += fmt::format(
-        "WARNING: masses, which are left out, would change {} % of the peak; the errors count "
-        "that\n",
-        significant(100.0 * *plan.masses_left_out, 3));
-  }
-  for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
+  std::string text;
+  const ShortAnswer parts = short_answer(plan, times_s, answer);
+  for (const std::string& line : parts.conclusion) text += line + "\n";
+  for (const std::string& line : parts.limits) text += line + "\n";
+  for (const std::string& words : parts.warnings) text += fmt::format("WARNING: {}\n", words);
   return text;
+}
+
+ShortAnswer short_answer(const Plan& plan, const std::vector<double>& times_s,
+                         const Trajectory& answer) {
+  const PlannedCandidate& c = plan.chosen();
+  const auto add = [](std::vector<std::string>& lines, const std::string& line) {
+    if (!line.empty()) lines.push_back(line.substr(0, line.find_last_not_of('\n') + 1));
+  };
+  ShortAnswer short_one;
+  short_one.conclusion = {
+      fmt::format("{}: planned model {}", plan.title, model_words(c)),
+      fmt::format("{}: claimed error at most {} %, verified {} % ({})", claim_of(plan).quantity,
+                  significant(100.0 * shown_error(plan, *c.claimed_error), 3),
+                  significant(100.0 * shown_error(plan, *c.verified_error), 3),
+                  claim_of(plan).norm)};
+  add(short_one.conclusion, response_words(plan));
+  add(short_one.conclusion, trajectory_text(plan.by_depth, times_s, answer));
+  if (plan.request.measure.output == PlanOutput::force) {
+    add(short_one.limits,
+        "outputs: the response alone; --outputs field plans and stores the whole network");
+  }
+  add(short_one.limits, offline_text(plan));
+  short_one.warnings = plan_warnings(plan);
+  return short_one;
 }
 
 void write_planned_run(const Plan& plan, const ExperimentScene& scene,
