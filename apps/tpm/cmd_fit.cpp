@@ -1,83 +1,29 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <memory>
-#include <regex>
 
-#include "command.hpp"
-#include "recording_options.hpp"
+#include "fit_options.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/file_kind.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/fit/groups/group_comparison.hpp"
 #include "tpm/fit/likelihood/experiment_refit.hpp"
-#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/predict/fitted_scene.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
-#include "tpm/fit/select/fixed_times.hpp"
-#include "tpm/fit/select/specimens.hpp"
-#include "tpm/fit/select/young_moduli.hpp"
-#include "tpm/fit/show/comparison_report.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
 #include "tpm/fit/show/fit_report.hpp"
 #include "tpm/fit/show/function_report.hpp"
 #include "tpm/fit/show/recording_report.hpp"
-#include "tpm/law/contact_geometry.hpp"
-#include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
 #include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {
-
-struct FitOptions {
-  RecordingOptions recordings;  ///< its files may also be one configuration, or one folder
-  std::vector<std::string> laws;
-  std::string family, margin, times;
-  bool no_held_out = false;
-  bool no_profiles = false;
-  std::string folder;
-  bool no_draw = false;
-  bool verbose = false;
-  std::string output;
-  std::string rate;
-  std::string hold_out_depth;
-  std::string starts;
-  std::string seed;
-  std::string bootstrap;
-  std::string resample;
-  std::string reference;
-  std::string group_by;
-  bool compare = false;
-  PlacementArguments placement;
-  std::string radius, cone_angle, punch_radius, poisson;
-};
-
-/// The probe, if the options name one; none else.
-std::optional<ContactGeometry> probe_of(const FitOptions& options) {
-  ContactGeometry probe;
-  const auto set = [](std::optional<double>& size, const std::string& text, Dimension dimension,
-                      const char* option) {
-    if (!text.empty()) size = option_quantity(text, dimension, option);
-  };
-  set(probe.sphere_radius_m, options.radius, Dimension::length, "--radius");
-  set(probe.cone_half_angle_rad, options.cone_angle, Dimension::angle, "--cone-angle");
-  set(probe.punch_radius_m, options.punch_radius, Dimension::length, "--punch-radius");
-  if (!options.poisson.empty()) probe.poisson_ratio = option_number(options.poisson, "--poisson");
-  if (probe.is_given()) {
-    of_option([&] { return modulus_Pa(LawSpec{}, 1.0, probe); });  // refuses what cannot be
-    return probe;
-  }
-  if (options.poisson.empty()) return std::nullopt;
-  throw Error(ExitCode::usage, "--poisson", "without a probe",
-              "--radius, --cone-angle or --punch-radius");
-}
 
 /// --bootstrap and --resample, over what the configuration says.
 void configure_bootstrap(const FitOptions& options, FitConfig& config) {
@@ -129,171 +75,6 @@ bool is_configuration(const std::vector<std::string>& files) {
   return !document.contains("kind");
 }
 
-/// The law that all recordings are fitted with; none where there is a choice.
-std::optional<LawSpec> only_law(const SelectionOptions& selection) {
-  return selection.laws.size() == 1 ? std::optional(selection.laws.front()) : std::nullopt;
-}
-
-SelectionOptions selection_options(const FitOptions& options) {
-  SelectionOptions selection;
-  if (!options.laws.empty()) selection.laws = chosen_laws(options.laws, {});
-  selection.only_listed = !options.laws.empty();
-  if (!options.margin.empty()) selection.margin = option_number(options.margin, "--margin");
-  selection.held_out = !options.no_held_out;
-  selection.setup.profiles = !options.no_profiles;
-  if (!options.times.empty()) {
-    if (options.laws.size() > 1) {
-      throw Error(ExitCode::usage, "--times", fmt::format("with {} laws", options.laws.size()),
-                  "one law at most");
-    }
-    selection.setup.times_s = parse_times(options.times, "--times");
-    selection.laws = {
-        law_of_times(selection.laws.empty() ? std::nullopt : std::optional(selection.laws.front()),
-                     selection.setup.times_s, "--times")};
-    selection.only_listed = true;
-  }
-  if (const auto probe = probe_of(options)) {
-    selection.setup.exponent = probe_exponent(*probe);
-    if (selection.laws.empty()) {
-      selection.laws = laws_of_probe(chosen_laws({}, options.family), *probe);
-    }
-  }
-  if (selection.laws.empty() && !options.family.empty()) {
-    selection.laws = chosen_laws({}, options.family);
-  }
-  if (!options.starts.empty()) {
-    selection.setup.starts = parse_whole_number(options.starts, "--starts", 1);
-  }
-  if (!options.seed.empty()) selection.setup.seed = parse_whole_number(options.seed, "--seed", 0);
-  return selection;
-}
-
-/// --reference for recordings: a depth, or a change of relative length.
-void set_reference(const FitOptions& options, const std::vector<PreparedRecording>& recordings,
-                   SelectionOptions& selection) {
-  if (options.reference.empty()) return;
-  const Dimension drive = quantity_dimension(law_drive(recordings.front().recording));
-  selection.setup.reference = option_quantity(options.reference, drive, "--reference");
-  if (*selection.setup.reference > 0.0) return;
-  throw Error(ExitCode::usage, "--reference", fmt::format("'{}'", printable(options.reference)),
-              "a depth above 0, such as \"4 mm\"");
-}
-
-/// Which specimen each recording is of: what the group of a name pattern matches, or what the file
-/// says under a key.
-void set_specimens(const FitOptions& options, std::vector<PreparedRecording>& recordings) {
-  const std::string& by = options.group_by;
-  if (by.empty()) return;
-  if (by.find('(') == std::string::npos) {
-    for (PreparedRecording& r : recordings) {
-      r.specimen = recording_label(r.name, by, import_options(options.recordings));
-    }
-    return;
-  }
-  std::regex pattern;
-  try {
-    pattern = std::regex(by);
-  } catch (const std::regex_error&) {
-    throw Error(ExitCode::usage, "--group-by", fmt::format("'{}' is no pattern", printable(by)),
-                "a regular expression such as \"(liver[0-9]+)_\"");
-  }
-  if (pattern.mark_count() != 1) {
-    throw Error(ExitCode::usage, "--group-by",
-                fmt::format("{} groups in '{}'", pattern.mark_count(), printable(by)), "one");
-  }
-  for (PreparedRecording& r : recordings) {
-    const std::string name = std::filesystem::path(r.name).filename().string();
-    std::smatch match;
-    if (!std::regex_search(name, match, pattern) || match[1].length() == 0) {
-      throw Error(ExitCode::usage, "--group-by",
-                  fmt::format("'{}' is not matched by '{}'", printable(name), printable(by)),
-                  "a pattern that every file name matches");
-    }
-    r.specimen = match[1].str();
-  }
-}
-
-/// Recordings in a folder, in alphabetical order.
-std::vector<std::string> recordings_in(const std::filesystem::path& folder) {
-  std::vector<std::string> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string ending = entry.path().extension().string();
-    constexpr std::array kEndings{".csv", ".txt", ".tsv", ".jpk-force"};
-    const bool known = std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
-    if (entry.is_regular_file() && known) {
-      files.push_back(entry.path().string());
-    }
-  }
-  std::sort(files.begin(), files.end());
-  if (files.empty()) {
-    throw bad_input(folder.string(), "no recording",
-                    "files that end in .csv, .txt, .tsv or .jpk-force");
-  }
-  return files;
-}
-
-/// --folder, or NAME_fit after the recording or the folder of recordings.
-std::string figure_folder(const FitOptions& options, const std::string& input) {
-  if (!options.folder.empty()) return options.folder;
-  std::filesystem::path path = std::filesystem::absolute(input).lexically_normal();
-  if (!path.has_filename()) path = path.parent_path();
-  return path.stem().string() + "_fit";
-}
-
-/// Announces the files of recordings.
-void announce_figures(const FitOptions& options, const std::string& input,
-                      std::initializer_list<const char*> names) {
-  if (options.no_draw) return;
-  will_write_into(figure_folder(options, input), names,
-                  options.folder.empty() ? Naming::by_default : Naming::folder);
-}
-
-/// A probe goes with recordings of a force over a depth alone.
-void require_indentation(const FitOptions& options,
-                         const std::vector<PreparedRecording>& recordings) {
-  if (!probe_of(options)) return;
-  for (const PreparedRecording& r : recordings) {
-    if (r.recording.drive_quantity == Quantity::indentation_depth) continue;
-    throw Error(ExitCode::usage, "--radius, --cone-angle, --punch-radius",
-                fmt::format("'{}' is no indentation", printable(r.name)),
-                "them with a contact force over an indentation depth");
-  }
-}
-
-void write_moduli(const std::filesystem::path& folder, const std::optional<YoungModuli>& moduli,
-                  std::vector<std::string>& files) {
-  if (!moduli) return;
-  write_file(folder / "young_moduli.json", to_text(to_json(*moduli)));
-  write_file(folder / "young_moduli.csv", moduli_csv(*moduli));
-  files.insert(files.end(), {"young_moduli.json", "young_moduli.csv"});
-}
-
-/// The answer to recordings, with the moduli if there are any.
-std::string with_moduli(Json json, std::string text, const std::optional<YoungModuli>& moduli,
-                        const Session& session) {
-  if (moduli) {
-    json["young_moduli"] = to_json(*moduli);
-    text += "\n" + to_terminal_text(*moduli);
-  }
-  return session.json() ? to_text(json) : text;
-}
-
-/// The text of the answer: the short one, or with --verbose `text`, with the files below.
-std::string answer_with_files(const FitOptions& options, const Session& session, std::string text,
-                              ShortAnswer answer, const std::string& folder,
-                              const std::vector<std::string>& files, const std::string& next) {
-  if (session.json()) return text;
-  if (options.verbose) return files.empty() ? text : text + written(session, folder, files);
-  end_answer(answer, folder, files, next);
-  return to_text(answer);
-}
-
-/// The page of the figures in a folder that was written.
-std::string next_of_figures(const std::string& folder) {
-  return fmt::format("tpm view {}",
-                     shell_word((std::filesystem::path(folder) / "figures.json").string()));
-}
-
 /// The page of the law in a folder; without one its figures.
 std::string next_of_law(const std::string& folder, const std::vector<std::string>& files) {
   if (files.empty()) return {};
@@ -331,95 +112,6 @@ int fit_configuration(const FitOptions& options, const Session& session) {
                     : next_of_law(options.folder, files));
   deliver(text, options.output);
   deliver_csv(parameters_csv(result), csv);
-  return 0;
-}
-
-int fit_folder(const FitOptions& options, const Session& session) {
-  const auto csv = csv_beside(options.output, session);
-  announce_figures(options, options.recordings.files.front(), {"figures.json", "specimens.json"});
-  RecordingOptions input = options.recordings;
-  input.files = recordings_in(options.recordings.files.front());
-  SelectionOptions selection = selection_options(options);
-  const std::optional<LawSpec> law = only_law(selection);
-  std::vector<PreparedRecording> recordings = read_recordings(input);
-  require_indentation(options, recordings);
-  set_reference(options, recordings, selection);
-  hold_placement(options.placement, options.recordings, recordings, selection.setup.contact,
-                 selection.setup.zero);
-  set_specimens(options, recordings);
-  const SpecimenStudy study = study_specimens(recordings, law, selection);
-  std::optional<YoungModuli> moduli;
-  if (const auto probe = probe_of(options)) {
-    moduli = pooled_moduli(study, *probe, options.poisson.empty());
-  }
-  std::string text = with_moduli(to_json(study), to_terminal_text(study), moduli, session);
-  const std::string folder = figure_folder(options, options.recordings.files.front());
-  std::vector<std::string> files;
-  if (!options.no_draw) {
-    files = write_specimen_report(folder, study, probe_of(options));
-    write_moduli(folder, moduli, files);
-  }
-  ShortAnswer answer = short_answer(study);
-  if (moduli) add_moduli(answer, *moduli);
-  text = answer_with_files(options, session, std::move(text), std::move(answer), folder, files,
-                           files.empty() ? "" : next_of_figures(folder));
-  deliver(text, options.output);
-  deliver_csv(pooled_csv(study), csv);
-  return 0;
-}
-
-/// "healthy" of "data/healthy/".
-std::string folder_name(const std::string& folder) {
-  std::filesystem::path path = std::filesystem::absolute(folder).lexically_normal();
-  if (!path.has_filename()) path = path.parent_path();
-  return path.filename().string();
-}
-
-RecordingGroup group_in(const FitOptions& options, const std::string& folder) {
-  RecordingOptions input = options.recordings;
-  input.files = recordings_in(folder);
-  RecordingGroup group{folder_name(folder), read_recordings(input)};
-  require_indentation(options, group.recordings);
-  set_specimens(options, group.recordings);
-  return group;
-}
-
-int compare_folders(const FitOptions& options, const Session& session) {
-  const std::vector<std::string>& folders = options.recordings.files;
-  if (folders.size() != 2 || !std::filesystem::is_directory(folders[0]) ||
-      !std::filesystem::is_directory(folders[1])) {
-    throw Error(ExitCode::usage, "--compare",
-                fmt::format("with {} input{}", folders.size(), folders.size() == 1 ? "" : "s"),
-                "two folders of recordings, such as: tpm fit healthy/ fibrotic/ --compare");
-  }
-  const auto csv = csv_beside(options.output, session);
-  RecordingGroup first = group_in(options, folders[0]);
-  RecordingGroup second = group_in(options, folders[1]);
-  if (first.name == second.name) {  // "1/liver" and "2/liver"
-    first.name = folders[0];
-    second.name = folders[1];
-  }
-  const std::string folder =
-      options.folder.empty()
-          ? fmt::format("{}_against_{}", folder_name(folders[1]), folder_name(folders[0]))
-          : options.folder;
-  if (!options.no_draw) will_write_into(folder, {"figures.json", "comparison.json"});
-  SelectionOptions selection = selection_options(options);
-  const std::optional<LawSpec> law = only_law(selection);
-  set_reference(options, first.recordings, selection);
-  hold_placement(options.placement, options.recordings, first.recordings, selection.setup.contact,
-                 selection.setup.zero);
-  hold_placement(options.placement, options.recordings, second.recordings, selection.setup.contact,
-                 selection.setup.zero);
-  const std::optional<ContactGeometry> probe = probe_of(options);
-  const GroupComparison comparison = compare_groups(first, second, law, selection, probe);
-  std::string text = session.json() ? to_text(to_json(comparison)) : to_terminal_text(comparison);
-  std::vector<std::string> files;
-  if (!options.no_draw) files = write_comparison_report(folder, comparison, probe);
-  text = answer_with_files(options, session, std::move(text), short_answer(comparison), folder,
-                           files, files.empty() ? "" : next_of_figures(folder));
-  deliver(text, options.output);
-  deliver_csv(comparison_csv(comparison), csv);
   return 0;
 }
 
