@@ -213,7 +213,14 @@ TEST_CASE("order 1 of a spring-pot is a dashpot, and no bound", "[intervals]") {
   judge_identified(c, spans);
   CHECK(c.identified);
   CHECK(c.special == "alpha = 1: the spring-pot is a dashpot");
-  c.fit.parameters[0].at_upper_bound = false;
+  ParameterResult& order = c.fit.parameters[0];
+  order.verdict = Verdict::lower_only;
+  CHECK(verdict_text(order) == "one-sided: lower limit only; 1: a dashpot");
+  order.at_upper_bound = false;
+  order.estimate = 0.9996;
+  CHECK(verdict_text(order) == "one-sided: lower limit only; not told from 1, a dashpot");
+  order.verdict = Verdict::identified;
+  CHECK(verdict_text(order) == "identified");
   c.fit.parameters[0].at_lower_bound = true;
   judge_identified(c, spans);
   CHECK(c.reason == "alpha ends at its lower bound");

@@ -111,6 +111,7 @@ class Finder {
     found_.peak_response = *std::max_element(response_.begin(), response_.end());
     estimate_noise();
     level_ = without_drift();
+    touch_noise_ = std::max(found_.noise_sd_estimate, slow_noise_of_rest());
     find_contact();
     find_creep();
     find_detachments();
@@ -127,7 +128,7 @@ class Finder {
   [[nodiscard]] TouchSearch search() const {
     // Of a few samples, no more than an eighth can be asked to agree.
     const std::size_t most = std::max<std::size_t>(response_.size() / 8, 1);
-    return {drive_, level_, pieces_, found_.noise_sd_estimate,
+    return {drive_, level_, pieces_, touch_noise_,
             std::clamp<std::size_t>(options_.sustained_samples, 1, most)};
   }
 
@@ -205,6 +206,22 @@ class Finder {
     std::vector<double> level = response_;
     for (std::size_t i = 0; i < level.size(); ++i) level[i] -= slope * (time_[i] - time_.front());
     return level;
+  }
+
+  /// Standard deviation of the readings at rest before the first movement, where it is well above
+  /// that of neighbours: noise that wanders is no touch. 0 elsewhere.
+  [[nodiscard]] double slow_noise_of_rest() const {
+    constexpr std::size_t kFewest = 10;
+    constexpr double kWellAbove = 1.5;
+    const DrivePiece& rest = pieces_.front();
+    if (!indentation_ || pieces_.size() < 2 || rest.motion != Motion::still) return 0.0;
+    const std::size_t n = rest.last + 1;
+    if (n < kFewest) return 0.0;
+    double mean = 0.0, squares = 0.0;
+    for (std::size_t i = 0; i < n; ++i) mean += level_[i] / static_cast<double>(n);
+    for (std::size_t i = 0; i < n; ++i) squares += std::pow(level_[i] - mean, 2);
+    const double sd = std::sqrt(squares / static_cast<double>(n - 1));
+    return sd > kWellAbove * found_.noise_sd_estimate ? sd : 0.0;
   }
 
   void find_contact() {
@@ -365,6 +382,7 @@ class Finder {
   const PhaseOptions& options_;
   std::vector<DrivePiece> pieces_;
   std::vector<double> level_;  ///< the response, without a drift of its zero
+  double touch_noise_ = 0.0;   ///< of a reading, for the search of contact
   bool noise_in_hold_ = false;
   RecordingPhases found_;
 };

@@ -16,6 +16,12 @@ std::string percent(double level) {
   return fmt::format("{:.4g} %", 100.0 * level);
 }
 
+/// Of a spring-pot, which is a dashpot at 1.
+bool is_order_up_to_1(const ParameterResult& p) {
+  const bool order = p.parameter.name == "alpha" || p.parameter.name == "beta";
+  return order && p.parameter.upper == 1.0;
+}
+
 std::string bound_note(const ParameterResult& p) {
   if (p.at_lower_bound) {
     return fmt::format("; the best fit runs to its lower bound {}",
@@ -32,8 +38,7 @@ std::string bound_note(const ParameterResult& p) {
 }  // namespace
 
 bool is_dashpot(const ParameterResult& p) {
-  const bool order = p.parameter.name == "alpha" || p.parameter.name == "beta";
-  return order && p.at_upper_bound && p.parameter.upper == 1.0;
+  return is_order_up_to_1(p) && p.at_upper_bound;
 }
 
 std::string_view verdict_name(Verdict verdict) noexcept {
@@ -165,6 +170,11 @@ std::string verdict_text(const ParameterResult& p) {
     const Condition& c = p.conditional_on[i];
     text += fmt::format("{} {} at its {} bound", i == 0 ? ", conditional on" : " and", c.parameter,
                         c.upper ? "upper" : "lower");
+  }
+  if (is_dashpot(p)) {
+    text += "; 1: a dashpot";
+  } else if (p.verdict == Verdict::lower_only && is_order_up_to_1(p)) {
+    text += "; not told from 1, a dashpot";
   }
   if (p.only_if_described) text += "; only if the law described the data";
   if (p.nuisance && (p.at_lower_bound || p.at_upper_bound)) {

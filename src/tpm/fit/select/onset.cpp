@@ -266,14 +266,29 @@ Onset stated_onset(const PreparedRecording& r, std::optional<double> exponent) {
   return onset;
 }
 
+/// Where the ramp has too few samples to be extrapolated: between two of them, and before the force
+/// that was seen by as far as a power stays below what noise hides.
+Measured coarse_onset(const PreparedRecording& r, const RestReadings& rests,
+                      std::optional<double> exponent) {
+  constexpr double kHidden = 5.0;  // standard deviations
+  constexpr double kSteepest = 3.0;
+  const std::vector<double>& drive = r.recording.drive;
+  const std::size_t contact = r.phases.contact_index;
+  const std::size_t next = std::min(contact + 1, drive.size() - 1);
+  const double step = std::abs(drive[next] - drive[contact > 0 ? contact - 1 : 0]);
+  const double risen = std::abs(r.phases.peak_response - r.phases.floor_response);
+  const double share = risen > 0.0 ? std::min(kHidden * rests.noise_sd / risen, 1.0) : 1.0;
+  const double hidden = ramp_travel(r) * std::pow(share, 1.0 / exponent.value_or(kSteepest));
+  return {r.phases.contact_drive - 0.5 * hidden, std::hypot(step / std::sqrt(12.0), 0.5 * hidden)};
+}
+
 }  // namespace
 
 Onset find_onset(const PreparedRecording& r, const RestReadings& rests,
                  std::optional<double> exponent) {
   constexpr std::array kParts{0.05, 0.1, 0.15, 0.2, 0.3, 0.5};
   constexpr std::size_t kFewestInContact = 8;
-  constexpr double kLeast = 1e-4;   // of the travel: nothing is known better
-  constexpr double kCoarse = 0.05;  // of the travel, where the ramp has too few samples
+  constexpr double kLeast = 1e-4;  // of the travel: nothing is known better
   if (rests.before == 0 || !rests.zero) return stated_onset(r, exponent);
   const std::vector<double>& drive = r.recording.drive;
   const double travel = ramp_travel(r);
@@ -343,11 +358,7 @@ Onset find_onset(const PreparedRecording& r, const RestReadings& rests,
     least = onset.expected_sd;
     best = {onset.drive, share, part->inside, true};
   }
-  if (best.samples == 0) {
-    const std::size_t next = std::min(contact + 1, drive.size() - 1);
-    const double step = std::abs(drive[next] - drive[contact > 0 ? contact - 1 : 0]);
-    best.drive = {r.phases.contact_drive, std::min(step, kCoarse * travel)};
-  }
+  if (best.samples == 0) best.drive = coarse_onset(r, rests, exponent);
   constexpr double kMost = 0.25;  // of the travel
   best.drive.sd = std::clamp(best.drive.sd, kLeast * travel, kMost * travel);
   return best;

@@ -113,9 +113,10 @@ double rounding_sd(const PreparedRecording& r) {
 /// The noise of the longest hold, about a straight line and four exponentials: a short rest does
 /// not tell how its readings are correlated.
 struct HoldNoise {
-  double phi = 0.0, variance = 0.0;
+  AutoregressionEstimate noise;
   double step_s = 0.0;  ///< of samples, which phi belongs to
   std::size_t samples = 0;
+  double freedom = 1.0;  ///< degrees of freedom of the variance for a known phi
 };
 
 std::optional<HoldNoise> hold_noise(const PreparedRecording& r) {
@@ -144,8 +145,8 @@ std::optional<HoldNoise> hold_noise(const PreparedRecording& r) {
   }
   if (!(y.cwiseAbs().maxCoeff() > 0.0)) return std::nullopt;
   const double step_s = median_step(time);
-  const AutoregressionEstimate noise = estimate_autoregression(time, y, j, step_s);
-  return HoldNoise{noise.phi, noise.variance, step_s, n};
+  return HoldNoise{estimate_autoregression(time, y, j, step_s), step_s, n,
+                   static_cast<double>(n) - static_cast<double>(j.cols())};
 }
 
 /// Generalised least squares of a line (or a level) through readings at rest.
@@ -166,26 +167,37 @@ void fit_rests(const RestSamples& rest, double rounding, const std::optional<Hol
     y[i] = rest.reading[k] - level;
   }
   const double step_s = hold ? hold->step_s : median_step(rest.time_s);
-  AutoregressionEstimate noise;
-  if (hold) {
-    noise.phi = hold->phi;
-    noise.variance = hold->variance;
-  } else {
-    noise = estimate_autoregression(rest.time_s, y, j, step_s);
-  }
-  const AutoregressiveNoise whitener(noise.phi, step_s);
+  const AutoregressionEstimate noise =
+      hold ? hold->noise : estimate_autoregression(rest.time_s, y, j, step_s);
   Eigen::MatrixXd both(n, p + 1);
   both << j, y;
-  whitener.whiten(rest.time_s, both);
-  const Eigen::MatrixXd gram = both.leftCols(p).transpose() * both.leftCols(p);
-  const Eigen::MatrixXd inverse = gram.llt().solve(Eigen::MatrixXd::Identity(p, p));
-  const Eigen::VectorXd x = inverse * (both.leftCols(p).transpose() * both.col(p));
+  const auto inverse_at = [&](double phi, Eigen::MatrixXd& rows) -> Eigen::MatrixXd {
+    AutoregressiveNoise(phi, step_s).whiten(rest.time_s, rows);
+    const Eigen::MatrixXd gram = rows.leftCols(p).transpose() * rows.leftCols(p);
+    return gram.llt().solve(Eigen::MatrixXd::Identity(p, p));
+  };
+  // Of the noise of a hold: how far phi, which is estimated, moves the variance of each column
+  // (satterthwaite_degrees, whose columns are those of the hold).
+  const auto degrees_of_hold = [&](Eigen::Index column) {
+    const double step = 0.02 * (1.0 - noise.phi) + 1e-6;
+    const double below = std::max(noise.phi - step, 0.0), above = noise.phi + step;
+    Eigen::MatrixXd low = both, high = both;
+    const double slope =
+        noise.log_squares_slope +
+        std::log(inverse_at(above, high)(column, column) / inverse_at(below, low)(column, column)) /
+            (above - below);
+    const double variance = slope * slope * noise.phi_variance + 2.0 / hold->freedom;
+    return std::max(2.0 / variance, 1.0);
+  };
+  Eigen::MatrixXd whitened = both;
+  const Eigen::MatrixXd inverse = inverse_at(noise.phi, whitened);
+  const Eigen::VectorXd x = inverse * (whitened.leftCols(p).transpose() * whitened.col(p));
   const Eigen::MatrixXd covariance = noise.variance * inverse;
   result.phi = noise.phi;
   result.noise_sd = std::sqrt(noise.variance);
   const auto sd = [&](Eigen::Index column, double variance) {
     const double degrees =
-        hold ? static_cast<double>(hold->samples) : satterthwaite_degrees(noise, column, n, p);
+        hold ? degrees_of_hold(column) : satterthwaite_degrees(noise, column, n, p);
     return students(std::sqrt(variance), degrees);
   };
   if (p == 1) {
@@ -208,7 +220,7 @@ std::size_t samples_before_contact(const PreparedRecording& recording) {
 }
 
 RestReadings read_rests(const PreparedRecording& recording) {
-  constexpr double kShort = 30.0;  // samples, below which a longer hold tells the noise
+  constexpr double kShort = 100.0;  // samples, below which a longer hold tells the noise
   RestReadings result;
   const RestSamples all = rest_samples(recording);
   result.before = all.before;
@@ -226,7 +238,7 @@ RestReadings read_rests(const PreparedRecording& recording) {
   // A hold that no such curve describes has no noise to be read.
   constexpr double kAlike = 16.0;  // in variance
   const bool alike = rest.reading.size() < kFewestForNoise ||
-                     (hold && hold->variance * (n - 1.0) <= kAlike * squares);
+                     (hold && hold->noise.variance * (n - 1.0) <= kAlike * squares);
   const bool longer = hold && alike && hold->samples > rest.reading.size();
   if ((longer || rest.reading.size() >= kFewestForNoise) && !constant) {
     fit_rests(rest, squares < n * 4.0 * rounding * rounding ? rounding : 0.0,

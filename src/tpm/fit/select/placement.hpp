@@ -33,7 +33,7 @@ struct RestReadings {
 ///
 ///     sigma sqrt((1 + 2 sum_k (1 - k/n) phi^k) / n).
 ///
-/// The noise of a rest below 30 samples is that of the longest hold, if that has more.
+/// The noise of a rest below 100 samples is that of the longest hold, if that has more.
 /// Both are multiplied by sqrt(f / (f - 2)), f the degrees of freedom of their variance: the
 /// standard deviation of Student's t. A rest of more than 1,000 samples is averaged in blocks.
 [[nodiscard]] RestReadings read_rests(const PreparedRecording& recording);
@@ -53,6 +53,9 @@ struct Onset {
 /// least squares over the first 5 to 50 % of the travel, whichever part is expected to leave the
 /// least uncertainty: of the noise (for the loading that the largest part shows), the zero, and a
 /// quarter of what B moves (how far the loading departs from a power within the part).
+///
+/// Where fewer than 8 samples lie within any part, contact is between two samples, and before the
+/// force that is seen by as far as a power stays below five standard deviations of the noise.
 ///
 /// Without samples before contact, a preload is extrapolated back to no force, and the uncertainty
 /// is as large as the way there.
