@@ -132,6 +132,7 @@ class ContactCandidate : public PlanModel {
     const PlanScene& scene = surrogate.scene();
     if (!budget.rate_Hz) return "steps a servo's period, and there is none";
     if (!scene.by_depth()) return "sees spheres that are moved";
+    if (scene.has_loads()) return "begins without loads";
     if (!scene.single_sphere() && !(takes_patch() && scene.single_patch())) {
       return takes_patch() ? "sees one sphere or patch that is moved"
                            : "sees one sphere that is moved";

@@ -15,8 +15,9 @@ namespace tpm::plan {
 namespace {
 
 constexpr int kLanczosSteps = 24;
-constexpr std::size_t kMostKinks = 200;
-constexpr int kSamples = 400;     // after each change of rate
+constexpr int kSamples = 400;  // after each change of rate, fewer where rates change often
+constexpr int kLeastSamples = 4;
+constexpr std::size_t kAllSamples = 80'000;
 constexpr double kPeriods = 3.0;  // of the lowest mode that they span
 
 /// Lanczos' method with full orthogonalisation.
@@ -30,10 +31,16 @@ class Lanczos {
         root_(mass_kg.cwiseSqrt().transpose().replicate(3, 1).reshaped()),
         viscous_state_{rest.mean, relaxation_factor, rest.closed} {}
 
-  /// @param field displacements, m
-  [[nodiscard]] std::vector<SeenMode> modes(Eigen::Matrix3Xd field) const {
-    constraints_.project(field);
-    Eigen::VectorXd q = root_.cwiseProduct(field.reshaped());
+  /// @param fields displacements, m, per unit of what each group imposes; the response is the
+  /// first's
+  [[nodiscard]] std::vector<SeenMode> modes(const std::vector<Eigen::Matrix3Xd>& fields) const {
+    Eigen::MatrixXd sources(root_.size(), std::ssize(fields));
+    for (std::size_t g = 0; g < fields.size(); ++g) {
+      Eigen::Matrix3Xd field = fields[g];
+      constraints_.project(field);
+      sources.col(static_cast<Eigen::Index>(g)) = root_.cwiseProduct(field.reshaped());
+    }
+    Eigen::VectorXd q = sources.col(0);
     const double size = q.norm();
     if (!(size > 0.0)) return {};
     q /= size;
@@ -54,11 +61,14 @@ class Lanczos {
     const SymmetricModes ritz =
         tridiagonal_modes(Eigen::Map<Eigen::VectorXd>(diagonal.data(), std::ssize(diagonal)),
                           Eigen::Map<Eigen::VectorXd>(beside.data(), std::ssize(beside)));
+    const Eigen::MatrixXd seen = ritz.vectors.transpose() * (basis.transpose() * sources);
     std::vector<SeenMode> modes;
     for (Eigen::Index i = 0; i < ritz.values.size(); ++i) {
-      const double first = size * ritz.vectors(0, i);
-      const double omega2 = std::max(ritz.values[i], 1e-12);
-      modes.push_back({omega2, first * first * omega2});
+      SeenMode& mode = modes.emplace_back();
+      mode.omega2 = std::max(ritz.values[i], 1e-12);
+      for (const double of_group : seen.row(i)) {
+        mode.weights.push_back(seen(i, 0) * of_group * mode.omega2);
+      }
     }
     return modes;
   }
@@ -87,12 +97,39 @@ struct ImpulseResponse {
 ImpulseResponse impulse(double t, double omega2, double alpha) {
   const double half = 0.5 * alpha;
   const double d2 = omega2 - half * half;
-  const double decay = std::exp(-half * t);
-  // Above critical damping sine and cosine become hyperbolic; the envelope is enough there.
-  const double d = std::sqrt(std::max(d2, 1e-6 * omega2));
-  const double s = std::sin(d * t) / d, c = std::cos(d * t);
-  return {decay * s, (1.0 - decay * (c + half * s)) / omega2, decay * (c - half * s)};
+  const double d = std::sqrt(std::max(std::abs(d2), 1e-6 * omega2));
+  double s = 0.0, c = 0.0;  // sine over d and cosine times the decay, or hyperbolic ones
+  if (d2 > 0.0) {
+    const double decay = std::exp(-half * t);
+    s = decay * std::sin(d * t) / d;
+    c = decay * std::cos(d * t);
+  } else {
+    const double slow = std::exp((d - half) * t), fast = std::exp(-(d + half) * t);
+    s = 0.5 * (slow - fast) / d;
+    c = 0.5 * (slow + fast);
+  }
+  return {s, (1.0 - c - half * s) / omega2, c - half * s};
 }
+
+/// A mode in motion: q, its integral, its rate.
+class MovingMode {
+ public:
+  MovingMode(double omega2, double alpha) : omega2_(omega2), alpha_(alpha) {}
+  void strike(double impulse) { rate_ += impulse; }
+  [[nodiscard]] MovingMode after(double t) const {
+    const ImpulseResponse r = impulse(t, omega2_, alpha_);
+    MovingMode later = *this;
+    later.value_ = value_ * (r.rate + alpha_ * r.value) + rate_ * r.value;
+    later.integral_ += value_ * (r.value + alpha_ * r.integral) + rate_ * r.integral;
+    later.rate_ = rate_ * r.rate - omega2_ * value_ * r.value;
+    return later;
+  }
+  [[nodiscard]] double response() const { return value_ + alpha_ * integral_; }
+
+ private:
+  double omega2_, alpha_;
+  double value_ = 0.0, integral_ = 0.0, rate_ = 0.0;
+};
 
 /// Without the modes in which spheres ring on stiff contacts of tools: the network itself damps
 /// those, and its impacts are inelastic.
@@ -113,26 +150,37 @@ std::vector<SeenMode> without_ringing_contacts(std::vector<SeenMode> modes, cons
 
 struct Kink {
   double time_s = 0.0, change = 0.0;
+  std::size_t group = 0;
 };
 
-std::vector<Kink> rate_kinks(const Protocol& protocol) {
+/// What each group imposes, the first that of the scene.
+std::vector<const Protocol*> all_protocols(const PlanScene& scene) {
+  std::vector<const Protocol*> all{&scene.protocol()};
+  for (const DriveGroup& group : scene.driven().probes.loading().beside) {
+    all.push_back(&group.protocol);
+  }
+  return all;
+}
+
+void add_rate_kinks(const Protocol& protocol, std::size_t group, std::vector<Kink>& kinks) {
   const auto knots = protocol.knots();
-  std::vector<Kink> kinks;
   double rate = 0.0;
   for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
     const double length = knots[k + 1].time_s - knots[k].time_s;
     if (!(length > 0.0)) continue;
     const double next = (knots[k + 1].value - knots[k].value) / length;
-    if (next != rate) kinks.push_back({knots[k].time_s, next - rate});
+    if (next != rate) kinks.push_back({knots[k].time_s, next - rate, group});
     rate = next;
   }
-  if (kinks.size() <= kMostKinks) return kinks;
-  std::stable_sort(kinks.begin(), kinks.end(), [](const Kink& a, const Kink& b) {
-    return std::abs(a.change) > std::abs(b.change);
-  });
-  kinks.resize(kMostKinks);
-  std::sort(kinks.begin(), kinks.end(),
-            [](const Kink& a, const Kink& b) { return a.time_s < b.time_s; });
+  // One that ends before the others keeps its last value.
+  if (group > 0 && rate != 0.0) kinks.push_back({knots.back().time_s, -rate, group});
+}
+
+std::vector<Kink> rate_kinks(const std::vector<const Protocol*>& protocols) {
+  std::vector<Kink> kinks;
+  for (std::size_t g = 0; g < protocols.size(); ++g) add_rate_kinks(*protocols[g], g, kinks);
+  std::stable_sort(kinks.begin(), kinks.end(),
+                   [](const Kink& a, const Kink& b) { return a.time_s < b.time_s; });
   return kinks;
 }
 
@@ -148,33 +196,38 @@ double largest_jump(const Protocol& protocol) {
 
 double of_rates(const std::vector<Kink>& kinks, const std::vector<SeenMode>& modes, double alpha,
                 double own_drag, double span_s, double end_s) {
-  double largest = 0.0;
+  std::vector<MovingMode> moving;
+  for (const SeenMode& mode : modes) moving.emplace_back(mode.omega2, alpha);
+  double largest = 0.0, rate = 0.0;
+  const int samples =
+      std::clamp(static_cast<int>(kAllSamples / std::max<std::size_t>(kinks.size(), 1)),
+                 kLeastSamples, kSamples);
   for (std::size_t k = 0; k < kinks.size(); ++k) {
-    const double until = k + 1 < kinks.size() ? kinks[k + 1].time_s : end_s;
-    const double length = std::min(span_s, until - kinks[k].time_s);
-    for (int i = 0; i <= kSamples; ++i) {
-      const double t = kinks[k].time_s + length * i / kSamples;
-      double sum = 0.0, rate = 0.0;
-      for (std::size_t j = 0; j <= k; ++j) {
-        rate += kinks[j].change;
-        for (const SeenMode& mode : modes) {
-          const ImpulseResponse r = impulse(t - kinks[j].time_s, mode.omega2, alpha);
-          sum += kinks[j].change * mode.weight * (r.value + alpha * r.integral);
-        }
-      }
-      largest = std::max(largest, std::abs(sum + own_drag * rate));
+    const Kink& kink = kinks[k];
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+      moving[i].strike(kink.change * modes[i].weights[kink.group]);
     }
+    if (kink.group == 0) rate += kink.change;
+    const double until = k + 1 < kinks.size() ? kinks[k + 1].time_s : end_s;
+    const double length = std::min(span_s, until - kink.time_s);
+    for (int s = 0; s <= samples && length > 0.0; ++s) {
+      double sum = own_drag * rate;
+      for (const MovingMode& mode : moving) sum += mode.after(length * s / samples).response();
+      largest = std::max(largest, std::abs(sum));
+    }
+    for (MovingMode& mode : moving) mode = mode.after(until - kink.time_s);
   }
   return largest;
 }
 
-double of_jump(double jump, const std::vector<SeenMode>& modes, double alpha, double span_s) {
+double of_jump(double jump, std::size_t group, const std::vector<SeenMode>& modes, double alpha,
+               double span_s) {
   double largest = 0.0;
   for (int i = 0; i <= kSamples; ++i) {
     double sum = 0.0;
     for (const SeenMode& mode : modes) {
       const ImpulseResponse r = impulse(span_s * i / kSamples, mode.omega2, alpha);
-      sum += mode.weight * (r.rate + alpha * r.value);
+      sum += mode.weights[group] * (r.rate + alpha * r.value);
     }
     largest = std::max(largest, std::abs(jump * sum));
   }
@@ -192,16 +245,19 @@ InertiaModes inertia_modes(const PlanScene& scene) {
   const double omega = lowest.angular_frequency();
   const double alpha = 2.0 * scene.scene().formulation.damping_ratio * omega;
   DrivenTissue tissue(driven.bonds, driven.rest, driven.constraints, driven.probes,
-                      scene.protocol().drive());
+                      scene.protocol());
   const TissueState rest = tissue.at_rest(0.0);
   const ViscousState viscous_state{rest.mean, lowest.relaxation_factor, rest.closed};
   if (!tissue.equilibrium().factorise(rest.position, viscous_state)) {
     throw Error(ExitCode::numerical, "network", "its stiffness at rest is not positive", "");
   }
+  std::vector<Eigen::Matrix3Xd> fields;
+  for (std::size_t g = 0; g < tissue.groups(); ++g) {
+    fields.push_back(tissue.unit_field(rest, viscous_state, g).displacement);
+  }
   InertiaModes found;
   found.modes = without_ringing_contacts(
-      Lanczos(scene, rest, tissue.constraints(), mass, lowest.relaxation_factor)
-          .modes(tissue.unit_field(rest, viscous_state).displacement),
+      Lanczos(scene, rest, tissue.constraints(), mass, lowest.relaxation_factor).modes(fields),
       driven.bonds, mass);
   found.lowest_Hz = lowest.frequency_Hz;
   found.alpha_per_s = alpha;
@@ -220,12 +276,15 @@ InertiaEstimate estimate_inertia(const PlanScene& scene) {
         std::max(estimate.highest_Hz, std::sqrt(mode.omega2) / (2.0 * std::numbers::pi));
   }
   const double span_s = kPeriods / lowest_Hz;
-  estimate.of_rates = of_rates(rate_kinks(scene.protocol()), modes, alpha, own_drag, span_s,
+  const std::vector<const Protocol*> protocols = all_protocols(scene);
+  estimate.of_rates = of_rates(rate_kinks(protocols), modes, alpha, own_drag, span_s,
                                scene.protocol().knots().back().time_s);
-  const double jump = largest_jump(scene.protocol());
-  if (jump > 0.0) {
-    estimate.of_jumps = scene.by_depth() ? std::numeric_limits<double>::infinity()
-                                         : of_jump(jump, modes, alpha, span_s);
+  for (std::size_t g = 0; g < protocols.size(); ++g) {
+    const double jump = largest_jump(*protocols[g]);
+    if (!(jump > 0.0)) continue;
+    estimate.of_jumps += protocols[g]->drive() == Drive::displacement
+                             ? std::numeric_limits<double>::infinity()
+                             : of_jump(jump, g, modes, alpha, span_s);
   }
   return estimate;
 }

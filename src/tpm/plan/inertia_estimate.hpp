@@ -7,8 +7,8 @@ namespace tpm::plan {
 
 /// A mode as the contact sees it.
 struct SeenMode {
-  double omega2 = 0.0;  ///< rad^2/s^2
-  double weight = 0.0;  ///< Gamma^2 omega^2
+  double omega2 = 0.0;          ///< rad^2/s^2
+  std::vector<double> weights;  ///< Gamma_0 Gamma_g omega^2 of each group g that is driven
 };
 
 /// How the network with masses moves about rest.
@@ -30,7 +30,9 @@ struct InertiaEstimate {
 /// The free spheres' deviation from their balance is driven by the acceleration of the balanced
 /// field u: M z'' + alpha M z' + K z = -M u (d'' + alpha d'), and changes the response by
 /// -u' K z. The modes are gathered by Lanczos' method from M^(1/2) u (24 steps), which needs no
-/// eigenvectors; every change of rate starts them anew, and they are summed over the protocol. K is
+/// eigenvectors; every change of rate starts them anew, and they are summed over the protocol.
+/// Where contacts have protocols of their own each one's balanced field drives the same modes, and
+/// the response is that of the first. K is
 /// that of the lowest mode's frequency, alpha the damping of the scene. What the driven sphere's
 /// own mass weighs in the drag is in it, its impacts are not, as in InertialRun::response. Throws
 /// as lowest_mode and masses_kg do.

@@ -22,8 +22,9 @@ constexpr double kLeastTolerance = 1e-6, kMostTolerance = 0.5;
 constexpr double kSlowest_Hz = 1.0, kFastest_Hz = 1e6;
 // What a plan may take: in parts of its reference and cross-check, and that anyway.
 constexpr double kMostOfReference = 2.0, kAnyway_s = 1.5;
-/// Runs with masses cannot be cut short: what is begun below this limit ends above it.
-constexpr double kMostOfReferenceWithMasses = 1.5;
+/// With masses of the reference alone. Its runs cannot be cut short: what is begun below this limit
+/// ends above it.
+constexpr double kMostOfReferenceWithMasses = 1.75;
 
 void require_valid(const PlanRequest& request) {
   require_number(request.tolerance >= kLeastTolerance && request.tolerance <= kMostTolerance,
@@ -81,6 +82,7 @@ class Planning {
     plan_.title = scene.tissue.title;
     plan_.request = request;
     plan_.by_depth = scene_.by_depth();
+    plan_.own_protocols = scene_.has_own_protocols();
     plan_.duration_s = scene_.duration_s();
     plan_.spheres = scene_.network().organ.size();
     plan_.bonds = scene_.network().bonds.size();
@@ -107,6 +109,7 @@ class Planning {
     tell("reference");
     reference_ = verified_reference(*surrogate_, plan_.request.tolerance);
     plan_.reference = reference_.reference;
+    plan_.work.reference_run_s = nominal_costs().seconds_of(reference_.trajectory.work);
     plan_.work.reference_s = nominal_costs().seconds_of(reference_.work);
     limit_work();
     tell("candidates");
@@ -140,7 +143,7 @@ class Planning {
 
   void limit_work() {
     if (plan_.request.thorough) return;
-    allowance_.set_most(plan_.inertial ? kMostOfReferenceWithMasses * plan_.work.reference_s
+    allowance_.set_most(plan_.inertial ? kMostOfReferenceWithMasses * plan_.work.reference_run_s
                                        : most_work_s(plan_.work.reference_s));
   }
 
@@ -321,6 +324,7 @@ PlanClaim claim_of(const Plan& plan) {
   claim.quantity = field           ? "displacements of all spheres"
                    : plan.by_depth ? "contact force"
                                    : "indentation depth";
+  if (plan.own_protocols && !field) claim.quantity += " of the first contact";
   claim.norm =
       fmt::format("largest absolute difference over the protocol{}, in parts of the {}",
                   field ? " and all spheres" : "", field ? "largest displacement" : "peak");
@@ -330,7 +334,8 @@ PlanClaim claim_of(const Plan& plan) {
         "tenth of the peak, if that is larger",
         shortest(rounded(measure.relative_weight, 4)));
   }
-  claim.protocol = "the scene's own protocol, no other";
+  claim.protocol = plan.own_protocols ? "the scene's own protocols, no others"
+                                      : "the scene's own protocol, no other";
   return claim;
 }
 

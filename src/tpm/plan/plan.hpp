@@ -13,9 +13,10 @@ namespace tpm::plan {
 
 /// Counted operations of a plan, at nominal costs.
 struct PlanWork {
-  double first_run_s = 0.0;  ///< of the coarsest run of the network
-  double reference_s = 0.0;  ///< of the reference and its cross-check
-  double all_s = 0.0;        ///< of all runs and of what is built
+  double first_run_s = 0.0;      ///< of the coarsest run of the network
+  double reference_run_s = 0.0;  ///< of the reference alone
+  double reference_s = 0.0;      ///< of the reference and its cross-check
+  double all_s = 0.0;            ///< of all runs and of what is built
 };
 
 /// What a plan will take, from its first run: `all_s` is a bound if the reference takes what is
@@ -39,7 +40,8 @@ struct PlanRequest {
   bool relevance = true;  ///< find out what does not matter
   bool changes = true;    ///< find out robustness margins
   /// Try everything, however long it takes. Else, by nominal costs, a plan takes about twice as
-  /// long as its reference and cross-check at most, or 1.5 s without masses.
+  /// long as its reference and cross-check at most, or 1.5 s; with masses, less than twice as long
+  /// as its reference alone.
   bool thorough = false;
   std::function<void(const std::string& what)> progress;  ///< told what is being done
   std::function<void(double share)> run_progress;  ///< told how far a run with masses has come
@@ -111,6 +113,7 @@ struct Plan {
   /// are shown do (shown_error()).
   std::optional<double> masses_left_out;
   bool by_depth = true;
+  bool own_protocols = false;  ///< contacts besides the first have protocols of their own
   double duration_s = 0.0;
   std::size_t spheres = 0, bonds = 0;
   std::vector<PlannedCandidate> candidates;  ///< by rising cost, those without one last

@@ -10,14 +10,11 @@
 namespace tpm::plan {
 namespace {
 
-constexpr int kReferenceTimesOfPiece = 640;
-constexpr int kMostReferenceTimes = 3000;
 // Of the reference without masses, in parts of the plan's; tighter while the cross-check disagrees.
 constexpr double kReferenceShare = 1e-3, kTightestReference = 1e-10, kTighterReference = 1e-2;
 constexpr double kCheckTimesReference = 10.0;  // the tolerance of the cross-check
 constexpr int kCheckStages = 3;
 constexpr double kInertialTolerance = 1e-6, kTighter = 0.1, kTightest = 1e-8;
-constexpr int kCheckOrder = 3;
 constexpr double kAgreement = 0.1;  // of the tolerance
 
 }  // namespace
@@ -27,27 +24,27 @@ VerifiedReference verified_reference(const PlanSurrogate& surrogate, double tole
   const PlanScene& scene = surrogate.scene();
   const PlanMeasure& measure = surrogate.measure();
   const bool field = surrogate.wants_field();
+  reference.times_s = surrogate.times_of_reference();
   Trajectory cross_check;
   if (surrogate.inertial()) {
-    reference.times_s = sampled_times(scene.protocol(), kReferenceTimesOfPiece, kMostReferenceTimes,
-                                      scene.driven().bonds.shortest_relaxation_time_s());
     // Errors gather over the periods of ringing, which few steps of a rise do not show: as tight as
     // it takes for the two to agree.
     for (double own = kInertialTolerance;; own *= kTighter) {
-      reference.trajectory = scene.inertial(inertial_options(scene, own), reference.times_s, field);
-      InertialOptions other = inertial_options(scene, own);
-      other.newton = NewtonSolver::klu;
-      other.highest_order = kCheckOrder;
+      reference.trajectory =
+          reference.times_s == surrogate.times()
+              ? surrogate.with_masses(own)
+              : scene.inertial(inertial_options(scene, own), reference.times_s, field);
+      InertialOptions other = inertial_options(scene, kCheckTimesReference * own);
+      other.formula = MotionFormula::trapezoidal;
       cross_check = scene.inertial(other, reference.times_s, field);
       reference.reference.method =
           fmt::format("network with masses, BDF of order 2, tolerance {}", shortest(own));
       reference.reference.cross_check =
-          fmt::format("BDF of order 3 with KLU, tolerance {}", shortest(own));
+          fmt::format("trapezoidal rule, tolerance {}", significant(kCheckTimesReference * own, 3));
       const double apart = trajectory_error(cross_check, reference.trajectory, measure);
       if (apart <= kAgreement * tolerance || own < kTightest * (1.0 + kTighter)) break;
     }
   } else {
-    reference.times_s = surrogate.times();
     for (double own = std::max(kReferenceShare * tolerance, kTightestReference);;
          own = std::max(kTighterReference * own, kTightestReference)) {
       reference.trajectory = surrogate.collocation(own);

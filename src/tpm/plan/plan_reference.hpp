@@ -13,10 +13,10 @@ struct VerifiedReference {
 
 /// The full nonlinear network at a thousandth of the tolerance, or tighter until it and a second
 /// run by other formulae agree: without masses Radau collocation with eight stages against three
-/// (of order 15 and 5 in smooth motion); with masses BDF of order 2 with the elimination by hand
-/// against order 3 with KLU. Throws Error(numerical) as the runs do, and where the two differ by
+/// (of order 15 and 5 in smooth motion); with masses BDF of order 2 against the trapezoidal rule at
+/// ten times its tolerance. Throws Error(numerical) as the runs do, and where the two differ by
 /// more than a tenth of the tolerance.
-/// @param surrogate whose runs are shared: without masses the reference is one of them
+/// @param surrogate whose runs are shared: the reference is one of them but with masses and tools
 [[nodiscard]] VerifiedReference verified_reference(const PlanSurrogate& surrogate,
                                                    double tolerance);
 

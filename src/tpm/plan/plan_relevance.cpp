@@ -97,8 +97,8 @@ PlanRelevance relevance_of_inertia(const PlanSurrogate& surrogate, const PlanAll
   try {
     if (surrogate.inertial()) {
       const Trajectory& massless = surrogate.coarse();
-      result.error =
-          trajectory_error(massless, surrogate.with_masses(kInertiaTolerance), surrogate.measure());
+      result.error = trajectory_error(massless, surrogate.with_masses_as_fine_as(kInertiaTolerance),
+                                      surrogate.measure());
       return result;
     }
     const InertiaEstimate& estimate = surrogate.inertia();

@@ -23,13 +23,6 @@ ExperimentScene plannable(ExperimentScene scene) {
   if (scene.formulation.mass_spring) {
     throw bad_input("scene", "runs the mass-spring model", "the tissue: without a comparison");
   }
-  if (scene.has_own_protocols()) {
-    throw bad_input("scene", "contacts have protocols of their own, which no plan compares",
-                    "one protocol, or tpm simulate");
-  }
-  if (scene.dead_load_N.size() > 0) {
-    throw bad_input("scene", "has loads, which no plan compares", "none, or tpm simulate");
-  }
   return scene;
 }
 
@@ -138,6 +131,13 @@ bool PlanScene::single_patch() const {
   return scene_.contacts.size() == 1 && scene_.contacts.front().kind == ContactKind::patch;
 }
 
+Protocol PlanScene::corners() const {
+  const std::vector<DriveGroup>& beside = driven().probes.loading().beside;
+  if (beside.empty()) return protocol();
+  const ImposedPath path(protocol(), beside);
+  return {Drive::displacement, {path.knots().begin(), path.knots().end()}, protocol().name()};
+}
+
 bool PlanScene::jumps() const {
   const auto knots = protocol().knots();
   bool jumps = knots.front().value != 0.0 && !protocol().equilibrium_at_start();
@@ -197,17 +197,30 @@ PlanScene PlanScene::with_protocol(Protocol protocol) const {
   return {std::move(scene), *this};
 }
 
+PlanScene PlanScene::with_all_protocols(
+    const std::function<Protocol(const Protocol&)>& change) const {
+  if (!has_own_protocols()) return with_protocol(change(protocol()));
+  ExperimentScene scene = scene_;
+  scene.protocol = change(scene.protocol);
+  for (SceneContact& contact : scene.contacts) {
+    if (contact.protocol) contact.protocol = change(*contact.protocol);
+  }
+  return {std::move(scene), spent_};  // those of contacts are part of the network that is driven
+}
+
 PlanScene PlanScene::deeper(double factor) const {
-  return with_protocol(protocol().scaled(factor));
+  return with_all_protocols([factor](const Protocol& one) { return one.scaled(factor); });
 }
 
 PlanScene PlanScene::faster(double factor) const {
-  std::vector<Knot> knots(protocol().knots().begin(), protocol().knots().end());
-  const double begin = knots.front().time_s;
-  for (Knot& knot : knots) knot.time_s = begin + (knot.time_s - begin) / factor;
-  Protocol quick(protocol().drive(), std::move(knots), protocol().name());
-  quick.set_equilibrium_at_start(protocol().equilibrium_at_start());
-  return with_protocol(std::move(quick));
+  return with_all_protocols([factor](const Protocol& one) {
+    std::vector<Knot> knots(one.knots().begin(), one.knots().end());
+    const double begin = knots.front().time_s;
+    for (Knot& knot : knots) knot.time_s = begin + (knot.time_s - begin) / factor;
+    Protocol quick(one.drive(), std::move(knots), one.name());
+    quick.set_equilibrium_at_start(one.equilibrium_at_start());
+    return quick;
+  });
 }
 
 PlanScene PlanScene::stiffer(double factor) const {
@@ -234,13 +247,16 @@ PlanScene PlanScene::nothing_relaxing() const {
 }
 
 PlanScene PlanScene::all_relaxed() const {
-  const auto at_equilibrium = [](BondMaterial& material) {
+  // A branch that never relaxes bears half of it: formulations want something that could relax.
+  // Under loads next to nothing, since tissue sags as far as what is left of the equilibrium lets
+  // it.
+  const double share = scene_.dead_load_N.size() > 0 ? 1e-6 : 0.5;
+  const auto at_equilibrium = [share](BondMaterial& material) {
     if (material.lateral == LateralBond::relaxing) {
       material.lateral_Pa *= material.equilibrium_Pa / material.instantaneous_Pa();
     }
-    // A branch that never relaxes bears half of it: formulations want something that could relax.
-    material.equilibrium_Pa *= 0.5;
-    material.branches = {{material.equilibrium_Pa, 1.0}};
+    material.branches = {{share * material.equilibrium_Pa, 1.0}};
+    material.equilibrium_Pa *= 1.0 - share;
     material.kernel = material.potential;
   };
   return with_materials(at_equilibrium).nothing_relaxing();

@@ -69,6 +69,13 @@ class PlanScene {
   [[nodiscard]] double duration_s() const;
   [[nodiscard]] bool by_depth() const { return protocol().drive() == Drive::displacement; }
   [[nodiscard]] bool has_tools() const { return !network_->driven.tools.empty(); }
+  /// Contacts besides the first have protocols of their own.
+  [[nodiscard]] bool has_own_protocols() const { return scene_.has_own_protocols(); }
+  /// Loads act all along, and the tissue sags before anything is imposed.
+  [[nodiscard]] bool has_loads() const { return scene_.dead_load_N.size() > 0; }
+  /// The times at which anything imposed changes its rate or jumps: protocol(), or where contacts
+  /// have protocols of their own the corners of all, with their numbers as values.
+  [[nodiscard]] Protocol corners() const;
   /// One sphere driven itself and nothing else in contact.
   [[nodiscard]] bool single_sphere() const;
   /// One patch and nothing else in contact.
@@ -102,6 +109,7 @@ class PlanScene {
   /// Bonds as stiff as when all has relaxed, from the first instant on. An elastic network like the
   /// other, not one that relaxes fast: following that takes steps without end where E2 >> E1.
   [[nodiscard]] PlanScene all_relaxed() const;
+  /// Another protocol of the scene; those of contacts stay.
   [[nodiscard]] PlanScene with_protocol(Protocol protocol) const;
   [[nodiscard]] PlanScene with_materials(const std::function<void(BondMaterial&)>& change) const;
   /// Spheres of deeper layers held: `layers` outer ones move.
@@ -110,6 +118,8 @@ class PlanScene {
  private:
   PlanScene(ExperimentScene scene, const PlanScene& same_network);
   PlanScene(ExperimentScene scene, std::shared_ptr<WorkSpent> spent);
+  [[nodiscard]] PlanScene with_all_protocols(
+      const std::function<Protocol(const Protocol&)>& change) const;
 
   ExperimentScene scene_;
   std::shared_ptr<const RunNetwork> network_;

@@ -9,7 +9,10 @@ namespace {
 
 // Those of the reference, whose run is one of these, and which other runs are compared with.
 constexpr int kTimesOfPiece = 64, kMostTimes = 800;
-constexpr int kTimesOfPieceWithMasses = 160, kMostTimesWithMasses = 1280;
+constexpr int kTimesOfPieceWithMasses = 640, kMostTimesWithMasses = 3000;
+constexpr int kTimesOfPieceUnderTools = 160, kMostTimesUnderTools = 1280;
+// Of a run at a tenth of the tolerance, where masses count, about.
+constexpr double kFinerRunTakes = 2.5;
 constexpr int kCurvePoints = 33;
 constexpr double kCurveTolerance = 1e-5;
 constexpr double kRamp_s = 1.0;       // in which static curves are followed
@@ -58,6 +61,23 @@ DepthCurve static_curve(const PlanScene& scene, double least_m, double most_m, R
   return curve;
 }
 
+std::vector<double> times_of(const PlanScene& scene, int per_piece, int most) {
+  return sampled_times(scene.corners(), per_piece, most,
+                       scene.driven().bonds.shortest_relaxation_time_s());
+}
+
+std::vector<double> times_of_claims(const PlanScene& scene, bool inertial) {
+  if (!inertial) return times_of(scene, kTimesOfPiece, kMostTimes);
+  if (!scene.has_tools()) return times_of(scene, kTimesOfPieceWithMasses, kMostTimesWithMasses);
+  return times_of(scene, kTimesOfPieceUnderTools, kMostTimesUnderTools);
+}
+
+/// The run at a tolerance, or of those made that are finer the coarsest; none if there is none.
+const Trajectory* as_fine_as(const std::map<double, Trajectory>& runs, double tolerance) {
+  if (runs.empty() || runs.begin()->first > kSame * tolerance) return nullptr;
+  return &std::prev(runs.upper_bound(kSame * tolerance))->second;
+}
+
 }  // namespace
 
 InertialOptions inertial_options(const PlanScene& scene, double tolerance) {
@@ -73,9 +93,12 @@ PlanSurrogate::PlanSurrogate(PlanScene scene, const PlanMeasure& measure, bool i
       measure_(measure),
       inertial_(inertial),
       most_s_(most_s),
-      times_(sampled_times(scene_.protocol(), inertial ? kTimesOfPieceWithMasses : kTimesOfPiece,
-                           inertial ? kMostTimesWithMasses : kMostTimes,
-                           scene_.driven().bonds.shortest_relaxation_time_s())) {}
+      times_(times_of_claims(scene_, inertial)) {}
+
+std::vector<double> PlanSurrogate::times_of_reference() const {
+  if (!inertial_ || !scene_.has_tools()) return times_;
+  return times_of(scene_, kTimesOfPieceWithMasses, kMostTimesWithMasses);
+}
 
 const Trajectory& PlanSurrogate::collocation(double tolerance) const {
   const auto found = collocation_.find(tolerance);
@@ -88,12 +111,12 @@ const Trajectory& PlanSurrogate::collocation(double tolerance) const {
 }
 
 bool PlanSurrogate::has_collocation_as_fine_as(double tolerance) const {
-  return !collocation_.empty() && collocation_.begin()->first <= kSame * tolerance;
+  return as_fine_as(collocation_, tolerance) != nullptr;
 }
 
 const Trajectory& PlanSurrogate::collocation_as_fine_as(double tolerance) const {
-  if (!has_collocation_as_fine_as(tolerance)) return collocation(tolerance);
-  return std::prev(collocation_.upper_bound(kSame * tolerance))->second;
+  const Trajectory* made = as_fine_as(collocation_, tolerance);
+  return made != nullptr ? *made : collocation(tolerance);
 }
 
 const Trajectory& PlanSurrogate::coarse() const {
@@ -119,6 +142,11 @@ const Trajectory& PlanSurrogate::with_masses(double tolerance) const {
       .emplace(tolerance,
                scene_.inertial(inertial_options(scene_, tolerance), times_, wants_field()))
       .first->second;
+}
+
+const Trajectory& PlanSurrogate::with_masses_as_fine_as(double tolerance) const {
+  const Trajectory* made = as_fine_as(with_masses_, tolerance);
+  return made != nullptr ? *made : with_masses(tolerance);
 }
 
 const InertiaEstimate& PlanSurrogate::inertia() const {
@@ -155,8 +183,10 @@ const ContactCurves& PlanSurrogate::curves() const {
 OperationCount PlanSurrogate::work_of_claims() const {
   OperationCount work = coarse_or_first().work;
   if (inertial_) {
-    work += with_masses(kTolerance).work;
-    work += with_masses(kRoughTolerance).work;
+    const OperationCount& rough_work = with_masses(kRoughTolerance).work;
+    const auto finer = with_masses_.find(kTolerance);
+    work += rough_work;
+    work += finer != with_masses_.end() ? finer->second.work : rough_work.times(kFinerRunTakes);
   } else {
     work += rough().work;
   }
@@ -168,7 +198,7 @@ double PlanSurrogate::claim_of(const Trajectory& model) const {
     return kSafety * trajectory_error(model, coarse(), measure_) + coarse_error() + kRounding;
   }
   // By runs, not by the linear estimate: where tissue stiffens masses do more than that says.
-  const Trajectory& moving = with_masses(kTolerance);
+  const Trajectory& moving = with_masses_as_fine_as(kTolerance);
   return kSafety * trajectory_error(model, moving, measure_) +
          trajectory_error(with_masses(kRoughTolerance), moving, measure_);
 }

@@ -29,6 +29,9 @@ class PlanSurrogate {
   [[nodiscard]] bool wants_field() const { return measure_.output == PlanOutput::field; }
   [[nodiscard]] bool inertial() const { return inertial_; }
   [[nodiscard]] const std::vector<double>& times() const { return times_; }
+  /// Those of the reference: times(), but where steps with masses end at the times that are asked
+  /// for, as they do under tools, others, so that models are verified in steps of their own.
+  [[nodiscard]] std::vector<double> times_of_reference() const;
 
   /// The network without masses, by collocation at a tolerance, at times().
   [[nodiscard]] const Trajectory& collocation(double tolerance) const;
@@ -52,8 +55,10 @@ class PlanSurrogate {
   [[nodiscard]] const OperationCount& work_of_first() const { return rough().work; }
   /// Its difference from that run.
   [[nodiscard]] double coarse_error() const;
-  /// The network with masses.
+  /// The network with masses, at times().
   [[nodiscard]] const Trajectory& with_masses(double tolerance) const;
+  /// The run at `tolerance` or, if one was made, the coarsest finer one.
+  [[nodiscard]] const Trajectory& with_masses_as_fine_as(double tolerance) const;
 
   [[nodiscard]] const ContactSpectrum& spectrum() const { return spectrum_at_rest(scene_); }
   [[nodiscard]] const InertiaEstimate& inertia() const;

@@ -16,6 +16,7 @@ class ScalarCandidate : public PlanModel {
   [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                    const PlanBudget& /*budget*/) const override {
     if (surrogate.scene().has_tools()) return "a tool touches and leaves spheres";
+    if (surrogate.scene().has_own_protocols()) return "knows one protocol, not those of contacts";
     if (surrogate.wants_field() && !knows_field()) return "knows the contact's force only";
     return std::nullopt;
   }

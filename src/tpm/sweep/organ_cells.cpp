@@ -189,7 +189,8 @@ class OrganCell final : public CellModel {
   std::optional<CellAnswer> on_reduced(const ExperimentScene& scene, const std::string& structure,
                                        const AskedTimes& times, std::span<double> values,
                                        std::span<std::int64_t> counts) {
-    if (!scene.tissue.is_element()) return {};  // regions are no part of the key
+    if (!scene.tissue.is_element()) return {};    // regions are no part of the key
+    if (scene.dead_load_N.size() > 0) return {};  // another sag for each material
     const BondElement p = scene.tissue.element();
     const std::string key = fmt::format("{} {} {} {} {} {}", structure, p.equilibrium_Pa,
                                         p.relaxing_Pa(), p.lateral_Pa, p.A0_m2, p.l0_m);

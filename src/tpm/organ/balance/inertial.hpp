@@ -14,6 +14,14 @@ enum class NewtonSolver {
   klu,
 };
 
+/// How CVODES steps.
+enum class MotionFormula {
+  bdf,
+  /// The trapezoidal rule (Adams and Moulton's formula of order 2): it damps nothing by itself, and
+  /// errs otherwise than BDF.
+  trapezoidal,
+};
+
 struct InertialOptions {
   /// Error that a step may have, root mean square over the coordinates, in parts of the largest
   /// depth (velocities: of that depth times the lowest angular frequency); 1e-12 to 0.1.
@@ -21,6 +29,7 @@ struct InertialOptions {
   /// Highest order of the BDF formulae, 1 to 5. Those above 2 are not stable on the imaginary axis,
   /// where vibrations live: they keep the step short for as long as something rings.
   int highest_order = 2;
+  MotionFormula formula = MotionFormula::bdf;
   NewtonSolver newton = NewtonSolver::eliminated;
   /// Of the lowest mode of the network without its probe, 0 to 10; what the bonds' own dashpots add
   /// is not in it.

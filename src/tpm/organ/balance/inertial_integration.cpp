@@ -72,14 +72,16 @@ InertialIntegration::InertialIntegration(InertialEquation& eq, const InertialOpt
       context_(sundials::make_context()),
       state_(N_VNew_Serial(eq.size(), context_.get())),
       error_(N_VClone(state_.get())),
-      memory_(CVodeCreate(CV_BDF, context_.get())) {
+      memory_(
+          CVodeCreate(options.formula == MotionFormula::bdf ? CV_BDF : CV_ADAMS, context_.get())) {
   view(state_.get()) = start;
   view(error_.get()) = error;
   void* m = memory_.get();
   check(CVodeInit(m, motion_rate, 0.0, state_.get()), "CVodeInit");
   check(CVodeSetUserData(m, &equation_), "CVodeSetUserData");
   check(CVodeSVtolerances(m, 0.0, error_.get()), "CVodeSVtolerances");
-  check(CVodeSetMaxOrd(m, options.highest_order), "CVodeSetMaxOrd");
+  const bool trapezoidal = options.formula == MotionFormula::trapezoidal;
+  check(CVodeSetMaxOrd(m, trapezoidal ? 2 : options.highest_order), "CVodeSetMaxOrd");
   check(CVodeSetMaxNumSteps(m, 50'000'000), "CVodeSetMaxNumSteps");
   sundials::mute(m);
   options.newton == NewtonSolver::klu ? use_klu() : use_elimination();

@@ -87,7 +87,7 @@ constexpr Capabilities kOfNetwork = with_any_material({.network = true,
                                                        .planned = true});
 
 Capabilities in_steps(Capabilities can) {
-  can.beforehand = can.own_protocols = can.dead_loads = false;
+  can.beforehand = false;
   return can;
 }
 

@@ -382,6 +382,7 @@ Json plan_json(const Plan& plan) {
                        {"difference", rounded(plan.reference.difference, 2)},
                        {"peak", rounded(plan.reference.peak, kPlanDigits)}};
   json["work"] = {{"first_run_s", rounded(plan.work.first_run_s, kPlanDigits)},
+                  {"reference_run_s", rounded(plan.work.reference_run_s, kPlanDigits)},
                   {"reference_s", rounded(plan.work.reference_s, kPlanDigits)},
                   {"all_s", rounded(plan.work.all_s, kPlanDigits)}};
   json["frontier"] = array_json(plan.candidates,
