@@ -28,6 +28,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
+#include "tpm/files/replacement.hpp"
 #include "tpm/haptics/device/forces_off_guard.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
@@ -91,7 +92,9 @@ void deliver(const std::string& text, const std::string& file) {
 }
 
 std::filesystem::path csv_beside(const std::string& output, const Session& session) {
-  if (output.empty() || !session.json() || is_device_or_pipe(output)) return {};
+  if (output.empty() || is_device_or_pipe(output)) return {};
+  (void)Replacement(output);  // before a long run and its folder of results: can it be written?
+  if (!session.json()) return {};
   std::filesystem::path file = output;
   // One that is called so already keeps its name whole.
   file = file.extension() == ".csv" ? output + ".csv" : file.replace_extension(".csv").string();
