@@ -172,7 +172,7 @@ void add_rendering(ValidationRequest& request, const ValidateOptions& options) {
   request.remarks = presses.remarks;
   for (const RecordingComparison& r : rendered.recordings) {
     if (r.part.whole()) continue;
-    request.remarks.push_back(fmt::format("{}: {}", r.name, part_words(r.part, presses.law.spec)));
+    request.remarks.push_back(fmt::format("{}: {}", r.name, part_words(r, presses.law.spec)));
   }
 }
 

@@ -37,9 +37,13 @@ TEST_CASE("a credibility page shows its record, and no longer once it was edited
   write_file(folder / "page.html", page);
   CHECK(read_credibility_record(folder / "page.html") == record);
   CHECK(shows_its_record(folder / "page.html", record));
-  CHECK_THAT(page, Contains("not adequate") && !Contains(">not_adequate<") &&
-                       Contains("peak force, N") && Contains("empty: nothing was given") &&
-                       Contains("tpm accuracy verify") && Contains("data-title=\"u_input\""));
+  CHECK_THAT(
+      page,
+      Contains("not adequate") && !Contains(">not_adequate<") && Contains("peak force, N") &&
+          Contains("empty: nothing was given") && Contains("tpm accuracy verify") &&
+          Contains("data-title=\"u_input\"") &&
+          Contains("compared: ramp from 19.9 s to 20.65 s, 3 mm deep, and hold to 40.7 s: the "
+                   "whole loading"));
   // Someone makes the verdict that is shown a better one; the record stays.
   std::string edited = page;
   const auto at = edited.find(">not adequate<");

@@ -174,40 +174,87 @@ void several(int experiments) {
   say("area metric beyond the 95 % point of its draws, 5 recordings", "peak", area);
 }
 
-/// Is u_input what the law's error scatters by? rms of (S of the fitted law - S of the true one)
-/// over u_input, 1 if it is right; at the validation's protocol, contact and zero known.
-void input_alone(int experiments, int calibrations) {
-  const StudyNoise noise;
+/// An error and the uncertainty stated for it, over many experiments, N.
+struct ErrorOfMany {
+  int count = 0;
+  double sum = 0.0, squares = 0.0, u_squares = 0.0;
+  void add(double error, double u) {
+    ++count;
+    sum += error;
+    squares += error * error;
+    u_squares += u * u;
+  }
+  [[nodiscard]] double mean() const { return sum / count; }
+  [[nodiscard]] double sd() const { return std::sqrt((squares - sum * sum / count) / (count - 1)); }
+  [[nodiscard]] double u() const { return std::sqrt(u_squares / count); }
+};
+
+void say(const std::string& what, const char* quantity, const ErrorOfMany& e) {
+  fmt::print("| {} | {} | {:.3f} | {:.3f} | {:.3f} | {:.3f} |\n", what, quantity, 1e3 * e.mean(),
+             1e3 * e.sd(), 1e3 * e.u(), e.sd() / e.u());
+  std::fflush(stdout);
+}
+
+/// Is each part of u_val what its error scatters by? S of the fitted law at the true contact
+/// against S of the law without noise; the rest of E against the readings' u_D; E against u_val.
+void parts(int experiments, int calibrations, double phi, double slow_branch) {
+  StudyNoise noise;
+  noise.phi = phi;
+  const StudyTest test = study_validation(40, 0.4);
   Random random(56);
   Random unused(0);
   StudyNoise clean;
-  clean.sigma_N = clean.zero_N = 0.0;
+  clean.sigma_N = 1e-7;
+  clean.zero_N = 0.0;
+  const LawFile limit = study_calibration(1, clean, random, slow_branch);
+  const TrueErrors delta = true_errors(limit, test, 1.0, slow_branch);
   const PreparedRecording truth =
-      prepare_recording("truth", study_recording(study_validation(40, 0.0), clean, unused));
+      prepare_recording("truth", study_recording(test, clean, unused, 1.0, slow_branch));
   const RecordingParts parts = parts_of(truth);
-  LawFile right = study_calibration(1, noise, random);
-  right.values = {60.0, 45.0, 2.0, 0.0, 0.0};
-  const Eigen::VectorXd exact = LawAlong(right, truth).at(0.0).value;
-  double peak = 0.0, end = 0.0;
+  struct Quantity {
+    QuantityKind kind;
+    const char* name;
+    double delta;
+    ErrorOfMany s, d, e;
+  };
+  std::vector<Quantity> quantities{
+      {QuantityKind::peak, "peak", delta.peak, {}, {}, {}},
+      {QuantityKind::end_of_hold, "end of hold", delta.end, {}, {}, {}}};
+  const auto simulated = [&](const LawFile& law, const LawAlong::At& at, QuantityKind kind) {
+    return read_quantity({kind}, parts, truth.recording, 0.0, at.value).value();
+  };
+  const LawAlong limit_along(limit, truth);
+  const LawAlong::At limit_at = limit_along.at(1e-3 * test.contact_mm);
+  double sigma = 0.0, correlation = 0.0;
   for (int i = 0; i < experiments; ++i) {
-    const LawFile law = study_calibration(calibrations, noise, random);
+    const LawFile law = study_calibration(calibrations, noise, random, slow_branch);
     const LawAlong along(law, truth);
-    const LawAlong::At at = along.at(0.0);
-    const auto square = [&](QuantityKind kind) {
-      const auto s = read_quantity({kind}, parts, truth.recording, 0.0, at.value).value();
-      const auto t = read_quantity({kind}, parts, truth.recording, 0.0, exact).value();
-      const double u = (s.weight.transpose() * at.by_law * along.root()).norm();
-      return std::pow((s.value - t.value) / u, 2);
-    };
-    peak += square(QuantityKind::peak);
-    end += square(QuantityKind::end_of_hold);
+    const LawAlong::At at = along.at(1e-3 * test.contact_mm);
+    const RecordingComparison r =
+        compared(law, test, noise, random, PlacementRule::held, 1.0, slow_branch);
+    sigma += r.scatter.sigma / experiments;
+    correlation += r.scatter.phi / experiments;
+    for (Quantity& q : quantities) {
+      const auto s = simulated(law, at, q.kind);
+      const double of_law = s.value - simulated(limit, limit_at, q.kind).value;
+      const QuantityComparison& found = study_quantity(r, q.kind);
+      q.s.add(of_law, (s.weight.transpose() * at.by_law * along.root()).norm());
+      q.d.add(found.e.error - q.delta - of_law, found.u_D);
+      q.e.add(found.e.error - q.delta, found.e.u_val);
+    }
   }
-  const auto ratio = [experiments](double sum) { return std::sqrt(sum / experiments); };
-  fmt::print(
-      "| error of S over u_input (rms), {} calibration recording{} | peak, end of hold | "
-      "{:.3f}, {:.3f} |\n",
-      calibrations, calibrations > 1 ? "s" : "", ratio(peak), ratio(end));
-  std::fflush(stdout);
+  const std::string what = fmt::format("{}{} calibration recording{}",
+                                       slow_branch > 0.0 ? "branch left out, "
+                                       : phi > 0.0       ? "AR(1) 0.9, "
+                                                         : "",
+                                       calibrations, calibrations > 1 ? "s" : "");
+  for (const Quantity& q : quantities) {
+    say(what + ": S, u_input", q.name, q.s);
+    say(what + ": D and contact, u_D", q.name, q.d);
+    say(what + ": E, u_val", q.name, q.e);
+  }
+  fmt::print("scatter: sigma {:.4f} mN, correlation {:.4f} on average\n\n", 1e3 * sigma,
+             correlation);
 }
 
 }  // namespace
@@ -230,7 +277,13 @@ int main(int argc, char** argv) {
         if (wanted("branch")) branch_left_out(n, words.size() > 2 ? std::stoull(words[2]) : 53);
         if (wanted("instruments")) instruments(n);
         if (wanted("several")) several(n);
-        if (wanted("input")) input_alone(n, 1);
-        if (wanted("input")) input_alone(n, 5);
+        if (wanted("parts")) {
+          fmt::print("| what | quantity | mean error, mN | its sd | u | sd / u |\n");
+          fmt::print("|---|---|---|---|---|---|\n");
+          parts(n, 1, 0.0, 0.0);
+          parts(n, 5, 0.0, 0.0);
+          parts(n, 1, 0.9, 0.0);
+          parts(n, 1, 0.0, 6.0);
+        }
       });
 }

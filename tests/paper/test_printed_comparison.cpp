@@ -1,7 +1,13 @@
 // The paper's model against printed numbers and ranges: verdicts by hand.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <filesystem>
 #include <limits>
+#include <map>
+#include <regex>
+#include <sstream>
+#include <string>
 
 #include "tpm/files/file.hpp"
 #include "tpm/paper/claims/audit.hpp"
@@ -15,6 +21,27 @@ using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 
 namespace {
+
+std::string report_in_repository() {
+  return read_file(std::filesystem::path(TPM_TEST_SOURCE_DIR) / "reports" / "paper" / "report.md");
+}
+
+/// How often each sentence of paragraphs, lists and captions stands in a Markdown page.
+std::map<std::string, int> sentences_of(const std::string& page) {
+  std::map<std::string, int> counts;
+  std::istringstream lines(page);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("|") || line.starts_with("#") || line.starts_with("![")) continue;
+    line = std::regex_replace(line, std::regex(R"(^- (Fit: )?|\*\*)"), "");
+    line = std::regex_replace(line, std::regex(R"(\. )"), "\n");
+    std::istringstream parts(line);
+    for (std::string sentence; std::getline(parts, sentence);) {
+      if (sentence.ends_with('.')) sentence.pop_back();
+      if (std::ranges::count(sentence, ' ') >= 3) ++counts[sentence];
+    }
+  }
+  return counts;
+}
 
 /// S against [low, high] with u_D alone, R = 10 %.
 PrintedComparison judged(double simulated, double low, double high, double u_D,
@@ -99,5 +126,36 @@ TEST_CASE("what the paper never printed is not called printed") {
       CHECK_THAT(f.consequence, !Contains(cause.text));
     }
     CHECK_THAT(f.consequence, !Contains("_"));
+  }
+}
+
+TEST_CASE("the report says no sentence twice") {
+  CHECK(sentences_of("- a b c d. A b c d.\n\n**a b c d.**\n").at("a b c d") == 2);
+  const std::map<std::string, int> sentences = sentences_of(report_in_repository());
+  CHECK(sentences.size() > 50);
+  for (const auto& [sentence, count] : sentences) {
+    INFO(sentence);
+    CHECK(count == 1);
+  }
+}
+
+TEST_CASE("the report's summary accounts for all claims, and the page names no variables") {
+  const std::string page = report_in_repository();
+  std::smatch counts;
+  REQUIRE(std::regex_search(
+      page, counts,
+      std::regex(
+          "of (\\d+) claims (\\d+) stand, (\\d+) differ from their recomputation, (\\d+) are "
+          "contradicted by [^;]*; off in the last digit: (\\d+); undetermined: (\\d+)")));
+  int sum = 0;
+  for (std::size_t i = 2; i < counts.size(); ++i) sum += std::stoi(counts[i]);
+  CHECK(sum == std::stoi(counts[1]));
+  // Identifiers of data sets, quantities of uncertainty and files may stand.
+  const std::regex name(R"([A-Za-z0-9]*[a-z][a-z0-9]*_[a-z0-9_]+(\.[a-z]+)?)");
+  const std::regex allowed(
+      R"(evren_(relaxation|static)|amy_creep|u_(val|num|input)|[a-z_0-9]+\.(svg|json))");
+  for (std::sregex_iterator i(page.begin(), page.end(), name), end; i != end; ++i) {
+    INFO(i->str());
+    CHECK(std::regex_match(i->str(), allowed));
   }
 }

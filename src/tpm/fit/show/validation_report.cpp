@@ -58,7 +58,7 @@ Figure error_figure(const Validation& v) {
     error.add(place, e.error);
     if (!e.limit) continue;
     constexpr double kHalf = 0.35;
-    Series allowed{.kind = Series::Kind::band, .label = "requirement", .provenance = "model"};
+    Series allowed{.kind = Series::Kind::band, .label = "requirement", .provenance = "assumed"};
     allowed.add_range(place - kHalf, -*e.limit, *e.limit);
     allowed.add_range(place + kHalf, -*e.limit, *e.limit);
     panel.series.push_back(std::move(allowed));
@@ -135,7 +135,8 @@ Figure motion_figure(const ValidationRequest& request, const Validation& v) {
     double longest = v.applicability.front().fitted_duration_s.value_or(0.0);
     for (const Series& series : panel.series) longest = std::max(longest, series.x.back());
     const double shown = *depth / unit.to_si;
-    panel.series.push_back(line("deepest of the calibration", {0.0, longest}, {shown, shown}));
+    panel.series.push_back(
+        line("deepest of the calibration", {0.0, longest}, {shown, shown}, "derived"));
   }
   figure.panels.push_back(std::move(panel));
   return figure;

@@ -6,16 +6,22 @@
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/validate/measured_placement_weights.hpp"
 
 namespace tpm::fit {
 namespace {
 
-/// Derivatives of the fitted samples of one recording, and what was measured of its placement.
+/// What one recording says of the law and of its own placement.
 struct FittedSlopes {
-  std::vector<double> time_s;
-  Eigen::MatrixXd by_law,
-      by_placement;                 ///< placement: zero, contact, drift, where they were fitted
-  Eigen::VectorXd prior_precision;  ///< 1/sd^2 of each column of by_placement; 0: no prior
+  /// Of all samples: what each adds to the scores of law and placement, the derivatives of the
+  /// fitted ones and, of a placement that was measured, its weight in what the fit took for it.
+  Eigen::MatrixXd scores;
+  /// J'J of the fitted samples; placement: zero, contact, drift, where they were fitted.
+  Eigen::MatrixXd gram;
+  /// Of each column of the placement, times the variance of an independent reading: 1/sd^2 that the
+  /// fit weighed its prior by (0: no prior), and the variance of what was measured by readings that
+  /// `scores` does not hold.
+  Eigen::VectorXd prior, prior_variance;
 };
 
 /// Contact and zero of a recording in the fit, and which were estimated.
@@ -51,47 +57,69 @@ double precision_of(const std::optional<Measured>& measured) {
   return measured && measured->sd > 0.0 ? 1.0 / (measured->sd * measured->sd) : 0.0;
 }
 
+/// @param of_independent variance of an independent reading, against which priors were weighed
 FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
                        const FittedFile& file, bool only_one, const RecordingParts& parts,
-                       const ReadingScatter& scatter) {
+                       const ReadingScatter& scatter, double of_independent) {
   const Recording& r = recording.recording;
   const LawAlong along(law, recording);
   const PlacementInFit in = placement_in(law, along, file, only_one, recording, parts, scatter);
   const LawAlong::At at = along.at(in.contact);
   std::vector<Eigen::Index> rows;
-  FittedSlopes slopes;
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (!file.holds(r.time_s[i]) || !std::isfinite(at.value[k])) continue;
-    rows.push_back(k);
-    slopes.time_s.push_back(r.time_s[i]);
+    if (file.holds(r.time_s[i]) && std::isfinite(at.value[k])) rows.push_back(k);
   }
-  slopes.by_law = at.by_law(rows, Eigen::all);
   MeasuredPlacement measured;
   const bool indents =
       law.spec.drive == Quantity::indentation_depth && law.spec.response == Quantity::contact_force;
   if (indents) measured = measure_placement(recording, law.spec, std::nullopt);
+  const std::optional<Eigen::VectorXd> zero_weights = zero_by_reading(r, measured.rests);
+  std::optional<Eigen::VectorXd> onset_weights;
+  const std::optional<double> exponent = first_loading_exponent(law.spec, std::nullopt);
+  if (exponent && zero_weights && !file.drift) {
+    onset_weights = onset_by_reading(recording, measured.onset, *exponent,
+                                     measured.rests.zero->value, *zero_weights);
+  }
+  struct Column {
+    Eigen::VectorXd slope;  ///< of the fitted samples
+    double precision = 0.0;
+    std::optional<Eigen::VectorXd> weights;  ///< of what was measured
+  };
+  std::vector<Column> columns;
   const auto n = static_cast<Eigen::Index>(rows.size());
-  std::vector<Eigen::VectorXd> columns;
-  std::vector<double> precision;
   if (in.fits_zero) {
-    columns.emplace_back(Eigen::VectorXd::Ones(n));
-    precision.push_back(precision_of(measured.rests.zero));
+    columns.push_back({Eigen::VectorXd::Ones(n), precision_of(measured.rests.zero), zero_weights});
   }
   if (in.fits_contact) {
-    columns.emplace_back(at.by_contact(rows));
-    precision.push_back(indents ? precision_of(measured.onset.drive) : 0.0);
+    columns.push_back(
+        {at.by_contact(rows), indents ? precision_of(measured.onset.drive) : 0.0, onset_weights});
   }
   if (file.drift) {
     const double origin_s = file.drift_origin_s.value_or(0.0);
-    columns.emplace_back(Eigen::VectorXd::Map(slopes.time_s.data(), n).array() - origin_s);
-    precision.push_back(precision_of(measured.rests.drift));
+    const auto time = Eigen::VectorXd::Map(r.time_s.data(), std::ssize(r.time_s));
+    columns.push_back(
+        {time(rows).array() - origin_s, precision_of(measured.rests.drift), std::nullopt});
   }
-  slopes.by_placement.resize(n, static_cast<Eigen::Index>(columns.size()));
-  slopes.prior_precision =
-      Eigen::VectorXd::Map(precision.data(), static_cast<Eigen::Index>(precision.size()));
-  for (Eigen::Index k = 0; k < slopes.by_placement.cols(); ++k) {
-    slopes.by_placement.col(k) = columns[static_cast<std::size_t>(k)];
+  const Eigen::Index p = at.by_law.cols(), width = std::ssize(columns);
+  FittedSlopes slopes;
+  slopes.prior = slopes.prior_variance = Eigen::VectorXd::Zero(width);
+  Eigen::MatrixXd j(n, p + width);
+  j.leftCols(p) = at.by_law(rows, Eigen::all);
+  for (Eigen::Index k = 0; k < width; ++k)
+    j.col(p + k) = columns[static_cast<std::size_t>(k)].slope;
+  slopes.gram = j.transpose() * j;
+  slopes.scores = Eigen::MatrixXd::Zero(std::ssize(r.time_s), p + width);
+  slopes.scores(rows, Eigen::all) = j;
+  for (Eigen::Index k = 0; k < width; ++k) {
+    const Column& column = columns[static_cast<std::size_t>(k)];
+    if (!(column.precision > 0.0)) continue;
+    slopes.prior[k] = of_independent * column.precision;
+    if (column.weights) {
+      slopes.scores.col(p + k) += slopes.prior[k] * *column.weights;
+    } else {
+      slopes.prior_variance[k] = 1.0 / column.precision;
+    }
   }
   return slopes;
 }
@@ -104,6 +132,9 @@ std::optional<LawFile> with_calibration_covariance(const LawFile& law,
   if (calibration.empty() || calibration.size() != u.data.size() || u.noise.kind != "absolute") {
     return std::nullopt;
   }
+  // Where the size of the noise is estimated, a prior weighs against the variance of an independent
+  // reading (docs/theory.md).
+  const double of_independent = u.noise.absolute * u.noise.absolute * u.readings_per_independent;
   std::vector<FittedSlopes> all;
   std::vector<ReadingScatter> scatters;
   Eigen::Index own = 0;
@@ -112,33 +143,28 @@ std::optional<LawFile> with_calibration_covariance(const LawFile& law,
     const RecordingParts parts = parts_of(calibration[i]);
     scatters.push_back(scatter_of(calibration[i], parts));
     degrees += scatters.back().degrees;
-    all.push_back(
-        slopes_of(law, calibration[i], u.data[i], calibration.size() == 1, parts, scatters.back()));
-    own += all.back().by_placement.cols();
+    all.push_back(slopes_of(law, calibration[i], u.data[i], calibration.size() == 1, parts,
+                            scatters.back(), of_independent));
+    own += all.back().prior.size();
   }
-  const Eigen::Index p = all.front().by_law.cols();
+  const Eigen::Index p = all.front().gram.cols() - all.front().prior.size();
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(p + own, p + own), b = a;
-  // Where the size of the noise is estimated, a prior weighs against the variance of an independent
-  // reading (docs/theory.md).
-  const double of_independent = u.noise.absolute * u.noise.absolute * u.readings_per_independent;
   Eigen::Index place = p;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const Eigen::Index width = all[i].by_placement.cols();
-    Eigen::MatrixXd j(all[i].by_law.rows(), p + width);
-    j << all[i].by_law, all[i].by_placement;
-    const Eigen::MatrixXd gram = j.transpose() * j;
-    const Eigen::MatrixXd noisy = scatters[i].covariance(all[i].time_s, j);
+    const Eigen::Index width = all[i].prior.size();
+    const Eigen::MatrixXd noisy =
+        scatters[i].covariance(calibration[i].recording.time_s, all[i].scores);
     const auto add = [&](Eigen::MatrixXd& sum, const Eigen::MatrixXd& part) {
       sum.topLeftCorner(p, p) += part.topLeftCorner(p, p);
       sum.block(0, place, p, width) += part.topRightCorner(p, width);
       sum.block(place, 0, width, p) += part.bottomLeftCorner(width, p);
       sum.block(place, place, width, width) += part.bottomRightCorner(width, width);
     };
-    add(a, gram);
+    add(a, all[i].gram);
     add(b, noisy);
-    const Eigen::VectorXd prior = of_independent * all[i].prior_precision;
+    const Eigen::VectorXd& prior = all[i].prior;
     a.diagonal().segment(place, width) += prior;
-    b.diagonal().segment(place, width) += of_independent * prior;
+    b.diagonal().segment(place, width) += prior.cwiseAbs2().cwiseProduct(all[i].prior_variance);
     place += width;
   }
   // Columns of one size: coordinates differ by many orders of magnitude.

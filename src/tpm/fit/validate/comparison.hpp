@@ -124,6 +124,9 @@ struct ComparisonOptions {
                                                          const PreparedRecording& recording,
                                                          const ComparisonOptions& options);
 
+/// Whether a quantity is a response: peak, end of the hold, at a time or a depth.
+[[nodiscard]] bool is_of_response(QuantityKind kind);
+
 /// The unit in which a quantity is shown.
 [[nodiscard]] Unit quantity_unit(const QuantityOfInterest& quantity, Quantity drive,
                                  Quantity response);

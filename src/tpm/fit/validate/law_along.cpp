@@ -49,11 +49,11 @@ std::vector<double> within(const Protocol& motion, std::vector<double> times_s, 
   return times_s;
 }
 
-bool is_load(Quantity q) {
+}  // namespace
+
+bool is_load(Quantity q) noexcept {
   return q == Quantity::load || q == Quantity::contact_force || q == Quantity::stress;
 }
-
-}  // namespace
 
 PreparedRecording as_load_imposed(const PreparedRecording& recording) {
   PreparedRecording turned = recording;

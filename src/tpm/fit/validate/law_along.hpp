@@ -76,6 +76,9 @@ class LawAlong {
   bool contact_of_law_ = false;
 };
 
+/// Whether a quantity is a load: as the drive of a recording it makes it one of creep.
+[[nodiscard]] bool is_load(Quantity q) noexcept;
+
 /// A recording of creep with the load as its drive and what it moved as its response.
 [[nodiscard]] PreparedRecording as_load_imposed(const PreparedRecording& recording);
 

@@ -10,6 +10,7 @@
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
+#include "tpm/fit/validate/law_along.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -205,8 +206,9 @@ ReadingScatter scatter_of(const PreparedRecording& recording, const RecordingPar
   const double independent = (static_cast<double>(n) - static_cast<double>(fit.columns)) *
                              (1.0 - scatter.phi) / (1.0 + scatter.phi);
   const double quantum = quantum_of({r.response.data() + first, n});
-  const double stated =
-      recording.instrument && !recording.load_imposed ? recording.instrument->reading_floor() : 0.0;
+  const double stated = recording.instrument && !is_load(r.drive_quantity)
+                            ? recording.instrument->reading_floor()
+                            : 0.0;
   scatter.sigma = std::max({scatter.sigma, quantum / std::sqrt(12.0), stated});
   scatter.degrees = std::max(independent - 1.0, 1.0);
   return scatter;

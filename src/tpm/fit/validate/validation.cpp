@@ -10,7 +10,6 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/select/loading_sense.hpp"
 #include "tpm/fit/validate/calibration_covariance.hpp"
@@ -40,8 +39,7 @@ std::optional<fs::path> found_file(const std::string& name, const std::string& s
 Applicability motion_of(const PreparedRecording& recording, const RecordingParts& parts,
                         double contact) {
   const Recording& r = recording.recording;
-  const bool load = r.drive_quantity == Quantity::load;
-  const std::vector<double>& depth = load ? r.response : r.drive;
+  const std::vector<double>& depth = is_load(r.drive_quantity) ? r.response : r.drive;
   Applicability a;
   const std::size_t last = std::max(parts.hold_last.value_or(parts.ramp_last), parts.loop_last);
   for (std::size_t i = parts.ramp_first; i <= last; ++i) {
@@ -248,7 +246,6 @@ CalibrationData find_calibration(const LawFile& law, const fs::path& law_file,
     } else {
       try {
         file.recording = read(path->string());
-        require_imposed_motion(file.recording->recording, fitted.name, "validation");
       } catch (const Error& error) {
         if (error.code() != ExitCode::bad_input) throw;
         file.recording.reset();
@@ -310,7 +307,6 @@ Validation validate(const ValidationRequest& request) {
   std::vector<Applicability> unseen_motions;
   for (std::size_t i = 0; i < request.recordings.size(); ++i) {
     const PreparedRecording& recording = request.recordings[i];
-    require_imposed_motion(recording.recording, recording.name, "validation");
     if (request.presses.empty()) require_rise(recording);
     ComparisonOptions options;
     options.quantities = request.quantities;

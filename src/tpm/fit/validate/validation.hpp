@@ -85,15 +85,16 @@ struct Validation {
 /// hand's own motion, from a validation whose recordings are presses of a session.
 [[nodiscard]] std::vector<RenderingError> rendering_errors(const Validation& presses);
 
-/// "ramp from 1 s to 5.1 s, 4.04 mm deep, hold to 25 s: the whole press"
-[[nodiscard]] std::string part_words(const ComparedPart& part, const LawSpec& law);
+/// "ramp from 1 s to 5.1 s, 4.04 mm deep, and hold to 25 s: the whole press"
+[[nodiscard]] std::string part_words(const RecordingComparison& recording, const LawSpec& law);
 
 /// "no model error is seen above the uncertainty", "a model error: peak force -14.2 +- 2.3 mN", ...
 [[nodiscard]] std::string conclusion_words(const Validation& validation);
 
 [[nodiscard]] std::string to_terminal_text(const Validation& validation);
 [[nodiscard]] Json to_json(const Validation& validation);
-/// One row a recording and quantity, then one a pooled quantity; SI.
+/// One row a recording and quantity, then one a pooled quantity; SI. Behind those of a recording,
+/// and of the means, stands the verdict of all quantities.
 [[nodiscard]] std::string to_csv(const Validation& validation);
 
 }  // namespace tpm::fit

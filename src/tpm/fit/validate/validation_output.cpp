@@ -1,4 +1,4 @@
-// Declared in tpm/fit/validate/validation.hpp.
+// Declared in tpm/fit/validate/validation.hpp: text for a terminal.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,12 +15,7 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kStoredDigits = 6;
 using Rank = BriefText::Rank;
-
-double stored(double value) {
-  return rounded(value, kStoredDigits);
-}
 
 std::string number(double value, const Unit& unit, int digits = 3) {
   return significant(value / unit.to_si, digits);
@@ -241,7 +236,7 @@ void add_recording(BriefText& text, const Validation& v, std::size_t index) {
   add_table(text, std::move(section), Rank::quantity, "quantities");
   add_remarks(text, r);
   const Unit unit = response_unit(r);
-  if (part_is_said(r)) text.add_line("compared", part_words(r.part, v.spec), Rank::context);
+  if (part_is_said(r)) text.add_line("compared", part_words(r, v.spec), Rank::context);
   text.add_line("together", joint_text(r.joint), Rank::detail);
   text.add_line("whole curve", curve_text(r.curve, unit), Rank::detail);
   if (!r.pick.empty()) text.add_line("S from", answer_text(r), Rank::context);
@@ -313,8 +308,7 @@ void add_each_recording(BriefText& text, const Validation& v) {
   for (const RecordingComparison& r : v.recordings) {
     whole_said = whole_said || (r.part.whole() && part_is_said(r));
     if (r.part.whole()) continue;
-    text.add_line("compared", fmt::format("{}: {}", r.name, part_words(r.part, v.spec)),
-                  Rank::context);
+    text.add_line("compared", fmt::format("{}: {}", r.name, part_words(r, v.spec)), Rank::context);
   }
   if (whole_said) {
     const bool all =
@@ -339,17 +333,21 @@ void add_each_recording(BriefText& text, const Validation& v) {
 
 }  // namespace
 
-std::string part_words(const ComparedPart& part, const LawSpec& law) {
-  const Unit unit = shown_unit(quantity_dimension(law.drive));
-  const auto deep = [&](double si) { return significant(si / unit.to_si, 3); };
+std::string part_words(const RecordingComparison& r, const LawSpec& law) {
+  const ComparedPart& part = r.part;
+  const Unit unit = shown_unit(quantity_dimension(r.creep ? law.response : law.drive));
+  const auto driven = [&](double si) { return significant(si / unit.to_si, 3); };
   const auto seconds = [](double s) { return significant(s, 4); };
-  std::string text = fmt::format("ramp from {} s to {} s, {} deep, ", seconds(part.from_s),
-                                 seconds(part.corner_s), with_unit(deep(part.depth), unit));
+  std::string text =
+      fmt::format("ramp from {} s to {} s, {}, ", seconds(part.from_s), seconds(part.corner_s),
+                  r.creep || unit.dimension != Dimension::length
+                      ? "to " + with_unit(driven(part.depth), unit)
+                      : with_unit(driven(part.depth), unit) + " deep");
   text += part.hold_s > 0.0 ? fmt::format("and hold to {} s", seconds(part.to_s)) : "no hold";
-  if (part.whole()) return text + ": the whole press";
+  if (part.whole()) return text + (part.hold_asked_s ? ": the whole press" : ": the whole loading");
   text += ": only a part";
   if (part.depth < part.depth_of_all) {
-    text += fmt::format(", of {}", with_unit(deep(part.depth_of_all), unit));
+    text += fmt::format(", of {}", with_unit(driven(part.depth_of_all), unit));
   }
   if (part.left_out_s > 0.0) {
     text += fmt::format(", without {} s of the {} s {}", seconds(part.left_out_s),
@@ -416,192 +414,6 @@ std::string to_terminal_text(const Validation& v) {
   for (const std::string& remark : v.remarks) text.add_line("note", remark, Rank::context);
   text.add_line("verdict", conclusion_words(v), Rank::always);
   return text.text();
-}
-
-namespace {
-
-void put_error(Json& j, const ErrorWithUncertainty& e) {
-  j["E"] = stored(e.error);
-  j["u_val"] = stored(e.u_val);
-  if (std::isfinite(e.degrees)) j["degrees_of_freedom"] = stored(e.degrees);
-  j["k"] = stored(e.coverage);
-  j["U"] = stored(e.expanded());
-}
-
-Json quantity_json(const QuantityComparison& q) {
-  Json j{{"quantity", q.name},
-         {"unit", q.unit.symbol},
-         {"S", stored(q.simulated)},
-         {"D", stored(q.measured)}};
-  put_error(j, q.e);
-  j["u_num"] = stored(q.u_num);
-  j["u_input"] = stored(q.u_input);
-  j["u_D"] = stored(q.u_D);
-  j["parts"] = array_json(q.parts, [](const UncertaintyPart& part) {
-    return Json{{"name", part.name}, {"u", stored(part.u)}};
-  });
-  j["numerical"] = array_json(q.numerical, [](const UncertaintyPart& part) {
-    return Json{{"name", part.name}, {"u", stored(part.u)}};
-  });
-  if (q.limit) j["R"] = stored(*q.limit);
-  j["verdict"] = verdict_key(q.verdict);
-  j["p_value"] = stored(q.p_value);
-  j["rejected_by_holm"] = q.rejected;
-  if (!q.remark.empty()) j["remark"] = q.remark;
-  return j;
-}
-
-Json applicability_json(const Applicability& a) {
-  Json j{{"depth_SI", stored(a.depth)},
-         {"duration_s", stored(a.duration_s)},
-         {"rate_SI_per_s", stored(a.rate)}};
-  if (a.fitted_depth) j["calibration_depth_SI"] = stored(*a.fitted_depth);
-  if (a.fitted_duration_s) j["calibration_duration_s"] = stored(*a.fitted_duration_s);
-  if (a.slowest) j["calibration_slowest_SI_per_s"] = stored(*a.slowest);
-  if (a.fastest) j["calibration_fastest_SI_per_s"] = stored(*a.fastest);
-  j["outside"] = a.outside;
-  j["unknown"] = a.unknown;
-  return j;
-}
-
-Json recording_json(const RecordingComparison& r, const Applicability& a) {
-  Json j{{"recording", r.name}, {"sha256", r.sha256}, {"fitted", r.calibration}};
-  if (r.creep) j["load_imposed"] = true;
-  if (!r.pick.empty()) j["pick"] = r.pick;
-  Json part{{"from_s", stored(r.part.from_s)},
-            {"corner_s", stored(r.part.corner_s)},
-            {"to_s", stored(r.part.to_s)},
-            {"depth_SI", stored(r.part.depth)},
-            {"depth_of_all_SI", stored(r.part.depth_of_all)},
-            {"hold_s", stored(r.part.hold_s)},
-            {"loaded_s", stored(r.part.loaded_s)},
-            {"left_out_s", stored(r.part.left_out_s)},
-            {"whole", r.part.whole()}};
-  if (r.part.hold_asked_s) {
-    part["hold_asked_s"] = stored(*r.part.hold_asked_s);
-  }
-  j["compared"] = std::move(part);
-  j["quantities"] = array_json(r.quantities, quantity_json);
-  j["not_compared"] = r.without;
-  Json joint{{"rank", r.joint.rank}};
-  if (r.joint.rank > 0) {
-    joint["T_squared"] = stored(r.joint.t_squared);
-    joint["F"] = stored(r.joint.f);
-    joint["p_value"] = stored(r.joint.p_value);
-    if (std::isfinite(r.joint.degrees)) joint["degrees_of_freedom"] = stored(r.joint.degrees);
-  }
-  joint["dependent"] = r.joint.dependent;
-  j["together"] = joint;
-  j["curve"] = {{"samples", r.curve.samples},
-                {"mean_square_E", stored(r.curve.mean_square_error)},
-                {"mean_square_u", stored(r.curve.mean_square_u)},
-                {"chi_squared", stored(r.curve.chi_squared)}};
-  const ValidationPlacement& p = r.placement;
-  Json placement{{"contact", stored(p.contact)},    {"contact_u", stored(p.contact_u)},
-                 {"contact_from", p.contact_words}, {"zero", stored(p.zero)},
-                 {"zero_u", stored(p.zero_u)},      {"zero_readings", p.zero_readings}};
-  if (p.onset) placement["onset"] = stored(*p.onset);
-  if (p.onset_u) placement["onset_u"] = stored(*p.onset_u);
-  if (p.contact_moved) placement["contact_moved_in_u"] = stored(*p.contact_moved);
-  if (p.zero_moved) placement["zero_moved_in_u"] = stored(*p.zero_moved);
-  j["placement"] = placement;
-  j["scatter"] = {{"sigma", stored(r.scatter.sigma)},
-                  {"phi", stored(r.scatter.phi)},
-                  {"degrees_of_freedom", stored(r.scatter.degrees)},
-                  {"from", r.scatter.told_by}};
-  if (r.instrument) j["instrument"] = r.instrument->stated;
-  j["same_instrument"] = r.same_instrument;
-  j["applicability"] = applicability_json(a);
-  j["verdict"] = verdict_key(r.verdict);
-  return j;
-}
-
-Json pooled_json(const PooledQuantity& p) {
-  Json j{{"quantity", p.name},
-         {"unit", p.relative ? "1" : p.unit.symbol},
-         {"recordings", p.recordings},
-         {"share_of_S", p.relative}};
-  if (!p.relative) {
-    j["S"] = stored(p.simulated);
-    j["D"] = stored(p.measured);
-  }
-  put_error(j, p.e);
-  j["u_shared"] = stored(p.u_shared);
-  j["sd_between"] = stored(p.between);
-  if (p.limit) j["R"] = stored(*p.limit);
-  j["verdict"] = verdict_key(p.verdict);
-  j["p_value"] = stored(p.p_value);
-  j["rejected_by_holm"] = p.rejected;
-  if (!p.remark.empty()) j["remark"] = p.remark;
-  if (p.area) {
-    Json area{{"area", stored(p.area->area)},
-              {"mean_of_draws", stored(p.area->null_mean)},
-              {"upper_95_of_draws", stored(p.area->null_95)},
-              {"p_value", stored(p.area->p_value)}};
-    if (p.area->lower) area["lower"] = stored(*p.area->lower);
-    if (p.area->upper) area["upper"] = stored(*p.area->upper);
-    if (p.area_at) area["at"] = *p.area_at;
-    j["area_metric"] = area;
-  }
-  return j;
-}
-
-}  // namespace
-
-Json to_json(const Validation& v) {
-  Json j{{"law_file", v.law_file},
-         {"law_sha256", v.law_sha256},
-         {"law", law_name(v.spec)},
-         {"subject", v.subject}};
-  j["calibration"] = array_json(v.calibration, [](const CalibrationData::File& f) {
-    Json file{{"name", f.name}, {"sha256", f.sha256}, {"found", f.recording.has_value()}};
-    if (!f.samples_sha256.empty()) file["samples_sha256"] = f.samples_sha256;
-    return file;
-  });
-  if (!v.session.empty()) {
-    j["session"] = v.session;
-    j["rendering"] = array_json(v.rendering, [&v](const RenderingError& e) {
-      return Json{{"quantity", quantity_words(e.quantity, v.spec.drive, v.spec.response)},
-                  {"mean", stored(e.mean)},
-                  {"limit", stored(e.limit)},
-                  {"presses", e.presses}};
-    });
-  }
-  j["requirement"] = v.requirement.empty() ? Json("none") : Json(v.requirement);
-  j["placement"] = placement_rule_name(v.placement);
-  j["u_input_from"] = v.u_input_from;
-  j["recordings"] = Json::array();
-  for (std::size_t i = 0; i < v.recordings.size(); ++i) {
-    j["recordings"].push_back(recording_json(v.recordings[i], v.applicability[i]));
-  }
-  if (!v.pooled.empty()) j["pooled"] = array_json(v.pooled, pooled_json);
-  if (!v.alone.empty()) j["in_one_only"] = array_json(v.alone, quantity_json);
-  j["remarks"] = v.remarks;
-  j["verdict"] = verdict_key(v.verdict);
-  j["words"] = conclusion_words(v);
-  return j;
-}
-
-std::string to_csv(const Validation& v) {
-  std::string text = csv_line({"recording", "quantity", "unit", "S", "D", "E", "U", "u_val",
-                               "u_num", "u_input", "u_D", "k", "R", "verdict"});
-  const auto cell = [](double value) { return significant(value, kStoredDigits); };
-  for (const RecordingComparison& r : v.recordings) {
-    for (const QuantityComparison& q : r.quantities) {
-      text += csv_line({r.name, q.name, q.unit.symbol, cell(q.simulated), cell(q.measured),
-                        cell(q.e.error), cell(q.e.expanded()), cell(q.e.u_val), cell(q.u_num),
-                        cell(q.u_input), cell(q.u_D), cell(q.e.coverage),
-                        q.limit ? cell(*q.limit) : "", std::string(verdict_key(q.verdict))});
-    }
-  }
-  for (const PooledQuantity& p : v.pooled) {
-    text += csv_line({"mean", p.name, p.relative ? "1" : p.unit.symbol,
-                      p.relative ? "" : cell(p.simulated), p.relative ? "" : cell(p.measured),
-                      cell(p.e.error), cell(p.e.expanded()), cell(p.e.u_val), "", "", "",
-                      cell(p.e.coverage), p.limit ? cell(*p.limit) : "",
-                      std::string(verdict_key(p.verdict))});
-  }
-  return text;
 }
 
 }  // namespace tpm::fit

@@ -37,12 +37,9 @@ Table estimates_table(const FitResult& fit) {
   return table;
 }
 
+/// What neither the summary nor a table says.
 std::vector<Cell> findings(const FitResult& fit) {
   std::vector<Cell> items;
-  for (const ParameterResult& p : fit.parameters) items.push_back({p.words});
-  for (const HypothesisResult& h : fit.hypotheses) {
-    items.push_back({h.words, h.excluded ? Tone::bad : Tone::plain});
-  }
   if (!fit.weakest_words.empty()) items.push_back({fit.weakest_words});
   std::string chi_square = fmt::format("chi-square {} with {} degrees of freedom",
                                        significant(fit.chi_square, 4), fit.degrees_of_freedom);

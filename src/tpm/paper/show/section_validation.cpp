@@ -131,7 +131,7 @@ Figure validation_error_figure(const std::vector<PrintedComparison>& all, double
   Figure figure{"validation_error", "Model error against the requirement",
                 "What is known of the model error, [E - U, E + U] in percent of D, for every D "
                 "that the print allows. Adequate: the whole bar lies between the dashed lines. Not "
-                "adequate: the whole bar lies outside. u_D holds the printed digits alone."};
+                "adequate: the whole bar lies outside."};
   for (const ErrorPanel& shown :
        {ErrorPanel{"Relaxation, peak", "peak force", "depth", "mm", 1.0, 9.0, 0.45, relaxing},
         ErrorPanel{"Relaxation, 30 s", "force after", "depth", "mm", 1.0, 9.0, 0.45, relaxing},
@@ -169,8 +169,7 @@ void add_validation(Document& document, const PaperReport& report) {
       "u_input² + u_D², and the model error lies in [E - U, E + U] with 95 %, U = k u_val. The "
       "paper calls its results close and states no requirement, so R = {} of D is ours "
       "(`tpm paper report --require`). Adequate: |E| + U ≤ R. Not adequate: |E| - U > R. The "
-      "column "
-      "'at other R' says what any other requirement would give.",
+      "column 'at other R' says what any other requirement would give.",
       share_text(report.requirement)));
   document.bullets(
       {{counted("Printed", counts_of(report.comparisons, true))},
