@@ -24,6 +24,7 @@ namespace {
 struct BudgetCommand {
   std::string law;
   RecordingOptions recordings;  ///< its file may also hold a protocol
+  PlacementArguments held;
   RampOptions ramp;
   std::string scene, finer, tolerance = "1%";
   std::string loop_rate = "1 kHz", encoder = "10 um", delay = "1", samples = "1000", seed = "0";
@@ -52,6 +53,7 @@ BudgetOptions budget_options(const BudgetCommand& command) {
 
 /// An organ's protocol is its scene's, unless another is given.
 ErrorBudget budget_of_organ(const BudgetCommand& command, const LawFile& law) {
+  require_nothing_held(command.held);
   ExperimentScene scene = read_experiment(command.scene);
   const bool other = !command.ramp.depth.empty() || !command.ramp.rate.empty() ||
                      !command.ramp.hold.empty() || !command.recordings.files.empty();
@@ -72,10 +74,15 @@ ErrorBudget budget_of_contact(const BudgetCommand& command, const LawFile& law) 
   if (!command.finer.empty()) {
     throw Error(ExitCode::usage, "--finer", "without --scene", "both, or none");
   }
-  const BudgetOptions options = budget_options(command);
+  BudgetOptions options = budget_options(command);
   const auto file = chosen_protocol(command.ramp, command.recordings.files);
-  if (file) return contact_budget(law, file->protocol, file->times_s, options);
-  return contact_budget(law, read_recordings(command.recordings).front(), options);
+  if (file) {
+    require_nothing_held(command.held);
+    return contact_budget(law, file->protocol, file->times_s, options);
+  }
+  const std::vector<PreparedRecording> recordings = read_recordings(command.recordings);
+  hold_placement(command.held, command.recordings, recordings, options.contact, options.zero);
+  return contact_budget(law, recordings.front(), options);
 }
 
 /// A plan whose tolerance is the data uncertainty; without a folder, the command that writes one.
@@ -148,6 +155,7 @@ void add_budget_command(CLI::App& app, Session& session) {
   add_verbose_option(*command, options->verbose, "from which stage to which, what a hand can feel");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
+  add_placement_options(*command, options->held);
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm fit recording.csv --folder fitted\n"

@@ -22,6 +22,7 @@ namespace {
 struct MaterialCommand {
   std::string law, scene;
   RecordingOptions recordings;  ///< its file may also hold a protocol
+  PlacementArguments held;
   RampOptions ramp;
   bool fit_times = false;
   std::string stiffening = "automatic";
@@ -45,6 +46,7 @@ std::vector<MaterialMotion> chosen_motions(const MaterialCommand& command, const
   const bool none = ramp.depth.empty() && ramp.rate.empty() && ramp.hold.empty() &&
                     command.recordings.files.empty();
   if (none) {
+    require_nothing_held(command.held);
     if (!has_protocol(scene)) {
       throw Error(ExitCode::usage, "RECORDING", "neither given nor a protocol in the scene",
                   "the recording that was fitted, or --depth, --rate and --hold");
@@ -53,11 +55,15 @@ std::vector<MaterialMotion> chosen_motions(const MaterialCommand& command, const
     return {motion_of_protocol(own.protocol, own.times_s)};
   }
   if (const auto file = chosen_protocol(ramp, command.recordings.files)) {
+    require_nothing_held(command.held);
     return {motion_of_protocol(file->protocol, file->times_s)};
   }
-  return mapped<MaterialMotion>(
-      read_recordings(command.recordings),
-      [&](const PreparedRecording& recording) { return motion_of_recording(law, recording); });
+  const std::vector<PreparedRecording> recordings = read_recordings(command.recordings);
+  PredictionOptions held;
+  hold_placement(command.held, command.recordings, recordings, held.contact, held.zero);
+  return mapped<MaterialMotion>(recordings, [&](const PreparedRecording& recording) {
+    return motion_of_recording(law, recording, held);
+  });
 }
 
 int run_material(const MaterialCommand& command, const Session& session) {
@@ -120,6 +126,7 @@ void add_material_command(CLI::App& app, Session& session) {
                       "material.csv and the figure into this folder");
   command->add_option("-o,--output", options->output, "Write the scene here");
   add_recording_options(*command, options->recordings);
+  add_placement_options(*command, options->held);
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm fit recording.csv --folder fitted\n"

@@ -86,12 +86,9 @@ int predict(const PredictOptions& options, const Session& session) {
   PredictionOptions chosen = prediction_options(options);
   const auto file = chosen_protocol(options.ramp, options.recordings.files);
   std::optional<PreparedRecording> recording;
-  const bool holds = !options.held.contact.empty() || !options.held.zero.empty();
-  if (file && holds) {
-    throw Error(ExitCode::usage, "--contact, --zero", "with a protocol",
-                "them with a recording; a protocol counts from the surface");
-  }
-  if (!file) {
+  if (file) {
+    require_nothing_held(options.held);
+  } else {
     recording = read_recordings(options.recordings).front();
     hold_placement(options.held, options.recordings, std::span(&*recording, 1), chosen.contact,
                    chosen.zero);

@@ -101,6 +101,12 @@ void hold_placement(const PlacementArguments& arguments, const RecordingOptions&
   require_contact_within(*contact, recordings, "--contact");
 }
 
+void require_nothing_held(const PlacementArguments& arguments) {
+  if (arguments.contact.empty() && arguments.zero.empty()) return;
+  throw Error(ExitCode::usage, "--contact, --zero", "with a protocol",
+              "them with a recording; a protocol counts from the surface");
+}
+
 ImportOptions import_options(const RecordingOptions& options) {
   return reading_of(options.reading);
 }

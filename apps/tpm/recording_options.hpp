@@ -49,6 +49,9 @@ void hold_placement(const PlacementArguments& arguments, const RecordingOptions&
                     std::span<const PreparedRecording> recordings, std::optional<double>& contact,
                     std::optional<double>& zero);
 
+/// Throws Error(usage) where there is no recording whose placement could be held.
+void require_nothing_held(const PlacementArguments& arguments);
+
 /// Adds the options above; `files` is the command's own.
 void add_recording_options(CLI::App& command, RecordingOptions& options);
 

@@ -32,7 +32,11 @@ struct FitRequest {
   std::optional<std::string> law;
   std::optional<std::size_t> starts;
   std::optional<std::uint64_t> seed;
-  std::optional<double> reference, contact, zero;
+  std::optional<double> reference, contact, contact_force_N, zero;
+
+  [[nodiscard]] bool holds_placement() const {
+    return contact.has_value() || contact_force_N.has_value() || zero.has_value();
+  }
   ImportOptions import;
 };
 
@@ -72,11 +76,17 @@ class Fit {
   [[nodiscard]] py::list parameters() const {
     py::list rows;
     for (const ParameterResult& p : fit_.parameters) {
+      const std::optional<WithDrift>& drift = p.with_drift;
+      using Value = std::optional<double>;
       rows.append(py::dict(py::arg("name") = p.parameter.name, py::arg("estimate") = p.estimate,
                            py::arg("standard_error") = p.standard_error, py::arg("lower") = p.lower,
                            py::arg("upper") = p.upper, py::arg("unit") = si_unit(p.parameter),
                            py::arg("verdict") = verdict_text(p), py::arg("nuisance") = p.nuisance,
                            py::arg("only_if_described") = p.only_if_described,
+                           py::arg("not_separable") = p.not_separable,
+                           py::arg("with_drift") = drift ? Value(drift->estimate) : Value(),
+                           py::arg("with_drift_lower") = drift ? drift->lower : Value(),
+                           py::arg("with_drift_upper") = drift ? drift->upper : Value(),
                            py::arg("words") = p.words));
     }
     return rows;
@@ -166,9 +176,9 @@ SelectionOptions selection_of(const FitRequest& request, const LongCall& call) {
 }
 
 Fit fit_configuration(const FitRequest& request, const LongCall& call) {
-  if (request.law || request.reference || request.contact || request.zero) {
-    throw Error(ExitCode::usage, "law, reference, contact, zero", "with a configuration",
-                "them only with recordings; a configuration says its own");
+  if (request.law || request.reference || request.holds_placement()) {
+    throw Error(ExitCode::usage, "law, reference, contact, contact_force, zero",
+                "with a configuration", "them only with recordings; a configuration says its own");
   }
   FitProblem problem = read_fit_problem(request.files.front());
   if (request.starts) problem.config.starts = *request.starts;
@@ -200,18 +210,23 @@ Fit fit_files(const FitRequest& request) {
   if (alone) {
     auto function = find_material_function(first.string(), request.import);
     if (function) {
-      if (request.contact || request.zero) {
-        throw Error(ExitCode::usage, "contact, zero", "with a material function",
+      if (request.holds_placement()) {
+        throw Error(ExitCode::usage, "contact, contact_force, zero", "with a material function",
                     "them only with recordings");
       }
       Selection selection = call.run([&] { return select_law(*function, options); });
       return fit_selected(std::move(selection), std::move(function));
     }
   }
+  if (request.contact && request.contact_force_N) {
+    throw Error(ExitCode::usage, "contact", "beside contact_force", "one of them");
+  }
+  PhaseOptions phases;
+  phases.contact_response = request.contact_force_N;
   std::vector<PreparedRecording> recordings;
   for (const std::string& file : request.files) {
     recordings.push_back(
-        prepare_recording(file, read_recording_file(file, request.import).recording));
+        prepare_recording(file, read_recording_file(file, request.import).recording, phases));
     recordings.back().import = request.import;
     take_instrument(recordings.back(), file);
   }
@@ -297,9 +312,10 @@ void bind_fits(py::module_& module) {
   module.def("fit", [](std::vector<std::string> files, std::optional<std::string> law,
                        std::optional<std::size_t> starts, std::optional<std::uint64_t> seed,
                        std::optional<double> reference, std::optional<double> contact,
-                       std::optional<double> zero, const py::dict& columns) {
-    return fit_files({std::move(files), std::move(law), starts, seed, reference, contact, zero,
-                      import_of(columns)});
+                       std::optional<double> contact_force_N, std::optional<double> zero,
+                       const py::dict& columns) {
+    return fit_files({std::move(files), std::move(law), starts, seed, reference, contact,
+                      contact_force_N, zero, import_of(columns)});
   });
   module.def("read_recording", &recording_of);
 }

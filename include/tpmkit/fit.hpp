@@ -23,6 +23,12 @@ enum class Verdict {
 
 [[nodiscard]] std::string_view verdict_name(Verdict verdict) noexcept;
 
+/// What a fit with a drift of the zero says of a parameter; SI.
+struct WithDrift {
+  double estimate = 0.0;
+  std::optional<double> lower, upper;
+};
+
 /// One estimated parameter, SI.
 struct FittedParameter {
   std::string name;
@@ -37,6 +43,9 @@ struct FittedParameter {
   /// What the recording cannot tell it from ("drift or a slow branch"): it is then not identified,
   /// whatever the verdict. Empty: nothing.
   std::string not_separable;
+  /// The second answer, where no rest tells a drift of the zero: `lower` and `upper` hold its
+  /// interval, too.
+  std::optional<WithDrift> with_drift = std::nullopt;
   /// Why the minimum itself is not trusted ("found by one start of 5", and what to do); the
   /// parameter is then not identified, whatever the verdict. Empty: nothing.
   std::string unconfirmed;
@@ -74,6 +83,11 @@ struct FitRequest {
   std::string law;
   std::optional<std::size_t> starts;  ///< of the search; default: the configuration's, or 40
   std::optional<std::uint64_t> seed;  ///< of the starts; default: the configuration's, or 0
+  /// For fit_recordings(), as the options of `tpm fit` of these names, SI. Contact and zero are
+  /// held; contact lies where the force passes `contact_force_N`, in place of `contact`.
+  std::optional<double> contact = std::nullopt, contact_force_N = std::nullopt, zero = std::nullopt;
+  /// Samples before and after these times of the files are left out.
+  std::optional<double> from_s = std::nullopt, until_s = std::nullopt;
   /// Called before each evaluation; true ends the fit with an exception.
   std::function<bool()> interrupted;
 };

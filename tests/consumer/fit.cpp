@@ -26,5 +26,12 @@ int main() {
     std::printf("%s %.4f\n", fit.parameters[i].name.c_str(), fit.parameters[i].estimate);
     right = right && std::abs(fit.parameters[i].estimate / expected[i] - 1.0) < 1e-2;
   }
+  // The depth of contact and the reading without a load are known: nothing else is fitted of them.
+  request.contact = 0.0;
+  request.zero = 0.0;
+  request.from_s = 0.0;
+  request.until_s = 8.0;
+  const tpm::fit::FitSummary held = tpm::fit::fit_recordings({"made.csv"}, request);
+  right = right && held.parameters.size() == 3;
   return right ? 0 : 1;
 }

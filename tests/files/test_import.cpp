@@ -6,6 +6,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/header_words.hpp"
 #include "tpm/files/import/import.hpp"
+#include "tpm/files/import/recording_file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
@@ -269,6 +270,38 @@ TEST_CASE("machine files that do not hold a recording are refused") {
   CHECK_THAT(fault(head + "0,0,0\n1,x,1\n"), Catch::Contains("f.csv:3: column 2 'Force': 'x'"));
   CHECK_THAT(fault(head + "0,0,0\n1,1,1\n2,2\n"), Catch::Contains("f.csv:4: 2 fields"));
   CHECK_THAT(fault("a (s),b (N),c\n0,0,0\n"), Catch::Contains("no column is recognised"));
+}
+
+TEST_CASE("rows of a sample that was lost are left out, and it is said") {
+  const TempFolder folder;
+  write_file(folder / "f.csv",
+             "Time (s),Force (N),Depth (mm)\n0,0,0\n1,NaN,1\n2,3,2\n3,,3\n4,5,4\n5,6,5\n");
+  const RecordingFile file = read_recording_file(folder / "f.csv", {});
+  CHECK(file.recording.time_s == std::vector{0.0, 2.0, 4.0, 5.0});
+  CHECK(file.recording.response == std::vector{0.0, 3.0, 5.0, 6.0});
+  CHECK_THAT(columns_words(file.findings),
+             Catch::Contains("missing: 2 of 6 rows have an empty cell or NaN, from line 3 on"));
+  // A column that is mostly empty is none.
+  write_file(folder / "g.csv", "Time (s),Force (N),Depth (mm)\n0,0,0\n1,nan,1\n2,nan,2\n");
+  CHECK_THROWS_WITH(read_recording_file(folder / "g.csv", {}),
+                    Catch::Contains("g.csv:3: column 2 'Force': 'nan'"));
+}
+
+TEST_CASE("rows of one time stamp become their mean, and it is said") {
+  const TempFolder folder;
+  write_file(folder / "f.csv",
+             "Time (s),Force (N),Depth (mm)\n0,0,0\n0,2,1\n1,3,2\n2,4,3\n2,5,4\n2,6,5\n");
+  const RecordingFile file = read_recording_file(folder / "f.csv", {});
+  CHECK(file.recording.time_s == std::vector{0.0, 1.0, 2.0});
+  CHECK(file.recording.response == std::vector{1.0, 3.0, 5.0});
+  CHECK_THAT(file.recording.drive[2], WithinRel(4e-3, 1e-14));
+  CHECK_THAT(columns_words(file.findings),
+             Catch::Contains("repeated times: 3 of 6 rows have the time of the row before"));
+  // A clock that goes back stamps no rows alike: it is refused, with what to do.
+  write_file(folder / "g.csv", "Time (s),Force (N),Depth (mm)\n0,0,0\n1,1,1\n0,2,2\n0,3,3\n");
+  CHECK_THROWS_WITH(read_recording_file(folder / "g.csv", {}),
+                    Catch::Contains("g.csv:4: time 0 s does not follow 1 s") &&
+                        Catch::Contains("a file for each part before and after this line"));
 }
 
 TEST_CASE("WebPlotDigitizer CSV: one dataset, and several") {

@@ -5,6 +5,7 @@
 
 #include "expected_values.hpp"
 #include "temp_folder.hpp"
+#include "tpm/base/random.hpp"
 #include "tpm/data/phases.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/recording_file.hpp"
@@ -294,6 +295,22 @@ TEST_CASE("recordings in which little happens get an explained answer") {
   CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate-response"));
   for (double& depth : upside_down.drive) depth = -depth;
   CHECK_THAT(all_words(phases_of(upside_down)), Catch::Contains("--negate-drive"));
+}
+
+TEST_CASE("a ramp that noise hides is no creep") {
+  Recording r;
+  r.drive_quantity = Quantity::indentation_depth;
+  r.response_quantity = Quantity::contact_force;
+  base::Random random(4);
+  for (int i = 0; i < 480; ++i) {
+    const double t = 0.05 * i, depth = std::clamp(2e-3 * (t - 3.0), 0.0, 4e-3);
+    r.time_s.push_back(t);
+    r.drive.push_back(depth);
+    // Noise of a fifth of the peak: near the end of the ramp the readings overlap.
+    r.response.push_back(90.0 * depth + 0.08 * random.normal());
+  }
+  const RecordingPhases phases = find_phases(r);
+  for (const Phase& phase : phases.phases) CHECK(phase.kind != PhaseKind::creep);
 }
 
 TEST_CASE("what cannot be cut into phases is refused") {

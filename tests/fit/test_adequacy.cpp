@@ -198,6 +198,59 @@ TEST_CASE("the causes of a misfit are told apart", "[adequacy]") {
     lost.reading[i] = 0.3 * (i % 3 - 1);
   }
   CHECK(first_word(lost) == "lost ");
+  // What is back at the level of the rest for good may also be a fluid that nothing moves any more.
+  for (int i = 110; i < kLoaded; ++i) {
+    lost.residual[i] -= lost.reading[i];
+    lost.reading[i] = 0.3 * (i % 3 - 1);
+  }
+  CHECK_THAT(judge_adequacy(lost.data()).causes.front(),
+             Catch::StartsWith("lost signal, or a fluid whose response ends with the motion"));
+}
+
+TEST_CASE("a signal that stands still at any level is named", "[adequacy]") {
+  for (const int first : {30, 100, kLoaded - 20}) {
+    CAPTURE(first);
+    Simulated frozen = simulated(60, 0.0, Defect::none, 0.0, 0.0, 6);
+    for (int i = first + 1; i < first + 20; ++i) {
+      const double law = frozen.reading[i] - frozen.residual[i];
+      frozen.reading[i] = frozen.reading[first];
+      // The law goes on while the readings do not, more than under the end of a hold.
+      frozen.residual[i] = frozen.reading[i] - law - 2.0 * (i - first);
+    }
+    const Adequacy a = judge_adequacy(frozen.data());
+    REQUIRE(a.described == Described::not_described);
+    REQUIRE_FALSE(a.causes.empty());
+    CHECK_THAT(a.causes.front(), Catch::StartsWith("frozen signal: 20 readings in a row from"));
+  }
+  // Coarsely rounded readings repeat, and nothing stands still.
+  Simulated coarse = simulated(60, 0.0, Defect::ringing, 20.0, 6.0, 7);
+  for (const std::string& cause : judge_adequacy(coarse.data()).causes) {
+    CHECK_THAT(cause, !Catch::StartsWith("frozen"));
+  }
+}
+
+TEST_CASE("the bend of a zero that warms up is told from correlated noise", "[adequacy]") {
+  constexpr int kTrials = 1000;
+  for (const double rho : {0.0, 0.6, 0.9}) {
+    for (const int at_rest : {20, 60, 200}) {
+      CAPTURE(rho, at_rest);
+      int found = 0;
+      for (int i = 0; i < kTrials; ++i) {
+        const Simulated s = simulated(at_rest, rho, Defect::none, 0.0, 0.0, 900U + i);
+        const auto bend = rest_bend(s.rest_time_s, s.rest);
+        REQUIRE(bend);
+        found += bend->p_value < 1e-3;
+      }
+      CHECK(found <= 5);  // of 1000, at a level of 0.1 %
+    }
+  }
+  Simulated warm = simulated(100, 0.0, Defect::none, 0.0, 0.0, 8);
+  for (std::size_t i = 0; i < warm.rest.size(); ++i) {
+    warm.rest[i] += 50.0 * (1.0 - std::exp(-(warm.rest_time_s[i] - warm.rest_time_s[0]) / 8.0));
+  }
+  const RestBend bend = rest_bend(warm.rest_time_s, warm.rest).value();
+  CHECK(bend.p_value < 1e-6);
+  CHECK(bend.noises > 3.0);
 }
 
 TEST_CASE("too short a rest gives no verdict", "[adequacy]") {

@@ -107,6 +107,22 @@ TEST_CASE("the short answer of a law with many parameters names the verdict of e
   CHECK_THAT(text, Contains("more29: flat"));
 }
 
+TEST_CASE("an estimate near 0 is shown in the unit of its interval", "[fit][answer]") {
+  Selection s = selected(1.0);
+  FitResult& fit = s.candidates[s.recommended].fit;
+  for (ParameterResult& p : fit.parameters) {
+    if (p.parameter.name != "contact") continue;
+    p.verdict = Verdict::identified;
+    p.estimate = 1.6e-16;
+    p.lower = -2.871e-6;
+    p.upper = 2.427e-6;
+  }
+  const std::string text = printed_answer(s);
+  INFO(text);
+  CHECK_THAT(text, Contains("-2.871 .. 2.427") && Contains("um"));
+  CHECK_THAT(text, !Contains(" fm"));
+}
+
 TEST_CASE("the short answer of a folder names the recordings that are not fitted or described",
           "[fit][answer]") {
   SpecimenStudy study;

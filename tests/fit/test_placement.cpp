@@ -182,6 +182,27 @@ TEST_CASE("a drift after withdrawal is read there, too", "[placement]") {
   CHECK(rests.drift->sd < 5e-6);
 }
 
+TEST_CASE("a placement that is remembered is the one that is measured", "[placement]") {
+  PlacedTest test;
+  const PreparedRecording recording = test::prepared(test, 12);
+  std::vector<PreparedRecording> two(2, recording);
+  two.back().to_s = 0.5 * recording.to_s;
+  PlacementMemory memory;
+  for (const char* name : {"linear-1", "linear-3", "hertz-1", "power-1"}) {
+    const LawSpec law = parse_law_name(name, "test");
+    for (const PreparedRecording& r : two) {
+      const MeasuredPlacement measured = measure_placement(r, law, {});
+      const MeasuredPlacement& remembered = memory.of(r, law, {});
+      CHECK(remembered.onset.drive.value == measured.onset.drive.value);
+      CHECK(remembered.onset.drive.sd == measured.onset.drive.sd);
+      CHECK(remembered.drift == measured.drift);
+      CHECK(&memory.of(r, law, {}) == &remembered);
+    }
+  }
+  CHECK(memory.of(recording, parse_law_name("power-1", "test"), 2.0).onset.drive.value ==
+        measure_placement(recording, parse_law_name("power-1", "test"), 2.0).onset.drive.value);
+}
+
 TEST_CASE("without a rest a drift and a slow branch are not separable", "[placement]") {
   PlacedTest test;
   test.rest_s = 0.0;

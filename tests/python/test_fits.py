@@ -45,6 +45,24 @@ class Fits(unittest.TestCase):
         self.assertIn("linear-1", self.fit.laws.index)
         self.assertTrue(self.fit.words)
 
+    def test_the_second_answer_with_a_drift(self):
+        table = self.fit.parameters
+        for name in ("k1", "tau1"):
+            row = table.loc[name]
+            self.assertFalse(np.isnan(row.with_drift))
+            self.assertLessEqual(row.lower, row.with_drift_lower)
+            self.assertGreaterEqual(row.upper, row.with_drift_upper)
+        self.assertEqual(table.loc["k_inf", "not_separable"], "drift or a slow branch")
+        self.assertTrue(np.isnan(table.loc["offset", "with_drift"]))
+
+    def test_placement_can_be_held(self):
+        fit = tpmkit.fit(self.file, law="linear-1", starts=3, contact=0.0, zero=0.0, columns={"until": "10 s"})
+        self.assertEqual(list(fit.parameters.index), ["k_inf", "k1", "tau1"])
+        by_force = tpmkit.fit(self.file, law="linear-1", starts=3, contact_force=0.01)
+        self.assertNotIn("contact", by_force.parameters.index)
+        with self.assertRaisesRegex(tpmkit.Error, "beside contact_force"):
+            tpmkit.fit(self.file, law="linear-1", contact=0.0, contact_force=0.01)
+
     def test_predictions_are_those_of_the_fitted_law(self):
         protocol = tpmkit.Protocol.ramp_and_hold(2e-3, 1e-3, 10.0)
         times = np.linspace(0.0, 12.0, 25)

@@ -106,14 +106,17 @@ class Fit:
 
         Columns: estimate, standard_error (linearised), lower and upper (limits by profile likelihood; NaN
         where the data give none), unit, verdict, nuisance (belongs to the recording), only_if_described (the
-        law does not describe the data: the row holds only if it did), words.
+        law does not describe the data: the row holds only if it did), not_separable (what the recording cannot
+        tell it from; empty: nothing), with_drift, with_drift_lower, with_drift_upper (estimate and limits of the
+        fit with a drift of the zero, where no rest tells one: lower and upper hold these limits, too; else NaN),
+        words.
         """
         import pandas as pd
 
         columns = ["name", "estimate", "standard_error", "lower", "upper", "unit", "verdict", "nuisance",
-                   "only_if_described", "words"]
+                   "only_if_described", "not_separable", "with_drift", "with_drift_lower", "with_drift_upper", "words"]
         table = pd.DataFrame(self._core.parameters, columns=columns).set_index("name")
-        numbers = ["estimate", "standard_error", "lower", "upper"]
+        numbers = ["estimate", "standard_error", "lower", "upper", "with_drift", "with_drift_lower", "with_drift_upper"]
         table[numbers] = table[numbers].astype(float)
         return table
 
@@ -523,6 +526,7 @@ def fit(
     seed: int | None = None,
     reference: float | None = None,
     contact: float | None = None,
+    contact_force: float | None = None,
     zero: float | None = None,
     columns: Mapping[str, Any] | None = None,
 ) -> Fit | Specimens:
@@ -545,9 +549,9 @@ def fit(
         Number of starts and seed of the search; equal seeds give equal answers.
     reference
         Depth (m) at which coefficients are secants. Default: the largest.
-    contact, zero
-        Depth of contact (m) and reading without a load (N) of recordings, to be held. Default: measured, with
-        their uncertainties.
+    contact, contact_force, zero
+        Depth of contact (m), or the force (N) that marks it, and reading without a load (N) of recordings, to be
+        held. Default: measured, with their uncertainties.
     columns
         What a file does not say: ``{"time": "t", "drive": "z", "response": "F", "units": {"F": "mN"}}``;
         also sd, frequency, storage, loss, drive_quantity, response_quantity; and provenance, such as "assumed"
@@ -572,11 +576,13 @@ def fit(
     for name, value in (("starts", starts), ("seed", seed)):
         if value is not None and (isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0):
             raise _core.Error(f"fit: {name} is {value!r}; expected a whole number")
-    for name, value in (("reference", reference), ("contact", contact), ("zero", zero)):
+    placement = {"reference": reference, "contact": contact, "contact_force": contact_force, "zero": zero}
+    units_of = {"reference": "m", "contact": "m", "contact_force": "N", "zero": "N"}
+    for name, value in placement.items():
         if value is not None and not isinstance(value, (int, float, np.floating, np.integer)):
-            raise _core.Error(f"fit: {name} is {value!r}; expected a number, in m (zero: in N)")
+            raise _core.Error(f"fit: {name} is {value!r}; expected a number, in {units_of[name]}")
 
-    options = (law, starts, seed, reference, contact, zero, dict(columns or {}))
+    options = (law, starts, seed, *placement.values(), dict(columns or {}))
     if arrays:
         return _fit_table(_table_of(time, depth, force, units), options)
     if hasattr(files, "to_csv"):
@@ -584,10 +590,10 @@ def fit(
     if isinstance(files, (str, os.PathLike)):
         if os.path.isdir(files):
             words = ["fit", os.fspath(files), "--no-draw", *_options(columns)]
-            said = {"laws": law, "starts": starts, "seed": seed, "reference": reference, "contact": contact, "zero": zero}
+            said = {"laws": law, "starts": starts, "seed": seed, **placement}
             for key, value in said.items():
-                unit = {"reference": " m", "contact": " m", "zero": " N"}.get(key, "")
-                words += [] if value is None else ["--" + key, f"{value}{unit}"]
+                unit = " " + units_of[key] if key in units_of else ""
+                words += [] if value is None else ["--" + key.replace("_", "-"), f"{value}{unit}"]
             return Specimens(_program.answer(words))
         files = [files]
     names = [os.fspath(f) for f in files]  # type: ignore[union-attr]

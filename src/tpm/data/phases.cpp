@@ -254,6 +254,22 @@ class Finder {
     return start;
   }
 
+  /// Whether noise alone makes readings look constant: the means of their halves are apart.
+  [[nodiscard]] bool rises_within_noise(std::size_t first, std::size_t last) const {
+    constexpr double kSure = 4.0, kConstant = 0.02;  // standard deviations; of the level
+    const std::size_t half = (last - first + 1) / 2;
+    if (half < 2) return false;
+    const auto mean_from = [&](std::size_t begin) {
+      double sum = 0.0;
+      for (std::size_t i = begin; i < begin + half; ++i) sum += response_[i];
+      return sum / static_cast<double>(half);
+    };
+    const double early = mean_from(first), late = mean_from(last + 1 - half);
+    const double unsure =
+        kSure * found_.noise_sd_estimate * std::sqrt(2.0 / static_cast<double>(half));
+    return late - early > std::max(unsure, kConstant * std::abs(late));
+  }
+
   /// A force that stays constant while the depth grows was held by the machine.
   void find_creep() {
     constexpr double kLeastPart = 0.3;  // of the phase's time
@@ -265,7 +281,9 @@ class Finder {
       const std::size_t start = start_of_constant_response(phase);
       const double part =
           (time_[phase.last] - time_[start]) / (time_[phase.last] - time_[phase.first]);
-      if (part > kLeastPart) relabel(start, phase.last, PhaseKind::creep);
+      if (part > kLeastPart && !rises_within_noise(start, phase.last)) {
+        relabel(start, phase.last, PhaseKind::creep);
+      }
     }
   }
 

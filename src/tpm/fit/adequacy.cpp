@@ -176,19 +176,51 @@ EqualRun run_at(std::span<const double> values, double value, bool largest) {
 }
 
 /// Readings that are back at the level of the rest while the law expects a load.
-std::optional<double> signal_lost_at_s(const AdequacyData& data, const RestNoise& noise) {
+struct LostSignal {
+  double at_s = 0.0;
+  bool to_the_end = false;  ///< as of a fluid without memory, too, whose force ends with the motion
+};
+
+std::optional<LostSignal> signal_lost(const AdequacyData& data, const RestNoise& noise) {
   constexpr int kInARow = 3;
   constexpr double kAtRest = 4.0, kFarOff = 20.0;  // standard deviations of the noise
   const double level = mean_of(data.rest);
   const double sd = std::sqrt(noise.variance);
+  const auto at_rest = [&](double reading) { return std::abs(reading - level) <= kAtRest * sd; };
   int count = 0;
   for (std::size_t i = 0; i < data.reading.size(); ++i) {
-    const bool lost = std::abs(data.reading[i] - level) <= kAtRest * sd &&
-                      std::abs(data.residual[i]) > kFarOff * sd;
+    const bool lost = at_rest(data.reading[i]) && std::abs(data.residual[i]) > kFarOff * sd;
     count = lost ? count + 1 : 0;
-    if (count == kInARow) return data.time_s[i + 1 - kInARow];
+    if (count < kInARow) continue;
+    const auto later = data.reading.subspan(i);
+    const auto still = std::ranges::count_if(later, at_rest);
+    constexpr double kAll = 0.98;  // some readings lie far off
+    return LostSignal{data.time_s[i + 1 - kInARow],
+                      static_cast<double>(still) > kAll * static_cast<double>(later.size())};
   }
   return std::nullopt;
+}
+
+/// Readings that stand still at any level while those that the law expects move on: longer than
+/// rounding makes, and by more than the noise.
+std::optional<EqualRun> frozen_run(const AdequacyData& data, const RestNoise& noise) {
+  constexpr std::size_t kLeast = 8, kTimes = 3;
+  constexpr double kMoved = 6.0;  // standard deviations of the noise
+  const std::span<const double> readings = data.reading;
+  EqualRun run;
+  std::size_t begin = 0, second = 0;
+  for (std::size_t i = 1; i <= readings.size(); ++i) {
+    if (i < readings.size() && readings[i] == readings[begin]) continue;
+    const std::size_t length = i - begin;
+    second = std::max(second, std::min(length, run.length));
+    if (length > run.length) run = {begin, length, readings[begin], false};
+    begin = i;
+  }
+  if (run.length < kLeast || run.length <= kTimes * second) return std::nullopt;
+  const auto [low, high] =
+      std::ranges::minmax_element(data.residual.subspan(run.first, run.length));
+  if (*high - *low <= kMoved * std::sqrt(noise.variance)) return std::nullopt;
+  return run;
 }
 
 std::vector<std::string> causes_of(const AdequacyData& data, const RestNoise& noise, double level) {
@@ -200,10 +232,18 @@ std::vector<std::string> causes_of(const AdequacyData& data, const RestNoise& no
         run->length, significant(data.time_s[run->first], 4),
         run->largest ? "largest" : "smallest"));
   }
-  if (const auto lost = signal_lost_at_s(data, noise)) {
+  if (const auto lost = signal_lost(data, noise)) {
+    causes.push_back(
+        fmt::format("{}: from {} s on readings are {} at the level of the rest{}",
+                    lost->to_the_end ? "lost signal, or a fluid whose response ends with the motion"
+                                     : "lost signal",
+                    significant(lost->at_s, 4), lost->to_the_end ? "to the end" : "back",
+                    lost->to_the_end ? "" : " under a load"));
+  }
+  if (const auto run = frozen_run(data, noise); run && causes.empty()) {
     causes.push_back(fmt::format(
-        "lost signal: from {} s on readings are back at the level of the rest under a load",
-        significant(*lost, 4)));
+        "frozen signal: {} readings in a row from {} s on are equal, longer than rounding makes",
+        run->length, significant(data.time_s[run->first], 4)));
   }
   if (const auto trend = rest_trend(data.rest_time_s, data.rest)) {
     constexpr double kSeen = 4.0, kMatters = 1.0;
@@ -267,6 +307,33 @@ std::optional<RestTrend> rest_trend(std::span<const double> time_s, std::span<co
   const double rho = std::clamp(lag1_about(line.off, 0.0).value_or(0.0), 0.0, kMostCorrelation);
   const double variance = squares / static_cast<double>(rest.size() - 2);
   return RestTrend{line.per_s, std::sqrt(variance / line.spread * (1.0 + rho) / (1.0 - rho))};
+}
+
+std::optional<RestBend> rest_bend(std::span<const double> time_s, std::span<const double> rest) {
+  constexpr std::size_t kFewest = 20;
+  if (rest.size() < kFewest) return std::nullopt;
+  const double mean_time = mean_of(time_s);
+  const double half = 0.5 * (time_s.back() - time_s.front());
+  if (!(half > 0.0)) return std::nullopt;
+  std::vector<double> square;
+  square.reserve(time_s.size());
+  for (const double t : time_s) square.push_back(std::pow((t - mean_time) / half, 2));
+  const std::vector<double> parabola = line_through(time_s, square).off;
+  const RestLine line = line_through(time_s, rest);
+  const double spread = squares_about(parabola, 0.0);
+  double product = 0.0;
+  for (std::size_t i = 0; i < rest.size(); ++i) product += parabola[i] * line.off[i];
+  const double bend = product / spread;
+  std::vector<double> left = line.off;
+  for (std::size_t i = 0; i < left.size(); ++i) left[i] -= bend * parabola[i];
+  const auto correlation = lag1_about(left, 0.0);
+  if (!correlation) return std::nullopt;
+  const double rho = upper_correlation(*correlation, left.size(), true);
+  const double variance = squares_about(left, 0.0) / static_cast<double>(left.size() - 3);
+  const double independent = (1.0 - rho) / (1.0 + rho);
+  const double degrees = std::max(static_cast<double>(left.size()) * independent - 3.0, 1.0);
+  const double t2 = bend * bend * spread / variance * independent;
+  return RestBend{std::abs(bend) / std::sqrt(variance), fisher_tail(t2, 1.0, degrees)};
 }
 
 Adequacy judge_adequacy(const AdequacyData& data, double level) {

@@ -66,6 +66,19 @@ struct Adequacy {
 [[nodiscard]] std::optional<RestTrend> rest_trend(std::span<const double> time_s,
                                                   std::span<const double> rest);
 
+/// Bend of the readings at rest: the zero of a force cell that warms up does not drift along a
+/// line.
+struct RestBend {
+  double noises = 0.0;   ///< range of the bend over the rest, in standard deviations of the noise
+  double p_value = 1.0;  ///< of a bend at least this large in autoregressive noise about a line
+};
+
+/// A parabola beside the line, by Student's t with the degrees of freedom and the standard error
+/// that the upper confidence bound of the residuals' lag-1 correlation leaves. None below 20
+/// samples.
+[[nodiscard]] std::optional<RestBend> rest_bend(std::span<const double> time_s,
+                                                std::span<const double> rest);
+
 /// Tests whether residuals have a larger variance than readings at rest. With autoregressive noise
 /// of first order and lag-1 correlation rho,
 ///

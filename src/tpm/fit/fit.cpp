@@ -139,7 +139,10 @@ FitResult balanced_search(ExperimentResiduals& function, std::vector<FitParamete
     }
     result = search(function, parameters, threshold, false, minima_of(result));
   }
-  result = widened_search(function, parameters, threshold, profiles, minima_of(result));
+  // Without profiles the last round is the answer, unless it presses on a bound that can move.
+  if (profiles || widen_pressed_bounds(result, function.config(), parameters)) {
+    result = widened_search(function, parameters, threshold, profiles, minima_of(result));
+  }
   result.starts_run = survey.starts_run;
   result.starts_failed = survey.starts_failed;
   result.starts_agreeing = survey.starts_agreeing;

@@ -34,12 +34,6 @@ struct Condition {
   bool operator==(const Condition&) const = default;
 };
 
-/// What a fit with a drift of the zero says of a parameter; SI.
-struct WithDrift {
-  double estimate = 0.0;
-  std::optional<double> lower, upper;
-};
-
 /// Result for one estimated parameter; SI.
 struct ParameterResult {
   FitParameter parameter;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
@@ -63,8 +64,48 @@ void require_times(const ImportedSeries& series, const std::string& file) {
         place(series, file, i),
         fmt::format("time {} {} does not follow {} {}", shortest(time->values[i]),
                     time->unit.symbol, shortest(time->values[i - 1]), time->unit.symbol),
-        "strictly increasing times");
+        series.lines.empty() ? "strictly increasing times"
+                             : "strictly increasing times: another --time COLUMN, or a file for "
+                               "each part before and after this line");
   }
+}
+
+double mean_of_rows(const std::vector<double>& values, std::size_t first, std::size_t end) {
+  return std::accumulate(values.begin() + static_cast<std::ptrdiff_t>(first),
+                         values.begin() + static_cast<std::ptrdiff_t>(end), 0.0) /
+         static_cast<double>(end - first);
+}
+
+/// A clock that is coarser than the sampling stamps several rows alike: they become one, their
+/// mean. Standard deviations stay as they are: what a machine states need not be independent.
+void average_repeated_times(ImportedSeries& series) {
+  const ImportedColumn* time = find(series, Quantity::time);
+  if (time == nullptr || series.lines.empty() || !series.segments.empty()) return;
+  const std::vector<double> stamps = time->values;
+  if (stamps.size() < 2 || !std::ranges::is_sorted(stamps)) return;
+  std::vector<std::size_t> begin{0};
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    if (stamps[i] != stamps[i - 1]) begin.push_back(i);
+  }
+  if (begin.size() == stamps.size() || begin.size() < 2) return;
+  begin.push_back(stamps.size());
+  std::vector<int> lines;
+  for (std::size_t k = 0; k + 1 < begin.size(); ++k) lines.push_back(series.lines[begin[k]]);
+  for (ImportedColumn& column : series.columns) {
+    std::vector<double> means;
+    for (std::size_t k = 0; k + 1 < begin.size(); ++k) {
+      means.push_back(mean_of_rows(column.values, begin[k], begin[k + 1]));
+    }
+    column.shifted = column.shifted || column.quantity != Quantity::time;
+    column.values = std::move(means);
+  }
+  series.lines = std::move(lines);
+  series.findings.push_back(
+      {"repeated times",
+       fmt::format("{} of {} rows have the time of the row before: rows of one time became one, "
+                   "their mean",
+                   stamps.size() - series.lines.size(), stamps.size()),
+       true});
 }
 
 void require_not_negative(const ImportedSeries& series, const std::string& file, Quantity quantity,
@@ -203,6 +244,7 @@ void check_and_measure(ImportedSeries& series, const std::string& file) {
     add_spectrum_measures(series);
     return;
   }
+  average_repeated_times(series);
   require_times(series, file);
   require_not_negative(series, file, observed(series).quantity, Bound::sd);
   add_measures(series);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <tuple>
 
@@ -131,11 +133,14 @@ class SeriesReader {
                const std::vector<Use>& uses, const std::string& file)
       : table_(table), header_(header), file_(file), end_(header.block.end) {
     leave_out_blank_rows(uses);
-    series_.lines.reserve(end_ - header.block.first);
+    rows_.reserve(end_ - header.block.first);
     for (std::size_t i = header.block.first; i < end_; ++i) {
       require_width(table.rows[i], uses);
-      series_.lines.push_back(table.rows[i].line);
+      rows_.push_back(i);
     }
+    leave_out_missing_readings(uses);
+    series_.lines.reserve(rows_.size());
+    for (const std::size_t i : rows_) series_.lines.push_back(table.rows[i].line);
   }
 
   void add(const Use& use) {
@@ -151,7 +156,7 @@ class SeriesReader {
     imported.bound = bound;
     imported.unit = unit_of_use(use);
     imported.values.reserve(series_.lines.size());
-    for (std::size_t i = header_.block.first; i < end_; ++i) {
+    for (const std::size_t i : rows_) {
       const double value = number_at(table_.rows[i], use);
       imported.values.push_back(negate ? turned - value : value);  // 0, not -0
     }
@@ -172,6 +177,9 @@ class SeriesReader {
   }
 
   [[nodiscard]] ImportedSeries take() {
+    if (!missing_.empty()) {
+      series_.findings.push_back(ImportFinding::told_of("missing", std::move(missing_)));
+    }
     std::string unused;
     for (const MachineColumn& column : header_.columns) {
       if (std::find(used_.begin(), used_.end(), column.index) != used_.end()) continue;
@@ -202,6 +210,27 @@ class SeriesReader {
     if (end_ == all) return;
     series_.findings.push_back(ImportFinding::told_of(
         "blank", fmt::format("{} in these columns", lines_of(table_, end_, all))));
+  }
+
+  /// A sample that was lost is an empty cell or "NaN". Where most rows have one, the column is
+  /// none.
+  void leave_out_missing_readings(const std::vector<Use>& uses) {
+    const auto missing = [&](std::size_t i) {
+      return std::ranges::any_of(uses, [&](const Use& use) {
+        std::string field(field_at(table_.rows[i], use.column->index));
+        std::ranges::transform(field, field.begin(),
+                               [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        static constexpr auto kNone =
+            std::to_array<std::string_view>({"", "nan", "-nan", "na", "n/a", "#n/a"});
+        return std::ranges::find(kNone, field) != kNone.end();
+      });
+    };
+    const auto first = std::ranges::find_if(rows_, missing);
+    const auto count = static_cast<std::size_t>(std::ranges::count_if(rows_, missing));
+    if (count == 0 || 2 * count >= rows_.size()) return;
+    missing_ = fmt::format("{} of {} rows have an empty cell or NaN, from line {} on: left out",
+                           count, rows_.size(), table_.rows[*first].line);
+    std::erase_if(rows_, missing);
   }
 
   void require_width(const DelimitedRow& row, const std::vector<Use>& uses) const {
@@ -254,7 +283,9 @@ class SeriesReader {
   const DelimitedTable& table_;
   const MachineHeader& header_;
   const std::string& file_;
-  std::size_t end_;  ///< row behind the last sample
+  std::size_t end_;                ///< row behind the last sample
+  std::vector<std::size_t> rows_;  ///< that are read
+  std::string missing_;            ///< which rows are left out; empty: none
   ImportedSeries series_;
   std::vector<std::size_t> used_;
 };

@@ -163,6 +163,8 @@ PredictionOptions random_part_options(const BudgetOptions& options) {
   prediction.samples = options.samples;
   prediction.seed = options.seed;
   prediction.level = options.level;
+  prediction.contact = options.contact;
+  prediction.zero = options.zero;
   return prediction;
 }
 

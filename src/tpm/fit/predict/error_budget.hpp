@@ -87,6 +87,7 @@ struct BudgetOptions {
   int samples = 1000;  ///< laws drawn for the random part
   std::uint64_t seed = 0;
   double level = 0.95;
+  std::optional<double> contact, zero;  ///< of a recording, held; none: found (PredictionOptions)
 };
 
 /// Signed differences between neighbouring stages in their order. They telescope: their sum is the

@@ -16,19 +16,23 @@ namespace {
 constexpr std::size_t kMostTimes = 200;  // of a motion, that the forces are compared at
 
 /// Contact and offset of the fit if the law was fitted to this recording; else those that suit it
-/// best.
-RecordingPlacement placement_of(const LawFile& law, const PreparedRecording& recording) {
-  const auto fitted = values_in_fit(law, recording);
-  const std::vector<double> values = fitted ? *fitted : place_recording(law, recording).values;
+/// best. What is held is kept.
+RecordingPlacement placement_of(const LawFile& law, const PreparedRecording& recording,
+                                const PredictionOptions& held) {
+  const bool holds = held.contact || held.zero;
+  const auto fitted = holds ? std::nullopt : values_in_fit(law, recording);
+  const std::vector<double> values =
+      fitted ? *fitted : place_recording(law, recording, held).values;
   return {values[values.size() - 2], values.back()};
 }
 
 }  // namespace
 
-MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& recording) {
+MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& recording,
+                                   const PredictionOptions& held) {
   const Recording& r = recording.recording;
   require_quantities_of(law, recording);
-  const RecordingPlacement placement = placement_of(law, recording);
+  const RecordingPlacement placement = placement_of(law, recording, held);
   std::vector<double> time_s, drive_m, force_N;
   for (std::size_t i = 0; i < r.time_s.size() && r.time_s[i] <= recording.to_s; ++i) {
     if (r.time_s[i] < recording.from_s) continue;

@@ -6,6 +6,7 @@
 
 #include "tpm/files/json.hpp"
 #include "tpm/fit/likelihood/parameter.hpp"
+#include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/predict/organ_readings.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpmkit/bond_material.hpp"
@@ -33,9 +34,10 @@ struct MaterialMotion {
 
 /// The motion of a recording's ramp and hold, in as few straight pieces as keep it within 0.2 % of
 /// its depth. Contact and offset are those of the law if it was fitted to this recording alone;
-/// else they are found for it, the law fixed.
+/// else they are found for it, the law fixed; what `held` says of them is kept.
 [[nodiscard]] MaterialMotion motion_of_recording(const LawFile& law,
-                                                 const PreparedRecording& recording);
+                                                 const PreparedRecording& recording,
+                                                 const PredictionOptions& held = {});
 /// @param times_s rising, within the protocol
 [[nodiscard]] MaterialMotion motion_of_protocol(const Protocol& protocol,
                                                 std::vector<double> times_s);

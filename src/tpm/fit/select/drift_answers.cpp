@@ -105,6 +105,23 @@ void hold_both_in_covariance(FitResult& fit, const FitResult& drifting, double s
   }
 }
 
+/// The search with a drift begins where that without one ended: a drift moves the minimum, but no
+/// further than the data leave it open.
+void begin_at_minima(FitConfig& config, const FitResult& fit) {
+  constexpr std::size_t kMost = 5;
+  constexpr std::size_t kBesides = 8;  // starts anywhere
+  config.given_starts.clear();
+  for (const DistinctMinimum& m : fit.minima) {
+    if (config.given_starts.size() == kMost) break;
+    std::vector<double> start = m.minimum.natural;
+    for (std::size_t j = start.size(); j < config.parameters.size(); ++j) {
+      start.push_back(config.parameters[j].fit.start);
+    }
+    config.given_starts.push_back(std::move(start));
+  }
+  config.starts = std::min(config.starts, kBesides);
+}
+
 }  // namespace
 
 std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
@@ -116,16 +133,12 @@ std::optional<DriftAnswers> give_both_drift_answers(FitResult& fit,
                                                     std::span<const PreparedRecording> recordings,
                                                     const std::vector<DataSet>& data) {
   const ParameterResult* lasting = not_separable_in(fit);
-  // Of a strain that answers a stress there is no second answer: the search for it does not move
-  // the drift from 0.
-  const bool strain = std::ranges::any_of(recordings, [](const PreparedRecording& r) {
-    return r.load_imposed && r.recording.response_quantity == Quantity::strain;
-  });
-  if (lasting == nullptr || strain) return std::nullopt;
+  if (lasting == nullptr) return std::nullopt;
   DriftAnswers answers;
   answers.k_inf = lasting->estimate;
   FitConfig config = fit.config;
   for (std::size_t i = 0; i < recordings.size(); ++i) add_possible_drift(config, recordings[i], i);
+  begin_at_minima(config, fit);
   std::optional<FitResult> drifting;
   const std::string failure = gave_up([&] { drifting = run_fit(config, data); });
   if (!failure.empty()) drifting.reset();

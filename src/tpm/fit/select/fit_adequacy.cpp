@@ -80,6 +80,26 @@ std::string drift_off(const FitResult& fit, std::size_t choice, double level) {
   return {};
 }
 
+/// The zero of a force cell that still warms up: the rest before the load bends.
+/// @return empty if it does not, by more than chance and than the noise
+std::string bend_of_rest(const RestedRecording& rested, double level) {
+  constexpr double kStill = 1e-3;  // of the drive's range
+  constexpr double kLevel = 0.1;   // of that of the other tests, which come first
+  constexpr double kSeen = 1.0;    // noises
+  const Recording& r = *rested.recording;
+  const auto [low, high] = std::ranges::minmax_element(r.drive);
+  const double still = kStill * (*high - *low);
+  std::size_t end = 0;
+  while (end < std::min(rested.at_rest, r.time_s.size()) &&
+         std::abs(r.drive[end] - r.drive.front()) <= still) {
+    ++end;
+  }
+  const auto bend = rest_bend(std::span(r.time_s).first(end), std::span(r.response).first(end));
+  if (!bend || bend->noises < kSeen || bend->p_value >= kLevel * level) return {};
+  return fmt::format("its zero bends at rest by {} noises, and the fit knows a line",
+                     times_text(bend->noises));
+}
+
 bool has_measured_drift(const FitResult& fit, std::size_t choice) {
   return std::ranges::any_of(fit.config.parameters, [&](const EstimatedParameter& p) {
     return p.prior && p.drift && p.drift->choice == choice;
@@ -103,7 +123,12 @@ std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecor
     const double each = has_measured_drift(fit, r.choice) ? 0.5 * level : level;
     Judged one{adequacy_of(r, rested[r.choice], parameters_each(fit), each), r.choice};
     one.drift_off = drift_off(fit, r.choice, each);
-    if (!one.drift_off.empty()) {
+    const std::string bent = bend_of_rest(rested[r.choice], each);
+    if (!bent.empty()) {
+      one.drift_off = bent;
+      one.adequacy.described = Described::not_described;
+      one.adequacy.causes.emplace_back("a drift of the zero that is not linear (a warm-up)");
+    } else if (!one.drift_off.empty()) {
       Adequacy& a = one.adequacy;
       a.described = Described::not_described;
       a.causes.emplace_back("a slow branch that the law does not have, or a drift that changes");

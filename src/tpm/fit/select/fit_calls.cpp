@@ -4,7 +4,9 @@
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/instrument_of_recording.hpp"
+#include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpmkit/error.hpp"
 #include "tpmkit/fit.hpp"
 
 namespace tpm::fit {
@@ -23,6 +25,7 @@ std::vector<FittedParameter> fitted_parameters(const FitResult& fit) {
                     .nuisance = p.nuisance,
                     .only_if_described = p.only_if_described,
                     .not_separable = p.not_separable,
+                    .with_drift = p.with_drift,
                     .unconfirmed = p.unconfirmed,
                     .words = p.words});
   }
@@ -45,9 +48,40 @@ FitSummary summary_of(const FitResult& fit) {
   return summary;
 }
 
+void require_no_placement(const FitRequest& request) {
+  if (!request.contact && !request.contact_force_N && !request.zero && !request.from_s &&
+      !request.until_s) {
+    return;
+  }
+  throw Error(ExitCode::usage, "contact, contact_force, zero, from, until", "with a configuration",
+              "them only with recordings; a configuration says its own");
+}
+
+std::vector<PreparedRecording> prepared_recordings(const std::vector<std::filesystem::path>& files,
+                                                   const FitRequest& request) {
+  if (request.contact && request.contact_force_N) {
+    throw Error(ExitCode::usage, "contact", "beside contact_force", "one of them");
+  }
+  ImportOptions import;
+  import.from_s = request.from_s;
+  import.until_s = request.until_s;
+  PhaseOptions phases;
+  phases.contact_response = request.contact_force_N;
+  std::vector<PreparedRecording> recordings;
+  for (const std::filesystem::path& file : files) {
+    recordings.push_back(
+        prepare_recording(file.string(), read_recording_file(file, import).recording, phases));
+    recordings.back().import = import;
+    take_instrument(recordings.back(), file);
+  }
+  if (request.contact) require_contact_within(*request.contact, recordings, "contact");
+  return recordings;
+}
+
 }  // namespace
 
 FitSummary fit_configuration(const std::filesystem::path& file, const FitRequest& request) {
+  require_no_placement(request);
   FitProblem problem = read_fit_problem(file);
   if (request.starts) problem.config.starts = *request.starts;
   if (request.seed) problem.config.seed = *request.seed;
@@ -57,12 +91,10 @@ FitSummary fit_configuration(const std::filesystem::path& file, const FitRequest
 
 FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
                           const FitRequest& request) {
-  std::vector<PreparedRecording> recordings;
-  for (const std::filesystem::path& file : files) {
-    recordings.push_back(prepare_recording(file.string(), read_recording_file(file, {}).recording));
-    take_instrument(recordings.back(), file);
-  }
+  const std::vector<PreparedRecording> recordings = prepared_recordings(files, request);
   SelectionOptions options;
+  options.setup.contact = request.contact;
+  options.setup.zero = request.zero;
   if (!request.law.empty()) options.laws = {parse_law_name(request.law, "law")};
   options.only_listed = !request.law.empty();
   if (request.starts) options.setup.starts = *request.starts;

@@ -45,6 +45,22 @@ bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
   return !candidate.law.solid && spans.too_short_to_end(longest_s);
 }
 
+/// A branch that relaxes faster than the samples follow acts as a dashpot: its stiffness and time
+/// are not told, but their product is.
+std::string dashpot_words(const FitResult& fit, const std::string& time_name) {
+  constexpr std::string_view kTime = "tau", kStiffness = "k";
+  if (!time_name.starts_with(kTime)) return {};
+  const std::string stiffness = std::string(kStiffness) + time_name.substr(kTime.size());
+  const auto of = [&](const std::string& name) {
+    return std::ranges::find_if(fit.parameters,
+                                [&](const ParameterResult& p) { return p.parameter.name == name; });
+  };
+  const auto k = of(stiffness), tau = of(time_name);
+  if (k == fit.parameters.end() || tau == fit.parameters.end()) return {};
+  return fmt::format(": the samples tell {} {} = {} {} s alone, a dashpot", stiffness, time_name,
+                     significant(k->estimate * tau->estimate, 4), si_unit(k->parameter));
+}
+
 Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
   constexpr int kLeastStandardErrors = 2;
   double longest_s = 0.0;
@@ -59,8 +75,10 @@ Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
     if (is_dashpot(p)) continue;
     if (p.at_lower_bound && may_vanish(candidate.law, law->name)) continue;
     if (p.at_lower_bound || p.at_upper_bound) {
-      return {fmt::format("{} ends at its {} bound", p.parameter.name,
-                          p.at_lower_bound ? "lower" : "upper")};
+      const bool fast = p.at_lower_bound && law->dimension == Dimension::time;
+      return {fmt::format("{} ends at its {} bound{}", p.parameter.name,
+                          p.at_lower_bound ? "lower" : "upper",
+                          fast ? dashpot_words(candidate.fit, p.parameter.name) : "")};
     }
     for (const Condition& c : p.conditional_on) {
       if (!c.at_estimate) continue;

@@ -289,4 +289,13 @@ MeasuredPlacement measure_placement(const PreparedRecording& recording, const La
   return placement;
 }
 
+const MeasuredPlacement& PlacementMemory::of(const PreparedRecording& recording, const LawSpec& law,
+                                             std::optional<double> of_probe) {
+  const Key key{recording.name, recording.from_s, recording.to_s,
+                first_loading_exponent(law, of_probe)};
+  const auto found = measured_.find(key);
+  if (found != measured_.end()) return found->second;
+  return measured_.emplace(key, measure_placement(recording, law, of_probe)).first->second;
+}
+
 }  // namespace tpm::fit

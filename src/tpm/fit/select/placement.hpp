@@ -1,7 +1,9 @@
 #pragma once
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "tpm/fit/likelihood/config.hpp"
@@ -90,5 +92,19 @@ struct MeasuredPlacement {
 [[nodiscard]] MeasuredPlacement measure_placement(const PreparedRecording& recording,
                                                   const LawSpec& law,
                                                   std::optional<double> exponent);
+
+/// What was measured of recordings, for a choice among laws: many of them have one exponent, and
+/// the placement depends on nothing else of a law. Not for several threads.
+class PlacementMemory {
+ public:
+  /// As measure_placement(). Recordings are known by name and window; the rest of one of a name
+  /// must not change as long as this lives.
+  [[nodiscard]] const MeasuredPlacement& of(const PreparedRecording& recording, const LawSpec& law,
+                                            std::optional<double> of_probe);
+
+ private:
+  using Key = std::tuple<std::string, double, double, std::optional<double>>;
+  std::map<Key, MeasuredPlacement> measured_;
+};
 
 }  // namespace tpm::fit

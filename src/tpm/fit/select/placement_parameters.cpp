@@ -276,8 +276,10 @@ void add_placement(FitConfig& config, const LawModel& model,
                          options.nuisance);
       continue;
     }
-    const MeasuredPlacement placement =
-        options.measured ? measure_placement(r, law, options.exponent) : MeasuredPlacement{};
+    const MeasuredPlacement placement = !options.measured ? MeasuredPlacement{}
+                                        : options.placements
+                                            ? options.placements->of(r, law, options.exponent)
+                                            : measure_placement(r, law, options.exponent);
     if (!options.zero) {
       add_automatic(config, offset_bounds(law, r, named("offset", r)), {{offset, scope}});
       if (options.measured) config.parameters.back().prior = zero_prior(r, placement.rests);

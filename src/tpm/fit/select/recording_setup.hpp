@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -50,6 +51,8 @@ enum class Nuisance {
   offset_and_contact,
 };
 
+class PlacementMemory;
+
 /// Settings of an automatic configuration.
 struct SetupOptions {
   Nuisance nuisance = Nuisance::automatic;
@@ -67,6 +70,8 @@ struct SetupOptions {
   std::optional<double> zero;     ///< reading without a load that is held, SI; none: measured
   /// Whether what was measured of zero, contact and drift enters the fit (measure_placement).
   bool measured = true;
+  /// Of a choice among laws, so that each placement is measured once; none: measured each time.
+  std::shared_ptr<PlacementMemory> placements = nullptr;
   std::function<bool()> interrupted;  ///< see FitConfig
 };
 

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/gate.hpp"
+#include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpm/work/progress.hpp"
@@ -315,7 +317,9 @@ void rank_candidates(Selection& s, bool few_readings) {
 }
 
 Selection select_law(std::span<const PreparedRecording> recordings,
-                     const SelectionOptions& options) {
+                     const SelectionOptions& wanted) {
+  SelectionOptions options = wanted;
+  options.setup.placements = std::make_shared<PlacementMemory>();
   std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
   if (!options.only_listed && !recordings.empty() &&
       is_answered_by_stress(law_drive(recordings.front().recording))) {
@@ -366,9 +370,9 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   settle_choice(s, protocol_spans(recordings),
                 options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
   Candidate& chosen = s.candidates[s.recommended];
-  s.drift = give_both_drift_answers(chosen.fit, recordings);
+  if (options.drift_answers) s.drift = give_both_drift_answers(chosen.fit, recordings);
   if (s.drift) chosen.fit.flags.push_back(drift_words(*s.drift, chosen.fit));
-  if (s.preferred) {
+  if (options.drift_answers && s.preferred) {
     FitResult& preferred = s.candidates[*s.preferred].fit;
     const auto both = give_both_drift_answers(preferred, recordings);
     if (both) preferred.flags.push_back(drift_words(*both, preferred));

@@ -53,6 +53,7 @@ struct SelectionOptions {
   bool only_listed = false;   ///< do not try laws without plateau besides
   double margin = 3.0;        ///< how much of BIC a larger law must gain to be preferred
   bool held_out = true;
+  bool drift_answers = true;  ///< fit the chosen law again with a drift, where no rest tells one
   SetupOptions setup;
 };
 
@@ -91,7 +92,7 @@ struct Selection {
 /// nuisance parameters refitted, the material fixed); with one the second half of its hold is
 /// predicted from the rest.
 [[nodiscard]] Selection select_law(std::span<const PreparedRecording> recordings,
-                                   const SelectionOptions& options);
+                                   const SelectionOptions& wanted);
 
 [[nodiscard]] Json to_json(const Selection& selection);
 [[nodiscard]] std::string to_terminal_text(const Selection& selection);

@@ -31,6 +31,7 @@ struct Tally {
 std::vector<Tally> tally_laws(std::span<const PreparedRecording> recordings,
                               SelectionOptions options) {
   options.held_out = false;
+  options.drift_answers = false;
   options.setup.profiles = false;
   std::vector<Tally> tallies;
   for (std::size_t i = 0; i < recordings.size(); ++i) {
