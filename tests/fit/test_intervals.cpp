@@ -285,6 +285,15 @@ TEST_CASE("a Wald test that the profile contradicts does not count", "[intervals
   CHECK_THAT(
       least_law_words(s, "the data"),
       Contains("the data prefer linear-1, by 30 in BIC, but do not identify its parameters"));
+  // No standard error is no more than one that is large: the profile decides.
+  s = made_contest(30.0, 0.8);
+  s.candidates[0].fit.parameters[0].standard_error.reset();
+  judge_identified(s.candidates[0], spans);
+  CHECK(s.candidates[0].reason == "k1 has no standard error");
+  CHECK(s.candidates[0].by_wald);
+  settle_choice(s, spans, closed);
+  CHECK(s.recommended == 0);
+  CHECK_FALSE(s.preferred);
   // A little behind is not worth two answers.
   s = made_contest(9.0, 0.8);
   settle_choice(s, spans, open);

@@ -15,7 +15,7 @@ namespace {
 /// Why a law's parameters are not known.
 struct Refusal {
   std::string reason;
-  bool by_wald = false;  ///< by a standard error alone
+  bool by_wald = false;  ///< by a standard error alone, or because there is none
 };
 
 const LawParameter* material_parameter(const std::vector<LawParameter>& table,
@@ -88,7 +88,8 @@ Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
     // An interval says more than the standard error, and stands in the table of the parameters.
     const bool has_interval = p.verdict == Verdict::identified || p.verdict == Verdict::lower_only;
     if (!p.standard_error && !has_interval) {
-      return {fmt::format("{} has no standard error", p.parameter.name)};
+      keep({fmt::format("{} has no standard error", p.parameter.name), true});
+      continue;
     }
     const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0 &&
                            !may_vanish(candidate.law, law->name);
@@ -179,6 +180,11 @@ void settle_choice(Selection& s, const ProtocolSpans& spans, const ProfiledFit& 
   if (!(s.candidates[s.recommended].delta_bic > kDecisiveBic)) return;
   s.preferred = s.best_bic;
   profile(s.best_bic);
+  // Its own intervals may say that it is identified after all.
+  if (!s.candidates[s.best_bic].identified) return;
+  s.recommended = least_within(s.candidates, s.margin);
+  profile(s.recommended);
+  s.preferred.reset();
 }
 
 std::string least_law_words(const Selection& s, const std::string& data) {
