@@ -285,7 +285,7 @@ TEST_CASE("What makes a session differ from a reading is named") {
        0.501,
        8e-3,
        kTouching,
-       {"no limit acted", "answers 501 mN", "(E1 12 kPa) are 4 times softer"},
+       {"no limit acted", "answers 0.501 N", "(E1 12 kPa) are 4 times softer"},
        {"pushed to"}},
       {1.0, 2.0, 2.0, 8e-3, 0, {"no limit acted", "2 times stiffer"}, {"of it"}},
       // The session's limit: the network reaches the reading.
@@ -309,7 +309,7 @@ TEST_CASE("What makes a session differ from a reading is named") {
        2.0,
        8e-3,
        0,
-       {"500 mN of it is the error of the model in the loop; no limit acted"},
+       {"0.5 N of it is the error of the model in the loop; no limit acted"},
        {"softer"}},
       {2.0, 2.01, 2.01, 8e-3, 0, {"the reading is met"}, {"limit"}}};
   for (const Case& c : cases) {

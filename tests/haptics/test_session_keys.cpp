@@ -30,7 +30,7 @@ TEST_CASE("schema and reader of a session agree on odd ones", "[keys]") {
 TEST_CASE("schema and reader of a device file agree on odd ones", "[keys]") {
   test::compare_schema_and_form(
       device_kind(),
-      {of_source("configs/devices/omega7.json"), of_source("configs/devices/inverse3.json"),
+      {of_source("configs/devices/delta3.json"), of_source("configs/devices/inverse3.json"),
        example_of(device_kind())},
       test::kOddDocuments);
 }
