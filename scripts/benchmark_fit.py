@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times `tpm fit` against scipy doing the same fit, in one run, and prints the ratio.
 
-    scripts/benchmark_fit.py PATH_TO_TPM [--repeats 5] [--large]
+    scripts/benchmark_fit.py PATH_TO_TPM [--repetitions 5] [--large]
 
 A synthetic ramp-and-hold recording of 500 samples (law linear-1: k_inf, k1, tau1 and an offset;
 1 % noise, fixed seed) is fitted with profile likelihoods by both. The scipy script uses the same
@@ -161,7 +161,7 @@ def shown(times):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("tpm", nargs="?")
-    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--repetitions", type=int, default=5)
     parser.add_argument("--large", action="store_true")
     parser.add_argument("--scipy", metavar="CSV", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
@@ -171,12 +171,12 @@ def main():
     if not arguments.tpm:
         parser.error("the path of tpm is missing")
     print(f"machine: {platform.machine()}, {os.cpu_count()} processors, Python "
-          f"{platform.python_version()}; {arguments.repeats} repeats, median (range)")
+          f"{platform.python_version()}; {arguments.repetitions} repeats, median (range)")
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         csv, config = write_problem(folder, 500)
         ours, theirs, theirs_fit = [], [], []
-        for _ in range(arguments.repeats):
+        for _ in range(arguments.repetitions):
             spent, fitted = process_time([arguments.tpm, "fit", str(config), "--format", "json"])
             ours.append(spent)
             spent, reference = process_time([sys.executable, __file__, "--scipy", str(csv)])
@@ -196,7 +196,7 @@ def main():
         if arguments.large:
             _, config = write_problem(folder, 1_000_000)
             times = []
-            for _ in range(arguments.repeats):
+            for _ in range(arguments.repetitions):
                 spent, _ = process_time([arguments.tpm, "fit", str(config), "--format", "json"])
                 times.append(spent)
             print(f"1,000,000 samples, one branch: tpm {shown(times)}")

@@ -118,7 +118,7 @@ def organ(options, folder):
     plain = simulated(options, scene, folder, "plain")
     masses = simulated(options, {**scene, "formulation": {"kind": "inertial"}}, folder, "masses")
     tight = simulated(options, {**scene, "tolerance": 1e-8}, folder, "tight")
-    planned = simulated(options, scene, folder, "planned", "--plan", "--tolerance", "1%", "--rate", "1000")
+    planned = simulated(options, scene, folder, "planned", "--planned", "--tolerance", "1%", "--loop-rate", "1 kHz")
     times = budget["time_s"]
     (Path(folder) / "asked.json").write_text(json.dumps({"protocol": scene["protocol"],
                                                          "outputs": {"times": [f"{t!r} s" for t in times]}}))

@@ -92,7 +92,7 @@ ENVIRONMENT = (
 )
 FILES = (
     ("PREFIX/share/tpmkit", "Curves, configurations and schemas that come with tpm (tpm example lists them)."),
-    ("NAME_fit/, simulation.h5, session.tpmrec, ...", "Results under names that were not given; --force replaces changed ones."),
+    ("NAME_fit/, simulation.h5, session.tpmrec, ...", "Results under names that were not given; --overwrite replaces changed ones."),
 )
 
 

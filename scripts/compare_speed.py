@@ -70,18 +70,18 @@ def benchmark_command(program):
 
 
 def recorded(program, names, repeats, folder):
-    """Ratios to the calibration loop of the named works of `tpm accuracy benchmark --record`."""
+    """Ratios to the calibration loop of the named works of `tpm accuracy benchmark --append-to`."""
     file = pathlib.Path(folder, "speed.csv")
     file.unlink(missing_ok=True)
-    subprocess.run([*benchmark_command(program), "--record", str(file), "--repeats", str(repeats), *names], check=True,
+    subprocess.run([*benchmark_command(program), "--append-to", str(file), "--repetitions", str(repeats), *names], check=True,
                    stdout=subprocess.DEVNULL)
     with file.open(newline="") as rows:
         return {row["work"]: float(row["ratio"]) for row in csv.DictReader(rows)}
 
 
 def works(program):
-    """Names of the works that a program can record; empty if it knows no --record."""
-    done = subprocess.run([*benchmark_command(program), "--record", "x.csv", "--list"], capture_output=True, text=True)
+    """Names of the works that a program can record; empty if it knows no --append-to."""
+    done = subprocess.run([*benchmark_command(program), "--append-to", "x.csv", "--list"], capture_output=True, text=True)
     return [line.split()[0] for line in done.stdout.splitlines() if line.strip()] if done.returncode == 0 else []
 
 
@@ -140,7 +140,7 @@ def main():
     for name, why in failed.items():
         print(f"{name:<30} not compared: {why}")
     if not common:
-        print("named pieces of work are not compared: one of the two has no tpm accuracy benchmark --record")
+        print("named pieces of work are not compared: one of the two has no tpm accuracy benchmark --append-to")
     if slower:
         print(f"slower by more than {100 * (REGRESSION - 1):.0f} %: {', '.join(slower)}")
         return 1

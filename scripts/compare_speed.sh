@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds two commits and compares their speed by processor time, in alternation: whole commands that both
-# know, and the named pieces of work of `tpm accuracy benchmark --record` where both have it.
+# know, and the named pieces of work of `tpm accuracy benchmark --append-to` where both have it.
 #   scripts/compare_speed.sh A B [ROUNDS]
 # Exit 1 if B needs more than 10 % longer than A for one of them; it is named.
 set -euo pipefail

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the organ that `tpm simulate --figures FOLDER` describes, as SVG, PNG and PDF.
+"""Draws the organ that `tpm simulate --folder FOLDER` describes, as SVG, PNG and PDF.
 
     draw_deformation.py PICTURES.json FOLDER
 
@@ -319,7 +319,7 @@ def pages(picture):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("pictures", type=Path, help="as written by tpm simulate --figures")
+    parser.add_argument("pictures", type=Path, help="as written by tpm simulate --folder")
     parser.add_argument("folder", type=Path, help="where the drawings go")
     arguments = parser.parse_args()
     try:

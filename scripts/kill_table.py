@@ -6,7 +6,7 @@
 SIGKILL comes at the n-th call that opens a file for writing, writes (before it and half-way), syncs, renames, cuts
 or removes: every n to --first, then --spread more. Before the second run, a file of a wanted name is either as it
 was before the command or whole; a recording of a session may also end early, and then `tpm hil export` has to read
-every whole row of it. The second run (with --force where an early recording stands) has to end as an undisturbed
+every whole row of it. The second run (with --overwrite where an early recording stands) has to end as an undisturbed
 one does, write the same bytes and leave nothing else behind. Exit code 1 if any
 did otherwise.
 """
@@ -30,7 +30,7 @@ COMMANDS = [
             ["sim.h5", "sim.xdmf"], weight=4),
     Command("fit FOLDER", "fit in/folder --laws linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"], weight=4),
     Command("hil run", "hil run in/session.json -o s.tpmrec", ["s.tpmrec"], old=False),
-    Command("paper report", "paper report -o paper", [], varies=["paper/report.run.json"], weight=100),
+    Command("paper report", "paper report --folder paper", [], varies=["paper/report.run.json"], weight=100),
     # Programs of Python: a drawing script, and the module (where it is on PYTHONPATH) that has figures drawn.
     Command("draw_figures.py", "draw_figures.py in/fitted/figures.json . --print", [], weight=4),
     Command("draw_network.py", "draw_network.py in/net.json net", ["net.png", "net.svg"], weight=4),
@@ -128,7 +128,7 @@ def killed(tpm: Path, preload: Path, inputs: Path, command: Command, at: int, pl
                     found.append(f"{output}: its bytes are not those of an undisturbed run's beginning")
                 if read != places.whole(len(content)):
                     found.append(f"{output}: {read} rows are read of {places.whole(len(content))} whole ones")
-                again.append("--force")
+                again.append("--overwrite")
             elif output not in command.varies and content != plain[output]:
                 found.append(f"{output} is not whole after the signal")
         second = tpm_in(folder, tpm, again)

@@ -63,7 +63,7 @@ def main(tpm):
                 session["indentations"].update({"hold": "10 s", "rest": "200 s"})
                 path = write(folder, "session.json", session)
                 recording = os.path.join(folder, "session.tpmrec")
-                text = said(tpm, "hil", "run", path, "-o", recording, "--force")
+                text = said(tpm, "hil", "run", path, "-o", recording, "--overwrite")
                 model = line(text, r"^model: ([a-z_0-9]+)")
                 verified = line(said(tpm, "hil", "verify", recording, "--window", "0 s", "--verbose"),
                                 r"^all +[0-9]+ +[0-9.e-]+ +[0-9.e-]+ +([0-9.e-]+ %)")

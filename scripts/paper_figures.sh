@@ -15,7 +15,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 step "the published model recomputed"
-"$program" paper report --output "$folder/report" >"$folder/report.txt"
+"$program" paper report --folder "$folder/report" >"$folder/report.txt"
 "$TPMKIT_PYTHON" scripts/draw_figures.py "$folder/report/figures.json" "$folder/drawn" --print
 
 step "what is lost between the data and a hand"

@@ -13,7 +13,7 @@ step "building tpm (build/release); some minutes the first time"
 build release tpm
 
 step "recomputing the paper"
-build/release/tpm paper report --output out/paper
+build/release/tpm paper report --folder out/paper
 step "done. A synthetic recording and the law that it supports:"
 build/release/tpm example recording --folder out/example
 build/release/tpm fit out/example/recording.csv --folder out/example/recording_fit

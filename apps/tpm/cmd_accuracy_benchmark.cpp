@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/accuracy/runner.hpp"
 #include "tpm/accuracy/show/benchmark_report.hpp"
@@ -44,7 +45,8 @@ Json list_entries(const auto& entries, int width, const Session& session) {
 int list_problems(const Session& session) {
   Json json = list_entries(benchmark_entries(), 18, session);
   if (session.json()) {
-    say("{}", to_text(Json{{"problems", std::move(json)}, {"formulations", formulations_json()}}));
+    say("{}", answer_text(session, Json{{"problems", std::move(json)},
+                                        {"formulations", formulations_json()}}));
   } else {
     say("\nFormulations:\n{}", formulations_text());
   }
@@ -76,7 +78,7 @@ void print_summary(const BenchmarkRecord& record) {
 
 int list_works(const Session& session) {
   Json json = list_entries(speed_works(), 22, session);
-  if (session.json()) say("{}", to_text(Json{{"works", std::move(json)}}));
+  if (session.json()) say("{}", answer_text(session, Json{{"works", std::move(json)}}));
   return 0;
 }
 
@@ -84,10 +86,10 @@ int list_works(const Session& session) {
 int record_speed(const BenchmarkChoice& choice, const Session& session) {
   if (choice.list) return list_works(session);
   if (choice.no_timing || choice.keep) {
-    throw Error(ExitCode::usage, "--record", "with --no-timing or --keep", "neither of them");
+    throw Error(ExitCode::usage, "--append-to", "with --no-timing or --keep", "neither of them");
   }
   SpeedOptions options;
-  options.repeats = static_cast<int>(parse_whole_number(choice.repeats, "--repeats", 1));
+  options.repeats = static_cast<int>(parse_whole_number(choice.repeats, "--repetitions", 1));
   const std::vector<SpeedWork> works = chosen_speed_works(choice.problems);
   will_update({choice.record});
   Progress progress("measuring", works.size() * static_cast<std::size_t>(options.repeats));
@@ -95,7 +97,7 @@ int record_speed(const BenchmarkChoice& choice, const Session& session) {
   const SpeedOrigin origin{choice.commit};
   append_speed_record(choice.record, rows, origin);
   if (session.json()) {
-    say("{}", to_text(speed_json(rows, origin)));
+    say("{}", answer_text(session, speed_json(rows, origin)));
     return 0;
   }
   say("{}appended to {}\n", speed_text(rows), choice.record);
@@ -106,7 +108,7 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
   if (!choice.record.empty()) return record_speed(choice, session);
   if (choice.list) return list_problems(session);
   BenchmarkRecord record;
-  record.options.repeats = static_cast<int>(parse_whole_number(choice.repeats, "--repeats", 1));
+  record.options.repeats = static_cast<int>(parse_whole_number(choice.repeats, "--repetitions", 1));
   record.options.timing = !choice.no_timing;
   std::vector<BenchmarkEntry> entries = chosen_benchmarks(choice.problems);
   const std::string python = find_drawing_python();  // before minutes of work, not after
@@ -131,7 +133,7 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
   }
   write_benchmark(record, choice.folder, python);
   if (session.json()) {
-    say("{}", to_text(to_json(record)));
+    say("{}", answer_text(session, to_json(record)));
     return 0;
   }
   print_summary(record);
@@ -148,30 +150,32 @@ void add_benchmark_command(CLI::App& accuracy, Session& session) {
       "benchmark", "Error against cost of every method at many settings, on named problems");
   auto choice = std::make_shared<BenchmarkChoice>();
   command->add_option("PROBLEM", choice->problems, "Names of problems (default: all; see --list)");
-  command->add_option("-o,--output", choice->folder, "Folder to write into")->capture_default_str();
-  command->add_option("--repeats", choice->repeats, "Of each run that completes")
+  command->add_option("--folder", choice->folder, "Folder to write into")->capture_default_str();
+  command
+      ->add_option("--repetitions", choice->repeats,
+                   "Number of repetitions: runs of each setting that completes")
       ->capture_default_str();
   command->add_flag("--no-timing", choice->no_timing,
                     "Errors and counts only, each run once: the same bytes from run to run");
   command->add_flag("--keep", choice->keep,
                     "Keep what the folder holds: run the problems that are missing there, or those "
                     "named; goes on from a run that was interrupted");
-  command->add_flag(
-      "--list", choice->list,
-      "Name the problems and all formulations (with --record the pieces of work), and do "
-      "nothing");
-  command->add_option("--record", choice->record,
+  command->add_flag("--list", choice->list,
+                    "List what can be named, and do nothing: problems and formulations, with "
+                    "--append-to the pieces of work");
+  command->add_option("--append-to", choice->record,
                       "Instead: measure named pieces of work (all, or those given in place of "
                       "problems) by processor time, and append a row for each to this CSV file");
-  command->add_option("--commit", choice->commit, "With --record: what the program was built from")
+  command
+      ->add_option("--commit", choice->commit, "With --append-to: what the program was built from")
       ->capture_default_str();
   add_format_option(*command, session);
   command->footer(
       "Run it on an otherwise idle machine. Example:\n"
-      "  tpm accuracy benchmark -o reports/accuracy\n"
-      "  tpm accuracy benchmark -o reports/accuracy --keep\n"
-      "  tpm accuracy benchmark bond_paper organ_poke --repeats 50\n"
-      "  tpm accuracy benchmark --record speed.csv --commit $(git rev-parse --short HEAD)");
+      "  tpm accuracy benchmark --folder reports/accuracy\n"
+      "  tpm accuracy benchmark --folder reports/accuracy --keep\n"
+      "  tpm accuracy benchmark bond_paper organ_poke --repetitions 50\n"
+      "  tpm accuracy benchmark --append-to speed.csv --commit $(git rev-parse --short HEAD)");
   set_run(*command, session, [choice, &session] { return benchmark(*choice, session); });
 }
 

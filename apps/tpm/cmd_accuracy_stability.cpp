@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/accuracy/show/stability_report.hpp"
 #include "tpm/files/writable.hpp"
@@ -46,7 +47,7 @@ int stability(const std::string& folder, int along, const StabilityParts& parts,
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   write_stability(study, folder, python, took.count());
   if (session.json()) {
-    say("{}", to_text(to_json(study)));
+    say("{}", answer_text(session, to_json(study)));
     return 0;
   }
   for (const std::string& sentence : stability_sentences(study)) say("- {}\n", sentence);
@@ -60,7 +61,7 @@ void add_stability_command(CLI::App& accuracy, Session& session) {
   CLI::App* command = accuracy.add_subcommand(
       "stability", "Where each step rule fails: maps, limits against theory, degenerate corners");
   auto folder = std::make_shared<std::string>("out/stability");
-  command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
+  command->add_option("--folder", *folder, "Folder to write into")->capture_default_str();
   auto along = std::make_shared<std::string>(std::to_string(kPointsAlongMaps));
   command->add_option("--points", *along, "Points along each axis of the maps, 2 to 200")
       ->capture_default_str();
@@ -70,7 +71,7 @@ void add_stability_command(CLI::App& accuracy, Session& session) {
       ->check(CLI::IsMember({"maps", "limits", "corners", "servo"}));
   add_format_option(*command, session);
   command->footer(
-      "Examples:\n  tpm accuracy stability --output out/stability\n  tpm accuracy stability "
+      "Examples:\n  tpm accuracy stability --folder out/stability\n  tpm accuracy stability "
       "--points 5  (a quick "
       "look)\n  tpm accuracy stability --only corners,servo");
   set_run(*command, session, [folder, along, only, &session] {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/accuracy/show/verification_report.hpp"
 #include "tpm/files/writable.hpp"
@@ -26,7 +27,7 @@ int list_groups(const Session& session) {
     json.push_back({{"name", group.name}, {"summary", group.summary}});
     if (!session.json()) say("{:<13} {}\n", group.name, group.summary);
   }
-  if (session.json()) say("{}", to_text(Json{{"groups", std::move(json)}}));
+  if (session.json()) say("{}", answer_text(session, Json{{"groups", std::move(json)}}));
   return 0;
 }
 
@@ -43,7 +44,8 @@ int verify_program(const VerificationChoice& choice, const Session& session) {
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   if (!choice.folder.empty()) write_verification(verification, choice.folder, took.count());
   if (session.json()) {
-    say("{}", to_text(to_json(verification)));
+    say("{}",
+        answer_text(session, to_json(verification), {{"checks_hold", verification.failed() == 0}}));
   } else {
     for (const VerificationLine& line : verification_lines(verification)) {
       line.failed ? write_alarming(line.text) : write_output(line.text);
@@ -65,19 +67,17 @@ void add_verify_command(CLI::App& accuracy, Session& session) {
       "must?");
   auto choice = std::make_shared<VerificationChoice>();
   command->add_option("GROUP", choice->groups, "Groups of checks (default: all; see --list)");
-  command->add_option("-o,--output", choice->folder,
-                      "Folder to write report.html, report.md, verification.json and "
-                      "verification.csv into");
+  command->add_option("--folder", choice->folder, "Folder to write into");
   command->add_option("--flaw", choice->flaw,
                       "Make one coefficient of everything that is verified wrong by this share, "
                       "such as 1%, to see that the checks fail");
-  command->add_flag("--list", choice->list, "Name the groups, and do nothing");
+  command->add_flag("--list", choice->list, "List what can be named, and do nothing: the groups");
   add_format_option(*command, session);
   command->footer(
       "Exit code 1 if a check fails; its lines are red on a terminal.\nExamples:\n"
       "  tpm accuracy verify\n"
       "  tpm accuracy verify regression --format json\n"
-      "  tpm accuracy verify -o verification\n"
+      "  tpm accuracy verify --folder verification\n"
       "  tpm accuracy verify closed-forms --flaw 1%");
   set_run(*command, session, [choice, &session] { return verify_program(*choice, session); });
 }

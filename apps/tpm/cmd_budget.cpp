@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
@@ -46,7 +47,7 @@ BudgetOptions budget_options(const BudgetCommand& command) {
   }
   options.device.delay_periods = static_cast<int>(parse_whole_number(command.delay, "--delay", 0));
   constexpr std::uint64_t kFewest = 100;
-  options.samples = static_cast<int>(parse_whole_number(command.samples, "--samples", kFewest));
+  options.samples = static_cast<int>(parse_whole_number(command.samples, "--draws", kFewest));
   options.seed = parse_whole_number(command.seed, "--seed", 0);
   return options;
 }
@@ -103,7 +104,7 @@ int run_budget(const BudgetCommand& command, const Session& session) {
   if (!command.folder.empty()) files = write_budget_report(command.folder, budget);
   std::string text;
   if (session.json()) {
-    text = to_text(to_json(budget));
+    text = answer_text(session, to_json(budget));
   } else if (command.verbose) {
     text = to_terminal_text(budget);
     if (!files.empty()) text += written(session, command.folder, files);
@@ -135,23 +136,26 @@ void add_budget_command(CLI::App& app, Session& session) {
       "An organ (JSON scene) that stands for the contact: its own stages follow the "
       "law, along its protocol");
   command->add_option("--finer", options->finer,
-                      "The same organ at a finer spacing: adds the line spacing");
+                      "Organ at a finer spacing, else the same: adds the line spacing");
   command
       ->add_option("--tolerance", options->tolerance,
-                   "With --scene: of the model that is picked for the loop, as tpm plan takes it")
+                   "Largest error of the model, with --scene: of the one that is picked for the "
+                   "loop, as tpm plan takes it")
       ->capture_default_str();
-  command->add_option("--loop-rate", options->loop_rate, "Of the servo loop")
+  command->add_option("--loop-rate", options->loop_rate, "Rate of the servo loop")
       ->capture_default_str();
   command->add_option("--encoder", options->encoder, "Step of the position, 0 m for none")
       ->capture_default_str();
   command->add_option("--delay", options->delay, "Periods from a position to its force")
       ->capture_default_str();
-  command->add_option("--samples", options->samples, "Laws drawn for the random part, 100 or more")
+  command
+      ->add_option("--draws", options->samples,
+                   "Number of laws drawn from the covariance, 100 or more: for the random part")
       ->capture_default_str();
-  command->add_option("--seed", options->seed, "Of what is drawn, 0 or more")
+  command->add_option("--seed", options->seed, "Seed of the random numbers, 0 or more: the draws")
       ->capture_default_str();
   command->add_option("--folder", options->folder,
-                      "Write budget.json, budget.csv and the waterfall into this folder");
+                      "Folder to write into: budget.json, budget.csv and the waterfall");
   add_verbose_option(*command, options->verbose, "from which stage to which, what a hand can feel");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "data_text.hpp"
 #include "tpm/files/import/description.hpp"
@@ -33,7 +34,7 @@ int list(const Session& session) {
     const auto words = [](const CurveSummary& c) {
       return Json{{"id", c.id}, {"kind", c.kind}, {"rows", c.size}, {"title", c.title}};
     };
-    say("{}", to_text(array_json(curves, words)));
+    say("{}", answer_text(session, Json{{"curves", array_json(curves, words)}}));
     return 0;
   }
   std::vector<std::vector<std::string>> table{{"id", "kind", "rows", "title"}};
@@ -58,7 +59,7 @@ int show(const Session& session, const std::string& argument, bool all_rows) {
   if (session.json()) {
     Json json = array_json(curves, curve_json);
     if (in_segments) json.front()["segments"] = description_json(*described).at("segments");
-    say("{}", to_text(is_packed(argument) ? json : json.front()));
+    say("{}", answer_text(session, Json{{"curves", json}}));
     return 0;
   }
   for (std::size_t i = 0; i < curves.size(); ++i) {
@@ -84,14 +85,16 @@ int check(const Session& session, const std::vector<std::string>& files) {
       if (!session.json()) tell_user("tpm: {}\n", error.what());
     }
   }
-  if (session.json()) say("{}", to_text(report));
+  if (session.json())
+    say("{}", answer_text(session, Json{{"curves", report}}, {{"curves_sound", sound}}));
   return exit_code(sound);
 }
 
 int pack(const Session& session, const std::vector<std::string>& arguments,
          const std::string& output, bool force) {
   if (!force && fs::exists(output)) {
-    throw Error(ExitCode::usage, "-o " + output, "the file exists", "another --output, or --force");
+    throw Error(ExitCode::usage, "-o " + output, "the file exists",
+                "another --output, or --overwrite");
   }
   std::vector<Curve> curves;
   for (const std::string& argument : arguments) {
@@ -99,7 +102,7 @@ int pack(const Session& session, const std::vector<std::string>& arguments,
   }
   pack_curves(output, curves);
   if (session.json()) {
-    say("{}", to_text(Json{{"file", output}, {"curves", curves.size()}}));
+    say("{}", answer_text(session, Json{{"file", output}, {"curves", curves.size()}}));
   } else {
     say("{}: {} curves\n", output, curves.size());
   }
@@ -111,7 +114,7 @@ void add_list(CLI::App& data, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm data list\n"
-      "JSON: a list of objects with id, kind (points, recording, spectrum, values), rows, title");
+      "JSON: curves, objects with id, kind (points, recording, spectrum, values), rows, title");
   set_run(*command, session, [&session] { return list(session); });
 }
 
@@ -120,11 +123,12 @@ void add_show(CLI::App& data, Session& session) {
   auto argument = std::make_shared<std::string>();
   auto all_rows = std::make_shared<bool>(false);
   command->add_option("curve", *argument, "Id, or .csv, .json or .h5 file")->required();
-  command->add_flag("--all", *all_rows, "Print every sample of a recording");
+  command->add_flag("--verbose", *all_rows, "Print everything: every sample of a recording");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm data show evren_relaxation\n"
-      "JSON, all numbers SI: id, kind, title, citation, doi, specimen, probe, note, sha256 and\n"
+      "JSON: curves, objects in SI with id, kind, title, citation, doi, specimen, probe, note, "
+      "sha256 and\n"
       "  points: observable, time_origin, time_provenance, data with label, depth_m, load_N,\n"
       "          time_s, force_N or depth_m (band: force_lower_N, force_upper_N), provenance\n"
       "  recording: provenance, samples with time_s, depth_m, force_N, force_sd_N as lists; "
@@ -145,7 +149,7 @@ void add_check(CLI::App& data, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm data check mine/*.csv\n"
-      "JSON: a list of objects with file, ok, rows or error");
+      "JSON: curves, objects with file, ok, rows or error");
   set_run(*command, session, [&session, files] { return check(session, *files); });
 }
 
@@ -158,8 +162,8 @@ void add_pack(CLI::App& data, Session& session) {
   CLI::App* command = data.add_subcommand("pack", "Write curves into one HDF5 file");
   auto options = std::make_shared<Options>();
   command->add_option("curves", options->curves, "Ids, or .csv, .json or .h5 files")->required();
-  command->add_option("-o,--output", options->output, "The HDF5 file (.h5)")->required();
-  command->add_flag("--force", options->force, "Replace a file that exists");
+  command->add_option("-o,--output", options->output, "File to write (HDF5, .h5)")->required();
+  command->add_flag("--overwrite", options->force, "Replace files that exist");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm data pack evren_relaxation evren_static -o curves.h5\n"

@@ -6,6 +6,7 @@
 #include <memory>
 #include <set>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/file.hpp"
@@ -22,11 +23,10 @@ namespace {
 /// The command line as it was typed; options_of() turns it into numbers and checks it.
 struct ImportArguments {
   std::vector<std::string> files;
-  std::string output;
+  std::string output, folder;
   bool force = false;
   ImportOptions options;  ///< what needs no reading: names
   ReadingArguments reading;
-  std::string negate = "none";
   std::string contact_force;
   std::string contact_samples = "3";
   std::string x, y, depth, load;
@@ -55,15 +55,15 @@ ImportOptions options_of(const ImportArguments& arguments) {
   options.format = arguments.options.format;
   options.header = arguments.options.header;
   options.dataset = arguments.options.dataset;
-  options.negate_drive |= arguments.negate == "drive" || arguments.negate == "both";
-  options.negate_response |= arguments.negate == "response" || arguments.negate == "both";
   if (!arguments.contact_force.empty()) {
     options.contact_force_N =
         positive(arguments.contact_force, Dimension::force, "--contact-force");
   }
   options.contact_samples = parse_count(arguments.contact_samples, 1, "--contact-samples");
-  if (!arguments.x.empty()) options.x = of_option([&] { return parse_axis(arguments.x, "--x"); });
-  if (!arguments.y.empty()) options.y = of_option([&] { return parse_axis(arguments.y, "--y"); });
+  if (!arguments.x.empty())
+    options.x = of_option([&] { return parse_axis(arguments.x, "--x-quantity"); });
+  if (!arguments.y.empty())
+    options.y = of_option([&] { return parse_axis(arguments.y, "--y-quantity"); });
   if (!arguments.depth.empty()) {
     options.depth_m = positive(arguments.depth, Dimension::length, "--depth");
   }
@@ -120,17 +120,20 @@ void name_target(Target& target, const fs::path& stem) {
   target.csv = stem.string() + ".csv";
 }
 
-/// One curve takes the name --output; several go into it as a folder.
+/// The name --output of one curve, or the curve's own in --folder.
 fs::path stem_of(const ImportArguments& arguments, const std::string& source,
                  const std::string& curve_name, std::size_t index, std::size_t of) {
-  if (arguments.files.size() == 1 && of == 1 && !arguments.output.empty()) {
+  if (!arguments.output.empty()) {
+    if (arguments.files.size() > 1 || of > 1) {
+      throw Error(ExitCode::usage, "--output", "is one file for several curves", "--folder");
+    }
     const fs::path single = arguments.output;
     const bool ending = single.extension() == ".csv" || single.extension() == ".json";
     return ending ? fs::path(single).replace_extension() : single;
   }
   std::string name = file_stem(fs::path(source).stem().string());
   if (of > 1) name += fmt::format("_{}_{}", index + 1, file_stem(curve_name));
-  return fs::path(arguments.output) / name;
+  return fs::path(arguments.folder) / name;
 }
 
 std::vector<Target> plan(const ImportArguments& arguments, const ImportOptions& options) {
@@ -156,7 +159,7 @@ void require_free(const std::vector<Target>& targets) {
     for (const fs::path& path : {target.csv, fs::path(target.csv).replace_extension(".json")}) {
       if (fs::exists(path)) {
         throw Error(ExitCode::usage, path.string(), "the file exists",
-                    "another --output, or --force");
+                    "another name, or --overwrite");
       }
     }
   }
@@ -165,14 +168,14 @@ void require_free(const std::vector<Target>& targets) {
 void print_text(const std::vector<Target>& targets, bool written) {
   for (const Target& target : targets) {
     say("{} -> {}\n", target.source,
-        written ? target.csv.string() : "nothing written: no --output");
+        written ? target.csv.string() : "nothing written: no --output or --folder");
     for (const ImportFinding& finding : target.curve.findings) {
       say("  {}: {}\n", finding.what, finding.value);
     }
   }
 }
 
-void print_json(const std::vector<Target>& targets, bool written) {
+void print_json(const Session& session, const std::vector<Target>& targets, bool written) {
   const Json report = array_json(targets, [&](const Target& target) {
     Json understood = Json::object();
     for (const ImportFinding& finding : target.curve.findings)
@@ -182,7 +185,7 @@ void print_json(const std::vector<Target>& targets, bool written) {
                 {"id", target.curve.description.header.id},
                 {"understood", understood}};
   });
-  say("{}", to_text(report));
+  say("{}", answer_text(session, Json{{"curves", report}}));
 }
 
 void write_curves(const std::vector<Target>& targets) {
@@ -194,42 +197,43 @@ void write_curves(const std::vector<Target>& targets) {
   }
 }
 
-/// Nothing is written before every file was understood, and nothing at all without --output.
+/// Nothing is written before every file was understood, and nothing at all without --output or
+/// --folder.
 int import_files(const Session& session, const ImportArguments& arguments) {
-  const bool write = !arguments.output.empty();
+  const bool write = !arguments.output.empty() || !arguments.folder.empty();
   const std::vector<Target> targets = plan(arguments, options_of(arguments));
   for (const Target& target : targets) {
     if (write) will_write({target.csv, fs::path(target.csv).replace_extension(".json")});
   }
   if (write && !arguments.force) require_free(targets);
   if (write) write_curves(targets);
-  session.json() ? print_json(targets, write) : print_text(targets, write);
+  session.json() ? print_json(session, targets, write) : print_text(targets, write);
   return 0;
 }
 
 void add_text_options(CLI::App& command, ImportArguments& a) {
   const std::vector<std::string> formats = import_formats();
-  command.add_option("--from", a.options.format, fmt::format("{}", fmt::join(formats, ", ")))
+  command
+      .add_option("--input-format", a.options.format,
+                  fmt::format("Format of the file: {}", fmt::join(formats, ", ")))
       ->check(CLI::IsMember(formats));
 }
 
 void add_machine_options(CLI::App& command, ImportArguments& a) {
   const char* group = "Testing machines and force curves";
-  add_reading_options(command, a.reading, group, "--from-time");
+  add_reading_options(command, a.reading, group);
   const auto add = options_of_group(command, group);
-  add("--negate", a.negate, "Turn the sign of: none, drive, response or both")
-      ->check(CLI::IsMember({"none", "drive", "response", "both"}));
   add("--contact-force", a.contact_force,
-      "Start time and depth where the force reaches this, such as \"0.05 N\"");
+      "Force at which contact begins, such as \"0.05 N\": start time and depth there");
   add("--contact-samples", a.contact_samples, "Samples in a row that must reach it (3)");
 }
 
 void add_figure_options(CLI::App& command, ImportArguments& a) {
   const auto add = options_of_group(command, "Digitised figures");
-  add("--x", a.x, "What the x axis shows, such as time:s or indentation_depth:mm");
-  add("--y", a.y, "What the y axis shows, such as contact_force:N");
+  add("--x-quantity", a.x, "What the x axis shows, such as time:s or indentation_depth:mm");
+  add("--y-quantity", a.y, "What the y axis shows, such as contact_force:N");
   add("--dataset", a.options.dataset, "Only the dataset of this name");
-  add("--depth", a.depth, "Imposed depth of a relaxation curve, such as \"4 mm\"");
+  add("--depth", a.depth, "Depth of the indentation: of a relaxation curve, such as \"4 mm\"");
   add("--load", a.load, "Imposed load of a creep curve, such as \"0.98 N\"");
   add("--time-origin", a.time_origin, "With --depth or --load: end_of_ramp or load_applied");
 }
@@ -254,10 +258,13 @@ void add_data_import_command(CLI::App& data, Session& session) {
   auto arguments = std::make_shared<ImportArguments>();
   command->add_option("files", arguments->files, "Files to import; sheets as several files")
       ->required();
-  command->add_option("-o,--output", arguments->output,
-                      "Name of the curve; a folder if there are several. Without it the files are "
-                      "only read, and what was understood is printed");
-  command->add_flag("--force", arguments->force, "Replace files that exist");
+  command->add_option(
+      "-o,--output", arguments->output,
+      "File to write (.csv, a description goes beside it); of several curves --folder. Without "
+      "either the files are only read, and what was understood is printed");
+  command->add_option("--folder", arguments->folder, "Folder to write into: of several curves")
+      ->excludes("--output");
+  command->add_flag("--overwrite", arguments->force, "Replace files that exist");
   add_text_options(*command, *arguments);
   add_machine_options(*command, *arguments);
   add_figure_options(*command, *arguments);
@@ -266,13 +273,14 @@ void add_data_import_command(CLI::App& data, Session& session) {
   command->footer(
       "Examples:\n"
       "  tpm data import export.csv -o mine/liver --contact-force \"0.05 N\"\n"
-      "  tpm data import fig7.json -o mine/fig7 --x time:s --y contact_force:N --depth \"4 mm\" "
+      "  tpm data import fig7.json -o mine/fig7 --x-quantity time:s --y-quantity contact_force:N "
+      "--depth \"4 mm\" "
       "\\\n"
       "      --time-origin end_of_ramp\n"
       "  tpm data import cell.jpk-force -o mine/cell --segments extend,pause "
       "--probe-shape sphere \\\n"
       "      --probe-diameter \"10 um\"\n"
-      "JSON: a list of objects with source, csv (null if not written), id and understood\n"
+      "JSON: curves, objects with source, csv (null if not written), id and understood\n"
       "(what was found in the file)");
   set_run(*command, session, [&session, arguments] { return import_files(session, *arguments); });
 }

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "design_options.hpp"
 #include "recording_options.hpp"
@@ -40,7 +41,8 @@ int rank_candidates(const DesignOptions& options, const Session& session) {
   const DesignCheck* checked = check ? &*check : nullptr;
   if (!options.folder.empty()) draw(result, options.folder);
   const Json json = to_json(result, checked, top);
-  deliver(session.json() ? to_text(json) : to_terminal_text(result, checked, top), options.output);
+  deliver(session.json() ? answer_text(session, json) : to_terminal_text(result, checked, top),
+          options.output);
   deliver_csv(json_table_csv(json.at("ranked"), "/expected/parameters"), csv);
   return 0;
 }
@@ -68,12 +70,12 @@ int design(const DesignOptions& options, const Session& session) {
     refuse("--family", !options.family.empty(), "a file", kWithoutFile);
     refuse("--noise", !options.noise.empty(), "a file", kWithoutFile);
     refuse("--order", !options.order.empty(), "a file", kWithoutFile);
-    refuse("--margin", !options.margins.empty(), "a file", kWithoutFile);
+    refuse("--margins", !options.margins.empty(), "a file", kWithoutFile);
     if (!is_fit_configuration(options.design)) return rank_candidates(options, session);
   }
   const char* input = options.design.empty() ? "laws" : "a configuration of a fit";
   refuse("--top", !options.top.empty(), input, "it with a design");
-  refuse("--draw", !options.folder.empty(), input, "it with a design");
+  refuse("--folder", !options.folder.empty(), input, "it with a design");
   return options.design.empty() ? check_choice_of_law(options, session)
                                 : check_intervals(options, session);
 }
@@ -90,20 +92,23 @@ void add_design_command(CLI::App& app, Session& session) {
                       "A design (schemas/design.schema.json), whose best experiment is simulated; "
                       "or a configuration of tpm fit, whose start values are the true values; or "
                       "none, with --laws or --family");
-  command->add_option("--repetitions", options->repetitions,
-                      "Simulate and fit this many data sets (default: 100 of a design, 2000 of a "
-                      "configuration, 200 of each law); of a design 0 for none, else 10 or more");
-  command->add_option("--seed", options->seed, "Seed of the simulations, 0 or more, or 'clock'")
+  command->add_option(
+      "--repetitions", options->repetitions,
+      "Number of repetitions: data sets that are simulated and fitted (default: 100 of a design, "
+      "2000 of a configuration, 200 of each law); of a design 0 for none, else 10 or more");
+  command
+      ->add_option("--seed", options->seed,
+                   "Seed of the random numbers, 0 or more, or 'clock': the simulations")
       ->capture_default_str();
   add_output_option(*command, options->output);
   add_format_option(*command, session);
   const auto add_of_design = options_of_group(*command, "Of a design");
-  add_of_design("--top", options->top, "How many candidates to list (default: 10)");
-  add_of_design("--draw", options->folder, "Write figures into this folder");
+  add_of_design("--top", options->top, "How many to list: candidates (default 10)");
+  add_of_design("--folder", options->folder, "Folder to write into: figures");
   constexpr const char* kOfLaws = "Without a file";
   command
       ->add_option("--laws", options->laws,
-                   "Only these laws generate data; all of the family compete")
+                   "Names of laws: only these generate data; all of the family compete")
       ->delimiter(',')
       ->group(kOfLaws);
   const auto add_of_laws = options_of_group(*command, kOfLaws);
@@ -113,7 +118,7 @@ void add_design_command(CLI::App& app, Session& session) {
   add_of_laws("--order", options->order,
               "Order of the fractional elements that generate (default: 0.4)");
   command
-      ->add_option("--margin", options->margins,
+      ->add_option("--margins", options->margins,
                    "Margins of BIC, each judging the same fits (default: that of tpm fit)")
       ->delimiter(',')
       ->group(kOfLaws);
@@ -123,7 +128,7 @@ void add_design_command(CLI::App& app, Session& session) {
       "Exit code 1 if a coverage differs from its level at the 0.1 % level (exact binomial test), "
       "if a law\nis not returned (nor one within one sigma of it) in 95 % of the repetitions, or "
       "a law with more\nparameters in over 5 %.\n"
-      "Example:\n  tpm design configs/design_liver.json --draw out/design\n"
+      "Example:\n  tpm design configs/design_liver.json --folder out/design\n"
       "  tpm design configs/design_meat.json --repetitions 0 --format json\n"
       "  tpm design configs/coverage_absolute.json --repetitions 2000\n"
       "  tpm design --laws linear-1,power-2 --repetitions 20");

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "data_text.hpp"
 #include "tpm/base/nearest_word.hpp"
@@ -127,7 +128,7 @@ int list_examples(const Session& session) {
     }
     Json real = Json::array();
     for (const RealRecording& r : kReal) real.push_back({{"about", r.about}, {"source", r.source}});
-    say("{}", to_text(Json{{"examples", all}, {"real_recordings", real}}));
+    say("{}", answer_text(session, Json{{"examples", all}, {"real_recordings", real}}));
     return 0;
   }
   std::vector<std::vector<std::string>> table{{"name", "for", "provenance", "what"}};
@@ -169,17 +170,17 @@ int copy(const Example& example, const std::string& folder, const Session& sessi
       missing.emplace_back(to, std::move(bytes));
     } else if (!session.force && (fs::is_directory(to, ec) || read_file(to) != bytes)) {
       throw Error(ExitCode::usage, to.string(), "is there already and differs from the example",
-                  "another --folder, or --force");
+                  "another --folder, or --overwrite");
     } else if (session.force) {
       missing.emplace_back(to, std::move(bytes));
     }
   }
   for (const auto& [to, bytes] : missing) write_file(to, bytes);
   if (session.json()) {
-    say("{}", to_text(Json{{"name", example.name},
-                           {"provenance", example.provenance},
-                           {"files", copied},
-                           {"next", next_command(example, folder)}}));
+    say("{}", answer_text(session, Json{{"name", example.name},
+                                        {"provenance", example.provenance},
+                                        {"files", copied},
+                                        {"next", next_command(example, folder)}}));
     return 0;
   }
   say("{} [{}]: {}\nwrote {}\nnext: {}\n", example.name, example.provenance, example.about,
@@ -197,7 +198,7 @@ void add_example_command(CLI::App& app, Session& session) {
       app.add_subcommand("example", "List the inputs that come with tpm, or copy one");
   auto options = std::make_shared<Options>();
   command->add_option("NAME", options->name, "Which one; without it all are listed");
-  command->add_option("--folder", options->folder, "Copy into this folder (default: this one)");
+  command->add_option("--folder", options->folder, "Folder to write into (default: this one)");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm example recording\n  tpm example organ --folder trial\n"

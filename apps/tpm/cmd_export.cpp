@@ -44,8 +44,8 @@ ExportOptions options_of(const ExportTexts& texts) {
   set_quantity(geometry.length_m, texts.length, Dimension::length, "--length");
   if (texts.poisson) geometry.poisson_ratio = option_number(*texts.poisson, "--poisson");
   PronyWindow& window = options.window;
-  if (texts.from) window.from_s = option_quantity(*texts.from, Dimension::time, "--from");
-  if (texts.until) window.to_s = option_quantity(*texts.until, Dimension::time, "--until");
+  if (texts.from) window.from_s = option_quantity(*texts.from, Dimension::time, "--earliest");
+  if (texts.until) window.to_s = option_quantity(*texts.until, Dimension::time, "--latest");
   if (texts.terms) window.times = static_cast<int>(parse_whole_number(*texts.terms, "--terms", 1));
   return options;
 }
@@ -97,29 +97,34 @@ void add_export_command(CLI::App& app, Session& session) {
   command->add_option("LAW|SCENE", texts->law, "Law file (docs/laws.md), or an organ (JSON scene)")
       ->required();
   command
-      ->add_option("--to", texts->to,
-                   "Of a law: abaqus, ansys, febio or json; of an organ: sofa or mjcf")
+      ->add_option(
+          "--to", texts->to,
+          "Program to write for; of a law: abaqus, ansys, febio or json; of an organ: sofa or mjcf")
       ->required();
-  command->add_option("--radius", texts->radius, "Sphere that was pressed in, for moduli in Pa");
+  command->add_option("--radius", texts->radius,
+                      "Radius of the sphere that was pressed in, for moduli in Pa");
   command->add_option("--cone-angle", texts->cone,
-                      "Or cone: angle between its axis and its surface, such as \"45 deg\"");
-  command->add_option("--punch-radius", texts->punch, "Or flat punch");
-  command->add_option("--area", texts->area, "Or cross section of a bar");
-  command->add_option("--length", texts->length, "and its length");
-  command->add_option("--poisson", texts->poisson, "Poisson's ratio (0.49)");
-  command->add_option("--from", texts->from, "Fractional laws: earliest time (0.01 s)");
-  command->add_option("--until", texts->until, "Fractional laws: latest time (100 s)");
-  command->add_option("--terms", texts->terms, "Fractional laws: relaxation times to choose from");
+                      "Angle between axis and surface of a cone, such as \"45 deg\"");
+  command->add_option("--punch-radius", texts->punch, "Radius of a flat punch");
+  command->add_option("--area", texts->area, "Cross section, of a bar");
+  command->add_option("--length", texts->length, "Length of that bar");
+  command->add_option("--poisson", texts->poisson, "Poisson's ratio (default 0.49)");
+  command->add_option("--earliest", texts->from,
+                      "Earliest time of a fractional law (default 0.01 s)");
+  command->add_option("--latest", texts->until, "Latest time of a fractional law (default 100 s)");
+  command->add_option("--terms", texts->terms,
+                      "Relaxation times to choose from, for a fractional law");
   command->add_flag("--relaxation-only", texts->relaxation_only,
                     "Leave out a power kernel or tension, which the target cannot say");
-  command->add_option("--density", texts->density, "Organs: of the spheres, kg/m^3 (1060)");
-  command->add_flag("--instantaneous", texts->instantaneous,
-                    "Organs: springs of the instantaneous stiffness without dampers, for fast "
-                    "motions");
-  command->add_option("-o,--output", texts->output, "Write here instead of to the terminal");
+  command->add_option("--density", texts->density,
+                      "Density of the spheres of an organ, kg/m^3 (default 1060)");
+  command->add_flag(
+      "--instantaneous", texts->instantaneous,
+      "Springs of the instantaneous stiffness without dampers, of an organ: for fast motions");
+  command->add_option("-o,--output", texts->output, "File to write (default: the terminal)");
   command->footer(
       "Example:\n  tpm export law.json --to abaqus --radius \"2 mm\"\n"
-      "  tpm export fractional.json --to febio --from \"0.1 s\" --until \"30 s\"\n"
+      "  tpm export fractional.json --to febio --earliest \"0.1 s\" --latest \"30 s\"\n"
       "  tpm export on_liver/scene.json --to mjcf -o liver.xml");
   set_run(*command, session, [texts] {
     const auto engine = organ_target(texts->to);

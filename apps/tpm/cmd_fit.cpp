@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "answer.hpp"
 #include "fit_options.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/file_kind.hpp"
@@ -97,7 +98,8 @@ int fit_configuration(const FitOptions& options, const Session& session) {
   const auto csv = csv_beside(options.output, session);
   if (!options.no_draw) will_write_into(options.folder, {"figures.json", "law.json"});
   const FitResult result = fit_and_judge(configured(options));
-  std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
+  std::string text =
+      session.json() ? answer_text(session, to_json(result)) : to_terminal_text(result);
   if (!session.json() && result.adequacy) text = result.adequacy->words + "\n\n" + text;
   std::vector<std::string> files;
   if (!options.folder.empty() && !options.no_draw) {
@@ -168,7 +170,7 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
   const FitResult& best = selection.candidates[selection.recommended].fit;
   std::string text =
       session.json()
-          ? to_text(to_json(selection))
+          ? answer_text(session, to_json(selection))
           : fmt::format("{}{}{}\n{}", function.read_as, function.read_as.empty() ? "" : "\n",
                         to_terminal_text(selection), to_terminal_text(best));
   const std::string folder = figure_folder(options, function.name);
@@ -251,9 +253,10 @@ void add_fit_command(CLI::App& app, Session& session) {
       ->required();
   constexpr const char* kChoice = "The choice of a law for recordings";
   command
-      ->add_option("--laws", options->laws,
-                   "Fit this law, e.g. power-2, or choose among these, e.g. linear-1,power-2 "
-                   "(default: the least of the family that the recordings support)")
+      ->add_option(
+          "--laws", options->laws,
+          "Names of laws: fit this one, e.g. power-2, or choose among these, e.g. linear-1,power-2 "
+          "(default: the simplest of the family that the recordings support)")
       ->delimiter(',')
       ->group(kChoice);
   const auto add_choice = options_of_group(*command, kChoice);
@@ -272,43 +275,46 @@ void add_fit_command(CLI::App& app, Session& session) {
   command->add_option("--times", options->times,
                       "Relaxation times that are not fitted: \"0.1 s, 1 s, 10 s\", or \"1 ms : "
                       "1000 s : 13\" for 13 at equal ratios (law linear-13 unless --laws says)");
-  CLI::Option* folder =
-      command->add_option("--folder", options->folder,
-                          "Where figures and files go (default: NAME_fit for recordings, none are "
-                          "written for a configuration)");
+  CLI::Option* folder = command->add_option("--folder", options->folder,
+                                            "Folder to write into: figures and files (default: "
+                                            "NAME_fit for recordings, none for a configuration)");
   add_verbose_option(*command, options->verbose, "every law tried, starts, readings");
   command->add_flag("--no-draw", options->no_draw, "Write no figures and files")->excludes(folder);
   add_recording_options(*command, options->recordings);
   add_placement_options(*command, options->placement);
-  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
-  command->add_option("--rate", options->rate, "Assume this ramp rate instead, e.g. \"2 mm/s\"");
-  command->add_option("--hold-out", options->hold_out_depth,
-                      "Predict this depth instead of fitting it, e.g. \"8 mm\"");
-  command->add_option("--starts", options->starts, "Number of starts");
-  command->add_option("--seed", options->seed, "Seed of the random starts, 0 or more");
-  command->add_option("--bootstrap", options->bootstrap,
-                      "Refit this many resampled data sets, 20 or more");
-  command->add_option("--resample", options->resample,
-                      "What is drawn: residuals, blocks or recordings");
+  command->add_option("-o,--output", options->output, "File to write (default: the terminal)");
+  const auto add_of_configuration = options_of_group(*command, "Of a configuration");
+  add_of_configuration(
+      "--rate", options->rate,
+      "Speed of the ramp, assumed instead of that of the configuration, e.g. \"2 mm/s\"");
+  add_of_configuration("--hold-out", options->hold_out_depth,
+                       "Depth that is predicted instead of fitted, e.g. \"8 mm\"");
+  add_of_configuration("--bootstrap", options->bootstrap,
+                       "Refit this many resampled data sets, 20 or more");
+  add_of_configuration("--resample", options->resample,
+                       "What is resampled: residuals, blocks or recordings");
+  command->add_option("--starts", options->starts,
+                      "Number of starts (default: that of the configuration, else 50)");
+  command->add_option("--seed", options->seed,
+                      "Seed of the random numbers, 0 or more: the starts (default: that of the "
+                      "configuration, else 0)");
   command->add_option("--reference", options->reference,
-                      "Recordings: the depth at which coefficients are secants, e.g. \"4 mm\" "
+                      "Depth that coefficients refer to: as secants, e.g. \"4 mm\"; of recordings "
                       "(default: the largest; of a folder the largest that all reach)");
-  command->add_option(
-      "--group-by", options->group_by,
-      "Folder: what tells the specimens apart: a pattern of the file names with one "
-      "group, e.g. \"(liver[0-9]+)_\", or a column or key of the files");
-  command->add_flag(
-      "--compare", options->compare,
-      "Two folders: ratio of each parameter, and of Young's moduli, with interval and "
-      "test");
+  command->add_option("--group-by", options->group_by,
+                      "What tells the specimens of a folder apart: a pattern of the file names "
+                      "with one group, e.g. \"(liver[0-9]+)_\", or a column or key of the files");
+  command->add_flag("--compare", options->compare,
+                    "Compare two folders: ratio of each parameter, and of Young's moduli, with "
+                    "interval and test");
   add_format_option(*command, session);
   const auto add_probe = options_of_group(*command, "Young's modulus of an indentation, in Pa");
   add_probe("--radius", options->radius,
-            "Of the sphere that was pressed in (Hertz), e.g. \"2 mm\"");
+            "Radius of the sphere that was pressed in, for Young's modulus (Hertz), e.g. \"2 mm\"");
   add_probe("--cone-angle", options->cone_angle,
-            "Or of a cone: between its axis and its surface, e.g. \"45 deg\" (Sneddon)");
-  add_probe("--punch-radius", options->punch_radius, "Or of a flat punch (Sneddon)");
-  add_probe("--poisson", options->poisson, "Poisson's ratio, 0 to 0.5 (0.49, assumed)");
+            "Angle between axis and surface of a cone, e.g. \"45 deg\" (Sneddon)");
+  add_probe("--punch-radius", options->punch_radius, "Radius of a flat punch (Sneddon)");
+  add_probe("--poisson", options->poisson, "Poisson's ratio, 0 to 0.5 (default 0.49, assumed)");
   command->footer(
       "Example:\n  tpm fit configs/liver_relaxation.json\n"
       "  tpm fit meat.csv\n  tpm fit slow.csv fast.csv --laws linear-1,linear-2,power-2 --verbose\n"

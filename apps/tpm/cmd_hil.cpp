@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "hil_options.hpp"
 #include "hil_page.hpp"
@@ -100,7 +101,7 @@ int list_plugin(const DeviceOptions& options, const Session& session) {
   if (list.empty()) text += "none     the plugin is there, and sees no device\n";
   const Json json{
       {"plugin", {{"file", plugin.file()}, {"name", plugin.name()}, {"devices", list}}}};
-  say("{}", session.json() ? to_text(json) : text);
+  say("{}", session.json() ? answer_text(session, json) : text);
   return 0;
 }
 
@@ -143,10 +144,11 @@ int list_devices(const DeviceOptions& options, const Session& session) {
   }
   const auto [inverse, inverse_text] = listed_inverse(options.choice.inverse);
   if (session.json()) {
-    say("{}", to_text(Json{{"force_dimension", {{"devices", list}, {"reason", reason}}},
-                           {"inverse3", inverse},
-                           {"virtual", {{"available", true}, {"simulated_device", true}}},
-                           {"replay", {{"available", true}, {"simulated_device", true}}}}));
+    say("{}",
+        answer_text(session, Json{{"force_dimension", {{"devices", list}, {"reason", reason}}},
+                                  {"inverse3", inverse},
+                                  {"virtual", {{"available", true}, {"simulated_device", true}}},
+                                  {"replay", {{"available", true}, {"simulated_device", true}}}}));
     return 0;
   }
   if (devices.empty()) text = fmt::format("none     of Force Dimension: {}\n", reason);
@@ -253,7 +255,7 @@ int exit_code_of(const ServoOutcome& outcome) {
 int run_hil(const RunChoice& choice, const Session& session) {
   if (!session.force && std::filesystem::is_regular_file(choice.output)) {
     throw Error(ExitCode::usage, "-o " + choice.output, "the file exists",
-                "another --output, or --force");
+                "another --output, or --overwrite");
   }
   HilSession hil = read_session(choice.session, choice.changes);
   DeviceChoice device = chosen_device(choice.device);
@@ -309,7 +311,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   if (session.json()) {
     Json json = run_json(hil, run);
     json["recording"] = choice.output;
-    say("{}", to_text(json));
+    say("{}", answer_text(session, json));
   } else {
     say("{}wrote {}\n", run_text(hil, run), choice.output);
   }
@@ -337,41 +339,44 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
                            did_you_mean(kind, kinds), fmt::join(kinds, ", "));
       })
       ->capture_default_str();
-  command.add_option("--serial", options.serial, "Of the device, where there are several")
+  command
+      .add_option("--serial", options.serial,
+                  "Serial number of the device, where there are several")
       ->check(CLI::Range(0, 65535));
   command.add_option("--index", options.index, "Its place in the list of tpm hil devices")
       ->check(CLI::Range(0, 127));
   command.add_option("--dhd-library", options.library,
                      "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
-  command.add_option("--plugin", options.plugin,
-                     "Of --device plugin: a shared library after tpmkit/haptic_device.h");
+  command.add_option(
+      "--plugin", options.plugin,
+      "Library of a device plugin, after tpmkit/haptic_device.h: of --device plugin");
   command.add_option(
       "--device-file", options.file,
       "What was measured of the device (tpm hil identify; schemas/device.schema.json); "
       "without it hardware counts as 20 ms late and free of friction");
   command
       .add_option("--inverse-port", options.choice.inverse.port,
-                  "Of --device inverse3: simulation channel of the Inverse service")
+                  "Port of the Inverse service: its simulation channel, of --device inverse3")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   command
       .add_option("--inverse-events-port", options.choice.inverse.events_port,
-                  "The same: its events, of versions from 3.5 on")
+                  "Port of its events, of versions from 3.5 on")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   command
       .add_option("--inverse-http-port", options.choice.inverse.old_http_port,
-                  "The same: HTTP of versions before 3.5")
+                  "Port of its HTTP, of versions before 3.5")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   command.add_option("--inverse-id", options.choice.inverse.device_id,
-                     "The same: which device, where there are several");
+                     "Which device of the service, where there are several");
   command
       .add_option("--inverse-gravity", options.choice.inverse.gravity_carried,
-                  "The same: share of the device's weight that the service is to carry")
+                  "Share of the device's weight that the service is to carry")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--recording", options.replay, "What --device replay plays");
+  command.add_option("--device-recording", options.replay, "What --device replay plays");
   command.add_flag("--may-move", options.choice.may_move,
                    "The device may move by itself to initialise");
   command.add_flag("--take-as-ready", options.choice.take_as_ready,
@@ -410,10 +415,10 @@ void add_hil_command(CLI::App& app, Session& session) {
   devices->add_option("--dhd-library", listed->library,
                       "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
   devices->add_option("--plugin", listed->plugin,
-                      "Those of a device plugin instead (docs/library.md)");
+                      "Library of a device plugin: list its devices (docs/library.md)");
   devices
       ->add_option("--inverse-port", listed->choice.inverse.port,
-                   "Simulation channel of the Inverse service")
+                   "Port of the Inverse service: its simulation channel")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   add_format_option(*devices, session);
@@ -424,11 +429,12 @@ void add_hil_command(CLI::App& app, Session& session) {
   auto choice = std::make_shared<RunChoice>();
   run->add_option("SESSION", choice->session, "JSON session (schemas/hil.schema.json)")->required();
   add_device_options(*run, choice->device);
-  run->add_option("--time", choice->time,
-                  "real: on the clock; virtual: as fast as it goes, the same bits each time; "
-                  "default: real with a real device or a page, else virtual")
+  run->add_option("--clock", choice->time,
+                  "Clock of the run: real, or virtual: as fast as it goes, the same bits each time "
+                  "(default: real with a real device or a page, else virtual)")
       ->check(CLI::IsMember({"real", "virtual"}));
-  run->add_option("-o,--output", choice->output, "Recording")->capture_default_str();
+  run->add_option("-o,--output", choice->output, "File to write (the recording, .tpmrec)")
+      ->capture_default_str();
   run->add_option("--law", choice->changes.law,
                   "Feel this law instead of the session's tissue (tpm fit writes law.json)");
   run->add_option("--replay-motion", choice->changes.motion,
@@ -440,11 +446,12 @@ void add_hil_command(CLI::App& app, Session& session) {
                   "Code of who runs the session; stands in the recording");
   run->add_option("--subject", choice->notes.subject_code,
                   "Code of who holds the device; stands in the recording");
-  run->add_flag("--force", session.force, "Replace a recording that exists");
+  run->add_flag("--overwrite", session.force, "Replace files that exist");
   run->add_flag("--accept-unstable", choice->accept_unstable,
                 "Run what would be unstable, on the virtual device only");
-  run->add_option("--page", choice->page.port,
-                  "Show the session in a browser on this machine: port, 0 for one that is free");
+  run->add_option(
+      "--page", choice->page.port,
+      "Port of a page that a browser on this machine shows: the session; 0 for one that is free");
   run->add_option("--page-wait", choice->page.wait,
                   "Begin when the page has been opened, or after so long")
       ->capture_default_str();

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "hil_options.hpp"
 #include "interrupt_watch.hpp"
@@ -34,14 +35,15 @@ int check_hil(const CheckChoice& choice, const Session& session) {
   if (!choice.session.empty()) hil = read_session(choice.session);
   if (!choice.rate.empty()) {
     hil.servo.period_s =
-        1.0 / within(choice.rate, Dimension::frequency, "--rate", kLeast_Hz, kMost_Hz);
+        1.0 / within(choice.rate, Dimension::frequency, "--loop-rate", kLeast_Hz, kMost_Hz);
   }
   const double duration = within(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);
   const InterruptWatch interrupts(InterruptWatch::Of::motors);
   const OutOfMemoryIsThrown while_the_device_is_open;
   const JitterCheck check = check_jitter(chosen_device(choice.device), hil, duration,
                                          chosen_wish(choice.device), InterruptWatch::seen);
-  say("{}", session.json() ? to_text(check_json(check)) : check_text(check));
+  say("{}", session.json() ? answer_text(session, check_json(check), {{"rate_kept", check.fit}})
+                           : check_text(check));
   return exit_code(check.fit);
 }
 
@@ -55,13 +57,14 @@ void add_hil_check_command(CLI::App& hil, Session& session) {
                       "With the rate and the limits of this session (default: those of one that "
                       "says nothing)");
   add_device_options(*command, choice->device);
-  command->add_option("--rate", choice->rate,
-                      "Of the loop, 100 Hz to 4 kHz (default: the session's, 1 kHz)");
-  command->add_option("--duration", choice->duration, "Of the test")->capture_default_str();
+  command->add_option("--loop-rate", choice->rate,
+                      "Rate of the servo loop, 100 Hz to 4 kHz (default: the session's, 1 kHz)");
+  command->add_option("--duration", choice->duration, "Duration, of the test")
+      ->capture_default_str();
   add_format_option(*command, session);
   command->footer(
       "Examples:\n  tpm hil check configs/hil_liver.json --device omega7\n"
-      "  tpm hil check --device virtual --rate \"4 kHz\" --duration \"10 s\"");
+      "  tpm hil check --device virtual --loop-rate \"4 kHz\" --duration \"10 s\"");
   set_run(*command, session, [choice, &session] { return check_hil(*choice, session); });
 }
 

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "hil_options.hpp"
 #include "tpm/files/file.hpp"
@@ -19,11 +20,11 @@ int export_hil(const ExportChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   export_recording(recording, sha256_hex(read_file(choice.recording)), choice.output);
   if (session.json()) {
-    say("{}", to_text(Json{{"file", choice.output},
-                           {"rows", recording.rows.size()},
-                           {"whole", recording.closed && recording.damaged == 0},
-                           {"damaged_rows", recording.damaged},
-                           {"simulated_device", recording.simulated()}}));
+    say("{}", answer_text(session, Json{{"file", choice.output},
+                                        {"rows", recording.rows.size()},
+                                        {"whole", recording.closed && recording.damaged == 0},
+                                        {"damaged_rows", recording.damaged},
+                                        {"simulated_device", recording.simulated()}}));
   } else {
     const std::string damage = damage_line(recording);
     say("{}\n{}{}wrote {}: {} rows\n", device_line(recording), damage, damage.empty() ? "" : "\n",
@@ -38,7 +39,7 @@ void add_hil_export_command(CLI::App& hil, Session& session) {
   CLI::App* command = hil.add_subcommand("export", "Write a recording as HDF5");
   auto choice = std::make_shared<ExportChoice>();
   command->add_option("RECORDING", choice->recording, "What tpm hil run has written")->required();
-  command->add_option("-o,--output", choice->output, "HDF5 file")->required();
+  command->add_option("-o,--output", choice->output, "File to write (HDF5)")->required();
   add_format_option(*command, session);
   command->footer("Example:\n  tpm hil export session.tpmrec -o session.h5");
   set_run(*command, session, [choice, &session] { return export_hil(*choice, session); });

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "hil_options.hpp"
 #include "interrupt_watch.hpp"
@@ -80,7 +81,7 @@ int identify_hil(const IdentifyChoice& choice, const Session& session) {
   if (!choice.session.empty()) hil = read_session(choice.session);
   if (!choice.rate.empty()) {
     hil.servo.period_s =
-        1.0 / between(choice.rate, Dimension::frequency, "--rate", kSlowest_Hz, kFastest_Hz);
+        1.0 / between(choice.rate, Dimension::frequency, "--loop-rate", kSlowest_Hz, kFastest_Hz);
   }
   const DeviceChoice device = chosen_device(choice.device);
   const bool hardware = limits_of(device).hardware();
@@ -105,7 +106,7 @@ int identify_hil(const IdentifyChoice& choice, const Session& session) {
   const Json json = device_file_json(run, hardware ? date_now() : std::string());
   write_file(choice.output, to_text(json));
   if (session.json()) {
-    say("{}", to_text(json));
+    say("{}", answer_text(session, json, {{"delay_found", run.found.delay_mean_s.has_value()}}));
   } else {
     say("{}wrote {}\n", identified_text(run), choice.output);
   }
@@ -121,18 +122,18 @@ void add_hil_identify_command(CLI::App& hil, Session& session) {
   command->add_option("SESSION", choice->session,
                       "With the rate, the push and the simulated device of this session");
   add_device_options(*command, choice->device);
-  command->add_option("--rate", choice->rate,
-                      "Of the loop, 500 Hz to 4 kHz (default: the session's, 1 kHz)");
-  command->add_option("--duration", choice->duration, "Of the measurement, 5 s to 10 min")
+  command->add_option("--loop-rate", choice->rate,
+                      "Rate of the servo loop, 500 Hz to 4 kHz (default: the session's, 1 kHz)");
+  command->add_option("--duration", choice->duration, "Duration, 5 s to 10 min")
       ->capture_default_str();
   command
-      ->add_option("--time", choice->time,
-                   "real: on the clock; virtual: as fast as it goes; default: real with a real "
-                   "device, else virtual")
+      ->add_option("--clock", choice->time,
+                   "Clock of the run: real, or virtual: as fast as it goes (default: real with a "
+                   "real device, else virtual)")
       ->check(CLI::IsMember({"real", "virtual"}));
   command
       ->add_option("-o,--output", choice->output,
-                   "Device file (schemas/device.schema.json), for --device-file")
+                   "File to write (schemas/device.schema.json), for --device-file")
       ->capture_default_str();
   add_format_option(*command, session);
   command->footer(

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "hil_options.hpp"
 #include "interrupt_watch.hpp"
@@ -61,7 +62,7 @@ int serve_hil(const ServeChoice& choice, const Session& session) {
   options.watcher = [&view](const ServoRecord& row) { view.see(row); };
   const ServeRun run = serve_session(hil, options);
   view.ended(run.outcome);
-  say("{}", session.json() ? to_text(serve_json(hil, run)) : serve_text(hil, run));
+  say("{}", session.json() ? answer_text(session, serve_json(hil, run)) : serve_text(hil, run));
   // Ctrl-C is how a server without --duration ends.
   const bool ended = run.outcome.cause == StopCause::finished ||
                      (run.outcome.cause == StopCause::signal && options.duration_s == 0.0);
@@ -76,13 +77,17 @@ void add_hil_serve_command(CLI::App& hil, Session& session) {
   auto choice = std::make_shared<ServeChoice>();
   command->add_option("SESSION", choice->session, "JSON session (schemas/hil.schema.json)")
       ->required();
-  command->add_option("--port", choice->port, "Of the simulation channel, 0 for one that is free")
+  command
+      ->add_option("--port", choice->port, "Port of the simulation channel, 0 for one that is free")
       ->capture_default_str();
-  command->add_option("--events-port", choice->events_port, "Of the events, 0 for one that is free")
+  command
+      ->add_option("--events-port", choice->events_port,
+                   "Port of the events, 0 for one that is free")
       ->capture_default_str();
-  command->add_option("--duration", choice->duration, "End after so long (default: at Ctrl-C)");
-  command->add_option("--page", choice->page,
-                      "Show the tissue in a browser on this machine: port, 0 for one that is free");
+  command->add_option("--duration", choice->duration, "Duration (default: until Ctrl-C)");
+  command->add_option(
+      "--page", choice->page,
+      "Port of a page that a browser on this machine shows: the tissue; 0 for one that is free");
   command->add_flag("--poll", choice->poll,
                     "Never sleep between messages: faster answers, one processor busy");
   add_format_option(*command, session);

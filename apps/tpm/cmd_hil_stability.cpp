@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/haptics/show/boundary_report.hpp"
 #include "tpm/show/draw.hpp"
@@ -12,16 +13,16 @@ void add_hil_stability_command(CLI::App& hil, Session& session) {
   CLI::App* command = hil.add_subcommand(
       "stability", "Largest stiffness that is passive, and stable, against rate, delay, friction");
   auto figures = std::make_shared<std::string>();
-  command->add_option("--figures", *figures, "Folder for figures (SVG, PNG)");
+  command->add_option("--folder", *figures, "Folder to write into: figures (SVG, PNG)");
   add_format_option(*command, session);
-  command->footer("Example:\n  tpm hil stability --figures hil_borders");
+  command->footer("Example:\n  tpm hil stability --folder hil_borders");
   set_run(*command, session, [figures, &session] {
     const BoundaryStudy study = study_boundaries({});
     std::vector<std::string> files;
     if (!figures->empty()) files = write_figures(*figures, boundary_figures(study));
     Json json = boundary_json(study);
     json["files"] = files;
-    say("{}", session.json() ? to_text(json) : boundary_text(study));
+    say("{}", session.json() ? answer_text(session, json) : boundary_text(study));
     return 0;
   });
 }

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 #include "tpm/show/draw.hpp"
@@ -24,7 +25,7 @@ VerifyOptions options_of(const VerifyChoice& choice) {
   VerifyOptions options;
   options.motion_tolerance_m =
       option_quantity(choice.motion_tolerance, Dimension::length, "--motion-tolerance");
-  options.spacing_s = option_quantity(choice.spacing, Dimension::time, "--spacing");
+  options.spacing_s = option_quantity(choice.spacing, Dimension::time, "--compare-every");
   options.window_s = option_quantity(choice.window, Dimension::time, "--window");
   if (options.motion_tolerance_m > 0.0 && options.spacing_s > 0.0 && options.window_s >= 0.0) {
     return options;
@@ -37,13 +38,14 @@ int verify_hil(const VerifyChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));
   if (session.json()) {
-    say("{}", to_text(verification_json(recording, v)));
+    say("{}", answer_text(session, verification_json(recording, v),
+                          {{"recording_whole", recording.damaged == 0}}));
   } else if (choice.verbose) {
     say("{}", verification_text(recording, v));
   } else {
     ShortAnswer answer = short_answer(recording, v);
     end_answer(answer, "", {},
-               fmt::format("tpm hil report {} -o hil_report", shell_word(choice.recording)));
+               fmt::format("tpm hil report {} --folder hil_report", shell_word(choice.recording)));
     say("{}", to_text(answer));
   }
   // What is left of a damaged recording is verified; the answer is no all the same.
@@ -58,7 +60,8 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
   const Verification v = verify(recording, options_of(choice));
   write_hil_report(recording, v, choice.output, python);
   if (session.json()) {
-    say("{}", to_text(verification_json(recording, v)));
+    say("{}", answer_text(session, verification_json(recording, v),
+                          {{"recording_whole", recording.damaged == 0}}));
   } else {
     ShortAnswer answer = short_answer(recording, v);
     end_answer(answer, choice.output, {"report.html", "report.md", "report.json"},
@@ -76,15 +79,15 @@ std::shared_ptr<VerifyChoice> add_choice(CLI::App& command, Session& session) {
   command.add_option("RECORDING", choice->recording, "What tpm hil run has written")->required();
   command
       .add_option("--motion-tolerance", choice->motion_tolerance,
-                  "Of the recorded motion, which is thinned out for the reference")
-      ->capture_default_str();
-  command.add_option("--spacing", choice->spacing, "Of the instants that are compared")
+                  "Tolerance of the recorded motion, which is thinned out for the reference")
       ->capture_default_str();
   command
-      .add_option(
-          "--window", choice->window,
-          "Of the cross-check by CVODE: from the start, of a ball over the surface from the "
-          "first touch")
+      .add_option("--compare-every", choice->spacing, "Time between the instants that are compared")
+      ->capture_default_str();
+  command
+      .add_option("--window", choice->window,
+                  "Window of the cross-check by CVODE: from the start, of a ball over the surface "
+                  "from the first touch")
       ->capture_default_str();
   add_format_option(command, session);
   return choice;
@@ -106,8 +109,8 @@ void add_hil_verify_commands(CLI::App& hil, Session& session) {
   const auto to_report = add_choice(*report, session);
   add_verbose_option(*report, to_report->verbose,
                      "every cross-check and reading of the experiment");
-  report->add_option("-o,--output", to_report->output, "Folder")->capture_default_str();
-  report->footer("Example:\n  tpm hil report session.tpmrec -o hil_report");
+  report->add_option("--folder", to_report->output, "Folder to write into")->capture_default_str();
+  report->footer("Example:\n  tpm hil report session.tpmrec --folder hil_report");
   set_run(*report, session, [to_report, &session] { return report_hil(*to_report, session); });
 }
 

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "recording_options.hpp"
 #include "tpm/fit/online/identification.hpp"
@@ -51,7 +52,7 @@ int run_identify(const IdentifyCommand& command, const Session& session) {
     json["loop"] = to_json(loop);
     text += "\n" + to_terminal_text(loop);
   }
-  if (session.json()) text = to_text(json);
+  if (session.json()) text = answer_text(session, json);
   if (!command.folder.empty()) {
     text += written(
         session, command.folder,
@@ -72,8 +73,8 @@ void add_identify_command(CLI::App& app, Session& session) {
       ->required()
       ->expected(1);
   command->add_option("--laws", options->laws,
-                      "Laws to choose from, such as linear-1 power-2 (default: linear and power "
-                      "kernels with 0 to 2 branches, and linear-1-elastic)");
+                      "Names of laws: choose among these, such as linear-1 power-2 (default: "
+                      "linear and power kernels with 0 to 2 branches, and linear-1-elastic)");
   command
       ->add_option("--target", options->target,
                    "Stop when every material parameter is known to this part of its estimate")
@@ -82,14 +83,18 @@ void add_identify_command(CLI::App& app, Session& session) {
       ->add_option("--patience", options->patience,
                    "And stays so until there are this many times as many samples, 1 or more")
       ->capture_default_str();
-  command->add_option("--level", options->level, "Of the intervals")->capture_default_str();
-  command->add_option("--reference", options->reference,
-                      "Planned depth, that coefficients refer to (default: the recording's)");
-  command->add_option("--seed", options->seed, "Of the searches, 0 or more")->capture_default_str();
+  command->add_option("--level", options->level, "Confidence level, 0.9 or 90%: of the intervals")
+      ->capture_default_str();
+  command->add_option(
+      "--reference", options->reference,
+      "Depth that coefficients refer to: the planned one (default: the recording's)");
+  command
+      ->add_option("--seed", options->seed, "Seed of the random numbers, 0 or more: the searches")
+      ->capture_default_str();
   command->add_flag("--no-loop", options->no_loop,
                     "Do not hand the laws over to a model in the loop");
   command->add_option("--folder", options->folder,
-                      "Write identification.json, law.json and the figure into this folder");
+                      "Folder to write into: identification.json, law.json and the figure");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);

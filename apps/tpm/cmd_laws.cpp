@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
@@ -86,11 +87,11 @@ std::string family_text() {
 std::string answer(const std::string& name, const Session& session) {
   if (!name.empty()) {
     const LawSpec spec = of_option([&] { return parse_law_name(name, "laws"); });
-    return session.json() ? to_text(law_json(spec, true)) : one_law_text(spec);
+    return session.json() ? answer_text(session, law_json(spec, true)) : one_law_text(spec);
   }
   if (!session.json()) return family_text();
   const auto law = [](const char* text) { return law_json(parse_law_name(text, "laws"), false); };
-  return to_text(Json{{"names", grammar()}, {"laws", array_json(kExamples, law)}});
+  return answer_text(session, Json{{"names", grammar()}, {"laws", array_json(kExamples, law)}});
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
@@ -79,7 +80,8 @@ int run_material(const MaterialCommand& command, const Session& session) {
                    std::filesystem::path(command.scene).parent_path(), material_options(command));
   result.samples_sha256 = sample_digests(read_json(command.law));
   if (!command.output.empty()) deliver(to_text(result.scene), command.output);
-  std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
+  std::string text =
+      session.json() ? answer_text(session, to_json(result)) : to_terminal_text(result);
   if (!command.folder.empty()) {
     text += written(session, command.folder, write_organ_material_report(command.folder, result));
   }
@@ -122,9 +124,9 @@ void add_material_command(CLI::App& app, Session& session) {
       ->check(CLI::IsMember({"law", "readings", "profiles"}))
       ->capture_default_str();
   command->add_option("--folder", options->folder,
-                      "Write scene.json, session.json (for tpm hil run), material.json, "
-                      "material.csv and the figure into this folder");
-  command->add_option("-o,--output", options->output, "Write the scene here");
+                      "Folder to write into: scene.json, session.json (for tpm hil run), "
+                      "material.json, material.csv and the figure");
+  command->add_option("-o,--output", options->output, "File to write (the scene)");
   add_recording_options(*command, options->recordings);
   add_placement_options(*command, options->held);
   add_format_option(*command, session);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -32,7 +33,7 @@ Json scene_of_options(const NetworkChoice& choice) {
                           std::uint64_t least) {
     if (!text.empty()) organ[key] = parse_whole_number(text, option, least);
   };
-  number("count", "--count", choice.count, 2);
+  number("count", "--spheres", choice.count, 2);
   number("layers", "--layers", choice.layers, 1);
   number("seed", "--seed", choice.seed, 0);
   if (!choice.spacing.empty()) organ["spacing"] = choice.spacing;
@@ -61,7 +62,7 @@ int build(const NetworkChoice& choice, const Session& session) {
   if (session.json()) {
     Json json = network_json(tissue, inspection);
     json["files"] = {choice.output, xdmf.string()};
-    say("{}", to_text(json));
+    say("{}", answer_text(session, json));
   } else {
     say("{}wrote {} and {}\n", network_text(tissue, inspection), choice.output, xdmf.string());
   }
@@ -89,7 +90,7 @@ int check(const NetworkChoice& choice, const Session& session) {
     json["stands"] = fault.empty();
     json["fault"] = fault.empty() ? Json(nullptr) : Json(fault);
     json["modes_counted"] = tissue.network.organ.size() <= kMostSpheresForModes;
-    say("{}", to_text(json));
+    say("{}", answer_text(session, json, {{"network_stands", fault.empty()}}));
   } else {
     say("{}least support: {} at sphere {} (loose below {})\n", network_text(tissue, inspection),
         significant(*least, 3), least - support.begin() + 1, shortest(kLooseSupport));
@@ -127,11 +128,11 @@ std::shared_ptr<NetworkChoice> add_choice(CLI::App& command) {
   auto choice = std::make_shared<NetworkChoice>();
   command.add_option("SCENE", choice->scene,
                      "JSON scene (schemas/scene.schema.json); without one the liver of the paper");
-  command.add_option("--count", choice->count, "Number of spheres of a liver");
+  command.add_option("--spheres", choice->count, "Number of spheres of a liver");
   command.add_option("--layers", choice->layers, "Layers of a shell");
   command.add_option("--spacing", choice->spacing, "Distance of neighbours, e.g. \"20 mm\"");
-  command.add_option("--filling", choice->filling, "shell or solid");
-  command.add_option("--seed", choice->seed, "Seed of the filling");
+  command.add_option("--filling", choice->filling, "Filling of an organ: shell or solid");
+  command.add_option("--seed", choice->seed, "Seed of the random numbers, 0 or more: the filling");
   return choice;
 }
 
@@ -146,11 +147,12 @@ void add_network_command(CLI::App& app, Session& session) {
 
   CLI::App* build_command = network->add_subcommand("build", "Write a network to HDF5 and XDMF");
   const auto to_build = add_choice(*build_command);
-  build_command->add_option("-o,--output", to_build->output, "HDF5 file; an XDMF goes beside it")
+  build_command
+      ->add_option("-o,--output", to_build->output, "File to write (HDF5); an XDMF goes beside it")
       ->required();
   add_format_option(*build_command, session);
   build_command->footer(
-      "Example:\n  tpm network build --count 424 --layers 2 -o organ.h5\n"
+      "Example:\n  tpm network build --spheres 424 --layers 2 -o organ.h5\n"
       "  tpm network build configs/liver_scene.json -o organ.h5");
   set_run(*build_command, session, [to_build, &session] { return build(*to_build, session); });
 
@@ -165,7 +167,8 @@ void add_network_command(CLI::App& app, Session& session) {
   const auto to_show = add_choice(*show_command);
   to_show->output = "network";
   show_command
-      ->add_option("-o,--output", to_show->output, "Name of the pictures, without an ending")
+      ->add_option("-o,--output", to_show->output,
+                   "File to write (SVG); PNG, PDF and the numbers (JSON) go beside it")
       ->capture_default_str();
   show_command->footer("Example:\n  tpm network show configs/liver_scene.json -o liver");
   set_run(*show_command, session, [to_show, &session] { return show(*to_show, session); });

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/paper/claims/audit.hpp"
@@ -23,7 +24,8 @@ int run_command(const Session& session, const AuditOptions& options) {
   const auto csv = csv_beside(options.output, session);
   const AuditReport report = run_audit(read_json(path), path.filename().string());
   const Json json = to_json(report);
-  deliver(session.json() ? to_text(json) : audit_text(report, options.all), options.output);
+  deliver(session.json() ? answer_text(session, json) : audit_text(report, options.all),
+          options.output);
   deliver_csv(json_table_csv(json.at("findings"), "/details"), csv);
   return 0;
 }
@@ -37,11 +39,12 @@ void add_audit_command(CLI::App& paper, Session& session) {
   command->add_option("claims", options->claims,
                       "Claims file (default: the paper's, data/paper_claims.json)");
   add_output_option(*command, options->output);
-  command->add_flag("--all", options->all, "Also show the claims that hold");
+  command->add_flag("--verbose", options->all, "Print everything: also the claims that hold");
   add_format_option(*command, session);
   command->footer(
       "Findings are results, not errors: the exit code is 0 when the audit ran.\n"
-      "Example:\n  tpm paper audit --all\n  tpm paper audit my_claims.json --format json --output "
+      "Example:\n  tpm paper audit --verbose\n  tpm paper audit my_claims.json --format json "
+      "--output "
       "audit.json");
   set_run(*command, session, [&session, options] { return run_command(session, *options); });
 }

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/writable.hpp"
@@ -33,7 +34,7 @@ int experiments(const ExperimentsOptions& options, const Session& session) {
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   write_organ_study(study, options.folder, python, took.count());
   if (session.json()) {
-    say("{}", to_text(to_json(study)));
+    say("{}", answer_text(session, to_json(study)));
     return 0;
   }
   for (const std::string& sentence : cost_sentences(study)) say("- {}\n", sentence);
@@ -52,10 +53,9 @@ void add_experiments_command(CLI::App& paper, Session& session) {
   command->add_option("CONFIG", options->config,
                       "Tissues, data and experiments (schemas/organ_experiments.schema.json; "
                       "default: configs/organ_experiments.json)");
-  command->add_option("-o,--output", options->folder, "Folder to write into")
-      ->capture_default_str();
+  command->add_option("--folder", options->folder, "Folder to write into")->capture_default_str();
   add_format_option(*command, session);
-  command->footer("Example:\n  tpm paper experiments --output out/experiments");
+  command->footer("Example:\n  tpm paper experiments --folder out/experiments");
   set_run(*command, session, [options, &session] { return experiments(*options, session); });
 }
 

@@ -28,15 +28,15 @@ void add_report_command(CLI::App& paper, Session& session) {
   CLI::App* command = paper.add_subcommand(
       "report", "Recompute the paper: tables, audit, fits and figures in one report");
   auto folder = std::make_shared<std::string>("out/paper");
-  command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
+  command->add_option("--folder", *folder, "Folder to write into")->capture_default_str();
   auto requirement = std::make_shared<std::string>("10%");
   command
       ->add_option("--require", *requirement,
-                   "How large a model error may be, as a share of the measured value (the section "
-                   "on validation)")
+                   "Largest model error that is acceptable: a share of the measured value (the "
+                   "section on validation)")
       ->capture_default_str();
   command->footer(
-      "Example:\n  tpm paper report --output out/paper\n  tpm paper report --require 20%");
+      "Example:\n  tpm paper report --folder out/paper\n  tpm paper report --require 20%");
   set_run(*command, session, [folder, requirement, &session] {
     const double share = parse_share(*requirement, "--require");
     if (!(share > 0.0 && share < 1.0)) {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/quantity_text.hpp"
@@ -89,8 +90,9 @@ void warn_of_depths(const TableRequest& request) {
             significant(1e3 * deepest_m, 4));
 }
 
-std::string rendered(const TablesResult& result, const std::string& format) {
-  if (format == "json") return to_text(to_json(result));
+std::string rendered(const TablesResult& result, const std::string& format,
+                     const Session& session) {
+  if (format == "json") return answer_text(session, to_json(result));
   if (format == "csv") return tables_csv(result);
   const TableStyle style = format == "md"      ? TableStyle::markdown
                            : format == "latex" ? TableStyle::latex
@@ -98,12 +100,12 @@ std::string rendered(const TablesResult& result, const std::string& format) {
   return render(tables_document(result), style);
 }
 
-int run_command(const TableOptions& options) {
+int run_command(const TableOptions& options, const Session& session) {
   const TableRequest request = request_of(options);
   const auto path = paper_claims_path();
   const std::string name = path.filename().string();
   const auto printed = read_printed_tables(read_json(path), name);
-  const std::string text = rendered(make_tables(request, printed), options.format);
+  const std::string text = rendered(make_tables(request, printed), options.format, session);
   warn_of_depths(request);
   deliver(text, options.output);
   return 0;
@@ -123,9 +125,10 @@ void add_options(CLI::App& command, TableOptions& options) {
   command.add_option("--eta", options.eta, "Dashpot eta1 (default 5 Pa s)");
   command.add_option("--A0", options.A0, "Area that turns stress into force (default 12.56 mm^2)");
   command.add_option("--l0", options.l0, "Reference length (default 1 mm)");
-  command.add_option("--rate", options.rate, "Ramp rate with --consistent (assumed: 4 mm/s)");
-  command.add_option("--hold", options.hold, "Hold time with --consistent (default 30 s)");
-  command.add_option("-o,--output", options.output, "Write to this file instead of the terminal");
+  command.add_option("--rate", options.rate,
+                     "Speed of the ramp, with --consistent (assumed: 4 mm/s)");
+  command.add_option("--hold", options.hold, "Time at depth, with --consistent (default 30 s)");
+  command.add_option("-o,--output", options.output, "File to write (default: the terminal)");
   command.add_option("--format", options.format, "Output format: text, md, csv, latex or json")
       ->check(CLI::IsMember({"text", "md", "csv", "latex", "json"}))
       ->capture_default_str();
@@ -142,7 +145,7 @@ void add_tables_command(CLI::App& paper, Session& session) {
       "Plain numbers are mm, kPa, Pa s, mm^2, mm/s and s; other units go with the number.\n"
       "Example:\n  tpm paper tables --depths 2,4,6,8 --spacings 20,25,30,35 --E \"12 kPa\"\n"
       "  tpm paper tables --consistent --eta \"2e5 Pa s\" --rate \"2 mm/s\" --format md");
-  set_run(*command, session, [options] { return run_command(*options); });
+  set_run(*command, session, [options, &session] { return run_command(*options, session); });
 }
 
 }  // namespace tpm::app

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "plan_options.hpp"
 #include "tpm/base/text.hpp"
@@ -27,16 +28,18 @@ namespace fs = std::filesystem;
 void add_plan_options(CLI::App& command, PlanChoice& choice) {
   command
       .add_option("--tolerance", choice.tolerance,
-                  "Error in parts of the peak, such as 1% or 0.01; jnd: what a hand can feel; "
-                  "data: the data uncertainty (with --budget)")
+                  "Largest error of the model, in parts of the peak, such as 1% or 0.01; jnd: what "
+                  "a hand can feel; data: the data uncertainty (with --budget-file)")
       ->capture_default_str();
-  command.add_option("--budget", choice.budget, "budget.json of tpm budget, for --tolerance data");
+  command.add_option("--budget-file", choice.budget,
+                     "budget.json of tpm budget, for --tolerance data");
   command
       .add_option("--outputs", choice.outputs,
                   "What the tolerance is about: force (the response) or field (displacements)")
       ->check(CLI::IsMember({"force", "field"}))
       ->capture_default_str();
-  command.add_option("--rate", choice.rate, "Servo rate in Hz: every period needs its answer");
+  command.add_option("--loop-rate", choice.rate,
+                     "Rate of the servo loop, such as \"1 kHz\": every period needs its answer");
   command.add_option("--wall", choice.wall, "Computing time, such as \"0.1 s per s\"");
   command.add_option(
       "--costs", choice.costs,
@@ -49,7 +52,7 @@ namespace {
 void set_tolerance_of_data(PlanRequest& request, const PlanChoice& choice) {
   if (choice.budget.empty()) {
     throw Error(ExitCode::usage, "--tolerance data", "without a budget",
-                "--budget budget.json, as tpm budget --folder writes it");
+                "--budget-file budget.json, as tpm budget --folder writes it");
   }
   constexpr double kMost = 0.5, kLeast = 1e-6;
   const double part = tolerance_of_data(read_json(choice.budget), choice.budget);
@@ -67,14 +70,14 @@ PlanRequest plan_request(const PlanChoice& choice) {
   } else if (choice.budget.empty()) {
     set_tolerance(request, choice.tolerance);
   } else {
-    throw Error(ExitCode::usage, "--budget", "without --tolerance data", "both or none");
+    throw Error(ExitCode::usage, "--budget-file", "without --tolerance data", "both or none");
   }
   if (choice.outputs == "field") request.measure = {PlanOutput::field, 0.0};
   if (!choice.rate.empty()) {
-    const auto rate = find_number(choice.rate);
-    if (!rate || !(*rate >= 1.0 && *rate <= 1e6)) {
-      throw Error(ExitCode::usage, "--rate", fmt::format("'{}'", printable(choice.rate)),
-                  "a servo rate of 1 to 1e6 Hz");
+    const double rate = option_quantity(choice.rate, Dimension::frequency, "--loop-rate");
+    if (!(rate >= 1.0 && rate <= 1e6)) {
+      throw Error(ExitCode::usage, "--loop-rate", fmt::format("'{}'", printable(choice.rate)),
+                  "a servo rate of 1 Hz to 1 MHz");
     }
     request.budget.rate_Hz = rate;
   }
@@ -140,7 +143,8 @@ int calibrate(const PlanCommand& command, const Session& session) {
     seconds[std::string(entry.text)] = costs.seconds[static_cast<std::size_t>(entry.meaning)];
   }
   if (session.json()) {
-    say("{}", to_text(Json{{"seconds_per_operation", seconds}, {"file", file.string()}}));
+    say("{}",
+        answer_text(session, Json{{"seconds_per_operation", seconds}, {"file", file.string()}}));
     return 0;
   }
   for (const auto& [name, value] : seconds.items()) {
@@ -159,13 +163,13 @@ struct PlannedScene {
 PlannedScene planned_scene(const PlanCommand& command) {
   if (command.spheres.empty()) {
     if (!command.scene_output.empty()) {
-      throw Error(ExitCode::usage, "--write-scene", "without --spheres", "both or none");
+      throw Error(ExitCode::usage, "--write-scene", "without --sphere-tolerance", "both or none");
     }
     return {std::nullopt, read_experiment(command.scene)};
   }
   if (!command.scene_output.empty()) will_write({command.scene_output});
   SpheresRequest request;
-  request.tolerance = parse_share(command.spheres, "--spheres");
+  request.tolerance = parse_share(command.spheres, "--sphere-tolerance");
   request.most = command.most_spheres;
   const fs::path file = command.scene;
   const RefilledScene refilled(read_json(file), command.scene, file.parent_path());
@@ -200,16 +204,16 @@ std::string next_of_plan(const PlanCommand& command, const Plan& plan) {
   const auto add = [&](const char* name, const std::string& value) {
     if (!value.empty()) options += fmt::format(" {} {}", name, shell_word(value));
   };
-  add("--budget", choice.budget);
+  add("--budget-file", choice.budget);
   if (choice.outputs != "force") add("--outputs", choice.outputs);
   if (!plan.choice) {
     if (plan.without_budget) return fmt::format("tpm plan {}{}", scene, options);
     return fmt::format("tpm simulate {}", scene);
   }
-  add("--rate", choice.rate);
+  add("--loop-rate", choice.rate);
   add("--wall", choice.wall);
   add("--costs", choice.costs);
-  return fmt::format("tpm simulate {} --plan{} -o planned.h5", scene, options);
+  return fmt::format("tpm simulate {} --planned{} -o planned.h5", scene, options);
 }
 
 /// The answer, with the number of spheres before it if that was asked for.
@@ -240,19 +244,24 @@ int run_plan(const PlanCommand& command, const Session& session) {
   const PlannedScene chosen = planned_scene(command);
   if (!chosen.scene) {
     const Json json{{"spheres_choice", spheres_json(*chosen.spheres)}};
-    deliver(session.json() ? to_text(json) : spheres_text(*chosen.spheres), command.output);
+    deliver(session.json() ? answer_text(session, json, {{"number_found", false}})
+                           : spheres_text(*chosen.spheres),
+            command.output);
     return exit_code(false);
   }
   if (command.estimate) {
     const ExpectedPlanWork work = expected_work(*chosen.scene, request);
-    deliver(session.json() ? to_text(expected_plan_json(work)) : expected_plan_text(work),
-            command.output);
+    deliver(
+        session.json() ? answer_text(session, expected_plan_json(work)) : expected_plan_text(work),
+        command.output);
     return 0;
   }
   const Plan plan = planned(*chosen.scene, std::move(request));
   Json json = plan_json(plan);
   if (chosen.spheres) json["spheres_choice"] = spheres_json(*chosen.spheres);
-  deliver(session.json() ? to_text(json) : answer_of_plan(command, chosen, plan), command.output);
+  deliver(session.json() ? answer_text(session, json, {{"model_found", plan.choice.has_value()}})
+                         : answer_of_plan(command, chosen, plan),
+          command.output);
   deliver_csv(json_table_csv(json.at("frontier")), csv);
   return exit_code(plan.choice.has_value());
 }
@@ -265,15 +274,17 @@ void add_plan_command(CLI::App& app, Session& session) {
   command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)");
   add_plan_options(*command, choice->choice);
   command->add_option(
-      "--spheres", choice->spheres,
+      "--sphere-tolerance", choice->spheres,
       "How far the number of spheres may be from the limit of many small ones, such "
       "as 10%: choose it first (spacing_law continuum)");
   command
-      ->add_option("--most-spheres", choice->most_spheres, "Of --spheres: the most that are tried")
+      ->add_option("--most-spheres", choice->most_spheres,
+                   "Largest number of spheres that is tried, with --sphere-tolerance")
       ->check(CLI::Range(200, 1'000'000))
       ->capture_default_str();
-  command->add_option("--write-scene", choice->scene_output,
-                      "Of --spheres: write the scene with the number chosen");
+  command->add_option(
+      "--write-scene", choice->scene_output,
+      "Scene to write with the number of spheres that was chosen, with --sphere-tolerance");
   command->add_flag("--brief", choice->brief,
                     "Leave out what does not matter and the robustness margins");
   command
@@ -287,10 +298,10 @@ void add_plan_command(CLI::App& app, Session& session) {
   add_verbose_option(*command, choice->verbose,
                      "every candidate and number of spheres, the work of planning");
   command->add_option("-o,--output", choice->output,
-                      "Write here instead of to the terminal; beside JSON the candidates as .csv");
+                      "File to write (default: the terminal); beside JSON the candidates as .csv");
   add_format_option(*command, session);
   command->footer(
-      "Example:\n  tpm plan configs/plan/shallow.json --tolerance 1% --rate 1000\n"
+      "Example:\n  tpm plan configs/plan/shallow.json --tolerance 1% --loop-rate \"1 kHz\"\n"
       "Exit code 1: no model meets tolerance and budget.");
   set_run(*command, session, [choice, &session] { return run_plan(*choice, session); });
 }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "law_spectrum.hpp"
 #include "protocol_options.hpp"
@@ -39,7 +40,7 @@ PredictionOptions prediction_options(const PredictOptions& options) {
   }
   if (!options.samples.empty()) {
     constexpr std::uint64_t kFewest = 100;
-    chosen.samples = static_cast<int>(parse_whole_number(options.samples, "--samples", kFewest));
+    chosen.samples = static_cast<int>(parse_whole_number(options.samples, "--draws", kFewest));
   }
   chosen.seed = parse_whole_number(options.seed, "--seed", 0);
   return chosen;
@@ -70,7 +71,7 @@ void require_only_frequencies(const PredictOptions& options) {
        {std::pair{&options.ramp.rate, "--rate"}, std::pair{&options.ramp.hold, "--hold"},
         std::pair{&options.held.contact, "--contact"}, std::pair{&options.held.zero, "--zero"},
         std::pair{&options.level, "--level"}, std::pair{&options.placement, "--placement"},
-        std::pair{&options.samples, "--samples"}, std::pair{&options.folder, "--folder"}}) {
+        std::pair{&options.samples, "--draws"}, std::pair{&options.folder, "--folder"}}) {
     if (!text->empty()) refuse(name);
   }
 }
@@ -96,7 +97,7 @@ int predict(const PredictOptions& options, const Session& session) {
   const LawPrediction prediction = answer_of(options.law, file, recording, chosen);
   const Json json = to_json(prediction);
   std::string text = session.json() ? "" : to_terminal_text(prediction);
-  if (session.json()) text = to_text(json);
+  if (session.json()) text = answer_text(session, json);
   if (!options.folder.empty()) {
     text +=
         written(session, options.folder, write_prediction_report(options.folder, prediction, json));
@@ -126,26 +127,27 @@ void add_predict_command(CLI::App& app, Session& session) {
       ->expected(0, 1);
   add_ramp_options(*command, options->ramp);
   command->get_option("--depth")->description(
-      "Instead of a file: ramp to this depth, \"4 mm\"; with --frequencies the depth about which "
+      "Depth of the indentation: instead of a file, a ramp to this depth, \"4 mm\"; with "
+      "--frequencies the depth about which "
       "the tissue oscillates (default: the law's reference)");
   command->add_option("--frequencies", options->frequencies,
                       "Instead of a protocol: storage and loss of the law over frequency, small "
                       "oscillations: \"1 Hz, 10 Hz\", or \"0.001 Hz : 100 Hz : 16\" for 16 at "
                       "equal ratios");
   command->add_option("--level", options->level,
-                      "Of the bands, 0.9 or 90% (default: that of the fit)");
+                      "Confidence level, 0.9 or 90%: of the bands (default: that of the fit)");
   command->add_option("--placement", options->placement,
-                      "Contact point and offset: surface (0), fitted (those of the fit) or own "
+                      "Contact and zero: surface (0), fitted (those of the fit) or own "
                       "(found for the recording); default: surface for a protocol, fitted for a "
                       "recording that was fitted, own for another");
   add_placement_options(*command, options->held);
-  command->add_option("--samples", options->samples,
-                      "Bands from so many laws drawn from the covariance, 100 or more, instead of "
-                      "from derivatives");
-  command->add_option("--seed", options->seed, "Of what is drawn, 0 or more")
+  command->add_option("--draws", options->samples,
+                      "Number of laws drawn from the covariance, 100 or more: bands from these, "
+                      "instead of from derivatives");
+  command->add_option("--seed", options->seed, "Seed of the random numbers, 0 or more: the draws")
       ->capture_default_str();
   command->add_option("--folder", options->folder,
-                      "Write prediction.csv, prediction.json and the figure into this folder");
+                      "Folder to write into: prediction.csv, prediction.json and the figure");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);

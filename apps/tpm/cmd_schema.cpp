@@ -136,7 +136,7 @@ void add_schema_command(CLI::App& app, Session& session) {
       app.add_subcommand("schema", "Print the keys of a kind of file as JSON Schema");
   const auto options = std::make_shared<SchemaOptions>();
   command->add_option("NAME", options->name, "Kind of file, such as scene; default: list them");
-  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  command->add_option("-o,--output", options->output, "File to write (default: the terminal)");
   auto* example =
       command->add_flag("--example", options->example, "Print a small file of the kind");
   command->add_flag("--keys", options->keys, "Print tables of all keys (Markdown)")

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "interrupt_watch.hpp"
 #include "plan_options.hpp"
@@ -186,7 +187,7 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
                         const Session& session) {
   if (choice.beside_mass_spring || choice.vtkhdf || !choice.figures.empty()) {
     throw Error(
-        ExitCode::usage, "--figures, --vtkhdf or --beside-mass-spring",
+        ExitCode::usage, "--folder, --vtkhdf or --beside-mass-spring",
         fmt::format("with the formulation '{}'", scene.formulation.kind),
         "a formulation that shows whole states: " +
             formulations_that([](const Formulation& f) { return f.as<StateRunner>() != nullptr; }));
@@ -201,13 +202,13 @@ int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& sce
 }
 
 int list_formulations(const Session& session) {
-  say("{}",
-      session.json() ? to_text(Json{{"formulations", formulations_json()}}) : formulations_text());
+  say("{}", session.json() ? answer_text(session, Json{{"formulations", formulations_json()}})
+                           : formulations_text());
   return 0;
 }
 
 int list_materials(const Session& session) {
-  say("{}", session.json() ? to_text(Json{{"shapes", shapes_json()}}) : shapes_text());
+  say("{}", session.json() ? answer_text(session, Json{{"shapes", shapes_json()}}) : shapes_text());
   return 0;
 }
 
@@ -256,7 +257,7 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
 /// Plans the scene and runs the pick instead of the scene's formulation.
 int simulate_planned(const SimulateChoice& choice, const Session& session) {
   if (choice.beside_mass_spring || choice.vtkhdf || !choice.figures.empty()) {
-    throw Error(ExitCode::usage, "--plan", "with figures, --vtkhdf or --beside-mass-spring",
+    throw Error(ExitCode::usage, "--planned", "with figures, --vtkhdf or --beside-mass-spring",
                 "none of them: a planned model need not know the whole network");
   }
   (void)Replacement(choice.output);  // can the result be written?
@@ -266,7 +267,8 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   const Plan plan = planned(scene, std::move(request));
   if (!plan.choice) {
     if (session.json() || choice.verbose) {
-      say("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
+      say("{}", session.json() ? answer_text(session, plan_json(plan), {{"model_found", false}})
+                               : plan_text(plan));
       return exit_code(false);
     }
     ShortAnswer answer = short_answer(plan);
@@ -313,9 +315,9 @@ void add_simulate_command(CLI::App& app, Session& session) {
       app.add_subcommand("simulate", "Push or load an organ as a scene says; HDF5, XDMF, pictures");
   auto choice = std::make_shared<SimulateChoice>();
   command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)");
-  command->add_option("-o,--output", choice->output, "HDF5 file; an XDMF goes beside it")
+  command->add_option("-o,--output", choice->output, "File to write (HDF5); an XDMF goes beside it")
       ->capture_default_str();
-  command->add_option("--figures", choice->figures, "Folder for pictures (PNG, SVG)");
+  command->add_option("--folder", choice->figures, "Folder to write into: pictures (PNG, SVG)");
   command->add_flag("--beside-mass-spring", choice->beside_mass_spring,
                     "Also run the mass-spring model on the same spheres; figures show both");
   command->add_flag("--vtkhdf", choice->vtkhdf,
@@ -325,8 +327,8 @@ void add_simulate_command(CLI::App& app, Session& session) {
                    "Time between checkpoints, such as \"5 s\"")
       ->capture_default_str();
   CLI::Option* planned = command->add_flag(
-      "--plan", choice->planned,
-      "Run the cheapest model that tpm plan finds, instead of the scene's formulation");
+      "--planned", choice->planned,
+      "Use the cheapest model that tpm plan finds, instead of the scene's formulation");
   command->add_flag("--list-formulations", choice->list,
                     "List what a scene's key 'formulation' can name, with what each can do");
   command->add_flag("--list-materials", choice->list_materials,
@@ -334,12 +336,12 @@ void add_simulate_command(CLI::App& app, Session& session) {
   add_verbose_option(*command, choice->verbose, "contacts, equations, limits of every model");
   add_plan_options(*command, choice->plan);
   for (const char* of_plan :
-       {"--tolerance", "--budget", "--outputs", "--rate", "--wall", "--costs"}) {
+       {"--tolerance", "--budget-file", "--outputs", "--loop-rate", "--wall", "--costs"}) {
     command->get_option(of_plan)->needs(planned);
   }
   add_format_option(*command, session);
   command->footer(
-      "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5 --figures pictures\n"
+      "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5 --folder pictures\n"
       "An interrupted run resumes when the same command is given again.");
   set_run(*command, session, [choice, &session] { return run_command(*choice, session); });
 }

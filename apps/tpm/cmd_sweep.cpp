@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "interrupt_watch.hpp"
 #include "tpm/base/namespaces.hpp"
@@ -200,7 +201,7 @@ int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls
   log.sync();
   write_file(file.string() + ".run.json", to_text(sidecar(sweep, run, {})));
   if (session.json()) {
-    say("{}", to_text(Json{{"file", file.string()}, {"blocks", run.blocks}}));
+    say("{}", answer_text(session, Json{{"file", file.string()}, {"blocks", run.blocks}}));
   } else {
     say("shard {} of {}: {} of {} blocks in {}\n", shard.index + 1, shard.count, run.blocks,
         sweep.blocks(), file.string());
@@ -307,7 +308,9 @@ void add_sweep_command(CLI::App& app, Session& session) {
       app.add_subcommand("sweep", "Many experiments over combinations of parameters; one HDF5");
   auto choice = std::make_shared<SweepChoice>();
   command->add_option("SWEEP", choice->sweep, "JSON sweep (schemas/sweep.schema.json)");
-  command->add_option("-o,--output", choice->output, "HDF5 file; CSV and times go beside it")
+  command
+      ->add_option("-o,--output", choice->output,
+                   "File to write (HDF5); CSV and times go beside it")
       ->capture_default_str();
   command->add_option("--workers", choice->workers, "Threads, 1 to 1024 (default: all processors)");
   command->add_option("--shard", choice->shard,
@@ -320,7 +323,9 @@ void add_sweep_command(CLI::App& app, Session& session) {
   merging->add_option("SWEEP", choice->sweep, "JSON sweep")->required();
   merging->add_option("SHARD", choice->shards,
                       "Files of shards (default: those beside the output)");
-  merging->add_option("-o,--output", choice->output, "HDF5 file, as it was given to the shards")
+  merging
+      ->add_option("-o,--output", choice->output,
+                   "File to write (HDF5), as it was given to the shards")
       ->capture_default_str();
   add_format_option(*merging, session);
   merging->footer(

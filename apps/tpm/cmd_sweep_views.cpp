@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
@@ -32,7 +33,7 @@ struct SweepViewChoice {
 
 int show(const SweepViewChoice& choice, const Session& session) {
   const SweepReader sweep(choice.file);
-  say("{}", session.json() ? to_text(sweep_json(sweep)) : sweep_text(sweep));
+  say("{}", session.json() ? answer_text(session, sweep_json(sweep)) : sweep_text(sweep));
   return 0;
 }
 
@@ -84,7 +85,7 @@ int sensitivity(const SweepViewChoice& choice, const Session& session) {
     if (wished) all.push_back(sensitivity_of(sweep, v.name, fixed));
   }
   for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
-  say("{}", session.json() ? to_text(sensitivity_json(all)) : sensitivity_text(all));
+  say("{}", session.json() ? answer_text(session, sensitivity_json(all)) : sensitivity_text(all));
   draw_into(choice.figure_folder, sensitivity_figures(all, sweep.title()));
   return 0;
 }
@@ -104,9 +105,11 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
   const auto all = mapped<SweepConvergence>(names, [&](const std::string& name) {
     return convergence_of(sweep, name, axis, choice.size, fixed);
   });
-  say("{}", session.json() ? to_text(convergence_json(all)) : convergence_text(all));
+  const bool monotone = std::ranges::any_of(all, &SweepConvergence::monotone);
+  say("{}", session.json() ? answer_text(session, convergence_json(all), {{"monotone", monotone}})
+                           : convergence_text(all));
   draw_into(choice.figure_folder, convergence_figures(all, sweep.title()));
-  return exit_code(std::ranges::any_of(all, &SweepConvergence::monotone));
+  return exit_code(monotone);
 }
 
 /// Paths in a configuration of tpm fit are relative to it: they are kept when it is moved.
@@ -122,10 +125,11 @@ int best(const SweepViewChoice& choice, const Session& session) {
   const SweepReader sweep(choice.file);
   std::optional<std::string> over;
   if (!choice.over.empty()) over = choice.over;
-  const auto count = parse_whole_number(choice.count, "--count", 1);
+  const auto count = parse_whole_number(choice.count, "--top", 1);
   const auto cells = best_cells(sweep, choice.best_output, count, over);
   if (choice.fit.empty() != choice.start.empty()) {
-    throw Error(ExitCode::usage, "--fit", "alone", "--fit FIT.json with --start START.json");
+    throw Error(ExitCode::usage, "--configuration", "alone",
+                "--configuration FIT.json with --write-configuration START.json");
   }
   if (!choice.fit.empty()) {
     Json fit = checked(read_json(choice.fit), fit_kind(), choice.fit);
@@ -143,7 +147,7 @@ int best(const SweepViewChoice& choice, const Session& session) {
                   {choice.best_output, cell.value},
                   {"parameters", std::move(parameters)}};
     });
-    say("{}", to_text(Json{{"best", std::move(list)}}));
+    say("{}", answer_text(session, Json{{"best", std::move(list)}}));
     return 0;
   }
   for (const BestCell& cell : cells) {
@@ -189,9 +193,11 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   set_run(*showing, session, [choice, &session] { return show(*choice, session); });
   CLI::App* command = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
   command->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  command->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
-  command->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
-  command->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
+  command->add_option("--variable", choice->variables,
+                      "Quantity of the sweep (default: all numbers but counts)");
+  command->add_option("--at", choice->at, "Place on an axis, AXIS=VALUE: beside the samples");
+  command->add_option("--folder", choice->figure_folder,
+                      "Folder to write into: figures (SVG, PNG)");
   add_force_option(*command, session);
   add_format_option(*command, session);
   command->footer(
@@ -206,9 +212,10 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
       "--size", choice->size,
       "Formula of the size, such as 'count^(-1/3)' (default: the axis' parameter)");
   refining->add_option("--variable", choice->variables,
-                       "Of what (default: all numbers but counts)");
-  refining->add_option("--at", choice->at, "AXIS=VALUE: place on another axis");
-  refining->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
+                       "Quantity of the sweep (default: all numbers but counts)");
+  refining->add_option("--at", choice->at, "Place on an axis, AXIS=VALUE: another than --axis");
+  refining->add_option("--folder", choice->figure_folder,
+                       "Folder to write into: figures (SVG, PNG)");
   add_force_option(*refining, session);
   add_format_option(*refining, session);
   refining->footer(
@@ -217,30 +224,35 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   set_run(*refining, session, [choice, &session] { return convergence(*choice, session); });
   CLI::App* choosing = sweep.add_subcommand("best", "The cells with the least value of an output");
   choosing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  choosing->add_option("--output", choice->best_output, "What is to be least, such as a misfit")
+  choosing
+      ->add_option("--objective", choice->best_output,
+                   "Quantity that is to be smallest, such as a misfit")
       ->required();
-  choosing->add_option("--count", choice->count, "How many cells")->capture_default_str();
+  choosing->add_option("--top", choice->count, "How many to list: cells")->capture_default_str();
   choosing->add_option("--over", choice->over, "Axis that the output is summed over");
-  choosing->add_option("--fit", choice->fit, "Configuration of tpm fit to be started there");
-  choosing->add_option("--start", choice->start, "File for the configuration with these starts");
+  choosing->add_option("--configuration", choice->fit,
+                       "Configuration of tpm fit to be started there");
+  choosing->add_option("--write-configuration", choice->start,
+                       "File for the configuration with these starts");
   add_format_option(*choosing, session);
   choosing->footer(
       "Example:\n  tpm sweep configs/sweep_misfit_organ.json -o organ.h5\n"
-      "  tpm sweep best organ.h5 --output misfit --over indentation");
+      "  tpm sweep best organ.h5 --objective misfit --over indentation");
   set_run(*choosing, session, [choice, &session] { return best(*choice, session); });
   CLI::App* plotting = sweep.add_subcommand("plot", "Maps, families of lines, Pareto fronts");
   plotting->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  plotting->add_option("-o,--output", choice->folder, "Folder for pictures (PNG, SVG)")
+  plotting->add_option("--folder", choice->folder, "Folder to write into: figures (SVG, PNG)")
       ->capture_default_str();
-  plotting->add_option("--variable", choice->variables, "What is drawn (default: all but counts)");
+  plotting->add_option("--variable", choice->variables,
+                       "Quantity of the sweep (default: all but counts)");
   plotting->add_option("--x", choice->x, "Axis drawn across (default: the last)");
   plotting->add_option("--y", choice->y, "Axis drawn upwards, and of families");
-  plotting->add_option("--at", choice->at, "AXIS=VALUE: place on an axis that is not drawn");
+  plotting->add_option("--at", choice->at, "Place on an axis, AXIS=VALUE: that is not drawn");
   plotting->add_option("--pareto", choice->pareto,
                        "MISFIT,COST: cells that no other betters in both");
   plotting->footer(
       "Example:\n  tpm sweep configs/sweep_x_depth.json -o sweep.h5\n"
-      "  tpm sweep plot sweep.h5 -o figures");
+      "  tpm sweep plot sweep.h5 --folder figures");
   set_run(*plotting, session, [choice, &session] { return plot(*choice, session); });
 }
 

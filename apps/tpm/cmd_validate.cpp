@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "plan_options.hpp"
 #include "recording_options.hpp"
@@ -100,7 +101,7 @@ void set_subject(ValidationRequest& request, std::vector<std::string>& digests,
   request.law_sha256 = sha256_hex(read_file(options.law));
   if (!is_organ_document(document)) {
     if (options.plan) {
-      throw Error(ExitCode::usage, "--plan", "with a law", "the organ that the law was put on");
+      throw Error(ExitCode::usage, "--planned", "with a law", "the organ that the law was put on");
     }
     request.law = read_law(options.law);
     digests = sample_digests(document);
@@ -299,8 +300,9 @@ int recheck(const std::string& page, const std::string& output, const Session& s
     Json list = array_json(changes, [](const CredibilityChange& c) {
       return Json{{"place", c.place}, {"before", c.before}, {"now", c.now}};
     });
-    write_output(
-        to_text(Json{{"page", page}, {"marked", marked.string()}, {"changes", std::move(list)}}));
+    write_output(answer_text(
+        session, Json{{"page", page}, {"marked", marked.string()}, {"changes", std::move(list)}},
+        {{"page_unchanged", changes.empty()}}));
   } else {
     std::string text = fmt::format("{}: {} of its values changed\n", page, changes.size());
     for (const CredibilityChange& c : changes) {
@@ -328,7 +330,9 @@ int run_validate(const ValidateOptions& options, const Session& session) {
   const auto csv = csv_beside(options.output, session);
   const ValidationRequest request = validation_request(options);
   const Validation validation = validate(request);
-  std::string text = session.json() ? to_text(to_json(validation)) : to_terminal_text(validation);
+  std::string text = session.json() ? answer_text(session, to_json(validation),
+                                                  {{"model_adequate", validation.answers_yes()}})
+                                    : to_terminal_text(validation);
   std::string page;
   if (!options.credibility.empty()) {
     page = credibility_page(record_of(options, request, validation));
@@ -361,18 +365,20 @@ void add_validate_command(CLI::App& app, Session& session) {
                       "Recordings that the law was not fitted to, one or more; or sessions of tpm "
                       "hil run (.tpmrec): the force that was rendered along the hand's motion");
   CLI::Option* plan = command->add_flag(
-      "--plan", options->plan, "S from the reduced model that tpm plan picks for the organ");
+      "--planned", options->plan,
+      "Use the cheapest model that tpm plan finds, for the organ: its answer is S");
   command
       ->add_option("--tolerance", options->planned.tolerance,
-                   "Of --plan: largest error, in parts of the peak force, or jnd")
+                   "Largest error of the model, with --planned: in parts of the peak force, or jnd")
       ->capture_default_str()
       ->needs(plan);
   command->add_option("--session", options->session,
                       "A session (.tpmrec) whose rendering is part of S: what a hand felt, against "
                       "recordings of the material");
-  command->add_option("--require", options->requirement,
-                      "How large a model error may be: a share of the measured value such as 10%, "
-                      "an amount such as \"20 mN\", or jnd (what a hand can tell, as in tpm plan)");
+  command->add_option(
+      "--require", options->requirement,
+      "Largest model error that is acceptable: a share of the measured value such as 10%, an "
+      "amount such as \"20 mN\", or jnd (what a hand can tell, as in tpm plan)");
   command
       ->add_option(
           "--quantity", options->quantities,
@@ -389,30 +395,31 @@ void add_validate_command(CLI::App& app, Session& session) {
                       "JSON file with the block \"instrument\" of the recordings, where no "
                       "description beside them has it");
   command->add_option("--calibration-instrument", options->calibration_instrument,
-                      "The same of the recordings that the law was fitted to");
-  command->add_option("--at", options->at,
+                      "Instrument of the recordings that the law was fitted to, as --instrument");
+  command->add_option("--at-recording", options->at,
                       "Recording to whose protocol the pooled area metric is carried, where "
                       "protocols differ");
   CLI::Option* credibility =
       command->add_option("--credibility", options->credibility,
                           "Write a page (HTML) with the evidence under the headings of V&V 40");
   command
-      ->add_option("--evidence", options->evidence,
-                   "Of that page: CATEGORY=FILE, such as \"code verification=checks.json\" (may be "
-                   "repeated); the file is named with its SHA-256")
+      ->add_option(
+          "--evidence", options->evidence,
+          "Evidence of that page: CATEGORY=FILE, such as \"code verification=checks.json\" (may be "
+          "repeated); the file is named with its SHA-256")
       ->allow_extra_args(false)
       ->needs(credibility);
-  command->add_option("--question", options->words.question, "Of that page: question of interest")
+  command->add_option("--question", options->words.question, "Question of interest, of that page")
       ->needs(credibility);
-  command->add_option("--context", options->words.context, "Of that page: context of use")
+  command->add_option("--context", options->words.context, "Context of use, of that page")
       ->needs(credibility);
-  command->add_option("--risk", options->words.risk, "Of that page: model risk")
+  command->add_option("--risk", options->words.risk, "Model risk, of that page")
       ->needs(credibility);
   command->add_option("--recheck", options->recheck,
                       "Compute a page of --credibility again and write beside it one "
                       "(_rechecked) that marks what changed; exit code 1 if anything did");
   command->add_option("--folder", options->folder,
-                      "Write validation.csv, validation.json and the figures into this folder");
+                      "Folder to write into: validation.csv, validation.json and the figures");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);

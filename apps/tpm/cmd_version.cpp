@@ -1,4 +1,5 @@
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/version.hpp"
@@ -10,8 +11,8 @@ void add_version_command(CLI::App& app, Session& session) {
   add_format_option(*command, session);
   command->footer("Example:\n  tpm version --format json");
   set_run(*command, session, [&session] {
-    say("{}", session.json() ? to_text(Json{{"version", version()}})
-                             : fmt::format("tpm {}\n", version()));
+    say("{}",
+        session.json() ? answer_text(session, Json::object()) : fmt::format("tpm {}\n", version()));
     return 0;
   });
 }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
@@ -49,16 +50,17 @@ int view(const ViewChoice& choice, const Session& session) {
   write_file(output, html);
   const Json& shown = page.description;
   if (session.json()) {
-    say("{}",
-        to_text(Json{{"file", output.string()},
-                     {"kind", shown.at("kind")},
-                     {"bytes", html.size()},
-                     {"plots", shown.at("plots").size()},
-                     {"samples", shown.value("samples", Json())},
-                     {"samples_per_value", shown.value("samples_per_value", Json())},
-                     {"spheres", shown.contains("organ") ? shown["organ"]["spheres"] : Json()},
-                     {"organ_shown", shown.contains("organ") ? shown["organ"]["shown"] : Json()},
-                     {"simulated", shown.value("simulated", Json())}}));
+    say("{}", answer_text(
+                  session,
+                  Json{{"file", output.string()},
+                       {"kind", shown.at("kind")},
+                       {"bytes", html.size()},
+                       {"plots", shown.at("plots").size()},
+                       {"samples", shown.value("samples", Json())},
+                       {"samples_per_value", shown.value("samples_per_value", Json())},
+                       {"spheres", shown.contains("organ") ? shown["organ"]["spheres"] : Json()},
+                       {"organ_shown", shown.contains("organ") ? shown["organ"]["shown"] : Json()},
+                       {"simulated", shown.value("simulated", Json())}}));
     return 0;
   }
   say("{}: {}\n", shown.at("kind").get<std::string>(), shown.at("title").get<std::string>());
@@ -86,8 +88,9 @@ void add_view_command(CLI::App& app, Session& session) {
                    "HDF5 of tpm simulate, a recording of tpm hil run, law.json, figures.json or "
                    "the JSON answer of tpm fit; or a folder with one of them")
       ->required();
-  command->add_option("-o,--output", choice->output,
-                      "HTML file (default: the name of FILE ending in .html, in this folder)");
+  command->add_option(
+      "-o,--output", choice->output,
+      "File to write (HTML; default: the name of FILE ending in .html, in this folder)");
   command->add_flag("--no-organ", choice->no_organ,
                     "Of a recording: curves only, without recomputing the organ from the motion");
   add_force_option(*command, session);

@@ -24,8 +24,9 @@ namespace tpm::app {
 /// in that subcommand's callback; main() calls it once, after the whole command line was read, and
 /// nothing that CLI11 filled in is used if reading failed.
 struct Session {
+  std::string command;          ///< its words after "tpm": "hil verify"
   std::string format = "text";  ///< --format: text or json
-  bool force = false;           ///< --force: results may be replaced whoever made them
+  bool force = false;           ///< --overwrite: results may be replaced whoever made them
   /// Of the result that --output names: Naming::by_default if the option is missing.
   Naming output_naming = Naming::file;
   std::function<int()> run;  ///< the chosen command; returns the exit code
@@ -43,8 +44,8 @@ void set_run(CLI::App& command, Session& session, std::function<int()> work);
 /// Adds --format text|json to a command.
 void add_format_option(CLI::App& command, Session& session);
 
-/// Adds --force to a command that writes files of names which the user does not give, unless it has
-/// one of its own.
+/// Adds --overwrite to a command that writes files of names which the user does not give, unless it
+/// has one of its own.
 void add_force_option(CLI::App& command, Session& session);
 
 /// Adds -o, --output for an answer beside which a table stands (csv_beside()).

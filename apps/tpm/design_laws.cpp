@@ -36,7 +36,7 @@ int check_choice_of_law(const DesignOptions& options, const Session& session) {
   }
   study.seed = design_seed(options.seed);
   for (const std::string& margin : options.margins) {
-    study.margins.push_back(option_number(margin, "--margin"));
+    study.margins.push_back(option_number(margin, "--margins"));
   }
   study.selection.laws = chosen_laws({}, options.family);
   const double order = parse_part(options.order.empty() ? "0.4" : options.order, "--order",

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <regex>
 
+#include "answer.hpp"
 #include "fit_options.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/groups/group_comparison.hpp"
@@ -154,7 +155,8 @@ int compare_folders(const FitOptions& options, const Session& session) {
                  selection.setup.zero);
   const std::optional<ContactGeometry> probe = probe_of(options);
   const GroupComparison comparison = compare_groups(first, second, law, selection, probe);
-  std::string text = session.json() ? to_text(to_json(comparison)) : to_terminal_text(comparison);
+  std::string text =
+      session.json() ? answer_text(session, to_json(comparison)) : to_terminal_text(comparison);
   std::vector<std::string> files;
   if (!options.no_draw) files = write_comparison_report(folder, comparison, probe);
   text = answer_with_files(options, session, std::move(text), short_answer(comparison), folder,

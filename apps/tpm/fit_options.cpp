@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "answer.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
@@ -119,7 +120,7 @@ std::string with_moduli(Json json, std::string text, const std::optional<YoungMo
     json["young_moduli"] = to_json(*moduli);
     text += "\n" + to_terminal_text(*moduli);
   }
-  return session.json() ? to_text(json) : text;
+  return session.json() ? answer_text(session, json) : text;
 }
 
 std::string answer_with_files(const FitOptions& options, const Session& session, std::string text,

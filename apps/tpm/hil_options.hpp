@@ -13,7 +13,8 @@ struct DeviceOptions {
   std::string real_time = "ignore";
 };
 
-/// Adds --device, --serial, --index, --dhd-library, --recording, --may-move and --take-as-ready.
+/// Adds --device, --serial, --index, --dhd-library, --device-recording, --may-move and
+/// --take-as-ready.
 void add_device_options(CLI::App& command, DeviceOptions& options);
 
 /// What was chosen; call when the command runs.

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "option_kinds.hpp"
 #include "tpm/base/namespaces.hpp"
 
 namespace tpm::app {
@@ -41,6 +42,8 @@ Json option_json(const CLI::Option& option) {
   if (option.get_items_expected_max() == 0) json["flag"] = true;
   if (option.get_items_expected_max() > 1) json["several"] = true;
   if (!option.get_default_str().empty()) json["default"] = option.get_default_str();
+  const std::string_view kind = kind_of_option(option.get_name());
+  if (!kind.empty() && option.get_items_expected_max() != 0) json["kind"] = kind;
   if (const auto values = listed_values(option.get_type_name()); !values.empty()) {
     json["values"] = values;
   }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "answer.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/rising_values.hpp"
 #include "tpm/base/text.hpp"
@@ -103,7 +104,8 @@ int write_spectrum(const SpectrumTexts& texts, const Session& session) {
   const SpectrumResponse r = respond_spectrum(law.spec, law.values, frequency_Hz,
                                               operating_depth(texts, law.spec), Want::values);
   require_finite(frequency_Hz, r);
-  deliver(session.json() ? to_text(json_of(law, frequency_Hz, r)) : text_of(law, frequency_Hz, r),
+  deliver(session.json() ? answer_text(session, json_of(law, frequency_Hz, r))
+                         : text_of(law, frequency_Hz, r),
           texts.output);
   deliver_csv(csv_of(law, frequency_Hz, r), csv);
   return 0;

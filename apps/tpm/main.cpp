@@ -19,9 +19,11 @@
 #include <utility>
 #include <vector>
 
+#include "answer.hpp"
 #include "command.hpp"
 #include "command_words.hpp"
 #include "json_usage.hpp"
+#include "option_kinds.hpp"
 #include "out_of_memory.hpp"
 #include "shipped_files.hpp"
 #include "tpm/base/quantity_text.hpp"
@@ -44,14 +46,14 @@ void add_format_option(CLI::App& command, Session& session) {
 
 void add_output_option(CLI::App& command, std::string& output) {
   command.add_option("-o,--output", output,
-                     "Write here instead of to the terminal; beside JSON the table as .csv");
+                     "File to write (default: the terminal); beside JSON the table as .csv");
 }
 
 void add_force_option(CLI::App& command, Session& session) {
-  if (command.get_option_no_throw("--force") != nullptr) return;
-  command.add_flag("--force", session.force,
-                   "Replace files that were changed since tpm wrote them, or results of other "
-                   "inputs under names that were not given");
+  if (command.get_option_no_throw("--overwrite") != nullptr) return;
+  command.add_flag("--overwrite", session.force,
+                   "Replace files that exist, also those that were changed since tpm wrote them, "
+                   "and results of other inputs under names that were not given");
 }
 
 void set_run(CLI::App& command, Session& session, std::function<int()> work) {
@@ -115,7 +117,7 @@ std::string written(const Session& session, const std::string& folder,
 void say_with_files(const Session& session, Json json, std::string_view text,
                     const std::vector<std::string>& files) {
   json["files"] = files;
-  write_output(session.json() ? to_text(json)
+  write_output(session.json() ? answer_text(session, std::move(json))
                               : fmt::format("{}wrote {}\n", text, fmt::join(files, ", ")));
 }
 
@@ -154,14 +156,17 @@ std::uint64_t parse_whole_number(const std::string& text, const char* option,
 
 namespace {
 
-/// No command writes over a file that it reads: what --output names is announced before anything is
-/// read. Commands that write further files announce them themselves.
+/// No command writes over a file that it reads: what --output names, or --folder where that has a
+/// default, is announced before anything is read. Commands that write further files announce them
+/// themselves.
 void announce_output(const CLI::App& app, Session& session) {
   for (const CLI::App* command : app.get_subcommands()) {
     announce_output(*command, session);
     const CLI::Option* output = command->get_option_no_throw("--output");
+    if (output == nullptr) output = command->get_option_no_throw("--folder");
     // Of a command with a command of its own only that one runs.
     if (output == nullptr || !command->get_subcommands().empty()) continue;
+    if (output->check_lname("folder") && output->get_default_str().empty()) continue;
     const bool given = output->count() > 0;
     session.output_naming = given ? Naming::file : Naming::by_default;
     will_write({given ? output->results().front() : output->get_default_str()},
@@ -185,6 +190,16 @@ std::string origin_of(const CLI::App& app) {
     }
   }
   return origin;
+}
+
+/// The words of the chosen command: "hil verify".
+std::string words_of_command(const CLI::App& app) {
+  std::string words;
+  for (const CLI::App* command : app.get_subcommands()) {
+    const std::string below = words_of_command(*command);
+    words = command->get_name() + (below.empty() ? "" : " " + below);
+  }
+  return words;
 }
 
 /// Every command that writes under names of its own can be told to replace what stands there.
@@ -239,6 +254,7 @@ int run(int argc, char** argv) {
   FileRoles roles;
   add_commands(app, session);
   add_force_options(app, session);
+  set_option_kinds(app);
   app.add_flag_callback(
       "--json-usage",
       [&app] {
@@ -265,6 +281,7 @@ int run(int argc, char** argv) {
   for (const ShippedFile& file : shipped) {
     tell_user("tpm: {} is not here: using the one that comes with tpm, {}\n", file.word, file.path);
   }
+  session.command = words_of_command(app);
   roles.mark_results(origin_of(app), session.force);
   announce_output(app, session);
   return session.run();

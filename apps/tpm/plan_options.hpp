@@ -7,7 +7,7 @@
 
 namespace tpm::app {
 
-/// What `tpm plan` and `tpm simulate --plan` are asked for.
+/// What `tpm plan` and `tpm simulate --planned` are asked for.
 struct PlanChoice {
   std::string tolerance = "1%";
   std::string outputs = "force";

@@ -32,9 +32,11 @@ ProtocolFile ramp_of(const RampOptions& options) {
 }  // namespace
 
 void add_ramp_options(CLI::App& command, RampOptions& options) {
-  command.add_option("--depth", options.depth, "Instead of a file: ramp to this depth, \"4 mm\"");
-  command.add_option("--rate", options.rate, "At this speed, \"2 mm/s\"");
-  command.add_option("--hold", options.hold, "And hold it so long, \"30 s\"");
+  command.add_option(
+      "--depth", options.depth,
+      "Depth of the indentation: instead of a file, a ramp to this depth, such as \"4 mm\"");
+  command.add_option("--rate", options.rate, "Speed of the ramp, such as \"2 mm/s\"");
+  command.add_option("--hold", options.hold, "Time at depth, such as \"30 s\"");
 }
 
 std::optional<ProtocolFile> chosen_protocol(const RampOptions& options,

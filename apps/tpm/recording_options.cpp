@@ -17,8 +17,9 @@ namespace tpm::app {
 
 namespace {
 
-/// "step_time" is --step-time on the command line.
+/// "step_time" is --step-time on the command line, and "from" is --from-time.
 std::string option_name(std::string_view key) {
+  if (key == "from") key = "from_time";
   std::string name = fmt::format("--{}", key);
   std::replace(name.begin(), name.end(), '_', '-');
   return name;
@@ -26,8 +27,7 @@ std::string option_name(std::string_view key) {
 
 }  // namespace
 
-void add_reading_options(CLI::App& command, ReadingArguments& arguments, const char* group,
-                         const char* from) {
+void add_reading_options(CLI::App& command, ReadingArguments& arguments, const char* group) {
   for (const ReadingOption& option : reading_options()) {
     const std::string key(option.key);
     const std::string meaning(option.meaning);
@@ -38,8 +38,8 @@ void add_reading_options(CLI::App& command, ReadingArguments& arguments, const c
           ->group(group);
       continue;
     }
-    const std::string names = key == "from" ? std::string(from) : option_name(key);
-    CLI::Option* added = command.add_option(names, arguments.texts[key], meaning)->group(group);
+    CLI::Option* added =
+        command.add_option(option_name(key), arguments.texts[key], meaning)->group(group);
     const std::vector<std::string> choices = CLI::detail::split(std::string(option.choices), ',');
     if (!option.choices.empty()) added->check(CLI::IsMember(choices));
   }
@@ -72,15 +72,15 @@ void add_recording_options(CLI::App& command, RecordingOptions& options) {
   add_reading_options(command, options.reading, group);
   options_of_group(command, group)(
       "--contact-force", options.contact_response,
-      "Contact begins where the force passes this, e.g. \"0.05 N\"; default: found");
+      "Force at which contact begins, such as \"0.05 N\" (default: found)");
 }
 
 void add_placement_options(CLI::App& command, PlacementArguments& arguments) {
   command.add_option("--contact", arguments.contact,
-                     "Recordings: hold the depth of contact, e.g. \"0.3 mm\" (default: the onset "
-                     "of the force, measured with its uncertainty)");
+                     "Depth of contact that is held, of recordings, e.g. \"0.3 mm\" (default: the "
+                     "onset of the force, measured with its uncertainty)");
   command.add_option("--zero", arguments.zero,
-                     "Recordings: hold the reading without a load, e.g. \"12 mN\" (default: "
+                     "Reading without a load that is held, of recordings, e.g. \"12 mN\" (default: "
                      "measured before contact)");
 }
 
@@ -143,7 +143,7 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
 }
 
 void add_family_option(CLI::App& command, std::string& family, const char* group) {
-  command.add_option("--family", family, "classical (default), fractional or all")
+  command.add_option("--family", family, "Family of laws: classical (default), fractional or all")
       ->check(CLI::IsMember({"classical", "fractional", "all"}))
       ->group(group);
 }

@@ -19,10 +19,7 @@ struct ReadingArguments {
 };
 
 /// Adds them in one group of the help.
-/// @param from  names of the option of the first time that is read: tpm data import has another
-///              --from
-void add_reading_options(CLI::App& command, ReadingArguments& arguments, const char* group,
-                         const char* from = "--from,--from-time");
+void add_reading_options(CLI::App& command, ReadingArguments& arguments, const char* group);
 
 /// Throws Error(bad_input) naming the option.
 [[nodiscard]] ImportOptions reading_of(const ReadingArguments& arguments);

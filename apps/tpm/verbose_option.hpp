@@ -10,8 +10,7 @@ namespace tpm::app {
 inline void add_verbose_option(CLI::App& command, bool& verbose, const char* such_as) {
   command.add_flag(
       "--verbose", verbose,
-      fmt::format("Print all that was computed: {} (default: an answer of at most 25 lines)",
-                  such_as));
+      fmt::format("Print everything: {} (default: an answer of at most 25 lines)", such_as));
 }
 
 }  // namespace tpm::app

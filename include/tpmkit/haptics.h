@@ -71,7 +71,6 @@ enum tpm_haptics_cause {
   TPM_HAPTICS_LATE = 5,                 /**< too many periods missed */
   TPM_HAPTICS_NOT_IN_PLACE = 6,         /**< the tool was never in free air and at rest */
   TPM_HAPTICS_OUTSIDE_VALIDITY = 7,     /**< forces were outside the validity of the model for too long */
-  TPM_HAPTICS_UNTRUSTED = 7,            /**< deprecated, until 0.3: TPM_HAPTICS_OUTSIDE_VALIDITY */
   TPM_HAPTICS_ENERGY = 8,               /**< the rendering delivered energy to the hand */
   TPM_HAPTICS_OSCILLATION = 9,
   TPM_HAPTICS_OTHER = 10,

@@ -30,8 +30,6 @@ enum class StopCause : std::int32_t {
   oscillation,       ///< the force oscillated without motion of the hand
   position_jump,     ///< the device reported a motion faster than any hand
   damping,           ///< damping had to be added in too many cycles
-  hang [[deprecated("use cycle_timeout")]] = cycle_timeout,
-  untrusted [[deprecated("use outside_validity")]] = outside_validity,
 };
 
 [[nodiscard]] std::string_view word_of(StopCause cause);

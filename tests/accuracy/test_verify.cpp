@@ -113,10 +113,10 @@ TEST_CASE("verification: names of groups") {
 
 TEST_CASE("tpm accuracy verify: exit code, text, JSON, CSV and pages agree", "[heavy]") {
   const test::TempFolder folder;
-  const Run good = run_program("accuracy verify closed-forms -o '" + (folder / "good") + "'");
+  const Run good = run_program("accuracy verify closed-forms --folder '" + (folder / "good") + "'");
   CHECK(good.exit_code == 0);
   CHECK_THAT(good.output, Contains("all hold.") && !Contains("FAILS") && !Contains(kRed));
-  const Run bad = run_program("accuracy verify closed-forms --flaw 1% --format json -o '" +
+  const Run bad = run_program("accuracy verify closed-forms --flaw 1% --format json --folder '" +
                               (folder / "bad") + "'");
   CHECK(bad.exit_code == 1);
   const Json json = Json::parse(bad.output);

@@ -120,6 +120,8 @@ std::vector<ErrorCase> machine_cases() {
   return {
       {type, "missing", import, with_files({})},
       {type, "empty", import, machine("")},
+      {type, "two files for one name", "data import {}/m.csv {}/n.csv -o {}/out",
+       with_files({{"m.csv", head + "0,0,0\n1,1,1\n"}, {"n.csv", head + "0,0,0\n1,1,1\n"}})},
       {type, "header only", import, machine(head)},
       {type, "wrong column", import, machine("a,b,c\n0,0,0\n1,1,1\n")},
       {type, "no unit", import, machine("Time,Force,Depth\n0,0,0\n1,1,1\n")},
@@ -205,14 +207,16 @@ std::vector<ErrorCase> spectrum_cases() {
        machine("Frequency (Hz),G' (Pa),G'' (Pa)\n1,1,1\n1,2,2\n")},
       {type, "modulus beside stiffness", import,
        machine("Frequency (Hz),G' (Pa),G'' (N/m)\n1,1,1\n2,2,2\n")},
-      {type, "digitised storage alone", import + " --x frequency:Hz --y storage_modulus:Pa",
+      {type, "digitised storage alone",
+       import + " --x-quantity frequency:Hz --y-quantity storage_modulus:Pa",
        machine("1,1\n2,2\n")},
   };
 }
 
 std::vector<ErrorCase> digitizer_cases() {
   const std::string type = "WebPlotDigitizer project";
-  const std::string import = "data import {}/w.json -o {}/out --x time:s --y contact_force:N";
+  const std::string import =
+      "data import {}/w.json -o {}/out --x-quantity time:s --y-quantity contact_force:N";
   const auto project = [](std::string text) { return with_files({{"w.json", std::move(text)}}); };
   const auto data = [&project](const std::string& points) {
     return project(R"({"axesColl": [], "datasetColl": [{"name": "d", "axesName": "XY", "data": [)" +
@@ -229,7 +233,8 @@ std::vector<ErrorCase> digitizer_cases() {
       {type, "pixels without axes", import, data(R"({"x": 1, "y": 2})")},
       {type, "one time twice", import, data(R"({"value": [1, 1]}, {"value": [1, 2]})")},
       {type, "axes not named", "data import {}/w.json -o {}/out", data(R"({"value": [1, 1]})")},
-      {type, "wrong unit", "data import {}/w.json -o {}/out --x time:mm --y contact_force:N",
+      {type, "wrong unit",
+       "data import {}/w.json -o {}/out --x-quantity time:mm --y-quantity contact_force:N",
        data(R"({"value": [1, 1]})")},
       {type, "binary garbage", import, project("{" + kGarbage)},
       {type, "100 MB line", import, project("{" + long_line())},
@@ -679,8 +684,8 @@ std::vector<ErrorCase> scene_cases() {
        liver(R"("bonds": {"spacing_law": "paper"}, "material": {"E": "3 kPa"})")},
       {type, "one radial bond a sphere", check, liver(R"("bonds": {"diagonals": false})")},
       {type, "unguided star", check, scene(R"({"organ": {"kind": "star"}, "sliders": []})")},
-      {type, "scene and options", check + " --count 424", liver(R"("title": "t")")},
-      {type, "bad count", "network build --count 1 -o {}/out", with_files({})},
+      {type, "scene and options", check + " --spheres 424", liver(R"("title": "t")")},
+      {type, "bad count", "network build --spheres 1 -o {}/out", with_files({})},
   };
 }
 
@@ -776,10 +781,10 @@ std::vector<ErrorCase> session_recording_cases() {
        recording(std::string("TPMROWS1\x88\0\0\0\x10\0\0\0{", 17))},
       {type, "damaged header", to_hdf5,
        recording(std::string("TPMROWS1\x88\0\0\0\x02\0\0\0{}\0\0\0\0", 22))},
-      {type, "report of garbage", "hil report {}/r.tpmrec -o {}/out", recording(kGarbage)},
+      {type, "report of garbage", "hil report {}/r.tpmrec --folder {}/out", recording(kGarbage)},
       {type, "verification of garbage", "hil verify {}/r.tpmrec", recording(kGarbage)},
       {type, "replay of garbage",
-       "hil run {}/h.json --device replay --recording {}/r.tpmrec -o {}/out",
+       "hil run {}/h.json --device replay --device-recording {}/r.tpmrec -o {}/out",
        with_files({{"h.json", kSession}, {"r.tpmrec", kGarbage}})},
   };
 }
@@ -929,13 +934,13 @@ TEST_CASE("tpm data check reports every failing file and answers no") {
   CHECK(run("data check evren_static", folder).exit_code == 0);
 }
 
-TEST_CASE("tpm data import and pack do not replace files without --force") {
+TEST_CASE("tpm data import and pack do not replace files without --overwrite") {
   const TempFolder folder;
   with_files({{"m.csv", "Time (s),Force (N)\n0,0\n1,1\n"}})(folder);
   CHECK(run("data import {}/m.csv -o {}/out", folder).exit_code == 0);
   const std::string first = read_file(folder / "out.csv");
   CHECK(run("data import {}/m.csv -o {}/out", folder).exit_code == 2);
-  CHECK(run("data import {}/m.csv -o {}/out --force", folder).exit_code == 0);
+  CHECK(run("data import {}/m.csv -o {}/out --overwrite", folder).exit_code == 0);
   CHECK(read_file(folder / "out.csv") == first);
   CHECK(run("data pack {}/out.csv -o {}/p.h5", folder).exit_code == 0);
   CHECK(run("data pack {}/out.csv -o {}/p.h5", folder).exit_code == 2);

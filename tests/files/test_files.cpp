@@ -86,9 +86,9 @@ TEST_CASE("No command writes over a file that it reads, whatever the file is cal
         "$TPM network show twin.json -o organ", "$TPM network show organ.json -o link",
         "$TPM network show organ.json -o ./way/../organ", "$TPM network build x.xdmf -o x.h5",
         "$TPM simulate x.xdmf -o x.h5", "$TPM simulate x.xdmf -o x.xdmf",
-        "$TPM simulate organ.json -o organ.json", "$TPM data import d.csv -o d --force",
-        "$TPM data pack c.h5 -o c.h5 --force", "$TPM sweep s.json -o s.json",
-        "$TPM sweep t.csv -o t.h5", "$TPM design figures.json --repetitions 0 --draw ."}) {
+        "$TPM simulate organ.json -o organ.json", "$TPM data import d.csv -o d --overwrite",
+        "$TPM data pack c.h5 -o c.h5 --overwrite", "$TPM sweep s.json -o s.json",
+        "$TPM sweep t.csv -o t.h5", "$TPM design figures.json --repetitions 0 --folder ."}) {
     INFO(line);
     const Ran ran = run_in(folder, line);
     CHECK(ran.code == 2);
@@ -144,8 +144,9 @@ TEST_CASE("a result of a default name gives way to the same command with the sam
   }
   CHECK(origin_mark(folder / "r")->origin == fit);
   CHECK(run_as(fit, false, Naming::by_default, "b").empty());
-  CHECK_THAT(run_as("tpm fit /data/b.csv", false, Naming::by_default, "c"),
-             Contains("r: is a result of: tpm fit /data/a.csv; expected ") && Contains("--force"));
+  CHECK_THAT(
+      run_as("tpm fit /data/b.csv", false, Naming::by_default, "c"),
+      Contains("r: is a result of: tpm fit /data/a.csv; expected ") && Contains("--overwrite"));
   CHECK(read_file(folder / "r") == "b");
   CHECK(run_as("tpm fit /data/b.csv", false, Naming::folder, "c").empty());
   { std::ofstream(folder / "r", std::ios::app) << "edited"; }
@@ -377,7 +378,7 @@ TEST_CASE("Control characters of names and titles are escaped on every way to th
 TEST_CASE("Views of a sweep read the file that a sweep writes by default") {
   const test::TempFolder folder;
   REQUIRE(run_in(folder, "$TPM sweep $S/configs/sweep_x_depth.json").code == 0);
-  for (const char* view : {"show sweep.h5", "best sweep.h5 --output peak_force"}) {
+  for (const char* view : {"show sweep.h5", "best sweep.h5 --objective peak_force"}) {
     CAPTURE(view);
     const Ran ran = run_in(folder, std::string("$TPM sweep ") + view);
     CHECK(ran.code == 0);
@@ -402,43 +403,43 @@ TEST_CASE("Inputs without an end are refused by every command that reads") {
   write_file(folder / "law.json", R"({"law": "linear", "drive": "indentation_depth",
     "response": "contact_force", "reference_m": 0.001, "provenance": "assumed",
     "parameters": {"k_inf_N_per_m": 20.0}})");
-  for (const char* command :
-       {"simulate /dev/zero -o o.h5",
-        "network build /dev/zero -o o.h5",
-        "network check /dev/zero",
-        "network show /dev/zero -o o",
-        "plan /dev/zero",
-        "sweep /dev/zero -o o.h5",
-        "sweep merge /dev/zero o.blocks",
-        "fit /dev/zero --no-draw",
-        "fit a.csv /dev/zero --no-draw",
-        "data check /dev/zero",
-        "data show /dev/zero",
-        "data pack /dev/zero -o o.h5",
-        "data import /dev/zero -o o",
-        "predict /dev/zero --frequencies '1 Hz'",
-        "export /dev/zero --to febio",
-        "design /dev/zero",
-        "predict /dev/zero a.csv",
-        "predict law.json /dev/zero",
-        "budget /dev/zero a.csv",
-        "budget law.json /dev/zero",
-        "identify /dev/zero",
-        "paper audit /dev/zero",
-        "paper experiments /dev/zero -o o",
-        "plan $S/configs/liver_poke.json --costs /dev/zero",
-        "hil run /dev/zero -o o.tpmrec",
-        "hil check /dev/zero",
-        "hil verify /dev/zero",
-        "hil report /dev/zero",
-        "hil export /dev/zero -o o.h5",
-        "hil run $S/configs/hil_omega7.json --law /dev/zero -o o.tpmrec",
-        "hil run $S/configs/hil_omega7.json --device replay --recording /dev/zero -o o.tpmrec",
-        "sweep show /dev/zero",
-        "sweep best /dev/zero --output peak_force",
-        "sweep plot /dev/zero -o o.png",
-        "sweep convergence /dev/zero",
-        "sweep sensitivity /dev/zero"}) {
+  for (const char* command : {"simulate /dev/zero -o o.h5",
+                              "network build /dev/zero -o o.h5",
+                              "network check /dev/zero",
+                              "network show /dev/zero -o o",
+                              "plan /dev/zero",
+                              "sweep /dev/zero -o o.h5",
+                              "sweep merge /dev/zero o.blocks",
+                              "fit /dev/zero --no-draw",
+                              "fit a.csv /dev/zero --no-draw",
+                              "data check /dev/zero",
+                              "data show /dev/zero",
+                              "data pack /dev/zero -o o.h5",
+                              "data import /dev/zero -o o",
+                              "predict /dev/zero --frequencies '1 Hz'",
+                              "export /dev/zero --to febio",
+                              "design /dev/zero",
+                              "predict /dev/zero a.csv",
+                              "predict law.json /dev/zero",
+                              "budget /dev/zero a.csv",
+                              "budget law.json /dev/zero",
+                              "identify /dev/zero",
+                              "paper audit /dev/zero",
+                              "paper experiments /dev/zero --folder o",
+                              "plan $S/configs/liver_poke.json --costs /dev/zero",
+                              "hil run /dev/zero -o o.tpmrec",
+                              "hil check /dev/zero",
+                              "hil verify /dev/zero",
+                              "hil report /dev/zero",
+                              "hil export /dev/zero -o o.h5",
+                              "hil run $S/configs/hil_omega7.json --law /dev/zero -o o.tpmrec",
+                              "hil run $S/configs/hil_omega7.json --device replay "
+                              "--device-recording /dev/zero -o o.tpmrec",
+                              "sweep show /dev/zero",
+                              "sweep best /dev/zero --objective peak_force",
+                              "sweep plot /dev/zero --folder o.png",
+                              "sweep convergence /dev/zero",
+                              "sweep sensitivity /dev/zero"}) {
     INFO(command);
     write_file(folder / "a.csv", "time [s],depth [mm],force [N]\n0,0,0\n1,1,0.1\n2,1,0.08\n");
     const Ran ran = run_in(folder, std::string("$TPM ") + command);

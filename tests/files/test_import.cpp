@@ -55,8 +55,8 @@ void check_values(const std::vector<double>& found, const std::vector<double>& e
 
 ImportOptions figure(const char* x, const char* y) {
   ImportOptions options;
-  options.x = parse_axis(x, "--x");
-  options.y = parse_axis(y, "--y");
+  options.x = parse_axis(x, "--x-quantity");
+  options.y = parse_axis(y, "--y-quantity");
   return options;
 }
 
@@ -305,8 +305,9 @@ TEST_CASE("rows of one time stamp become their mean, and it is said") {
 }
 
 TEST_CASE("WebPlotDigitizer CSV: one dataset, and several") {
-  CHECK_THROWS_WITH(import_curves(fixture("wpd_single.csv"), {}),
-                    Catch::Contains("expected --x QUANTITY:UNIT, such as --x time:s"));
+  CHECK_THROWS_WITH(
+      import_curves(fixture("wpd_single.csv"), {}),
+      Catch::Contains("expected --x-quantity QUANTITY:UNIT, such as --x-quantity time:s"));
   ImportOptions options = figure("time:s", "contact_force:N");
   const Recording recording = import_recording(fixture("wpd_single.csv"), options);
   CHECK(recording.provenance == Provenance::digitized);

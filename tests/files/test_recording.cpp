@@ -364,8 +364,8 @@ TEST_CASE("any recording from one path: described, exported or digitised") {
   CHECK(strip.response_sd == std::vector<double>{100, 200, 300});
 
   ImportOptions figure;
-  figure.x = parse_axis("time:s", "--x");
-  figure.y = parse_axis("stress:kPa", "--y");
+  figure.x = parse_axis("time:s", "--x-quantity");
+  figure.y = parse_axis("stress:kPa", "--y-quantity");
   CHECK_THROWS_WITH(read_recording_file(fixture("wpd_project_v4.json"), figure),
                     Catch::Contains("holds 2 curves; expected --dataset with one of"));
   figure.dataset = "pixels only";

@@ -146,8 +146,8 @@ TEST_CASE("exports that hold no whole spectrum are refused") {
   CHECK_THAT(import_fault("Frequency (Hz),G' (Pa),G'' (N/m)\n1,1,1\n2,2,2\n"),
              Catch::Contains("a modulus beside a stiffness"));
   ImportOptions figure;
-  figure.x = parse_axis("frequency:Hz", "--x");
-  figure.y = parse_axis("storage_modulus:Pa", "--y");
+  figure.x = parse_axis("frequency:Hz", "--x-quantity");
+  figure.y = parse_axis("storage_modulus:Pa", "--y-quantity");
   CHECK_THAT(import_fault("1,1\n2,2\n", figure), Catch::Contains("without both storage and loss"));
   const TempFolder folder;
   write_file(folder / "m.csv", head + "1,1,1\n2,2,2\n");

@@ -147,8 +147,8 @@ TEST_CASE("a place between those of an axis is told, not taken silently") {
   REQUIRE(exit_code_of("$TPM sweep '" + std::string(folder / "sweep.json") + "' -o '" + file +
                        "' > /dev/null 2>&1") == 0);
   const auto plot = [&](const std::string& at) {
-    return exit_code_of("$TPM sweep plot '" + file + "' -o '" + pictures + "' --at 'depth=" + at +
-                        "' 2> '" + told + "'");
+    return exit_code_of("$TPM sweep plot '" + file + "' --folder '" + pictures +
+                        "' --at 'depth=" + at + "' 2> '" + told + "'");
   };
   CHECK(plot("4 mm") == 0);
   CHECK(exit_code_of("grep -q 'between places' '" + told + "'") == 1);

@@ -34,7 +34,7 @@ TEST_CASE("kill -9 at random moments: every recording opens and verifies up to t
     if (child == 0) {
       (void)!freopen("/dev/null", "w", stdout);
       (void)!freopen("/dev/null", "w", stderr);
-      execl(TPM_TEST_PROGRAM, "tpm", "hil", "run", (folder / "session.json").c_str(), "--time",
+      execl(TPM_TEST_PROGRAM, "tpm", "hil", "run", (folder / "session.json").c_str(), "--clock",
             "real", "-o", file.c_str(), static_cast<char*>(nullptr));
       _exit(127);
     }

@@ -294,7 +294,7 @@ TEST_CASE("A device that keeps the clock has no virtual time") {
   InverseDevice device({service.port(), service.events_port(), service.port(), ""},
                        limits_of("inverse3"), false);
   CHECK(device.open().hardware);
-  CHECK_THAT(error_of([&] { device.prepare({}); }), Contains("expected --time real"));
+  CHECK_THAT(error_of([&] { device.prepare({}); }), Contains("expected --clock real"));
 }
 
 TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any other") {

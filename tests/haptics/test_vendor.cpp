@@ -424,7 +424,7 @@ TEST_CASE("The whole way is walked through a library, and said not to be without
   const std::string build = std::filesystem::path(TPM_TEST_PROGRAM).parent_path();
   const auto walked = [&](const std::string& arguments) {
     const std::string line = "TPM_BUILD='" + build + "' TPM_SESSION='" + (folder / "session.json") +
-                             "' TPM_RUN_OPTIONS='--time virtual --device-file " TPM_TEST_SOURCE_DIR
+                             "' TPM_RUN_OPTIONS='--clock virtual --device-file " TPM_TEST_SOURCE_DIR
                              "/tests/fixtures/stand_in_device.json' '" TPM_TEST_SOURCE_DIR
                              "/scripts/try_vendor_library.sh' " +
                              arguments + " > '" + (folder / "said") + "' 2>&1";

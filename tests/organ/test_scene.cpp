@@ -178,7 +178,7 @@ TEST_CASE("a network in HDF5 holds its spheres and bonds, and the XDMF names onl
 TEST_CASE("tpm network show draws the liver as PNG and SVG, twice the same") {
   const TempFolder folder;
   const std::string show =
-      std::string("\"") + TPM_TEST_PROGRAM + "\" network show --count 100 -o \"";
+      std::string("\"") + TPM_TEST_PROGRAM + "\" network show --spheres 100 -o \"";
   REQUIRE(std::system((show + (folder / "a") + "\" >/dev/null").c_str()) == 0);
   REQUIRE(std::system((show + (folder / "b.png") + "\" >/dev/null").c_str()) == 0);
   CHECK(read_file(folder / "a.svg") == read_file(folder / "b.svg"));

@@ -174,7 +174,7 @@ TEST_CASE("tissue and mass-spring model are run and drawn beside each other, twi
   for (const std::string name : {"a", "b"}) {
     REQUIRE(exit_code(command_for(
                 folder / "s.json", folder / (name + ".h5"),
-                fmt::format("--beside-mass-spring --figures \"{0}\" --format json >\"{0}.json\"",
+                fmt::format("--beside-mass-spring --folder \"{0}\" --format json >\"{0}.json\"",
                             folder / name))) == 0);
   }
   const Json json = parse_json(read_file(folder / "a.json"), "answer");

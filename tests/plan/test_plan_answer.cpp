@@ -52,7 +52,7 @@ TEST_CASE("the short answer of a plan has 25 lines, the pick first, and every wa
   for (const bool chosen : {true, false}) {
     const Plan plan = full_plan(chosen);
     show::ShortAnswer answer = short_answer(plan);
-    show::end_answer(answer, "", {}, "tpm simulate scene.json --plan");
+    show::end_answer(answer, "", {}, "tpm simulate scene.json --planned");
     const std::string text = show::to_text(answer);
     INFO(text);
     CHECK(std::ranges::count(text, '\n') <= 25);

@@ -32,7 +32,7 @@ source $file
 CASES = (
     (["tpm", "va"], {"validate"}, {"fit"}),
     (["tpm", "paper", ""], {"report", "tables", "audit", "experiments"}, {"fit"}),
-    (["tpm", "fit", "--form"], {"--format"}, {"--force"}),
+    (["tpm", "fit", "--form"], {"--format"}, {"--overwrite"}),
     (["tpm", "fit", "--format", ""], {"text", "json"}, {"--format"}),
     (["tpm", "fit", "--laws", "power"], {"power-1"}, {"linear-1"}),
     (["tpm", "hil", "run", "--device", "v"], {"virtual"}, {"replay"}),

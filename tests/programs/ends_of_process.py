@@ -114,8 +114,8 @@ def main():
         (folder / "script").write_text(f"watchdog_by_clock 0\nevents {folder / 'log'}\n")
         log = folder / "log"
         environment = {**os.environ, "TPM_STAND_IN_SCRIPT": str(folder / "script"), "TPM_ENDS_LOG": str(log)}
-        run = [str(build / "tpm"), "hil", "run", str(folder / "s.json"), "-o", str(folder / "r.tpmrec"), "--force",
-               "--time", "real"]
+        run = [str(build / "tpm"), "hil", "run", str(folder / "s.json"), "-o", str(folder / "r.tpmrec"), "--overwrite",
+               "--clock", "real"]
         stand_in = run + ["--device", "omega7", "--dhd-library", str(build / "tests/stand_in_dhd/libstand_in_dhd_whole.so"),
                           "--device-file", str(ROOT / "tests/fixtures/stand_in_device.json")]
         plugin = run + ["--device", "plugin", "--plugin", str(made_plugin(folder))]

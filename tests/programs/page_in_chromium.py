@@ -145,7 +145,7 @@ class Chromium:
 
 def begun(tpm, session, folder):
     process = subprocess.Popen(
-        [tpm, "hil", "run", session, "--time", "real", "--page", "0", "--page-wait", "120 s", "--page-keep", "20 s",
+        [tpm, "hil", "run", session, "--clock", "real", "--page", "0", "--page-wait", "120 s", "--page-keep", "20 s",
          "-o", folder / "r.tpmrec"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     line = process.stderr.readline()
     assert line.startswith("page: http://127.0.0.1:"), line

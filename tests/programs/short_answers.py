@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 MOST = 25
-PLANS = (("shallow.json", "--tolerance", "1%", "--rate", "1000"), ("servo.json",), ("star.json",), ("creep.json",), ("deep.json",),
+PLANS = (("shallow.json", "--tolerance", "1%", "--loop-rate", "1 kHz"), ("servo.json",), ("star.json",), ("creep.json",), ("deep.json",),
          ("servo.json", "--wall", "1e-9 s per s"), ("tool.json", "--brief"), ("patch_field.json", "--outputs", "field", "--brief"))
 SCENES = ("liver_poke.json", "grasp.json", "sagging_liver.json", "two_indenters.json", "plan/fast_poke.json")
 

@@ -232,7 +232,7 @@ def check_cursor(page, result):
 def look_at_recording(chromium, tpm, folder):
     (folder / "session.json").write_text(json.dumps(SESSION))
     recording, rows = folder / "s.tpmrec", folder / "rows.h5"
-    subprocess.run([tpm, "hil", "run", folder / "session.json", "--time", "virtual", "-o", recording], check=True, capture_output=True)
+    subprocess.run([tpm, "hil", "run", folder / "session.json", "--clock", "virtual", "-o", recording], check=True, capture_output=True)
     told = json.loads(subprocess.run([tpm, "view", recording, "-o", folder / "s.html", "--format", "json"], check=True,
                                      capture_output=True).stdout)
     assert told["samples"] >= 1_000_000 and told["samples_per_value"] == 1, told

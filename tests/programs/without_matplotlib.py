@@ -19,13 +19,13 @@ RUNS = {
     "budget": "budget ../fit/recording_fit/law.json --depth 4mm --rate 1mm/s --hold 30s --folder budget",
     "identify": "identify ../fit/recording.csv --folder identified",
     "validate": "validate ../fit/recording_fit/law.json ../fit/recording.csv --require 10% --folder validated",
-    "design": "design configs/design_liver.json --repetitions 0 --draw drawn",
-    "network": "network show --count 100 -o liver",
-    "simulate": "simulate configs/liver_poke.json -o poke.h5 --figures pictures",
-    "sweep": "sweep configs/sweep_x_depth.json -o sweep.h5; sweep plot sweep.h5 -o maps",
-    "session": "hil run configs/hil_law.json -o session.tpmrec; hil report session.tpmrec -o page",
-    "borders": "hil stability --figures borders",
-    "report": "paper report -o paper",
+    "design": "design configs/design_liver.json --repetitions 0 --folder drawn",
+    "network": "network show --spheres 100 -o liver",
+    "simulate": "simulate configs/liver_poke.json -o poke.h5 --folder pictures",
+    "sweep": "sweep configs/sweep_x_depth.json -o sweep.h5; sweep plot sweep.h5 --folder maps",
+    "session": "hil run configs/hil_law.json -o session.tpmrec; hil report session.tpmrec --folder page",
+    "borders": "hil stability --folder borders",
+    "report": "paper report --folder paper",
 }
 DRAWINGS = {".svg", ".png", ".pdf"}
 # They differ from run to run anyway, or hold or name the drawings.

@@ -26,8 +26,8 @@ inline std::vector<ErrorCase> jpk_error_cases() {
   flipped[flipped.find(std::string("\0\4\0\3", 4)) + 1] = 9;
   const std::string distance = "vDeflection.conversion-set.conversion.distance.";
   return {
-      {type, "empty", import + " --from jpk", file("")},
-      {type, "no archive", import + " --from jpk", file(kGarbage)},
+      {type, "empty", import + " --input-format jpk", file("")},
+      {type, "no archive", import + " --input-format jpk", file(kGarbage)},
       {type, "truncated", import, file(whole.substr(0, whole.size() / 2))},
       {type, "another archive", import, curve({{"xl/workbook.xml", "<workbook/>"}})},
       {type, "map of curves", import, curve({{"header.properties", "type=force-scan-map\n"}})},

@@ -6,7 +6,7 @@ namespace tpm::test {
 /// Scenes of which the tissue is sound and what is done to it is not.
 inline std::vector<ErrorCase> simulation_error_cases() {
   const std::string type = "simulation scene";
-  const std::string simulate = "simulate {}/s.json -o {}/out.h5 --figures {}/out";
+  const std::string simulate = "simulate {}/s.json -o {}/out.h5 --folder {}/out";
   const auto scene = [](const std::string& more) {
     return with_files({{"s.json", R"({"organ": {"kind": "liver"})" + more + "}"}});
   };

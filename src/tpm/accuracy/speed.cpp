@@ -52,7 +52,7 @@ std::vector<SpeedWork> chosen_speed_works(const std::vector<std::string>& names)
       std::vector<std::string_view> known;
       known.reserve(all.size());
       for (const SpeedWork& work : all) known.push_back(work.name);
-      throw Error(ExitCode::usage, "--record", fmt::format("no work '{}'", name),
+      throw Error(ExitCode::usage, "--append-to", fmt::format("no work '{}'", name),
                   fmt::format("one of: {}", fmt::join(known, ", ")));
     }
     chosen.push_back(*found);

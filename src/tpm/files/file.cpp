@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <openssl/evp.h>
 #include <openssl/sha.h>
 #include <poll.h>
 #include <unistd.h>
@@ -12,9 +13,11 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <memory>
 
 #include "tpm/files/descriptor.hpp"
 #include "tpm/files/file_roles.hpp"
+#include "tpm/files/files_read.hpp"
 #include "tpm/files/replacement.hpp"
 #include "tpmkit/error.hpp"
 
@@ -250,12 +253,41 @@ std::string read_page(std::string_view name) {
                       "<script>\n" + read_file(folder / "drawing.js") + "</script>");
 }
 
-std::string sha256_hex(std::string_view bytes) {
-  std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
-  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), digest.data());
+namespace {
+
+using Digest = std::array<unsigned char, SHA256_DIGEST_LENGTH>;
+
+std::string hexadecimal(const Digest& digest) {
   std::string text;
   for (const unsigned char byte : digest) text += fmt::format("{:02x}", byte);
   return text;
+}
+
+}  // namespace
+
+std::string sha256_hex(std::string_view bytes) {
+  Digest digest{};
+  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), digest.data());
+  return hexadecimal(digest);
+}
+
+std::string sha256_of_file(const fs::path& path) {
+  const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> hash(EVP_MD_CTX_new(),
+                                                                     &EVP_MD_CTX_free);
+  if (in.get() < 0 || !hash || EVP_DigestInit_ex(hash.get(), EVP_sha256(), nullptr) != 1) return {};
+  constexpr std::size_t kPart = 1 << 20;
+  std::string part(kPart, '\0');
+  for (;;) {
+    const ssize_t size = ::read(in.get(), part.data(), part.size());
+    if (size < 0 && errno == EINTR) continue;
+    if (size < 0) return {};
+    if (size == 0) break;
+    EVP_DigestUpdate(hash.get(), part.data(), static_cast<std::size_t>(size));
+  }
+  Digest digest{};
+  return EVP_DigestFinal_ex(hash.get(), digest.data(), nullptr) == 1 ? hexadecimal(digest)
+                                                                     : std::string{};
 }
 
 }  // namespace tpm::files

@@ -13,6 +13,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/files_read.hpp"
 #include "tpm/files/origin_mark.hpp"
 #include "tpmkit/error.hpp"
 
@@ -96,7 +97,7 @@ void require_ours(const fs::path& path, Naming naming) {
     what = fmt::format("is a result of: {}", printable(mark->origin, kLongestOriginShown));
   }
   if (what.empty()) return;
-  throw Error(ExitCode::usage, path.string(), what, "a name for the result, or --force");
+  throw Error(ExitCode::usage, path.string(), what, "a name for the result, or --overwrite");
 }
 
 void announce(const std::vector<fs::path>& files, std::vector<fs::path> Roles::*list,
@@ -184,6 +185,15 @@ void note_written(const fs::path& path) {
   const std::lock_guard lock(roles_mutex);
   if (!roles) return;
   if (const auto file = identity_of(path)) Roles::add(roles->written, *file, path);
+}
+
+std::vector<fs::path> files_read() {
+  const std::lock_guard lock(roles_mutex);
+  std::vector<fs::path> files;
+  if (!roles) return files;
+  for (const auto& [file, path] : roles->read) files.push_back(path);
+  std::ranges::sort(files);
+  return files;
 }
 
 std::string result_origin() {

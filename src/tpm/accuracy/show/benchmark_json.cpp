@@ -187,7 +187,7 @@ std::size_t place_in_list(std::string_view name) {
 }
 
 std::string options_words(const BenchmarkOptions& options) {
-  return options.timing ? fmt::format("--repeats {}", options.repeats) : "--no-timing";
+  return options.timing ? fmt::format("--repetitions {}", options.repeats) : "--no-timing";
 }
 
 /// Of a document that the schema has let pass.

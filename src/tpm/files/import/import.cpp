@@ -30,7 +30,7 @@ const DigitizedAxis& required_axis(const std::optional<DigitizedAxis>& axis, cha
                                    const std::string& file) {
   if (axis) return *axis;
   throw bad_input(file, fmt::format("a digitised file does not say what its {} axis shows", name),
-                  fmt::format("--{} QUANTITY:UNIT, such as --{} {}", name, name,
+                  fmt::format("--{0}-quantity QUANTITY:UNIT, such as --{0}-quantity {1}", name,
                               name == 'x' ? "time:s" : "contact_force:N"));
 }
 
@@ -187,7 +187,7 @@ ImportedFile import_series(const std::filesystem::path& path, const ImportOption
   }
   if (!machine && (options.step_time_s || options.from_s || options.until_s || options.block)) {
     throw bad_input(input.file(), fmt::format("is a file of kind {}", importer.name),
-                    "--step-time, --from, --until and --block only for tables of a machine");
+                    "--step-time, --from-time, --until and --block only for tables of a machine");
   }
   ImportedFile imported;
   imported.usual = importer.usual;

@@ -12,8 +12,8 @@
 
 namespace tpm::files {
 
-/// The kinds of files that are imported, as --from takes them: "auto", which finds the kind out
-/// from the content, "machine", "jpk", ...
+/// The kinds of files that are imported, as --input-format takes them: "auto", which finds the kind
+/// out from the content, "machine", "jpk", ...
 [[nodiscard]] std::vector<std::string> import_formats();
 
 /// What one axis of a digitised figure shows.

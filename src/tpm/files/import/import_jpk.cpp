@@ -342,7 +342,8 @@ void require_jpk_options(const ImportOptions& options, const std::string& file) 
                        options.deflection_sensitivity_m_per_V;
   if (columns || options.x || options.y || options.depth_m || options.load_N) {
     throw bad_input(file, "a JPK force file says itself what its channels are",
-                    "only --drive and --response with the names of channels, --negate, "
+                    "only --drive and --response with the names of channels, --negate-drive, "
+                    "--negate-response, "
                     "--spring-constant, --segments and --contact-force");
   }
 }

@@ -32,7 +32,7 @@ class ImportInput {
 /// A kind of foreign file. The list in import.cpp holds all (docs/architecture.md, "An
 /// importer").
 struct Importer {
-  std::string_view name;  ///< as --from takes it
+  std::string_view name;  ///< as --input-format takes it
   Provenance usual;       ///< of such a file if the options give none
   /// True if the content can only be a file of this kind.
   bool (*recognizes)(ImportInput& input);

@@ -90,7 +90,8 @@ struct ReadingKey {
 };
 
 constexpr auto kKeys = std::to_array<ReadingKey>({
-    {{"encoding", "auto (UTF-8, UTF-16 with a mark, else latin-1), utf-8 or latin-1",
+    {{"encoding",
+      "Encoding of the text: auto (UTF-8, UTF-16 with a mark, else latin-1), utf-8 or latin-1",
       "auto,utf-8,latin-1"},
      [](ImportOptions& o, Text t, Where w) {
        if (t == kFound) return;
@@ -100,7 +101,8 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
      [](const ImportOptions& o) {
        return std::string(o.text.latin1 ? "latin-1" : o.text.utf8 ? "utf-8" : "");
      }},
-    {{"separator", "auto, comma, semicolon, tab or blank", "auto,comma,semicolon,tab,blank"},
+    {{"separator", "Separator of columns: auto, comma, semicolon, tab or blank",
+      "auto,comma,semicolon,tab,blank"},
      [](ImportOptions& o, Text t, Where w) {
        if (t != kFound) o.text.separator = parse_word(kSeparators, "separator", t, w);
      },
@@ -159,14 +161,16 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
     {{"loss", "Column of its loss modulus or stiffness"},
      [](ImportOptions& o, Text t, Where) { o.loss_column = t; },
      [](const ImportOptions& o) { return o.loss_column; }},
-    {{"drive_quantity", "indentation_depth, strain, relative_length or abscissa"},
+    {{"drive_quantity",
+      "Quantity that was imposed: indentation_depth, strain, relative_length or abscissa"},
      [](ImportOptions& o, Text t, Where w) { o.drive_quantity = parse_quantity_name(t, w); },
      [](const ImportOptions& o) {
        return text_or_empty<Quantity>(
            o.drive_quantity, [](const Quantity& q) { return std::string(quantity_name(q)); });
      }},
     {{"response_quantity",
-      "contact_force, stress, relaxation_modulus, creep_compliance or ordinate"},
+      "Quantity that was observed: contact_force, stress, relaxation_modulus, creep_compliance or "
+      "ordinate"},
      [](ImportOptions& o, Text t, Where w) { o.response_quantity = parse_quantity_name(t, w); },
      [](const ImportOptions& o) {
        return text_or_empty<Quantity>(
@@ -209,14 +213,15 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
        return text_or_empty<double>(o.rest_length_m,
                                     [](const double& m) { return in_units(m, 1e-3, "mm"); });
      }},
-    {{"area", "Cross section of that specimen, for a column of its force"},
+    {{"area", "Cross section, of that specimen: for a column of its force"},
      [](ImportOptions& o, Text t, Where w) { o.area_m2 = positive_size(t, Dimension::area, w); },
      [](const ImportOptions& o) {
        return text_or_empty<double>(o.area_m2,
                                     [](const double& a) { return in_units(a, 1e-6, "mm^2"); });
      }},
     {{"spring_constant",
-      "Of the cantilever: JPK force files (instead of that of the file), and tables with the "
+      "Spring constant of the cantilever: JPK force files (instead of that of the file), and "
+      "tables with the "
       "height of the piezo"},
      [](ImportOptions& o, Text t, Where w) {
        o.spring_constant_N_per_m = positive_size(t, Dimension::stiffness, w);
@@ -225,7 +230,8 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
        return text_or_empty<double>(o.spring_constant_N_per_m,
                                     [](const double& k) { return in_units(k, 1.0, "N/m"); });
      }},
-    {{"deflection_sensitivity", "Tables with a deflection in V or mV, such as \"50 nm/V\""},
+    {{"deflection_sensitivity",
+      "Deflection per volt, of tables with a deflection in V or mV, such as \"50 nm/V\""},
      [](ImportOptions& o, Text t, Where w) {
        o.deflection_sensitivity_m_per_V = sensitivity_text(t, w);
      },
@@ -233,7 +239,8 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
        return text_or_empty<double>(o.deflection_sensitivity_m_per_V,
                                     [](const double& s) { return in_units(s, 1e-9, "nm/V"); });
      }},
-    {{"segments", "JPK force files: kinds to read, such as extend,pause; default: all"},
+    {{"segments",
+      "Segments to read, of JPK force files: kinds, such as extend,pause; default: all"},
      [](ImportOptions& o, Text t, Where) { o.segments = list_from(t); },
      [](const ImportOptions& o) { return fmt::format("{}", fmt::join(o.segments, ",")); }},
 });

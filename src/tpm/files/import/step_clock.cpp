@@ -48,7 +48,7 @@ void keep_time_window(ImportedSeries& series, const std::string& file,
   const ImportedColumn* time = time_of(series);
   if (time == nullptr) {
     throw bad_input(file, "no column is recognised as time",
-                    "--from, --until and --step-time only with times (--time COLUMN)");
+                    "--from-time, --until and --step-time only with times (--time COLUMN)");
   }
   const std::vector<double>& times = time->values;
   const double to_si = time->unit.to_si;
@@ -68,7 +68,7 @@ void keep_time_window(ImportedSeries& series, const std::string& file,
         fmt::format("fewer than 2 samples in the chosen times; the file holds {} s to "
                     "{} s",
                     significant(times.front() * to_si, 6), significant(times.back() * to_si, 6)),
-        "--from, --until and --step-time within these");
+        "--from-time, --until and --step-time within these");
   }
   const auto first = static_cast<std::size_t>(begin - times.begin());
   const auto last = static_cast<std::size_t>(end - times.begin());

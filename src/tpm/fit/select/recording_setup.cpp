@@ -232,8 +232,8 @@ void leave_out_start_up(PreparedRecording& r) {
       std::ranges::count_if(time, [&](double t) { return t >= time[hold->first] && t < from_s; });
   r.from_s = from_s;
   r.start_up = fmt::format(
-      "{}: {} samples after the step are left out, to {} s: {} (--from leaves out more)", r.name,
-      left_out, significant(from_s, 4),
+      "{}: {} samples after the step are left out, to {} s: {} (--from-time leaves out more)",
+      r.name, left_out, significant(from_s, 4),
       ringing > hold->first ? "they ring" : "the ramp within the step was not sampled");
 }
 

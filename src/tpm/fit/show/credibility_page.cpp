@@ -155,7 +155,7 @@ class EvidencePage {
       if (any) continue;
       const bool code = category == kCategories.front();
       table.rows.push_back({{category},
-                            {code ? "empty: nothing was given (`tpm accuracy verify -o "
+                            {code ? "empty: nothing was given (`tpm accuracy verify --folder "
                                     "verification` writes it)"
                                   : "empty: nothing was given"}});
     }

@@ -275,7 +275,7 @@ Validation validate(const ValidationRequest& request) {
   }
   if (request.at && std::ranges::find(request.recordings, *request.at, &PreparedRecording::name) ==
                         request.recordings.end()) {
-    throw Error(ExitCode::usage, "--at", fmt::format("'{}'", printable(*request.at)),
+    throw Error(ExitCode::usage, "--at-recording", fmt::format("'{}'", printable(*request.at)),
                 "the name of one of the recordings");
   }
   Validation v;

@@ -248,7 +248,7 @@ const DeviceIdentity& InverseDevice::open() {
 
 void InverseDevice::prepare(const DevicePreparation& preparation) {
   if (!preparation.real_time && identity_.hardware) {
-    throw service_fault("a device keeps the clock", "--time real");
+    throw service_fault("a device keeps the clock", "--clock real");
   }
   preparation_ = preparation;
   prepared_ = true;

@@ -252,7 +252,7 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
   }
   if (choice.replay.empty()) {
     throw Error(ExitCode::usage, "--device replay", "has nothing to replay",
-                "--recording FILE beside it");
+                "--device-recording FILE beside it");
   }
   const HilRecording recording = read_recording(choice.replay);
   return std::make_shared<ReplayDevice>(motion_of(recording), recording.name);

@@ -76,7 +76,8 @@ std::string audit_text(const AuditReport& report, bool all) {
     }
     out += finding_text(finding);
   }
-  if (left_out > 0) out += fmt::format("{} claims that hold are not shown (--all).\n", left_out);
+  if (left_out > 0)
+    out += fmt::format("{} claims that hold are not shown (--verbose).\n", left_out);
   return out + summary_text(report);
 }
 

@@ -1,0 +1,78 @@
+#include "answer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include "tpm/files/files_read.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Of the members that all answers have. Raised when one of them changes its meaning.
+constexpr int kShape = 1;
+
+/// Members of results that hold remarks, as one text or as a list of texts, and their code.
+constexpr std::array<std::pair<const char*, const char*>, 6> kRemarks{{{"remarks", "remark"},
+                                                                       {"warnings", "warning"},
+                                                                       {"flags", "flag"},
+                                                                       {"notes", "note"},
+                                                                       {"sentences", "sentence"},
+                                                                       {"why", "reason"}}};
+
+Json remarks_of(const Json& result) {
+  Json remarks = Json::array();
+  for (const auto& [member, code] : kRemarks) {
+    const auto found = result.find(member);
+    if (found == result.end()) continue;
+    const auto add = [&, code = code](const Json& text) {
+      if (text.is_string()) remarks.push_back({{"code", code}, {"text", text}});
+    };
+    if (!found->is_array()) add(*found);
+    if (found->is_array()) std::for_each(found->begin(), found->end(), add);
+  }
+  return remarks;
+}
+
+/// Files of the working folder have the name that they have in it.
+std::string input_name(const fs::path& file) {
+  std::error_code no_folder;
+  const fs::path near = file.lexically_proximate(fs::current_path(no_folder));
+  return no_folder || near.empty() || *near.begin() == ".." ? file.string() : near.string();
+}
+
+Json inputs() {
+  return array_json(files::files_read(), [](const fs::path& file) {
+    const std::string digest = files::sha256_of_file(file);
+    return Json{{"file", input_name(file)},
+                {"sha256", digest.empty() ? Json(nullptr) : Json(digest)}};
+  });
+}
+
+}  // namespace
+
+std::string answer_text(const Session& session, Json result, const std::vector<Verdict>& verdicts) {
+  Json answer{{"tpm", kShape}, {"command", session.command}, {"version", version()}};
+  answer["inputs"] = inputs();
+  answer["verdicts"] = array_json(verdicts, [](const Verdict& verdict) {
+    return Json{{"code", verdict.code}, {"holds", verdict.holds}};
+  });
+  answer["remarks"] = remarks_of(result);
+  for (auto& [name, value] : result.items()) {
+    if (name == "version" || name == "remarks") continue;
+    if (answer.contains(name)) {
+      throw std::logic_error(fmt::format("the result has a member '{}' of the envelope", name));
+    }
+    answer[name] = std::move(value);
+  }
+  return to_text(answer);
+}
+
+}  // namespace tpm::app

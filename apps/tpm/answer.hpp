@@ -1,0 +1,25 @@
+#pragma once
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "command.hpp"
+
+namespace tpm::app {
+
+/// What a command was asked and whether it is so: what its exit code 0 or 1 says.
+struct Verdict {
+  std::string_view code;  ///< "network_stands"
+  bool holds = false;
+};
+
+/// The answer of a command as JSON. What all answers have stands before the members of `result`
+/// (docs/json.md): `tpm`, `command`, `version`, `inputs` with SHA-256, `verdicts` and `remarks`,
+/// which are the texts of the members of `result` that hold remarks, each with a code. To be called
+/// when all inputs were read.
+/// @param result an object; a member `version` is the program's, `remarks` are texts; no other
+///               member has a name of the envelope
+[[nodiscard]] std::string answer_text(const Session& session, Json result,
+                                      const std::vector<Verdict>& verdicts = {});
+
+}  // namespace tpm::app

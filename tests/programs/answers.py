@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""Answers in JSON: every command with --format json prints one envelope, and docs/json.md lists the members.
+
+    answers.py ROOT TPM            compares
+    answers.py ROOT TPM --write    writes the table of docs/json.md
+
+Runs each command once. SLOW are those that take minutes, wait for a client or measure the machine.
+"""
+
+import hashlib
+import json
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ENVELOPE = ["tpm", "command", "version", "inputs", "verdicts", "remarks"]
+REMARKS = ("remarks", "warnings", "flags", "notes", "sentences", "why")
+PRESS = '--depth "2 mm" --rate "2 mm/s" --hold "3 s"'
+RUNS = f"""
+example recording
+example
+data list
+data show evren_relaxation
+data check recording.csv
+data import recording.csv -o imported
+data pack evren_static -o packed.h5
+fit recording.csv --laws linear-1 --starts 2 --folder fitted
+fit CONFIGS/liver_relaxation.json --starts 2
+predict fitted/law.json {PRESS}
+predict fitted/law.json --frequencies "1 Hz, 10 Hz"
+validate fitted/law.json recording.csv --require 10%
+identify recording.csv --laws linear-1 --no-loop
+laws
+laws power-2
+design CONFIGS/design_liver.json --repetitions 0
+network build --spheres 60 -o net.h5
+network check CONFIGS/liver_inner_fixed_scene.json
+material fitted/law.json CONFIGS/liver_scene.json recording.csv --folder on_liver
+simulate small.json -o small.h5
+view small.h5 -o small.html
+plan CONFIGS/plan/star.json --costs nominal
+plan CONFIGS/plan/star.json --costs nominal --estimate
+sweep CONFIGS/sweep_x_depth_100.json -o sweep.h5
+sweep CONFIGS/sweep_x_depth_100.json -o parts.h5 --shard 1/1
+sweep merge CONFIGS/sweep_x_depth_100.json -o parts.h5
+sweep show sweep.h5
+sweep best sweep.h5 --objective peak_force
+sweep CONFIGS/sweep_convergence_step.json -o step.h5
+sweep convergence step.h5 --axis step
+hil devices
+hil run session.json -o session.tpmrec
+hil verify session.tpmrec
+hil report session.tpmrec
+hil export session.tpmrec -o rows.h5
+budget fitted/law.json {PRESS} --draws 100
+paper tables
+paper audit
+accuracy verify closed-forms
+accuracy verify --list
+accuracy benchmark --list
+version
+"""
+SLOW = {"hil serve", "hil check", "hil identify", "hil stability", "paper experiments", "accuracy benchmark", "accuracy stability",
+        "sweep sensitivity"}
+BEGIN, END = "<!-- members: written by tests/programs/answers.py -->", "<!-- end of members -->"
+
+
+def with_format(command, path=""):
+    if any("--format" in o["names"] for o in command["options"]) and path:
+        yield path
+    for below in command.get("commands", []):
+        yield from with_format(below, f"{path} {below['name']}".strip())
+
+
+def faults_of(answer, words, folder, exit_code):
+    """What is wrong with the envelope of an answer."""
+    if not isinstance(answer, dict):
+        return ["is no object"]
+    faults = []
+    if list(answer)[: len(ENVELOPE)] != ENVELOPE:
+        faults.append(f"begins with {list(answer)[:len(ENVELOPE)]}")
+        return faults
+    if not " ".join(words).startswith(answer["command"]) or answer["tpm"] != 1:
+        faults.append(f"command '{answer['command']}', shape {answer['tpm']}")
+    for one in answer["inputs"]:
+        digest = hashlib.sha256((folder / one["file"]).read_bytes()).hexdigest()
+        if digest != one["sha256"]:
+            faults.append(f"SHA-256 of {one['file']} is not that of the file")
+    read = {Path(one["file"]).resolve() for one in answer["inputs"]} | {(folder / one["file"]).resolve() for one in answer["inputs"]}
+    for word in words[1:]:
+        given = folder / word
+        if given.is_file() and given.resolve() not in read and words[words.index(word) - 1] not in ("-o", "--output"):
+            faults.append(f"{word} was given and is no input")
+    if any(set(one) != {"code", "text"} or not one["code"] or not one["text"] for one in answer["remarks"]):
+        faults.append("a remark without code or text")
+    texts = [one["text"] for one in answer["remarks"]]
+    for member in REMARKS[1:]:
+        held = answer.get(member, [])
+        held = [held] if isinstance(held, str) else held
+        faults += [f"{member}: '{t}' is no remark" for t in held if isinstance(t, str) and t and t not in texts]
+    if any(set(one) != {"code", "holds"} for one in answer["verdicts"]):
+        faults.append("a verdict without code or holds")
+    if exit_code == 1 and all(one["holds"] for one in answer["verdicts"]):
+        faults.append("exit code 1, and no verdict says no")
+    if exit_code == 0 and any(not one["holds"] for one in answer["verdicts"]):
+        faults.append("exit code 0, and a verdict says no")
+    return faults
+
+
+def main():
+    root, program = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
+    sys.path.insert(0, str(root / "scripts"))
+    from fault_table import INDENTED, SESSION  # noqa: E402
+
+    usage = json.loads(subprocess.run([program, "--json-usage"], capture_output=True, text=True, check=True).stdout)
+    wanted = set(with_format(usage))
+    members, faults, met = {}, 0, set()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "small.json").write_text(json.dumps(INDENTED))
+        (folder / "session.json").write_text(json.dumps(SESSION))
+        for line in RUNS.strip().splitlines():
+            words = [w.replace("CONFIGS", str(root / "configs")) for w in shlex.split(line)]
+            done = subprocess.run([program, *words, "--format", "json"], cwd=folder, capture_output=True, text=True, timeout=300)
+            if done.returncode > 1:
+                faults += 1
+                print(f"tpm {line}: exit code {done.returncode}: {done.stderr.strip()}")
+                continue
+            answer = json.loads(done.stdout)
+            wrong = faults_of(answer, words, folder, done.returncode)
+            faults += len(wrong)
+            for fault in wrong:
+                print(f"tpm {line}: {fault}")
+            if wrong:
+                continue
+            met.add(answer["command"])
+            of_command = members.setdefault(answer["command"], ([], []))
+            of_command[0].extend(v["code"] for v in answer["verdicts"] if v["code"] not in of_command[0])
+            of_command[1].extend(m for m in answer if m not in ENVELOPE and m not in of_command[1])
+    for missing in sorted(wanted - met - SLOW):
+        faults += 1
+        print(f"tpm {missing} --format json is not asked")
+    for unknown in sorted(SLOW - wanted):
+        faults += 1
+        print(f"tpm {unknown} has no --format")
+    rows = ["| command | verdicts | members of the result |", "| --- | --- | --- |"]
+    ticked = lambda words: ", ".join(f"`{w}`" for w in words)
+    rows += [f"| `{c}` | {ticked(v)} | {ticked(m)} |" for c, (v, m) in sorted(members.items())]
+    page = root / "docs/json.md"
+    text = page.read_text(encoding="utf-8")
+    before, rest = text.split(BEGIN)
+    after = rest.split(END)[1]
+    new = before + BEGIN + "\n\n" + "\n".join(rows) + "\n\n" + END + after
+    if "--write" in sys.argv:
+        page.write_text(new, encoding="utf-8")
+    elif new != text:
+        faults += 1
+        print("docs/json.md is not what the commands print; answers.py ROOT TPM --write")
+    print(f"{len(met)} commands asked, {len(SLOW)} left out, {faults} faults")
+    sys.exit(bool(faults))
+
+
+if __name__ == "__main__":
+    main()
