@@ -3,12 +3,14 @@
 // For 20 numbers of spheres (or those between FROM and TO) and each lattice: spheres that were
 // added, the least outer support, and over five pushes spread over the surface the largest over the
 // smallest stiffness and the smallest over the median, under one sphere and under a rigid patch
-// over four spacings.
+// over four spacings; how many spheres such a patch has; and the largest over the smallest under
+// patches of 15 spheres each, the number that four spacings span on an even layer.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -30,9 +32,28 @@ constexpr double kPatch = 2.0;  // radius in spacings
 const std::array<Eigen::Vector3d, 5> kPushes{
     {{0.1, 0.2, 1.0}, {1.0, 0.1, -0.2}, {-0.3, 1.0, 0.4}, {-0.6, -0.5, 0.8}, {0.7, -0.6, -0.5}}};
 
+constexpr std::size_t kOfPatch = 15;  // 4 pi over sqrt(3)/2: 14.5
+
 struct Stiffness {
-  double single = 0.0, patch = 0.0;
+  double single = 0.0, patch = 0.0, alike = 0.0;
+  std::size_t spheres = 0;
 };
+
+/// Of spheres that are driven along a normal together, N/m.
+double driven_together(const Equilibrium& equilibrium, const std::vector<Eigen::Index>& spheres,
+                       const Eigen::Vector3d& normal, Eigen::Index columns) {
+  const auto size = static_cast<Eigen::Index>(spheres.size());
+  Eigen::MatrixXd compliance(size, size);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    Eigen::Matrix3Xd field = Eigen::Matrix3Xd::Zero(3, columns);
+    field.col(spheres[static_cast<std::size_t>(j)]) = normal;
+    equilibrium.displace(field);
+    for (Eigen::Index i = 0; i < size; ++i) {
+      compliance(i, j) = normal.dot(field.col(spheres[static_cast<std::size_t>(i)]));
+    }
+  }
+  return compliance.ldlt().solve(Eigen::VectorXd::Ones(size)).sum();
+}
 
 /// N/m, instantaneous at rest, with the far 30 % of the depth fixed.
 Stiffness pushed(Organ organ, const Eigen::Vector3d& towards, const TpmParameters& material) {
@@ -55,25 +76,24 @@ Stiffness pushed(Organ organ, const Eigen::Vector3d& towards, const TpmParameter
   if (!equilibrium.factorise(network.organ.position,
                              {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0}))
     return {};
-  std::vector<Eigen::Index> patch;
-  for (Eigen::Index i = 0; i < outer; ++i) {
-    const double apart =
-        (network.organ.position.col(i) - network.organ.position.col(contact)).norm();
-    if (apart <= kPatch * network.organ.spacing) patch.push_back(i);
-  }
-  const auto size = static_cast<Eigen::Index>(patch.size());
-  Eigen::MatrixXd compliance(size, size);
+  std::vector<Eigen::Index> nearest(static_cast<std::size_t>(outer));
+  std::iota(nearest.begin(), nearest.end(), Eigen::Index{0});
+  const Positions& at = network.organ.position;
+  const auto apart = [&](Eigen::Index i) { return (at.col(i) - at.col(contact)).norm(); };
+  std::stable_sort(nearest.begin(), nearest.end(),
+                   [&](Eigen::Index a, Eigen::Index b) { return apart(a) < apart(b); });
+  const auto stiffness_of = [&](std::size_t spheres) {
+    const auto last = nearest.begin() + static_cast<std::ptrdiff_t>(spheres);
+    return driven_together(equilibrium, {nearest.begin(), last}, normal, at.cols());
+  };
   Stiffness found;
-  for (Eigen::Index j = 0; j < size; ++j) {
-    Eigen::Matrix3Xd field = Eigen::Matrix3Xd::Zero(3, network.organ.position.cols());
-    field.col(patch[static_cast<std::size_t>(j)]) = normal;
-    equilibrium.displace(field);
-    for (Eigen::Index i = 0; i < size; ++i) {
-      compliance(i, j) = normal.dot(field.col(patch[static_cast<std::size_t>(i)]));
-    }
-    if (patch[static_cast<std::size_t>(j)] == contact) found.single = 1.0 / compliance(j, j);
-  }
-  found.patch = compliance.ldlt().solve(Eigen::VectorXd::Ones(size)).sum();
+  found.spheres =
+      static_cast<std::size_t>(std::count_if(nearest.begin(), nearest.end(), [&](Eigen::Index i) {
+        return apart(i) <= kPatch * network.organ.spacing;
+      }));
+  found.single = stiffness_of(1);
+  found.patch = stiffness_of(found.spheres);
+  found.alike = stiffness_of(kOfPatch);
   return found;
 }
 
@@ -86,9 +106,8 @@ std::string spread(std::vector<double> values) {
 void measure(std::size_t from, std::size_t to) {
   fmt::print(
       "| lattice | spheres | outer | off the lattice | least outer support | single max/min | "
-      "single min/median | patch max/min | patch min/median "
-      "|\n|---|---|---|---|---|---|---|---|---|"
-      "\n");
+      "single min/median | patch max/min | patch min/median | spheres of it | 15 spheres max/min "
+      "|\n|---|---|---|---|---|---|---|---|---|---|---|\n");
   const test::Sphere ball(kRadius_m);
   const TpmParameters material;
   constexpr int kCounts = 20;
@@ -101,19 +120,26 @@ void measure(std::size_t from, std::size_t to) {
       request.lattice = lattice;
       const Organ organ = fill_solid(ball, request);
       const std::vector<double> support = outer_support(build_network(organ, {}, "ball"));
-      std::vector<double> single, patch;
+      std::vector<double> single, patch, alike;
+      std::size_t fewest = organ.size(), most = 0;
       for (const Eigen::Vector3d& towards : kPushes) {
         const Stiffness stiffness = pushed(organ, towards, material);
         single.push_back(stiffness.single);
         patch.push_back(stiffness.patch);
+        alike.push_back(stiffness.alike);
+        fewest = std::min(fewest, stiffness.spheres);
+        most = std::max(most, stiffness.spheres);
       }
       const std::string added =
           organ.assumptions.size() > 2
               ? organ.assumptions.back().substr(0, organ.assumptions.back().find(' '))
               : "0";
-      fmt::print("| {} | {} | {} | {} | {:.2f} | {} | {} |\n",
+      fmt::print("| {} | {} | {} | {} | {:.2f} | {} | {} | {} to {} | {:.2f} |\n",
                  entry_of(kLatticeWords, lattice).text, organ.size(), support.size(), added,
-                 *std::min_element(support.begin(), support.end()), spread(single), spread(patch));
+                 *std::min_element(support.begin(), support.end()), spread(single), spread(patch),
+                 fewest, most,
+                 *std::max_element(alike.begin(), alike.end()) /
+                     *std::min_element(alike.begin(), alike.end()));
       std::fflush(stdout);
     }
   }

@@ -260,6 +260,32 @@ TEST_CASE("a tissue of a stated modulus has it, and no other Poisson ratio than 
   CHECK_THROWS_WITH(parse_tissue(shell, "scene", {}), Contains("no inside"));
 }
 
+TEST_CASE("the inside of a block of cells has the moduli of its lattice in closed form") {
+  // Sums over the first and second neighbours of a lattice whose bonds are alike.
+  struct Case {
+    const char* lattice;
+    int cells;
+    double poisson, anisotropy;
+  };
+  for (const Case& c : {Case{"cubic", 8, 1.0 / 4.0, 1.0}, Case{"bcc", 8, 1.0 / 5.0, 2.0 / 3.0},
+                        Case{"fcc", 6, 1.0 / 7.0, 2.0 / 5.0}}) {
+    CAPTURE(c.lattice);
+    Json json = block_scene();
+    json["organ"] = {{"kind", "block"},
+                     {"cells", {c.cells, c.cells, c.cells}},
+                     {"spacing", "10 mm"},
+                     {"lattice", c.lattice}};
+    json["material"] = {{"E", "3 kPa"}};
+    json["bonds"] = {{"rule", "per_bond"}};
+    const NetworkInspection found = inspect(parse_tissue(json, "scene", {}));
+    REQUIRE(found.equilibrium);
+    CHECK_THAT(found.equilibrium->mean_young_Pa(), WithinRel(3000.0, 1e-9));
+    REQUIRE(found.instantaneous);
+    CHECK_THAT(found.instantaneous->poisson, WithinRel(c.poisson, 1e-6));
+    CHECK_THAT(found.instantaneous->anisotropy, WithinRel(c.anisotropy, 1e-6));
+  }
+}
+
 TEST_CASE("a scene that states neither E nor a spacing law is told which law it has") {
   const auto told = [](const Json& json) {
     for (const std::string& words : parse_tissue(json, "scene", {}).network.organ.assumptions) {

@@ -112,6 +112,19 @@ TEST_CASE("an outer sphere that the inside does not hold is refused by number an
         Approx(outer_support(network).front()));
 }
 
+TEST_CASE("points that are pushed into one corner of a thin plate part again") {
+  const MeshSurface plate(box({0.06, 0.06, 0.004}));
+  for (int i = 0; i < 24; ++i) {
+    ShellRequest request;
+    request.layers = 1;
+    request.spacing = 2.8e-3 + 5e-5 * i;
+    CAPTURE(*request.spacing);
+    Organ organ;
+    REQUIRE_NOTHROW(organ = fill_shell(plate, request));
+    CHECK(least_distance(organ) > 0.3);
+  }
+}
+
 TEST_CASE("a body with no room for three layers is no solid") {
   SolidRequest request;
   request.spacing = 0.005;

@@ -14,10 +14,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-SCENE = {
-    "organ": {"kind": "block", "cells": [2, 2, 2], "spacing": "10 mm", "lattice": "fcc"},
-    "anchors": [{"kind": "half_space", "point": ["0 mm", "0 mm", "1 mm"], "normal": [0, 0, -1]}],
-}
+ANCHORS = [{"kind": "half_space", "point": ["0 mm", "0 mm", "1 mm"], "normal": [0, 0, -1]}]
+
+
+def block(cells):
+    organ = {"kind": "block", "cells": [cells, cells, cells], "spacing": "10 mm", "lattice": "fcc"}
+    return {"organ": organ, "anchors": ANCHORS}
 
 
 def library():
@@ -35,10 +37,14 @@ def main():
     if mujoco is None:
         print("no libmujoco")
         sys.exit(77)
-    tpm = sys.argv[1]
+    for cells in (2, 5):  # few spheres, and so many that memory counts
+        check(mujoco, sys.argv[1], block(cells))
+
+
+def check(mujoco, tpm, scene):
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "s.json").write_text(json.dumps(SCENE))
+        (folder / "s.json").write_text(json.dumps(scene))
         subprocess.run([tpm, "export", folder / "s.json", "--to", "mjcf", "-o", folder / "s.xml"], check=True,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         text = (folder / "s.xml").read_text()

@@ -22,21 +22,52 @@ struct InnerBlock {
   std::size_t count = 0;  ///< of free ones
 };
 
+/// Layers lie flat one on another, as in a block of cells: the first covers the top alone.
+bool is_stack(const Organ& organ) {
+  return (organ.normal.colwise() - organ.normal.col(0)).isZero(0.0);
+}
+
+/// The deepest sphere; of a stack that nearest to the middle.
+Index middle_of(const Organ& organ) {
+  Index middle = std::max_element(organ.layer.begin(), organ.layer.end()) - organ.layer.begin();
+  if (!is_stack(organ)) return middle;
+  const Eigen::Vector3d centre =
+      0.5 * (organ.position.rowwise().minCoeff() + organ.position.rowwise().maxCoeff());
+  (organ.position.colwise() - centre).colwise().squaredNorm().minCoeff(&middle);
+  return middle;
+}
+
+/// Spheres at the surface: of a stack those with fewer bonds than the others.
+std::vector<bool> at_surface(const Network& network) {
+  const Organ& organ = network.organ;
+  std::vector<bool> surface(organ.size());
+  for (std::size_t i = 0; i < organ.size(); ++i) surface[i] = organ.layer[i] == 0;
+  if (!is_stack(organ)) return surface;
+  std::vector<int> bonds(organ.size(), 0);
+  for (const Bond& bond : network.bonds) {
+    ++bonds[bond.a];
+    ++bonds[bond.b];
+  }
+  const int most = *std::max_element(bonds.begin(), bonds.end());
+  for (std::size_t i = 0; i < organ.size(); ++i) surface[i] = bonds[i] < most;
+  return surface;
+}
+
 InnerBlock inner_block(const Network& network) {
   const Organ& organ = network.organ;
-  const auto deepest = std::max_element(organ.layer.begin(), organ.layer.end());
   InnerBlock block;
-  block.centre = organ.position.col(deepest - organ.layer.begin());
+  block.centre = organ.position.col(middle_of(organ));
   block.free.resize(organ.size());
+  const std::vector<bool> surface = at_surface(network);
   const double reach = (kHalfBox - 1.01 * network.options.support) * organ.spacing;
   for (std::size_t i = 0; i < organ.size(); ++i) {
     const Eigen::Vector3d from = organ.position.col(static_cast<Index>(i)) - block.centre;
-    block.free[i] = organ.layer[i] >= 2 && from.cwiseAbs().maxCoeff() <= reach;
+    block.free[i] = organ.layer[i] >= 2 && !surface[i] && from.cwiseAbs().maxCoeff() <= reach;
   }
-  // Bonds to the outer layers are not the inside's.
+  // Bonds to the surface are not the inside's.
   for (const Bond& bond : network.bonds) {
-    if (organ.layer[bond.a] == 0) block.free[bond.b] = false;
-    if (organ.layer[bond.b] == 0) block.free[bond.a] = false;
+    if (surface[bond.a]) block.free[bond.b] = false;
+    if (surface[bond.b]) block.free[bond.a] = false;
   }
   block.count = static_cast<std::size_t>(std::count(block.free.begin(), block.free.end(), true));
   return block;

@@ -19,6 +19,7 @@ namespace {
 constexpr double kReach = 1.05;
 constexpr double kRounding = 1e-6;  // of a spacing, of a point on the surface
 constexpr std::size_t kMost = 1'000'000;
+const Eigen::Vector3d kAnyDirection{0.6, 0.48, 0.64};
 const double kCell = std::sqrt(3.0) / 2.0;  // area of a point of a triangular lattice of spacing 1
 
 /// Sweeps of the relaxation: the spread gains little after 30, and small organs can afford more.
@@ -37,9 +38,11 @@ void repel(const Surface& surface, double spacing, double step, NearPairs& near,
     const auto b = static_cast<Eigen::Index>(pair.second);
     const Eigen::Vector3d apart = points.col(b) - points.col(a);
     const double distance = apart.norm();
-    if (!(distance > 0.0) || distance >= reach) continue;
+    if (distance >= reach) continue;
     const double lacking = 1.0 - distance / reach;
-    const Eigen::Vector3d share = (step * spacing * lacking / distance) * apart;
+    // Two that were pushed into one corner have no direction of their own.
+    const Eigen::Vector3d share = distance > 0.0 ? (step * spacing * lacking / distance) * apart
+                                                 : step * spacing * kAnyDirection;
     push.col(a) -= share;
     push.col(b) += share;
   }

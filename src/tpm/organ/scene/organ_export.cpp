@@ -149,14 +149,18 @@ std::string mjcf_bodies(const Tissue& tissue, double mass_kg) {
   return text;
 }
 
+/// Numbers on MuJoCo's stack. A network of tendons needs many times what it would guess: a dense
+/// row of the Jacobian for each, more than four times (measured with 2.2.2).
+double mjcf_stack_numbers(const Tissue& tissue, std::size_t bonds) {
+  constexpr double kRows = 5.0, kLeastNumbers = 8.0 * 1024.0 * 1024.0;
+  return kLeastNumbers + kRows * static_cast<double>(bonds) * 3.0 *
+                             static_cast<double>(tissue.network.organ.size());
+}
+
 std::string mjcf_document(const Tissue& tissue, const OrganExportOptions& options, double mass_kg) {
   const std::vector<ExportedBond> bonds = exported_bonds(tissue, options.instantaneous);
-  // Of the memory that MuJoCo would guess, a network of tendons needs many times as much: a row of
-  // the Jacobian for each, thrice. `nstack` counts numbers and is read by every MuJoCo that there
-  // has been; `memory` is unknown before 2.3.
-  constexpr double kRows = 3.0, kLeastNumbers = 8.0 * 1024.0 * 1024.0;
-  const double rows = kRows * static_cast<double>(bonds.size()) * 3.0 *
-                      static_cast<double>(tissue.network.organ.size());
+  // `nstack` counts numbers and is read by every MuJoCo that there has been; `memory` is unknown
+  // before 2.3.
   std::string text = "<?xml version=\"1.0\"?>\n" + opening_comments(tissue, options);
   text += fmt::format(
       "<mujoco model=\"{}\">\n"
@@ -164,7 +168,7 @@ std::string mjcf_document(const Tissue& tissue, const OrganExportOptions& option
       "  <option timestep=\"0.001\" gravity=\"0 0 0\" integrator=\"implicit\"/>\n"
       "  <worldbody>\n{}  </worldbody>\n  <tendon>\n",
       xml_attribute(tissue.title.empty() ? tissue.network.organ.name : tissue.title),
-      static_cast<long>(kLeastNumbers + rows), mjcf_bodies(tissue, mass_kg));
+      static_cast<long>(mjcf_stack_numbers(tissue, bonds.size())), mjcf_bodies(tissue, mass_kg));
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const ExportedBond& bond = bonds[i];
     // Between the two lengths of a spring nothing pulls: that is a rope.
@@ -228,6 +232,14 @@ std::vector<std::string> organ_export_warnings(const Tissue& tissue,
     warnings.emplace_back("stiffening with elongation: bonds keep their stiffness at rest");
   }
   const auto bonds = exported_bonds(tissue, options.instantaneous);
+  constexpr double kMuch_GB = 2.0;
+  const double stack_GB = 1e-9 * sizeof(double) * mjcf_stack_numbers(tissue, bonds.size());
+  if (options.target == OrganTarget::mjcf && stack_GB > kMuch_GB) {
+    warnings.push_back(
+        fmt::format("tendons that know their two ends alone: MuJoCo takes about {} GB for the {} "
+                    "dense rows of this organ, and time with them",
+                    significant(stack_GB, 2), bonds.size()));
+  }
   const auto ropes =
       std::count_if(bonds.begin(), bonds.end(), [](const ExportedBond& bond) { return bond.rope; });
   if (ropes > 0 && options.target == OrganTarget::sofa) {
