@@ -69,6 +69,14 @@ std::string identified_text(const IdentifyRun& run) {
     text += fmt::format("encoder     step {} um, noise {} um\n",
                         significant(1e6 * *f.encoder_step_m, 3), significant(1e6 * f.noise_m, 2));
   }
+  if (f.stalls > 0) {
+    text +=
+        fmt::format("left out    {} {} in which loop or device stalled, {} s in all{}\n", f.stalls,
+                    f.stalls == 1 ? "stretch" : "stretches", significant(f.stalled_s, 2),
+                    run.begun_again == 0 ? std::string()
+                                         : fmt::format("; begun again {} {}", run.begun_again,
+                                                       run.begun_again == 1 ? "time" : "times"));
+  }
   for (const std::string& line : f.not_identified) {
     text += fmt::format("not identified: {}\n", line);
   }

@@ -146,6 +146,51 @@ TEST_CASE("A handle that hardly moves is not identified") {
   REQUIRE_FALSE(found.not_identified.empty());
 }
 
+TEST_CASE("Loops that wake late and miss periods identify the same device, and say what stalled") {
+  Handle h;
+  h.force_late_s = 3e-3;
+  h.coulomb_N = 0.02;
+  Handle stalling = h;
+  stalling.late_share = 0.3;     // of the cycles wake late by up to a period
+  stalling.stall_every_s = 0.1;  // 2 to 7 periods are missed at a time
+  stalling.longest_stall_s = 7e-3;
+  // A machine that other programs use: nearly no 130 periods follow each other on time.
+  const DeviceIdentification found = identify_device(moved(stalling), h.period_s);
+  CAPTURE(found.not_identified.empty() ? "" : found.not_identified.front());
+  REQUIRE(found.delay_mean_s);
+  CHECK(found.stalls == 0);
+  CHECK_THAT(*found.delay_mean_s, WithinAbs(3e-3, 0.5 * h.period_s));
+  CHECK_THAT(*found.delay_largest_s, WithinAbs(3e-3, h.period_s));
+  CHECK_THAT(*found.mass_kg, WithinRel(h.mass_kg, 0.1));
+  CHECK(*found.viscous_lower_95_N_s_per_m < h.viscous_N_s_per_m);
+  CHECK(*found.viscous_lower_95_N_s_per_m > 0.7 * h.viscous_N_s_per_m);
+  REQUIRE(checked_delay_s(moved(stalling), h.period_s));
+  // Longer stalls are left out.
+  stalling.stall_every_s = 0.4;
+  stalling.longest_stall_s = 0.05;
+  const DeviceIdentification rest = identify_device(moved(stalling), h.period_s);
+  REQUIRE(rest.delay_mean_s);
+  CHECK(rest.stalls > 20);
+  CHECK(rest.stalled_s > 0.5);
+  CHECK_THAT(*rest.delay_mean_s, WithinAbs(3e-3, 0.5 * h.period_s));
+  CHECK_THAT(*rest.mass_kg, WithinRel(h.mass_kg, 0.1));
+  // So many that nothing is left say so.
+  stalling.stall_every_s = 0.03;
+  const DeviceIdentification nothing = identify_device(moved(stalling), h.period_s);
+  CHECK_FALSE(nothing.delay_mean_s);
+  REQUIRE_FALSE(nothing.not_identified.empty());
+  CHECK_THAT(nothing.not_identified.back(), Catch::Matchers::Contains("stalled too often"));
+}
+
+TEST_CASE("Positions that are not counted in steps have no encoder step") {
+  Handle h;
+  h.encoder_step_m = 1e-12;
+  const DeviceIdentification found = identify_device(moved(h), h.period_s);
+  CHECK_FALSE(found.encoder_step_m);
+  REQUIRE(found.delay_mean_s);
+  CHECK_THAT(*found.mass_kg, WithinRel(h.mass_kg, 0.1));
+}
+
 TEST_CASE("The simulated device is identified, and its file is one that a session takes") {
   HilSession like = test::parsed(test::short_session());
   like.plant.delay_periods = 4;

@@ -27,14 +27,16 @@ struct InverseHazardRow {
   double largest_N = 0.0;  ///< that reached the service, or was rendered
   double most_N = 0.0;     ///< for that
   int tries = 0;           ///< until a row was within: other programs can stall the machine
-  [[nodiscard]] bool within() const {
-    return ended.find(expected) != ended.npos && after_s <= bound_s && largest_N <= most_N + 1e-9;
+  /// Holds on a machine that stalls, too.
+  [[nodiscard]] bool as_expected() const {
+    return ended.find(expected) != ended.npos && largest_N <= most_N + 1e-9;
   }
+  [[nodiscard]] bool within() const { return as_expected() && after_s <= bound_s; }
 };
 
 namespace inverse_hazards {
 
-constexpr double kAsked_N = 1.0, kLimit_N = 3.0, kWatchdog_s = 0.016;
+constexpr double kAsked_N = 1.0, kLimit_N = 3.0;
 constexpr int kMostTries = 10;
 
 inline double since_s(std::int64_t from_ns) {
@@ -62,7 +64,7 @@ inline InverseHazardRow refused(const char* hazard, const char* expected,
 
 /// A service that goes wrong in a loop of 1 kHz which asks for 1 N.
 inline InverseHazardRow ended(const char* hazard, const char* expected, double bound_s,
-                              const StandInFaults& faults,
+                              double watchdog_s, const StandInFaults& faults,
                               const std::function<void(StandInInverse&)>& act, bool loop_hangs) {
   InverseHazardRow row{hazard, expected, "", 0.0, bound_s, 0.0, kLimit_N, 0};
   do {
@@ -73,14 +75,16 @@ inline InverseHazardRow ended(const char* hazard, const char* expected, double b
     (void)device.open();
     DevicePreparation preparation;
     preparation.real_time = true;
-    preparation.watchdog_s = kWatchdog_s;
+    preparation.watchdog_s = watchdog_s;
     preparation.max_force_N = kLimit_N;
     device.prepare(preparation);
     device.enable_forces();
     std::int64_t fault_ns = 0;
     row.ended = "goes on";
     constexpr int kBegins = 200, kLasts = 2000;
-    for (int i = 0; i < kLasts; ++i) {
+    // A loop that hangs is there for longer than the watchdog waits.
+    const int lasts = kLasts + static_cast<int>(2e3 * watchdog_s);
+    for (int i = 0; i < lasts; ++i) {
       Eigen::Vector3d at_m;
       if (i == kBegins || (fault_ns == 0 && faults.from > 0 && service.forces() >= faults.from)) {
         if (fault_ns == 0) fault_ns = now_ns();
@@ -175,7 +179,9 @@ inline double to_zero_s(WebSocketClient& client) {
 
 /// Each hazard of the device, measured; a row that other programs have pushed out of its bounds is
 /// tried again, up to 10 times.
-inline std::vector<InverseHazardRow> inverse_hazard_rows() {
+/// @param watchdog_s of the loop; with a long one a machine that stalls ends nothing
+/// @param scheduling_s that the threads may come late, in the bounds
+inline std::vector<InverseHazardRow> inverse_hazard_rows(double watchdog_s, double scheduling_s) {
   using namespace inverse_hazards;
   using How = StandInFaults::How;
   std::vector<InverseHazardRow> rows;
@@ -204,30 +210,29 @@ inline std::vector<InverseHazardRow> inverse_hazard_rows() {
     faults.how = how;
     return faults;
   };
-  constexpr double kScheduling_s = 0.010;
   // A state is at most a period old when the fault comes.
-  constexpr double kSilent_s = kWatchdog_s + kScheduling_s;
-  rows.push_back(
-      ended("the service falls silent", "unplugged", kSilent_s, failing(How::silence), {}, false));
-  rows.push_back(
-      ended("the service closes", "unplugged", kSilent_s, failing(How::close), {}, false));
-  rows.push_back(
-      ended("the service sends garbage", "no state", kSilent_s, failing(How::garbage), {}, false));
-  rows.push_back(ended("the service answers for another device", "no state", kSilent_s,
+  const double silent_s = watchdog_s + scheduling_s;
+  rows.push_back(ended("the service falls silent", "unplugged", silent_s, watchdog_s,
+                       failing(How::silence), {}, false));
+  rows.push_back(ended("the service closes", "unplugged", silent_s, watchdog_s, failing(How::close),
+                       {}, false));
+  rows.push_back(ended("the service sends garbage", "no state", silent_s, watchdog_s,
+                       failing(How::garbage), {}, false));
+  rows.push_back(ended("the service answers for another device", "no state", silent_s, watchdog_s,
                        failing(How::other_device), {}, false));
   const auto telling = [](const InverseEvent& event) {
     return [event](StandInInverse& service) { service.tell(event); };
   };
-  rows.push_back(ended("event: busy", "device-busy", kScheduling_s, {},
+  rows.push_back(ended("event: busy", "device-busy", scheduling_s, watchdog_s, {},
                        telling({"device-busy", "warning", "049D", "", "taken"}), false));
-  rows.push_back(ended("event: unplugged", "device-disconnected", kScheduling_s, {},
+  rows.push_back(ended("event: unplugged", "device-disconnected", scheduling_s, watchdog_s, {},
                        telling({"device-disconnected", "warning", "049D", "", "lost"}), false));
   rows.push_back(ended(
-      "event: the device brakes", "ebrake_triggered", kScheduling_s, {},
+      "event: the device brakes", "ebrake_triggered", scheduling_s, watchdog_s, {},
       telling({"device-safety-triggered", "error", "049D", "ebrake_triggered", "brake"}), false));
-  rows.push_back(
-      ended("the loop hangs", "no command in the watchdog's time", kSilent_s, {}, {}, true));
-  rows.push_back(served("client: falls silent", "zero", kDriverSilence_s + kScheduling_s, kLimit_N,
+  rows.push_back(ended("the loop hangs", "no command in the watchdog's time", silent_s, watchdog_s,
+                       {}, {}, true));
+  rows.push_back(served("client: falls silent", "zero", kDriverSilence_s + scheduling_s, kLimit_N,
                         [](WebSocketClient& client, int /*port*/, double& after_s) {
                           push_until(client, 2.0, 2.0);
                           after_s = to_zero_s(client);
@@ -240,7 +245,7 @@ inline std::vector<InverseHazardRow> inverse_hazard_rows() {
                           after_s = 0.0;
                           return std::string(size_N > 0.0 ? "limited" : "no force");
                         }));
-  rows.push_back(served("client: sends garbage while it pushes", "zero", kScheduling_s, kLimit_N,
+  rows.push_back(served("client: sends garbage while it pushes", "zero", scheduling_s, kLimit_N,
                         [](WebSocketClient& client, int /*port*/, double& after_s) {
                           push_until(client, 2.0, 2.0);
                           (void)answered_N(client, R"({"inverse3": [)");

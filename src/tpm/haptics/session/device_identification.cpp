@@ -41,24 +41,85 @@ double bump_area(double s) {
 }
 
 struct Windows {
-  std::vector<std::size_t> centre;  ///< samples
+  std::size_t tried = 0;
+  std::vector<std::size_t> centre;  ///< periods
   Eigen::MatrixXd motion;           ///< a row each, kUnknowns columns
   double half_s = 0.0;
 };
 
-/// Motion in the middle of a window of 2 half + 1 samples, as m, b, c, k and f multiply it.
-Eigen::RowVectorXd motion_around(const std::vector<IdentificationSample>& samples,
-                                 std::size_t centre, std::size_t half, double period_s,
+/// What was measured, on the grid of periods.
+struct Timeline {
+  double period_s = 0.0;
+  std::vector<double> at_m;             ///< a period each
+  std::vector<std::size_t> gap;         ///< periods of the grid before each that are not known
+  std::vector<double> sent_s, force_N;  ///< commands, in their order
+  int stalls = 0;
+  double stalled_s = 0.0;
+
+  [[nodiscard]] std::size_t size() const { return at_m.size(); }
+  /// Whether all of `from` to `to` is known.
+  [[nodiscard]] bool covers(std::size_t from, std::size_t to) const {
+    return gap[to + 1] == gap[from];
+  }
+};
+
+/// Positions between readings that are close to each other, and when each command was sent.
+Timeline timeline_of(const std::vector<IdentificationSample>& samples, double period_s) {
+  Timeline line;
+  line.period_s = period_s;
+  std::vector<double> read_s, read_m;
+  double period = -1.0;
+  for (const IdentificationSample& sample : samples) {
+    period += 1.0 + sample.missed;
+    // A reading is never earlier than the one before, whatever the clock says.
+    const double now_s =
+        std::max(period * period_s + sample.late_s, line.sent_s.empty() ? 0.0 : line.sent_s.back());
+    line.sent_s.push_back(now_s);
+    line.force_N.push_back(sample.force_N);
+    if (sample.stale) continue;
+    if (!read_s.empty() && now_s <= read_s.back()) continue;
+    read_s.push_back(now_s);
+    read_m.push_back(sample.at_m);
+  }
+  line.gap.push_back(0);
+  if (read_s.empty()) return line;
+  const auto periods = static_cast<std::size_t>(period) + 1;
+  const double longest_s = kLongestBridge_s + 0.5 * period_s;
+  std::size_t next = 0;
+  bool stalled = false;
+  for (std::size_t i = 0; i < periods; ++i) {
+    const double time_s = static_cast<double>(i) * period_s;
+    while (next < read_s.size() && read_s[next] < time_s - 1e-9) ++next;
+    const bool exact = next < read_s.size() && read_s[next] <= time_s + 1e-9;
+    const bool between = next > 0 && next < read_s.size();
+    const bool known = exact || (between && read_s[next] - read_s[next - 1] <= longest_s);
+    double at_m = next < read_s.size() ? read_m[next] : read_m.back();
+    if (!exact && between) {
+      const double part = (time_s - read_s[next - 1]) / (read_s[next] - read_s[next - 1]);
+      at_m = read_m[next - 1] + part * (read_m[next] - read_m[next - 1]);
+    }
+    line.at_m.push_back(at_m);
+    line.gap.push_back(line.gap.back() + (known ? 0 : 1));
+    const bool counts = !known && between;  // not the first and the last period
+    if (counts && !stalled) ++line.stalls;
+    if (counts) line.stalled_s += period_s;
+    stalled = counts;
+  }
+  return line;
+}
+
+constexpr std::size_t kSlope = 8;  // periods over which the sign of a motion is taken
+
+/// Motion in the middle of a window of 2 half + 1 periods, as m, b, c, k and f multiply it.
+Eigen::RowVectorXd motion_around(const Timeline& line, std::size_t centre, std::size_t half,
                                  double least_m) {
   Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(kUnknowns);
-  const double half_s = static_cast<double>(half) * period_s;
-  constexpr std::size_t kSlope = 8;
+  const double period_s = line.period_s, half_s = static_cast<double>(half) * period_s;
   for (std::size_t i = centre - half; i <= centre + half; ++i) {
     const double s =
         (static_cast<double>(i) - static_cast<double>(centre)) / static_cast<double>(half);
-    const double x = samples[i].at_m;
-    const double moved =
-        samples[std::min(i + kSlope, samples.size() - 1)].at_m - samples[i - kSlope].at_m;
+    const double x = line.at_m[i];
+    const double moved = line.at_m[std::min(i + kSlope, line.size() - 1)] - line.at_m[i - kSlope];
     const double sign = std::abs(moved) < least_m ? 0.0 : std::copysign(1.0, moved);
     const double w = bump(s) * period_s;
     row[0] += bump_curvature(s) / (half_s * half_s) * period_s * x;
@@ -70,34 +131,30 @@ Eigen::RowVectorXd motion_around(const std::vector<IdentificationSample>& sample
   return row;
 }
 
-/// The force over the window if it comes `delay_s` late; commands are held for a period.
-double force_around(const std::vector<IdentificationSample>& samples, std::size_t centre,
-                    std::size_t half, double period_s, double delay_s) {
-  const double half_s = static_cast<double>(half) * period_s;
-  const double middle_s = static_cast<double>(centre) * period_s;
-  const double first = (middle_s - half_s - delay_s) / period_s - 1.0;
-  const double last = (middle_s + half_s - delay_s) / period_s + 1.0;
-  const auto from = static_cast<std::size_t>(std::max(0.0, std::floor(first)));
-  const std::size_t to =
-      std::min(samples.size() - 1, static_cast<std::size_t>(std::max(0.0, std::ceil(last))));
+/// The force over the window if it comes `delay_s` late; a command is held until the next one.
+double force_around(const Timeline& line, std::size_t centre, std::size_t half, double delay_s) {
+  const double half_s = static_cast<double>(half) * line.period_s;
+  const double middle_s = static_cast<double>(centre) * line.period_s;
+  const auto& sent = line.sent_s;
+  const auto after = std::upper_bound(sent.begin(), sent.end(), middle_s - half_s - delay_s);
+  auto i = static_cast<std::size_t>(after - sent.begin());
+  if (i > 0) --i;
   double sum = 0.0;
-  for (std::size_t i = from; i <= to; ++i) {
-    const double begin = (static_cast<double>(i) * period_s + delay_s - middle_s) / half_s;
-    sum += samples[i].force_N * (bump_area(begin + period_s / half_s) - bump_area(begin)) * half_s;
+  for (; i < sent.size(); ++i) {
+    const double from = (sent[i] + delay_s - middle_s) / half_s;
+    if (from > 1.0) break;
+    const double until_s = i + 1 < sent.size() ? sent[i + 1] : sent[i] + line.period_s;
+    const double to = (until_s + delay_s - middle_s) / half_s;
+    sum += line.force_N[i] * (bump_area(to) - bump_area(from)) * half_s;
   }
   return sum;
 }
 
-bool is_covered(const std::vector<IdentificationSample>& samples, std::size_t from,
-                std::size_t to) {
-  return std::all_of(samples.begin() + static_cast<std::ptrdiff_t>(from),
-                     samples.begin() + static_cast<std::ptrdiff_t>(to) + 1,
-                     [](const IdentificationSample& s) { return s.missed == 0; });
-}
-
-/// The encoder's step: what nearly all changes of the position are whole multiples of.
+/// The encoder's step: what nearly all small changes of the position are whole multiples of. Large
+/// ones are near a multiple of anything.
 std::optional<double> step_of(const std::vector<IdentificationSample>& samples) {
-  constexpr double kLeast_m = 1e-9, kOff = 0.02, kNearlyAll = 0.99;
+  constexpr double kLeast_m = 1e-9, kOff = 0.02, kNearlyAll = 0.99, kMostSteps = 10.0;
+  constexpr std::size_t kFewest = 50;
   double least = std::numeric_limits<double>::infinity();
   std::size_t changes = 0, fitting = 0;
   for (std::size_t i = 1; i < samples.size(); ++i) {
@@ -107,23 +164,26 @@ std::optional<double> step_of(const std::vector<IdentificationSample>& samples) 
   if (!std::isfinite(least)) return std::nullopt;
   for (std::size_t i = 1; i < samples.size(); ++i) {
     const double steps = std::abs(samples[i].at_m - samples[i - 1].at_m) / least;
-    if (steps < 0.5) continue;
+    if (steps < 0.5 || steps > kMostSteps) continue;
     ++changes;
     fitting += std::abs(steps - std::round(steps)) < kOff * std::max(1.0, steps) ? 1 : 0;
   }
-  const bool one_step = static_cast<double>(fitting) >= kNearlyAll * static_cast<double>(changes);
+  const bool one_step = changes >= kFewest &&
+                        static_cast<double>(fitting) >= kNearlyAll * static_cast<double>(changes);
   return one_step ? std::optional(least) : std::nullopt;
 }
 
 /// From third differences, in which a smooth motion is lost: the variance of noise is theirs / 20.
-double noise_of(const std::vector<IdentificationSample>& samples) {
-  double sum = 0.0;
-  for (std::size_t i = 3; i < samples.size(); ++i) {
-    const double d = samples[i].at_m - 3.0 * samples[i - 1].at_m + 3.0 * samples[i - 2].at_m -
-                     samples[i - 3].at_m;
+double noise_of(const Timeline& line) {
+  double sum = 0.0, count = 0.0;
+  for (std::size_t i = 3; i < line.size(); ++i) {
+    if (!line.covers(i - 3, i)) continue;
+    const double d =
+        line.at_m[i] - 3.0 * line.at_m[i - 1] + 3.0 * line.at_m[i - 2] - line.at_m[i - 3];
     sum += d * d;
+    count += 1.0;
   }
-  return std::sqrt(sum / (20.0 * static_cast<double>(samples.size() - 3)));
+  return std::sqrt(sum / (20.0 * std::max(1.0, count)));
 }
 
 struct Solution {
@@ -155,12 +215,11 @@ Solution solve(const Windows& windows, const Eigen::VectorXd& force) {
   return s;
 }
 
-Eigen::VectorXd forces(const std::vector<IdentificationSample>& samples, const Windows& windows,
-                       std::size_t half, double period_s, double delay_s) {
+Eigen::VectorXd forces(const Timeline& line, const Windows& windows, std::size_t half,
+                       double delay_s) {
   Eigen::VectorXd sums(static_cast<Eigen::Index>(windows.centre.size()));
   for (Eigen::Index i = 0; i < sums.size(); ++i) {
-    sums[i] =
-        force_around(samples, windows.centre[static_cast<std::size_t>(i)], half, period_s, delay_s);
+    sums[i] = force_around(line, windows.centre[static_cast<std::size_t>(i)], half, delay_s);
   }
   return sums;
 }
@@ -173,11 +232,11 @@ struct DelayFit {
 constexpr double kLeastExplained = 0.9;
 
 /// The delay with the smallest residual: coarse, then fine.
-DelayFit fit_delay(const std::vector<IdentificationSample>& samples, const Windows& windows,
-                   std::size_t half, double period_s) {
+DelayFit fit_delay(const Timeline& line, const Windows& windows, std::size_t half) {
   DelayFit fit;
+  const double period_s = line.period_s;
   const auto misfit = [&](double delay_s) {
-    return solve(windows, forces(samples, windows, half, period_s, delay_s)).rms;
+    return solve(windows, forces(line, windows, half, delay_s)).rms;
   };
   double best = std::numeric_limits<double>::infinity();
   const auto search = [&](double from_s, double to_s, double by_s) {
@@ -191,22 +250,23 @@ DelayFit fit_delay(const std::vector<IdentificationSample>& samples, const Windo
   search(0.0, kLongestDelay_s, period_s);
   const double coarse_s = fit.delay_s;
   search(std::max(0.0, coarse_s - period_s), coarse_s + period_s, 0.05 * period_s);
-  const Eigen::VectorXd force = forces(samples, windows, half, period_s, fit.delay_s);
+  const Eigen::VectorXd force = forces(line, windows, half, fit.delay_s);
   fit.solution = solve(windows, force);
   fit.explained = 1.0 - fit.solution.rms * fit.solution.rms * static_cast<double>(force.size()) /
                             std::max(force.squaredNorm(), 1e-300);
   return fit;
 }
 
-/// Windows of 2 half + 1 samples, `apart` samples from each other, without missed periods.
-Windows windows_of(const std::vector<IdentificationSample>& samples, std::size_t half,
-                   std::size_t margin, std::size_t apart, double period_s, double least_m) {
+/// Windows of 2 half + 1 periods, `apart` periods from each other, in which nothing stalled.
+Windows windows_of(const Timeline& line, std::size_t half, std::size_t margin, std::size_t apart,
+                   double least_m) {
   Windows windows;
   std::vector<Eigen::RowVectorXd> rows;
-  for (std::size_t c = margin; c + margin < samples.size(); c += apart) {
-    if (!is_covered(samples, c - margin, c + half)) continue;
+  for (std::size_t c = margin; c + margin < line.size(); c += apart) {
+    ++windows.tried;
+    if (!line.covers(c - half - kSlope, c + half + kSlope)) continue;
     windows.centre.push_back(c);
-    rows.push_back(motion_around(samples, c, half, period_s, least_m));
+    rows.push_back(motion_around(line, c, half, least_m));
   }
   windows.motion.resize(static_cast<Eigen::Index>(rows.size()), kUnknowns);
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -236,14 +296,15 @@ constexpr double kFewestSteps = 20.0;
 std::optional<double> checked_delay_s(const std::vector<IdentificationSample>& samples,
                                       double period_s) {
   const auto [half, margin] = lengths_of(period_s);
-  if (samples.size() < 2 * margin + half) return std::nullopt;
-  const double step_m = step_of(samples).value_or(noise_of(samples) * std::sqrt(12.0));
+  const Timeline line = timeline_of(samples, period_s);
+  if (line.size() < 2 * margin + half) return std::nullopt;
+  const double step_m = step_of(samples).value_or(noise_of(line) * std::sqrt(12.0));
   const double stroke_m = stroke_of(samples);
   if (!(stroke_m >= kFewestSteps * step_m) || stroke_m <= 0.0) return std::nullopt;
   const Windows windows =
-      windows_of(samples, half, margin, std::max<std::size_t>(1, half / 8), period_s, 2.0 * step_m);
+      windows_of(line, half, margin, std::max<std::size_t>(1, half / 8), 2.0 * step_m);
   if (windows.centre.size() < kFewestWindows) return std::nullopt;
-  const DelayFit fit = fit_delay(samples, windows, half, period_s);
+  const DelayFit fit = fit_delay(line, windows, half);
   if (!(fit.explained > kLeastExplained) || !(fit.solution.value[0] > 0.0)) return std::nullopt;
   return fit.delay_s;
 }
@@ -269,13 +330,16 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
   DeviceIdentification found;
   found.resolution_s = 0.5 * period_s;
   const auto [half, margin] = lengths_of(period_s);
-  if (samples.size() < 2 * margin + half) {
+  const Timeline line = timeline_of(samples, period_s);
+  if (line.size() < 2 * margin + half) {
     found.not_identified.emplace_back("everything: the measurement is too short");
     return found;
   }
   found.stroke_m = stroke_of(samples);
   found.encoder_step_m = step_of(samples);
-  found.noise_m = noise_of(samples);
+  found.stalls = line.stalls;
+  found.stalled_s = line.stalled_s;
+  found.noise_m = noise_of(line);
   const double step_m = found.encoder_step_m.value_or(found.noise_m * std::sqrt(12.0));
   if (!found.encoder_step_m) {
     found.not_identified.emplace_back("encoder step: changes of the position have no common step");
@@ -287,13 +351,16 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
     return found;
   }
   const double least_m = 2.0 * step_m;
-  const Windows windows = windows_of(samples, half, margin, half, period_s, least_m);
+  const Windows windows = windows_of(line, half, margin, half, least_m);
   if (windows.centre.size() < kFewestWindows) {
-    found.not_identified.emplace_back(
-        "delay, friction, mass: too many periods were missed (tpm hil check)");
+    found.not_identified.push_back(fmt::format(
+        "delay, friction, mass: the loop or the device stalled too often: {} of {} windows of {} "
+        "ms are whole, and {} are needed (tpm hil check)",
+        windows.centre.size(), windows.tried, significant(1e3 * kVelocityWindow_s, 3),
+        kFewestWindows));
     return found;
   }
-  const DelayFit fit = fit_delay(samples, windows, half, period_s);
+  const DelayFit fit = fit_delay(line, windows, half);
   const double delay_s = fit.delay_s, explained = fit.explained;
   const Solution& s = fit.solution;
   if (!(explained > kLeastExplained) || !(s.value[0] > 0.0)) {
@@ -305,21 +372,23 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
   }
   // Each edge has a delay of its own.
   std::vector<double> delays;
-  for (std::size_t i = margin; i + margin < samples.size(); ++i) {
-    const double jump = samples[i].force_N - samples[i - 1].force_N;
+  for (std::size_t i = 1; i < line.sent_s.size(); ++i) {
+    const double jump = line.force_N[i] - line.force_N[i - 1];
     if (std::abs(jump) < kEdge_N) continue;
-    const auto late = static_cast<std::size_t>(std::lround(delay_s / period_s));
-    const std::size_t c = i + late;
-    if (c + margin >= samples.size() || !is_covered(samples, i - half, c + half)) continue;
-    const double seen = motion_around(samples, c, half, period_s, least_m).dot(s.value);
-    const double meant = force_around(samples, c, half, period_s, delay_s);
+    const double acts_s = line.sent_s[i] + delay_s;
+    const auto c = static_cast<std::size_t>(std::lround(acts_s / period_s));
+    if (c < margin || c + margin >= line.size()) continue;
+    if (!line.covers(c - half - kSlope, c + half + kSlope)) continue;
+    const double seen = motion_around(line, c, half, least_m).dot(s.value);
+    const double meant = force_around(line, c, half, delay_s);
     const double off =
-        (static_cast<double>(i) * period_s + delay_s - static_cast<double>(c) * period_s) /
-        (static_cast<double>(half) * period_s);
+        (acts_s - static_cast<double>(c) * period_s) / (static_cast<double>(half) * period_s);
     delays.push_back(delay_s + (meant - seen) / (jump * bump(off)));
   }
   if (delays.size() < 10) {
-    found.not_identified.emplace_back("delay: too few edges of the force were served in time");
+    found.not_identified.emplace_back(
+        "delay: the loop or the device stalled at all but a few edges of the force (tpm hil "
+        "check)");
     return found;
   }
   double sum = 0.0, squares = 0.0;

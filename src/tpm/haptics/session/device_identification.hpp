@@ -13,6 +13,8 @@ struct IdentificationSample {
   double at_m = 0.0;     ///< along the direction of the forces, as the device reads it
   double force_N = 0.0;  ///< sent in this period, held until the next one
   int missed = 0;        ///< periods without a cycle before this one
+  double late_s = 0.0;   ///< after the beginning of the period in which it was read and sent
+  bool stale = false;    ///< the position is that of an earlier call
 };
 
 /// What was found of a device. Values that could not be identified are empty.
@@ -31,6 +33,10 @@ struct DeviceIdentification {
   std::optional<double> coulomb_low_N, coulomb_high_N;
   double held_N_per_m = 0.0;  ///< stiffness of whatever holds the handle
   double stroke_m = 0.0;
+  /// Stretches in which nobody read a position for more than kLongestBridge_s, and their length.
+  /// They are left out.
+  int stalls = 0;
+  double stalled_s = 0.0;
   std::vector<std::string> not_identified;  ///< what, and why, one line each
 };
 
@@ -45,6 +51,10 @@ struct DeviceIdentification {
 /// w is (1 - s^2)^4. Windows of 64 ms give one equation each; for every delay d they are solved by
 /// least squares, and the delay with the smallest residual is taken. Each edge of the force is then
 /// a measurement of its own delay. Coulomb friction is an unknown of its own and never a part of b.
+///
+/// Samples need not come on time: a command counts from when it was sent until the next one, and
+/// positions are taken linearly between readings that are at most kLongestBridge_s apart, in which
+/// forces of the identification bend the motion by 10 um at most. Longer stalls are left out.
 /// @param period_s of the samples
 [[nodiscard]] DeviceIdentification identify_device(const std::vector<IdentificationSample>& samples,
                                                    double period_s);
@@ -69,5 +79,6 @@ class IdentifyingForce {
   double sign_ = 1.0;
 };
 inline constexpr double kMostIdentifyingForce_N = 0.29;
+inline constexpr double kLongestBridge_s = 0.008;
 
 }  // namespace tpm::haptics

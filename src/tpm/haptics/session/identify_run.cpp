@@ -1,5 +1,6 @@
 #include "tpm/haptics/session/identify_run.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -14,6 +15,12 @@ namespace tpm::haptics {
 namespace {
 
 constexpr double kLongestStroke_m = 0.020;  ///< from the start, beyond which no force is sent
+/// A shorter rest of a measurement is not worth another beginning.
+constexpr double kLeastPart_s = 1.0;
+/// Between two parts of a measurement, of which nothing is known.
+constexpr double kBetweenParts_s = 0.5;
+/// A cycle may take so long: with these forces the watchdog of the device is enough.
+constexpr double kCycleTimeout_s = 0.5;
 
 /// Answers with the forces of the identification, whatever the motion.
 class IdentifyingModel final : public ContactModel {
@@ -56,7 +63,10 @@ ServoSettings identifying_settings(const HilSession& like, const DeviceLimits& l
   servo.most_damping_N_s_per_m = 0.0;
   servo.to_model = Eigen::Matrix3d::Identity();
   servo.surface_before_hand_m = 0.0;
-  // The forces are small and not a tissue's: there is nothing to watch but the device.
+  // The forces are small and not a tissue's: there is nothing to watch but the device. Stalls are
+  // left out of the measurement.
+  servo.most_late = std::numeric_limits<int>::max();
+  servo.most_missed = std::numeric_limits<int>::max();
   servo.energy_allowance_J = std::numeric_limits<double>::infinity();
   servo.watch_oscillation = false;
   StartGateSettings gate;
@@ -65,21 +75,21 @@ ServoSettings identifying_settings(const HilSession& like, const DeviceLimits& l
   return servo;
 }
 
-/// Moves the handle; fills the identity and the outcome of the run.
-std::vector<IdentificationSample> moved_samples(IdentifyRun& run,
-                                                const std::shared_ptr<HapticDevice>& device,
-                                                const DeviceChoice& choice, const HilSession& like,
-                                                const DeviceIdentifyOptions& options) {
+/// Moves the handle; fills the identity and the outcome of the run, and adds to the samples.
+void move_handle(IdentifyRun& run, std::vector<IdentificationSample>& samples,
+                 const std::shared_ptr<HapticDevice>& device, const DeviceChoice& choice,
+                 const HilSession& like, const DeviceIdentifyOptions& options) {
   const DeviceLimits limits = limits_of(choice);
   const ServoSettings servo = identifying_settings(like, limits, options.duration_s);
   const auto model = std::make_shared<IdentifyingModel>(servo.push, servo.period_s, options.seed);
-  std::vector<IdentificationSample> samples;
-  samples.reserve(servo.phase_ends.back() + 1);
+  samples.reserve(samples.size() + servo.phase_ends.back() + 1);
   const RecordSink sink = [&](const ServoRecord& row) {
     if (row.phase < 0 || row.stop != StopCause::none) return;
+    // The lateness of a row begins with the first period that it missed.
+    const double late_s = static_cast<double>(row.woke_late_s) - row.missed * servo.period_s;
     samples.push_back({servo.push.dot(Eigen::Map<const Eigen::Vector3d>(row.position_m)),
                        servo.push.dot(Eigen::Map<const Eigen::Vector3d>(row.commanded_N)),
-                       row.missed});
+                       row.missed, std::max(0.0, late_s), (row.flags & kTimeGuarded) != 0});
   };
   DevicePreparation preparation = like.preparation;
   preparation.period_s = servo.period_s;
@@ -94,7 +104,7 @@ std::vector<IdentificationSample> moved_samples(IdentifyRun& run,
     if (options.real_time) {
       RealTimeOptions real;
       real.wish = options.wish;
-      real.cycle_timeout_s = like.cycle_timeout_s;
+      real.cycle_timeout_s = std::max(like.cycle_timeout_s, kCycleTimeout_s);
       real.interrupted = options.interrupted;
       real.prepare = [&] { device->prepare(preparation); };
       run.outcome = run_in_real_time(device, model, servo, sink, real);
@@ -106,7 +116,27 @@ std::vector<IdentificationSample> moved_samples(IdentifyRun& run,
     device->stop();
     throw;
   }
-  return samples;
+}
+
+/// Whether a machine that stalls may have ended the loop, or a device that was left alone by it.
+bool is_stall(StopCause cause) {
+  return cause == StopCause::watchdog || cause == StopCause::communication ||
+         cause == StopCause::unplugged;
+}
+
+std::string end_of(const ServoOutcome& outcome) {
+  const std::string words = outcome.device.error_text;
+  return std::string(word_of(outcome.cause)) + (words.empty() ? "" : " (" + words + ")");
+}
+
+void identify(IdentifyRun& run, const std::vector<IdentificationSample>& samples) {
+  const StopCause cause = run.outcome.cause;
+  if (cause == StopCause::finished || is_stall(cause)) {
+    run.found = identify_device(samples, run.period_s);
+    if (cause == StopCause::finished || run.found.delay_mean_s) return;
+  }
+  run.found.not_identified.push_back("everything: the measurement ended early: " +
+                                     end_of(run.outcome));
 }
 
 }  // namespace
@@ -118,13 +148,9 @@ IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
   run.period_s = like.servo.period_s;
   run.duration_s = options.duration_s;
   run.real_time = options.real_time;
-  const auto samples = moved_samples(run, device, choice, like, options);
-  if (run.outcome.cause == StopCause::finished) {
-    run.found = identify_device(samples, run.period_s);
-  } else {
-    run.found.not_identified.push_back("everything: the measurement ended early: " +
-                                       std::string(word_of(run.outcome.cause)));
-  }
+  std::vector<IdentificationSample> samples;
+  move_handle(run, samples, device, choice, like, options);
+  identify(run, samples);
   return run;
 }
 
@@ -133,7 +159,8 @@ DelayCheck check_delay(const std::shared_ptr<HapticDevice>& device, const Device
   IdentifyRun run;
   DeviceIdentifyOptions second = options;
   second.duration_s = kDelayCheck_s;
-  const auto samples = moved_samples(run, device, choice, like, second);
+  std::vector<IdentificationSample> samples;
+  move_handle(run, samples, device, choice, like, second);
   DelayCheck check;
   check.cause = run.outcome.cause;
   if (check.cause == StopCause::finished) {
@@ -153,7 +180,34 @@ IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& lik
   session.plant.push = like.servo.push;
   session.phases = {
       {SessionPhaseKind::rest, "identification", options.duration_s, 0.0, 0.0, 0.0, 0.0}};
-  return run_identification_on(make_device(choice, session), choice, session, options);
+  IdentifyRun run;
+  run.period_s = like.servo.period_s;
+  run.duration_s = options.duration_s;
+  run.real_time = options.real_time;
+  std::vector<IdentificationSample> samples;
+  DeviceIdentifyOptions part = options;
+  for (;;) {
+    const ServoCounts before = run.outcome.counts;
+    const std::uint64_t cycles_before = run.outcome.cycles;
+    move_handle(run, samples, make_device(choice, session), choice, session, part);
+    const ServoOutcome& ended = run.outcome;
+    part.duration_s -= static_cast<double>(ended.cycles) * run.period_s;
+    run.outcome.counts.missed += before.missed;
+    run.outcome.counts.late += before.late;
+    run.outcome.cycles += cycles_before;
+    if (!options.real_time || !is_stall(ended.cause) || part.duration_s < kLeastPart_s ||
+        run.begun_again == kMostBegunAgain) {
+      break;
+    }
+    ++run.begun_again;
+    // Nobody knows when the force of before ended; it is zero when the next part begins.
+    const int between = static_cast<int>(kBetweenParts_s / run.period_s);
+    const double last_m = samples.empty() ? 0.0 : samples.back().at_m;
+    samples.push_back({last_m, 0.0, between / 2, 0.0, true});
+    samples.push_back({last_m, 0.0, between / 2, 0.0, true});
+  }
+  identify(run, samples);
+  return run;
 }
 
 Json device_file_json(const IdentifyRun& run, const std::string& date) {
@@ -198,6 +252,9 @@ Json device_file_json(const IdentifyRun& run, const std::string& date) {
                    {"rate_Hz", rounded(1.0 / run.period_s, kDigits)},
                    {"duration_s", rounded(run.duration_s, kDigits)},
                    {"missed_periods", run.outcome.counts.missed},
+                   {"stalls", f.stalls},
+                   {"stalled_s", rounded(f.stalled_s, kDigits)},
+                   {"begun_again", run.begun_again},
                    {"ended", word_of(run.outcome.cause)},
                    {"stroke_m", rounded(f.stroke_m, kDigits)}};
   if (!date.empty()) measurement["date"] = date;

@@ -16,19 +16,24 @@ struct DeviceIdentifyOptions {
 struct IdentifyRun {
   DeviceIdentity device;
   DeviceIdentification found;
-  ServoOutcome outcome;
+  ServoOutcome outcome;  ///< of the last part; missed periods and cycles of all
   double period_s = 0.0, duration_s = 0.0;
+  /// Ends by a stall, after each of which the measurement went on with a new connection.
+  int begun_again = 0;
   bool real_time = false;
 };
 
 /// Moves the handle of a device with forces below 0.3 N along the push of a session, and finds what
 /// device_identification.hpp lists. Nothing is taken from what the device or its simulation says of
 /// itself. The handle has to be free, or at most lightly held; forces begin when it is at rest.
+/// Stretches in which loop or device stalled are left out. In real time a stall that ends the loop,
+/// as a watchdog does, is one too: the device is opened again, up to kMostBegunAgain times.
 /// @param like rate, push and watchdog; of the simulated device also its numbers
 /// Throws Error(environment) as a session does; an early end is in the outcome.
 [[nodiscard]] IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& like,
                                              const DeviceIdentifyOptions& options);
-/// The same on a device that the caller has made.
+inline constexpr int kMostBegunAgain = 9;
+/// The same on a device that the caller has made, which is opened once.
 [[nodiscard]] IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
                                                 const DeviceChoice& choice, const HilSession& like,
                                                 const DeviceIdentifyOptions& options);
