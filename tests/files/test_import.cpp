@@ -272,6 +272,17 @@ TEST_CASE("machine files that do not hold a recording are refused") {
   CHECK_THAT(fault("a (s),b (N),c\n0,0,0\n"), Catch::Contains("no column is recognised"));
 }
 
+TEST_CASE("a time stamp with its date is a time") {
+  const TempFolder folder;
+  write_file(folder / "f.csv",
+             "Timestamp,Position (mm),Load (N)\n2026-03-04 23:59:59.500,0,0\n"
+             "2026-03-05 00:00:00.500,1,2\n2026-03-05 00:00:01.500,2,3\n");
+  const Recording r = read_recording_file(folder / "f.csv", {}).recording;
+  REQUIRE(r.time_s.size() == 3);
+  CHECK_THAT(r.time_s[1] - r.time_s[0], WithinRel(1.0, 1e-9));
+  CHECK_THAT(r.time_s[2] - r.time_s[1], WithinRel(1.0, 1e-9));
+}
+
 TEST_CASE("rows of a sample that was lost are left out, and it is said") {
   const TempFolder folder;
   write_file(folder / "f.csv",

@@ -89,6 +89,7 @@ constexpr Recognized kLossTangent{ColumnRole::loss_tangent, Quantity::abscissa, 
 constexpr auto kWords = std::to_array<TitleWord>({
     {"time", kTime},
     {"t", kTime},
+    {"timestamp", kTime},
     {"temps", kTime},
     {"zeit", kTime},
     {"prufzeit", kTime},

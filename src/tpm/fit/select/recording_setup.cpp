@@ -27,6 +27,21 @@ bool is_after_the_test(PhaseKind kind) {
   return kind == PhaseKind::unloading || kind == PhaseKind::detached || kind == PhaseKind::recovery;
 }
 
+/// A drive that overshoots falls back a little to where it is then held: that is no unloading.
+bool swings_back(const PreparedRecording& r, const Phase& phase) {
+  constexpr double kLittle = 0.1;  // of the travel
+  if (phase.kind != PhaseKind::unloading) return false;
+  const std::vector<double>& drive = r.recording.drive;
+  const double begin = r.phases.contact_found ? r.phases.contact_drive : drive.front();
+  const auto end = drive.begin() + static_cast<std::ptrdiff_t>(phase.last) + 1;
+  const double peak = *std::max_element(drive.begin(), end);
+  const bool held_later = std::ranges::any_of(r.phases.phases, [&](const Phase& later) {
+    return later.kind == PhaseKind::hold && later.first >= phase.last &&
+           peak - drive[later.first] <= kLittle * (peak - begin);
+  });
+  return held_later && peak - drive[phase.last] <= kLittle * (peak - begin);
+}
+
 /// Samples before contact that are kept where they are too few to measure the zero beforehand.
 constexpr std::size_t kBaseline = 10;
 constexpr std::size_t kFewestBeforeContact = 3;
@@ -262,7 +277,7 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
   bool pressed = false;
   for (const Phase& phase : r.phases.phases) {
     pressed = pressed || phase.kind == PhaseKind::loading || phase.kind == PhaseKind::hold;
-    if (!pressed || !is_after_the_test(phase.kind)) continue;
+    if (!pressed || !is_after_the_test(phase.kind) || swings_back(r, phase)) continue;
     r.to_s = time[phase.first];
     break;
   }
