@@ -1,4 +1,4 @@
-// Declared in tpm/fit/validate/comparison.hpp: unit, requirement and verdict of quantities.
+// Declared in tpm/fit/validate/comparison.hpp.
 #include <algorithm>
 #include <array>
 #include <cmath>

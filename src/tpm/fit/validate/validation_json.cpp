@@ -1,4 +1,4 @@
-// Declared in tpm/fit/validate/validation.hpp: the same as JSON and as a table.
+// Declared in tpm/fit/validate/validation.hpp.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Declared in tpm/fit/validate/validation.hpp: text for a terminal.
+// Declared in tpm/fit/validate/validation.hpp.
 #include <fmt/format.h>
 
 #include <algorithm>
