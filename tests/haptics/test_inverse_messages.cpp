@@ -165,5 +165,53 @@ TEST_CASE("A message that is none is refused with the place in it") {
   CHECK(parse_inventory(R"({"session_id": 1})").devices.empty());
 }
 
+TEST_CASE("What is not neutral is asked for over HTTP, each setting once and nothing else") {
+  const auto asked = [](const InverseSettings& settings,
+                        InverseFormat format = InverseFormat::vector) {
+    return neutral_requests(format, "049D", 7, settings, 1.0);
+  };
+  InverseSettings neutral;
+  neutral.gravity_named = neutral.gravity_compensation = true;
+  neutral.gravity_scaling = 1.0;
+  neutral.preset = kCentredPreset;
+  CHECK(asked(neutral).empty());
+
+  InverseSettings s = neutral;
+  s.damping = 0.2;
+  REQUIRE(asked(s).size() == 1);
+  CHECK(asked(s)[0].target == "/inverse3/049D/config/damping?session=%237");
+  CHECK(Json::parse(asked(s)[0].body) ==
+        Json::parse(R"({"scalar": 0, "vector": {"x": 0, "y": 0, "z": 0}})"));
+  s = neutral;
+  s.directional_damping.y() = 0.1;  // the scalar is 0
+  CHECK(asked(s).size() == 1);
+
+  s = neutral;
+  s.basis = "XZY";
+  REQUIRE(asked(s).size() == 1);
+  CHECK(asked(s)[0].target == "/inverse3/049D/config/basis?session=%237");
+  CHECK(Json::parse(asked(s)[0].body) == Json::parse(R"({"permutation": "XYZ"})"));
+
+  // A mount is set only where no preset stands for it; its position stays.
+  s = neutral;
+  s.mount_scale = {2.0, 2.0, 2.0};
+  CHECK(asked(s).empty());
+  s.preset.clear();
+  s.mount_position_m = {0.0, 0.1, 0.0};
+  s.mount_rotation = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX());
+  REQUIRE(asked(s).size() == 1);
+  CHECK(asked(s)[0].target == "/inverse3/049D/config/mount?session=%237");
+  const Json transform = Json::parse(asked(s)[0].body).at("transform");
+  CHECK(transform.at("position") == Json::parse(R"({"x": 0, "y": 0.1, "z": 0})"));
+  CHECK(transform.at("rotation") == Json::parse(R"({"w": 1, "x": 0, "y": 0, "z": 0})"));
+  CHECK(transform.at("scale") == Json::parse(R"({"x": 1, "y": 1, "z": 1})"));
+
+  // Before 3.5 no setting of a session can be set over HTTP.
+  s.damping = s.force_gate_gain = 0.3;
+  s.basis = "XZY";
+  CHECK(asked(s).size() == 4);
+  CHECK(asked(s, InverseFormat::values).empty());
+}
+
 }  // namespace
 }  // namespace tpm::haptics
