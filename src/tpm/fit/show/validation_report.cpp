@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/files/file.hpp"
+#include "tpm/fit/validate/law_along.hpp"
 #include "tpm/show/draw.hpp"
 
 namespace tpm::fit {
@@ -103,10 +104,25 @@ Series motion_line(const std::string& label, const Recording& r, double contact,
   Series s{.kind = Series::Kind::line,
            .label = label,
            .provenance = std::string(provenance_name(r.provenance))};
+  const std::vector<double>& moved = is_load(r.drive_quantity) ? r.response : r.drive;
   for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
-    s.add(r.time_s[i] - r.time_s.front(), (r.drive[i] - contact) / unit);
+    s.add(r.time_s[i] - r.time_s.front(), (moved[i] - contact) / unit);
   }
   return s;
+}
+
+/// Where contact was in the fit: the slack length of a strip, and the contact of a recording that
+/// was fitted alone, are the law's.
+double contact_in_fit(const LawFile& law, const CalibrationData::File& file) {
+  const PreparedRecording& r = file.recording.value();
+  if (is_load(r.recording.drive_quantity)) return r.phases.floor_response;
+  const auto& data = law.uncertainty->data;
+  if (law.spec.drive == Quantity::relative_length || data.size() == 1) {
+    return law.values[law.values.size() - 2];
+  }
+  const auto fitted = std::ranges::find(data, file.sha256, &FittedFile::sha256);
+  const bool known = fitted != data.end() && !file.sha256.empty() && fitted->contact;
+  return known ? *fitted->contact : r.phases.contact_drive;
 }
 
 Figure motion_figure(const ValidationRequest& request, const Validation& v) {
@@ -122,14 +138,15 @@ Figure motion_figure(const ValidationRequest& request, const Validation& v) {
       found > 1 ? fmt::format("calibration, {} recordings", found) : "calibration";
   for (const CalibrationData::File& file : v.calibration) {
     if (!file.recording) continue;
-    const Recording& r = file.recording->recording;
-    const double contact = file.recording->phases.contact_drive;
-    add_if_any(panel, motion_line(calibration, r, contact, unit.to_si));
+    add_if_any(panel, motion_line(calibration, file.recording->recording,
+                                  contact_in_fit(request.law, file), unit.to_si));
   }
   const std::vector<std::string> labels = motion_labels(v);
   for (std::size_t i = 0; i < v.recordings.size(); ++i) {
+    const RecordingComparison& compared = v.recordings[i];
+    const ValidationPlacement& p = compared.placement;
     add_if_any(panel, motion_line(labels[i], request.recordings[i].recording,
-                                  v.recordings[i].placement.contact, unit.to_si));
+                                  compared.creep ? p.zero : p.contact, unit.to_si));
   }
   if (const auto& depth = v.applicability.front().fitted_depth) {
     double longest = v.applicability.front().fitted_duration_s.value_or(0.0);
