@@ -164,8 +164,8 @@ void add_benchmark_command(CLI::App& accuracy, Session& session) {
                     "List what can be named, and do nothing: problems and formulations, with "
                     "--append-to the pieces of work");
   command->add_option("--append-to", choice->record,
-                      "Instead: measure named pieces of work (all, or those given in place of "
-                      "problems) by processor time, and append a row for each to this CSV file");
+                      "CSV file to append to: instead, measure named pieces of work (all, or those "
+                      "given in place of problems) by processor time, a row for each");
   command
       ->add_option("--commit", choice->commit, "With --append-to: what the program was built from")
       ->capture_default_str();

@@ -113,7 +113,7 @@ int run_command(const TableOptions& options, const Session& session) {
 
 void add_options(CLI::App& command, TableOptions& options) {
   command.add_flag("--as-printed", options.as_printed,
-                   "A step, Eqs. 15 and 16, t -> infinity (default)");
+                   "Tables as printed: a step, Eqs. 15 and 16, t -> infinity (default)");
   command.add_flag("--consistent", options.consistent,
                    "Ramp-and-hold with the true eta1: end of ramp and end of hold");
   command.add_option("--depths", options.depths, "Indentation depths (default 2,4,6,8 mm)");

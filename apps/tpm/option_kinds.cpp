@@ -4,7 +4,6 @@
 #include <string>
 
 #include "command.hpp"
-#include "tpm/base/quantity_text.hpp"
 
 namespace tpm::app {
 namespace {
@@ -106,7 +105,7 @@ void set_option_kinds(CLI::App& app) {
     // check() would append its own words to the kind in the help.
     option->each([name, dimension = *kind->dimension](const std::string& value) {
       // Some commands take a plain number in a unit of their own.
-      if (value.empty() || find_number(value)) return;
+      if (value.find_first_not_of("0123456789.+-eE") == std::string::npos) return;
       static_cast<void>(option_quantity(value, dimension, name));
     });
   }
