@@ -84,7 +84,7 @@ std::string drift_off(const FitResult& fit, std::size_t choice, double level) {
 /// @return empty if it does not, by more than chance and than the noise
 std::string bend_of_rest(const RestedRecording& rested, double level) {
   constexpr double kStill = 1e-3;  // of the drive's range
-  constexpr double kLevel = 0.1;   // of that of the other tests, which come first
+  constexpr double kShare = 0.1;   // of the level of the other tests, which come first
   constexpr double kSeen = 1.0;    // noises
   const Recording& r = *rested.recording;
   const auto [low, high] = std::ranges::minmax_element(r.drive);
@@ -95,7 +95,7 @@ std::string bend_of_rest(const RestedRecording& rested, double level) {
     ++end;
   }
   const auto bend = rest_bend(std::span(r.time_s).first(end), std::span(r.response).first(end));
-  if (!bend || bend->noises < kSeen || bend->p_value >= kLevel * level) return {};
+  if (!bend || bend->noises < kSeen || bend->p_value >= kShare * level) return {};
   return fmt::format("its zero bends at rest by {} noises, and the fit knows a line",
                      times_text(bend->noises));
 }
