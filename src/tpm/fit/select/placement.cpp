@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/median.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
 
@@ -67,6 +69,30 @@ RestSamples rest_samples(const PreparedRecording& r) {
   for (std::size_t k = recoil; k < withdrawn.size(); ++k) take(withdrawn[k]);
   rest.after = withdrawn.size() - recoil;
   return rest;
+}
+
+/// Without single readings far off, which are no noise about the zero (as isolated_outliers).
+RestSamples without_outliers(RestSamples rest) {
+  constexpr double kFarOff = 8.0, kOfMedian = 1.4826, kMostShare = 0.05;
+  std::vector<double> off = rest.reading;
+  const double middle = median(off);
+  for (double& each : off) each = std::abs(each - middle);
+  const double far = kFarOff * kOfMedian * median(off);
+  const auto is_far = [&](double reading) { return std::abs(reading - middle) > far; };
+  const auto outliers = std::ranges::count_if(rest.reading, is_far);
+  const double most = std::max(kMostShare * static_cast<double>(off.size()), 1.0);
+  if (!(far > 0.0) || off.size() < kFewestForSlope || static_cast<double>(outliers) > most) {
+    return rest;
+  }
+  RestSamples kept;
+  kept.before = rest.before;
+  kept.after = rest.after;
+  for (std::size_t i = 0; i < rest.reading.size(); ++i) {
+    if (is_far(rest.reading[i])) continue;
+    kept.time_s.push_back(rest.time_s[i]);
+    kept.reading.push_back(rest.reading[i]);
+  }
+  return kept;
 }
 
 /// Means of blocks, where there are many samples.
@@ -227,7 +253,7 @@ RestReadings read_rests(const PreparedRecording& recording) {
   result.after = all.after;
   if (all.reading.empty() || (all.before == 0 && all.after < kFewestForSlope)) return result;
   const double rounding = rounding_sd(recording);
-  const RestSamples rest = averaged(all);
+  const RestSamples rest = averaged(without_outliers(all));
   const auto n = static_cast<double>(rest.reading.size());
   const double level = middle_of_rest(rest.reading);
   double squares = 0.0;
