@@ -1,6 +1,7 @@
 #include "tpm/fit/select/placement.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -15,6 +16,7 @@ namespace {
 constexpr std::size_t kMostAtRest = 1000;  // samples, or blocks of them
 constexpr std::size_t kFewestForSlope = 8;
 constexpr std::size_t kFewestForNoise = 4;
+constexpr double kFarOff = 8.0, kOfMedian = 1.4826;  // robust standard deviations
 
 /// Readings of the rests, one behind the other.
 struct RestSamples {
@@ -73,7 +75,7 @@ RestSamples rest_samples(const PreparedRecording& r) {
 
 /// Without single readings far off, which are no noise about the zero (as isolated_outliers).
 RestSamples without_outliers(RestSamples rest) {
-  constexpr double kFarOff = 8.0, kOfMedian = 1.4826, kMostShare = 0.05;
+  constexpr double kMostShare = 0.05;
   std::vector<double> off = rest.reading;
   const double middle = median(off);
   for (double& each : off) each = std::abs(each - middle);
@@ -171,8 +173,20 @@ std::optional<HoldNoise> hold_noise(const PreparedRecording& r) {
   }
   if (!(y.cwiseAbs().maxCoeff() > 0.0)) return std::nullopt;
   const double step_s = median_step(time);
-  return HoldNoise{estimate_autoregression(time, y, j, step_s), step_s, n,
-                   static_cast<double>(n) - static_cast<double>(j.cols())};
+  // Single readings far off the curve are no noise here either.
+  const Eigen::VectorXd off = (y - j * j.colPivHouseholderQr().solve(y)).cwiseAbs();
+  const double far = kFarOff * kOfMedian * median({off.begin(), off.end()});
+  std::vector<Eigen::Index> kept;
+  std::vector<double> kept_time;
+  for (Eigen::Index i = 0; i < off.size(); ++i) {
+    if (far > 0.0 && off[i] > far) continue;
+    kept.push_back(i);
+    kept_time.push_back(time[static_cast<std::size_t>(i)]);
+  }
+  const Eigen::VectorXd reading = y(kept);
+  const Eigen::MatrixXd curve = j(kept, Eigen::all);
+  return HoldNoise{estimate_autoregression(kept_time, reading, curve, step_s), step_s, kept.size(),
+                   static_cast<double>(kept.size()) - static_cast<double>(j.cols())};
 }
 
 /// Generalised least squares of a line (or a level) through readings at rest.
