@@ -81,3 +81,18 @@ TEST_CASE(
     CHECK(within >= 180);  // 95 % of 200 are at least this many with a probability of 99.9 %
   }
 }
+
+TEST_CASE("a spoilt reading at rest does not move the zero", "[placement]") {
+  PlacedTest test = wandering("linear-1");
+  test.phi = 0.0;
+  Recording r = placed(test);
+  Random random(3);
+  r = measured(test, r, random);
+  const auto zero_of = [&](const Recording& recording) {
+    return measure_placement(prepare_recording("made.csv", recording), spec_of(test), {})
+        .rests.zero->value;
+  };
+  const double clean = zero_of(r);
+  r.response[12] += 20.0 * test.noise_N;
+  CHECK(std::abs(zero_of(r) - clean) < 0.1 * test.noise_N);
+}

@@ -217,10 +217,11 @@ class Finder {
     if (!indentation_ || pieces_.size() < 2 || rest.motion != Motion::still) return 0.0;
     const std::size_t n = rest.last + 1;
     if (n < kFewest) return 0.0;
-    double mean = 0.0, squares = 0.0;
-    for (std::size_t i = 0; i < n; ++i) mean += level_[i] / static_cast<double>(n);
-    for (std::size_t i = 0; i < n; ++i) squares += std::pow(level_[i] - mean, 2);
-    const double sd = std::sqrt(squares / static_cast<double>(n - 1));
+    constexpr double kOfMedian = 1.4826;  // robust: a spoilt reading is no noise that wanders
+    std::vector<double> off(level_.begin(), level_.begin() + static_cast<std::ptrdiff_t>(n));
+    const double middle = median(off);
+    for (double& each : off) each = std::abs(each - middle);
+    const double sd = kOfMedian * median(std::move(off));
     return sd > kWellAbove * found_.noise_sd_estimate ? sd : 0.0;
   }
 

@@ -1,9 +1,12 @@
 #include "tpm/fit/select/placement.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/median.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
 
@@ -13,6 +16,7 @@ namespace {
 constexpr std::size_t kMostAtRest = 1000;  // samples, or blocks of them
 constexpr std::size_t kFewestForSlope = 8;
 constexpr std::size_t kFewestForNoise = 4;
+constexpr double kFarOff = 8.0, kOfMedian = 1.4826;  // robust standard deviations
 
 /// Readings of the rests, one behind the other.
 struct RestSamples {
@@ -67,6 +71,30 @@ RestSamples rest_samples(const PreparedRecording& r) {
   for (std::size_t k = recoil; k < withdrawn.size(); ++k) take(withdrawn[k]);
   rest.after = withdrawn.size() - recoil;
   return rest;
+}
+
+/// Without single readings far off, which are no noise about the zero (as isolated_outliers).
+RestSamples without_outliers(RestSamples rest) {
+  constexpr double kMostShare = 0.05;
+  std::vector<double> off = rest.reading;
+  const double middle = median(off);
+  for (double& each : off) each = std::abs(each - middle);
+  const double far = kFarOff * kOfMedian * median(off);
+  const auto is_far = [&](double reading) { return std::abs(reading - middle) > far; };
+  const auto outliers = std::ranges::count_if(rest.reading, is_far);
+  const double most = std::max(kMostShare * static_cast<double>(off.size()), 1.0);
+  if (!(far > 0.0) || off.size() < kFewestForSlope || static_cast<double>(outliers) > most) {
+    return rest;
+  }
+  RestSamples kept;
+  kept.before = rest.before;
+  kept.after = rest.after;
+  for (std::size_t i = 0; i < rest.reading.size(); ++i) {
+    if (is_far(rest.reading[i])) continue;
+    kept.time_s.push_back(rest.time_s[i]);
+    kept.reading.push_back(rest.reading[i]);
+  }
+  return kept;
 }
 
 /// Means of blocks, where there are many samples.
@@ -145,8 +173,20 @@ std::optional<HoldNoise> hold_noise(const PreparedRecording& r) {
   }
   if (!(y.cwiseAbs().maxCoeff() > 0.0)) return std::nullopt;
   const double step_s = median_step(time);
-  return HoldNoise{estimate_autoregression(time, y, j, step_s), step_s, n,
-                   static_cast<double>(n) - static_cast<double>(j.cols())};
+  // Single readings far off the curve are no noise here either.
+  const Eigen::VectorXd off = (y - j * j.colPivHouseholderQr().solve(y)).cwiseAbs();
+  const double far = kFarOff * kOfMedian * median({off.begin(), off.end()});
+  std::vector<Eigen::Index> kept;
+  std::vector<double> kept_time;
+  for (Eigen::Index i = 0; i < off.size(); ++i) {
+    if (far > 0.0 && off[i] > far) continue;
+    kept.push_back(i);
+    kept_time.push_back(time[static_cast<std::size_t>(i)]);
+  }
+  const Eigen::VectorXd reading = y(kept);
+  const Eigen::MatrixXd curve = j(kept, Eigen::all);
+  return HoldNoise{estimate_autoregression(kept_time, reading, curve, step_s), step_s, kept.size(),
+                   static_cast<double>(kept.size()) - static_cast<double>(j.cols())};
 }
 
 /// Generalised least squares of a line (or a level) through readings at rest.
@@ -227,7 +267,7 @@ RestReadings read_rests(const PreparedRecording& recording) {
   result.after = all.after;
   if (all.reading.empty() || (all.before == 0 && all.after < kFewestForSlope)) return result;
   const double rounding = rounding_sd(recording);
-  const RestSamples rest = averaged(all);
+  const RestSamples rest = averaged(without_outliers(all));
   const auto n = static_cast<double>(rest.reading.size());
   const double level = middle_of_rest(rest.reading);
   double squares = 0.0;
