@@ -37,7 +37,7 @@ COMMANDS = [
     Command("Python: fit", "-c \"import tpmkit; tpmkit.fit('in/folder/a1.csv', law='linear-1', starts=2).save('fitted')\"",
             [], weight=4),
     Command("Python: sweep", "-c \"import tpmkit; tpmkit.sweep('in/sweep.json', 'sweep.h5', workers=1)\"",
-            ["sweep.h5", "sweep.csv", "sweep.run.json"], varies=["sweep.run.json"], weight=4),
+            ["sweep.h5"], weight=4),
 ]
 SCRIPTS = Path(__file__).resolve().parent
 PYTHON = os.environ.get("TPMKIT_PYTHON", "/usr/bin/python3")

@@ -24,7 +24,7 @@ TEST_CASE("schema and reader of a sweep agree on odd ones", "[keys]") {
        of_source("configs/sweep_sensitivity.json"), of_source("configs/sweep_organ.json"),
        of_source("configs/sweep_convergence_step.json"),
        of_source("configs/sweep_sensitivity_organ_creep.json"), example_of(sweep_kind())},
-      test::kOddDocuments);
+      500);
 }
 
 TEST_CASE("the example of a sweep is read", "[keys]") {
