@@ -71,7 +71,7 @@ def main():
         for scene in SCENES:
             checks.check(["simulate", root / "configs" / scene, "-o", "run.h5"], lambda d: d["warnings"])
         for plan in ("servo.json", "creep.json"):
-            checks.check(["simulate", root / "configs/plan" / plan, "--plan", "--costs", "nominal", "-o", "planned.h5"],
+            checks.check(["simulate", root / "configs/plan" / plan, "--planned", "--costs", "nominal", "-o", "planned.h5"],
                          lambda d: d["warnings"])
         subprocess.run([program, "hil", "run", root / "configs/hil_liver.json", "-o", "session.tpmrec"], cwd=folder, check=True,
                        capture_output=True)
