@@ -242,6 +242,9 @@ macro(tpm_rooms)
   add_library(tpmkit INTERFACE)
   add_library(tpmkit::tpmkit ALIAS tpmkit)
   target_link_libraries(tpmkit INTERFACE ${TPM_ROOM_LIBRARIES})
+  if(BUILD_SHARED_LIBS)  # a weak reference alone does not keep the library of haptics, whose list is the longest
+    target_link_options(tpmkit INTERFACE LINKER:--no-as-needed)
+  endif()
 endmacro()
 
 # Rooms whose public headers are installed, with those that they need: each an archive with an export of its own.
