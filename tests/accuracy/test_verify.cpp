@@ -121,7 +121,10 @@ TEST_CASE("tpm accuracy verify: exit code, text, JSON, CSV and pages agree", "[h
   CHECK(bad.exit_code == 1);
   const Json json = Json::parse(bad.output);
   CHECK(json.at("failed") == json.at("checks"));
-  CHECK(json == Json::parse(read_file(folder / "bad/verification.json")));
+  for (const auto& [key, value] :
+       Json::parse(read_file(folder / "bad/verification.json")).items()) {
+    CHECK(json.at(key) == value);  // beside what stands in the answers of all commands
+  }
   const std::string csv = read_file(folder / "bad/verification.csv");
   CHECK(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')) ==
         1 + json.at("rows").size());

@@ -149,6 +149,10 @@ const Trajectory& PlanSurrogate::with_masses_as_fine_as(double tolerance) const 
   return made != nullptr ? *made : with_masses(tolerance);
 }
 
+double PlanSurrogate::finest_with_masses(double tolerance) const {
+  return with_masses_.empty() ? tolerance : std::min(tolerance, with_masses_.begin()->first);
+}
+
 const InertiaEstimate& PlanSurrogate::inertia() const {
   if (!inertia_) inertia_ = estimate_inertia(scene_);
   return *inertia_;

@@ -59,6 +59,8 @@ class PlanSurrogate {
   [[nodiscard]] const Trajectory& with_masses(double tolerance) const;
   /// The run at `tolerance` or, if one was made, the coarsest finer one.
   [[nodiscard]] const Trajectory& with_masses_as_fine_as(double tolerance) const;
+  /// The tolerance of the finest run that was made, at most `tolerance`.
+  [[nodiscard]] double finest_with_masses(double tolerance) const;
 
   [[nodiscard]] const ContactSpectrum& spectrum() const { return spectrum_at_rest(scene_); }
   [[nodiscard]] const InertiaEstimate& inertia() const;
