@@ -183,8 +183,16 @@ std::optional<HoldNoise> hold_noise(const PreparedRecording& r) {
     kept.push_back(i);
     kept_time.push_back(time[static_cast<std::size_t>(i)]);
   }
+  // Many of them are no single readings: a clipped hold, for one. What is left then need not tell
+  // the exponentials apart either.
+  constexpr Eigen::Index kSeldom = 10;
+  if (kSeldom * (off.size() - std::ssize(kept)) > off.size()) return std::nullopt;
   const Eigen::VectorXd reading = y(kept);
   const Eigen::MatrixXd curve = j(kept, Eigen::all);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(curve);
+  if (qr.rank() < curve.cols() || !((reading - curve * qr.solve(reading)).norm() > 0.0)) {
+    return std::nullopt;
+  }
   return HoldNoise{estimate_autoregression(kept_time, reading, curve, step_s), step_s, kept.size(),
                    static_cast<double>(kept.size()) - static_cast<double>(j.cols())};
 }
