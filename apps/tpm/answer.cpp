@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tpm/files/files_read.hpp"
+#include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
 namespace tpm::app {
@@ -51,6 +52,11 @@ std::string input_name(const fs::path& file) {
 Json inputs() {
   return array_json(files::files_read(), [](const fs::path& file) {
     const std::string digest = files::sha256_of_file(file);
+    std::error_code gone;
+    if (digest.empty() && fs::is_regular_file(file, gone)) {  // a pipe has none
+      throw Error(ExitCode::environment, file.string(), "cannot be read again for its SHA-256",
+                  "a file that can be read");
+    }
     return Json{{"file", input_name(file)},
                 {"sha256", digest.empty() ? Json(nullptr) : Json(digest)}};
   });
