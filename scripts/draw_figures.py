@@ -76,6 +76,7 @@ STYLE = {
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,  # whole numbers at the ticks, not a sum above the axis
     "hatch.linewidth": 0.7,
 }
 
