@@ -25,7 +25,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 
 # Inches.
-WIDTH, LEFT, GAP, RIGHT, ABOVE, BELOW, LEGEND_ROW = 13.0, 0.65, 0.6, 0.95, 0.9, 0.7, 0.22
+WIDTH, LEFT, GAP, RIGHT, ABOVE, BELOW, LEGEND_ROW = 13.0, 0.65, 0.6, 1.05, 0.9, 0.7, 0.22
 MOST_HIGH = 5.0
 LEGEND_COLUMNS = 3
 ARROW = 3.5  # length of the probe, in radii
@@ -248,7 +248,7 @@ def decorate(page, row, sizes, picture, colouring, words):
     if colouring.bar is not None:
         mappable, label = colouring.bar
         box = row[-1].get_position()
-        bar = page.add_axes([1 - 0.72 / WIDTH, box.y0, 0.14 / WIDTH, box.height])
+        bar = page.add_axes([1 - 0.82 / WIDTH, box.y0, 0.14 / WIDTH, box.height])
         page.colorbar(mappable, cax=bar).set_label(label)
     page.legend(handles=handles, loc="lower center", ncol=LEGEND_COLUMNS, frameon=False,
                 bbox_to_anchor=(0.5, 0.22 / height))
@@ -306,7 +306,7 @@ def draw_two(picture):
 
 def pages(picture):
     state = picture["states"][0]
-    words = f"{state['name']}, {state['words']}"
+    words = f"{state['name']} at the end of the run, {state['words']}"
     yield "undeformed", draw_one(picture, picture["position_m"], picture["tools"], by_layer(picture, "Undeformed"), "at rest")
     for name, colouring in [
             ("deformed", by_layer(picture, "Deformed, not magnified")),

@@ -44,8 +44,10 @@ DATA_MARKERS = ["o", "s", "D", "^", "v", "X", "P"]
 LINE_WIDTHS = [2.8, 1.8, 1.1, 0.8]
 THIN_LINE = 0.9
 # More readings than this are drawn as a grey trace, wider than the lines over it.
-DENSE, DENSE_COLOUR, DENSE_SIZE, WIDEST_OVER_DENSE = 100, "#8C8C8C", 3.6, 1.1
+DENSE, DENSE_COLOUR, DENSE_SIZE = 100, "#8C8C8C", 3.6
+WIDEST_OVER_OTHERS = 1.1  # of a line over a grey trace or a band, which it must not hide
 PIXELS_PER_INCH = 300
+SMALLEST_PLAIN = 1e-4  # of the numbers at an axis; smaller ones are written with a power of ten
 
 PROVENANCE = {
     "model": "computed by tpm",
@@ -74,6 +76,7 @@ STYLE = {
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,  # whole numbers at the ticks, not a sum above the axis
     "hatch.linewidth": 0.7,
 }
 
@@ -99,14 +102,14 @@ def looks(figure):
     """Colour, marker and width of each label: one look per label throughout the figure."""
     chosen = {}
     lines = data = 0
-    dense = any(is_dense(s) for panel in figure["panels"] for s in panel["series"])
+    covers = any(is_dense(s) or s["kind"] == "band" for panel in figure["panels"] for s in panel["series"])
     for series in (s for panel in figure["panels"] for s in panel["series"]):
         if series["label"] in chosen:
             continue
         if series["kind"] == "line":
             chosen[series["label"]] = {
                 "color": MODEL_COLOURS[lines % len(MODEL_COLOURS)],
-                "width": min(LINE_WIDTHS[min(lines, len(LINE_WIDTHS) - 1)], WIDEST_OVER_DENSE if dense else math.inf),
+                "width": min(LINE_WIDTHS[min(lines, len(LINE_WIDTHS) - 1)], WIDEST_OVER_OTHERS if covers else math.inf),
             }
             lines += 1
         else:
@@ -252,13 +255,14 @@ def tick_short_log_axis(axis_of_plot, limits):
 
 
 def plain_number(value, _position):
-    """12.5, or 2·10⁵ where that is shorter."""
-    if value < 1e4:
-        return f"{value:g}"
-    exponent = math.floor(math.log10(value * (1 + 1e-12)))
+    """12.5, or 2·10⁵ and 5·10⁻⁷ where that is shorter."""
+    size = abs(value)
+    if size == 0 or SMALLEST_PLAIN <= size < 1e4:
+        return f"{value:g}".replace("-", "\u2212")
+    exponent = math.floor(math.log10(size * (1 + 1e-12)))
     factor = value / 10.0**exponent
-    power = "10" + str(exponent).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return power if abs(factor - 1) < 1e-9 else f"{factor:g}·{power}"
+    power = "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return power if abs(factor - 1) < 1e-9 else f"{factor:g}·{power}".replace("-", "\u2212")
 
 
 def counts(panel):
@@ -302,7 +306,7 @@ def draw_panel(axes, panel, look, handles, narrow=False, letter=""):
         getattr(axes, f"set_{name}lim")(axis.get("lower"), axis.get("upper"))
         if axis["logarithmic"]:
             tick_short_log_axis(getattr(axes, f"{name}axis"), getattr(axes, f"get_{name}lim")())
-        elif max(abs(v) for v in getattr(axes, f"get_{name}lim")()) >= 1e5:
+        elif not SMALLEST_PLAIN < max(abs(v) for v in getattr(axes, f"get_{name}lim")()) < 1e5:
             # No power of ten apart from the ticks: it would lie on its neighbour's.
             getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(3 if narrow else 5))
             getattr(axes, f"{name}axis").set_major_formatter(FuncFormatter(plain_number))

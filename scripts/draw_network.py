@@ -120,8 +120,8 @@ def draw_view(axes, picture, position, view):
     axes.set_aspect("equal")
     liver = picture["liver"]
     axes.set_title(name if liver else plain_name, loc="left")
-    axes.set_xlabel(f"{across_words if liver else plain_words} (mm)")
-    axes.set_ylabel(f"{'up, y' if liver else 'y'} (mm)")
+    axes.set_xlabel(f"{across_words if liver else plain_words} [mm]")
+    axes.set_ylabel(f"{'up, y' if liver else 'y'} [mm]")
     return high - low
 
 
