@@ -89,7 +89,7 @@ ErrorBudget budget_of_contact(const BudgetCommand& command, const LawFile& law) 
 /// A plan whose tolerance is the data uncertainty; without a folder, the command that writes one.
 std::string next_of_budget(const BudgetCommand& command) {
   if (command.folder.empty()) return "the same with --folder budget";
-  return fmt::format("tpm plan {} --tolerance data --budget {}",
+  return fmt::format("tpm plan {} --tolerance data --budget-file {}",
                      command.scene.empty() ? std::string("SCENE.json") : shell_word(command.scene),
                      shell_word((std::filesystem::path(command.folder) / "budget.json").string()));
 }
@@ -164,7 +164,7 @@ void add_budget_command(CLI::App& app, Session& session) {
   command->footer(
       "Example:\n  tpm fit recording.csv --folder fitted\n"
       "  tpm budget fitted/law.json recording.csv --folder budget\n"
-      "  tpm plan configs/plan/servo.json --tolerance data --budget budget/budget.json");
+      "  tpm plan configs/plan/servo.json --tolerance data --budget-file budget/budget.json");
   set_run(*command, session, [options, &session] { return run_budget(*options, session); });
 }
 
