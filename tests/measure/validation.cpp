@@ -220,7 +220,7 @@ void parts(int experiments, int calibrations, double phi, double slow_branch) {
   std::vector<Quantity> quantities{
       {QuantityKind::peak, "peak", delta.peak, {}, {}, {}},
       {QuantityKind::end_of_hold, "end of hold", delta.end, {}, {}, {}}};
-  const auto simulated = [&](const LawFile& law, const LawAlong::At& at, QuantityKind kind) {
+  const auto simulated = [&](const LawAlong::At& at, QuantityKind kind) {
     return read_quantity({kind}, parts, truth.recording, 0.0, at.value).value();
   };
   const LawAlong limit_along(limit, truth);
@@ -235,8 +235,8 @@ void parts(int experiments, int calibrations, double phi, double slow_branch) {
     sigma += r.scatter.sigma / experiments;
     correlation += r.scatter.phi / experiments;
     for (Quantity& q : quantities) {
-      const auto s = simulated(law, at, q.kind);
-      const double of_law = s.value - simulated(limit, limit_at, q.kind).value;
+      const auto s = simulated(at, q.kind);
+      const double of_law = s.value - simulated(limit_at, q.kind).value;
       const QuantityComparison& found = study_quantity(r, q.kind);
       q.s.add(of_law, (s.weight.transpose() * at.by_law * along.root()).norm());
       q.d.add(found.e.error - q.delta - of_law, found.u_D);
