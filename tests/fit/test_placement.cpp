@@ -455,7 +455,8 @@ TEST_CASE("a stiffness that is not told from a drift is not pooled as if it were
   const SpecimenStudy none = study_of({0.5, 0.5, 0.5});
   CHECK(k_inf_of(none).only_without == "drift or a slow branch");
   CHECK_THAT(to_terminal_text(none), Catch::Contains("not identified: drift or a slow branch"));
-  for (const Json& entry : to_json(none).at("pooled")) {
+  const Json written = to_json(none);
+  for (const Json& entry : written.at("pooled")) {
     CHECK(entry.at("identified").get<bool>() == (entry.at("name") != "k_inf"));
   }
 }

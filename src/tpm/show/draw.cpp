@@ -208,7 +208,8 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
                                  std::filesystem::absolute(folder).string()};
   if (drawings == Drawings::for_print) words.emplace_back("--print");
   std::vector<std::filesystem::path> files;
-  for (const Json& figure : read_json(figures_json).at("figures")) {
+  const Json figures = read_json(figures_json);
+  for (const Json& figure : figures.at("figures")) {
     const auto id = figure.at("id").get<std::string>();
     files.push_back(folder / (id + ".svg"));
     if (drawings == Drawings::svg) continue;
