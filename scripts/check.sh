@@ -25,6 +25,10 @@ twice=$(git ls-files 'src/tpm/*.hpp' 'include/tpmkit/*.hpp' | xargs grep -hoE '^
         awk '{print $1 == "enum" ? $3 : $2}' | sort | uniq -d)
 [[ -z "$twice" ]] || die "src/tpm and include define more than one type named: $twice; expected one of a name"
 
+step "no loop over a part of a temporary"  # for (x : read_json(file).at("rows")): C++20 ends what is read before the first round
+ended=$(git ls-files '*.cpp' '*.hpp' | xargs grep -nE 'for \(.* : (\w+_)?json\(.*\)\.(at|items|begin|front|back)\b' || true)
+[[ -z "$ended" ]] || die "a loop reads what has ended; give it a name before the loop: $ended"
+
 step "building the slow tests (build/release)"
 configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=ON -DTPM_PYTHON=ON
 build release
