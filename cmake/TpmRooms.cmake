@@ -247,7 +247,8 @@ macro(tpm_rooms)
   endif()
 endmacro()
 
-# Rooms whose public headers are installed, with those that they need: each an archive with an export of its own.
+# Rooms whose public headers are installed, with those that they need: each an archive with an export of its own. The
+# target installed_rooms builds them.
 set(TPM_INSTALLED_ROOMS base work data law files show organ contact plan fit haptics)
 function(tpm_install_rooms)
   foreach(room IN LISTS TPM_INSTALLED_ROOMS)
@@ -256,6 +257,9 @@ function(tpm_install_rooms)
     install(EXPORT tpmkit-${room} NAMESPACE tpmkit:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/tpmkit
             COMPONENT development)
   endforeach()
+  add_custom_target(installed_rooms)
+  list(TRANSFORM TPM_INSTALLED_ROOMS PREPEND tpm_room_ OUTPUT_VARIABLE targets)
+  add_dependencies(installed_rooms ${targets})
 endfunction()
 
 # --- copies under sanitizers ------------------------------------------------------------------------

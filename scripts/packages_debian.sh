@@ -12,8 +12,7 @@ step "building (build/release); some minutes the first time"
 folder=build/release
 configure release -DTPM_PACKAGES=ON -DTPM_PYTHON=ON -DTPM_PYTHON_INSTALL:STRING=lib/python3/dist-packages \
   "-DCMAKE_INSTALL_LIBDIR=lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)"
-build release tpm tpmkit_component_core tpmkit_component_organ tpmkit_component_fit tpmkit_component_haptics \
-  tpmkit_haptics tpmkit_python command_help
+build release tpm installed_rooms tpmkit_haptics tpmkit_python command_help
 
 step "packing"
 # The date of the bill of materials is that of the changelog: equal sources give equal packages.

@@ -8,7 +8,8 @@
   tests, of which the one for the README's commands is run with TPM;
 - packaging/conda/recipe.yaml and packaging/spack: read as YAML and as Python; every dependency of
   cmake/TpmDependencies.cmake is named by both, and a check sum stands where there is an address, and only there;
-- Dockerfile: stages, a user, an entry point; every path that it copies or runs exists.
+- Dockerfile: stages, a user, an entry point; every path that it copies or runs exists;
+- what scripts, recipes and the Dockerfile build is made by CMake.
 """
 
 import ast
@@ -240,9 +241,29 @@ def faults_of_docker(root):
             yield f"Dockerfile: installs {package}, which is none of the packages"
 
 
+def faults_of_targets(root):
+    """Targets that are built by name, by `build PRESET TARGET...` or `cmake --build FOLDER --target TARGET...`."""
+    made = {"install"}
+    for file in [root / "CMakeLists.txt", *root.glob("cmake/*.cmake"), *root.glob("bindings/*/CMakeLists.txt"),
+                 root / "tests/CMakeLists.txt"]:
+        made.update(re.findall(r"(?:add_executable|add_library|add_custom_target|pybind11_add_module)\((\w+)", file.read_text(encoding="utf-8")))
+    scripts = [*sorted((root / "scripts").glob("*.sh")), root / "packaging/conda/build.sh"]
+    count = 0
+    for file in scripts:
+        text = re.sub(r"\\\n", " ", file.read_text(encoding="utf-8"))
+        for names in re.findall(r"^ *build [\w\"$-]+ ([\w ]+)$|cmake --build \S+ --target ([\w ]+)$", text, re.M):
+            for name in " ".join(names).split():
+                count += 1
+                if name not in made:
+                    yield f"{file.relative_to(root)}: builds {name}, which CMake does not make"
+    if count < 8:
+        yield f"this test found {count} targets in the scripts; expected 8 or more"
+
+
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
-    faults = [*faults_of_versions(root, program), *faults_of_debian(root, program), *faults_of_recipes(root), *faults_of_docker(root)]
+    faults = [*faults_of_versions(root, program), *faults_of_debian(root, program), *faults_of_recipes(root), *faults_of_docker(root),
+              *faults_of_targets(root)]
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")

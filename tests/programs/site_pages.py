@@ -4,8 +4,9 @@
     site_pages.py links HTML_FOLDER             every link and picture leads to a file, every anchor to an element
     site_pages.py TPM                           builds the site, then checks links, and in Chromium that no page is
                                                 wider than a window of 400 or 1400 pixels, no heading lies under another
-                                                part, every picture is there, every formula is set, and the search finds
-                                                the page for questions as a new user types them
+                                                part or is broken within a word, no first column hides the second, every
+                                                picture is there, every formula is set, and the search finds the page for
+                                                questions as a new user types them
     site_pages.py look HTML_FOLDER              the checks in Chromium alone, on a site that is built
     site_pages.py sheet HTML_FOLDER SHEET.png   all pages, small, on one picture
 """
@@ -110,7 +111,8 @@ def unset_formulas(chromium, page):
         time.sleep(0.05)
 
 
-# Headings that something else covers in their middle, and pictures that are not drawn.
+# Headings that something else covers in their middle, or whose words are broken; first columns that push out of sight what
+# stands beside them; pictures that are not drawn.
 FAULTS = """(() => {
   const found = [];
   for (const h of document.querySelectorAll('article h1, article h2, article h3, article h4')) {
@@ -120,6 +122,18 @@ FAULTS = """(() => {
     if (!box) continue;
     const top = document.elementFromPoint(box.left + Math.min(box.width, innerWidth - box.left) / 2, box.top + box.height / 2);
     if (top && !h.contains(top) && !top.contains(h)) found.push('covered: ' + h.textContent.trim());
+    if (!/H[12]/.test(h.tagName)) continue;
+    for (const walk = document.createTreeWalker(h, NodeFilter.SHOW_TEXT); walk.nextNode();) {
+      for (const word of walk.currentNode.data.matchAll(/[A-Za-z]+/g)) {
+        range.setStart(walk.currentNode, word.index); range.setEnd(walk.currentNode, word.index + word[0].length);
+        if (range.getClientRects().length > 1) found.push('broken: ' + word[0]);
+      }
+    }
+  }
+  for (const row of document.querySelectorAll('article table.docutils > tbody > tr:first-child')) {
+    const [first, beside] = row.children, frame = row.closest('table').parentElement;
+    if (row.children.length > 3 || !beside || beside.offsetTop > first.offsetTop) continue;
+    if (first.offsetWidth > 0.9 * frame.clientWidth) found.push('hides what stands beside it: ' + first.textContent.trim());
   }
   for (const i of document.images) { i.loading = 'eager'; if (i.complete && i.naturalWidth === 0) found.push('not drawn: ' + i.getAttribute('src')); }
   return found;
