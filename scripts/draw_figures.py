@@ -22,6 +22,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
 from drawing_files import literal, save_drawing  # noqa: E402
+from matplotlib.colors import to_rgba  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
 from matplotlib.patheffects import withStroke  # noqa: E402
@@ -156,7 +157,8 @@ def draw_points(axes, series, look):
 
 def draw_band(axes, series, look):
     if is_assumed(series):
-        style = dict(facecolor="none", edgecolor=look["color"], hatch="////", linewidth=0.6, linestyle="--")
+        # No hatching: what is drawn over it has to be read.
+        style = dict(facecolor=to_rgba(look["color"], 0.10), edgecolor=look["color"], linewidth=1.0, linestyle="--")
     else:
         style = dict(facecolor=look["color"], alpha=0.22, linewidth=0)
     axes.fill_between(series["x"], series["lower"], series["upper"], zorder=1, **style)
@@ -271,10 +273,14 @@ def counts(panel):
     return not panel["x"]["unit"] and not panel["x"]["logarithmic"] and places and all(x == int(x) for x in places)
 
 
+def is_aslant(names, width):
+    """Whether names side by side would touch each other on an axis of this width (inches)."""
+    return max((len(name) for name in names), default=0) * 5.0 * len(names) > width * 72
+
+
 def name_places(axes, names):
     """Names in place of the numbers 1, 2, ...; aslant where they would touch each other."""
-    room = axes.get_position().width * axes.figure.get_figwidth() * 72 / len(names)
-    aslant = max(len(name) for name in names) * 5.0 > room
+    aslant = is_aslant(names, axes.get_position().width * axes.figure.get_figwidth())
     axes.set_xticks(range(1, len(names) + 1), names, rotation=35 if aslant else 0, ha="right" if aslant else "center",
                     rotation_mode="anchor")
     axes.tick_params(axis="x", length=0, labelsize=8)
@@ -312,6 +318,9 @@ def draw_panel(axes, panel, look, handles, narrow=False, letter=""):
             getattr(axes, f"{name}axis").set_major_formatter(FuncFormatter(plain_number))
         elif narrow and name == "x":
             axes.xaxis.set_major_locator(MaxNLocator(3))
+    if "names" in panel["y"]:
+        axes.set_yticks(range(1, len(panel["y"]["names"]) + 1), [plain_name(name) for name in panel["y"]["names"]], fontsize=7.5)
+        axes.tick_params(axis="y", length=0)
     if "names" in panel["x"]:
         name_places(axes, [plain_name(name) for name in panel["x"]["names"]])
     elif counts(panel):
@@ -356,9 +365,10 @@ def keep_inside(page, axes, least):
     axes.set_position([place.x0 + share, place.y0, place.width - share, place.height])
 
 
-def below_names(panels):
-    """More room below panels whose places have long names, which stand aslant."""
-    longest = max((len(name) for panel in panels for name in panel["x"].get("names", [])), default=0)
+def below_names(panels, width):
+    """More room below panels (of this width, inches) whose places have long names, which stand aslant."""
+    aslant = [names for names in ([plain_name(n) for n in panel["x"].get("names", [])] for panel in panels) if is_aslant(names, width)]
+    longest = max((len(name) for names in aslant for name in names), default=0)
     return max(0.0, 0.045 * longest + 0.10 - BELOW_AXIS)
 
 
@@ -375,14 +385,14 @@ def draw_figure(figure):
     if figure.get("note"):
         notes = textwrap.wrap(figure["note"], 70 if len(panels) == 1 else 120) + notes
     rows = -(-len(labels) // columns)
-    below_axis = BELOW_AXIS + below_names(panels)
-    below = below_axis + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08
     across = min(len(panels), MOST_ACROSS)
+    panel_width = (width - LEFT - RIGHT - (across - 1) * GAP) / across
+    below_axis = BELOW_AXIS + below_names(panels, panel_width)
+    below = below_axis + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08
     stacked = -(-len(panels) // across)
     row_height = TOP + PANEL_HEIGHT + below_axis
     height = TOP + PANEL_HEIGHT + below + (stacked - 1) * row_height
     page = plt.figure(figsize=(width, height))
-    panel_width = (width - LEFT - RIGHT - (across - 1) * GAP) / across
     handles = {}
     for i, panel in enumerate(panels):
         left = LEFT + i % across * (panel_width + GAP)

@@ -8,6 +8,8 @@
 #include "tpm/paper/claims/audit.hpp"
 #include "tpm/paper/show/study_report.hpp"
 #include "tpm/show/json_table_csv.hpp"
+#include "tpm/show/short_answer.hpp"
+#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {
@@ -15,8 +17,20 @@ namespace {
 struct AuditOptions {
   std::string claims;
   std::string output;
-  bool all = false;
+  bool verbose = false;
 };
+
+/// What writes the claims with figures into a report; of other claims there is none.
+std::string next_of_audit(const AuditOptions& options) {
+  return options.claims.empty() ? "tpm paper report --folder paper" : "";
+}
+
+std::string audit_answer(const AuditReport& report, const AuditOptions& options) {
+  if (options.verbose) return audit_text(report);
+  ShortAnswer answer = short_answer(report);
+  end_answer(answer, "", {}, next_of_audit(options));
+  return to_text(answer);
+}
 
 int run_command(const Session& session, const AuditOptions& options) {
   const auto path =
@@ -24,7 +38,7 @@ int run_command(const Session& session, const AuditOptions& options) {
   const auto csv = csv_beside(options.output, session);
   const AuditReport report = run_audit(read_json(path), path.filename().string());
   const Json json = to_json(report);
-  deliver(session.json() ? answer_text(session, json) : audit_text(report, options.all),
+  deliver(session.json() ? answer_text(session, json) : audit_answer(report, options),
           options.output);
   deliver_csv(json_table_csv(json.at("findings"), "/details"), csv);
   return 0;
@@ -39,7 +53,7 @@ void add_audit_command(CLI::App& paper, Session& session) {
   command->add_option("claims", options->claims,
                       "Claims file (default: the paper's, data/paper_claims.json)");
   add_output_option(*command, options->output);
-  command->add_flag("--verbose", options->all, "Print everything: also the claims that hold");
+  add_verbose_option(*command, options->verbose, "every claim with numbers, inputs and causes");
   add_format_option(*command, session);
   command->footer(
       "Findings are results, not errors: the exit code is 0 when the audit ran.\n"

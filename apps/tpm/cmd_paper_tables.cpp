@@ -12,7 +12,9 @@
 #include "tpm/files/json.hpp"
 #include "tpm/paper/show/study_report.hpp"
 #include "tpm/paper/tables.hpp"
+#include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
+#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {
@@ -22,6 +24,7 @@ namespace {
 struct TableOptions {
   bool as_printed = false;
   bool consistent = false;
+  bool verbose = false;
   std::optional<std::string> depths, spacings;
   std::optional<std::string> E, E1, E2, Eprime, eta, A0, l0, rate, hold;
   std::string output;
@@ -90,8 +93,16 @@ void warn_of_depths(const TableRequest& request) {
             significant(1e3 * deepest_m, 4));
 }
 
-std::string rendered(const TablesResult& result, const std::string& format,
+std::string short_text(const TablesResult& result) {
+  ShortAnswer answer = short_answer(result);
+  end_answer(answer, "", {}, "tpm paper audit");
+  return to_text(answer);
+}
+
+std::string rendered(const TablesResult& result, const TableOptions& options,
                      const Session& session) {
+  const std::string& format = options.format;
+  if (format == "text" && !options.verbose) return short_text(result);
   if (format == "json") return answer_text(session, to_json(result));
   if (format == "csv") return tables_csv(result);
   const TableStyle style = format == "md"      ? TableStyle::markdown
@@ -105,7 +116,7 @@ int run_command(const TableOptions& options, const Session& session) {
   const auto path = paper_claims_path();
   const std::string name = path.filename().string();
   const auto printed = read_printed_tables(read_json(path), name);
-  const std::string text = rendered(make_tables(request, printed), options.format, session);
+  const std::string text = rendered(make_tables(request, printed), options, session);
   warn_of_depths(request);
   deliver(text, options.output);
   return 0;
@@ -128,6 +139,7 @@ void add_options(CLI::App& command, TableOptions& options) {
   command.add_option("--rate", options.rate,
                      "Speed of the ramp, with --consistent (assumed: 4 mm/s)");
   command.add_option("--hold", options.hold, "Time at depth, with --consistent (default 30 s)");
+  add_verbose_option(command, options.verbose, "each cell as printed and measured, with verdicts");
   command.add_option("-o,--output", options.output, "File to write (default: the terminal)");
   command.add_option("--format", options.format, "Output format: text, md, csv, latex or json")
       ->check(CLI::IsMember({"text", "md", "csv", "latex", "json"}))

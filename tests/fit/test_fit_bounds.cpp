@@ -97,6 +97,40 @@ TEST_CASE("Automatic bounds of the material are widened, and a note says so", "[
              Contains("the automatic bounds of tau1 were widened from 0.01 s .. 0.1 s"));
 }
 
+TEST_CASE("Bounds that could be widened by rounding alone stay, and nothing is said", "[bounds]") {
+  const PreparedRecording r = pressed_from_the_start(0.0, 1.5);
+  const std::vector<PreparedRecording> one{r};
+  FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
+  for (EstimatedParameter& p : config.parameters) {
+    if (p.fit.name != "tau1") continue;
+    p.fit.lower = 0.01;
+    p.fit.start = 0.02;
+    p.fit.upper = 0.1;  // 2 s
+    p.widest = WidestBounds{0.01, 0.1 * (1.0 + 1e-15)};
+  }
+  const FitResult fit = run_fit(config, data_sets(one));
+  const ParameterResult& tau = named(fit, "tau1");
+  CHECK(tau.at_upper_bound);
+  CHECK_FALSE(tau.first_bounds);
+  CHECK_THAT(fmt::format("{}", fmt::join(fit.flags, "\n")),
+             !Contains("bounds of tau1 were widened"));
+}
+
+TEST_CASE("A widening tells the bounds apart however small it is", "[bounds]") {
+  const PreparedRecording r = pressed_from_the_start(0.0, 1.5);
+  const std::vector<PreparedRecording> one{r};
+  FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
+  for (EstimatedParameter& p : config.parameters) {
+    if (p.fit.name != "tau1") continue;
+    p.fit.lower = 0.01;
+    p.fit.start = 0.02;
+    p.fit.upper = 0.1;
+    p.widest = WidestBounds{0.01, 0.100001};
+  }
+  CHECK_THAT(fmt::format("{}", fmt::join(run_fit(config, data_sets(one)).flags, "\n")),
+             Contains("tau1 were widened from 0.01 s .. 0.1 s to 0.01 s .. 0.100001 s"));
+}
+
 TEST_CASE("Verdicts that depend on a nuisance parameter on its bound are conditional", "[bounds]") {
   // Touched further away than automatic bounds go.
   const PreparedRecording r = pressed_from_the_start(12e-3, 3.0);

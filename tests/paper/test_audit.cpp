@@ -1,7 +1,10 @@
 // The audit: what it finds in the paper, and that findings follow from the printed strings.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <numbers>
 
 #include "expected_values.hpp"
 #include "tpm/fit/expression/expression.hpp"
@@ -336,7 +339,27 @@ TEST_CASE("JSON of the audit is complete and the same each time") {
     CHECK_FALSE(f.consequence.empty());
     CHECK_FALSE(f.expression.empty());
   }
-  CHECK_THAT(audit_text(printed_paper(), false),
-             Contains("creep-small-start") && !Contains("eq1-geometry"));
-  CHECK_THAT(audit_text(printed_paper(), true), Contains("eq1-geometry"));
+  CHECK_THAT(audit_text(printed_paper()),
+             Contains("creep-small-start") && Contains("eq1-geometry"));
+}
+
+TEST_CASE("The short answer of the audit counts every verdict and names what does not stand") {
+  const AuditReport& report = printed_paper();
+  const ShortAnswer answer = short_answer(report);
+  const std::string text = to_text(answer);
+  CHECK(std::ranges::count(text, '\n') <= static_cast<std::ptrdiff_t>(kAnswerLines));
+  CHECK_THAT(text, !Contains("more lines of claims"));
+  for (const Finding& f : report.findings) {
+    CAPTURE(f.id);
+    CHECK((text.find(f.id) != std::string::npos) != f.stands());
+  }
+  for (const auto& verdict : kAuditVerdicts) {
+    const std::string count =
+        fmt::format("{:<21}{:>4}", verdict.text, report.count(verdict.meaning));
+    CHECK_THAT(text, Contains(count));
+  }
+  // The diameter of a flat punch, sqrt(4 F / (pi p)) of 0.196 N at 6.9 kPa.
+  const double diameter_mm = 1e3 * std::sqrt(4.0 / std::numbers::pi * 0.196 / 6.9e3);
+  CHECK_THAT(text,
+             Contains(fmt::format("creep-probe: printed 4 mm, recomputed {:.3f} mm", diameter_mm)));
 }

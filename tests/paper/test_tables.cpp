@@ -1,4 +1,5 @@
 // Printed digits and Tables 1-5: the windows at their edges, and the counts of explained cells.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>
@@ -200,4 +201,37 @@ TEST_CASE("JSON has all 48 cells, and every format is the same each time") {
 
 TEST_CASE("CSV cells with commas and quotes are quoted") {
   CHECK(csv_line({"a", "b,c", "d\"e"}) == "a,\"b,c\",\"d\"\"e\"\n");
+}
+
+TEST_CASE(
+    "The short answer of the tables has a row per depth and spacing, and marks what does not "
+    "follow") {
+  const TablesResult result = printed_paper();
+  const ShortAnswer answer = short_answer(result);
+  REQUIRE(answer.rows.size() == result.rows.size());
+  const std::string text = to_text(answer);
+  CHECK(std::ranges::count(text, '\n') <= static_cast<std::ptrdiff_t>(kAnswerLines));
+  for (const std::string& row : answer.rows) CHECK(text.find(row) != std::string::npos);
+  const auto marked = [](const std::string& words) {
+    std::ptrdiff_t count = 0;
+    for (std::size_t at = words.find(", not "); at != std::string::npos;
+         at = words.find(", not ", at + 1)) {
+      ++count;
+    }
+    return count;
+  };
+  const CellCounts& forces = result.summary.force_from_printed_lambda1;
+  const CellCounts& lambda1 = result.summary.lambda1;
+  CHECK(marked(text) == forces.cells - forces.explained() + lambda1.cells - lambda1.explained());
+  CHECK_THAT(text, Catch::Contains("0.3024 N, not 0.301"));
+}
+
+TEST_CASE("A short answer of many rows says how many are left out, and keeps the counts") {
+  TableRequest request;
+  request.spacings_m.clear();
+  for (int i = 0; i < 30; ++i) request.spacings_m.push_back(0.020 + 0.0005 * i);
+  const ShortAnswer answer = short_answer(printed_paper(request));
+  const std::string text = to_text(answer);
+  CHECK(std::ranges::count(text, '\n') <= static_cast<std::ptrdiff_t>(kAnswerLines));
+  CHECK_THAT(text, Catch::Contains("more rows") && Catch::Contains("lambda1: "));
 }

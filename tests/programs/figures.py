@@ -26,10 +26,15 @@ def main():
     figure = {"id": "a", "title": "", "caption": "", "panels": [
         panel("one", {**axis, "lower": 0, "upper": 30}, [series('mine id="x"', "derived", [0, 5, 31, 4000])]),
         panel("(b) two", axis, [series("readings", "measured", [float(i % 7) for i in range(200)])])]}
+    band = {"kind": "band", "label": "requirement", "provenance": "assumed", "x": [0.6, 1.4], "lower": [-10, -10], "upper": [10, 10]}
+    of_names = panel("", {**axis, "names": ["linear", "power-1"]}, [band, series("E", "derived", [1.0, 2.0])])
+    of_names["x"]["names"] = ["peak force", "half time"]
+    numbered = panel("", axis, of_names["series"])
+    figures = [figure] + [{"id": id, "title": "", "caption": "", "panels": [p]} for id, p in (("b", of_names), ("c", numbered))]
     faults = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "figures.json").write_text(json.dumps({"figures": [figure]}))
+        (folder / "figures.json").write_text(json.dumps({"figures": figures}))
         for run in ("x", "y"):
             subprocess.run([sys.executable, SCRIPT, folder / "figures.json", folder / run, "--print"], check=True)
         for ending in ("svg", "png", "pdf"):
@@ -41,6 +46,15 @@ def main():
                 faults.append(f"no text '{wanted}' in the SVG: {words}")
         if not any("[derived] computed from the data" in (w or "") for w in words) or any("printed" in (w or "") for w in words):
             faults.append(f"provenance is not that of the data: {words}")
+        words = [e.text for e in tree.parse(folder / "x/b.svg").iter() if e.tag.endswith("}text")]
+        for wanted in ("linear", "power-1", "peak force", "half time"):
+            if wanted not in words:
+                faults.append(f"no name '{wanted}' at an axis: {words}")
+        if "<pattern" in (folder / "x/b.svg").read_text(encoding="utf-8"):
+            faults.append("a band is hatched: what is drawn over it cannot be read")
+        heights = [tree.parse(folder / f"x/{id}.svg").getroot().get("height") for id in "bc"]
+        if heights[0] != heights[1]:
+            faults.append(f"names that stand upright take room below as if they stood aslant: {heights}")
         png = (folder / "x/a.png").read_bytes()
         if int.from_bytes(png[16:20], "big") != 2670:  # 8.9 inches at 300 dpi
             faults.append("the PNG has not 300 dpi")

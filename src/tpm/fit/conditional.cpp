@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/law.hpp"
@@ -25,17 +26,23 @@ namespace {
 
 constexpr int kReadableDigits = 4;
 
+/// The next bound, or the old one where they differ by no more than rounding.
+double moved_bound(double old, double next) {
+  constexpr double kRounding = 1e-9;
+  return std::abs(next - old) <= kRounding * std::abs(old) ? old : next;
+}
+
 /// The next lower bound; the old one where there is no room.
 double further_down(const FitParameter& p, double widest) {
   const double next =
       p.scale == Scale::linear ? p.start - 2.0 * (p.start - p.lower) : p.lower / 10.0;
-  return std::min(p.lower, std::max(rounded(next, kReadableDigits), widest));
+  return moved_bound(p.lower, std::min(p.lower, std::max(rounded(next, kReadableDigits), widest)));
 }
 
 double further_up(const FitParameter& p, double widest) {
   const double next =
       p.scale == Scale::linear ? p.start + 2.0 * (p.upper - p.start) : p.upper * 10.0;
-  return std::max(p.upper, std::min(rounded(next, kReadableDigits), widest));
+  return moved_bound(p.upper, std::max(p.upper, std::min(rounded(next, kReadableDigits), widest)));
 }
 
 /// Whether the bound of a nuisance parameter cuts the interval of another parameter.
@@ -128,7 +135,7 @@ std::string bound_flag(const FitResult& result, const ParameterResult& nuisance)
   }
   const std::string where =
       fmt::format("{} is on its {} bound {}", p.name, upper ? "upper" : "lower",
-                  in_unit(p, upper ? p.upper : p.lower));
+                  in_sized_unit(nuisance, upper ? p.upper : p.lower));
   if (names.empty()) return where + "; no other parameter depends on it";
   return fmt::format("{}: what is said of {} holds only there", where, fmt::join(names, ", "));
 }
@@ -140,9 +147,27 @@ std::string condition_words(const ParameterResult& p, const std::vector<Paramete
         all, [&](const ParameterResult& other) { return other.parameter.name == c.parameter; });
     words += fmt::format("; {} {} at its {} bound {}",
                          c.at_estimate ? "this holds only with" : "its interval ends with",
-                         c.parameter, c.upper ? "upper" : "lower", in_unit(of->parameter, c.value));
+                         c.parameter, c.upper ? "upper" : "lower", in_sized_unit(*of, c.value));
   }
   return words;
+}
+
+/// With as many digits as tell the bounds before and after apart.
+std::string widening_words(const ParameterResult& p) {
+  constexpr int kFewest = 4, kMost = 17;
+  const Unit& unit = p.parameter.unit;
+  const auto range = [&](double lower, double upper, int digits) {
+    return fmt::format("{} .. {}", with_unit(significant(lower / unit.to_si, digits), unit),
+                       with_unit(significant(upper / unit.to_si, digits), unit));
+  };
+  std::string before, after;
+  for (int digits = kFewest; digits <= kMost && before == after; ++digits) {
+    before = range(p.first_bounds->lower, p.first_bounds->upper, digits);
+    after = range(p.parameter.lower, p.parameter.upper, digits);
+  }
+  return fmt::format(
+      "the automatic bounds of {} were widened from {} to {}: the fit pressed on them",
+      p.parameter.name, before, after);
 }
 
 }  // namespace
@@ -200,12 +225,7 @@ void mark_conditions(FitResult& result, const ResidualFunction& function) {
   for (ParameterResult& p : all) p.words += condition_words(p, all);
   for (const ParameterResult& p : all) {
     if (p.first_bounds) {
-      result.flags.push_back(fmt::format(
-          "the automatic bounds of {} were widened from {} .. {} to {} .. {}: the fit pressed on "
-          "them",
-          p.parameter.name, in_unit(p.parameter, p.first_bounds->lower),
-          in_unit(p.parameter, p.first_bounds->upper), in_unit(p.parameter, p.parameter.lower),
-          in_unit(p.parameter, p.parameter.upper)));
+      result.flags.push_back(widening_words(p));
     }
     if (p.nuisance && (p.at_lower_bound || p.at_upper_bound)) {
       result.flags.push_back(bound_flag(result, p));

@@ -7,6 +7,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/data/straight_pieces.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::fit {
@@ -98,8 +99,8 @@ void flag_priors(FitResult& result) {
     const ParameterResult& p = result.parameters[i];
     result.flags.push_back(fmt::format(
         "{} = {} beside {} +- {}{}: {} of this uncertainty away", p.parameter.name,
-        in_unit(p.parameter, p.estimate), in_unit(p.parameter, prior->mean),
-        in_unit(p.parameter, prior->sd), prior->from.empty() ? "" : " (" + prior->from + ")",
+        in_sized_unit(p, p.estimate), in_sized_unit(p, prior->mean), in_sized_unit(p, prior->sd),
+        prior->from.empty() ? "" : " (" + prior->from + ")",
         significant(std::abs(p.estimate - prior->mean) / prior->sd, 2)));
   }
 }

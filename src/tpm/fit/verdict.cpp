@@ -7,6 +7,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/quantity_text.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 
 namespace tpm::fit {
@@ -55,6 +56,17 @@ std::string_view verdict_name(Verdict verdict) noexcept {
 
 std::string in_unit(const FitParameter& parameter, double natural) {
   return with_unit(significant(natural / parameter.unit.to_si, 4), parameter.unit);
+}
+
+double size_of(const ParameterResult& p) {
+  constexpr double kNearZero = 0.01;  // of the further limit
+  const double limit = std::max(std::abs(p.lower.value_or(0.0)), std::abs(p.upper.value_or(0.0)));
+  return std::abs(p.estimate) < kNearZero * limit ? limit : p.estimate;
+}
+
+std::string in_sized_unit(const ParameterResult& p, double natural) {
+  const Unit unit = sized_unit(p.parameter.unit, size_of(p));
+  return with_unit(significant(natural / unit.to_si, 4), unit);
 }
 
 Verdict verdict_of(const ParameterResult& p) {

@@ -16,6 +16,14 @@ namespace tpm::fit {
 /// The verdict with what it rests on: "identified, conditional on contact at its lower bound".
 [[nodiscard]] std::string verdict_text(const ParameterResult& parameter);
 
+/// What the unit of a parameter is chosen by (sized_unit()): its estimate, or the further limit
+/// where the estimate is near 0 and says nothing of the size of the interval.
+[[nodiscard]] double size_of(const ParameterResult& parameter);
+
+/// "215.7 uN": a value in the unit in which a short answer shows the parameter, 4 significant
+/// digits.
+[[nodiscard]] std::string in_sized_unit(const ParameterResult& parameter, double natural);
+
 /// One limit of the interval in the parameter's own unit, "open" where the bound came first, or
 /// "failed" where the profile did.
 [[nodiscard]] std::string limit_text(const ParameterResult& parameter, bool upper);

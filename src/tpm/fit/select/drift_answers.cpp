@@ -187,15 +187,15 @@ std::string drift_words(const DriftAnswers& answers, const FitResult& fit) {
       "{}: not separable, for no rest without a load tells the drift well enough: {} = {} without "
       "a "
       "drift of the zero",
-      lasting->not_separable, k.name, in_unit(k, answers.k_inf));
+      lasting->not_separable, k.name, in_sized_unit(*lasting, answers.k_inf));
   if (!answers.drifting) return words + "; no fit with one was found";
   const Unit& rate = answers.rate;
   std::string drifts;
   for (const double drift : answers.drift_per_s) {
     drifts += fmt::format("{}{}", drifts.empty() ? "" : ", ", significant(drift / rate.to_si, 3));
   }
-  return words +
-         fmt::format(", {} with one of {} {}", in_unit(k, *answers.drifting), drifts, rate.symbol);
+  return words + fmt::format(", {} with one of {} {}", in_sized_unit(*lasting, *answers.drifting),
+                             drifts, rate.symbol);
 }
 
 }  // namespace tpm::fit

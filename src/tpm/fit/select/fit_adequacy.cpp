@@ -74,8 +74,8 @@ std::string drift_off(const FitResult& fit, std::size_t choice, double level) {
     if (std::abs(p.estimate - rests.mean) <= far * std::hypot(rests.sd, *p.standard_error))
       return {};
     return fmt::format("it takes a drift of {}, and the rests tell {} +- {}",
-                       in_unit(p.parameter, p.estimate), in_unit(p.parameter, rests.mean),
-                       in_unit(p.parameter, rests.sd));
+                       in_sized_unit(p, p.estimate), in_sized_unit(p, rests.mean),
+                       in_sized_unit(p, rests.sd));
   }
   return {};
 }

@@ -13,6 +13,7 @@
 #include "tpm/fit/select/fixed_times.hpp"
 #include "tpm/fit/select/function_starts.hpp"
 #include "tpm/fit/select/gate.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
@@ -179,7 +180,7 @@ std::vector<std::string> range_warnings(const FitResult& fit, const FunctionSize
     const bool early = p.estimate < sizes.shortest_s;
     if (!early && p.estimate <= sizes.longest_s) continue;
     warnings.push_back(fmt::format("{} = {} lies outside the measured range ({} s to {} s)",
-                                   p.parameter.name, in_unit(p.parameter, p.estimate),
+                                   p.parameter.name, in_sized_unit(p, p.estimate),
                                    significant(sizes.shortest_s, 3),
                                    significant(sizes.longest_s, 3)));
   }

@@ -8,6 +8,7 @@
 
 #include "tpm/base/text.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -125,19 +126,18 @@ std::vector<std::string> protocol_warnings(const FitResult& fit,
       warnings.push_back(fmt::format(
           "{} = {} is shorter than the shortest ramp ({} s): what relaxed during the ramp is known "
           "only through the ramp's shape; a faster ramp would show it",
-          p.parameter.name, in_unit(p.parameter, p.estimate), significant(ramp_s, 3)));
+          p.parameter.name, in_sized_unit(p, p.estimate), significant(ramp_s, 3)));
     }
     if (hold_s > 0.0 && p.estimate > hold_s / 3.0) {
       warnings.push_back(fmt::format(
           "{} = {} is long for the longest hold ({} s): no plateau is seen; hold for at least {} s",
-          p.parameter.name, in_unit(p.parameter, p.estimate), significant(hold_s, 3),
+          p.parameter.name, in_sized_unit(p, p.estimate), significant(hold_s, 3),
           significant(3.0 * p.estimate, 2)));
     }
     if (p.estimate < kLeastSamples * step_s) {
       warnings.push_back(fmt::format(
           "{} = {} is sampled by fewer than {} points ({} s apart): sampling cannot support it",
-          p.parameter.name, in_unit(p.parameter, p.estimate), kLeastSamples,
-          significant(step_s, 3)));
+          p.parameter.name, in_sized_unit(p, p.estimate), kLeastSamples, significant(step_s, 3)));
     }
   }
   return warnings;

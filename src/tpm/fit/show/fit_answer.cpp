@@ -30,17 +30,9 @@ std::string sized_limit(const ParameterResult& p, bool upper, const Unit& unit) 
   return limit ? significant(*limit / unit.to_si, 4) : limit_text(p, upper);
 }
 
-/// What the unit of a row is chosen by: an estimate near 0 says nothing of the size of its
-/// interval.
-double size_of_row(const ParameterResult& p) {
-  constexpr double kNearZero = 0.01;  // of the further limit
-  const double limit = std::max(std::abs(p.lower.value_or(0.0)), std::abs(p.upper.value_or(0.0)));
-  return std::abs(p.estimate) < kNearZero * limit ? limit : p.estimate;
-}
-
 std::string parameter_row(const ParameterResult& p) {
   constexpr double kNothing = 1e-4;  // of the size of the row
-  const double size = size_of_row(p);
+  const double size = size_of(p);
   const Unit unit = sized_unit(p.parameter.unit, size);
   const double shown = std::abs(p.estimate) < kNothing * std::abs(size) ? 0.0 : p.estimate;
   const std::string interval =

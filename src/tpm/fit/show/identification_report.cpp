@@ -68,8 +68,8 @@ Panel width_panel(const Identification& id) {
 
 Panel law_panel(const Identification& id) {
   Panel panel{.x = {"time", "s"},
-              .y = {"simplest law, by its place", "", false, 0.5,
-                    0.5 + static_cast<double>(id.laws.size())}};
+              .y = {"simplest law", "", false, 0.5, 0.5 + static_cast<double>(id.laws.size())}};
+  for (const LawSpec& law : id.laws) panel.y.names.push_back(law_name(law));
   for (std::size_t law = 0; law < id.laws.size(); ++law) {
     Series s{
         .kind = Series::Kind::points, .label = law_name(id.laws[law]), .provenance = "derived"};

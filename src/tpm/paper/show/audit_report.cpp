@@ -1,6 +1,11 @@
 // Declared in tpm/paper/show/study_report.hpp.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "tpm/base/printed_number.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/paper/show/study_report.hpp"
@@ -64,21 +69,75 @@ std::string summary_text(const AuditReport& report) {
                      }));
 }
 
+/// "creep-probe +50 %"
+std::string named_with_difference(const Finding& finding) {
+  if (finding.verdict != AuditVerdict::differs || !finding.difference_percent) return finding.id;
+  return fmt::format("{} {}", finding.id, percent_text(*finding.difference_percent));
+}
+
+/// The claims of a verdict, so many to a line as fit; of those that stand the number is enough.
+std::vector<std::string> verdict_lines(const AuditReport& report,
+                                       const Word<AuditVerdict>& verdict) {
+  constexpr std::size_t kNames = 27;
+  std::string names;
+  for (const Finding& finding : report.findings) {
+    if (finding.verdict != verdict.meaning || finding.stands()) continue;
+    names += (names.empty() ? "" : ", ") + named_with_difference(finding);
+  }
+  std::string all = fmt::format("{:<21}{:>4}  {}", verdict.text, report.count(verdict.meaning),
+                                wrapped(names, kWidth + 16, kNames, kNames));
+  all.erase(all.find_last_not_of(' ') + 1);
+  std::vector<std::string> lines;
+  for (std::size_t from = 0; from < all.size();) {
+    const std::size_t end = std::min(all.find('\n', from), all.size());
+    lines.push_back(all.substr(from, end - from));
+    from = end + 1;
+  }
+  return lines;
+}
+
+/// Findings with another number, the largest difference first.
+std::vector<const Finding*> furthest_off(const AuditReport& report) {
+  std::vector<const Finding*> found;
+  for (const Finding& finding : report.findings) {
+    if (finding.verdict == AuditVerdict::differs && finding.difference_percent) {
+      found.push_back(&finding);
+    }
+  }
+  std::ranges::stable_sort(found, std::greater<>(), [](const Finding* finding) {
+    return std::abs(*finding->difference_percent);
+  });
+  return found;
+}
+
 }  // namespace
 
-std::string audit_text(const AuditReport& report, bool all) {
+std::string audit_text(const AuditReport& report) {
   std::string out = report.title + "\n\n";
-  std::size_t left_out = 0;
-  for (const Finding& finding : report.findings) {
-    if (finding.stands() && !all) {
-      ++left_out;
-      continue;
-    }
-    out += finding_text(finding);
-  }
-  if (left_out > 0)
-    out += fmt::format("{} claims that hold are not shown (--verbose).\n", left_out);
+  for (const Finding& finding : report.findings) out += finding_text(finding);
   return out + summary_text(report);
+}
+
+ShortAnswer short_answer(const AuditReport& report) {
+  constexpr std::size_t kFurthest = 5;
+  ShortAnswer answer;
+  answer.conclusion = {report.title, summary_text(report)};
+  answer.head = {"verdict             claims  which do not stand"};
+  for (const auto& verdict : kAuditVerdicts) {
+    if (report.count(verdict.meaning) == 0) continue;
+    for (std::string& line : verdict_lines(report, verdict)) answer.rows.push_back(std::move(line));
+  }
+  answer.rest = [count = answer.rows.size()](std::size_t from) {
+    return fmt::format("... and {} more lines of claims: --verbose", count - from);
+  };
+  const std::vector<const Finding*> furthest = furthest_off(report);
+  for (std::size_t i = 0; i < std::min(furthest.size(), kFurthest); ++i) {
+    const Finding& f = *furthest[i];
+    answer.limits.push_back(fmt::format(
+        "{} {}: {} {}, recomputed {} ({})", i == 0 ? "furthest off:" : "             ", f.id,
+        f.printed.empty() ? "derived" : "printed", f.compared(), f.recomputed_words(), f.where));
+  }
+  return answer;
 }
 
 }  // namespace tpm::paper

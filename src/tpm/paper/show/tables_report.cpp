@@ -177,7 +177,56 @@ std::vector<std::string> csv_cells(std::string_view quantity, double depth_m, do
   return cells;
 }
 
+/// "0.3024 N", and "0.3024 N, not 0.301" where the printed digits do not follow: a force from the
+/// printed lambda1, as the paper computed it.
+std::string cell_words(const TableCell& cell, double to_display, std::string_view unit) {
+  std::string words = fmt::format("{} {}", significant(cell.value * to_display, 4), unit);
+  if (!cell.printed) return words;
+  const DigitCheck& check =
+      cell.printed->from_printed_lambda1.value_or(cell.printed->from_computed_lambda1);
+  CellCounts counts;
+  counts.add(check);
+  if (counts.explained() == 0) words += fmt::format(", not {}", check.printed.text);
+  return words;
+}
+
+std::string short_row(const std::string& depth, const std::string& spacing,
+                      const std::string& lambda1, const std::string& peak, const std::string& end) {
+  return fmt::format("{:>8}  {:>8}  {:<22}  {:<22}  {}", depth, spacing, lambda1, peak, end);
+}
+
+std::string band_words(const std::vector<BandRow>& bands) {
+  const auto inside = std::ranges::count_if(bands, &BandRow::inside);
+  return fmt::format("Relaxed forces at x = {}: {} of {} inside the measured band.",
+                     spacing_text(bands.front().spacing_m), inside, bands.size());
+}
+
 }  // namespace
+
+ShortAnswer short_answer(const TablesResult& result) {
+  ShortAnswer answer;
+  answer.conclusion = {fmt::format("{}", fmt::join(introduction(result.request), " "))};
+  answer.head = {short_row("depth", "x", "lambda1", "peak force", "end force")};
+  for (const TableRow& row : result.rows) {
+    const std::vector<Line> lines = lines_of(row);
+    std::vector<std::string> cells;
+    for (const Line& line : lines) {
+      cells.push_back(cell_words(*line.cell, line.to_display, line.unit));
+    }
+    answer.rows.push_back(short_row(spacing_text(row.depth_m), spacing_text(row.spacing_m),
+                                    cells[0], cells[1], cells[2]));
+  }
+  answer.rest = [count = answer.rows.size()](std::size_t from) {
+    return fmt::format("... and {} more rows, counted below", count - from);
+  };
+  const TableSummary& s = result.summary;
+  if (s.lambda1.cells == 0) return answer;
+  answer.limits = {counts_text("lambda1", s.lambda1),
+                   counts_text("Forces from the printed lambda1", s.force_from_printed_lambda1),
+                   counts_text("Forces from the computed lambda1", s.force_from_computed_lambda1)};
+  if (!result.bands.empty()) answer.limits.back() += " " + band_words(result.bands);
+  return answer;
+}
 
 TableDocument tables_document(const TablesResult& result) {
   TableDocument document;
