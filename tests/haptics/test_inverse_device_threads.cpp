@@ -8,8 +8,7 @@
 #include <functional>
 #include <thread>
 
-#include "hil_scenes.hpp"
-#include "stand_in_inverse.hpp"
+#include "inverse_sessions.hpp"
 #include "temp_folder.hpp"
 #include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/session/identify_run.hpp"
@@ -23,55 +22,10 @@ namespace {
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using namespace std::chrono_literals;
+using namespace test::inverse_sessions;
 using test::StandInFaults;
 using test::StandInInverse;
 using How = StandInFaults::How;
-
-/// The short session within the limits of the device, on a tissue of half the stiffness.
-Json inverse_session() {
-  Json json = test::short_session();
-  for (const char* modulus : {"E1", "E2", "Eprime"}) {
-    json["model"]["scene"]["material"][modulus] = "6 kPa";
-  }
-  json["model"]["scene"]["material"]["eta1"] = "1.2e4 Pa s";
-  json["limits"] = {{"force", "3 N"}};
-  return json;
-}
-
-/// With a plant that is later by some milliseconds.
-PlantSettings plant_of(const HilSession& session, int late_ms) {
-  PlantSettings plant = session.plant;
-  plant.period_s = session.servo.period_s;
-  plant.push = session.servo.push;
-  plant.delay_periods = late_ms;
-  return plant;
-}
-
-DeviceChoice choice_of(const StandInInverse& service) {
-  DeviceChoice choice;
-  choice.kind = "inverse3";
-  choice.inverse.port = service.port();
-  choice.inverse.events_port = service.events_port();
-  choice.inverse.old_http_port = service.port();
-  return choice;
-}
-
-std::string error_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
-}
-
-/// Message with which a device on such a service cannot be opened.
-std::string refusal(const StandInFaults& faults, const std::string& id = {}) {
-  StandInInverse service(PlantSettings{}, {}, false, faults);
-  InverseAddress address{service.port(), service.events_port(), service.port(), id};
-  InverseDevice device(address, limits_of("inverse3"), false);
-  return error_of([&] { (void)device.open(); });
-}
 
 TEST_CASE("A service is opened in both formats, made neutral, and what it says is recorded") {
   for (const bool old : {false, true}) {
@@ -117,7 +71,7 @@ TEST_CASE("A service is opened in both formats, made neutral, and what it says i
 
 TEST_CASE("A service that is not what it should be is refused with the reason") {
   StandInFaults f;
-  f.gate_stays = 0.3;
+  f.keeps = {"force_gate"};
   CHECK_THAT(refusal(f), Contains("force gate of the service stays at 0.3"));
   f = {};
   f.names_no_filters = true;
@@ -134,17 +88,22 @@ TEST_CASE("A service that is not what it should be is refused with the reason") 
     CHECK_THAT(refusal(f), Contains("does not say what its damping does to a force"));
   }
   f = {};
-  f.damping_stays = 0.5;
+  f.damping = 0.5;
+  f.keeps = {"damping"};
   CHECK_THAT(refusal(f), Contains("damping of the service stays at 0.5"));
+  f.damping = 0.0;
+  f.damping_along_z = 0.2;
+  CHECK_THAT(refusal(f), Contains("damping of the service stays at 0, by direction 0 0 0.2"));
   f = {};
   f.scale = 2.0;
   CHECK_THAT(refusal(f), Contains("scales coordinates"));
   for (const char* version : {"3.5.0.0", "3.1.0.0"}) {
     f = {};
     f.version = version;
-    f.preset_stays = "defaults";
+    f.keeps = {"preset", "basis", "mount", "gravity_compensation"};
+    f.gravity = 1.0;
     CHECK_THAT(refusal(f), Contains("preset of the service stays at 'defaults'"));
-    f.preset_stays = {};
+    f.preset = kCentredPreset;
     f.basis = "YXZ";
     CHECK_THAT(refusal(f), Contains("exchanges axes: basis YXZ; expected basis XYZ"));
     f.basis = "XYZ";
@@ -173,48 +132,6 @@ TEST_CASE("A service that is not what it should be is refused with the reason") 
   InverseDevice nobody({1, 1, 1, ""}, limits_of("inverse3"), false);
   CHECK_THAT(error_of([&] { (void)nobody.open(); }),
              Contains("port 1 of this machine: nobody answers"));
-}
-
-TEST_CASE("What no message sets is set over HTTP, read back and recorded") {
-  for (const char* version : {"3.5.0.0", "3.1.0.0"}) {
-    CAPTURE(version);
-    StandInFaults f;
-    f.version = version;
-    StandInInverse service(PlantSettings{}, {}, false, f);
-    const InverseAddress address{service.port(), service.events_port(), service.port(), ""};
-    InverseDevice device(address, limits_of("inverse3"), false);
-    const std::vector<std::string> lines = device.open().assumptions;
-    CHECK(service.carried() == 1.0);
-    CHECK_THAT(fmt::format("{}", fmt::join(lines, "\n")),
-               Contains("gravity compensation on, factor 1"));
-    CHECK(service.posts().size() == 1);
-    InverseAddress half = address;
-    half.gravity_carried = 0.5;
-    InverseDevice again(half, limits_of("inverse3"), false);
-    CHECK_THAT(fmt::format("{}", fmt::join(again.open().assumptions, "\n")),
-               Contains("gravity compensation on, factor 0.5"));
-    InverseAddress none = address;
-    none.gravity_carried = 0.0;
-    InverseDevice last(none, limits_of("inverse3"), false);
-    (void)last.open();
-    CHECK(service.carried() == 0.0);
-    f.no_posts = true;
-    CHECK_THAT(refusal(f), Contains("stays at carrying 0 of the device's weight; expected 1, or "
-                                    "--inverse-gravity with what it keeps"));
-  }
-  // Settings of the session, where the message is not heard.
-  StandInFaults f;
-  f.settings_by_http = true;
-  StandInInverse service(PlantSettings{}, {}, false, f);
-  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"), false);
-  (void)device.open();
-  CHECK_THAT(service.posts(), Catch::Matchers::UnorderedEquals(std::vector<std::string>{
-                                  "/inverse3/049D/config/gravity_compensation",
-                                  "/inverse3/049D/config/preset?session=%237",
-                                  "/inverse3/049D/config/force_gate?session=%237"}));
-  f.no_posts = true;
-  CHECK_THAT(refusal(f), Contains("preset of the service stays at 'defaults'"));
 }
 
 /// In real time, at 1 kHz.
@@ -346,6 +263,34 @@ TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any
     UNSCOPED_INFO(
         fmt::format("{} ms put in: max/peak {:.3g} %", late_ms, 1e2 * v.all.max_N / v.all.peak_N));
   }
+}
+
+TEST_CASE("A measurement goes on after a lost connection, and says so") {
+  const HilSession session = test::parsed(inverse_session());
+  constexpr int kLate_ms = 2;
+  PlantSettings free = plant_of(session, kLate_ms);
+  free.arm = {1e-9, 0.0, 0.0, 0.0};
+  StandInFaults faults;
+  faults.how = How::close;
+  faults.from = 3000;
+  StandInInverse service(free, {}, false, faults);
+  DeviceIdentifyOptions options;
+  options.duration_s = 8.0;
+  const IdentifyRun run = run_identification(choice_of(service), session, options);
+  CAPTURE(word_of(run.outcome.cause), run.outcome.device.error_text);
+  CHECK(run.outcome.cause == StopCause::finished);
+  CHECK(run.begun_again == 1);
+  CHECK(run.found.stalls == 1);  // nothing is known of the time between the connections
+  REQUIRE(run.found.delay_mean_s);
+  CHECK_THAT(*run.found.delay_mean_s, WithinAbs(1e-3 * kLate_ms, 0.5e-3 + 1e-9));
+  const Json file = device_file_json(run, "2026-11-28");
+  CHECK(file.at("measurement").at("begun_again") == 1);
+  CHECK(file.at("measurement").at("stalled_s").get<double>() > 0.4);
+  // One that never answers again is an error.
+  faults.how = How::silence;
+  StandInInverse silent(free, {}, false, faults);
+  CHECK_THAT(error_of([&] { (void)run_identification(choice_of(silent), session, options); }),
+             Contains("the service is silent"));
 }
 
 /// A session, message by message, on a service that goes wrong.

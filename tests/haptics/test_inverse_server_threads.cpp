@@ -29,7 +29,7 @@ using Catch::Matchers::WithinAbs;
 using namespace std::chrono_literals;
 using files::Json;
 
-constexpr double kSoon_s = 5.0;
+constexpr double kSoon_s = 60.0;  // on a machine that is busy, too
 
 /// A server with a hand that notes what it is asked, and no tissue.
 class NotingHand final : public ServedHand {
@@ -174,7 +174,7 @@ TEST_CASE("One client drives, a second reads only until the first has left") {
   CHECK(served.hand.pushes == 1);
   first.reset();
   double newtons = 0.0;
-  for (int i = 0; i < 100 && newtons == 0.0; ++i) {
+  for (int i = 0; i < 6000 && newtons == 0.0; ++i) {
     newtons = state_after(*second, push_of(3.0)).force_N.z();
     std::this_thread::sleep_for(10ms);
   }
@@ -200,8 +200,8 @@ TEST_CASE("A client that does not read is closed, and connections are counted") 
   Served served;
   const auto deaf = served.client();
   bool taken = true;
-  for (int i = 0; i < 200'000 && taken; ++i) taken = deaf->send("{}", 0.5);
-  for (int i = 0; i < 200 && served.server->counts().closed_for_fault == 0; ++i) {
+  for (int i = 0; i < 200'000 && taken; ++i) taken = deaf->send("{}", kSoon_s);
+  for (int i = 0; i < 6000 && served.server->counts().closed_for_fault == 0; ++i) {
     std::this_thread::sleep_for(10ms);
   }
   CHECK(served.server->counts().closed_for_fault == 1);
@@ -288,11 +288,11 @@ std::string served_push(const Eigen::Vector3d& force_N) {
   return force_message(InverseFormat::vector, "SIMULATED", force_N);
 }
 
-/// Until the state is as wanted, or for 5 s.
+/// Until the state is as wanted, or for a minute.
 InverseState when(WebSocketClient& client, const std::string& message,
                   const std::function<bool(const InverseState&)>& wanted) {
   InverseState state;
-  for (int i = 0; i < 5000; ++i) {
+  for (int i = 0; i < 60'000; ++i) {
     state = served_state(client, message);
     if (wanted(state)) break;
     std::this_thread::sleep_for(1ms);
@@ -304,7 +304,7 @@ TEST_CASE("A client's force moves the simulated hand, never above the limit, and
   Json json = test::short_session();
   json["limits"]["force"] = "3 N";
   double silent_N = 1.0, moved_m = 0.0, strong_N = 0.0;
-  const ServeRun run = with_session(json, 60.0, [&](WebSocketClient& client) {
+  const ServeRun run = with_session(json, 600.0, [&](WebSocketClient& client) {
     const double before_m = served_state(client, "{}").position_m.x();
     const auto pushed = [&](const InverseState& s) { return s.position_m.x() > before_m + 5e-3; };
     moved_m = when(client, served_push({2.0, 0.0, 0.0}), pushed).position_m.x() - before_m;
@@ -328,7 +328,7 @@ TEST_CASE("A client's force moves the simulated hand, never above the limit, and
 
 TEST_CASE("A hand that a client moves into the tissue meets its force") {
   double tissue_N = 0.0, depth_m = 0.0;
-  const ServeRun run = with_session(test::short_session(), 60.0, [&](WebSocketClient& client) {
+  const ServeRun run = with_session(test::short_session(), 600.0, [&](WebSocketClient& client) {
     (void)served_state(client, neutral_message("SIMULATED", "test"));
     const std::string down =
         R"({"inverse3":[{"device_id":"SIMULATED","commands":{"set_cursor_position":{"position":{"x":0,"y":0,"z":-0.010}}}}]})";
@@ -353,7 +353,7 @@ TEST_CASE("The example client in Python is served in both formats, and names a s
   std::atomic<bool> done{false};
   ServeOptions options;
   options.port = options.events_port = 0;
-  options.duration_s = 60.0;
+  options.duration_s = 600.0;
   options.interrupted = [&done] { return done.load(); };
   options.opened = [&](const InverseServer& server, const DeviceIdentity&, const LoopModel&) {
     worker = std::thread([&, port = server.port()] {

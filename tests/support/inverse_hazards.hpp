@@ -195,7 +195,7 @@ inline std::vector<InverseHazardRow> inverse_hazard_rows(double watchdog_s, doub
   f.no_inventory = true;
   rows.push_back(refused("a dead service that accepts", "the service is silent", f));
   f = {};
-  f.gate_stays = 0.3;
+  f.keeps = {"force_gate"};
   rows.push_back(refused("the service gates forces", "force gate of the service stays at 0.3", f));
   f = {};
   f.names_no_filters = true;

@@ -3,6 +3,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <deque>
@@ -29,18 +30,18 @@ struct StandInFaults {
   bool no_inventory = false;  ///< it accepts and is silent
   bool no_events = false;     ///< nobody listens there
   bool names_no_filters = false, names_no_damping = false;
-  double gate_stays = 0.0, damping_stays = 0.0;  ///< what cannot be made neutral
-  double scale = 1.0;                            ///< of the mount
-  std::string preset_stays, basis = "XYZ";
-  double mount_turned_rad = 0.0;  ///< about x
+  /// What it begins with; each is set by HTTP, force gate, damping and preset by a message too.
+  std::string preset = "defaults", basis = "XYZ";
+  double gate = 0.3, damping = 0.0, damping_along_z = 0.0, gravity = 0.0;
+  double mount_turned_rad = 0.0, scale = 1.0;  ///< about x; of the mount
+  std::vector<std::string> keeps;              ///< names of those that it does not change
   std::vector<std::string> devices = {"049D"};
   std::string wrong_accept;       ///< in place of Sec-WebSocket-Accept
   bool settings_by_http = false;  ///< what a message configures is not heard
-  bool no_posts = false;          ///< what HTTP sets stays
   int unasked_states = 0;         ///< behind the inventory, of a hand at kElsewhere_m
   int answers = 1'000'000;        ///< after so many it is silent
   double late_s = 0.0;            ///< from a message to its state
-  /// From this message with a force on, what `how` says; 0: never.
+  /// From this message with a force on, what `how` says, a connection is closed once; 0: never.
   int from = 0;
   enum class How { silence, garbage, other_device, close, drop_every_third } how = How::silence;
 };
@@ -67,10 +68,9 @@ class StandInInverse {
   [[nodiscard]] Eigen::Vector3d last_N();
   [[nodiscard]] std::string last_profile();
   [[nodiscard]] InverseFormat last_format();
-  /// Share of the weight that it carries.
-  [[nodiscard]] double carried();
   /// Targets of what was posted.
   [[nodiscard]] std::vector<std::string> posts();
+  [[nodiscard]] InverseSettings settings();
 
  private:
   void accept_all();
@@ -78,9 +78,9 @@ class StandInInverse {
   [[nodiscard]] std::string http(const HttpHead& head, const std::string& body);
   void post(const std::string& target, const std::string& body);
   /// The texts that answer; nothing: this connection is over.
-  [[nodiscard]] std::optional<std::vector<std::string>> answer(const std::string& text,
-                                                               bool& centred);
-  [[nodiscard]] InverseInventory inventory(bool centred);
+  [[nodiscard]] std::optional<std::vector<std::string>> answer(const std::string& text);
+  [[nodiscard]] InverseInventory inventory();
+  [[nodiscard]] bool keeps(std::string_view name) const;
   void live();
 
   StandInFaults faults_;
@@ -96,8 +96,7 @@ class StandInInverse {
   std::string last_profile_;
   InverseFormat last_format_ = InverseFormat::vector;
   std::uint32_t buttons_ = 0;
-  bool gate_open_ = false, centred_ = false;
-  double carried_ = 0.0;
+  InverseSettings set_;
   std::vector<std::string> posts_;
   std::vector<int> listeners_;
   std::atomic<int> forces_{0};
@@ -145,6 +144,17 @@ inline StandInInverse::StandInInverse(const PlantSettings& plant, OperatorScript
       lived_until_ns_(now_ns()),
       accepting_([this] { accept_all(); }) {
   plant_.await();
+  set_.handedness = "left";
+  set_.preset = faults_.preset;
+  set_.basis = faults_.basis;
+  set_.mount_rotation = Eigen::AngleAxisd(faults_.mount_turned_rad, Eigen::Vector3d::UnitX());
+  set_.mount_scale *= faults_.scale;
+  set_.filters_named = true;
+  set_.force_gate_gain = faults_.gate;
+  set_.damping = faults_.damping;
+  set_.directional_damping.z() = faults_.damping_along_z;
+  set_.gravity_compensation = faults_.gravity > 0.0;
+  set_.gravity_scaling = faults_.gravity;
 }
 
 inline StandInInverse::~StandInInverse() {
@@ -188,9 +198,13 @@ inline InverseFormat StandInInverse::last_format() {
   return last_format_;
 }
 
-inline double StandInInverse::carried() {
+inline InverseSettings StandInInverse::settings() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return carried_;
+  return set_;
+}
+
+inline bool StandInInverse::keeps(std::string_view name) const {
+  return std::find(faults_.keeps.begin(), faults_.keeps.end(), name) != faults_.keeps.end();
 }
 
 inline std::vector<std::string> StandInInverse::posts() {
@@ -222,7 +236,7 @@ inline void StandInInverse::live() {
   }
 }
 
-inline InverseInventory StandInInverse::inventory(bool centred) {
+inline InverseInventory StandInInverse::inventory() {
   const std::lock_guard<std::mutex> lock(mutex_);
   live();
   InverseInventory all;
@@ -232,20 +246,9 @@ inline InverseInventory StandInInverse::inventory(bool centred) {
     entry.id = id;
     entry.type = "inverse3";
     entry.simulated = faults_.simulated;
-    entry.settings.handedness = "left";
-    entry.settings.preset = centred ? kCentredPreset : "defaults";
-    if (!faults_.preset_stays.empty()) entry.settings.preset = faults_.preset_stays;
-    entry.settings.basis = faults_.basis;
-    entry.settings.mount_rotation =
-        Eigen::AngleAxisd(faults_.mount_turned_rad, Eigen::Vector3d::UnitX());
-    entry.settings.filters_named = true;
-    entry.settings.force_gate_gain = gate_open_ ? faults_.gate_stays : 0.3;
-    entry.settings.damping = faults_.damping_stays;
-    entry.settings.gravity_compensation = carried_ > 0.0;
-    entry.settings.gravity_scaling = carried_;
-    entry.settings.mount_scale *= faults_.scale;
+    entry.settings = set_;
     entry.state.position_m = plant_.measured_m();
-    if (!centred) entry.state.position_m += stand_in::kCentre_m;
+    if (set_.preset != kCentredPreset) entry.state.position_m += stand_in::kCentre_m;
     all.devices.push_back(entry);
   }
   return all;
@@ -254,17 +257,33 @@ inline InverseInventory StandInInverse::inventory(bool centred) {
 inline void StandInInverse::post(const std::string& target, const std::string& body) {
   const std::lock_guard<std::mutex> lock(mutex_);
   posts_.push_back(target);
-  if (faults_.no_posts) return;
-  const auto sets = [&target](const char* name) { return target.find(name) != target.npos; };
+  const auto sets = [&](const char* name) {
+    return target.find(std::string("/") + name) != target.npos && !keeps(name);
+  };
   const auto set = files::parse_json(body, "body");
   if (sets("gravity_compensation")) {
     const bool old = faults_.version < "3.5";
-    carried_ = set.at(old ? "enable" : "enabled").get<bool>()
-                   ? set.at(old ? "gravity_scaling_factor" : "scaling_factor").get<double>()
-                   : 0.0;
+    set_.gravity_compensation = set.at(old ? "enable" : "enabled").get<bool>();
+    set_.gravity_scaling = set.at(old ? "gravity_scaling_factor" : "scaling_factor").get<double>();
   }
-  if (sets("/config/preset")) centred_ = set.at("preset") == std::string(kCentredPreset);
-  if (sets("/config/force_gate")) gate_open_ = set.at("gain") == 0;
+  if (sets("preset")) set_.preset = set.at("preset").get<std::string>();
+  if (sets("basis")) set_.basis = set.at("permutation").get<std::string>();
+  if (sets("force_gate")) set_.force_gate_gain = set.at("gain").get<double>();
+  const auto part = [](const auto& json, const char* key) {
+    return json.at(key).template get<double>();
+  };
+  if (sets("damping")) {
+    set_.damping = part(set, "scalar");
+    const auto along = set.at("vector");
+    set_.directional_damping = {part(along, "x"), part(along, "y"), part(along, "z")};
+  }
+  if (sets("mount")) {
+    const auto rotation = set.at("transform").at("rotation"),
+               scale = set.at("transform").at("scale");
+    set_.mount_rotation = {part(rotation, "w"), part(rotation, "x"), part(rotation, "y"),
+                           part(rotation, "z")};
+    set_.mount_scale = {part(scale, "x"), part(scale, "y"), part(scale, "z")};
+  }
 }
 
 inline std::string StandInInverse::http(const HttpHead& head, const std::string& body) {
@@ -279,7 +298,7 @@ inline std::string StandInInverse::http(const HttpHead& head, const std::string&
                        fmt::format(R"({{"project_version":"{}"}})", faults_.version));
   }
   if (path == (old ? "/3.0/devices" : "/devices")) {
-    std::string text = inventory_message(inventory(centred_));
+    std::string text = inventory_message(inventory());
     if (faults_.names_no_filters) {
       const std::size_t at = text.find("\"filters\"");
       text.replace(at, 9, "\"unnamed\"");
@@ -290,18 +309,23 @@ inline std::string StandInInverse::http(const HttpHead& head, const std::string&
   return http_answer("404 Not Found", "text/plain", "no\n");
 }
 
-inline std::optional<std::vector<std::string>> StandInInverse::answer(const std::string& text,
-                                                                      bool& centred) {
+inline std::optional<std::vector<std::string>> StandInInverse::answer(const std::string& text) {
   using How = StandInFaults::How;
   const std::vector<std::string> none;
   const InverseCommand command = parse_command(text, faults_.devices.at(0));
   InverseState state;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (command.force_gate_gain && !faults_.settings_by_http) gate_open_ = true;
-    if (faults_.settings_by_http) centred = centred_;
-    if (!command.preset.empty() && !faults_.settings_by_http)
-      centred = centred_ = command.preset == kCentredPreset;
+    if (!faults_.settings_by_http) {
+      if (command.force_gate_gain && !keeps("force_gate")) {
+        set_.force_gate_gain = *command.force_gate_gain;
+      }
+      if (command.damping && !keeps("damping")) {
+        set_.damping = *command.damping;
+        set_.directional_damping.setZero();  // the message has both
+      }
+      if (!command.preset.empty() && !keeps("preset")) set_.preset = command.preset;
+    }
     if (!command.profile.empty()) last_profile_ = command.profile;
     live();
     if (command.force_N) {
@@ -314,7 +338,7 @@ inline std::optional<std::vector<std::string>> StandInInverse::answer(const std:
       if (!on_the_clock_) plant_.advance();
     }
     state.position_m = plant_.measured_m();
-    if (!centred) state.position_m += stand_in::kCentre_m;
+    if (set_.preset != kCentredPreset) state.position_m += stand_in::kCentre_m;
     state.velocity_m_per_s = plant_.velocity_m_per_s();
     state.force_N = last_N_;
     state.has_grip = true;
@@ -324,7 +348,9 @@ inline std::optional<std::vector<std::string>> StandInInverse::answer(const std:
   std::string id = faults_.devices.at(0);
   if (faults_.from > 0 && forces_ >= faults_.from) {
     if (faults_.how == How::silence) return none;
-    if (faults_.how == How::close) return std::nullopt;
+    if (faults_.how == How::close && command.force_N && forces_ == faults_.from) {
+      return std::nullopt;
+    }
     if (faults_.how == How::garbage) {
       return std::vector<std::string>{R"({"inverse3": [{"device_id": )"};
     }
@@ -338,7 +364,7 @@ inline std::optional<std::vector<std::string>> StandInInverse::answer(const std:
 inline void StandInInverse::talk(Socket socket, bool events) {
   std::string head;
   WebSocketReader reader(WebSocketSide::server, 65'536);
-  bool open = false, centred = false;
+  bool open = false;
   std::deque<std::pair<std::int64_t, std::string>> late;  // when to send what
   if (events && faults_.no_events) return;
   while (!ending_) {
@@ -376,7 +402,7 @@ inline void StandInInverse::talk(Socket socket, bool events) {
         const std::lock_guard<std::mutex> lock(mutex_);
         listeners_.push_back(socket.handle());
       } else if (!faults_.no_inventory) {
-        stand_in::send_text(socket.handle(), inventory_message(inventory(false)));
+        stand_in::send_text(socket.handle(), inventory_message(inventory()));
         InverseState elsewhere;
         elsewhere.position_m = stand_in::kElsewhere_m;
         for (int i = 0; i < faults_.unasked_states; ++i) {
@@ -391,7 +417,7 @@ inline void StandInInverse::talk(Socket socket, bool events) {
     while (const auto message = reader.next()) {
       if (message->kind == FrameKind::close) goes_on = false;
       if (message->kind == FrameKind::text && !events) {
-        const auto texts = answer(message->payload, centred);
+        const auto texts = answer(message->payload);
         goes_on = texts.has_value();
         for (const std::string& text : texts.value_or(std::vector<std::string>())) {
           if (faults_.late_s > 0.0) {

@@ -57,23 +57,6 @@ InverseInventory inverse_inventory(const InverseAddress& address) {
   return parse_inventory(*text);
 }
 
-void UnansweredMessages::sent(std::int64_t at_ns) noexcept {
-  if (count_ == at_ns_.size()) (void)answered();
-  at_ns_[(first_ + count_++) % at_ns_.size()] = at_ns;
-}
-
-std::optional<std::int64_t> UnansweredMessages::answered() noexcept {
-  if (count_ == 0) return std::nullopt;
-  const std::int64_t at_ns = at_ns_[first_];
-  first_ = (first_ + 1) % at_ns_.size();
-  --count_;
-  return at_ns;
-}
-
-void UnansweredMessages::forget_before(std::int64_t at_ns) noexcept {
-  while (count_ > 0 && at_ns_[first_] < at_ns) (void)answered();
-}
-
 InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits, bool said_by_user)
     : address_(std::move(address)),
       limits_(limits),
@@ -186,7 +169,8 @@ void InverseDevice::require_neutral() const {
         fmt::format("{}, or --inverse-gravity with what it keeps", address_.gravity_carried));
   }
   if (s.damping != 0.0 || !s.directional_damping.isZero()) {
-    throw service_fault(fmt::format("the damping of the service stays at {}", s.damping),
+    throw service_fault(fmt::format("the damping of the service stays at {}, by direction {}",
+                                    s.damping, fmt::join(s.directional_damping, " ")),
                         "a service whose damping can be set to 0");
   }
 }

@@ -9,6 +9,7 @@
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/inverse/loopback.hpp"
 #include "tpm/haptics/inverse/messages.hpp"
+#include "tpm/haptics/inverse/unanswered_messages.hpp"
 #include "tpm/haptics/loop/triple_buffer.hpp"
 #include "tpmkit/device.hpp"
 
@@ -23,22 +24,6 @@ struct InverseAddress {
   std::string device_id;         ///< empty: the only one
   double gravity_carried = 1.0;  ///< share of the device's weight that the service is to carry
   bool poll = false;             ///< the thread of the messages looks again and again, for latency
-};
-
-/// When the messages were sent that wait for their state. A service answers each by one state, in
-/// their order: a state belongs to the oldest of them. One that was never answered makes the states
-/// after it look older by a message, never younger, until it is forgotten.
-class UnansweredMessages {
- public:
-  void sent(std::int64_t at_ns) noexcept;
-  /// When the message was sent that a state answers; empty: nobody has asked for it.
-  [[nodiscard]] std::optional<std::int64_t> answered() noexcept;
-  /// Nobody waits any more for what was sent before.
-  void forget_before(std::int64_t at_ns) noexcept;
-
- private:
-  std::array<std::int64_t, 1024> at_ns_{};
-  std::size_t first_ = 0, count_ = 0;
 };
 
 /// What the service says of its devices; nothing is commanded. Throws Error(environment) where

@@ -246,12 +246,12 @@ void InverseServer::answer_http(Connection& c, const HttpHead& head) {
                inventory_message(inventory(asked == connections_.end() ? nullptr : asked->get()))));
   }
   if (path == "/" && !settings_.page.empty()) {
-    return send(c,
-                http_answer("200 OK", "text/html; charset=utf-8", settings_.page,
-                            "Content-Security-Policy: default-src 'none'; script-src "
-                            "'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self' "
-                            "ws://127.0.0.1:* ws://localhost:*; base-uri 'none'; form-action "
-                            "'none'; frame-ancestors 'none'\r\nReferrer-Policy: no-referrer\r\n"));
+    return send(
+        c, http_answer("200 OK", "text/html; charset=utf-8", settings_.page,
+                       "Content-Security-Policy: default-src 'none'; img-src data:; script-src "
+                       "'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self' "
+                       "ws://127.0.0.1:* ws://localhost:*; base-uri 'none'; form-action "
+                       "'none'; frame-ancestors 'none'\r\nReferrer-Policy: no-referrer\r\n"));
   }
   send(c, http_answer("404 Not Found", "text/plain", "nothing here\n"));
 }

@@ -195,7 +195,7 @@ IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& lik
     run.outcome.counts.missed += before.missed;
     run.outcome.counts.late += before.late;
     run.outcome.cycles += cycles_before;
-    if (!options.real_time || !is_stall(ended.cause) || part.duration_s < kLeastPart_s ||
+    if (!is_stall(ended.cause) || part.duration_s < kLeastPart_s ||
         run.begun_again == kMostBegunAgain) {
       break;
     }

@@ -26,8 +26,9 @@ struct IdentifyRun {
 /// Moves the handle of a device with forces below 0.3 N along the push of a session, and finds what
 /// device_identification.hpp lists. Nothing is taken from what the device or its simulation says of
 /// itself. The handle has to be free, or at most lightly held; forces begin when it is at rest.
-/// Stretches in which loop or device stalled are left out. In real time a stall that ends the loop,
-/// as a watchdog does, is one too: the device is opened again, up to kMostBegunAgain times.
+/// Stretches in which loop or device stalled are left out. A stall that ends the loop, as a
+/// watchdog or a lost connection does, is one too: the device is opened again, up to
+/// kMostBegunAgain times.
 /// @param like rate, push and watchdog; of the simulated device also its numbers
 /// Throws Error(environment) as a session does; an early end is in the outcome.
 [[nodiscard]] IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& like,
