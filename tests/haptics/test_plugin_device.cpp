@@ -117,6 +117,8 @@ TEST_CASE("What is wrong with a plugin is told in one line") {
   CHECK_THAT(refusal_of_bad("describe"), Contains("gives no reason"));
   CHECK_THAT(refusal_of_bad("force"), Contains("says force_N is nan"));
   CHECK_THAT(refusal_of_bad("ramp"), Contains("says least_ramp_in_s is 0; expected at least 0.1"));
+  CHECK_THAT(refusal_of_bad("friction"),
+             Contains("says friction_N_s_per_m is 10.1; expected at least 0 and at most 10"));
   CHECK_THAT(refusal_of_bad("two"), Contains("2 devices fit"));
 }
 

@@ -367,6 +367,7 @@ TEST_CASE("Gripper, buttons and what was noted stand in the recording") {
     options.recording = folder / "r";
     options.notes = {"2026-11-23", "op-1", "s 7"};
     (void)run_session(session, stand_in(), options);
+    CHECK(script.happened("gripper_force_0"));
     const HilRecording recording = read_recording(folder / "r");
     CHECK(recording.header.at("notes").at("subject_code") == "s 7");
     CHECK(recording.rows.at(500).gripper_m == 0.0125F);
@@ -378,6 +379,7 @@ TEST_CASE("Gripper, buttons and what was noted stand in the recording") {
   }
   const Script script(operator_lines(session, folder));
   const Ran r = ran(session, stand_in(), folder / "without");
+  CHECK_FALSE(script.happened("gripper_force_0"));
   CHECK(std::isnan(r.recording.rows.at(500).gripper_m));
   CHECK(r.recording.rows.at(500).buttons == 0);
   CHECK(std::isnan(r.recording.rows.at(500).grip[0]));

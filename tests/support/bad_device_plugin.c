@@ -27,6 +27,7 @@ static int describe(int index, tpm_device_description *d, char *message) {
   d->limits.stiffness_N_per_m = 4000.0;
   d->limits.slew_N_per_s = 1000.0;
   d->limits.least_ramp_in_s = is("ramp") ? 0.0 : 0.1;
+  d->limits.friction_N_s_per_m = is("friction") ? 10.1 : 0.1;
   return TPM_DEVICE_OK;
 }
 

@@ -434,6 +434,7 @@ StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
   cause = write(Eigen::Vector3d::Zero(), row);
   if (cause != StopCause::none) return cause;
   cause = look_at_status();
+  row.buttons = hand_.buttons;
   if (cause != StopCause::none) return cause;
   if (missing == 0) {
     if (!settings_.to_model || !with_surface || free_in_space()) {

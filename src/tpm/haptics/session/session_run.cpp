@@ -54,6 +54,8 @@ class Markers {
     seen_ = keys;
     buttons_ = row.buttons;
   }
+  /// A button that is down when the session begins, as the one that begins it, marks nothing.
+  void wait(const ServoRecord& row) { buttons_ = row.buttons; }
   [[nodiscard]] const Json& list() const { return list_; }
 
  private:
@@ -75,7 +77,9 @@ ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDev
   const RecordSink sink = [&](const ServoRecord& written) {
     ServoRecord row = written;
     const bool waits = row.phase < 0 && row.stop == StopCause::none;
-    if (!waits) {
+    if (waits) {
+      markers.wait(row);
+    } else {
       markers.see(row);
       const Eigen::Map<const Eigen::Vector3d> force_N(row.commanded_N);
       largest_force_N = std::max(largest_force_N, force_N.norm());

@@ -1,0 +1,159 @@
+// What a recording tells beside the forces: markers, clocks, and whether a hand feels anything.
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <memory>
+
+#include "hil_scenes.hpp"
+#include "temp_folder.hpp"
+#include "tpm/haptics/device/virtual_omega7.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpm/haptics/show/hil_report.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using Catch::Matchers::Contains;
+
+/// The simulated device, with buttons that are pressed when a test says.
+class Pressed final : public HapticDevice {
+ public:
+  explicit Pressed(const HilSession& session) : device_(session.plant, session.operator_script()) {}
+  const DeviceIdentity& open() override { return device_.open(); }
+  void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
+  void enable_forces() override { device_.enable_forces(); }
+  DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
+    return device_.read(position_m);
+  }
+  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override {
+    return device_.write(force_N);
+  }
+  DeviceStatus status() noexcept override { return device_.status(); }
+  HandState hand() noexcept override {
+    HandState state;
+    state.buttons = buttons;
+    return state;
+  }
+  void await() noexcept override { device_.await(); }
+  void begin() noexcept override { device_.begin(); }
+  void advance(double seconds) noexcept override { device_.advance(seconds); }
+  void stop() noexcept override { device_.stop(); }
+  void cut_forces() noexcept override { device_.cut_forces(); }
+
+  std::uint32_t buttons = 0;
+
+ private:
+  VirtualOmega7 device_;
+};
+
+/// Cycles with the flag of a marker.
+std::vector<std::uint64_t> marked_in(const HilRecording& recording) {
+  std::vector<std::uint64_t> cycles;
+  for (const ServoRecord& row : recording.rows) {
+    if ((row.flags & kMarked) != 0) cycles.push_back(row.cycle);
+  }
+  return cycles;
+}
+
+TEST_CASE("A button that goes down and a key set a marker, in the row and in the closing record") {
+  const HilSession session = test::parsed(
+      test::with(test::short_session(), "/start", {{"confirm", true}, {"limit", "2 s"}}));
+  const test::TempFolder folder;
+  const auto device = std::make_shared<Pressed>(session);
+  const auto keys = std::make_shared<std::atomic<std::uint32_t>>(0);
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  options.markers = keys;
+  // The button that begins the session stays down for 0.2 s and is no marker.
+  options.watcher = [&](const ServoRecord& row) {
+    if (row.phase < 0) {
+      device->buttons = 1;
+      return;
+    }
+    if (row.cycle == 200) device->buttons = 0;
+    if (row.cycle == 999) device->buttons = 2;
+    if (row.cycle == 1099) device->buttons = 3;  // another one, the first still down
+    if (row.cycle == 1499) *keys += 1;
+  };
+  const SessionRun run = run_session_on(session, device, limits_of("virtual"), {}, options);
+  REQUIRE(run.outcome.cause == StopCause::finished);
+  const HilRecording recording = read_recording(folder / "r");
+  CHECK(marked_in(recording) == std::vector<std::uint64_t>{1000, 1100, 1500});
+  const Json expected = {{{"cycle", 1000}, {"by", "button"}},
+                         {{"cycle", 1100}, {"by", "button"}},
+                         {{"cycle", 1500}, {"by", "key"}}};
+  CHECK(recording.closing.at("markers") == expected);
+}
+
+TEST_CASE("A session in real time says when it was, by both clocks; one in virtual time does not") {
+  const HilSession session = test::parsed(test::short_session());
+  const LoopModel model = make_loop_model(session);
+  const auto header = [&](bool real_time) {
+    return recording_header(session, DeviceIdentity{}, model, real_time, {}, Json());
+  };
+  CHECK(header(false).at("clock").is_null());
+  const Json first = header(true).at("clock"), second = header(true).at("clock");
+  CHECK(first.at("opened_monotonic_ns").get<std::int64_t>() > 0);
+  CHECK(second.at("opened_monotonic_ns").get<std::int64_t>() >=
+        first.at("opened_monotonic_ns").get<std::int64_t>());
+  CHECK_THAT(first.at("opened_utc").get<std::string>(), Catch::Matches("20..-..-..T.*Z"));
+
+  ServoOutcome outcome;
+  CHECK_FALSE(recording_closing(outcome).contains("clock"));
+  outcome.real_time = true;
+  outcome.first_cycle_monotonic_ns = first.at("opened_monotonic_ns").get<std::int64_t>();
+  const Json clock = recording_closing(outcome).at("clock");
+  CHECK(clock.at("first_cycle_monotonic_ns") == first.at("opened_monotonic_ns"));
+  CHECK_THAT(clock.at("first_cycle_utc").get<std::string>(), Catch::Matches("20..-..-..T.*Z"));
+}
+
+TEST_CASE("A session whose largest force no hand feels says so, in text and in JSON") {
+  const HilSession session = test::parsed(test::short_session());
+  SessionRun run;
+  run.model = make_loop_model(session);
+  run.largest_force_N = 0.76e-3;
+  CHECK_THAT(run_text(session, run), Contains("largest force 0.00076 N: no hand feels it"));
+  CHECK(run_json(session, run).dump().find("\"felt\":false") != std::string::npos);
+  run.largest_force_N = 0.098;
+  CHECK_THAT(run_text(session, run), Contains("largest force 0.098 N\n"));
+  CHECK(run_json(session, run).dump().find("\"felt\":true") != std::string::npos);
+}
+
+/// A check of 60 s at 1 kHz: nearly all wake-ups 20 us late, some and a few later.
+JitterCheck check_with(int some, std::int64_t some_ns, int few, std::int64_t few_ns) {
+  JitterCheck check;
+  check.rate_Hz = 1000.0;
+  check.duration_s = 60.0;
+  check.watchdog_s = check.cycle_timeout_s = 0.008;
+  check.late_limit = 100;
+  check.missed_limit = 50;
+  ServoOutcome& o = check.outcome;
+  o.cause = StopCause::finished;
+  o.cycles = 60'000;
+  for (int i = 0; i < 60'000 - some - few; ++i) o.woke_late.note(19'500);
+  for (int i = 0; i < some; ++i) o.woke_late.note(some_ns);
+  for (int i = 0; i < few; ++i) o.woke_late.note(few_ns);
+  assess(check);
+  return check;
+}
+
+TEST_CASE("A check tells p99.99 beside the watchdog, the bound 3/T, and names what it foretells") {
+  // p99.9 is 100 us and p99.99 300 us; 1e-4 of the cycles of an hour are 360:
+  // 300 + 200 / ln 10 * ln 360 = 811 us.
+  const JitterCheck check = check_with(100, 99'500, 10, 299'500);
+  const std::string text = check_text(check);
+  CHECK_THAT(text, Contains("p99.99 of the wake-ups 300 us, the watchdog waits for 8e+03 us") ||
+                       Contains("p99.99 of the wake-ups 300 us, the watchdog waits for 8000 us"));
+  CHECK_THAT(text, Contains("stalls beyond it: 0: fewer than 180 an hour with 95 % (3/T of 60 s)"));
+  CHECK_THAT(text, Contains("extrapolated, not measured: 811 us once an hour"));
+  const std::string json = check_json(check).dump();
+  CHECK_THAT(json, Contains("\"upper_95_per_s\":0.05"));
+  CHECK_THAT(json, Contains("\"once_an_hour_extrapolated_s\":0.000811"));
+  // Two stalls: there is no bound of none, they are counted.
+  const JitterCheck stalled = check_with(100, 99'500, 2, 9'000'000);
+  CHECK_THAT(check_text(stalled), Contains("stalls beyond it: 2\n") && !Contains("3/T"));
+  CHECK_THAT(check_json(stalled).dump(), Contains("\"upper_95_per_s\":null"));
+}
+
+}  // namespace
+}  // namespace tpm::haptics
