@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Counts how files are read: lines that name a key by hand, keys that are declared, schemas written by hand.
+"""Counts how files are read: lines and functions that name a key by hand, keys that are declared, schemas written by hand.
 
     reading_counts.py COMMIT...
     reading_counts.py --walk TPM SESSION.json
 
 A line names a key by hand if it asks a document for it by a text: at("depth"), contains("depth"), value("depth", ...),
-quantity_at(j, "depth", ...). Sources that only show results are left out. --walk needs the preset `work`, in which a room is
+quantity_at(j, "depth", ...). A function reads by hand if one of its lines does, or names the place of a key for a message
+(place.key("depth")), and none declares a key. Sources that only show results are left out. --walk needs the preset `work`, in which a room is
 a shared library: the dynamic linker says which room calls which function of another first (LD_DEBUG=bindings). A climb
 is a call of a room that stands later in docs/architecture.md.
 """
@@ -18,7 +19,8 @@ from collections import Counter
 from pathlib import Path
 
 BY_HAND = r'(\.at|\.contains|\.value|\.find|[a-z_]+_at|optional_[a-z]+|required_[a-z]+|require_[a-z]+|read_[a-z]+)\((.*, *)?"[A-Za-z_]+"'
-DECLARED = r'\b(key|unread|required_key|optional_key|required_text|optional_text)\("'
+PLACE = r'\.key\("'
+DECLARED = r'(^|[^.a-z_])(key|unread|required_key|optional_key|required_text|optional_text)\("'
 SOURCES = ["src/tpm/*.cpp", "src/tpm/*.hpp", ":!src/tpm/*show*"]
 
 
@@ -32,11 +34,39 @@ def by_hand_in(commit):
             if not re.search(r"optional_key|required_key|file\.|writer|attribute", line)]
 
 
+def functions_in(text):
+    """Definitions of a formatted file, as lines: each ends with a bracket at the margin."""
+    lines = []
+    for line in text.splitlines():
+        if line.startswith(("namespace", "using", "}  // namespace")) or not lines and line[:1] in ("", "#"):
+            lines = []
+            continue
+        lines.append(line)
+        if line in ("}", "};", "});"):
+            yield lines
+            lines = []
+
+
+def reading_functions(commit):
+    """Lines of the functions that read by hand, and of those that declare keys."""
+    hand = set(map(tuple, by_hand_in(commit) + lines_with(PLACE, commit)))
+    declared = set(map(tuple, lines_with(DECLARED, commit)))
+    by_hand, declaring = 0, 0
+    for file in {file for file, _ in hand | declared}:
+        text = subprocess.run(["git", "show", f"{commit}:{file}"], capture_output=True, text=True, check=True).stdout
+        for function in functions_in(text):
+            if any((file, line) in declared for line in function):
+                declaring += len(function)
+            elif any((file, line) in hand for line in function):
+                by_hand += len(function)
+    return by_hand, declaring
+
+
 def counts_of(commit):
     by_hand = by_hand_in(commit)
     schemas = subprocess.run(["git", "grep", "-hc", "", commit, "--", "schemas"], capture_output=True, text=True, check=True).stdout
     generated = bool(lines_with("json_schema", commit))
-    return len(by_hand), len(lines_with(DECLARED, commit)), 0 if generated else sum(map(int, schemas.split()))
+    return len(by_hand), *reading_functions(commit), len(lines_with(DECLARED, commit)), 0 if generated else sum(map(int, schemas.split()))
 
 
 def rooms():
@@ -71,7 +101,8 @@ def main():
         walk(sys.argv[2], sys.argv[3])
         return
     print("| | " + " | ".join(sys.argv[1:]) + " |\n| --- |" + " ---: |" * len(sys.argv[1:]))
-    rows = zip(("lines that name a key by hand", "keys declared", "lines of schemas by hand"), zip(*map(counts_of, sys.argv[1:])))
+    rows = zip(("lines that name a key by hand", "lines of functions that do", "lines of functions that declare keys", "keys declared",
+                "lines of schemas by hand"), zip(*map(counts_of, sys.argv[1:])))
     for name, numbers in rows:
         print(f"| {name} | " + " | ".join(map(str, numbers)) + " |")
     folders = Counter(str(Path(file).parent.relative_to("src/tpm")) for file, _ in by_hand_in(sys.argv[-1]))
