@@ -6,6 +6,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/accuracy/runner.hpp"
 #include "tpm/accuracy/show/benchmark_report.hpp"
 #include "tpm/accuracy/show/speed_record.hpp"
@@ -150,7 +151,7 @@ void add_benchmark_command(CLI::App& accuracy, Session& session) {
       "benchmark", "Error against cost of every method at many settings, on named problems");
   auto choice = std::make_shared<BenchmarkChoice>();
   command->add_option("PROBLEM", choice->problems, "Names of problems (default: all; see --list)");
-  command->add_option("--folder", choice->folder, "Folder to write into")->capture_default_str();
+  add_folder_option(*command, choice->folder)->capture_default_str();
   command
       ->add_option("--repetitions", choice->repeats,
                    "Number of repetitions: runs of each setting that completes")

@@ -9,6 +9,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/accuracy/show/stability_report.hpp"
 #include "tpm/files/writable.hpp"
 #include "tpm/show/draw.hpp"
@@ -61,7 +62,7 @@ void add_stability_command(CLI::App& accuracy, Session& session) {
   CLI::App* command = accuracy.add_subcommand(
       "stability", "Where each step rule fails: maps, limits against theory, degenerate corners");
   auto folder = std::make_shared<std::string>("out/stability");
-  command->add_option("--folder", *folder, "Folder to write into")->capture_default_str();
+  add_folder_option(*command, *folder)->capture_default_str();
   auto along = std::make_shared<std::string>(std::to_string(kPointsAlongMaps));
   command->add_option("--points", *along, "Points along each axis of the maps, 2 to 200")
       ->capture_default_str();

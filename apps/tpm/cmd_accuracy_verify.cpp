@@ -6,6 +6,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/accuracy/show/verification_report.hpp"
 #include "tpm/files/writable.hpp"
 #include "tpm/work/progress.hpp"
@@ -67,7 +68,7 @@ void add_verify_command(CLI::App& accuracy, Session& session) {
       "must?");
   auto choice = std::make_shared<VerificationChoice>();
   command->add_option("GROUP", choice->groups, "Groups of checks (default: all; see --list)");
-  command->add_option("--folder", choice->folder, "Folder to write into");
+  add_folder_option(*command, choice->folder);
   command->add_option("--flaw", choice->flaw,
                       "Make one coefficient of everything that is verified wrong by this share, "
                       "such as 1%, to see that the checks fail");

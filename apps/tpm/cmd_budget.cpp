@@ -7,6 +7,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/fit/predict/error_budget.hpp"
@@ -17,7 +18,6 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/units.hpp"
-#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {
@@ -124,7 +124,7 @@ void add_budget_command(CLI::App& app, Session& session) {
   CLI::App* command =
       app.add_subcommand("budget", "What is lost between a recording and a hand, stage by stage");
   auto options = std::make_shared<BudgetCommand>();
-  command->add_option("LAW", options->law, "law.json that tpm fit has written")->required();
+  add_fitted_law(*command, options->law);
   command
       ->add_option("PROTOCOL|RECORDING", options->recordings.files,
                    "A JSON file with a block protocol, or a recording: its motion, and its "
@@ -148,14 +148,9 @@ void add_budget_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--delay", options->delay, "Periods from a position to its force")
       ->capture_default_str();
-  command
-      ->add_option("--draws", options->samples,
-                   "Number of laws drawn from the covariance, 100 or more: for the random part")
-      ->capture_default_str();
-  command->add_option("--seed", options->seed, "Seed of the random numbers, 0 or more: the draws")
-      ->capture_default_str();
-  command->add_option("--folder", options->folder,
-                      "Folder to write into: budget.json, budget.csv and the waterfall");
+  add_draws_option(*command, options->samples, "for the random part")->capture_default_str();
+  add_seed_option(*command, options->seed, ": the draws")->capture_default_str();
+  add_folder_option(*command, options->folder, ": budget.json, budget.csv and the waterfall");
   add_verbose_option(*command, options->verbose, "from which stage to which, what a hand can feel");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);

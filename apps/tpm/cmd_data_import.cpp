@@ -8,6 +8,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
@@ -262,8 +263,7 @@ void add_data_import_command(CLI::App& data, Session& session) {
       "-o,--output", arguments->output,
       "File to write (.csv, a description goes beside it); of several curves --folder. Without "
       "either the files are only read, and what was understood is printed");
-  command->add_option("--folder", arguments->folder, "Folder to write into: of several curves")
-      ->excludes("--output");
+  add_folder_option(*command, arguments->folder, ": of several curves")->excludes("--output");
   command->add_flag("--overwrite", arguments->force, "Replace files that exist");
   add_text_options(*command, *arguments);
   add_machine_options(*command, *arguments);

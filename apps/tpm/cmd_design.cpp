@@ -6,6 +6,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "design_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/file.hpp"
@@ -96,10 +97,7 @@ void add_design_command(CLI::App& app, Session& session) {
       "--repetitions", options->repetitions,
       "Number of repetitions: data sets that are simulated and fitted (default: 100 of a design, "
       "2000 of a configuration, 200 of each law); of a design 0 for none, else 10 or more");
-  command
-      ->add_option("--seed", options->seed,
-                   "Seed of the random numbers, 0 or more, or 'clock': the simulations")
-      ->capture_default_str();
+  add_seed_option(*command, options->seed, ", or 'clock': the simulations")->capture_default_str();
   add_output_option(*command, options->output);
   add_format_option(*command, session);
   const auto add_of_design = options_of_group(*command, "Of a design");

@@ -11,6 +11,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "data_text.hpp"
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
@@ -198,7 +199,7 @@ void add_example_command(CLI::App& app, Session& session) {
       app.add_subcommand("example", "List the inputs that come with tpm, or copy one");
   auto options = std::make_shared<Options>();
   command->add_option("NAME", options->name, "Which one; without it all are listed");
-  command->add_option("--folder", options->folder, "Folder to write into (default: this one)");
+  add_folder_option(*command, options->folder, " (default: this one)");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm example recording\n  tpm example organ --folder trial\n"

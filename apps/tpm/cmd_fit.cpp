@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "answer.hpp"
+#include "common_options.hpp"
 #include "fit_options.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/file_kind.hpp"
@@ -21,7 +22,6 @@
 #include "tpm/fit/show/function_report.hpp"
 #include "tpm/fit/show/recording_report.hpp"
 #include "tpmkit/error.hpp"
-#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {
@@ -275,9 +275,9 @@ void add_fit_command(CLI::App& app, Session& session) {
   command->add_option("--times", options->times,
                       "Relaxation times that are not fitted: \"0.1 s, 1 s, 10 s\", or \"1 ms : "
                       "1000 s : 13\" for 13 at equal ratios (law linear-13 unless --laws says)");
-  CLI::Option* folder = command->add_option("--folder", options->folder,
-                                            "Folder to write into: figures and files (default: "
-                                            "NAME_fit for recordings, none for a configuration)");
+  CLI::Option* folder = add_folder_option(
+      *command, options->folder,
+      ": figures and files (default: NAME_fit for recordings, none for a configuration)");
   add_verbose_option(*command, options->verbose, "every law tried, starts, readings");
   command->add_flag("--no-draw", options->no_draw, "Write no figures and files")->excludes(folder);
   add_recording_options(*command, options->recordings);
@@ -295,9 +295,8 @@ void add_fit_command(CLI::App& app, Session& session) {
                        "What is resampled: residuals, blocks or recordings");
   command->add_option("--starts", options->starts,
                       "Number of starts (default: that of the configuration, else 50)");
-  command->add_option("--seed", options->seed,
-                      "Seed of the random numbers, 0 or more: the starts (default: that of the "
-                      "configuration, else 0)");
+  add_seed_option(*command, options->seed,
+                  ": the starts (default: that of the configuration, else 0)");
   command->add_option("--reference", options->reference,
                       "Depth that coefficients refer to: as secants, e.g. \"4 mm\"; of recordings "
                       "(default: the largest; of a folder the largest that all reach)");

@@ -15,6 +15,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "hil_options.hpp"
 #include "hil_page.hpp"
 #include "interrupt_watch.hpp"
@@ -323,6 +324,19 @@ int run_hil(const RunChoice& choice, const Session& session) {
   return exit_code_of(run.outcome);
 }
 
+void add_dhd_library(CLI::App& command, DeviceOptions& options) {
+  command.add_option("--dhd-library", options.library,
+                     "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
+}
+
+void add_inverse_port(CLI::App& command, DeviceOptions& options, const char* of = "") {
+  command
+      .add_option("--inverse-port", options.choice.inverse.port,
+                  fmt::format("Port of the Inverse service: its simulation channel{}", of))
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void add_device_options(CLI::App& command, DeviceOptions& options) {
@@ -345,8 +359,7 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
       ->check(CLI::Range(0, 65535));
   command.add_option("--index", options.index, "Its place in the list of tpm hil devices")
       ->check(CLI::Range(0, 127));
-  command.add_option("--dhd-library", options.library,
-                     "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
+  add_dhd_library(command, options);
   command.add_option(
       "--plugin", options.plugin,
       "Library of a device plugin, after tpmkit/haptic_device.h: of --device plugin");
@@ -354,11 +367,7 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
       "--device-file", options.file,
       "What was measured of the device (tpm hil identify; schemas/device.schema.json); "
       "without it hardware counts as 20 ms late and free of friction");
-  command
-      .add_option("--inverse-port", options.choice.inverse.port,
-                  "Port of the Inverse service: its simulation channel, of --device inverse3")
-      ->check(CLI::Range(1, 65535))
-      ->capture_default_str();
+  add_inverse_port(command, options, ", of --device inverse3");
   command
       .add_option("--inverse-events-port", options.choice.inverse.events_port,
                   "Port of its events, of versions from 3.5 on")
@@ -412,22 +421,17 @@ void add_hil_command(CLI::App& app, Session& session) {
 
   CLI::App* devices = hil->add_subcommand("devices", "What devices are there, and why one is not");
   auto listed = std::make_shared<DeviceOptions>();
-  devices->add_option("--dhd-library", listed->library,
-                      "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
+  add_dhd_library(*devices, *listed);
   devices->add_option("--plugin", listed->plugin,
                       "Library of a device plugin: list its devices (docs/library.md)");
-  devices
-      ->add_option("--inverse-port", listed->choice.inverse.port,
-                   "Port of the Inverse service: its simulation channel")
-      ->check(CLI::Range(1, 65535))
-      ->capture_default_str();
+  add_inverse_port(*devices, *listed);
   add_format_option(*devices, session);
   devices->footer("Examples:\n  tpm hil devices\n  tpm hil devices --plugin ./my_device.so");
   set_run(*devices, session, [listed, &session] { return list_devices(*listed, session); });
 
   CLI::App* run = hil->add_subcommand("run", "Run a session and record it");
   auto choice = std::make_shared<RunChoice>();
-  run->add_option("SESSION", choice->session, "JSON session (schemas/hil.schema.json)")->required();
+  add_session_argument(*run, choice->session);
   add_device_options(*run, choice->device);
   run->add_option("--clock", choice->time,
                   "Clock of the run: real, or virtual: as fast as it goes, the same bits each time "

@@ -4,6 +4,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "hil_options.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/haptics/session/recording_export.hpp"
@@ -38,7 +39,7 @@ int export_hil(const ExportChoice& choice, const Session& session) {
 void add_hil_export_command(CLI::App& hil, Session& session) {
   CLI::App* command = hil.add_subcommand("export", "Write a recording as HDF5");
   auto choice = std::make_shared<ExportChoice>();
-  command->add_option("RECORDING", choice->recording, "What tpm hil run has written")->required();
+  add_session_recording(*command, choice->recording);
   command->add_option("-o,--output", choice->output, "File to write (HDF5)")->required();
   add_format_option(*command, session);
   command->footer("Example:\n  tpm hil export session.tpmrec -o session.h5");

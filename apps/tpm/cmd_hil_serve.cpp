@@ -7,6 +7,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "hil_options.hpp"
 #include "interrupt_watch.hpp"
 #include "tpm/haptics/serve/serve.hpp"
@@ -75,8 +76,7 @@ void add_hil_serve_command(CLI::App& hil, Session& session) {
   CLI::App* command = hil.add_subcommand(
       "serve", "A simulated device and a tissue, for clients of the Inverse service");
   auto choice = std::make_shared<ServeChoice>();
-  command->add_option("SESSION", choice->session, "JSON session (schemas/hil.schema.json)")
-      ->required();
+  add_session_argument(*command, choice->session);
   command
       ->add_option("--port", choice->port, "Port of the simulation channel, 0 for one that is free")
       ->capture_default_str();

@@ -4,6 +4,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/haptics/show/boundary_report.hpp"
 #include "tpm/show/draw.hpp"
 
@@ -13,7 +14,7 @@ void add_hil_stability_command(CLI::App& hil, Session& session) {
   CLI::App* command = hil.add_subcommand(
       "stability", "Largest stiffness that is passive, and stable, against rate, delay, friction");
   auto figures = std::make_shared<std::string>();
-  command->add_option("--folder", *figures, "Folder to write into: figures (SVG, PNG)");
+  add_folder_option(*command, *figures, ": figures (SVG, PNG)");
   add_format_option(*command, session);
   command->footer("Example:\n  tpm hil stability --folder hil_borders");
   set_run(*command, session, [figures, &session] {

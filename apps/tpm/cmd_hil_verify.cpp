@@ -4,12 +4,12 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
-#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {
@@ -76,7 +76,7 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
 
 std::shared_ptr<VerifyChoice> add_choice(CLI::App& command, Session& session) {
   auto choice = std::make_shared<VerifyChoice>();
-  command.add_option("RECORDING", choice->recording, "What tpm hil run has written")->required();
+  add_session_recording(command, choice->recording);
   command
       .add_option("--motion-tolerance", choice->motion_tolerance,
                   "Tolerance of the recorded motion, which is thinned out for the reference")
@@ -109,7 +109,7 @@ void add_hil_verify_commands(CLI::App& hil, Session& session) {
   const auto to_report = add_choice(*report, session);
   add_verbose_option(*report, to_report->verbose,
                      "every cross-check and reading of the experiment");
-  report->add_option("--folder", to_report->output, "Folder to write into")->capture_default_str();
+  add_folder_option(*report, to_report->output)->capture_default_str();
   report->footer("Example:\n  tpm hil report session.tpmrec --folder hil_report");
   set_run(*report, session, [to_report, &session] { return report_hil(*to_report, session); });
 }

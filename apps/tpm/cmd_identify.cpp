@@ -5,6 +5,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/fit/online/identification.hpp"
 #include "tpm/fit/online/identified_loop.hpp"
@@ -88,13 +89,10 @@ void add_identify_command(CLI::App& app, Session& session) {
   command->add_option(
       "--reference", options->reference,
       "Depth that coefficients refer to: the planned one (default: the recording's)");
-  command
-      ->add_option("--seed", options->seed, "Seed of the random numbers, 0 or more: the searches")
-      ->capture_default_str();
+  add_seed_option(*command, options->seed, ": the searches")->capture_default_str();
   command->add_flag("--no-loop", options->no_loop,
                     "Do not hand the laws over to a model in the loop");
-  command->add_option("--folder", options->folder,
-                      "Folder to write into: identification.json, law.json and the figure");
+  add_folder_option(*command, options->folder, ": identification.json, law.json and the figure");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);

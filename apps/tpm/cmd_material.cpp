@@ -5,6 +5,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/base/lists.hpp"
@@ -96,7 +97,7 @@ void add_material_command(CLI::App& app, Session& session) {
       "material",
       "Put a fitted law on an organ: find the bonds' material that responds like the law");
   auto options = std::make_shared<MaterialCommand>();
-  command->add_option("LAW", options->law, "law.json that tpm fit has written")->required();
+  add_fitted_law(*command, options->law);
   command
       ->add_option("SCENE", options->scene,
                    "An organ (JSON scene); its material is replaced, its regions stay")
@@ -123,9 +124,9 @@ void add_material_command(CLI::App& app, Session& session) {
           "by likelihood profiles (minutes)")
       ->check(CLI::IsMember({"law", "readings", "profiles"}))
       ->capture_default_str();
-  command->add_option("--folder", options->folder,
-                      "Folder to write into: scene.json, session.json (for tpm hil run), "
-                      "material.json, material.csv and the figure");
+  add_folder_option(
+      *command, options->folder,
+      ": scene.json, session.json (for tpm hil run), material.json, material.csv and the figure");
   command->add_option("-o,--output", options->output, "File to write (the scene)");
   add_recording_options(*command, options->recordings);
   add_placement_options(*command, options->held);

@@ -5,6 +5,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/writable.hpp"
 #include "tpm/paper/show/organ_study_report.hpp"
@@ -53,7 +54,7 @@ void add_experiments_command(CLI::App& paper, Session& session) {
   command->add_option("CONFIG", options->config,
                       "Tissues, data and experiments (schemas/organ_experiments.schema.json; "
                       "default: configs/organ_experiments.json)");
-  command->add_option("--folder", options->folder, "Folder to write into")->capture_default_str();
+  add_folder_option(*command, options->folder)->capture_default_str();
   add_format_option(*command, session);
   command->footer("Example:\n  tpm paper experiments --folder out/experiments");
   set_run(*command, session, [options, &session] { return experiments(*options, session); });

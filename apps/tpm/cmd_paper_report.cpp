@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/paper/show/paper_report.hpp"
 #include "tpm/show/draw.hpp"
 
@@ -28,7 +29,7 @@ void add_report_command(CLI::App& paper, Session& session) {
   CLI::App* command = paper.add_subcommand(
       "report", "Recompute the paper: tables, audit, fits and figures in one report");
   auto folder = std::make_shared<std::string>("out/paper");
-  command->add_option("--folder", *folder, "Folder to write into")->capture_default_str();
+  add_folder_option(*command, *folder)->capture_default_str();
   auto requirement = std::make_shared<std::string>("10%");
   command
       ->add_option("--require", *requirement,

@@ -9,6 +9,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "plan_options.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -20,7 +21,6 @@
 #include "tpm/show/short_answer.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
-#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;
@@ -271,7 +271,7 @@ int run_plan(const PlanCommand& command, const Session& session) {
 void add_plan_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("plan", "The cheapest model that a scene needs, verified");
   auto choice = std::make_shared<PlanCommand>();
-  command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)");
+  add_scene_argument(*command, choice->scene);
   add_plan_options(*command, choice->choice);
   command->add_option(
       "--sphere-tolerance", choice->spheres,

@@ -8,6 +8,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "law_spectrum.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
@@ -115,11 +116,7 @@ void add_predict_command(CLI::App& app, Session& session) {
       "Predict the response to a protocol or a recording's motion, with an uncertainty band, or "
       "storage and loss over frequency");
   auto options = std::make_shared<PredictOptions>();
-  command
-      ->add_option("LAW|SCENE", options->law,
-                   "law.json that tpm fit has written, or the organ (scene.json or material.json) "
-                   "on which tpm material has put it")
-      ->required();
+  add_law_or_scene(*command, options->law)->required();
   command
       ->add_option("PROTOCOL|RECORDING", options->recordings.files,
                    "A JSON file with a block protocol (a scene, or schemas/protocol.schema.json), "
@@ -141,13 +138,9 @@ void add_predict_command(CLI::App& app, Session& session) {
                       "(found for the recording); default: surface for a protocol, fitted for a "
                       "recording that was fitted, own for another");
   add_placement_options(*command, options->held);
-  command->add_option("--draws", options->samples,
-                      "Number of laws drawn from the covariance, 100 or more: bands from these, "
-                      "instead of from derivatives");
-  command->add_option("--seed", options->seed, "Seed of the random numbers, 0 or more: the draws")
-      ->capture_default_str();
-  command->add_option("--folder", options->folder,
-                      "Folder to write into: prediction.csv, prediction.json and the figure");
+  add_draws_option(*command, options->samples, "bands from these, instead of from derivatives");
+  add_seed_option(*command, options->seed, ": the draws")->capture_default_str();
+  add_folder_option(*command, options->folder, ": prediction.csv, prediction.json and the figure");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);

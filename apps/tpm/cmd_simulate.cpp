@@ -6,6 +6,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "interrupt_watch.hpp"
 #include "plan_options.hpp"
 #include "tpm/base/text.hpp"
@@ -24,7 +25,6 @@
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
-#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;
@@ -314,10 +314,10 @@ void add_simulate_command(CLI::App& app, Session& session) {
   CLI::App* command =
       app.add_subcommand("simulate", "Push or load an organ as a scene says; HDF5, XDMF, pictures");
   auto choice = std::make_shared<SimulateChoice>();
-  command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)");
+  add_scene_argument(*command, choice->scene);
   command->add_option("-o,--output", choice->output, "File to write (HDF5); an XDMF goes beside it")
       ->capture_default_str();
-  command->add_option("--folder", choice->figures, "Folder to write into: pictures (PNG, SVG)");
+  add_folder_option(*command, choice->figures, ": pictures (PNG, SVG)");
   command->add_flag("--beside-mass-spring", choice->beside_mass_spring,
                     "Also run the mass-spring model on the same spheres; figures show both");
   command->add_flag("--vtkhdf", choice->vtkhdf,

@@ -8,6 +8,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -182,22 +183,29 @@ int plot(const SweepViewChoice& choice, const Session& session) {
   return 0;
 }
 
+void add_file(CLI::App& command, SweepViewChoice& choice) {
+  command.add_option("FILE", choice.file, "HDF5 file of tpm sweep")->required();
+}
+
+void add_variables(CLI::App& command, SweepViewChoice& choice) {
+  command.add_option("--variable", choice.variables,
+                     "Quantity of the sweep (default: all numbers but counts)");
+}
+
 }  // namespace
 
 void add_sweep_views(CLI::App& sweep, Session& session) {
   auto choice = std::make_shared<SweepViewChoice>();
   CLI::App* showing = sweep.add_subcommand("show", "What a file of results holds");
-  showing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  add_file(*showing, *choice);
   add_format_option(*showing, session);
   showing->footer("Example:\n  tpm sweep show sweep.h5");
   set_run(*showing, session, [choice, &session] { return show(*choice, session); });
   CLI::App* command = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
-  command->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  command->add_option("--variable", choice->variables,
-                      "Quantity of the sweep (default: all numbers but counts)");
+  add_file(*command, *choice);
+  add_variables(*command, *choice);
   command->add_option("--at", choice->at, "Place on an axis, AXIS=VALUE: beside the samples");
-  command->add_option("--folder", choice->figure_folder,
-                      "Folder to write into: figures (SVG, PNG)");
+  add_folder_option(*command, choice->figure_folder, ": figures (SVG, PNG)");
   add_force_option(*command, session);
   add_format_option(*command, session);
   command->footer(
@@ -206,16 +214,14 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   set_run(*command, session, [choice, &session] { return sensitivity(*choice, session); });
   CLI::App* refining = sweep.add_subcommand(
       "convergence", "Order, extrapolated value and grid convergence index along an axis");
-  refining->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  add_file(*refining, *choice);
   refining->add_option("--axis", choice->axis, "Axis of ever finer places (default: the last)");
   refining->add_option(
       "--size", choice->size,
       "Formula of the size, such as 'count^(-1/3)' (default: the axis' parameter)");
-  refining->add_option("--variable", choice->variables,
-                       "Quantity of the sweep (default: all numbers but counts)");
+  add_variables(*refining, *choice);
   refining->add_option("--at", choice->at, "Place on an axis, AXIS=VALUE: another than --axis");
-  refining->add_option("--folder", choice->figure_folder,
-                       "Folder to write into: figures (SVG, PNG)");
+  add_folder_option(*refining, choice->figure_folder, ": figures (SVG, PNG)");
   add_force_option(*refining, session);
   add_format_option(*refining, session);
   refining->footer(
@@ -223,7 +229,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
       "  tpm sweep convergence spheres.h5 --size 'count^(-1/3)'");
   set_run(*refining, session, [choice, &session] { return convergence(*choice, session); });
   CLI::App* choosing = sweep.add_subcommand("best", "The cells with the least value of an output");
-  choosing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  add_file(*choosing, *choice);
   choosing
       ->add_option("--objective", choice->best_output,
                    "Quantity that is to be smallest, such as a misfit")
@@ -240,9 +246,8 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
       "  tpm sweep best organ.h5 --objective misfit --over indentation");
   set_run(*choosing, session, [choice, &session] { return best(*choice, session); });
   CLI::App* plotting = sweep.add_subcommand("plot", "Maps, families of lines, Pareto fronts");
-  plotting->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  plotting->add_option("--folder", choice->folder, "Folder to write into: figures (SVG, PNG)")
-      ->capture_default_str();
+  add_file(*plotting, *choice);
+  add_folder_option(*plotting, choice->folder, ": figures (SVG, PNG)")->capture_default_str();
   plotting->add_option("--variable", choice->variables,
                        "Quantity of the sweep (default: all but counts)");
   plotting->add_option("--x", choice->x, "Axis drawn across (default: the last)");

@@ -8,6 +8,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "plan_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/file.hpp"
@@ -358,9 +359,7 @@ void add_validate_command(CLI::App& app, Session& session) {
                                          "recordings that it has not seen: the model "
                                          "error and its uncertainty (ASME V&V 20)");
   auto options = std::make_shared<ValidateOptions>();
-  command->add_option("LAW|SCENE", options->law,
-                      "law.json that tpm fit has written, or the organ (scene.json or "
-                      "material.json) on which tpm material has put it");
+  add_law_or_scene(*command, options->law);
   command->add_option("RECORDING", options->recordings.files,
                       "Recordings that the law was not fitted to, one or more; or sessions of tpm "
                       "hil run (.tpmrec): the force that was rendered along the hand's motion");
@@ -418,8 +417,7 @@ void add_validate_command(CLI::App& app, Session& session) {
   command->add_option("--recheck", options->recheck,
                       "Compute a page of --credibility again and write beside it one "
                       "(_rechecked) that marks what changed; exit code 1 if anything did");
-  command->add_option("--folder", options->folder,
-                      "Folder to write into: validation.csv, validation.json and the figures");
+  add_folder_option(*command, options->folder, ": validation.csv, validation.json and the figures");
   add_output_option(*command, options->output);
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);

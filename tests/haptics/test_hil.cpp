@@ -122,7 +122,7 @@ TEST_CASE("A patch is pushed by models that move several spheres, and verified",
 }
 
 TEST_CASE("A patch is refused by models of one sphere, and a contact where there is none") {
-  for (const char* const kind : {"condensed", "network", "network_beside"}) {
+  for (const char* const kind : {"condensed", "network"}) {
     CHECK_THROWS_WITH(make_loop_model(parsed(patch_session(kind))),
                       Contains("/model/contact") && Contains("pushed at one sphere"));
   }

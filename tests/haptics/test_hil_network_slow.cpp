@@ -40,7 +40,7 @@ Ran ran(const char* kind) {
   return ran(test::network_session(kind));
 }
 
-TEST_CASE("A session of the whole network verifies, stepped in the loop and beside it", "[heavy]") {
+TEST_CASE("A session of the whole network verifies", "[heavy]") {
   VerifyOptions options;
   options.motion_tolerance_m = 2e-6;
   const Verification in_loop = verify(ran("network").recording, options);
@@ -50,16 +50,13 @@ TEST_CASE("A session of the whole network verifies, stepped in the loop and besi
   CHECK(in_loop.others[0].end_s > 2.5);
   CHECK(in_loop.others[0].apart_N <
         test::allowed_error("session.network_references_apart") * in_loop.all.peak_N);
-  const Ran beside = ran("network_beside");
-  const Verification v = verify(beside.recording, options);
-  CHECK(v.all.max_N < test::allowed_error("session.network_beside_loop") * v.all.peak_N);
-  CHECK(beside.bytes == ran("network_beside").bytes);
+  CHECK(ran("network").bytes == ran("network").bytes);
 }
 
 TEST_CASE("No model of the loop takes from the heap or gives back while it is stepped") {
   const Json session =
-      GENERATE_COPY(test::network_session("network"), test::network_session("network_beside"),
-                    test::network_session("condensed"), test::network_session("planned"),
+      GENERATE_COPY(test::network_session("network"), test::network_session("condensed"),
+                    test::network_session("planned"),
                     test::with(test::network_session("planned"), "/model/tolerance", "0.2%"),
                     test::short_session(), test::slide_session());
   CAPTURE(session.at("model").dump());
@@ -125,7 +122,7 @@ TEST_CASE("A session without a kind is planned for 1 %, of the star it is the el
   json.at("model").erase("kind");
   std::size_t told = 0;
   const LoopModel loop =
-      make_loop_model(test::parsed(json), false, [&told](const std::string&) { ++told; });
+      make_loop_model(test::parsed(json), [&told](const std::string&) { ++told; });
   CHECK(told == kPlanningSteps);
   CHECK(loop.plan.at("choice") == "element");
   CHECK(loop.plan.at("tolerance") == 0.01);
@@ -213,9 +210,10 @@ TEST_CASE("The report of a session says how it ended and where it left the range
              Contains("beyond the range that the model is good for in 2 cycles, first at 0.5 s"));
 }
 
-TEST_CASE("A network beside the loop is for tissues that relax slowly") {
-  const HilSession fast = test::parsed(test::network_session("network_beside", "1e3 Pa s"));
-  CHECK_THROWS_WITH(make_loop_model(fast), Contains("too short for the model 'network_beside'"));
+TEST_CASE("The model that was deleted is refused by name, with what replaces it") {
+  CHECK_THROWS_WITH(test::parsed(test::network_session("network_beside")),
+                    Contains("/model/kind") && Contains("'network_beside' was removed") &&
+                        Contains("expected planned") && Contains("network"));
 }
 
 }  // namespace

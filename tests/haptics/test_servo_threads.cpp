@@ -17,7 +17,6 @@
 #include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/loop/empty_space.hpp"
 #include "tpm/haptics/session/jitter_check.hpp"
-#include "tpm/haptics/session/network_beside.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/verify/verify.hpp"
 #include "tpmkit/error.hpp"
@@ -321,29 +320,6 @@ TEST_CASE("What goes through a triple buffer arrives whole, in order, the last o
   writer.join();
   CHECK(broken == 0);
   CHECK_FALSE(buffer.refresh());
-}
-
-TEST_CASE("A network in a thread of its own follows the loop, however late it is, run after run") {
-  const LoopModel beside =
-      make_loop_model(test::parsed(test::network_session("network_beside")), true);
-  const LoopModel inside = make_loop_model(test::parsed(test::network_session("network")));
-  auto& model = dynamic_cast<NetworkBeside&>(*beside.model);
-  for (int run = 0; run < 2; ++run) {
-    model.reset();
-    inside.model->reset();
-    ContactAnswer answer, expected;
-    for (int i = 1; i <= 20'000 && (i <= 600 || model.age() > 5); ++i) {
-      const Eigen::Vector3d at = 1e-5 * std::min(i, 400) * beside.push;
-      expected = inside.model->step(at);
-      answer = model.step(at);
-      std::this_thread::sleep_for(500us);
-    }
-    INFO("run " << run);
-    CHECK(model.age() <= 5);
-    CHECK(answer.valid);
-    CHECK(expected.force_N.norm() > 0.1);
-    CHECK((answer.force_N - expected.force_N).norm() < 0.01 * expected.force_N.norm());
-  }
 }
 
 TEST_CASE("The jitter check counts and reports") {

@@ -78,7 +78,7 @@ TEST_CASE("the list holds the formulations, each once, by rank") {
         "closed_form, cvodes, linear, element, curves, condensed, zone, servo_network, static, "
         "network_step, quasi_static, inertial, forward_euler, semi_implicit_euler, rk4, "
         "backward_euler, implicit_midpoint, newmark, tr_bdf2, exponential, xpbd, cvode_adams, "
-        "cvode_bdf, ida, network_beside, surface, law");
+        "cvode_bdf, ida, surface, law");
   CHECK(find_formulation("collocation") == find_formulation("quasi_static"));
   CHECK(find_formulation("network") == find_formulation("servo_network"));
   CHECK(find_formulation("") == nullptr);

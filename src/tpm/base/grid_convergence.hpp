@@ -4,7 +4,8 @@
 
 namespace tpm::base {
 
-/// What three solutions on ever finer grids tell (Roache 1994; the procedure of Celik et al. 2008).
+/// Convergence of three solutions on ever finer grids (Roache 1994; the procedure of Celik et al.
+/// 2008).
 struct GridConvergence {
   enum class Behaviour { monotone, oscillating, diverging, exact };
   Behaviour behaviour = Behaviour::exact;

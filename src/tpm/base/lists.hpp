@@ -11,7 +11,7 @@
 
 namespace tpm::base {
 
-/// What `value` makes of the items, a member or a function.
+/// The results of `value`, a member or a function, for the items.
 template <class Made, class Items, class Value>
 std::vector<Made> mapped(Items&& items, Value value) {
   std::vector<Made> all;
@@ -26,8 +26,8 @@ std::string listed(const Items& items, Text text, std::string_view between = ", 
   return fmt::format("{}", fmt::join(mapped<std::string>(items, text), between));
 }
 
-/// What `value` says of the items, a member or a function: each once, in the order in which they
-/// first occur.
+/// The distinct results of `value`, a member or a function, for the items, in the order in which
+/// they first occur.
 template <class Items, class Value>
 auto each_once(const Items& items, Value value) {
   std::vector<std::decay_t<decltype(std::invoke(value, *items.begin()))>> all;

@@ -15,7 +15,7 @@ namespace tpm::data {
 using namespace base;
 }
 
-/// How an element answers.
+/// The response of an element.
 namespace tpm::law {
 using namespace base;
 using namespace data;
@@ -52,7 +52,7 @@ using namespace files;
 using namespace organ;
 }  // namespace tpm::contact
 
-/// Which model is accurate enough.
+/// The choice of a model that is accurate enough.
 namespace tpm::plan {
 using namespace base;
 using namespace data;

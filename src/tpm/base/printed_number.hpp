@@ -10,7 +10,7 @@ namespace tpm::base {
 struct PrintedNumber {
   std::string text;
   double value = 0.0;
-  double last_digit = 1.0;  ///< what one unit of the last printed digit is worth, > 0
+  double last_digit = 1.0;  ///< value of one unit of the last printed digit, > 0
 };
 
 /// Reads a decimal number with optional sign, point and exponent, and nothing else.
@@ -22,7 +22,7 @@ struct PrintedNumber {
 /// With so many decimals, and two significant digits where these show fewer: "-12.3 %", "+0.012 %".
 [[nodiscard]] std::string percent_text(double percent, int decimals);
 
-/// How a recomputed number relates to the printed digits.
+/// Relation of a recomputed number to the printed digits.
 enum class DigitVerdict {
   by_rounding,     ///< rounding gives the printed digits
   by_truncation,   ///< only cutting the digits off gives them

@@ -6,7 +6,7 @@
 
 namespace tpm::base {
 
-/// What an option that takes a list of rising values accepts.
+/// Values that an option with a list of rising values accepts.
 struct RisingValues {
   Dimension dimension = Dimension::dimensionless;
   int most = 0;                      ///< values of a range

@@ -8,7 +8,7 @@ namespace tpm::files {
 /// False with errno if that is not possible.
 [[nodiscard]] bool write_checksum(int descriptor, std::uint64_t size);
 
-/// What the end of a file says about its content.
+/// State of a file's content by the checksum at its end.
 enum class ChecksumState { none, whole, broken };
 
 [[nodiscard]] ChecksumState checksum_of(int descriptor);

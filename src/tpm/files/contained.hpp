@@ -9,7 +9,7 @@
 
 namespace tpm::files {
 
-/// What a contained process may do and use.
+/// Limits of a contained process.
 struct ContainedLimits {
   /// True: the child writes the file with data of ours, without limits but `cpu_s`, which is then
   /// that of each request. Its end is a fault of the system (Error(environment)), not of the file.
@@ -64,7 +64,7 @@ class Contained {
   std::uint64_t most_bytes_;
   int socket_ = -1;
   int child_ = -1;
-  std::string end_;        ///< how the child ended; empty: it lives
+  std::string end_;        ///< the end of the child; empty: it lives
   std::deque<Taker> due_;  ///< of the answers that are due
 };
 

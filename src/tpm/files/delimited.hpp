@@ -12,13 +12,13 @@
 
 namespace tpm::files {
 
-/// How the characters of a text file are stored.
+/// Encoding of a text file.
 enum class Encoding { utf8, utf8_with_mark, utf16_little_endian, utf16_big_endian, latin1 };
 
 /// "UTF-8", "UTF-16 LE", ... as people write it.
 [[nodiscard]] std::string_view encoding_name(Encoding encoding) noexcept;
 
-/// What the reader is told; whatever is left open is found out from the text.
+/// Options of the reader; those left open are determined from the text.
 struct DelimitedOptions {
   std::optional<char> separator;      ///< ',', ';', '\t' or ' ' (any blanks)
   std::optional<bool> decimal_comma;  ///< "3,5" is three and a half; with separator ',' in quotes

@@ -58,7 +58,7 @@ void mark_result(int descriptor);
 /// Called by writers once the file has its content: it may be read back and written again.
 void note_written(const std::filesystem::path& path);
 
-/// What results are marked with: of mark_results(), for programs that write for this one. Empty if
+/// The mark of results, set by mark_results(), for programs that write for this one. Empty if
 /// they are not.
 [[nodiscard]] std::string result_origin();
 

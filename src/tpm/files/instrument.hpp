@@ -10,14 +10,14 @@
 
 namespace tpm::files {
 
-/// How well an instrument knows one of its channels, as standard uncertainties: of a reading x
+/// Standard uncertainties of one channel of an instrument: of a reading x
 /// relative |x| and, independent of it, absolute.
 struct ChannelUncertainty {
   double relative = 0.0;
   double absolute = 0.0;  ///< SI of the channel
 };
 
-/// What is stated of the instrument of a recording: the block "instrument" of a curve's
+/// Statements about the instrument of a recording: the block "instrument" of a curve's
 /// description (docs/data_formats.md).
 struct Instrument {
   std::string id;  ///< equal in two recordings: their errors are the same

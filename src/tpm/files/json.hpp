@@ -10,7 +10,7 @@ namespace tpm::files {
 /// Keys keep the order in which they were written: reports are compared byte for byte.
 using Json = nlohmann::ordered_json;
 
-/// What `convert` makes of the items, a member or a function.
+/// The results of `convert`, a member or a function, for the items.
 template <class Items, class Convert>
 [[nodiscard]] Json array_json(const Items& items, Convert convert) {
   Json array = Json::array();

@@ -22,7 +22,7 @@ enum class ThousandsMark {
 /// Throws Error(bad_input).
 [[nodiscard]] ThousandsMark parse_thousands_name(std::string_view text, std::string_view where);
 
-/// How a file writes its numbers.
+/// Notation of a file's numbers.
 struct NumberStyle {
   bool decimal_comma = false;                     ///< "3,5" is three and a half
   ThousandsMark thousands = ThousandsMark::none;  ///< never the decimal sign
@@ -41,7 +41,7 @@ struct NumberStyle {
 /// True if a field holds a number in any style.
 [[nodiscard]] bool is_number_in_some_style(std::string_view field);
 
-/// What the user says about the style; the rest is told by the numbers.
+/// The user's choice of a style; the rest is told by the numbers.
 struct StyleChoice {
   std::optional<bool> decimal_comma;
   std::optional<ThousandsMark> thousands;

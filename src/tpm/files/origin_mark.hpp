@@ -5,8 +5,8 @@
 
 namespace tpm::files {
 
-/// What made a file, kept in its extended attribute "user.tpm.origin", which moves and is deleted
-/// with it. File systems without such attributes have none, and most copies have none.
+/// The origin of a file, kept in its extended attribute "user.tpm.origin", which moves and is
+/// deleted with it. File systems without such attributes have none, and most copies have none.
 struct OriginMark {
   std::string origin;    ///< the command and its inputs
   bool changed = false;  ///< its size or its time is not that of the marked content

@@ -41,7 +41,7 @@ class Replacement {
   [[nodiscard]] bool link_to(const char* name) const noexcept;
 
   std::filesystem::path path_;    ///< as it was given, for messages
-  std::filesystem::path target_;  ///< what a symbolic link leads to
+  std::filesystem::path target_;  ///< target of a symbolic link
   std::string open_file_;         ///< the file without a name, for linkat(); empty: it has one
   /// Names that it may have on its way, made before it is written: putting it in place needs no
   /// memory.

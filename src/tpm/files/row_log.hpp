@@ -41,7 +41,7 @@ class RowLogWriter {
   std::vector<std::byte> kept_;
 };
 
-/// What a file of rows holds.
+/// Content of a file of rows.
 struct RowLog {
   std::string header;
   std::size_t row_bytes = 0;

@@ -7,8 +7,8 @@
 
 namespace tpm::law {
 
-/// What turns a stiffness in N/m into Young's modulus E in Pa: the rigid probe that was pressed
-/// into a half space, or a bar. nu is Poisson's ratio, u_ref the law's reference depth.
+/// The geometry by which a stiffness in N/m becomes Young's modulus E in Pa: the rigid probe that
+/// was pressed into a half space, or a bar. nu is Poisson's ratio, u_ref the law's reference depth.
 ///
 /// | probe      | force                                        | law                   |
 /// | sphere     | F = 4/3 E/(1 - nu^2) sqrt(R) u^(3/2) (Hertz) | hertz                 |
@@ -40,7 +40,7 @@ struct ContactGeometry {
 /// "a sphere of radius 2 mm, F = 4/3 E/(1 - nu^2) sqrt(R) u^(3/2) (Hertz)"; empty if not given.
 [[nodiscard]] std::string geometry_words(const ContactGeometry& geometry);
 
-/// What a reader has to know before using moduli of that geometry: a depth that is not small beside
+/// Warnings for a reader of moduli of that geometry: a depth that is not small beside
 /// the sphere, a kernel that is not the probe's.
 /// @param depth_m largest depth that the law was fitted to, from contact on; the law's reference
 ///   depth if it is not known

@@ -26,7 +26,7 @@ struct BranchWeights {
   CreepPlaces decay;
 };
 
-/// What all laws share: the places, and what interpolates there.
+/// The part that all laws share: the places, and their interpolation.
 struct CreepRule {
   ExponentialCollocation collocation;
   std::vector<ExponentialCollocation::Place> place;

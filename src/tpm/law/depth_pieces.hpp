@@ -9,7 +9,7 @@
 
 namespace tpm::law {
 
-/// How V(u) runs over a piece: straight, the cubic through values and slopes at both ends
+/// Course of V(u) over a piece: straight, the cubic through values and slopes at both ends
 /// (kernel_between), or the quartic through five values.
 enum class PieceCourse { straight, cubic, quartic };
 
@@ -46,7 +46,7 @@ class DepthPieces {
   [[nodiscard]] const std::vector<PieceClass>& classes() const { return classes_; }
   /// Lengths of the pieces over those of their class, less 1.
   [[nodiscard]] const Eigen::ArrayXd& off_length() const { return off_length_; }
-  /// How many pieces the first `steps` steps have.
+  /// Number of pieces of the first `steps` steps.
   [[nodiscard]] Eigen::Index after(std::size_t steps) const {
     return steps == 0 ? 0 : after_step_[steps - 1];
   }

@@ -6,7 +6,7 @@
 
 namespace tpm::law {
 
-/// What ContactHistory answers to an imposed drive, for laws whose branches have times among the
+/// The answer of ContactHistory to an imposed drive, for laws whose branches have times among the
 /// parameters: all steps of one branch after those of another, in plain arrays, several times as
 /// fast. Agrees with it to the tolerance of both, 1e-10 of the peak; derivatives to 1e-5 where the
 /// sampling is uneven by a few millionths.

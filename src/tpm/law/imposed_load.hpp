@@ -22,7 +22,7 @@ namespace tpm::law {
 /// differences of its eigenvalues (Daleckii and Krein). Then u follows from V.
 class LoadedSurface {
  public:
-  /// Whether the law can be answered so.
+  /// True if the law can be answered so.
   [[nodiscard]] static bool answers(const LawAtParameters& law);
 
   LoadedSurface(const LawAtParameters& law, Want want);
@@ -51,7 +51,7 @@ class LoadedSurface {
     double decay;
     std::array<double, 3> of;
   };
-  /// What one parameter does to A, and to the sum over the eigenvalues.
+  /// Derivatives of A, and of the sum over the eigenvalues, by one parameter.
   struct Direction {
     int parameter;
     double d_sum;          ///< dA

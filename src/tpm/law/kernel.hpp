@@ -50,8 +50,8 @@ class KernelShape {
     Tangent tangent;
   };
   [[nodiscard]] Jet jet(double u) const;
-  /// How far the polynomial of fourth degree through V at five evenly spaced depths from a to b is
-  /// off at 1/8 and 7/8 of the way, where its error is largest. a, b >= 0
+  /// Error of the polynomial of fourth degree through V at five evenly spaced depths from a to b,
+  /// at 1/8 and 7/8 of the way, where it is largest. a, b >= 0
   [[nodiscard]] double quartic_error(double a, double b) const;
   /// u with value(u) = v; v >= 0
   [[nodiscard]] double inverse(double v) const;

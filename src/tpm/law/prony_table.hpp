@@ -10,7 +10,7 @@ namespace tpm::law {
 /// exp(-t/tau_i)) with long_share + sum g_i = 1.
 struct PronyTable {
   double instant = 0.0;       ///< G(0) of the table, N/m (or Pa)
-  double long_share = 0.0;    ///< what remains in the end, 0 to 1
+  double long_share = 0.0;    ///< equilibrium share, 0 to 1
   std::vector<double> g;      ///< > 0
   std::vector<double> tau_s;  ///< rising
   bool fitted = false;        ///< a fractional law: the table follows it within the window only
@@ -21,7 +21,7 @@ struct PronyTable {
   [[nodiscard]] double at(double t_s) const;
 };
 
-/// How a fractional law is turned into branches.
+/// Window and times by which a fractional law is turned into branches.
 struct PronyWindow {
   double from_s = 0.01;
   double to_s = 100.0;

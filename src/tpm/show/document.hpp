@@ -6,7 +6,7 @@
 
 namespace tpm::show {
 
-/// How a verdict is tinted where there is colour; the words always carry the meaning.
+/// Tint of a verdict where there is colour; the words always carry the meaning.
 enum class Tone { plain, good, fair, bad };
 
 struct Cell {

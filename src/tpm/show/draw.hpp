@@ -16,7 +16,7 @@ namespace tpm::show {
 /// and write the rest.
 [[nodiscard]] std::string find_drawing_python();
 
-/// What is drawn of each figure: SVG alone, or PNG (300 dpi) and PDF too.
+/// Formats of each figure: SVG alone, or PNG (300 dpi) and PDF too.
 enum class Drawings { svg, for_print };
 
 /// Draws every figure of a figures.json into `folder`, one file each, with

@@ -26,7 +26,7 @@ struct Series {
   Kind kind = Kind::line;
   std::string label{};       ///< for the legend; same label, same colour in all panels of a figure
   std::string provenance{};  ///< "model", "simulated", or a word of provenance_name()
-  std::string assumed{};     ///< what of its place is assumed ("time"); empty if nothing
+  std::string assumed{};     ///< assumed part of its place ("time"); empty if none
   std::vector<double> x{};
   std::vector<double> y{};
   std::vector<double> sd{};
@@ -52,7 +52,7 @@ struct Axis {
   bool logarithmic = false;
   std::optional<double> lower{};  ///< limits; what is not given follows the data
   std::optional<double> upper{};
-  std::vector<std::string> names{};  ///< what stands at 1, 2, ...: for things that have no number
+  std::vector<std::string> names{};  ///< labels at 1, 2, ...: for things that have no number
 };
 
 struct Panel {

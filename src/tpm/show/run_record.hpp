@@ -8,8 +8,8 @@
 
 namespace tpm::show {
 
-/// What changes from run to run and so stays out of the results: version, compiler, machine, date
-/// and wall times.
+/// Facts that change from run to run and so stay out of the results: version, compiler, machine,
+/// date and wall times.
 /// @param seconds wall time of each part of the run
 [[nodiscard]] Json run_record(const std::map<std::string, double>& seconds);
 

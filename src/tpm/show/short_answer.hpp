@@ -16,12 +16,12 @@ inline constexpr std::size_t kAnswerLines = 25;
 /// in one line first; then warnings share a line. Nothing else is shortened, and no warning is left
 /// out.
 struct ShortAnswer {
-  std::vector<std::string> conclusion{};  ///< what was found, and whether it can be relied on
+  std::vector<std::string> conclusion{};  ///< the finding, and whether it can be relied on
   std::vector<std::string> head{};        ///< of the table; may be empty
   std::vector<std::string> rows{};        ///< of the table
-  /// What the rows from this one on say, in one line. The default counts them.
+  /// Summary of the rows from this one on, in one line. The default counts them.
   std::function<std::string(std::size_t from)> rest{};
-  std::vector<std::string> limits{};    ///< what limits the answer most
+  std::vector<std::string> limits{};    ///< the strongest limits of the answer
   std::vector<std::string> warnings{};  ///< written with "! " before them, each once
   std::vector<std::string> end{};       ///< files, and the next command
 };

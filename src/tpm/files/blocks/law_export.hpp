@@ -29,8 +29,8 @@ struct ExportOptions {
 /// than the target takes, and for a fluid in FEBio.
 [[nodiscard]] std::string export_law(const LawFile& law, const ExportOptions& options);
 
-/// What the written material leaves out or stretches; each stands among its comments, too, and is
-/// told to the user.
+/// Warnings of all that the written material leaves out or stretches; each stands among its
+/// comments, too, and is told to the user.
 [[nodiscard]] std::vector<std::string> export_warnings(const LawFile& law,
                                                        const ExportOptions& options);
 

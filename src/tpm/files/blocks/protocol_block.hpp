@@ -29,8 +29,8 @@ inline constexpr auto kProtocolKindWords =
                                        {ProtocolKind::creep, "creep"},
                                        {ProtocolKind::knots, "knots"}});
 
-/// What a block says of a protocol. Numbers may be open as long as something else will set them: an
-/// axis of a sweep, the data of a fit.
+/// The protocol as a block states it. Numbers may be open as long as something else will set them:
+/// an axis of a sweep, the data of a fit.
 struct ProtocolBlock {
   ProtocolKind kind = ProtocolKind::ramp_hold;
   std::optional<double> depth_m, rate_m_per_s, hold_s, load_N, duration_s;
@@ -51,7 +51,7 @@ struct ProtocolBlock {
 
 enum class Openness {
   complete,  ///< every key has to be there
-  open,      ///< what is missing stays open
+  open,      ///< missing values stay open
 };
 
 /// A block with the key `kind`, or of a kind that its place in the file says.

@@ -34,7 +34,7 @@ class ColumnChoice {
   /// "column 1 'Time', column 2 'Force'"
   [[nodiscard]] std::string list() const;
 
-  /// How many specimens stand side by side: 1 or more.
+  /// Number of specimens side by side, 1 or more.
   [[nodiscard]] std::size_t specimens() const noexcept { return specimens_; }
 
  private:
@@ -47,7 +47,7 @@ class ColumnChoice {
   const MachineHeader& header_;
   const std::string& file_;
   std::size_t specimens_ = 1;
-  std::vector<bool> of_others_;  ///< whether a column belongs to a later specimen
+  std::vector<bool> of_others_;  ///< true for a column of a later specimen
 };
 
 /// The number of a cell as it stands, without its unit; a clock as seconds. None for other texts.

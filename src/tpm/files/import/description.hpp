@@ -12,13 +12,13 @@
 
 namespace tpm::files {
 
-/// What part of a reading a column holds.
+/// The part of a reading that a column holds.
 enum class Bound { value, lower, upper, sd };
 
 /// "value", "lower", "upper" or "sd".
 [[nodiscard]] std::string_view bound_name(Bound bound) noexcept;
 
-/// What the description says of one CSV column.
+/// The description of one CSV column.
 struct ColumnDescription {
   Quantity quantity = Quantity::ordinate;
   Unit unit;
@@ -30,7 +30,7 @@ struct ColumnDescription {
 /// A part of a recording that the instrument ran as one, such as the approach or a pause.
 struct RecordedSegment {
   std::string kind;     ///< the instrument's word: "extend", "pause", "retract"
-  std::string control;  ///< how it was run, "constant-height-pause"; empty if not known
+  std::string control;  ///< mode of the run, "constant-height-pause"; empty if not known
   std::size_t samples = 0;
 };
 

@@ -23,7 +23,7 @@ struct ColumnTitle {
 /// A cell of a unit row without its brackets: "[mm]" -> "mm".
 [[nodiscard]] std::string_view without_brackets(std::string_view cell) noexcept;
 
-/// What a column of a testing machine may be used for.
+/// Uses of a testing machine's column.
 enum class ColumnRole {
   time,
   drive,
@@ -39,7 +39,7 @@ enum class ColumnRole {
   deflection,    ///< of that cantilever, as a length or as the signal of its detector
 };
 
-/// What a title says in English, French, German, Spanish or Italian, or as G', G", E' and E".
+/// The meaning of a title in English, French, German, Spanish or Italian, or as G', G", E' and E".
 struct Recognized {
   ColumnRole role;
   Quantity quantity;
@@ -58,7 +58,7 @@ struct RefusedTitle {
 /// None for a title that recognize_title recognises, and for one without any known word.
 [[nodiscard]] std::optional<RefusedTitle> refused_title(std::string_view name);
 
-/// Whether numbers in this dimension can be what a title says.
+/// True if numbers in this dimension can be what a title says.
 [[nodiscard]] bool is_dimension_of(const Recognized& meaning, Dimension dimension);
 
 /// True for an angular frequency ("omega", "angular frequency", "Kreisfrequenz"): there 1/s means

@@ -16,7 +16,7 @@ namespace tpm::files {
 /// out from the content, "machine", "jpk", ...
 [[nodiscard]] std::vector<std::string> import_formats();
 
-/// What one axis of a digitised figure shows.
+/// One axis of a digitised figure.
 struct DigitizedAxis {
   Quantity quantity = Quantity::time;
   Unit unit;
@@ -25,7 +25,7 @@ struct DigitizedAxis {
 /// "contact_force:N" or "abscissa". Throws Error(bad_input).
 [[nodiscard]] DigitizedAxis parse_axis(std::string_view text, std::string_view where);
 
-/// What the user says about a file; everything left out is found in the file or is an error that
+/// Choices of the user for a file; everything left out is found in the file or is an error that
 /// names the option. Nothing is guessed: a column without a unit is not imported.
 struct ImportOptions {
   std::string format = "auto";  ///< one of import_formats()
@@ -58,7 +58,7 @@ struct ImportOptions {
   std::optional<double> from_s;           ///< samples before this time of the file are left out
   std::optional<double> until_s;          ///< and those after this one
   std::optional<double> contact_force_N;  ///< above 0: samples before contact are left out
-  int contact_samples = 3;                ///< how many samples in a row must reach it, from 1
+  int contact_samples = 3;                ///< number of samples in a row that must reach it, from 1
 
   // Force curves of an AFM: JPK files, whose channels drive_column and response_column may name,
   // and tables with the height of the piezo.
@@ -79,7 +79,7 @@ struct ImportOptions {
 struct ImportFinding {
   std::string what;
   std::string value;
-  bool told = false;  ///< which column it is, or what a reader would not expect
+  bool told = false;  ///< true: a column's choice, or a finding that a reader would not expect
 
   [[nodiscard]] static ImportFinding told_of(std::string what, std::string value) {
     return {std::move(what), std::move(value), true};
@@ -102,7 +102,7 @@ struct ImportedSeries {
   std::vector<int> lines;               ///< of the samples in the file; empty if they have none
   std::vector<ImportFinding> findings;
   std::vector<RecordedSegment> segments;  ///< empty if the file does not say
-  std::string note;                       ///< what becomes part of the description's note
+  std::string note;                       ///< becomes part of the description's note
 };
 
 /// A curve in the project's own form: `csv` and `description` are what the two files hold.

@@ -30,7 +30,7 @@ struct DigitizedDataset {
 [[nodiscard]] std::vector<DigitizedDataset> read_engauge(const DelimitedTable& table,
                                                          const std::string& file);
 
-/// Whether a table can only be such a file.
+/// True if a table can only be such a file.
 [[nodiscard]] bool is_wpd_csv(const DelimitedTable& table);
 [[nodiscard]] bool is_engauge(const DelimitedTable& table);
 

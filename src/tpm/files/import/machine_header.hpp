@@ -17,7 +17,7 @@ struct MachineColumn {
   std::string name;  ///< may be empty
   std::string unit;  ///< may be empty
   std::optional<Recognized> meaning;
-  std::optional<RefusedTitle> refused;  ///< what it would mean but for a word or its unit
+  std::optional<RefusedTitle> refused;  ///< its meaning but for a word or its unit
   bool misfit = false;  ///< the unit is none of what the title says: taken if no other column fits
   bool unit_is_chosen = false;  ///< by the options, not by the file
 
@@ -31,7 +31,7 @@ struct MachineHeader {
   NumberStyle style;
   std::string sheet;
   std::vector<MachineColumn> columns;
-  std::vector<ImportFinding> findings;  ///< what of the file is not read
+  std::vector<ImportFinding> findings;  ///< parts of the file that are not read
 };
 
 /// Finds the samples, and above them titles and units in any order: blank rows, titles of the file

@@ -9,7 +9,7 @@
 
 namespace tpm::files {
 
-/// How the columns of a file and their units were understood: "read as time: column 1 'Time', s;
+/// The interpretation of a file's columns and units: "read as time: column 1 'Time', s;
 /// ...". Empty for a file with a description.
 /// @param findings of a RecordingFile or a SpectrumFile
 [[nodiscard]] std::string columns_words(const std::vector<ImportFinding>& findings);
@@ -43,7 +43,7 @@ using MeasuredFile = std::variant<RecordingFile, SpectrumFile>;
 [[nodiscard]] Spectrum read_spectrum_file(const std::filesystem::path& path,
                                           const ImportOptions& options = {});
 
-/// What a file says under a key: the text or number at the top of its description or, without a
+/// The value of a key in a file: the text or number at the top of its description or, without a
 /// description, the one value that the column of that title holds. Throws Error(bad_input) naming
 /// the file if there is no such key or the column does not hold one value.
 [[nodiscard]] std::string recording_label(const std::filesystem::path& path, std::string_view key,

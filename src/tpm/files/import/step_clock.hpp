@@ -16,7 +16,7 @@ void keep_time_window(ImportedSeries& series, const std::string& file,
 /// series stay as they are.
 void resolve_kept_step(ImportedSeries& series);
 
-/// Whether samples that begin late may count from a step at 0. Times in geometric progression may,
+/// True if samples that begin late may count from a step at 0. Times in geometric progression may,
 /// and so may times that begin within two steps of the sampling; others are those of a clock that
 /// ran before the step.
 /// @param times strictly increasing

@@ -100,10 +100,10 @@ template <class T>
 
 // NOLINTEND(performance-unnecessary-value-param)
 
-/// What breaks a rule about several keys.
+/// A violation of a rule about several keys.
 struct Fault {
   std::string key;   ///< where in the block: "direction"; empty: the block
-  std::string what;  ///< what is wrong there
+  std::string what;  ///< the violation there
 };
 
 /// A rule: what is expected, in words that end the message, and its first fault.

@@ -12,8 +12,8 @@ namespace tpm::files {
 /// A kind of file with its declared form.
 struct FileKind {
   std::string name;      ///< "scene" for schemas/scene.schema.json
-  std::string title;     ///< what a file of it is, and of which commands
-  std::string sentence;  ///< how its values are written
+  std::string title;     ///< meaning of such a file, and its commands
+  std::string sentence;  ///< the notation of its values
   FormPtr form;
 };
 

@@ -35,7 +35,7 @@ struct Range {
 struct KeyForm {
   std::string name;
   FormPtr form;
-  std::string sentence;  ///< what it means, without a full stop
+  std::string sentence;  ///< its meaning, without a full stop
   bool required = false;
   Json usual = nullptr;    ///< the default as files write it; null: none, or one that depends
   Json example = nullptr;  ///< a value for examples, where that of the form does not fit
@@ -43,12 +43,12 @@ struct KeyForm {
 
 /// One of the kinds that an object may be of.
 struct KindForm {
-  std::string word;      ///< what stands under the key that tells them apart
-  std::string sentence;  ///< what it is; may be empty
+  std::string word;      ///< value of the key that tells them apart
+  std::string sentence;  ///< its meaning; may be empty
   std::vector<KeyForm> keys;
 };
 
-/// What a value of a file may be. Which members count depends on the type.
+/// Values that a file may hold in one place. The members that count depend on the type.
 struct Form {
   enum class Type {
     any,       ///< whatever JSON has; its reader says more
@@ -63,11 +63,11 @@ struct Form {
     block,     ///< an object with `keys`
     kinds,     ///< an object of one of `kinds`, which the key `by` names
     either,    ///< one of `forms`
-    later,     ///< what `made` returns when it is asked for: of a list that the program links
+    later,     ///< returned by `made` when it is asked for: of a list that the program links
   };
   Type type = Type::any;
   std::string name = {};      ///< of a form that several places share: "contact"
-  std::string sentence = {};  ///< what it is
+  std::string sentence = {};  ///< its meaning
   Range range = {};
   Dimension dimension = Dimension::dimensionless;
   bool plain_too = false;  ///< a quantity may be a number, in SI

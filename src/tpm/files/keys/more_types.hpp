@@ -9,7 +9,7 @@
 
 namespace tpm::files {
 
-/// What has a form, as it stands in the file: its reader knows more later.
+/// A value with a form, as it stands in the file: its reader knows more later.
 [[nodiscard]] inline ValueType<Json> as_json(FormPtr form) {
   return {std::move(form), [](const Json& value, const DocumentPlace&) { return value; },
           [](const Json& value) { return value; }};

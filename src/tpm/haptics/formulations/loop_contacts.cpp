@@ -1,10 +1,9 @@
-// What only sessions step: a network beside the loop, a ball on a surface, a law.
+// Models that only sessions step: a ball on a surface, a law.
 #include <fmt/format.h>
 
 #include "tpm/base/text.hpp"
 #include "tpm/contact/law_contact.hpp"
 #include "tpm/haptics/session/loop_maker.hpp"
-#include "tpm/haptics/session/network_beside.hpp"
 #include "tpm/haptics/session/pushed_scene.hpp"
 #include "tpm/haptics/session/surface_scene.hpp"
 #include "tpmkit/error.hpp"
@@ -15,42 +14,16 @@ namespace {
 
 class LoopContact final : public Formulation, public LoopMaker {
  public:
-  LoopContact(Entry entry, LoopModel (*made)(const HilSession&, bool))
+  LoopContact(Entry entry, LoopModel (*made)(const HilSession&))
       : Formulation(std::move(entry)), made_(made) {}
-  [[nodiscard]] LoopModel loop(const HilSession& session, bool threads) const override {
-    return made_(session, threads);
-  }
+  [[nodiscard]] LoopModel loop(const HilSession& session) const override { return made_(session); }
 
  private:
-  LoopModel (*made_)(const HilSession&, bool);
+  LoopModel (*made_)(const HilSession&);
 };
 
-LoopModel network_beside_model(const HilSession& session, bool threads) {
-  constexpr double kShortest_s = 0.1;
-  const PushedScene scene(session);
-  const double tau_s = scene.tissue.bonds().shortest_relaxation_time_s();
-  if (tau_s < kShortest_s) {
-    throw bad_input(session.scene_place,
-                    fmt::format("has a relaxation time of {} s, too short for the model "
-                                "'network_beside'",
-                                significant(tau_s, 4)),
-                    "0.1 s or more, or the model 'network'");
-  }
-  const int every = NetworkBeside::periods_between(session.servo.period_s);
-  const BondSystem bonds = scene.tissue.bonds();
-  LoopModel loop = scene.begun("network_beside", "stepped beside the loop, pushed at");
-  loop.model = std::make_unique<NetworkBeside>(
-      scene.network(every * session.servo.period_s),
-      StiffnessByDepth(bonds, scene.rest(), scene.tissue.constraints(), scene.only_sphere(),
-                       scene.probe().direction, scene.deepest_m),
-      session.servo.period_s, threads);
-  loop.shape.field = scene.network(kDrawnEvery_s);
-  loop.error_bound = "its own estimate, row by row; what tpm hil verify measures";
-  return loop;
-}
-
 /// A contact by itself: there is no organ to draw but the place that is pushed.
-LoopModel law_model(const HilSession& session, bool /*threads*/) {
+LoopModel law_model(const HilSession& session) {
   constexpr double kDrawnRadius_m = 5e-3;
   const LawFile& law = session.law.value();
   const double valid_m = valid_depth_m(law, deepest_asked_m(session, law.spec.reference));
@@ -77,42 +50,28 @@ LoopModel law_model(const HilSession& session, bool /*threads*/) {
   return loop;
 }
 
-constexpr Capabilities kOfServoNetwork{.network = true,
-                                       .depth = true,
-                                       .field = true,
-                                       .servo = true,
-                                       .branches = true,
-                                       .stiffening = true,
-                                       .regions = true};
-
-Capabilities with_tools(Capabilities can) {
-  can.tools = true;
-  return can;
-}
-
-LoopModel ball_model(const HilSession& session, bool /*threads*/) {
-  return surface_model(session);
-}
+constexpr Capabilities kOfSurface{.network = true,
+                                  .depth = true,
+                                  .field = true,
+                                  .tools = true,
+                                  .servo = true,
+                                  .branches = true,
+                                  .stiffening = true,
+                                  .regions = true};
 
 }  // namespace
 
 Formulations loop_contacts_formulations() {
-  static const LoopContact beside(
-      {"network_beside",
-       "the whole network at 200 Hz beside the loop, which uses its last force "
-       "and stiffness",
-       kOfServoNetwork, 300},
-      network_beside_model);
   static const LoopContact surface(
-      {"surface", "the whole network in every period under a ball that moves in space",
-       with_tools(kOfServoNetwork), 310},
-      ball_model);
+      {"surface", "the whole network in every period under a ball that moves in space", kOfSurface,
+       310},
+      surface_model);
   static const LoopContact law({"law",
                                 "one contact that answers by a law of the family, without an organ",
                                 {.depth = true, .servo = true},
                                 320},
                                law_model);
-  static const std::vector<const Formulation*> all{&beside, &surface, &law};
+  static const std::vector<const Formulation*> all{&surface, &law};
   return all;
 }
 

@@ -41,9 +41,7 @@ class ReducedLoop final : public ReducedContact, public LoopMaker {
       : ReducedContact(std::move(entry), offered,
                        [](const FormulationChoice&) { return std::size_t{0}; }),
         made_(made) {}
-  [[nodiscard]] LoopModel loop(const HilSession& session, bool /*threads*/) const override {
-    return made_(session);
-  }
+  [[nodiscard]] LoopModel loop(const HilSession& session) const override { return made_(session); }
 
  private:
   LoopModel (*made_)(const HilSession&);

@@ -58,7 +58,7 @@ ServeRun serve_session(const HilSession& session, const ServeOptions& options) {
   const DeviceLimits& limits = limits_of("virtual");
   require_within(session, limits);
   ServeRun run;
-  LoopModel model = make_loop_model(session, true, {});
+  LoopModel model = make_loop_model(session);
   const std::shared_ptr<ContactModel> stepped = std::move(model.model);
   run.rendering = check_rendering(session, *stepped, model, limits);
   if (!run.rendering.acceptable()) {

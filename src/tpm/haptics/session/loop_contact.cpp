@@ -101,7 +101,7 @@ struct LoopContact::Stepped {
 };
 
 LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOptions& options)
-    : session_(session_of(file, options)), loop_(make_loop_model(session_, true)) {
+    : session_(session_of(file, options)), loop_(make_loop_model(session_)) {
   DeviceLimits limits;
   if (!options.device_file.empty()) {
     const DeviceFile device = read_device_file(options.device_file);

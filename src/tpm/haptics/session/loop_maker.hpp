@@ -14,9 +14,8 @@ class LoopMaker {
   LoopMaker& operator=(const LoopMaker&) = delete;
   virtual ~LoopMaker() = default;
   /// The model of a session, its stiffness still to come.
-  /// @param threads the model may work in a thread of its own
   /// Throws Error(bad_input) if the scene is not one that the model can stand for.
-  [[nodiscard]] virtual LoopModel loop(const HilSession& session, bool threads) const = 0;
+  [[nodiscard]] virtual LoopModel loop(const HilSession& session) const = 0;
 };
 
 /// A session can name it as its model.

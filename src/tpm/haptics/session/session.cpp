@@ -20,6 +20,17 @@
 namespace tpm::haptics {
 namespace {
 
+/// A session that follows its declaration. Throws Error(bad_input) otherwise.
+Json checked_session(const Json& json, std::string_view where) {
+  if (json.is_object() && json.contains("model") && json["model"].is_object() &&
+      json["model"].value("kind", Json()) == "network_beside") {
+    throw bad_input(DocumentPlace{std::string(where)}.key("model").key("kind").where,
+                    "'network_beside' was removed, it could add energy",
+                    "planned, condensed (its step does not grow with the organ) or network");
+  }
+  return checked(json, session_kind(), where);
+}
+
 /// The part of a direction that is square to the push.
 Eigen::Vector3d slide_of(const SlideKeys& slides, const Eigen::Vector3d& push,
                          const DocumentPlace& place) {
@@ -230,7 +241,7 @@ OperatorScript HilSession::operator_script() const {
 
 HilSession parse_session(const Json& written, std::string_view where,
                          const std::filesystem::path& folder) {
-  const Json json = checked(written, session_kind(), where);
+  const Json json = checked_session(written, where);
   const DocumentPlace place{std::string(where)};
   SessionKeys keys = session_block().made(json, place);
   const DeviceLimits device = limits_of("omega7");  // the simulated one has the same
@@ -308,7 +319,7 @@ void require_within(const HilSession& session, const DeviceLimits& limits) {
 }
 
 HilSession read_session(const std::filesystem::path& file, const SessionChanges& changes) {
-  Json json = checked(read_json(file), session_kind(), file.string());
+  Json json = checked_session(read_json(file), file.string());
   if (!changes.law.empty()) {
     json["model"] = {{"kind", "law"}, {"law", files::to_json(read_law(changes.law))}};
   }

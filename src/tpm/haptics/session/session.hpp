@@ -137,10 +137,8 @@ struct LoopModel {
 using PlanningTold = std::function<void(const std::string& what)>;
 inline constexpr std::size_t kPlanningSteps = 5;
 
-/// @param threads the model may work in a thread of its own; else all happens in its steps
 /// Throws Error(bad_input) if the scene is not one that the model can stand for; of a planned model
 /// Error(answer_is_no) if none is accurate and fast enough, Error(numerical) as make_plan().
-[[nodiscard]] LoopModel make_loop_model(const HilSession& session, bool threads = false,
-                                        const PlanningTold& told = {});
+[[nodiscard]] LoopModel make_loop_model(const HilSession& session, const PlanningTold& told = {});
 
 }  // namespace tpm::haptics

@@ -23,14 +23,14 @@ void require_materials(const Formulation& formulation, const HilSession& session
   }
 }
 
-LoopModel model_of(const HilSession& session, bool threads, const PlanningTold& told) {
+LoopModel model_of(const HilSession& session, const PlanningTold& told) {
   if (session.model == kPlannedModel) return planned_model(session, told);
   const Formulation* formulation = find_formulation(session.model);
   if (formulation == nullptr || !for_sessions(*formulation)) {
     refuse_formulation(session.model, "model", "session", formulations_that(for_sessions));
   }
   if (!session.law) require_materials(*formulation, session);
-  if (const auto* maker = formulation->as<LoopMaker>()) return maker->loop(session, threads);
+  if (const auto* maker = formulation->as<LoopMaker>()) return maker->loop(session);
   return offered_loop(*formulation, session);
 }
 
@@ -41,8 +41,8 @@ bool for_sessions(const Formulation& formulation) {
          (formulation.can().servo && formulation.as<PlanOffer>() != nullptr);
 }
 
-LoopModel make_loop_model(const HilSession& session, bool threads, const PlanningTold& told) {
-  LoopModel loop = model_of(session, threads, told);
+LoopModel make_loop_model(const HilSession& session, const PlanningTold& told) {
+  LoopModel loop = model_of(session, told);
   if (!session.law) {
     const BondSystem bonds = parse_tissue(session.scene, session.scene_place, {}).bonds();
     const std::span<const double> times_s = bonds.relaxation_times_s();

@@ -182,7 +182,7 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
                   const SessionRunOptions& options, bool checks, const MakeDevice& make) {
   require_within(session, limits);
   SessionRun run;
-  run.model = make_loop_model(session, options.real_time, options.planning);
+  run.model = make_loop_model(session, options.planning);
   const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
   run.rendering = check_rendering(session, *stepped, run.model, limits);
   if (choice.kind == "virtual") {

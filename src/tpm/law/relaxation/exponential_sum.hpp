@@ -17,11 +17,11 @@ struct FractionalWeights {
   Eigen::VectorXd d_weight_d_alpha;
   Eigen::VectorXd d_weight_d_beta;
   Eigen::VectorXd d_weight_d_log_tau;
-  double constant = 0.0;  ///< what relaxes so slowly that the window does not see it
+  double constant = 0.0;  ///< part that relaxes too slowly to be seen in the window
   double d_constant_d_alpha = 0.0;
   double d_constant_d_beta = 0.0;
   double d_constant_d_log_tau = 0.0;
-  double dashpot_s = 0.0;  ///< what relaxes within a step: acts on du/dt
+  double dashpot_s = 0.0;  ///< part that relaxes within a step: acts on du/dt
   double d_dashpot_d_alpha_s = 0.0;
   double d_dashpot_d_beta_s = 0.0;
   double d_dashpot_d_log_tau_s = 0.0;
