@@ -3,7 +3,8 @@
 
     packages.py ROOT TPM
 
-- one version in CMake, the program, CITATION.cff, CHANGELOG.md, the Debian changelog and the recipes; one licence;
+- one version in CMake, the program, CITATION.cff, CHANGELOG.md, the Debian changelog and the recipes; one licence; one date of
+  the release, or none;
 - packaging/debian: copyright in the form of DEP-5 with the text of LICENSE and the parts of docs/licences.md, control,
   tests, of which the one for the README's commands is run with TPM;
 - packaging/conda/recipe.yaml and packaging/spack: read as YAML and as Python; every dependency of
@@ -18,6 +19,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from email.utils import parsedate_to_datetime
 from pathlib import Path
 
 import yaml
@@ -77,7 +79,7 @@ def faults_of_versions(root, program):
     if 'file = "VERSION"' not in text_of(root, "bindings/python/pyproject.toml") or '"$stage/VERSION"' not in text_of(root, "scripts/wheel.sh"):
         yield "scripts/wheel.sh: the wheel does not take the version of the program"
     licences = {
-        "CITATION.cff": yaml.safe_load(text_of(root, "CITATION.cff"))["license"], "packaging/conda/recipe.yaml": recipe["about"]["license"],
+        "CITATION.cff": yaml.safe_load(text_of(root, "CITATION.cff"))["license"], "packaging/conda/recipe.yaml": recipe["about"]["license"].removesuffix(" AND LGPL-2.1-or-later"),
         "packaging/spack": calls["license"][0][0][0], "bindings/python/pyproject.toml": found(r'^license = { text = "(MIT) \(sources\)', text_of(root, "bindings/python/pyproject.toml")),
     }
     for place, there in licences.items():
@@ -85,6 +87,23 @@ def faults_of_versions(root, program):
             yield f"{place}: licence {there}; LICENSE is MIT"
     if not text_of(root, "LICENSE").startswith("MIT License"):
         yield "LICENSE: is not the MIT licence"
+
+
+def faults_of_dates(root):
+    """A tag needs one date in three places. Until then the heading says `unreleased`."""
+    said = found(r"^## \[[0-9.]+\] - (.*)$", text_of(root, "CHANGELOG.md"))
+    cited = yaml.safe_load(text_of(root, "CITATION.cff")).get("date-released")
+    if said == "unreleased":
+        if cited:
+            yield f"CITATION.cff: date-released {cited}; CHANGELOG.md says unreleased"
+        return
+    if not re.fullmatch(r"\d{4}-\d\d-\d\d", said or ""):
+        yield f"CHANGELOG.md: {said!r} is neither unreleased nor a date such as 2026-12-24"
+        return
+    signed = found(r"^ -- .*>  (.*)$", text_of(root, "packaging/debian/changelog"))
+    for place, date in (("CITATION.cff, date-released", str(cited)), ("packaging/debian/changelog", parsedate_to_datetime(signed).date().isoformat())):
+        if date != said:
+            yield f"{place}: {date}; CHANGELOG.md says {said}"
 
 
 def paragraphs(text):
@@ -176,6 +195,10 @@ def faults_of_recipes(root):
     built = {s["target_directory"] for s in recipe["source"] if "target_directory" in s}
     if built != {"libcsv", "cpp-httplib"}:
         yield f"conda: builds {sorted(built)} itself"
+    files = recipe["about"]["license_file"]
+    for name in built:
+        if not any(file.startswith(f"{name}/") for file in files):
+            yield f"conda: the licence of {name}, which the package holds, is not in license_file"
     script = text_of(root, "packaging/conda/build.sh")
     for name in built:
         if not re.search(rf"(cmake -S|cd) {name}\b", script):
@@ -187,6 +210,13 @@ def faults_of_recipes(root):
         yield "conda: does not say why the sources of tpmkit have no check sum"
 
     made, calls = spack_class(root, "tpmkit")
+    sundials = next(words[0] for words, _ in calls["depends_on"] if words[0].startswith("sundials"))
+    components = found(r"tpm_find\(SUNDIALS [0-9.]+ COMPONENTS ((?:\w|\s)+)\)", text_of(root, "cmake/TpmDependencies.cmake")).split()
+    for name in {"cvode", "cvodes", "ida", "idas", "arkode", "kinsol"} & set(components):
+        if f"+{name.upper()}" not in sundials.split():  # Spack writes the solvers in capitals
+            yield f"spack: {sundials}: without +{name.upper()}"
+    if re.search(r"[+~](cvodes?|idas?|arkode|kinsol)\b", sundials):
+        yield f"spack: {sundials}: Spack writes the solvers in capitals"
     needed = {re.split(r"[@ ~+]", words[0])[0] for words, _ in calls["depends_on"]}
     for name, (_, spack) in NAMES.items():
         if spack not in needed:
@@ -262,7 +292,7 @@ def faults_of_targets(root):
 
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
-    faults = [*faults_of_versions(root, program), *faults_of_debian(root, program), *faults_of_recipes(root), *faults_of_docker(root),
+    faults = [*faults_of_versions(root, program), *faults_of_dates(root), *faults_of_debian(root, program), *faults_of_recipes(root), *faults_of_docker(root),
               *faults_of_targets(root)]
     for fault in faults:
         print(fault)

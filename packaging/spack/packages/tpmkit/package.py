@@ -1,4 +1,5 @@
-# State: read by a test, never built, for there was no Spack on the machines of this project.
+# State: read by a test, never built, for there was no Spack on the machines of this project. Names of variants were compared
+# with a recipe of Spack of 2022 (sundials), versions were not: Spack may lack nanoflann 1.4 or Ceres 2.1, which Debian 12 has.
 import os
 
 from spack.package import *
@@ -43,7 +44,7 @@ class Tpmkit(CMakePackage):
     depends_on("nanoflann@1.4")
     depends_on("nlohmann-json@3.11:")
     depends_on("openssl@3:")
-    depends_on("sundials@6.4:6 +cvode +ida +klu")
+    depends_on("sundials@6.4:6 +CVODES +IDA +klu ~mpi")
     depends_on("utf8cpp@3.2:")
     depends_on("zlib@1.2:")
     depends_on("mpi", when="+mpi")
