@@ -127,8 +127,10 @@ void print_handles(int count) {
   }
   print_held("Without Coulomb friction", without);
   print_held("Coulomb friction up to 0.05 N", with);
-  print_share("lower limit above the truth, all", without.above + with.above,
-              without.found + with.found);
+  const int above = without.above + with.above, found = without.found + with.found;
+  if (found == 0) return;
+  fmt::print("lower limit of viscous friction above the truth, of all: {} of {}, {}\n", above,
+             found, exact_interval(above, found));
 }
 
 void print_all() {
