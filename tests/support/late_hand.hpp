@@ -5,6 +5,7 @@
 #include <deque>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "tpm/haptics/loop/servo_step.hpp"
 #include "tpmkit/contact_model.hpp"
@@ -51,10 +52,26 @@ struct LateHandSettings {
   double encoder_step_m = 1e-5, period_s = 1e-3;
 };
 
+/// What happened in a run with a hand.
+struct HandTrace {
+  /// Of each part of a period: the force that acts less the one that would act if no delay had
+  /// grown, N.
+  std::vector<double> of_growth_N;
+  std::vector<double> read_m, sent_N;  ///< of each cycle
+  std::vector<double> most_given_J;    ///< until each cycle
+};
+
 class LateHand final : public HapticDevice {
  public:
-  explicit LateHand(const LateHandSettings& settings)
+  static constexpr int kParts = 16;  ///< of a period
+
+  /// @param trace is filled; may be null
+  /// @param adds what the hand does beside its spring: `of_growth_N` of another run; may be null
+  explicit LateHand(const LateHandSettings& settings, HandTrace* trace = nullptr,
+                    const HandTrace* adds = nullptr)
       : s_(settings),
+        trace_(trace),
+        adds_(adds),
         decay_(std::exp(-(s_.damping_N_s_per_m + s_.friction_N_s_per_m) / s_.mass_kg * s_.period_s /
                         kParts)) {}
 
@@ -69,12 +86,14 @@ class LateHand final : public HapticDevice {
     const double jitter_s = s_.jitter_s * even_(random_);
     newest_s_ = std::max({time_s_, newest_s_, time_s_ + delay_s + jitter_s});
     coming_.push_back({newest_s_, force_N.z()});
+    if (trace_ != nullptr) as_told_.push_back({time_s_ + s_.delay_s, force_N.z()});
     return DeviceAnswer::ok;
   }
   DeviceStatus status() noexcept override { return {}; }
   void stop() noexcept override {
     coming_.clear();
-    force_N_ = 0.0;
+    as_told_.clear();
+    force_N_ = told_N_ = 0.0;
     if (off_s_ < 0.0) off_s_ = time_s_;
   }
   void cut_forces() noexcept override { stop(); }
@@ -97,13 +116,19 @@ class LateHand final : public HapticDevice {
   struct Coming {
     double at_s, force_N;
   };
-  static constexpr int kParts = 16;  ///< of a period
 
   void step(double part_s) noexcept {
     while (!coming_.empty() && coming_.front().at_s <= time_s_ + 1e-9) {
       force_N_ = coming_.front().force_N;
       coming_.pop_front();
     }
+    while (!as_told_.empty() && as_told_.front().at_s <= time_s_ + 1e-9) {
+      told_N_ = as_told_.front().force_N;
+      as_told_.pop_front();
+    }
+    if (trace_ != nullptr) trace_->of_growth_N.push_back(force_N_ - told_N_);
+    const double adds_N =
+        adds_ != nullptr && part_ < adds_->of_growth_N.size() ? adds_->of_growth_N[part_++] : 0.0;
     const double wall_m = s_.push_N / s_.stiffness_N_per_m;
     const bool pushes = time_s_ >= s_.pushes_s && time_s_ < s_.withdraws_s;
     const double speed = std::max(s_.least_speed_m_per_s, wall_m / 0.5);
@@ -111,7 +136,7 @@ class LateHand final : public HapticDevice {
     meant_m_ += std::clamp(wants_m, -speed * part_s, speed * part_s);
     const double before_m = at_m_;
     const double spring_N = s_.stiffness_N_per_m * (meant_m_ - at_m_);
-    speed_ = speed_ * decay_ + (force_N_ + spring_N) / s_.mass_kg * part_s;
+    speed_ = speed_ * decay_ + (force_N_ + adds_N + spring_N) / s_.mass_kg * part_s;
     at_m_ += speed_ * part_s;
     time_s_ += part_s;
     fastest_m_per_s_ = std::max(fastest_m_per_s_, std::abs(speed_));
@@ -125,9 +150,12 @@ class LateHand final : public HapticDevice {
 
   static constexpr double kAbove_m = -2e-3;
   LateHandSettings s_;
-  double decay_;
+  HandTrace* trace_;
+  const HandTrace* adds_;
+  std::size_t part_ = 0;
+  double decay_, told_N_ = 0.0;
   DeviceIdentity identity_;
-  std::deque<Coming> coming_;
+  std::deque<Coming> coming_, as_told_;
   std::mt19937 random_{1};
   std::uniform_real_distribution<double> even_{-1.0, 1.0};
   double time_s_ = 0.0, newest_s_ = 0.0, at_m_ = kAbove_m, meant_m_ = kAbove_m, speed_ = 0.0;
@@ -142,8 +170,10 @@ struct HandRun {
 
 /// The hand on a spring for five seconds, supervised as the settings say.
 /// @param oracle forces go off one delay after the energy given exceeds 2 mJ, by nothing else
+/// @param trace, adds see LateHand
 inline HandRun run_hand(const LateHandSettings& hand, double stiffness_N_per_m,
-                        ServoSettings settings, bool oracle = false) {
+                        ServoSettings settings, bool oracle = false, HandTrace* trace = nullptr,
+                        const HandTrace* adds = nullptr) {
   constexpr double kLength_s = 5.0;
   settings.period_s = hand.period_s;
   settings.push = Eigen::Vector3d::UnitZ();
@@ -153,7 +183,7 @@ inline HandRun run_hand(const LateHandSettings& hand, double stiffness_N_per_m,
     settings.watch_oscillation = false;
     settings.most_damping_N_s_per_m = 0.0;
   }
-  LateHand device(hand);
+  LateHand device(hand, trace, adds);
   LinearSpring spring(stiffness_N_per_m, hand.period_s);
   ServoStep step(device, spring, settings);
   ServoRecord row;
@@ -161,6 +191,11 @@ inline HandRun run_hand(const LateHandSettings& hand, double stiffness_N_per_m,
   const double late_s = std::max(hand.delay_s, hand.later_s);
   while (run.cause == StopCause::none) {
     run.cause = step.cycle(0, row);
+    if (trace != nullptr) {
+      trace->read_m.push_back(row.position_m[2]);
+      trace->sent_N.push_back(row.commanded_N[2]);
+      trace->most_given_J.push_back(device.most_given_J());
+    }
     device.stores(0.5 * row.model_force_N * row.model_force_N / stiffness_N_per_m);
     device.advance(hand.period_s);
     const double since_s = device.first_2_mJ_s();

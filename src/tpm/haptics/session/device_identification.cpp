@@ -407,16 +407,18 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
   constexpr double kOverlap = 2.0, kOneSided = 2.33, kBothSides = 1.96;
   const auto error = [&](Eigen::Index i) { return std::sqrt(kOverlap * s.spread(i, i)); };
   found.viscous_N_s_per_m = s.value[1];
-  constexpr double kSums = 0.98;  // sums over samples are not quite the integrals
+  constexpr double kSums = 0.98;  // sums and signs over samples are not quite the integrals
   found.viscous_lower_95_N_s_per_m = std::max(0.0, kSums * s.value[1] - kOneSided * error(1));
-  found.coulomb_low_N = std::max(0.0, s.value[2] - kBothSides * error(2));
-  found.coulomb_high_N = std::max(0.0, s.value[2] + kBothSides * error(2));
+  const double coulomb_N = s.value[2];
+  const double coulomb_margin_N = (1.0 - kSums) * std::abs(coulomb_N) + kBothSides * error(2);
+  found.coulomb_low_N = std::max(0.0, coulomb_N - coulomb_margin_N);
+  found.coulomb_high_N = std::max(0.0, coulomb_N + coulomb_margin_N);
   found.held_N_per_m = s.value[3];
   found.mass_kg = s.value[0];
   constexpr double kWithin = 0.1, kMostStep_m = 10.5e-6, kMostCoulomb_N = 0.05;
   // The centring spring is a part of the forces: what is left of stiffness is a hand's.
   const bool free = std::abs(s.value[3]) < std::max(3.0, kBothSides * error(3));
-  found.mass_certain = free && step_m <= kMostStep_m && *found.coulomb_high_N <= kMostCoulomb_N &&
+  found.mass_certain = free && step_m <= kMostStep_m && coulomb_N <= kMostCoulomb_N &&
                        kBothSides * error(0) < kWithin * s.value[0];
   const double margin_kg = std::max(kWithin * s.value[0], kBothSides * error(0));
   found.mass_low_kg = std::max(0.0, s.value[0] - margin_kg);
