@@ -31,6 +31,7 @@ LEGEND_COLUMNS = 3
 ARROW = 3.5  # length of the probe, in radii
 PROFILE = 10.0  # radii from the contact
 FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#08306B", "#4292C6", "#DADADA", "#EF6548", "#7F0000"])
+DEFORMED_MARGIN = 0.6  # radii around deformed spheres, which are drawn at half their size
 SLICE_HALF_WIDTH = 9.0  # radii to each side of the contact
 SLICE_THICKNESS = 1.1  # spheres nearer to the plane than this many radii are in it
 REST, INSIDE = "#9A9A9A", "#D9D9D9"
@@ -48,7 +49,7 @@ class Colouring:
 
 
 def by_layer(picture, title):
-    face = np.array([to_rgb(net.LAYER_COLOURS[k % len(net.LAYER_COLOURS)]) for k in picture["layer"]])
+    face = np.array([to_rgb(net.layer_colour(k)) for k in picture["layer"]])
     anchors = picture["anchors"]
     face[anchors] = 0.55 * face[anchors] + 0.45 * np.array(to_rgb(net.ANCHOR))
     return Colouring(face, title)
@@ -113,12 +114,17 @@ def finish_axes(axes, low, high, view, liver, title):
 
 
 def frame_of(picture, view):
-    """Lower and upper corner of a view: the organ at rest and the arrow of the probe."""
+    """Lower and upper corner of a view: the organ at rest and deformed, and the arrow of the probe."""
     across, up = view[:2]
     rest = 1e3 * np.array(picture["position_m"])[:, [across, up]]
     margin = 1e3 * picture["radius_m"]
     tip = rest[picture["contact"]] + ARROW * margin * np.array(picture["normal"][picture["contact"]])[[across, up]]
-    return np.minimum(rest.min(axis=0), tip) - margin, np.maximum(rest.max(axis=0), tip) + margin
+    least, most = np.minimum(rest.min(axis=0), tip) - margin, np.maximum(rest.max(axis=0), tip) + margin
+    for state in picture["states"]:
+        at = 1e3 * np.array(state["position_m"])[:, [across, up]]
+        beside = DEFORMED_MARGIN * margin
+        least, most = np.minimum(least, at.min(axis=0) - beside), np.maximum(most, at.max(axis=0) + beside)
+    return least, most
 
 
 def draw_tools(axes, tools, view):

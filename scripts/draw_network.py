@@ -40,6 +40,12 @@ STYLE = {"svg.fonttype": "none", "svg.hashsalt": "tpmkit", "font.family": "DejaV
          "axes.titlesize": 9.5, "axes.spines.top": False, "axes.spines.right": False}
 
 
+def layer_colour(k):
+    """The colours of inner layers repeat; the outermost keeps its own."""
+    inner = LAYER_COLOURS[1:]
+    return LAYER_COLOURS[0] if k == 0 else inner[(k - 1) % len(inner)]
+
+
 def shaded(colours, depth):
     """Lighter with the distance from the viewer: depth 1 is nearest."""
     fade = 0.62 * (1.0 - depth)[:, None]
@@ -100,7 +106,7 @@ def draw_view(axes, picture, position, view):
     span = np.ptp(toward)
     depth = (toward - toward.min()) / span if span > 0 else np.ones(len(toward))
     layer = np.array(picture["layer"])
-    face = np.array([to_rgb(LAYER_COLOURS[k % len(LAYER_COLOURS)]) for k in layer])
+    face = np.array([to_rgb(layer_colour(k)) for k in layer])
     anchored = np.zeros(len(at), bool)
     anchored[picture["anchors"]] = True
     face[anchored] = 0.55 * face[anchored] + 0.45 * np.array(to_rgb(ANCHOR))
@@ -132,7 +138,7 @@ def layer_name(k, count):
 
 
 def legend(page, picture, bottom):
-    handles = [Line2D([], [], ls="", marker="o", ms=8, mfc=LAYER_COLOURS[k % len(LAYER_COLOURS)], mec="#553333",
+    handles = [Line2D([], [], ls="", marker="o", ms=8, mfc=layer_colour(k), mec="#553333",
                       label=layer_name(k, picture["layer_count"])) for k in range(min(picture["layer_count"], 4))]
     if picture["layer_count"] > 4:
         handles[-1].set_label("and deeper, the colours repeating")

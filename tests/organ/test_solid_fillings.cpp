@@ -4,7 +4,9 @@
 
 #include "organ_meshes.hpp"
 #include "refusal.hpp"
+#include "tpm/base/random.hpp"
 #include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/body/known_margins.hpp"
 #include "tpm/organ/body/landing_site.hpp"
 #include "tpm/organ/body/mesh_surface.hpp"
 #include "tpm/organ/body/neighbours.hpp"
@@ -49,6 +51,27 @@ double least_distance(const Organ& organ) {
 }
 
 }  // namespace
+
+TEST_CASE(
+    "a margin known from points beside it has the sign of the one asked for, and is no larger") {
+  constexpr double kSide_m = 0.1, kSpacing_m = 0.01;
+  const MeshSurface cube(box(Vector3d::Constant(kSide_m)));
+  KnownMargins known(cube, kSpacing_m);
+  Random random(7);
+  int smaller = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const Vector3d point =
+        kSide_m * (1.4 * Vector3d(random.uniform(), random.uniform(), random.uniform()) -
+                   Vector3d::Constant(0.2));
+    const double least = (0.5 + random.uniform()) * kSpacing_m;
+    const double margin = -cube.signed_distance(point) - least;
+    const double found = known.margin(point, least);
+    REQUIRE(std::signbit(found) == std::signbit(margin));
+    REQUIRE(std::abs(found) <= std::abs(margin));
+    if (std::abs(found) < std::abs(margin)) ++smaller;
+  }
+  CHECK(smaller > 10'000);  // most are not asked for
+}
 
 TEST_CASE("every outer sphere of a solid ball is held from inside") {
   const Sphere ball(0.05);

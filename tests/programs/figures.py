@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What scripts/draw_figures.py makes of a small figures.json: text that is text, letters, limits, provenance, files.
+"""What scripts/draw_figures.py makes of a small figures.json: text that is text, letters, limits, provenance, files;
+and what the views of scripts/draw_deformation.py hold.
 
     figures.py TPM (not used)
 """
@@ -21,6 +22,24 @@ def panel(title, y_axis, all_series):
     return {"title": title, "x": {"quantity": "n", "unit": "", "logarithmic": False}, "y": y_axis, "series": all_series}
 
 
+def faults_of_views():
+    """A sphere that sags below the organ at rest is within the frame; only outermost spheres have the first colour."""
+    sys.path.insert(0, str(SCRIPT.parent))
+    import draw_deformation
+    import draw_network
+    rest, sagged = [[0, 0, 0], [0, 0.01, 0]], [[0, -0.03, 0], [0, 0.01, 0]]
+    picture = {"position_m": rest, "radius_m": 0.005, "contact": 1, "normal": [[0, 0, -1]] * 2,
+               "states": [{"position_m": sagged}]}
+    faults = []
+    for view in draw_network.VIEWS:
+        low, high = draw_deformation.frame_of(picture, view)
+        if low[1] > -32.5 or high[1] != 15:
+            faults.append(f"the frame of '{view[4]}' is {low} to {high} mm; a sphere of half its 5 mm is at -30 mm")
+    if [k for k in range(20) if draw_network.layer_colour(k) == draw_network.layer_colour(0)] != [0]:
+        faults.append("an inner layer has the colour of the outermost")
+    return faults
+
+
 def main():
     axis = {"quantity": "BIC", "unit": "", "logarithmic": False}
     figure = {"id": "a", "title": "", "caption": "", "panels": [
@@ -31,7 +50,7 @@ def main():
     of_names["x"]["names"] = ["peak force", "half time"]
     numbered = panel("", axis, of_names["series"])
     figures = [figure] + [{"id": id, "title": "", "caption": "", "panels": [p]} for id, p in (("b", of_names), ("c", numbered))]
-    faults = []
+    faults = faults_of_views()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "figures.json").write_text(json.dumps({"figures": figures}))

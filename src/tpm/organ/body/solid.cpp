@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "tpm/organ/body/filling.hpp"
+#include "tpm/organ/body/known_margins.hpp"
 #include "tpm/organ/body/neighbours.hpp"
 #include "tpm/organ/body/solid_support.hpp"
 #include "tpmkit/error.hpp"
@@ -34,19 +35,23 @@ class DeepPoints {
     reach_ = half.array().ceil().cast<int>();
   }
 
-  [[nodiscard]] std::size_t count() const {
+  /// @param known of a surface that is asked again and again
+  [[nodiscard]] std::size_t count(KnownMargins& known) const {
     std::size_t found = 0;
-    rows([&](const Vector3d&, std::size_t length) { found += length; });
+    rows([&](const Vector3d& point) { return known.margin(point, least_); },
+         [&](const Vector3d&, std::size_t length) { found += length; });
     return found;
   }
 
   [[nodiscard]] Positions collect() const {
     std::vector<Vector3d> found;
-    rows([&](const Vector3d& first, std::size_t length) {
-      for (std::size_t s = 0; s < length; ++s) {
-        found.emplace_back(first.x() + stride() * static_cast<double>(s), first.y(), first.z());
-      }
-    });
+    rows([&](const Vector3d& point) { return -surface_.signed_distance(point) - least_; },
+         [&](const Vector3d& first, std::size_t length) {
+           for (std::size_t s = 0; s < length; ++s) {
+             found.emplace_back(first.x() + stride() * static_cast<double>(s), first.y(),
+                                first.z());
+           }
+         });
     Positions points(3, static_cast<Eigen::Index>(found.size()));
     for (std::size_t i = 0; i < found.size(); ++i) {
       points.col(static_cast<Eigen::Index>(i)) = found[i];
@@ -58,25 +63,26 @@ class DeepPoints {
   [[nodiscard]] double stride() const { return points_.cell() * points_.pitch(); }
 
   /// Calls visit(first point, length) for stretches of deep points.
-  template <class Visit>
-  void rows(Visit&& visit) const {
+  /// @param margin_of how much deeper than necessary a point is, m, or less with the same sign
+  template <class Margin, class Visit>
+  void rows(const Margin& margin_of, const Visit& visit) const {
     for (int k = -reach_.z(); k <= reach_.z(); ++k) {
       for (int j = -reach_.y(); j <= reach_.y(); ++j) {
         int i = -reach_.x();
         if (!points_.holds(i, j, k) && !points_.holds(++i, j, k)) continue;  // an empty bcc row
-        row(i, j, k, visit);
+        row(i, j, k, margin_of, visit);
       }
     }
   }
 
-  template <class Visit>
-  void row(int first, int j, int k, Visit&& visit) const {
+  template <class Margin, class Visit>
+  void row(int first, int j, int k, const Margin& margin_of, const Visit& visit) const {
     const auto last = static_cast<std::size_t>((reach_.x() - first) / points_.cell());
     for (std::size_t s = 0; s <= last;) {
       const Vector3d point =
           centre_ +
           points_.pitch() * Vector3d(first + points_.cell() * static_cast<double>(s), j, k);
-      const double margin = -surface_.signed_distance(point) - least_;
+      const double margin = margin_of(point);
       const std::size_t alike =
           std::min(last + 1 - s, static_cast<std::size_t>(std::abs(margin) / stride()) + 1);
       // Rounding must not decide for a neighbour exactly a margin away.
@@ -93,18 +99,19 @@ class DeepPoints {
   Eigen::Array3i reach_;
 };
 
-std::size_t total(const Surface& surface, Lattice lattice, double spacing) {
-  return even_count(surface, spacing) + DeepPoints(surface, lattice, spacing).count();
+std::size_t total(const Surface& surface, Lattice lattice, double spacing, KnownMargins& known) {
+  return even_count(surface, spacing) + DeepPoints(surface, lattice, spacing).count(known);
 }
 
 /// About the largest spacing that gives at least `count` spheres: bisection, ended early where the
 /// surplus is below a thousandth.
-double spacing_for(const Surface& surface, Lattice lattice, std::size_t count) {
+double spacing_for(const Surface& surface, Lattice lattice, std::size_t count,
+                   KnownMargins& known) {
   const auto wanted = static_cast<double>(count);
   double too_far = 1.01 * even_spacing(surface, 1);
   double enough = std::min(0.5 * too_far, 1.2 * std::cbrt(surface.volume() / wanted));
   for (int round = 0; round < 60 && too_far / enough > 1.0 + 1e-6; ++round) {
-    const std::size_t found = total(surface, lattice, enough);
+    const std::size_t found = total(surface, lattice, enough, known);
     if (found >= count) {
       if (static_cast<double>(found - count) <= 1e-3 * wanted) return enough;
       break;
@@ -114,7 +121,7 @@ double spacing_for(const Surface& surface, Lattice lattice, std::size_t count) {
   }
   for (int round = 0; round < 20 && too_far / enough > 1.0 + 1e-6; ++round) {
     const double between = std::sqrt(enough * too_far);
-    const std::size_t found = total(surface, lattice, between);
+    const std::size_t found = total(surface, lattice, between, known);
     (found >= count ? enough : too_far) = between;
     if (found >= count && static_cast<double>(found - count) <= 1e-3 * wanted) break;
   }
@@ -271,7 +278,7 @@ void set_layers(double spacing, std::vector<InnerSphere>& inner) {
   }
 }
 
-double decided_spacing(const Surface& surface, const SolidRequest& request) {
+double decided_spacing(const Surface& surface, const SolidRequest& request, KnownMargins& known) {
   if (request.count.has_value() == request.spacing.has_value()) {
     throw bad_input("solid filling",
                     request.count ? "both a number of spheres and a spacing are given"
@@ -280,7 +287,7 @@ double decided_spacing(const Surface& surface, const SolidRequest& request) {
   }
   if (request.count) {
     require_sphere_count(*request.count);
-    return spacing_for(surface, request.lattice, *request.count);
+    return spacing_for(surface, request.lattice, *request.count, known);
   }
   if (!std::isfinite(*request.spacing) || !(*request.spacing > 0.0)) {
     throw bad_input("spacing", fmt::format("{} m", *request.spacing), "a length above 0");
@@ -302,13 +309,13 @@ void set_sphere(Organ& organ, Eigen::Index at, const Vector3d& position, const V
 
 /// Of a number of spheres, those that support the outer layer among them.
 SolidFilling counted_filling(const Surface& surface, const SolidRequest& request,
-                             SolidFilling first, std::size_t added) {
+                             SolidFilling first, std::size_t added, KnownMargins& known) {
   constexpr int kRounds = 3, kMostInside = 12;
   const std::size_t count = *request.count;
   std::size_t lattice = count - std::min(added, count / 2);
   SolidFilling filling;
   for (int round = 0; round < kRounds; ++round) {
-    const double spacing = spacing_for(surface, request.lattice, lattice);
+    const double spacing = spacing_for(surface, request.lattice, lattice, known);
     filling = lattice_filling(surface, request, spacing, 2 * count);
     add_support(surface, filling, kWantedInside, count);
     if (filling.count() >= count) break;
@@ -336,13 +343,15 @@ void require_room(const Surface& surface, double spacing) {
 }  // namespace
 
 Organ fill_solid(const Surface& surface, const SolidRequest& request) {
-  const double spacing = decided_spacing(surface, request);
+  const auto about = static_cast<double>(request.count.value_or(1));
+  KnownMargins known(surface, std::cbrt(surface.volume() / about));
+  const double spacing = decided_spacing(surface, request, known);
   require_room(surface, spacing);
   const std::size_t most = request.count.value_or(std::numeric_limits<std::size_t>::max());
   SolidFilling filling = lattice_filling(surface, request, spacing, most);
   if (const std::size_t added = add_support(surface, filling, kWantedInside, most);
       added > 0 && request.count) {
-    filling = counted_filling(surface, request, std::move(filling), added);
+    filling = counted_filling(surface, request, std::move(filling), added, known);
   }
   require_sphere_count(filling.count());
   set_layers(filling.spacing, filling.inner);
