@@ -5,6 +5,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "option_kinds.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/base/lists.hpp"
@@ -113,7 +114,7 @@ void add_material_command(CLI::App& app, Session& session) {
           "--stiffening", options->stiffening,
           "Which part of a bond stiffens with its elongation: equilibrium, all (the branches, too: "
           "not for tpm hil), none, or automatic: equilibrium if the law stiffens with depth")
-      ->check(CLI::IsMember({"automatic", "equilibrium", "all", "none"}))
+      ->check(one_of_words({"automatic", "equilibrium", "all", "none"}))
       ->capture_default_str();
   command
       ->add_option(
@@ -121,7 +122,7 @@ void add_material_command(CLI::App& app, Session& session) {
           "law: fit to the law's force, intervals from its covariance; readings: fit to "
           "the recordings, intervals from their scatter by derivatives; profiles: the same "
           "by likelihood profiles (minutes)")
-      ->check(CLI::IsMember({"law", "readings", "profiles"}))
+      ->check(one_of_words({"law", "readings", "profiles"}))
       ->capture_default_str();
   command->add_option("--folder", options->folder,
                       "Folder to write into: scene.json, session.json (for tpm hil run), "

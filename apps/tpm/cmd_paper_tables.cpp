@@ -6,6 +6,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "option_kinds.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
@@ -130,7 +131,7 @@ void add_options(CLI::App& command, TableOptions& options) {
   command.add_option("--hold", options.hold, "Time at depth, with --consistent (default 30 s)");
   command.add_option("-o,--output", options.output, "File to write (default: the terminal)");
   command.add_option("--format", options.format, "Output format: text, md, csv, latex or json")
-      ->check(CLI::IsMember({"text", "md", "csv", "latex", "json"}))
+      ->check(one_of_words({"text", "md", "csv", "latex", "json"}))
       ->capture_default_str();
 }
 

@@ -136,10 +136,12 @@ void add_predict_command(CLI::App& app, Session& session) {
                       "equal ratios");
   command->add_option("--level", options->level,
                       "Confidence level, 0.9 or 90%: of the bands (default: that of the fit)");
-  command->add_option("--placement", options->placement,
-                      "Contact and zero: surface (0), fitted (those of the fit) or own "
-                      "(found for the recording); default: surface for a protocol, fitted for a "
-                      "recording that was fitted, own for another");
+  command
+      ->add_option("--placement", options->placement,
+                   "Contact and zero: surface (0), fitted (those of the fit) or own "
+                   "(found for the recording); default: surface for a protocol, fitted for a "
+                   "recording that was fitted, own for another")
+      ->each(reads_word(parse_placement, "--placement"));
   add_placement_options(*command, options->held);
   command->add_option("--draws", options->samples,
                       "Number of laws drawn from the covariance, 100 or more: bands from these, "
