@@ -10,6 +10,7 @@
 #include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
+#include "option_kinds.hpp"
 #include "tpm/accuracy/show/stability_report.hpp"
 #include "tpm/files/writable.hpp"
 #include "tpm/show/draw.hpp"
@@ -69,7 +70,7 @@ void add_stability_command(CLI::App& accuracy, Session& session) {
   auto only = std::make_shared<std::vector<std::string>>();
   command->add_option("--only", *only, "Parts to run: maps, limits, corners, servo (default: all)")
       ->delimiter(',')
-      ->check(CLI::IsMember({"maps", "limits", "corners", "servo"}));
+      ->check(one_of_words({"maps", "limits", "corners", "servo"}));
   add_format_option(*command, session);
   command->footer(
       "Examples:\n  tpm accuracy stability --folder out/stability\n  tpm accuracy stability "

@@ -9,6 +9,7 @@
 #include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
+#include "option_kinds.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
@@ -217,7 +218,7 @@ void add_text_options(CLI::App& command, ImportArguments& a) {
   command
       .add_option("--input-format", a.options.format,
                   fmt::format("Format of the file: {}", fmt::join(formats, ", ")))
-      ->check(CLI::IsMember(formats));
+      ->check(one_of_words(formats));
 }
 
 void add_machine_options(CLI::App& command, ImportArguments& a) {
@@ -236,12 +237,14 @@ void add_figure_options(CLI::App& command, ImportArguments& a) {
   add("--dataset", a.options.dataset, "Only the dataset of this name");
   add("--depth", a.depth, "Depth of the indentation: of a relaxation curve, such as \"4 mm\"");
   add("--load", a.load, "Imposed load of a creep curve, such as \"0.98 N\"");
-  add("--time-origin", a.time_origin, "With --depth or --load: end_of_ramp or load_applied");
+  add("--time-origin", a.time_origin, "With --depth or --load: end_of_ramp or load_applied")
+      ->each(reads_word(parse_time_origin, "--time-origin"));
 }
 
 void add_description_options(CLI::App& command, ImportArguments& a) {
   const auto add = options_of_group(command, "Description");
-  add("--provenance", a.provenance, "Else measured for machines and digitized for figures");
+  add("--provenance", a.provenance, "Else measured for machines and digitized for figures")
+      ->each(reads_word(parse_provenance, "--provenance"));
   add("--title", a.options.header.title, "One line that says what the curve is");
   add("--citation", a.options.header.citation, "Authors, journal, year, pages");
   add("--doi", a.options.header.doi, "Bare DOI");

@@ -2,8 +2,11 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "command.hpp"
+#include "option_kinds.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/blocks/law_export.hpp"
 #include "tpm/files/json.hpp"
@@ -28,9 +31,16 @@ void set_quantity(std::optional<double>& target, const std::optional<std::string
   if (text) target = option_quantity(*text, dimension, option);
 }
 
+/// Programs for laws and engines for organs.
+std::vector<std::string> all_targets() {
+  std::vector<std::string> words = export_targets();
+  for (std::string& word : organ_targets()) words.push_back(std::move(word));
+  return words;
+}
+
 ExportOptions options_of(const ExportTexts& texts) {
   ExportOptions options;
-  options.target = of_option([&] { return parse_export_target(texts.to, "--to"); });
+  options.target = parse_export_target(texts.to, "--to");
   if (texts.density || texts.instantaneous) {
     throw Error(ExitCode::usage, texts.density ? "--density" : "--instantaneous", "with a law",
                 "--to sofa or mjcf, and a scene");
@@ -100,6 +110,7 @@ void add_export_command(CLI::App& app, Session& session) {
       ->add_option(
           "--to", texts->to,
           "Program to write for; of a law: abaqus, ansys, febio or json; of an organ: sofa or mjcf")
+      ->check(one_of_words(all_targets()))
       ->required();
   command->add_option("--radius", texts->radius,
                       "Radius of the sphere that was pressed in, for moduli in Pa");

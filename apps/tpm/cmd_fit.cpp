@@ -292,7 +292,8 @@ void add_fit_command(CLI::App& app, Session& session) {
   add_of_configuration("--bootstrap", options->bootstrap,
                        "Refit this many resampled data sets, 20 or more");
   add_of_configuration("--resample", options->resample,
-                       "What is resampled: residuals, blocks or recordings");
+                       "What is resampled: residuals, blocks or recordings")
+      ->each(reads_word(parse_resampling, "--resample"));
   command->add_option("--starts", options->starts,
                       "Number of starts (default: that of the configuration, else 50)");
   add_seed_option(*command, options->seed,

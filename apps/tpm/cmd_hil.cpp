@@ -19,6 +19,7 @@
 #include "hil_options.hpp"
 #include "hil_page.hpp"
 #include "interrupt_watch.hpp"
+#include "option_kinds.hpp"
 #include "out_of_memory.hpp"
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
@@ -349,7 +350,7 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
         std::vector<std::string> kinds = device_kinds();
         if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return std::string();
         kinds.emplace_back("plugin");
-        return fmt::format("'{}' is none{}; expected one of {}", printable(kind),
+        return fmt::format("unknown device '{}'{}; expected one of {}", printable(kind),
                            did_you_mean(kind, kinds), fmt::join(kinds, ", "));
       })
       ->capture_default_str();
@@ -393,7 +394,7 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
   command
       .add_option("--real-time", options.real_time,
                   "Real-time scheduling that is refused is an error, or said and ignored")
-      ->check(CLI::IsMember({"enforce", "ignore"}))
+      ->check(one_of_words({"enforce", "ignore"}))
       ->capture_default_str();
 }
 
@@ -436,7 +437,7 @@ void add_hil_command(CLI::App& app, Session& session) {
   run->add_option("--clock", choice->time,
                   "Clock of the run: real, or virtual: as fast as it goes, the same bits each time "
                   "(default: real with a real device or a page, else virtual)")
-      ->check(CLI::IsMember({"real", "virtual"}));
+      ->check(one_of_words({"real", "virtual"}));
   run->add_option("-o,--output", choice->output, "File to write (the recording, .tpmrec)")
       ->capture_default_str();
   run->add_option("--law", choice->changes.law,

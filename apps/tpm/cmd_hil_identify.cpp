@@ -9,6 +9,7 @@
 #include "command.hpp"
 #include "hil_options.hpp"
 #include "interrupt_watch.hpp"
+#include "option_kinds.hpp"
 #include "out_of_memory.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -138,7 +139,7 @@ void add_hil_identify_command(CLI::App& hil, Session& session) {
       ->add_option("--clock", choice->time,
                    "Clock of the run: real, or virtual: as fast as it goes (default: real with a "
                    "real device, else virtual)")
-      ->check(CLI::IsMember({"real", "virtual"}));
+      ->check(one_of_words({"real", "virtual"}));
   command
       ->add_option("-o,--output", choice->output,
                    "File to write (schemas/device.schema.json), for --device-file")

@@ -6,6 +6,7 @@
 #include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
+#include "option_kinds.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/base/lists.hpp"
@@ -114,7 +115,7 @@ void add_material_command(CLI::App& app, Session& session) {
           "--stiffening", options->stiffening,
           "Which part of a bond stiffens with its elongation: equilibrium, all (the branches, too: "
           "not for tpm hil), none, or automatic: equilibrium if the law stiffens with depth")
-      ->check(CLI::IsMember({"automatic", "equilibrium", "all", "none"}))
+      ->check(one_of_words({"automatic", "equilibrium", "all", "none"}))
       ->capture_default_str();
   command
       ->add_option(
@@ -122,7 +123,7 @@ void add_material_command(CLI::App& app, Session& session) {
           "law: fit to the law's force, intervals from its covariance; readings: fit to "
           "the recordings, intervals from their scatter by derivatives; profiles: the same "
           "by likelihood profiles (minutes)")
-      ->check(CLI::IsMember({"law", "readings", "profiles"}))
+      ->check(one_of_words({"law", "readings", "profiles"}))
       ->capture_default_str();
   add_folder_option(
       *command, options->folder,

@@ -7,6 +7,7 @@
 #include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
+#include "option_kinds.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
@@ -132,7 +133,8 @@ std::shared_ptr<NetworkChoice> add_choice(CLI::App& command) {
   command.add_option("--spheres", choice->count, "Number of spheres of a liver");
   command.add_option("--layers", choice->layers, "Layers of a shell");
   command.add_option("--spacing", choice->spacing, "Distance of neighbours, e.g. \"20 mm\"");
-  command.add_option("--filling", choice->filling, "Filling of an organ: shell or solid");
+  command.add_option("--filling", choice->filling, "Filling of an organ: shell or solid")
+      ->check(one_of_words({"shell", "solid"}));
   add_seed_option(command, choice->seed, ": the filling");
   return choice;
 }

@@ -6,6 +6,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "option_kinds.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
@@ -142,7 +143,7 @@ void add_options(CLI::App& command, TableOptions& options) {
   add_verbose_option(command, options.verbose, "each cell as printed and measured, with verdicts");
   command.add_option("-o,--output", options.output, "File to write (default: the terminal)");
   command.add_option("--format", options.format, "Output format: text, md, csv, latex or json")
-      ->check(CLI::IsMember({"text", "md", "csv", "latex", "json"}))
+      ->check(one_of_words({"text", "md", "csv", "latex", "json"}))
       ->capture_default_str();
 }
 

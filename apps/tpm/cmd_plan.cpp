@@ -10,6 +10,7 @@
 #include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
+#include "option_kinds.hpp"
 #include "plan_options.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -36,7 +37,7 @@ void add_plan_options(CLI::App& command, PlanChoice& choice) {
   command
       .add_option("--outputs", choice.outputs,
                   "What the tolerance is about: force (the response) or field (displacements)")
-      ->check(CLI::IsMember({"force", "field"}))
+      ->check(one_of_words({"force", "field"}))
       ->capture_default_str();
   command.add_option("--loop-rate", choice.rate,
                      "Rate of the servo loop, such as \"1 kHz\": every period needs its answer");

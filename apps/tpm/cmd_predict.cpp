@@ -133,10 +133,12 @@ void add_predict_command(CLI::App& app, Session& session) {
                       "equal ratios");
   command->add_option("--level", options->level,
                       "Confidence level, 0.9 or 90%: of the bands (default: that of the fit)");
-  command->add_option("--placement", options->placement,
-                      "Contact and zero: surface (0), fitted (those of the fit) or own "
-                      "(found for the recording); default: surface for a protocol, fitted for a "
-                      "recording that was fitted, own for another");
+  command
+      ->add_option("--placement", options->placement,
+                   "Contact and zero: surface (0), fitted (those of the fit) or own "
+                   "(found for the recording); default: surface for a protocol, fitted for a "
+                   "recording that was fitted, own for another")
+      ->each(reads_word(parse_placement, "--placement"));
   add_placement_options(*command, options->held);
   add_draws_option(*command, options->samples, "bands from these, instead of from derivatives");
   add_seed_option(*command, options->seed, ": the draws")->capture_default_str();

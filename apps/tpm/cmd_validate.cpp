@@ -389,6 +389,7 @@ void add_validate_command(CLI::App& app, Session& session) {
       ->add_option("--placement", options->placement,
                    "Contact and zero: held (found before contact and at the onset), onset "
                    "(the onset even where the depth starts at 0) or fitted to the recording")
+      ->each(reads_word(parse_placement_rule, "--placement"))
       ->capture_default_str();
   command->add_option("--instrument", options->instrument,
                       "JSON file with the block \"instrument\" of the recordings, where no "

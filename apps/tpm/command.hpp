@@ -99,6 +99,15 @@ decltype(auto) of_option(Read&& read) {
   }
 }
 
+/// Reads the word of an option while the command line is read: a wrong one is refused even if the
+/// command has no use for it.
+template <typename Parse>
+std::function<void(const std::string&)> reads_word(Parse parse, std::string option) {
+  return [parse, option = std::move(option)](const std::string& text) {
+    of_option([&] { static_cast<void>(parse(text, option)); });
+  };
+}
+
 /// The value of an option: parse_quantity() and parse_number() as usage errors.
 [[nodiscard]] double option_quantity(std::string_view text, Dimension dimension,
                                      std::string_view option);

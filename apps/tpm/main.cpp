@@ -40,7 +40,7 @@ namespace tpm::app {
 
 void add_format_option(CLI::App& command, Session& session) {
   command.add_option("--format", session.format, "Output format: text or json")
-      ->check(CLI::IsMember({"text", "json"}))
+      ->check(one_of_words({"text", "json"}))
       ->capture_default_str();
 }
 

@@ -1,9 +1,12 @@
 #include "option_kinds.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "command.hpp"
+#include "tpm/base/nearest_word.hpp"
 
 namespace tpm::app {
 namespace {
@@ -109,6 +112,16 @@ void set_option_kinds(CLI::App& app) {
       static_cast<void>(option_quantity(value, dimension, name));
     });
   }
+}
+
+CLI::Validator one_of_words(std::vector<std::string> words) {
+  const std::string known = fmt::format("{{{}}}", fmt::join(words, ","));
+  return {[words = std::move(words)](const std::string& word) {
+            if (std::ranges::find(words, word) != words.end()) return std::string();
+            return fmt::format("unknown word '{}'{}; expected one of {}", printable(word),
+                               did_you_mean(word, words), fmt::join(words, ", "));
+          },
+          known};
 }
 
 }  // namespace tpm::app

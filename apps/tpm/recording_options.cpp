@@ -1,4 +1,5 @@
 #include "recording_options.hpp"
+#include "option_kinds.hpp"
 
 #include <fmt/format.h>
 
@@ -41,7 +42,7 @@ void add_reading_options(CLI::App& command, ReadingArguments& arguments, const c
     CLI::Option* added =
         command.add_option(option_name(key), arguments.texts[key], meaning)->group(group);
     const std::vector<std::string> choices = CLI::detail::split(std::string(option.choices), ',');
-    if (!option.choices.empty()) added->check(CLI::IsMember(choices));
+    if (!option.choices.empty()) added->check(one_of_words(choices));
   }
   command
       .add_option("--unit", arguments.units, "Unit of a column, e.g. \"Force=N\" (may be repeated)")
@@ -144,7 +145,7 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
 
 void add_family_option(CLI::App& command, std::string& family, const char* group) {
   command.add_option("--family", family, "Family of laws: classical (default), fractional or all")
-      ->check(CLI::IsMember({"classical", "fractional", "all"}))
+      ->check(one_of_words({"classical", "fractional", "all"}))
       ->group(group);
 }
 

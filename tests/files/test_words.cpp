@@ -1,5 +1,6 @@
 // The words that tpm answers to: commands and options that are misspelt, exit codes of option
 // values, keys that are misspelt, "$schema" in every file that has a schema, causes of errors.
+#include <fmt/format.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -8,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +22,7 @@
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/description.hpp"
+#include "tpm/files/instrument.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/design/design.hpp"
 #include "tpm/fit/likelihood/fit_keys.hpp"
@@ -138,6 +142,136 @@ TEST_CASE("a wrong word is named, with the nearest right one and the help to rea
         "did you mean 'tpm design CONFIG --repetitions'?", "See tpm --help");
   check("fit", "fit: ", "required", "see tpm fit --help");
   check("fit --format jsn x.csv", "fit: ", "--format", "see tpm fit --help");
+}
+
+namespace {
+
+/// `word` with two of its letters swapped that differ, the last of them that do.
+std::string misspelt(std::string word) {
+  for (std::size_t i = word.size() - 1; i > 1; --i) {
+    if (word[i] == word[i - 1]) continue;
+    std::swap(word[i], word[i - 1]);
+    break;
+  }
+  return word;
+}
+
+/// Calls `check` with the words of each command and each of its options.
+template <typename Check>
+void each_option(const Json& command, const std::string& words, const Check& check) {
+  for (const Json& option : command.at("options")) check(words, option);
+  if (!command.contains("commands")) return;
+  for (const Json& below : command.at("commands")) {
+    each_option(below, words + " " + below.at("name").get<std::string>(), check);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("every option whose value is a word names the nearest one to a misspelt one") {
+  // Words of options that read them while the command line is read, and are not shown as a list.
+  const std::map<std::string, std::string> longest{{"--resample", "recordings"},
+                                                   {"--time-origin", "load_applied"},
+                                                   {"--provenance", "digitized"},
+                                                   {"tpm predict --placement", "surface"},
+                                                   {"tpm validate --placement", "fitted"}};
+  // Kinds of segments are those of the file.
+  const std::set<std::string> left_out{"--segments"};
+  const Json usage = parse_json(answer_to("--json-usage").output, "usage");
+  int checked_options = 0;
+  each_option(usage, "tpm", [&](const std::string& words, const Json& option) {
+    const std::string name = option.at("names").back();
+    const std::string kind = option.value("kind", std::string());
+    if ((kind != "WORD" && !option.contains("values")) || left_out.contains(name)) return;
+    CAPTURE(words, name);
+    std::string word;
+    if (option.contains("values")) {
+      for (const Json& value : option.at("values")) {
+        const auto text = value.get<std::string>();
+        if (text.size() > word.size()) word = text;
+      }
+    } else {
+      const auto own = longest.find(words + " " + name);
+      const auto found = own != longest.end() ? own : longest.find(name);
+      REQUIRE(found != longest.end());
+      word = found->second;
+    }
+    const std::string command = words.size() > 4 ? words.substr(4) + " " : "";
+    const Answer answer = answer_to(command + name + " " + misspelt(word));
+    CHECK(answer.exit_code == 2);
+    CHECK_THAT(answer.error, Contains(name) && Contains("(did you mean '" + word + "'?)"));
+    ++checked_options;
+  });
+  CHECK(checked_options > 40);
+}
+
+TEST_CASE("names of laws, parameters, columns and variables are answered with the nearest one") {
+  const test::TempFolder folder;
+  const std::string law = folder / "law.json", recording = folder / "r.csv";
+  write_file(law, R"({"law": "linear-1", "drive": "indentation_depth",
+"response": "contact_force", "reference_m": 0.004, "parameters": {"k_inf_N_per_m": 10,
+"k1_N_per_m": 10, "tau1_s": 1}, "provenance": "assumed"})");
+  std::string rows = "time [s],depth [mm],force [N]\n";
+  for (int i = 0; i < 20; ++i) rows += fmt::format("{},{},{}\n", 0.1 * i, 0.1 * i, 0.01 * i);
+  write_file(recording, rows);
+  write_file(folder / "wrong.json", R"({"law": "linear-1", "drive": "indentation_depth",
+"response": "contact_force", "reference_m": 0.004, "parameters": {"k_inf_N_per_m": 10,
+"k1_N_per_m": 10, "tua1_s": 1}, "provenance": "assumed"})");
+  write_file(folder / "instrument.json",
+             R"({"instrument": {"id": "x", "froce": "1 mN", "depth": "1 um"}})");
+  write_file(folder / "sweep.json", R"({"model": "single_contact",
+"indentation": {"kind": "step_hold"}, "axes": [{"parameter": "dpeth", "values": ["2 mm"]}],
+"outputs": ["peak_force"]})");
+  write_file(folder / "outputs.json", R"({"model": "single_contact",
+"indentation": {"kind": "step_hold"}, "axes": [{"parameter": "depth", "values": ["2 mm"]}],
+"outputs": ["peak_froce"]})");
+  write_file(folder / "scene.json", R"({"organ": {"kind": "liver", "count": 60},
+"formulation": {"kind": "newtork"}, "protocol": {"kind": "step_hold", "depth": "2 mm", "hold": "1 s"}})");
+  const auto check = [](const std::string& arguments, const std::string& right) {
+    CAPTURE(arguments);
+    const Answer answer = answer_to(arguments);
+    CHECK((answer.exit_code == 2 || answer.exit_code == 3));
+    CHECK(std::count(answer.error.begin(), answer.error.end(), '\n') == 1);
+    CHECK_THAT(answer.error, Contains("did you mean '" + right + "'?"));
+  };
+  const auto quoted = [](const std::string& file) { return "'" + file + "'"; };
+  check("laws linaer-1", "linear-1");
+  check("laws linear-1-elstic", "linear-1-elastic");
+  check("laws Power-2", "power-2");
+  check("laws hertz-fznere", "hertz-fzener");
+  check("design --laws linaer-1 --noise 0.001", "linear-1");
+  check("fit --laws linear-2,hertz-1-relaxign " + quoted(recording), "hertz-1-relaxing");
+  check("fit --time tiem " + quoted(recording), "time");
+  check("fit --drive-quantity indentation_dpeth " + quoted(recording), "indentation_depth");
+  check("export --to abaqsu " + quoted(law), "abaqus");
+  check("export --to mjfc " + quoted(law), "mjcf");
+  check("export --to json " + quoted(folder / "wrong.json"), "tau1_s");
+  check("validate " + quoted(law) + " " + quoted(recording) + " --quantity haf-time", "half-time");
+  check("validate " + quoted(law) + " " + quoted(recording) + " --instrument " +
+            quoted(folder / "instrument.json"),
+        "force");
+  check("hil run --device omga7 x.json", "omega7");
+  check("schema scnee", "scene");
+  check("example spectrm", "spectrum");
+  check("sweep " + quoted(folder / "sweep.json") + " -o " + quoted(folder / "s.h5"), "depth");
+  check("sweep " + quoted(folder / "outputs.json") + " -o " + quoted(folder / "s.h5"),
+        "peak_force");
+  check("simulate " + quoted(folder / "scene.json") + " -o " + quoted(folder / "s.h5"), "network");
+}
+
+TEST_CASE("a recording has a name of 255 bytes, though none is left for a description beside it") {
+  const test::TempFolder folder;
+  const std::string file = folder / (std::string(251, 'n') + ".csv");
+  std::string rows = "time [s],depth [mm],force [N]\n";
+  for (int i = 0; i < 60; ++i) {
+    const double depth = i < 20 ? 0.1 * i : 2.0;
+    rows += fmt::format("{},{},{}\n", 0.1 * i, depth, 0.01 * depth + 1e-5 * (i % 3));
+  }
+  write_file(file, rows);
+  CHECK_FALSE(instrument_beside(file));
+  const Answer answer = answer_to("fit --no-draw --laws linear '" + file + "'");
+  CAPTURE(answer.error);
+  CHECK(answer.exit_code == 0);
 }
 
 TEST_CASE("a bad value of an option is a fault of the command line, whatever the command") {

@@ -8,6 +8,9 @@
 #include <ctime>
 
 #include "tpm/accuracy/runner.hpp"
+#include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::accuracy {
@@ -49,11 +52,8 @@ std::vector<SpeedWork> chosen_speed_works(const std::vector<std::string>& names)
     const auto found =
         std::find_if(all.begin(), all.end(), [&](const SpeedWork& w) { return w.name == name; });
     if (found == all.end()) {
-      std::vector<std::string_view> known;
-      known.reserve(all.size());
-      for (const SpeedWork& work : all) known.push_back(work.name);
-      throw Error(ExitCode::usage, "--append-to", fmt::format("no work '{}'", name),
-                  fmt::format("one of: {}", fmt::join(known, ", ")));
+      throw unknown_word("--append-to", "no work", name, mapped<std::string>(all, &SpeedWork::name))
+          .with_code(ExitCode::usage);
     }
     chosen.push_back(*found);
   }

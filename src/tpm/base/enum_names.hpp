@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "tpm/base/lists.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::base {
@@ -50,15 +51,15 @@ std::string listed(const Words& words) {
   return listed(words, [](const auto& word) { return word.text; });
 }
 
-/// The value that a text stands for. Throws Error(bad_input) that names all of them.
+/// The value that a text stands for. Throws Error(bad_input) that names the nearest and all.
 /// @param noun what is named, for the message
 /// @param where for the message
 template <typename Words>
 auto parse_word(const Words& words, std::string_view noun, std::string_view text,
                 std::string_view where) {
   if (const auto* entry = find_entry(words, text)) return entry->meaning;
-  throw bad_input(where, fmt::format("unknown {} '{}'", noun, printable(text)),
-                  fmt::format("one of {}", listed(words)));
+  const auto known = mapped<std::string>(words, [](const auto& word) { return word.text; });
+  throw unknown_word(where, fmt::format("unknown {}", noun), text, known);
 }
 
 }  // namespace tpm::base

@@ -67,4 +67,11 @@ std::string did_you_mean(std::string_view word, std::span<const std::string> kno
   return nearest.empty() ? std::string{} : fmt::format(" (did you mean '{}'?)", nearest);
 }
 
+Error unknown_word(std::string_view where, std::string_view what, std::string_view word,
+                   std::span<const std::string> known) {
+  return bad_input(
+      where, fmt::format("{} '{}'{}", what, printable(word), did_you_mean(word, known)),
+      known.empty() ? "none, for there is none" : fmt::format("one of {}", fmt::join(known, ", ")));
+}
+
 }  // namespace tpm::base

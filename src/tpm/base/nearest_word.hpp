@@ -3,6 +3,8 @@
 #include <string>
 #include <string_view>
 
+#include "tpmkit/error.hpp"
+
 namespace tpm::base {
 
 /// The known word that a misspelt one was probably meant to be: the first of those with the fewest
@@ -14,5 +16,10 @@ namespace tpm::base {
 
 /// " (did you mean 'WORD'?)" for a message, or nothing.
 [[nodiscard]] std::string did_you_mean(std::string_view word, std::span<const std::string> known);
+
+/// Error(bad_input) for a word that is none of the known ones, in a file or on the command line:
+/// "WHERE: WHAT 'WORD' (did you mean 'NEAREST'?); expected one of KNOWN".
+[[nodiscard]] Error unknown_word(std::string_view where, std::string_view what,
+                                 std::string_view word, std::span<const std::string> known);
 
 }  // namespace tpm::base

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -103,9 +104,9 @@ Instrument read_instrument(const Json& block, Dimension response, Dimension driv
     const bool known = std::find(kKeys.begin(), kKeys.end(), key) != kKeys.end();
     const std::string here = fmt::format("{}/{}", where, printable(key));
     if (!known) {
-      throw bad_input(
-          here, "unknown key",
-          "one of id, force, depth, time, zero, resolution, noise, force_range, depth_range");
+      const std::vector<std::string> keys(kKeys.begin(), kKeys.end());
+      throw bad_input(here, "unknown key" + did_you_mean(key, keys),
+                      fmt::format("one of {}", fmt::join(keys, ", ")));
     }
     if (!value.is_string()) throw bad_input(here, "is no text", kLimitExpected);
     instrument.stated[key] = value.get<std::string>();
@@ -151,7 +152,8 @@ double Instrument::reading_floor() const {
 std::optional<Json> instrument_beside(const std::filesystem::path& recording) {
   std::filesystem::path description = recording;
   description.replace_extension(".json");
-  if (!std::filesystem::exists(description)) return std::nullopt;
+  std::error_code none;  // its name may be too long where that of the recording is not
+  if (!std::filesystem::exists(description, none)) return std::nullopt;
   const Json json = read_json(description);
   if (!json.is_object() || !json.contains("instrument")) return std::nullopt;
   return json.at("instrument");

@@ -7,6 +7,9 @@
 #include <map>
 #include <string_view>
 
+#include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/delimited.hpp"
 #include "tpm/fit/likelihood/fit_keys.hpp"
@@ -105,7 +108,9 @@ const Row& find_row(const std::map<std::string, const Row*>& rows, const Row& as
   const std::string id = asking.required(column);
   const auto found = rows.find(id);
   if (found != rows.end()) return *found->second;
-  throw bad_input(asking.where(column), fmt::format("'{}' is unknown", printable(id)),
+  const auto ids = mapped<std::string>(rows, [](const auto& row) { return row.first; });
+  throw bad_input(asking.where(column),
+                  fmt::format("'{}' is unknown{}", printable(id), did_you_mean(id, ids)),
                   "an id of the table of conditions or observables");
 }
 

@@ -9,6 +9,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -36,9 +37,20 @@ constexpr auto kNumbers =
     std::to_array<std::string_view>({"no", "one", "two", "three", "four", "five", "six", "seven",
                                      "eight", "nine", "ten", "eleven", "twelve"});
 
+template <typename Words>
+std::vector<std::string> texts_of(const Words& words) {
+  return mapped<std::string>(words, [](const auto& word) { return word.text; });
+}
+
+/// A law's name with each part replaced by the nearest word; empty where a part has none.
+std::string nearest_law(std::string_view text);
+
 Error unknown_law(std::string_view text, std::string_view where) {
+  const std::string nearest = nearest_law(text);
   return bad_input(
-      where, fmt::format("unknown law '{}'", printable(text)),
+      where,
+      fmt::format("unknown law '{}'{}", printable(text),
+                  nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest)),
       "KERNEL[-BRANCHES or -FRACTIONAL][-elastic or -relaxing][-fluid][-series], such as "
       "linear-1-elastic, power-2 or hertz-fzener");
 }
@@ -46,6 +58,30 @@ Error unknown_law(std::string_view text, std::string_view where) {
 /// Imposed is a plain number, answered is a stress.
 bool is_strain(const LawSpec& spec) {
   return is_answered_by_stress(spec.drive);
+}
+
+std::string nearest_law(std::string_view text) {
+  static const std::vector<std::string> kernels = texts_of(kKernelWords);
+  static const std::vector<std::string> others = [] {
+    std::vector<std::string> all = texts_of(kFractionalWords);
+    all.insert(all.end(), {"elastic", "relaxing", "fluid", "series"});
+    return all;
+  }();
+  constexpr std::size_t kLongest = 100;
+  if (text.size() > kLongest) return {};
+  std::string name;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find('-', begin), text.size());
+    const std::string_view part = text.substr(begin, end - begin);
+    const bool number = part.find_first_not_of("0123456789") == std::string_view::npos;
+    const std::string nearest = begin == 0 ? nearest_word(part, kernels)
+                                : number   ? std::string(part)
+                                           : nearest_word(part, others);
+    if (nearest.empty()) return {};
+    name.append(begin == 0 ? "" : "-").append(nearest);
+    begin = end + 1;
+  }
+  return name;
 }
 
 }  // namespace

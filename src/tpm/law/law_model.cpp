@@ -6,7 +6,9 @@
 #include <cmath>
 #include <optional>
 
+#include "tpm/base/lists.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/contact_retreat.hpp"
@@ -300,12 +302,8 @@ std::size_t LawModel::index(std::string_view parameter) const {
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
     if (parameters_[i].name == parameter) return i;
   }
-  std::vector<std::string_view> known;
-  known.reserve(parameters_.size());
-  for (const LawParameter& p : parameters_) known.push_back(p.name);
-  throw bad_input(fmt::format("law {}", name_),
-                  fmt::format("no parameter is called '{}'", printable(parameter)),
-                  fmt::format("one of {}", fmt::join(known, ", ")));
+  throw unknown_word(fmt::format("law {}", name_), "no parameter is called", parameter,
+                     mapped<std::string>(parameters_, &LawParameter::name));
 }
 
 bool LawModel::linear_in(std::size_t parameter) const {

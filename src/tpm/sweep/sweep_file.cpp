@@ -8,6 +8,8 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/sensitivity.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -212,8 +214,11 @@ void require_expressions(const Sweep& sweep, const DocumentPlace& place) {
   const auto require_known = [&](const std::string& text, const std::string& where) {
     for (const std::string& name : evaluator.inputs(text, scope, where)) {
       if (scope.values.contains(name)) continue;
-      throw bad_input(where, fmt::format("unknown symbol '{}'", printable(name)),
-                      "a parameter, or a number found before");
+      const auto known =
+          mapped<std::string>(scope.values, [](const auto& value) { return value.first; });
+      throw bad_input(
+          where, fmt::format("unknown symbol '{}'{}", printable(name), did_you_mean(name, known)),
+          "a parameter, or a number found before");
     }
   };
   for (std::size_t i = 0; i < sweep.skip.size(); ++i) {

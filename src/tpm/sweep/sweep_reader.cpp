@@ -5,6 +5,8 @@
 #include <algorithm>
 
 #include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::sweep {
@@ -44,15 +46,14 @@ SweepReader::SweepReader(const std::filesystem::path& file) : file_(file) {
 const ReadVariable& SweepReader::variable(const std::string& name) const {
   const auto found = std::ranges::find(variables_, name, &ReadVariable::name);
   if (found != variables_.end()) return *found;
-  throw bad_input("sweep", fmt::format("no variable '{}'", printable(name)),
-                  fmt::format("one of {}", listed(variables_, &ReadVariable::name)));
+  throw unknown_word("sweep", "no variable", name,
+                     mapped<std::string>(variables_, &ReadVariable::name));
 }
 
 std::size_t SweepReader::axis(const std::string& name) const {
   const auto found = std::ranges::find_if(axes_, [&](const ReadAxis& a) { return a.name == name; });
   if (found != axes_.end()) return static_cast<std::size_t>(found - axes_.begin());
-  throw bad_input("sweep", fmt::format("no axis '{}'", printable(name)),
-                  fmt::format("one of {}", listed(axes_, &ReadAxis::name)));
+  throw unknown_word("sweep", "no axis", name, mapped<std::string>(axes_, &ReadAxis::name));
 }
 
 std::uint64_t SweepReader::cells() const {

@@ -235,6 +235,10 @@ std::string json_text(const Exported& e, const LawFile& law) {
 
 }  // namespace
 
+std::vector<std::string> export_targets() {
+  return mapped<std::string>(kTargets, [](const auto& word) { return word.text; });
+}
+
 ExportTarget parse_export_target(std::string_view text, std::string_view where) {
   return parse_word(kTargets, "program", text, where);
 }

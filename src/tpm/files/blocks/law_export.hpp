@@ -14,6 +14,8 @@ namespace tpm::files {
 /// The programs that a relaxation can be written for; docs/laws.md has their conventions.
 enum class ExportTarget { abaqus, ansys, febio, json };
 
+/// "abaqus", ...
+[[nodiscard]] std::vector<std::string> export_targets();
 /// Throws Error(bad_input) naming the known words.
 [[nodiscard]] ExportTarget parse_export_target(std::string_view text, std::string_view where);
 

@@ -9,6 +9,7 @@
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/keys/more_types.hpp"
@@ -31,8 +32,7 @@ std::size_t place_of_key(const std::vector<LawParameter>& parameters, const std:
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (law_key(parameters[i]) == key) return i;
   }
-  throw bad_input(where, fmt::format("unknown parameter '{}'", printable(key)),
-                  "a parameter of the law");
+  throw unknown_word(where, "unknown parameter", key, mapped<std::string>(parameters, law_key));
 }
 
 Eigen::MatrixXd matrix_of(const std::vector<std::vector<double>>& rows, std::size_t size,

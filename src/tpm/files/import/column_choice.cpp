@@ -8,6 +8,9 @@
 #include <limits>
 #include <map>
 
+#include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/files/import/clock_text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -97,7 +100,10 @@ const MachineColumn& ColumnChoice::by_selector(const std::string& selector) cons
       number <= header_.columns.size()) {
     return header_.columns[number - 1];
   }
-  throw bad_input(file_, fmt::format("no column '{}'", printable(selector)), list());
+  const auto names = mapped<std::string>(header_.columns, &MachineColumn::name);
+  throw bad_input(
+      file_, fmt::format("no column '{}'{}", printable(selector), did_you_mean(selector, names)),
+      list());
 }
 
 /// Up to rounding, in SI.

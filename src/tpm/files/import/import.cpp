@@ -8,6 +8,9 @@
 #include <array>
 #include <numeric>
 
+#include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/assemble.hpp"
 #include "tpm/files/import/file_kind.hpp"
@@ -73,10 +76,10 @@ ImportedSeries digitized_series(DigitizedDataset dataset, const std::string& fil
 
 std::vector<ImportedSeries> datasets_series(std::vector<DigitizedDataset> datasets,
                                             const std::string& file, const ImportOptions& options) {
-  std::string names;
+  std::vector<std::string> names;
   std::vector<ImportedSeries> all;
   for (DigitizedDataset& dataset : datasets) {
-    names += fmt::format("{}'{}'", names.empty() ? "" : ", ", printable(dataset.name));
+    names.push_back(dataset.name);
     if (!options.dataset.empty() && dataset.name != options.dataset) continue;
     if (dataset.x.empty() && options.dataset.empty()) continue;
     if (dataset.x.empty()) throw bad_input(file, "the dataset has no points", "a digitised curve");
@@ -84,7 +87,11 @@ std::vector<ImportedSeries> datasets_series(std::vector<DigitizedDataset> datase
   }
   if (!all.empty()) return all;
   if (options.dataset.empty()) throw bad_input(file, "no dataset has points", "a digitised curve");
-  throw bad_input(file, fmt::format("no dataset '{}'", printable(options.dataset)), names);
+  throw bad_input(
+      file,
+      fmt::format("no dataset '{}'{}", printable(options.dataset),
+                  did_you_mean(options.dataset, names)),
+      listed(names, [](const std::string& name) { return fmt::format("'{}'", printable(name)); }));
 }
 
 using AllSeries = std::vector<ImportedSeries>;
@@ -121,8 +128,7 @@ const Importer& importer_of(ImportInput& input) {
   for (const Importer& importer : kImporters) {
     if (format == "auto" ? importer.recognizes(input) : importer.name == format) return importer;
   }
-  throw bad_input(input.file(), fmt::format("unknown format '{}'", printable(format)),
-                  fmt::format("one of {}", fmt::join(import_formats(), ", ")));
+  throw unknown_word(input.file(), "unknown format", format, import_formats());
 }
 
 std::vector<ImportFinding> format_findings(const Importer& importer, ImportInput& input) {

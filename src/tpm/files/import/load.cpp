@@ -46,7 +46,9 @@ CurveFiles find_files(const std::string& path_or_id) {
   if (path.extension() == ".csv" || path.extension() == ".json") {
     CurveFiles files{fs::path(path).replace_extension(".json"),
                      fs::path(path).replace_extension(".csv")};
-    if (path.extension() == ".csv" && fs::exists(path) && !fs::exists(files.description)) {
+    std::error_code none;
+    if (path.extension() == ".csv" && fs::exists(path, none) &&
+        !fs::exists(files.description, none)) {
       throw bad_input(
           path.string(), "has no description beside it",
           fmt::format("{} (tpm data import writes one)", files.description.filename().string()));

@@ -9,6 +9,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/clock_text.hpp"
 #include "tpmkit/error.hpp"
@@ -262,9 +263,9 @@ void set_reading_option(ImportOptions& options, std::string_view key, const std:
   for (const ReadingKey& known : kKeys) {
     if (known.option.key == key) return known.set(options, text, where);
   }
-  std::string keys;
-  for (const ReadingKey& known : kKeys) keys += fmt::format("{}, ", known.option.key);
-  throw bad_input(where, fmt::format("unknown option '{}'", printable(key)), keys + "units");
+  auto keys = mapped<std::string>(kKeys, [](const ReadingKey& k) { return k.option.key; });
+  keys.emplace_back("units");
+  throw unknown_word(where, "unknown option", key, keys);
 }
 
 void set_reading_unit(ImportOptions& options, const std::string& column, const std::string& unit,

@@ -24,9 +24,10 @@ fs::path with_ending(fs::path path, const char* ending) {
 
 /// A description and its rows stand side by side; an id has neither ending nor file.
 bool is_described(const fs::path& path) {
-  if (path.extension() == ".csv") return fs::exists(with_ending(path, ".json"));
-  if (path.extension() == ".json") return fs::exists(with_ending(path, ".csv"));
-  return !fs::exists(path) && !path.has_extension();
+  std::error_code none;  // its name may be too long where that of the rows is not
+  if (path.extension() == ".csv") return fs::exists(with_ending(path, ".json"), none);
+  if (path.extension() == ".json") return fs::exists(with_ending(path, ".csv"), none);
+  return !fs::exists(path, none) && !path.has_extension();
 }
 
 bool says_something_about_columns(const ImportOptions& options) {

@@ -6,6 +6,8 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/protocol_block.hpp"
 #include "tpm/files/keys/more_types.hpp"
@@ -258,8 +260,11 @@ std::size_t parameter_place(const FitConfig& config, const std::string& name,
   const std::vector<FitParameter> all = searched_parameters(config);
   const auto found = std::ranges::find(all, name, &FitParameter::name);
   if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
-  throw bad_input(place.where, fmt::format("no parameter is called '{}'", printable(name)),
-                  fmt::format("{}{}", besides, listed(all, &FitParameter::name)));
+  const auto names = mapped<std::string>(all, &FitParameter::name);
+  throw bad_input(
+      place.where,
+      fmt::format("no parameter is called '{}'{}", printable(name), did_you_mean(name, names)),
+      fmt::format("{}{}", besides, fmt::join(names, ", ")));
 }
 
 void separate_nuisance(const DesignKeys& keys, DesignProblem& problem, const DocumentPlace& place) {

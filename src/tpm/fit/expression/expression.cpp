@@ -9,6 +9,7 @@
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/fit/expression/model_functions.hpp"
 #include "tpmkit/error.hpp"
 
@@ -102,10 +103,17 @@ struct Evaluator::Impl {
   /// What may be named: all of it where the scope is all there is, else where to look.
   std::string known(const Scope& scope) const {
     if (!symbols.empty() || !definitions.empty()) return "a name from 'symbols' or 'definitions'";
-    std::vector<std::string> names;
-    for (const auto& [name, value] : scope.values) names.push_back(name);
-    for (const auto& [name, formula] : scope.formulas) names.push_back(name);
-    return names.empty() ? "a formula of numbers" : fmt::format("{}", fmt::join(names, ", "));
+    const std::vector<std::string> all = names(scope);
+    return all.empty() ? "a formula of numbers" : fmt::format("{}", fmt::join(all, ", "));
+  }
+
+  std::vector<std::string> names(const Scope& scope) const {
+    std::vector<std::string> all;
+    for (const auto& entry : scope.values) all.push_back(entry.first);
+    for (const auto& entry : scope.formulas) all.push_back(entry.first);
+    for (const auto& entry : symbols) all.push_back(entry.first);
+    for (const auto& entry : definitions) all.push_back(entry.first);
+    return all;
   }
 
   /// What the definitions of one evaluation came to: each is computed once, or a chain of
@@ -123,7 +131,10 @@ struct Evaluator::Impl {
     const std::string* formula = formula_of(name, scope);
     if (formula == nullptr) {
       if (const auto symbol = symbols.find(name); symbol != symbols.end()) return symbol->second;
-      throw bad_input(where, fmt::format("unknown symbol '{}'", printable(name)), known(scope));
+      throw bad_input(
+          where,
+          fmt::format("unknown symbol '{}'{}", printable(name), did_you_mean(name, names(scope))),
+          known(scope));
     }
     if (known_values.under_way.contains(name)) {
       throw bad_input(where, fmt::format("'{}' refers to itself", printable(name)),

@@ -6,6 +6,8 @@
 #include <limits>
 
 #include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/config_parts.hpp"
@@ -21,8 +23,8 @@ std::size_t parse_target(std::string_view name, const Model& model, const Docume
   const auto all = model.parameters();
   const auto found = std::ranges::find(all, name, &ParameterDescription::name);
   if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
-  throw bad_input(place.where, fmt::format("no model parameter is called '{}'", printable(name)),
-                  fmt::format("one of {}", listed(all, &ParameterDescription::name)));
+  throw unknown_word(place.where, "no model parameter is called", name,
+                     mapped<std::string>(all, &ParameterDescription::name));
 }
 
 /// The places of the data sets named under "for".
@@ -158,7 +160,11 @@ const EstimatedParameter& find_parameter(const FitConfig& config, const std::str
   for (const EstimatedParameter& p : config.parameters) {
     if (p.fit.name == name) return p;
   }
-  throw bad_input(place.where, fmt::format("'{}' is not an estimated parameter", printable(name)),
+  const auto names = mapped<std::string>(config.parameters,
+                                         [](const EstimatedParameter& p) { return p.fit.name; });
+  throw bad_input(place.where,
+                  fmt::format("'{}' is not an estimated parameter{}", printable(name),
+                              did_you_mean(name, names)),
                   "a name from /parameters");
 }
 

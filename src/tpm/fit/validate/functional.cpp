@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "tpm/base/enum_names.hpp"
 #include "tpm/base/median.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/data/drive_pieces.hpp"
@@ -233,17 +237,31 @@ bool is_pause(PieceIterator piece, PieceIterator end, const RecordingParts& part
          std::max(lasts(parts.ramp_first, parts.ramp_last), lasts(on.first, on.last));
 }
 
+constexpr auto kQuantityWords =
+    std::to_array<Word<QuantityKind>>({{QuantityKind::peak, "peak"},
+                                       {QuantityKind::end_of_hold, "end"},
+                                       {QuantityKind::relaxation_ratio, "ratio"},
+                                       {QuantityKind::half_time, "half-time"},
+                                       {QuantityKind::rate, "rate"},
+                                       {QuantityKind::work, "work"}});
+
 double parse_place(std::string_view text, Quantity drive, std::string_view where,
                    QuantityKind& kind) {
   const std::string expected =
-      "peak, end, ratio, half-time, rate, work, a time such as \"5 s\" or a depth";
+      fmt::format("{}, a time such as \"5 s\" or a depth", listed(kQuantityWords));
+  const auto unknown = [&] {
+    const auto known = mapped<std::string>(kQuantityWords, [](const auto& w) { return w.text; });
+    return bad_input(
+        where, fmt::format("unknown quantity '{}'{}", printable(text), did_you_mean(text, known)),
+        expected);
+  };
   const QuantityText parts = split_quantity(text);
   const Dimension of_drive = quantity_dimension(drive);
   if (!parts.unit.empty() && !is_unit(parts.unit)) {
-    throw bad_input(where, fmt::format("unknown quantity '{}'", printable(text)), expected);
+    throw unknown();
   }
   if (!find_number(parts.number)) {
-    throw bad_input(where, fmt::format("unknown quantity '{}'", printable(text)), expected);
+    throw unknown();
   }
   const bool time =
       !parts.unit.empty() && parse_unit(parts.unit, where).dimension == Dimension::time;
@@ -255,12 +273,7 @@ double parse_place(std::string_view text, Quantity drive, std::string_view where
 
 QuantityOfInterest parse_quantity_of_interest(std::string_view text, Quantity drive,
                                               std::string_view where) {
-  if (text == "peak") return {QuantityKind::peak};
-  if (text == "end") return {QuantityKind::end_of_hold};
-  if (text == "ratio") return {QuantityKind::relaxation_ratio};
-  if (text == "half-time") return {QuantityKind::half_time};
-  if (text == "work") return {QuantityKind::work};
-  if (text == "rate") return {QuantityKind::rate};
+  if (const auto* word = find_entry(kQuantityWords, text)) return {word->meaning};
   QuantityOfInterest q;
   q.at = parse_place(text, drive, where, q.kind);
   return q;

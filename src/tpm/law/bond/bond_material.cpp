@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -140,9 +141,9 @@ std::optional<double> value_of(const BondMaterial& material, std::string_view na
 
 void set_value(BondMaterial& material, std::string_view name, double value,
                std::string_view where) {
-  std::string names;
+  std::vector<std::string> names;
   for (const MaterialParameter& parameter : parameters_of(material)) {
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", parameter.name);
+    names.emplace_back(parameter.name);
     if (parameter.name != name) continue;
     if (!std::isfinite(value) || !parameter.allows(value)) {
       throw bad_input(
@@ -156,8 +157,7 @@ void set_value(BondMaterial& material, std::string_view name, double value,
     }
     return;
   }
-  throw bad_input(where, fmt::format("the material has no parameter '{}'", printable(name)),
-                  fmt::format("one of {}", names));
+  throw unknown_word(where, "the material has no parameter", name, names);
 }
 
 void require_valid(const BondMaterial& material, std::string_view where) {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -62,13 +63,12 @@ std::vector<const ElongationShape*> joined(std::initializer_list<ElongationShape
 }
 
 const ElongationShape& elongation_shape(std::string_view name, std::string_view where) {
-  std::string names;
+  std::vector<std::string> names;
   for (const ElongationShape* shape : elongation_shapes()) {
     if (shape->name() == name) return *shape;
-    names.append(names.empty() ? "" : ", ").append(shape->name());
+    names.emplace_back(shape->name());
   }
-  throw bad_input(where, fmt::format("unknown shape '{}'", printable(name)),
-                  fmt::format("one of {}", names));
+  throw unknown_word(where, "unknown shape", name, names);
 }
 
 ElongationFunction::ElongationFunction(const ElongationShape& shape,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "tpm/base/nearest_word.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -51,8 +52,13 @@ const Formulation* find_formulation(std::string_view name) {
 
 void refuse_formulation(std::string_view name, std::string_view noun, std::string_view where,
                         const std::string& able) {
-  throw bad_input(where, fmt::format("unknown {} '{}'", noun, printable(name)),
-                  fmt::format("one of {}", able));
+  std::vector<std::string> names;
+  for (std::size_t begin = 0; begin < able.size();) {
+    const std::size_t end = std::min(able.find(", ", begin), able.size());
+    names.push_back(able.substr(begin, end - begin));
+    begin = end + 2;
+  }
+  throw base::unknown_word(where, fmt::format("unknown {}", noun), name, names);
 }
 
 std::string_view words_of(bool Capabilities::*capability) {

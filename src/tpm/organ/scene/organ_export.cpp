@@ -3,14 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/organ/bonds/lowest_mode.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
 namespace {
+
+constexpr auto kOrganTargets =
+    std::to_array<Word<OrganTarget>>({{OrganTarget::sofa, "sofa"}, {OrganTarget::mjcf, "mjcf"}});
 
 void require_lines_alone(const Tissue& tissue) {
   for (std::size_t i = 1; i < tissue.sliders.size(); ++i) {
@@ -184,9 +190,12 @@ std::string mjcf_document(const Tissue& tissue, const OrganExportOptions& option
 
 }  // namespace
 
+std::vector<std::string> organ_targets() {
+  return mapped<std::string>(kOrganTargets, [](const auto& word) { return word.text; });
+}
+
 std::optional<OrganTarget> organ_target(std::string_view text) {
-  if (text == "sofa") return OrganTarget::sofa;
-  if (text == "mjcf") return OrganTarget::mjcf;
+  if (const auto* word = find_entry(kOrganTargets, text)) return word->meaning;
   return std::nullopt;
 }
 

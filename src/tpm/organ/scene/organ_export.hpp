@@ -14,6 +14,8 @@ enum class OrganTarget {
   mjcf,  ///< model of MuJoCo 2.3 or later: bodies on slides, spatial tendons
 };
 
+/// "sofa", "mjcf"
+[[nodiscard]] std::vector<std::string> organ_targets();
 /// None for another word.
 [[nodiscard]] std::optional<OrganTarget> organ_target(std::string_view text);
 

@@ -8,6 +8,8 @@
 #include <map>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/paper/claims/audit_kinds.hpp"
@@ -35,8 +37,7 @@ constexpr auto kKinds = std::to_array<ClaimKind>({
 const ClaimKind& kind_named(const std::string& name, std::string_view at) {
   const auto found = std::ranges::find(kKinds, name, &ClaimKind::name);
   if (found != kKinds.end()) return *found;
-  throw bad_input(at, fmt::format("unknown kind '{}'", printable(name)),
-                  "one of " + listed(kKinds, &ClaimKind::name));
+  throw unknown_word(at, "unknown kind", name, mapped<std::string>(kKinds, &ClaimKind::name));
 }
 
 using Placeholders = std::map<std::string, std::string, std::less<>>;

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "tpm/base/lists.hpp"
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/paper/claims/cause_search.hpp"
@@ -255,8 +258,11 @@ void check_dimension(const ClaimReader& claim, Finding& finding) {
   const std::string name = claim.text("expression");
   const PrintedSymbol* symbol = claim.set().symbol(name);
   if (symbol == nullptr) {
-    throw bad_input(claim.at(), fmt::format("unknown symbol '{}'", printable(name)),
-                    "a name from 'symbols'");
+    const auto known = mapped<std::string>(claim.set().symbols, &PrintedSymbol::name);
+    throw bad_input(
+        claim.at(),
+        fmt::format("unknown symbol '{}'{}", printable(name), did_you_mean(name, known)),
+        "a name from 'symbols'");
   }
   const std::string claimed = claim.text("claimed_dimension");
   const Unit example = parse_unit(claimed, claim.at());

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <set>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/nearest_word.hpp"
 #include "tpm/base/printed_number.hpp"
 #include "tpm/data/curve_words.hpp"
 #include "tpm/files/file.hpp"
@@ -224,8 +226,8 @@ std::size_t PrintedTable::column(std::string_view name, std::string_view at) con
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (columns[i].name == name) return i;
   }
-  throw bad_input(at, fmt::format("table '{}' has no column '{}'", id, printable(name)),
-                  "one of its columns");
+  throw unknown_word(at, fmt::format("table '{}' has no column", id), name,
+                     mapped<std::string>(columns, &PrintedColumn::name));
 }
 
 double PrintedTable::si(std::size_t row, std::size_t column, std::string_view at) const {
@@ -241,7 +243,7 @@ const PrintedTable& ClaimSet::table(std::string_view id, std::string_view at) co
   for (const PrintedTable& t : tables) {
     if (t.id == id) return t;
   }
-  throw bad_input(at, fmt::format("unknown table '{}'", printable(id)), "an id from 'tables'");
+  throw unknown_word(at, "unknown table", id, mapped<std::string>(tables, &PrintedTable::id));
 }
 
 std::filesystem::path paper_claims_path() {
