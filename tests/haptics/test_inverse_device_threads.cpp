@@ -182,28 +182,32 @@ TEST_CASE("A state is as old as the message that it answers") {
   CHECK(messages.answered() == 2000);
   CHECK_FALSE(messages.answered());
 
-  // Answers that take 6 periods are late, each of them, and positions all the same.
-  StandInFaults f;
-  f.late_s = 0.006;
-  StandInInverse service(PlantSettings{}, {}, true, f);
-  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"), false);
-  (void)device.open();
-  device.prepare(in_real_time(2.0));
-  device.enable_forces();
-  int fresh = 0;
-  Eigen::Vector3d at_m;
-  for (int i = 0; i < 200; ++i) {
-    const DeviceAnswer answer = device.read(at_m);
-    REQUIRE(answer != DeviceAnswer::failed);
-    fresh += answer == DeviceAnswer::ok;
-    CHECK(device.write({0.0, 0.0, 0.1}) == DeviceAnswer::ok);
-    std::this_thread::sleep_for(1ms);
+  // Answers that take 3 to 6 periods are late, each of them, and positions all the same.
+  for (const double jitter_s : {0.0, 0.003}) {
+    StandInFaults f;
+    f.late_s = 0.006 - jitter_s;
+    f.jitter_s = jitter_s;
+    StandInInverse service(PlantSettings{}, {}, true, f);
+    InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                         limits_of("inverse3"), false);
+    (void)device.open();
+    device.prepare(in_real_time(2.0));
+    device.enable_forces();
+    int fresh = 0;
+    Eigen::Vector3d at_m;
+    for (int i = 0; i < 200; ++i) {
+      const DeviceAnswer answer = device.read(at_m);
+      REQUIRE(answer != DeviceAnswer::failed);
+      fresh += answer == DeviceAnswer::ok;
+      CHECK(device.write({0.0, 0.0, 0.1}) == DeviceAnswer::ok);
+      std::this_thread::sleep_for(1ms);
+    }
+    device.stop();
+    CHECK(fresh == 0);
+    CHECK(device.status().time_guards == 200);
+    CHECK(device.status().forces_off == ForcesOff::none);
+    CHECK(device.traffic().messages > 20);
   }
-  device.stop();
-  CHECK(fresh == 0);
-  CHECK(device.status().time_guards == 200);
-  CHECK(device.traffic().messages > 20);
 }
 
 TEST_CASE("A device that keeps the clock has no virtual time") {
@@ -244,7 +248,10 @@ TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any
     options.recording = folder / fmt::format("late{}.tpmrec", late_ms);
     bool begun = false;
     options.watcher = [&](const ServoRecord& row) {
-      if (row.phase >= 0 && !begun) service.begin();
+      if (row.phase >= 0 && !begun) {
+        service.begin();
+        service.press(0b101U);
+      }
       begun = begun || row.phase >= 0;
     };
     const SessionRun run = run_session(session, choice, options);
@@ -257,6 +264,8 @@ TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any
     CHECK_THAT(device_line(recording), Contains("SIMULATED DEVICE"));
     CHECK(recording.header.at("device").at("serial") == "049D");
     CHECK((recording.rows.back().grip[0] == 0.5F && recording.rows.back().grip[1] == -0.5F));
+    CHECK(recording.rows.back().buttons == 0b101U);
+    CHECK(recording.closing.at("markers").size() == 1);
     const Verification v = verify(recording, {.window_s = 0.0});
     CHECK(v.all.max_N < 0.01 * v.all.peak_N);
     CHECK(v.all.peak_N > 0.1);

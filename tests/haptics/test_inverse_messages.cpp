@@ -68,6 +68,11 @@ TEST_CASE("An inventory of the public description is read") {
   CHECK(d.state.has_grip);
   CHECK(d.state.buttons == 0b101U);
   CHECK(d.state.grip.x() == 1.0);
+  CHECK_THAT(d.settings.lines().back(), Contains("torque scaling on"));
+  std::string silent = kInventory;
+  silent.replace(silent.find("torque_scaling"), 14, "unnamed_things");
+  CHECK_THAT(parse_inventory(silent).devices.at(0).settings.lines().back(),
+             Contains("torque scaling not named"));
 }
 
 TEST_CASE("A force is written and read in both formats, told by the version") {

@@ -1,6 +1,9 @@
 // tpm hil serve: what clients of the Inverse service receive, and that none of them gets in the
 // way.
 #include <fmt/format.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <atomic>
@@ -240,6 +243,22 @@ TEST_CASE("The server answers programs and its own page on this machine, and nob
   CHECK(parse_inventory(http_exchange(port, "/devices", "", kSoon_s)).devices.at(0).simulated);
   const test::RawClient dumb(port);  // asks for nothing
   CHECK(dumb.answer(5.0).empty());
+}
+
+TEST_CASE("Sockets listen on this machine only, and send small pieces without waiting") {
+  const Socket listening = listen_on_loopback(0);
+  sockaddr_in address{};
+  socklen_t size = sizeof address;
+  REQUIRE(getsockname(listening.handle(), reinterpret_cast<sockaddr*>(&address), &size) == 0);
+  CHECK(address.sin_addr.s_addr == htonl(INADDR_LOOPBACK));
+  const Socket client = connect_to_loopback(port_of(listening), kSoon_s);
+  const Socket server = accepted(listening);
+  for (const Socket* socket : {&client, &server}) {
+    int without_delay = 0;
+    size = sizeof without_delay;
+    REQUIRE(getsockopt(socket->handle(), IPPROTO_TCP, TCP_NODELAY, &without_delay, &size) == 0);
+    CHECK(without_delay != 0);
+  }
 }
 
 TEST_CASE("Events reach those who listen, and their words are nothing to the hand") {

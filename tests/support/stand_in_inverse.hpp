@@ -41,6 +41,7 @@ struct StandInFaults {
   int unasked_states = 0;         ///< behind the inventory, of a hand at kElsewhere_m
   int answers = 1'000'000;        ///< after so many it is silent
   double late_s = 0.0;            ///< from a message to its state
+  double jitter_s = 0.0;          ///< at most so much more, in no order
   /// From this message with a force on, what `how` says, a connection is closed once; 0: never.
   int from = 0;
   enum class How { silence, garbage, other_device, close, drop_every_third } how = How::silence;
@@ -366,6 +367,7 @@ inline void StandInInverse::talk(Socket socket, bool events) {
   WebSocketReader reader(WebSocketSide::server, 65'536);
   bool open = false;
   std::deque<std::pair<std::int64_t, std::string>> late;  // when to send what
+  double irregular = 0.0;
   if (events && faults_.no_events) return;
   while (!ending_) {
     for (; !late.empty() && late.front().first <= now_ns(); late.pop_front()) {
@@ -421,7 +423,11 @@ inline void StandInInverse::talk(Socket socket, bool events) {
         goes_on = texts.has_value();
         for (const std::string& text : texts.value_or(std::vector<std::string>())) {
           if (faults_.late_s > 0.0) {
-            late.emplace_back(now_ns() + static_cast<std::int64_t>(faults_.late_s * 1e9), text);
+            irregular += irregular < 0.381966 ? 0.618034 : -0.381966;  // golden section, in [0, 1)
+            const double late_s = faults_.late_s + faults_.jitter_s * irregular;
+            const std::int64_t due_ns = now_ns() + static_cast<std::int64_t>(late_s * 1e9);
+            // States come in the order of the messages.
+            late.emplace_back(late.empty() ? due_ns : std::max(due_ns, late.back().first), text);
           } else {
             stand_in::send_text(socket.handle(), text);
           }

@@ -235,9 +235,9 @@ std::string config_text(const InverseDeviceEntry& d) {
       json_text(d.type),
       d.simulated ? fmt::format(R"("{}":"{}",)", key::simulated, kSimulatedWords) : std::string(),
       json_text(d.id), s.gravity_compensation, s.gravity_scaling, json_text(s.handedness),
-      s.torque_scaling, json_text(s.preset), json_text(s.basis), vector_text(s.mount_position_m),
-      quaternion_text(s.mount_rotation), vector_text(s.mount_scale), s.force_gate_gain, s.damping,
-      vector_text(s.directional_damping));
+      s.torque_scaling.value_or(false), json_text(s.preset), json_text(s.basis),
+      vector_text(s.mount_position_m), quaternion_text(s.mount_rotation),
+      vector_text(s.mount_scale), s.force_gate_gain, s.damping, vector_text(s.directional_damping));
 }
 
 std::string status_text(bool simulated) {
@@ -292,7 +292,9 @@ std::vector<std::string> InverseSettings::lines() const {
                   gravity_named ? fmt::format("{}, factor {}", gravity_compensation ? "on" : "off",
                                               gravity_scaling)
                                 : "not named",
-                  torque_scaling ? "on" : "off")};
+                  !torque_scaling   ? "not named"
+                  : *torque_scaling ? "on"
+                                    : "off")};
 }
 
 InverseInventory parse_inventory(std::string_view text) {

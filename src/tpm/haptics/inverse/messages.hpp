@@ -41,7 +41,8 @@ struct InverseSettings {
   bool damping_named = false;
   double damping = 0.0;
   Eigen::Vector3d directional_damping = Eigen::Vector3d::Zero();
-  bool gravity_named = false, gravity_compensation = false, torque_scaling = false;
+  bool gravity_named = false, gravity_compensation = false;
+  std::optional<bool> torque_scaling;  ///< empty: the service does not say
   double gravity_scaling = 0.0;
 
   /// A metre of the program is one of the device: a mount or workspace in another scale changes
