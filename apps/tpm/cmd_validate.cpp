@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -97,6 +98,12 @@ PickedAnswer picked_answer(const Json& scene, const std::string& where, const Pl
 /// The law, or the organ that it was put on.
 void set_subject(ValidationRequest& request, std::vector<std::string>& digests,
                  const ValidateOptions& options) {
+  const std::string text = read_file(options.law);
+  const std::size_t begin = text.find_first_not_of(" \t\r\n");
+  if (begin != std::string::npos && std::isalnum(static_cast<unsigned char>(text[begin])) != 0) {
+    throw bad_input(options.law, "is no law and no scene, which stands before the recordings",
+                    "law.json of tpm fit, or scene.json of tpm material");
+  }
   const Json document = read_json(options.law);
   request.law_file = options.law;
   request.law_sha256 = sha256_hex(read_file(options.law));
@@ -323,7 +330,9 @@ int run_validate(const ValidateOptions& options, const Session& session) {
     return recheck(options.recheck, options.output, session);
   }
   if (options.law.empty() || options.recordings.files.empty()) {
-    throw Error(ExitCode::usage, "validate", "no law and no recording",
+    throw Error(ExitCode::usage, "validate",
+                options.law.empty() ? "no law and no recording"
+                                    : fmt::format("'{}' and no recording", printable(options.law)),
                 "LAW RECORDING..., or --recheck FILE");
   }
   if (!options.credibility.empty()) will_write({options.credibility});

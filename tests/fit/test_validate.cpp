@@ -330,6 +330,47 @@ TEST_CASE(
   CHECK_THAT(test::study_quantity(r, QuantityKind::peak).remark, Contains("zero"));
 }
 
+TEST_CASE("contact by a force is uncertain by a step of the drive", "[validate]") {
+  // 0.4 mm between samples: the one that passes 5 mN lies up to 0.35 mm beyond where 5 mN is
+  // reached, which makes the same material look stiffer by a seventh.
+  const LawFile law = base_law();
+  Random random(14);
+  test::StudyNoise noise;
+  noise.sigma_N = 2e-4;
+  PhaseOptions phases;
+  phases.contact_response = 5e-3 + noise.zero_N;
+  const PreparedRecording r = prepare_recording(
+      "threshold", test::study_recording(test::study_validation(40, 0.0), noise, random), phases);
+  ComparisonOptions options;
+  options.known = KnownPlacement::threshold;
+  const RecordingComparison c = compare_with_recording(law, r, options);
+  CHECK_THAT(c.placement.contact_u_sampled, WithinRel(0.4e-3 / std::numbers::sqrt3, 0.01));
+  for (const QuantityKind kind : {QuantityKind::peak, QuantityKind::end_of_hold}) {
+    const QuantityComparison& q = test::study_quantity(c, kind);
+    CAPTURE(q.name, q.e.error, q.e.expanded());
+    CHECK(std::abs(q.e.error) > 0.05 * q.measured);
+    CHECK(std::abs(q.e.error) <= q.e.expanded());
+    CHECK_THAT(q.parts.front().name, Contains("contact point"));
+  }
+  CHECK(c.joint.p_value > 0.05);
+}
+
+TEST_CASE("a contact by force that the fit did not use is remarked", "[validate]") {
+  ValidationRequest request;
+  request.law_file = "law.json";
+  request.law = base_law();
+  FittedFile file;
+  file.name = "calibration.csv";
+  file.contact = 1e-5;
+  request.law.uncertainty->data = {file};
+  request.recordings = {validation_of(1.0, 2e-4, 40, 15)};
+  request.contact_by_threshold = true;
+  const auto said = [&] { return to_terminal_text(validate(request)); };
+  CHECK_THAT(said(), Contains("fitted without --contact-force"));
+  request.law.uncertainty->data.front().held = {"contact"};
+  CHECK_THAT(said(), !Contains("fitted without --contact-force"));
+}
+
 TEST_CASE("the onset is found where contact begins", "[validate]") {
   const LawFile law = base_law();
   Random random(12);

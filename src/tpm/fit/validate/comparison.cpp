@@ -253,13 +253,13 @@ class Comparer {
     const double u_readings = u_of(weight);
     q.parts.push_back({"the scatter of the readings", u_of(d.weight)});
     q.parts.push_back({zero_name(), u_of(from_zero)});
-    q.parts.push_back({"the contact point", u_of(from_contact)});
+    q.of_contact = by_contact * p.contact_u_sampled;
+    q.parts.push_back({"the contact point", std::hypot(u_of(from_contact), q.of_contact)});
     const Eigen::RowVectorXd by_law =
         times(s.weight, at_.by_law) + by_contact * p.contact_by_law + by_zero * p.zero_by_law;
     q.shared = by_law * along_.root();
     q.u_input = q.shared.norm();
     q.parts.push_back({"the law's parameters", q.u_input});
-    double own_instrument = 0.0;
     double stated_zero = 0.0;
     const bool zero_told = p.zero_readings > 0 || p.zero_known;
     if (!zero_told && std::abs(by_zero) > 1e-9 * d.weight.cwiseAbs().sum()) {
@@ -272,19 +272,18 @@ class Comparer {
       }
     }
     add_instrument(q, s, d);
-    own_instrument = q.of_instrument.norm();
-    q.u_D = std::sqrt(u_readings * u_readings + own_instrument * own_instrument +
-                      stated_zero * stated_zero);
-    q.u_own = std::sqrt(u_readings * u_readings + stated_zero * stated_zero + q.u_num * q.u_num);
+    const double own_instrument = q.of_instrument.norm();
+    const double stated = std::hypot(stated_zero, q.of_contact);
+    q.u_D = std::hypot(u_readings, own_instrument, stated);
+    q.u_own = std::hypot(u_readings, stated, q.u_num);
     CombinedUncertainty sum;
     sum.add(u_readings, result_.scatter.degrees);
     sum.add(q.u_input, degrees_of_law_);
     sum.add(q.u_num, kInfinity);
     sum.add(own_instrument, kInfinity);
-    sum.add(stated_zero, kInfinity);
-    const double of_law = q.u_input;
+    sum.add(stated, kInfinity);
     const double shared = q.shared.norm();
-    sum.add(std::sqrt(std::max(shared * shared - of_law * of_law, 0.0)), kInfinity);
+    sum.add(std::sqrt(std::max(shared * shared - q.u_input * q.u_input, 0.0)), kInfinity);
     q.u_input = shared;
     q.e.u_val = sum.u();
     q.e.degrees = sum.degrees();
@@ -368,7 +367,8 @@ class Comparer {
       degrees = std::min(degrees, a.e.degrees);
       for (Eigen::Index j = 0; j < count; ++j) {
         const QuantityComparison& b = result_.quantities[static_cast<std::size_t>(j)];
-        covariance(i, j) += a.shared.dot(b.shared) + a.of_instrument.dot(b.of_instrument);
+        covariance(i, j) += a.shared.dot(b.shared) + a.of_instrument.dot(b.of_instrument) +
+                            a.of_contact * b.of_contact;
       }
       // What only this quantity has: numerical errors, and a zero that was stated.
       const double own = a.e.u_val * a.e.u_val - covariance(i, i);

@@ -30,8 +30,9 @@ struct QuantityComparison {
   /// one a direction; its norm is part of u_val.
   Eigen::RowVectorXd shared;
   Eigen::RowVectorXd
-      of_instrument;   ///< effects of its errors, shared by recordings of one instrument
-  double u_own = 0.0;  ///< the rest of u_val
+      of_instrument;        ///< effects of its errors, shared by recordings of one instrument
+  double of_contact = 0.0;  ///< effect of contact between two samples (contact_u_sampled)
+  double u_own = 0.0;       ///< the rest of u_val
 };
 
 /// Hotelling's T^2 over the quantities that are independent.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/enum_names.hpp"
@@ -155,7 +156,11 @@ class HeldPlacement {
       set_zero(p_, r_, zero_count(0.0, 0.0));
     } else if (known == KnownPlacement::threshold) {
       p_.contact = prepared_.phases.contact_drive;
-      p_.contact_words = "where the response passes --contact-force";
+      p_.contact_words = "the sample that passes --contact-force";
+      const std::size_t at = prepared_.phases.contact_index;
+      if (prepared_.phases.contact_found && at > 0) {
+        p_.contact_u_sampled = std::abs(r_.drive[at] - r_.drive[at - 1]) / std::numbers::sqrt3;
+      }
       set_zero(p_, r_, samples_before(r_, parts_, p_.contact, kGuard * travel_, false));
     } else if (law_.contact_of_law() || r_.drive_quantity == Quantity::strain) {
       p_.contact = law_.contact_of_law() ? law_.contact_in_law() : 0.0;
@@ -241,7 +246,7 @@ class HeldPlacement {
   }
 
   ValidationPlacement finished() {
-    p_.contact_u = scatter_.of(r_.time_s, p_.contact_by_reading);
+    p_.contact_u = std::hypot(scatter_.of(r_.time_s, p_.contact_by_reading), p_.contact_u_sampled);
     p_.zero_u = scatter_.of(r_.time_s, p_.zero_by_reading);
     return p_;
   }
@@ -294,6 +299,7 @@ ValidationPlacement fitted_placement(const LawAlong& law, const Recording& r,
   }
   p.zero_readings = last + 1;
   p.contact_words = "fitted to this recording, with the zero";
+  p.contact_u_sampled = 0.0;
   p.contact_u = scatter.of(r.time_s, p.contact_by_reading);
   p.zero_u = scatter.of(r.time_s, p.zero_by_reading);
   // What the fit and the held placement share of the noise is in both.

@@ -35,7 +35,10 @@ struct ValidationPlacement {
   Eigen::RowVectorXd contact_by_law, zero_by_law;       ///< one a coordinate of the law
   std::size_t zero_readings = 0;  ///< before contact; 0: the recording does not tell the zero
   bool zero_known = false;        ///< it is 0 by definition
-  double contact_u = 0.0, zero_u = 0.0;  ///< standard uncertainties from the readings, SI
+  double contact_u = 0.0, zero_u = 0.0;  ///< standard uncertainties, SI
+  /// The part of contact_u that no reading gives: contact by a threshold is the sample that passes
+  /// it, up to one step of the drive too late, so rectangular about it.
+  double contact_u_sampled = 0.0;
   std::optional<double> onset, onset_u;  ///< where the onset was found, whatever is used
   std::string contact_words;             ///< what it rests on
   /// Of a fitted placement: how far it lies from the held one, in standard uncertainties of both.

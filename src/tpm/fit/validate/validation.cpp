@@ -137,6 +137,21 @@ std::string unit_words(const RecordingComparison& r) {
   return {};
 }
 
+/// Where --contact-force defines contact here and the fit estimated it; empty: it does not.
+std::string threshold_words(const ValidationRequest& request) {
+  if (!request.contact_by_threshold) return {};
+  const std::vector<LawParameter> table = law_parameters(request.law.spec);
+  const LawUncertainty& u = *request.law.uncertainty;
+  const bool alone = std::ranges::any_of(
+      u.place, [&](std::size_t place) { return table[place].name == "contact"; });
+  const bool of_file = std::ranges::any_of(u.data, [](const FittedFile& file) {
+    return file.contact && std::ranges::find(file.held, "contact") == file.held.end();
+  });
+  if (!alone && !of_file) return {};
+  return "the law was fitted without --contact-force: its depths count from the onset, those of "
+         "the recordings from where the force is passed; the difference is in E";
+}
+
 /// All of them, or none.
 std::vector<PreparedRecording> found_recordings(const CalibrationData& calibration) {
   std::vector<PreparedRecording> found;
@@ -303,6 +318,8 @@ Validation validate(const ValidationRequest& request) {
   v.remarks = request.remarks;
   v.remarks.insert(v.remarks.end(), request.calibration.remarks.begin(),
                    request.calibration.remarks.end());
+  if (const std::string words = threshold_words(request); !words.empty())
+    v.remarks.push_back(words);
   std::vector<RecordingComparison> unseen;
   std::vector<Applicability> unseen_motions;
   for (std::size_t i = 0; i < request.recordings.size(); ++i) {
