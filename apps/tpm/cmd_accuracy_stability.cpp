@@ -74,8 +74,7 @@ void add_stability_command(CLI::App& accuracy, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Examples:\n  tpm accuracy stability --folder out/stability\n  tpm accuracy stability "
-      "--points 5  (a quick "
-      "look)\n  tpm accuracy stability --only corners,servo");
+      "--points 5\n  tpm accuracy stability --only corners,servo");
   set_run(*command, session, [folder, along, only, &session] {
     constexpr std::uint64_t kMost = 200;
     const std::uint64_t points = parse_whole_number(*along, "--points", 2);

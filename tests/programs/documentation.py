@@ -11,7 +11,8 @@
 - paper/paper.md shows every figure of paper/figures, cites every entry of paper/paper.bib and nothing else, and names
   only files that exist;
 - the groups of `tpm --help` and of docs/commands.md hold the same commands, each once;
-- the help of every command ends with an example that calls it;
+- the help of every command ends with an example that calls it, and the manual page of every command has the sections of
+  MANUAL and every variable of the environment that the program reads;
 - every page of docs, docs/site and reports is at most two steps from the README;
 - the excerpt of `tpm fit` in the README is what the program prints of the shipped example, with every warning.
 """
@@ -187,6 +188,32 @@ def without_example(root, program):
             yield f"{call} --help: has no example that calls it"
 
 
+MANUAL = ("NAME", "SYNOPSIS", "OPTIONS", "EXAMPLES", "EXIT STATUS", "ENVIRONMENT", "FILES", "SEE ALSO")
+
+
+def short_manuals(root, program):
+    from command_help import ENVIRONMENT, commands, man_page
+
+    found = commands(program)
+    for command in found:
+        page = man_page(command, "0", ["tpm"])
+        headings = re.findall(r"^\.SH \"?([^\"\n]+)", page, re.M)
+        for section in MANUAL:
+            if section not in headings:
+                yield f"{' '.join(['tpm', *command.words])}: its manual page has no section {section}"
+    named = {name for name, _ in ENVIRONMENT}
+    read = set()
+    for folder in ("apps/tpm", "src"):
+        for source in tracked(root / folder, ".cpp", ".hpp"):
+            read |= set(re.findall(r'getenv\("(\w+)"\)', source.read_text(encoding="utf-8")))
+    for name in sorted(read - named - PLATFORM):
+        yield f"the manual pages do not name the environment's {name}"
+
+
+# Variables that the system or mpirun sets.
+PLATFORM = {"HOME", "PATH", "OMPI_COMM_WORLD_SIZE", "PMI_SIZE"}
+
+
 def linked(page):
     for target in re.findall(r"\]\(([^)\s#]+)", page.read_text(encoding="utf-8")):
         if not re.match(r"[a-z]+:", target):
@@ -236,7 +263,8 @@ def false_excerpts(root, program):
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
     faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *too_many_pages(root), *unanswered(root), *faults_of_paper(root),
-              *differing_groups(root, program), *without_example(root, program), *far_pages(root), *false_excerpts(root, program)]
+              *differing_groups(root, program), *without_example(root, program), *short_manuals(root, program), *far_pages(root),
+              *false_excerpts(root, program)]
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")
