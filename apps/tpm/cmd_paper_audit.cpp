@@ -4,12 +4,12 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/paper/claims/audit.hpp"
 #include "tpm/paper/show/study_report.hpp"
 #include "tpm/show/json_table_csv.hpp"
 #include "tpm/show/short_answer.hpp"
-#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "answer.hpp"
 #include "command.hpp"
+#include "common_options.hpp"
 #include "option_kinds.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/quantity_text.hpp"
@@ -15,7 +16,6 @@
 #include "tpm/paper/tables.hpp"
 #include "tpm/show/short_answer.hpp"
 #include "tpmkit/error.hpp"
-#include "verbose_option.hpp"
 
 namespace tpm::app {
 namespace {

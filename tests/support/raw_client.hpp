@@ -11,10 +11,15 @@
 
 namespace tpm::test {
 
-/// A connection to a port of this machine on which anything may be sent.
+/// A connection to a port of this machine on which anything may be sent. With `receive_bytes` above
+/// 0 the kernel keeps no more than about twice that of what is not read.
 class RawClient {
  public:
-  explicit RawClient(int port) : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+  explicit RawClient(int port, int receive_bytes = 0)
+      : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    if (receive_bytes > 0) {  // before it connects: the window is agreed on then
+      (void)::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_bytes, sizeof receive_bytes);
+    }
     sockaddr_in to{};
     to.sin_family = AF_INET;
     to.sin_port = htons(static_cast<std::uint16_t>(port));
