@@ -101,11 +101,11 @@ def overlapping(boxes):
 def fits(chromium, name, folder, met):
     for wide in (1400, 400):
         chromium.call("Emulation.setDeviceMetricsOverride", width=wide, height=900, deviceScaleFactor=1, mobile=False)
+        # A page that draws on a canvas fits a moment after its window has changed.
         time.sleep(0.3)
-        seen = until(chromium, met, name)
+        seen = until(chromium, lambda s: met(s) and not s["overflow"] and wide - 20 <= s["wide"] <= wide, (name, wide))  # a bar to scroll
         if folder:
             chromium.picture(Path(folder) / f"{name}_{wide}.png")
-        assert wide - 20 <= seen["wide"] <= wide and not seen["overflow"], (name, wide, seen["wide"])  # a bar to scroll
         outside = {k: b for k, b in seen["boxes"].items() if b[0] < 0 or b[2] > seen["wide"] + 0.5}
         assert not outside, (name, wide, outside)
         assert not overlapping(seen["boxes"]), (name, wide, overlapping(seen["boxes"]))
