@@ -42,6 +42,7 @@ PREDEFINED = TPM_HAPTICS_API= TPM_DEVICE_API= __attribute__(x)=
 END
 
 step "building (sphinx)"
+rm -rf "$folder/html"  # a page that is gone is no page of the site
 TPMKIT_VERSION=$("$tpm" version | cut -d' ' -f2) TPMKIT_DOXYGEN=$PWD/$folder/doxygen/xml \
   /usr/bin/python3 -m sphinx -q -W --keep-going -b html -d "$folder/doctrees" "$folder/source" "$folder/html"
 mathjax=/usr/share/javascript/mathjax
