@@ -2,7 +2,7 @@
 # What a maintainer checks beyond scripts/test.sh: formatting, the slow tests (with Chromium, ParaView, the
 # Python package, notebooks and full disks), every source compiled with warnings as errors, the fast tests with the rooms of
 # TPM_SANITIZED_ROOMS (cmake/TpmRooms.cmake) under AddressSanitizer and UndefinedBehaviorSanitizer, those
-# with threads under ThreadSanitizer, a minute of fuzzing, clang-tidy on what changed. Stops at the first failure; ends with the
+# with threads under ThreadSanitizer, half a minute of fuzzing, clang-tidy on what changed. Stops at the first failure; ends with the
 # closing lines of the slow tests. Everything under sanitizers: presets asan-ubsan and tsan.
 #
 #   TPM_TIDY_BASE=COMMIT  clang-tidy checks the sources changed since COMMIT; `all` checks all.
@@ -54,8 +54,8 @@ build check
 step "fast tests with sanitized rooms, tests with threads under ThreadSanitizer"
 ctest --preset sanitized --parallel "$(nproc)" --no-tests=error | tail -n 4
 
-# 21 kinds of input, 6 s of processor time each, on two cores: a minute. scripts/fuzz.sh 310 is the whole of it.
-scripts/fuzz.sh --readers 6
+# 23 kinds of input, 3 s of processor time each, on two cores: half a minute. scripts/fuzz.sh 310 is the whole of it.
+scripts/fuzz.sh --readers 3
 
 step "all checks passed; the slow tests ended with:"
 sed -n '/% tests passed/,$p' "$slow_log"

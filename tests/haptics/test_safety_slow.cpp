@@ -1,4 +1,5 @@
-// A million random motions of passive set-ups, none of which may be stopped.
+// Random motions of passive set-ups, none of which may be stopped. A million of them:
+// measure_late_twins, whose page is reports/haptics/report.md.
 #include <algorithm>
 #include <catch2/catch.hpp>
 
@@ -8,8 +9,8 @@
 namespace tpm::haptics {
 namespace {
 
-TEST_CASE("No motion of a million of passive set-ups is stopped") {
-  constexpr int kSetUps = 1000, kWays = 1000;
+TEST_CASE("No motion of 60,000 of passive set-ups is stopped") {
+  constexpr int kSetUps = 1000, kWays = 60;
   Random random(2024);
   double most_delivered_J = 0.0;
   for (int i = 0; i < kSetUps; ++i) {
