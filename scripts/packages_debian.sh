@@ -10,7 +10,8 @@ install_missing "to make Debian packages" "${packages_run[@]}" "${packages_pytho
 
 step "building (build/release); some minutes the first time"
 folder=build/release
-configure release -DTPM_PACKAGES=ON -DTPM_PYTHON=ON -DTPM_PYTHON_INSTALL:STRING=lib/python3/dist-packages \
+configure release -DTPM_BUILD_TESTS=OFF -DTPM_PACKAGES=ON -DTPM_PYTHON=ON \
+  -DTPM_PYTHON_INSTALL:STRING=lib/python3/dist-packages \
   "-DCMAKE_INSTALL_LIBDIR=lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)"
 build release tpm installed_rooms tpmkit_haptics tpmkit_python command_help
 

@@ -290,10 +290,25 @@ def faults_of_targets(root):
         yield f"this test found {count} targets in the scripts; expected 8 or more"
 
 
+def faults_of_machines(root):
+    """A bare machine has what a script installs: without the tests' packages it configures without tests."""
+    count = 0
+    for script in sorted((root / "scripts").glob("*.sh")):
+        text = re.sub(r"\\\n", " ", script.read_text(encoding="utf-8"))
+        first = re.search(r"\bconfigure release\b.*", text)
+        if first is None or script.name == "install_packages.sh":
+            continue
+        count += 1
+        if "packages_test[@]" not in text and "TPM_BUILD_TESTS=OFF" not in first[0]:
+            yield f"scripts/{script.name}: configures the tests without installing packages_test; expected -DTPM_BUILD_TESTS=OFF"
+    if count < 6:
+        yield f"this test found {count} scripts that configure; expected 6 or more"
+
+
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
     faults = [*faults_of_versions(root, program), *faults_of_dates(root), *faults_of_debian(root, program), *faults_of_recipes(root), *faults_of_docker(root),
-              *faults_of_targets(root)]
+              *faults_of_targets(root), *faults_of_machines(root)]
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")
