@@ -91,20 +91,6 @@ int flag_clipping(FitResult& result) {
   return all;
 }
 
-/// Where priors put a parameter, and how far the readings moved it.
-void flag_priors(FitResult& result) {
-  for (std::size_t i = 0; i < result.parameters.size(); ++i) {
-    const std::optional<Prior>& prior = result.config.parameters[i].prior;
-    if (!prior) continue;
-    const ParameterResult& p = result.parameters[i];
-    result.flags.push_back(fmt::format(
-        "{} = {} beside {} +- {}{}: {} of this uncertainty away", p.parameter.name,
-        in_sized_unit(p, p.estimate), in_sized_unit(p, prior->mean), in_sized_unit(p, prior->sd),
-        prior->from.empty() ? "" : " (" + prior->from + ")",
-        significant(std::abs(p.estimate - prior->mean) / prior->sd, 2)));
-  }
-}
-
 /// What an organ follows of a measured motion.
 void flag_motions(FitResult& result, const ExperimentResiduals& function) {
   for (const Experiment& e : function.experiments()) {
@@ -120,10 +106,28 @@ void flag_motions(FitResult& result, const ExperimentResiduals& function) {
 
 }  // namespace
 
+std::vector<std::string> prior_words(const FitResult& result, bool flagged) {
+  constexpr double kFar = 3.0;  // 0.3 % of healthy fits
+  std::vector<std::string> words;
+  for (std::size_t i = 0; i < result.parameters.size(); ++i) {
+    const std::optional<Prior>& prior = result.config.parameters[i].prior;
+    if (!prior) continue;
+    const ParameterResult& p = result.parameters[i];
+    const double away = std::abs(p.estimate - prior->mean) / prior->sd;
+    const bool measured = !prior->from.starts_with("stated");  // else a limit of what is known
+    if ((!measured || away > kFar) != flagged) continue;
+    words.push_back(fmt::format(
+        "{} = {} beside {} +- {}{}: {} of this uncertainty away", p.parameter.name,
+        in_sized_unit(p, p.estimate), in_sized_unit(p, prior->mean), in_sized_unit(p, prior->sd),
+        prior->from.empty() ? "" : " (" + prior->from + ")", significant(away, 2)));
+  }
+  return words;
+}
+
 void add_flags(FitResult& result, const ExperimentResiduals& function) {
   flag_outliers(result, function);
   flag_noise(result);
-  flag_priors(result);
+  std::ranges::move(prior_words(result, true), std::back_inserter(result.flags));
   flag_not_predicted(result);
   flag_motions(result, function);
   for (const DataChoice& data : result.config.data) {

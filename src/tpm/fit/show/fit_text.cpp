@@ -7,6 +7,7 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/fit_flags.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/verdict.hpp"
 
@@ -170,6 +171,7 @@ std::string to_terminal_text(const FitResult& result) {
     text += fmt::format("{} readings; --format json lists them\n", result.data.size());
   }
   for (const std::string& flag : result.flags) text += "note: " + flag + "\n";
+  for (const std::string& prior : prior_words(result, false)) text += "note: " + prior + "\n";
   return text;
 }
 
