@@ -35,9 +35,10 @@ Placed placed(std::span<const double> parameters) {
 
 }  // namespace
 
-OrganOfLaw::OrganOfLaw(SceneOrgan organ, FittedBonds bonds, std::vector<double> natural,
+OrganOfLaw::OrganOfLaw(Json scene, SceneOrgan organ, FittedBonds bonds, std::vector<double> natural,
                        Eigen::MatrixXd follows, LawFile law)
-    : organ_(std::move(organ)),
+    : scene_(std::move(scene)),
+      organ_(std::move(organ)),
       bonds_(std::move(bonds)),
       natural_(std::move(natural)),
       follows_(std::move(follows)),
@@ -47,7 +48,11 @@ OrganOfLaw::OrganOfLaw(SceneOrgan organ, FittedBonds bonds, std::vector<double> 
 OrganOfLaw OrganOfLaw::at_tolerance(double tolerance) const {
   SceneOrgan organ = organ_;
   organ.model = std::make_shared<OrganModel>(organ_.tissue, tolerance);
-  return {std::move(organ), bonds_, natural_, follows_, law_};
+  return with(std::move(organ));
+}
+
+OrganOfLaw OrganOfLaw::with(SceneOrgan organ) const {
+  return {scene_, std::move(organ), bonds_, natural_, follows_, law_};
 }
 
 std::vector<double> OrganOfLaw::natural_at(std::span<const double> parameters) const {
@@ -135,7 +140,7 @@ OrganOfLaw assembled(const Json& scene, const std::vector<std::string>& names,
         fmt::format("not the parameters of the scene's bonds: {}", fmt::join(names, ", ")),
         fmt::format("{}", fmt::join(bonds.names(), ", ")));
   }
-  return {std::move(organ), std::move(bonds), std::move(natural), std::move(follows),
+  return {scene,         std::move(organ), std::move(bonds), std::move(natural), std::move(follows),
           std::move(law)};
 }
 

@@ -21,9 +21,10 @@ namespace tpm::fit {
 /// depth beyond the law's contact, and the law's offset is added to its force.
 class OrganOfLaw final : public Model {
  public:
+  /// @param scene of the organ, with the fitted material
   /// @param natural fitted values of the bonds' parameters, SI
   /// @param follows D: a row for each of them, a column for each place of the law's uncertainty
-  OrganOfLaw(SceneOrgan organ, FittedBonds bonds, std::vector<double> natural,
+  OrganOfLaw(Json scene, SceneOrgan organ, FittedBonds bonds, std::vector<double> natural,
              Eigen::MatrixXd follows, LawFile law);
 
   [[nodiscard]] std::string_view name() const override { return "organ of a law"; }
@@ -39,6 +40,11 @@ class OrganOfLaw final : public Model {
   /// The same organ, balanced to another tolerance (OrganModel).
   [[nodiscard]] OrganOfLaw at_tolerance(double tolerance) const;
 
+  /// Another organ with the same bonds.
+  [[nodiscard]] OrganOfLaw with(SceneOrgan organ) const;
+
+  [[nodiscard]] const Json& scene() const { return scene_; }
+  [[nodiscard]] const Organ& spheres_of_scene() const { return organ_.tissue->network.organ; }
   [[nodiscard]] const LawFile& law() const { return law_; }
   /// Whether the bonds' relaxation times follow the law's; else they are kept, and the uncertainty
   /// of the law's times reaches the answer only as far as the moduli take it up.
@@ -48,6 +54,7 @@ class OrganOfLaw final : public Model {
  private:
   [[nodiscard]] std::vector<double> natural_at(std::span<const double> parameters) const;
 
+  Json scene_;
   SceneOrgan organ_;
   FittedBonds bonds_;
   std::vector<double> natural_;

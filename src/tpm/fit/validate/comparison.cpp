@@ -14,6 +14,7 @@
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/predict/organ_readings.hpp"
 #include "tpm/fit/validate/grid_convergence.hpp"
+#include "tpm/fit/validate/joint_test.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -22,6 +23,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Of the value: the closed forms err by less (LawModel).
 constexpr double kNumericalError = 1e-9;
+constexpr const char* kFilling = "the place of the spheres";
 
 /// One error of an instrument: how E follows from it in the validation and in the calibration.
 struct InstrumentEffect {
@@ -92,6 +94,14 @@ class Comparer {
   /// How far the numbers of S may be off, and who gives them.
   void refine() {
     refinements_ = along_.refinements(result_.placement.contact);
+    if (options_.fillings != nullptr) {
+      result_.fillings = options_.fillings->words;
+      by_filling_ = along_.by_filling(*options_.fillings, result_.placement.contact);
+      if (by_filling_.empty() && !options_.fillings->organs.empty()) {
+        result_.fillings =
+            "without what the place of the spheres does: one of the other fillings gives way";
+      }
+    }
     if (!options_.pick) return;
     const Protocol motion = beyond_contact(along_.motion(), result_.placement.contact);
     PickedAnswer pick = options_.pick(motion, r_.time_s);
@@ -114,6 +124,16 @@ class Comparer {
       for (const Eigen::VectorXd& curve : refinement.values)
         values.push_back(times(s.weight, curve));
       add(refinement.name, grid_convergence(values, refinement.ratio).u);
+    }
+    if (!by_filling_.empty()) {
+      const auto n = std::ssize(by_filling_);
+      q.of_filling.resize(n);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        q.of_filling[i] = times(s.weight, by_filling_[static_cast<std::size_t>(i)]);
+      }
+      q.of_filling.array() -= q.of_filling.mean();
+      q.of_filling /= std::sqrt(static_cast<double>(n - 1));
+      add(kFilling, q.of_filling.norm());
     }
     if (claimed_limit_ > 0.0) {
       add(fmt::format("the claimed error of {}", result_.pick),
@@ -275,11 +295,14 @@ class Comparer {
     const double own_instrument = q.of_instrument.norm();
     const double stated = std::hypot(stated_zero, q.of_contact);
     q.u_D = std::hypot(u_readings, own_instrument, stated);
-    q.u_own = std::hypot(u_readings, stated, q.u_num);
+    const double by_filling = q.of_filling.norm();
+    const double of_numbers = std::sqrt(std::max(q.u_num * q.u_num - by_filling * by_filling, 0.0));
+    q.u_own = std::hypot(u_readings, stated, of_numbers);
     CombinedUncertainty sum;
     sum.add(u_readings, result_.scatter.degrees);
     sum.add(q.u_input, degrees_of_law_);
-    sum.add(q.u_num, kInfinity);
+    sum.add(of_numbers, kInfinity);
+    sum.add(by_filling, static_cast<double>(std::max<Eigen::Index>(q.of_filling.size() - 1, 1)));
     sum.add(own_instrument, kInfinity);
     sum.add(stated, kInfinity);
     const double shared = q.shared.norm();
@@ -368,7 +391,7 @@ class Comparer {
       for (Eigen::Index j = 0; j < count; ++j) {
         const QuantityComparison& b = result_.quantities[static_cast<std::size_t>(j)];
         covariance(i, j) += a.shared.dot(b.shared) + a.of_instrument.dot(b.of_instrument) +
-                            a.of_contact * b.of_contact;
+                            a.of_filling.dot(b.of_filling) + a.of_contact * b.of_contact;
       }
       // What only this quantity has: numerical errors, and a zero that was stated.
       const double own = a.e.u_val * a.e.u_val - covariance(i, i);
@@ -379,50 +402,15 @@ class Comparer {
                                  [kind](const auto& q) { return q.quantity.kind == kind; });
     };
     const bool ratio_follows = has(QuantityKind::peak) && has(QuantityKind::end_of_hold);
-    std::vector<Eigen::Index> kept;
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const QuantityComparison& q = result_.quantities[static_cast<std::size_t>(i)];
-      const bool follows = q.quantity.kind == QuantityKind::relaxation_ratio && ratio_follows;
-      if (follows || !adds_to(covariance, kept, i)) {
-        result_.joint.dependent.push_back(q.name);
-      } else {
-        kept.push_back(i);
-      }
+    std::vector<bool> follows;
+    for (const QuantityComparison& q : result_.quantities) {
+      follows.push_back(q.quantity.kind == QuantityKind::relaxation_ratio && ratio_follows);
     }
-    JointTest& joint = result_.joint;
-    joint.rank = static_cast<int>(kept.size());
-    if (kept.empty()) return;
-    const Eigen::MatrixXd c = covariance(kept, kept);
-    const Eigen::VectorXd e = error(kept);
-    joint.t_squared = e.dot(Eigen::VectorXd(solve_symmetric(c, e)));
-    const double p = static_cast<double>(joint.rank);
-    constexpr double kMany = 1e7;
-    if (degrees < kMany && degrees - p + 1.0 > 0.0) {
-      joint.degrees = degrees - p + 1.0;
-      joint.f = joint.t_squared * joint.degrees / (degrees * p);
-      joint.p_value = fisher_tail(std::max(joint.f, 0.0), p, joint.degrees);
-    } else if (degrees >= kMany) {
-      joint.degrees = kInfinity;
-      joint.f = joint.t_squared / p;
-      joint.p_value = chi_squared_tail(std::max(joint.t_squared, 0.0), p);
-    } else {
-      joint.rank = 0;
+    const std::vector<std::size_t> left_out =
+        test_together(result_.joint, error, covariance, follows, degrees);
+    for (const std::size_t i : left_out) {
+      result_.joint.dependent.push_back(result_.quantities[i].name);
     }
-  }
-
-  /// Whether a quantity varies by itself: a share of its variance is not explained by the others.
-  static bool adds_to(const Eigen::MatrixXd& c, const std::vector<Eigen::Index>& kept,
-                      Eigen::Index i) {
-    if (!(c(i, i) > 0.0)) return false;
-    if (kept.empty()) return true;
-    constexpr double kLeast = 1e-4;
-    const Eigen::MatrixXd among = c(kept, kept);
-    const Eigen::VectorXd with = c(kept, i);
-    const Eigen::VectorXd scale = among.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::MatrixXd scaled = scale.asDiagonal() * among * scale.asDiagonal();
-    const Eigen::VectorXd right = scale.cwiseProduct(with);
-    const double explained = right.dot(Eigen::VectorXd(solve_symmetric(scaled, right)));
-    return c(i, i) - explained > kLeast * c(i, i);
   }
 
   /// u^2 of what is no scatter of one sample: the instruments and the numbers of S.
@@ -435,6 +423,12 @@ class Comparer {
       }
       if (values.size() < 2) continue;
       square += std::pow(grid_convergence(values, refinement.ratio).u, 2);
+    }
+    if (!by_filling_.empty()) {
+      Eigen::VectorXd at(std::ssize(by_filling_));
+      for (Eigen::Index i = 0; i < at.size(); ++i)
+        at[i] = by_filling_[static_cast<std::size_t>(i)][k];
+      square += (at.array() - at.mean()).square().sum() / static_cast<double>(at.size() - 1);
     }
     if (!options_.instrument && !options_.calibration_instrument) return square;
     for (const InstrumentEffect& effect : effects_of(slopes_of(k))) {
@@ -486,6 +480,7 @@ class Comparer {
   Eigen::VectorXd measured_, depth_scale_, time_scale_, time_shift_;
   std::vector<Eigen::VectorXd> weights_;
   std::vector<LawAlong::Refinement> refinements_;
+  std::vector<Eigen::VectorXd> by_filling_;  ///< of the organ, then of other fillings
   double claimed_limit_ = 0.0;
   RecordingComparison result_;
 };

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "tpm/files/instrument.hpp"
+#include "tpm/fit/predict/other_fillings.hpp"
+#include "tpm/fit/validate/joint_test.hpp"
 #include "tpm/fit/validate/placement_of_recording.hpp"
 #include "tpm/fit/validate/requirement.hpp"
 
@@ -30,17 +32,12 @@ struct QuantityComparison {
   /// one a direction; its norm is part of u_val.
   Eigen::RowVectorXd shared;
   Eigen::RowVectorXd
-      of_instrument;        ///< effects of its errors, shared by recordings of one instrument
+      of_instrument;  ///< effects of its errors, shared by recordings of one instrument
+  /// Deviations of other fillings of an organ from their mean, over sqrt(n - 1): of u_num, shared
+  /// by recordings of one organ.
+  Eigen::RowVectorXd of_filling;
   double of_contact = 0.0;  ///< effect of contact between two samples (contact_u_sampled)
   double u_own = 0.0;       ///< the rest of u_val
-};
-
-/// Hotelling's T^2 over the quantities that are independent.
-struct JointTest {
-  int rank = 0;
-  double t_squared = 0.0, f = 0.0, p_value = 1.0;
-  double degrees = 0.0;                ///< of the denominator
-  std::vector<std::string> dependent;  ///< quantities that follow from the others
 };
 
 /// The difference of the whole curve, which gets no verdict.
@@ -69,6 +66,7 @@ struct RecordingComparison {
   std::optional<Instrument> instrument;
   bool same_instrument = false;  ///< as the calibration's
   bool creep = false;            ///< the load was imposed
+  std::string fillings;          ///< what u_num holds of the place of an organ's spheres
   std::string pick;              ///< name of the reduced model that answered; empty: none
   std::vector<QuantityComparison> quantities;
   std::vector<std::string> without;  ///< quantities that were asked for and cannot be read, and why
@@ -107,9 +105,10 @@ struct ComparisonOptions {
   std::optional<Requirement> requirement;
   PlacementRule placement = PlacementRule::held;
   KnownPlacement known = KnownPlacement::nothing;
-  const OrganOfLaw* organ = nullptr;  ///< answers in place of the law
-  PickAnswer pick = nullptr;          ///< answers in place of the organ
-  SessionMotion motion;               ///< of a session's press
+  const OrganOfLaw* organ = nullptr;        ///< answers in place of the law
+  const OtherFillings* fillings = nullptr;  ///< of the organ's body; none: not asked for
+  PickAnswer pick = nullptr;                ///< answers in place of the organ
+  SessionMotion motion;                     ///< of a session's press
   std::vector<RenderingError> rendering;
   std::optional<Instrument> instrument, calibration_instrument;
   bool calibration_data = false;

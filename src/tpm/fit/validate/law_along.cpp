@@ -7,6 +7,7 @@
 
 #include "tpm/data/straight_pieces.hpp"
 #include "tpm/fit/validate/functional.hpp"
+#include "tpm/work/give_up.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 #include "tpmkit/protocol.hpp"
@@ -209,6 +210,36 @@ std::vector<LawAlong::Refinement> LawAlong::refinements(double contact) const {
         coarse.respond(motion_, recording_.time_s, values, Want::values).value);
   }
   return {std::move(pieces), std::move(tolerances)};
+}
+
+std::vector<Eigen::VectorXd> LawAlong::by_filling(const OtherFillings& others,
+                                                  double contact) const {
+  if (organ_ == nullptr || others.organs.empty()) return {};
+  std::vector<double> values = law_.values;
+  values[values.size() - 2] = contact;
+  values.back() = 0.0;
+  const auto answer = [&](const OrganOfLaw& organ, const Protocol& motion) {
+    return Eigen::VectorXd(organ.respond(motion, recording_.time_s, values, Want::values).value);
+  };
+  const double deepest = motion_.peak() - contact;
+  const double scale = law_.fitted_to && deepest > 0.0 ? *law_.fitted_to / deepest : 1.0;
+  const Protocol calibrated = changed(motion_, [&](Knot k) {
+    return Knot{k.time_s, contact + scale * (k.value - contact)};
+  });
+  std::vector<Eigen::VectorXd> all;
+  const std::string gave_way = gave_up([&] {
+    const Eigen::VectorXd target = answer(*organ_, calibrated);
+    all.push_back(answer(*organ_, motion_));
+    for (const auto& other : others.organs) {
+      const Eigen::VectorXd force = answer(*other, calibrated);
+      const auto known = target.array().isFinite() && force.array().isFinite();
+      const double product = known.select(target.array() * force.array(), 0.0).sum();
+      const double square = known.select(force.array().square(), 0.0).sum();
+      all.push_back(product / square * answer(*other, motion_));
+    }
+  });
+  if (!gave_way.empty()) all.clear();
+  return all;
 }
 
 }  // namespace tpm::fit

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/fit/predict/organ_prediction.hpp"
+#include "tpm/fit/predict/other_fillings.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/model.hpp"
@@ -45,6 +46,13 @@ class LawAlong {
   };
   /// Of an organ: the same answer at three resolutions of its motion. None for closed forms.
   [[nodiscard]] std::vector<Refinement> refinements(double contact) const;
+
+  /// Of an organ: its answer, and those of other fillings of its body. Bonds are fitted to the law
+  /// at the places of their spheres, so each of the others has one factor on its moduli with which
+  /// it comes nearest to the organ, in least squares, along the motion at the depth of the
+  /// calibration. Empty if one of them gives way.
+  [[nodiscard]] std::vector<Eigen::VectorXd> by_filling(const OtherFillings& others,
+                                                        double contact) const;
 
   /// Covariance of the law's coordinates is root root'.
   [[nodiscard]] const Eigen::MatrixXd& root() const { return coordinates_.root; }

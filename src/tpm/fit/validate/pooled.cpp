@@ -30,22 +30,30 @@ bool one_instrument(const std::vector<Member>& members) {
          });
 }
 
-/// One row a recording: the effects of what they share.
-Eigen::MatrixXd shared_of(const std::vector<Member>& members, bool instrument) {
-  Eigen::Index columns = 0, of_instrument = 0;
+/// The effects of what recordings share, one row each.
+struct SharedEffects {
+  Eigen::MatrixXd rows;
+  Eigen::Index filling = 0, fillings = 0;  ///< columns of the fillings of an organ
+};
+
+SharedEffects shared_of(const std::vector<Member>& members, bool instrument) {
+  Eigen::Index columns = 0, of_instrument = 0, of_filling = 0;
   for (const Member& m : members) {
     columns = std::max(columns, m.quantity->shared.size());
+    of_filling = std::max(of_filling, m.quantity->of_filling.size());
     if (instrument) of_instrument = std::max(of_instrument, m.quantity->of_instrument.size());
   }
-  Eigen::MatrixXd shared =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(members.size()), columns + of_instrument);
+  Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(members.size()),
+                                                 columns + of_filling + of_instrument);
   for (std::size_t j = 0; j < members.size(); ++j) {
     const Member& m = members[j];
     const auto row = static_cast<Eigen::Index>(j);
     shared.row(row).head(m.quantity->shared.size()) = m.quantity->shared / m.scale;
+    shared.row(row).segment(columns, m.quantity->of_filling.size()) =
+        m.quantity->of_filling / m.scale;
     if (instrument) shared.row(row).tail(of_instrument) = m.quantity->of_instrument / m.scale;
   }
-  return shared;
+  return {std::move(shared), columns, of_filling};
 }
 
 double own_of(const Member& m, bool instrument) {
@@ -54,8 +62,9 @@ double own_of(const Member& m, bool instrument) {
 }
 
 void set_mean(PooledQuantity& pooled, const std::vector<Member>& members,
-              const Eigen::MatrixXd& shared, const std::vector<double>& own,
+              const SharedEffects& all_share, const std::vector<double>& own,
               double degrees_of_law) {
+  const Eigen::MatrixXd& shared = all_share.rows;
   std::vector<SpecimenEstimate> estimates;
   const double tiny = 1e-12 * std::abs(members.front().quantity->simulated / members.front().scale);
   for (std::size_t j = 0; j < members.size(); ++j) {
@@ -77,7 +86,11 @@ void set_mean(PooledQuantity& pooled, const std::vector<Member>& members,
   pooled.u_shared = mean_shared.norm() / weights;
   CombinedUncertainty sum;
   sum.add(effects.standard_error, static_cast<double>(members.size() - 1));
-  sum.add(pooled.u_shared, degrees_of_law);
+  const double of_fillings =
+      mean_shared.segment(all_share.filling, all_share.fillings).norm() / weights;
+  sum.add(std::sqrt(std::max(pooled.u_shared * pooled.u_shared - of_fillings * of_fillings, 0.0)),
+          degrees_of_law);
+  sum.add(of_fillings, static_cast<double>(std::max<Eigen::Index>(all_share.fillings - 1, 1)));
   pooled.e = {effects.mean, sum.u(), sum.degrees(), coverage_factor(sum.degrees())};
 }
 
@@ -144,7 +157,8 @@ void judge_pooled(PooledQuantity& pooled, const std::vector<Member>& members,
         std::max(pooled.e.u_val * pooled.e.u_val - pooled.u_shared * pooled.u_shared, 0.0));
     pooled.remark = what_must_shrink(
         pooled.e, *pooled.limit,
-        {{"the law's parameters and the instrument, which all share,", pooled.u_shared},
+        {{"what all recordings share (the law, the instrument, an organ's spheres)",
+          pooled.u_shared},
          {fmt::format("the mean over {} recordings", pooled.recordings), own}},
         pooled.relative
             ? Unit{"%", Dimension::dimensionless, 0.01}
@@ -206,11 +220,11 @@ std::vector<PooledQuantity> pool_recordings(std::span<const RecordingComparison>
       }
     }
     const bool instrument = one_instrument(members);
-    const Eigen::MatrixXd shared = shared_of(members, instrument);
+    const SharedEffects shared = shared_of(members, instrument);
     std::vector<double> own;
     for (const Member& m : members) own.push_back(own_of(m, instrument));
     set_mean(pooled, members, shared, own, degrees_of_law);
-    set_area(pooled, members, shared, own, options.at);
+    set_area(pooled, members, shared.rows, own, options.at);
     judge_pooled(pooled, members, options);
     all.push_back(std::move(pooled));
   }

@@ -320,6 +320,8 @@ Validation validate(const ValidationRequest& request) {
                    request.calibration.remarks.end());
   if (const std::string words = threshold_words(request); !words.empty())
     v.remarks.push_back(words);
+  const std::optional<OtherFillings> fillings =
+      request.organ ? std::optional(other_fillings(*request.organ)) : std::nullopt;
   std::vector<RecordingComparison> unseen;
   std::vector<Applicability> unseen_motions;
   for (std::size_t i = 0; i < request.recordings.size(); ++i) {
@@ -330,6 +332,7 @@ Validation validate(const ValidationRequest& request) {
     options.requirement = request.requirement;
     options.placement = request.placement;
     options.organ = request.organ.get();
+    options.fillings = fillings ? &*fillings : nullptr;
     options.pick = request.pick;
     options.rendering = request.rendering;
     if (!request.presses.empty()) {

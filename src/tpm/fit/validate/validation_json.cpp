@@ -65,6 +65,7 @@ Json recording_json(const RecordingComparison& r, const Applicability& a, const 
   Json j{{"recording", r.name}, {"sha256", r.sha256}, {"fitted", r.calibration}};
   if (r.creep) j["load_imposed"] = true;
   if (!r.pick.empty()) j["pick"] = r.pick;
+  if (!r.fillings.empty()) j["u_num_of_spheres"] = r.fillings;
   Json part{{"from_s", stored(r.part.from_s)},
             {"corner_s", stored(r.part.corner_s)},
             {"to_s", stored(r.part.to_s)},

@@ -410,6 +410,10 @@ std::string to_terminal_text(const Validation& v) {
     add_each_recording(text, v);
   }
   if (!v.session.empty()) text.add_line("rendered by", rendering_text(v), Rank::context);
+  for (const std::string& words :
+       each_once(v.recordings, [](const RecordingComparison& r) { return r.fillings; })) {
+    if (!words.empty()) text.add_line("u_num", words, Rank::detail);
+  }
   text.add_line("u_input", "from " + v.u_input_from, Rank::detail);
   for (const std::string& remark : v.remarks) text.add_line("note", remark, Rank::context);
   text.add_line("verdict", conclusion_words(v), Rank::always);
