@@ -61,7 +61,8 @@ def anchors(page):
 
 def broken_links(root):
     for page in tracked(root, ".md"):
-        for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        text = page.read_text(encoding="utf-8")
+        for target in re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'<img src="([^"]+)"', text):
             if re.match(r"[a-z]+:", target):
                 continue
             name, _, anchor = target.partition("#")
