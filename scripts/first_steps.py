@@ -25,7 +25,8 @@ def main():
     program, page = Path(sys.argv[1]).resolve(), Path(sys.argv[2])
     out = [f"# The four paths typed, {datetime.date.today().isoformat()}", "",
            "Each command as a new user types it, in an empty folder, with its exit code, wall time and last ten lines. The",
-           "machine was shared with other work, so times are upper bounds. Written by", "",
+           "machine was shared with other work, so times are upper bounds, and `tpm hil check`, which measures the machine, may",
+           "say `not fit`. Written by", "",
            f"    python3 scripts/first_steps.py build/release/tpm reports/first_steps/{page.name}"]
     with tempfile.TemporaryDirectory() as folder:
         for name, commands in PATHS.items():

@@ -30,6 +30,7 @@ CPP = (  # what is explained, its header, the kind and name of what doxygen desc
     ("Errors", "error.hpp", ("class tpm::Error",)),
 )
 LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
+PICTURE = re.compile(r'<img src="([^"]+)"')  # one whose width and side are stated
 
 
 def code_free(text):
@@ -72,6 +73,7 @@ class Site:
             return match[0]
 
         text = "".join(t if code else LINK.sub(link, t) for code, t in code_free(path.read_text(encoding="utf-8")))
+        self.linked.update((path.parent / name).resolve() for name in PICTURE.findall(text))
         if not re.search(r"^# ", text, re.M):  # a report whose writer gave it no title
             text = f"# {path.parent.name.capitalize()}: {path.stem}\n\n{text}"
         self.write(path.relative_to(self.root), text)

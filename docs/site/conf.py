@@ -9,7 +9,7 @@ root_doc = "docs/site/index"
 extensions = ["myst_parser", "breathe"]
 source_suffix = {".md": "markdown"}
 myst_heading_anchors = 5
-myst_enable_extensions = ["deflist", "dollarmath"]
+myst_enable_extensions = ["deflist", "dollarmath", "html_image"]
 # Formulas are set by the MathJax 2 that scripts/docs.sh puts beside the pages: no network is needed to read them.
 myst_update_mathjax = False
 mathjax_path = "mathjax/MathJax.js?config=TeX-AMS_SVG-full"

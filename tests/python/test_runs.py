@@ -148,6 +148,14 @@ class Runs(unittest.TestCase):
             tpmkit.open("none.h5")
         with self.assertRaisesRegex(tpmkit.Error, "expected one of .*liver_poke.json"):
             tpmkit.example("configs/none.json")
+        with self.assertRaisesRegex(tpmkit.Error, "expected a file of configs/ or data/"):
+            tpmkit.example("recording")
+        with self.assertRaisesRegex(tpmkit.Error, "expected one of configs/[^,]*spectrum.csv, configs/[^,]*spectrum.csv"):
+            tpmkit.example("spectrum.csv")
+
+    def test_a_file_that_comes_with_tpmkit_by_its_name_alone(self):
+        self.assertEqual(tpmkit.example("liver_poke.json"), tpmkit.example("configs/liver_poke.json"))
+        self.assertTrue(tpmkit.example("recording.csv").is_file())
         for workers in (0.5, -1, "all"):
             with self.assertRaisesRegex(tpmkit.Error, "^sweep: workers is .*; expected a whole number"):
                 tpmkit.sweep("sweep.json", "sweep.h5", workers=workers)

@@ -1,7 +1,12 @@
 """Python and the program answer alike, to the last printed digit."""
 
+import contextlib
 import csv
+import io
 import json
+import math
+import os
+import re
 import subprocess
 import tempfile
 import unittest
@@ -45,6 +50,31 @@ class SameAnswer(unittest.TestCase):
         # k = 60 N/m of a strip of 30 mm and 20 mm2 is a modulus of k L / A
         modulus = {p["name"]: p for p in here["fit"]["parameters"]}
         self.assertAlmostEqual(modulus["k_inf"]["estimate_SI"] / (60.0 * 30e-3 / 20e-6), 1.0, delta=0.02)
+
+
+def same(shown, printed):
+    """Is a word of the page the printed one; a number to 0.1 %."""
+    try:
+        return math.isclose(float(shown), float(printed), rel_tol=1e-3, abs_tol=1e-6)
+    except ValueError:
+        return shown == printed
+
+
+class Page(unittest.TestCase):
+    def test_the_example_of_the_page_prints_what_the_page_shows(self):
+        page = (Path(__file__).resolve().parents[2] / "docs/python.md").read_text(encoding="utf-8")
+        code, shown = re.search(r"## Example\n.*?```python\n(.*?)```.*?\n((?:    [^\n]*\n)+)", page, re.S).groups()
+        printed, here = io.StringIO(), os.getcwd()
+        with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(printed):
+            os.chdir(folder)
+            try:
+                exec(compile(code, "docs/python.md", "exec"), {})
+            finally:
+                os.chdir(here)
+        words, there = shown.split(), printed.getvalue().split()
+        self.assertEqual(len(words), len(there), printed.getvalue())
+        for word, other in zip(words, there):
+            self.assertTrue(same(word, other), f"the page shows {word}; printed is {other}")
 
 
 if __name__ == "__main__":

@@ -38,14 +38,22 @@ def with_units(data: xarray.Dataset) -> xarray.Dataset:
 
 
 def example(name: str) -> Path:
-    """A file that comes with tpmkit: ``example("configs/liver_poke.json")``. Raises tpmkit.Error if there is
-    none of the name."""
-    path = Path(_core.share_dir()) / name
-    if not path.is_file():
+    """A file that comes with tpmkit, by its path, ``example("configs/liver_poke.json")``, or by its name alone,
+    ``example("recording.csv")``. Raises tpmkit.Error if there is none, or several of that name."""
+    share = Path(_core.share_dir())
+    path = share / name
+    if path.is_file():
+        return path
+    if Path(name).name != name:
         folder = path.parent
         there = sorted(p.name for p in folder.iterdir() if p.is_file()) if folder.is_dir() else []
-        raise _core.Error(f"example: there is no {name}; expected one of {', '.join(there) or 'configs/, data/'}")
-    return path
+    else:
+        found = [p for folder in ("configs", "data") for p in sorted((share / folder).rglob("*")) if p.is_file() and p.name == name]
+        if len(found) == 1:
+            return found[0]
+        there = [str(p.relative_to(share)) for p in found]
+    raise _core.Error(f"example: there is no file, or not one alone, of the name {name}; expected "
+                      + (f"one of {', '.join(there)}" if there else "a file of configs/ or data/, such as recording.csv"))
 
 
 def read_recording(path: str | os.PathLike[str], *, columns: Mapping[str, Any] | None = None) -> xarray.Dataset:

@@ -2,7 +2,7 @@
 // measured. The numbers below score() are those of Sphinx.
 var Scorer = {
   score: ([docname, title, anchor, descr, score]) =>
-    score + (/^docs\/(troubleshooting|commands|site\/faq)$/.test(docname) ? 30 : /^(reports|docs\/site\/reference)\/|^docs\/keys$/.test(docname) ? -10 : 0),
+    score + (/^docs\/(troubleshooting|commands)$/.test(docname) ? 30 : /^(reports|docs\/site\/reference)\/|^docs\/keys$/.test(docname) ? -10 : 0),
   objNameMatch: 11,
   objPartialMatch: 6,
   objPrio: {0: 15, 1: 5, 2: -5},
