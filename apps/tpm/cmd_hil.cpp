@@ -1,10 +1,8 @@
 // tpm hil devices, tpm hil run: a session through a haptic device.
 #include <fmt/format.h>
-#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <ctime>
 #include <filesystem>
 #include <functional>
@@ -24,6 +22,7 @@
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/device/plugin_device.hpp"
+#include "tpm/haptics/session/enter_key.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
@@ -160,24 +159,11 @@ int list_devices(const DeviceOptions& options, const Session& session) {
   return 0;
 }
 
-/// Whether Enter was pressed where tpm runs in a terminal.
-bool enter_was_pressed() {
-  pollfd keys{STDIN_FILENO, POLLIN, 0};
-  char line[256];
-  return ::poll(&keys, 1, 0) > 0 && ::read(STDIN_FILENO, line, sizeof line) > 0;
-}
-
-/// Sees a signal, and Enter: where a session waits for it, it begins; after that a marker is set.
+/// Sees a signal, and Enter where tpm runs in a terminal.
 std::function<bool()> watched_keys(HilSession& session, SessionRunOptions& options) {
   if (!options.real_time || ::isatty(STDIN_FILENO) == 0) return InterruptWatch::seen;
-  const bool waits = session.servo.gate && session.servo.gate->confirm;
-  const auto confirmed = std::make_shared<std::atomic<bool>>(!waits);
-  if (waits) session.servo.gate->confirmed = confirmed;
-  const auto markers = std::make_shared<std::atomic<std::uint32_t>>(0);
-  options.markers = markers;
-  return [confirmed, markers] {
-    if (!enter_was_pressed()) return InterruptWatch::seen();
-    if (confirmed->exchange(true)) markers->fetch_add(1);
+  return [look = watch_enter(STDIN_FILENO, session, options)] {
+    look();
     return InterruptWatch::seen();
   };
 }

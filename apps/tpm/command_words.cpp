@@ -98,11 +98,43 @@ std::string no_such_command(const CLI::App& command, const std::string& word) {
                      place(command), printable(word), nearest, name, nearest, name);
 }
 
+/// "'tpm hil check --loop-rate'" for each command from this one on that has an option of this name.
+std::vector<std::string> with_option(const CLI::App& command, const std::string& name) {
+  std::vector<std::string> found;
+  const std::vector<std::string> known = options_of(command);
+  if (std::find(known.begin(), known.end(), name) != known.end()) {
+    found.push_back(fmt::format("'{} {}'", full_name(command), name));
+  }
+  for (const CLI::App* one : command.get_subcommands({})) {
+    const std::vector<std::string> below = with_option(*one, name);
+    found.insert(found.end(), below.begin(), below.end());
+  }
+  return found;
+}
+
+/// Commands that have this option: those that stand nearest to this one, at most three.
+std::vector<std::string> elsewhere(const CLI::App& command, const std::string& name) {
+  constexpr std::size_t kMost = 3;
+  if (!name.starts_with("--")) return {};
+  for (const CLI::App* app = &command; app != nullptr; app = app->get_parent()) {
+    std::vector<std::string> found = with_option(*app, name);
+    if (found.size() > kMost) found.resize(kMost);
+    if (!found.empty()) return found;
+  }
+  return {};
+}
+
 std::string no_such_option(const CLI::App& command, std::string_view word) {
   const std::string name(name_of(word));
   const std::string nearest = nearest_word(name, options_of(command));
-  return fmt::format("{}no option '{}'; {}see {} --help", place(command), printable(name),
-                     nearest.empty() ? "" : fmt::format("did you mean '{}'? ", nearest),
+  const std::vector<std::string> others = elsewhere(command, name);
+  std::string meant;
+  if (!nearest.empty()) {
+    meant = fmt::format("did you mean '{}'? ", nearest);
+  } else if (!others.empty()) {
+    meant = fmt::format("did you mean {}? ", fmt::join(others, " or "));
+  }
+  return fmt::format("{}no option '{}'; {}see {} --help", place(command), printable(name), meant,
                      full_name(command));
 }
 

@@ -117,6 +117,14 @@ TEST_CASE("a wrong word is named, with the nearest right one and the help to rea
   check("fit --frmat=json x.csv", "no option '--frmat'", "'--format'", "tpm fit --help");
   check("hil run --devcie virtual x.json", "hil run: no option '--devcie'", "'--device'",
         "tpm hil run --help");
+  // An option that another command has, the nearest ones first.
+  check("hil run --loop-rate 4000 x.json", "hil run: no option '--loop-rate'",
+        "did you mean 'tpm hil check --loop-rate' or 'tpm hil identify --loop-rate'?",
+        "tpm hil run --help");
+  check("hil verify --loop-rtae=1 x", "hil verify: no option '--loop-rtae'", "see",
+        "tpm hil verify --help");
+  check("paper tables --bootstrap 5", "paper tables: no option '--bootstrap'",
+        "did you mean 'tpm fit --bootstrap'", "tpm paper tables --help");
   check("sweep polt x.h5", "sweep: no command 'polt'", "'plot'", "tpm sweep --help");
   check("--verison", "no option '--verison'", "'--version'", "tpm --help");
   check("qqqqqqq", "no command 'qqqqqqq'", "expected one of example, data", "see tpm --help");

@@ -1,9 +1,18 @@
 // A delay that has grown, found by how the hand moves.
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <deque>
+#include <string>
 
+#include "hil_scenes.hpp"
+#include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/loop/delay_watch.hpp"
+#include "tpm/haptics/loop/servo_step.hpp"
+#include "tpm/haptics/session/session_run.hpp"
+#include "tpm/haptics/session/surface_scene.hpp"
 
 namespace tpm::haptics {
 namespace {
@@ -73,6 +82,60 @@ TEST_CASE("Missed periods are lived through") {
   DelayWatch watch({.period_s = 1e-3, .told_s = 1e-3});
   for (int i = 0; i < 200; ++i) watch.observe(1e-3 * std::sin(0.1 * i), 0.1, 1 + i % 5);
   CHECK(std::isfinite(watch.sign()));
+}
+
+/// What a session announces on a device, and whether its loop looks at the motion.
+struct Announced {
+  RenderingCheck rendering;
+  bool looks = false;
+};
+
+Announced announced(const HilSession& session, const DeviceLimits& limits) {
+  const LoopModel loop = make_loop_model(session);
+  Announced a;
+  a.rendering = check_rendering(session, *loop.model, loop, limits);
+  VirtualOmega7 device(session.plant, session.operator_script());
+  device.prepare(session.preparation);
+  a.looks =
+      ServoStep(device, *loop.model, loop_settings(session, loop, a.rendering, true)).passive();
+  return a;
+}
+
+TEST_CASE("A loop looks for a delay that grows exactly where its rendering is announced passive") {
+  // The shipped sessions whose models are made within a second, all passive by their friction.
+  for (const char* name : {"law", "liver", "network", "omega7", "surface"}) {
+    const std::string file = fmt::format(TPM_TEST_SOURCE_DIR "/configs/hil_{}.json", name);
+    HilSession session = read_session(file);
+    follow_surface(session);
+    CAPTURE(name);
+    const Announced shipped = announced(session, limits_of("virtual"));
+    CHECK(shipped.rendering.passive());
+    CHECK(shipped.looks);
+    session.plant.damping_N_s_per_m = 0.02;
+    const Announced slippery = announced(session, limits_of("virtual"));
+    CHECK_FALSE(slippery.rendering.passive());
+    CHECK_FALSE(slippery.looks);
+  }
+  // A star that is passive at rest, and stiffer where the session goes.
+  HilSession star = test::parsed(test::short_session());
+  const LoopModel loop = make_loop_model(star);
+  const double at_rest = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
+  const RenderingCheck there = check_rendering(star, *loop.model, loop, "virtual");
+  REQUIRE(there.stiffness_N_per_m > 1.01 * at_rest);
+  star.plant.damping_N_s_per_m =
+      0.5 * (there.stiffness_N_per_m + at_rest) * 0.5 * star.servo.period_s;
+  const Announced stiffer = announced(star, limits_of("virtual"));
+  CHECK_FALSE(stiffer.rendering.passive());
+  CHECK_FALSE(stiffer.looks);
+  // Hardware whose delay is no whole number of periods: 1.2 + 1 ms are passive, 3 periods not.
+  DeviceLimits limits = limits_of("omega7");
+  limits.measured_delay_s = 1.2e-3;
+  limits.measured_friction_N_s_per_m = there.stiffness_N_per_m * (0.5e-3 + 2.4e-3);
+  star.plant.delay_periods = 0;
+  const Announced measured = announced(star, limits);
+  CHECK(measured.rendering.delay_periods == 3);
+  CHECK(measured.rendering.passive());
+  CHECK(measured.looks);
 }
 
 }  // namespace

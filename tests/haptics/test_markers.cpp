@@ -1,11 +1,17 @@
 // What a recording tells beside the forces: markers, clocks, and whether a hand feels anything.
+#include <poll.h>
+#include <pty.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <functional>
 #include <memory>
 
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"
+#include "tpm/haptics/session/enter_key.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
@@ -82,6 +88,47 @@ TEST_CASE("A button that goes down and a key set a marker, in the row and in the
   const Json expected = {{{"cycle", 1000}, {"by", "button"}},
                          {{"cycle", 1100}, {"by", "button"}},
                          {{"cycle", 1500}, {"by", "key"}}};
+  CHECK(recording.closing.at("markers") == expected);
+}
+
+TEST_CASE("Enter in a terminal begins a session that waits for it, and then sets markers") {
+  HilSession session = test::parsed(
+      test::with(test::short_session(), "/start", {{"confirm", true}, {"limit", "30 s"}}));
+  int keyboard = -1, terminal = -1;
+  REQUIRE(::openpty(&keyboard, &terminal, nullptr, nullptr, nullptr) == 0);
+  const auto press = [&] {
+    (void)!::write(keyboard, "\n", 1);
+    pollfd there{terminal, POLLIN, 0};  // the kernel passes a line on when it likes
+    (void)::poll(&there, 1, 60'000);
+  };
+  const test::TempFolder folder;
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  const std::function<void()> look = watch_enter(terminal, session, options);
+  options.interrupted = [&] {
+    look();
+    return false;
+  };
+  // In virtual time keys are looked at every 1024 cycles.
+  int waited = 0;
+  options.watcher = [&](const ServoRecord& row) {
+    if (row.phase < 0 && ++waited == 1500) press();
+    if (row.phase >= 0 && (row.cycle == 1000 || row.cycle == 3000)) press();
+  };
+  const SessionRun run = run_session_on(session, std::make_shared<Pressed>(session),
+                                        limits_of("virtual"), {}, options);
+  ::close(keyboard);
+  ::close(terminal);
+  REQUIRE(run.outcome.cause == StopCause::finished);
+  CHECK(waited > 1500);  // it did not begin by itself
+  CHECK(waited <= 1500 + 1024);
+  const HilRecording recording = read_recording(folder / "r");
+  const std::vector<std::uint64_t> marked = marked_in(recording);
+  REQUIRE(marked.size() == 2);
+  CHECK((marked[0] > 1000 && marked[0] <= 1000 + 1024));
+  CHECK((marked[1] > 3000 && marked[1] <= 3000 + 1024));
+  const Json expected = {{{"cycle", marked[0]}, {"by", "key"}},
+                         {{"cycle", marked[1]}, {"by", "key"}}};
   CHECK(recording.closing.at("markers") == expected);
 }
 

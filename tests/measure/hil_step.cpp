@@ -15,7 +15,7 @@
 #include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
-#include "tpm/haptics/session/session.hpp"
+#include "tpm/haptics/session/session_run.hpp"
 
 using namespace tpm;
 using namespace tpm::files;
@@ -57,9 +57,8 @@ void measure(const std::string& file, int rounds) {
   constexpr double kLongest_s = 12.0;
   const HilSession session = read_session(file);
   const LoopModel loop = make_loop_model(session);
-  ServoSettings settings{session.servo};
-  settings.model_push = loop.push;
-  settings.to_model = loop.to_model;
+  const ServoSettings settings =
+      loop_settings(session, loop, check_rendering(session, *loop.model, loop, "virtual"), true);
   const auto cycles =
       static_cast<std::size_t>(std::min(kLongest_s, session.duration_s()) / settings.period_s);
   const std::filesystem::path path =

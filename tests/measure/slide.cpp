@@ -38,9 +38,8 @@ void run(const HilSession& session, const char* how) {
   const Eigen::Vector3d& push = session.servo.push;
   std::vector<Range> depths(session.phases.size()), forces(session.phases.size());
   LoopModel loop = make_loop_model(session);
-  ServoSettings servo{session.servo};
-  servo.model_push = loop.push;
-  servo.to_model = loop.to_model;
+  const ServoSettings servo =
+      loop_settings(session, loop, check_rendering(session, *loop.model, loop, "virtual"), true);
   const std::shared_ptr<HapticDevice> device = make_device({}, session);
   (void)device->open();
   device->prepare(session.preparation);

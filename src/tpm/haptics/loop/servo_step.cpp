@@ -43,8 +43,9 @@ double stiffness_of(const ContactModel& model, const ServoSettings& settings) {
   return std::max(kLeast_N_per_m, settings.to_model ? k.norm() : push.dot(k * push));
 }
 
-/// With what is known of the device: K (T/2 + delay) <= b.
+/// As announced, else with what is known of the device: K (T/2 + delay) <= b.
 bool is_passive(const ContactModel& model, const ServoSettings& settings) {
+  if (settings.passive) return *settings.passive;
   const double late_s = (0.5 + settings.delay_periods) * settings.period_s;
   return stiffness_of(model, settings) * late_s <= settings.friction_N_s_per_m;
 }

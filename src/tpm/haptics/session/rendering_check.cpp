@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "tpm/base/text.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
@@ -16,32 +18,61 @@ namespace {
 constexpr double kAtLoads_m = 0.010;
 constexpr double kNever_s = 1e6;  ///< a spring that never relaxes may be worse than one that does
 
-/// Stiffness along the push within one period at a depth, 0 outside the validity of the model.
-double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth_m) {
+/// Change of the force within one period by a motion at a depth, N/m, on the tool against the
+/// motion; empty outside the validity of the model.
+std::optional<Eigen::Vector3d> tangent_at(ContactModel& model, const Eigen::Vector3d& push,
+                                          double depth_m, const Eigen::Vector3d& motion) {
   constexpr int kSteps = 200;
   constexpr double kFurther_m = 5e-5;
   model.reset();
   ContactAnswer there;
   for (int i = 1; i <= kSteps; ++i) there = model.step(push * (depth_m * i / kSteps));
   const ContactAnswer stays = model.step(push * depth_m);
-  const ContactAnswer further = model.step(push * (depth_m + kFurther_m));
-  if (!stays.valid || !further.valid) return 0.0;
+  const ContactAnswer further = model.step(push * depth_m + motion * kFurther_m);
+  if (!stays.valid || !further.valid) return std::nullopt;
   // What relaxes in a period is left out: it did so in the period before as well.
-  const double equilibrium_N = push.dot(stays.force_N - there.force_N);
-  return (push.dot(stays.force_N - further.force_N) + equilibrium_N) / kFurther_m;
+  const Eigen::Vector3d equilibrium_N = stays.force_N - there.force_N;
+  return (stays.force_N - further.force_N + equilibrium_N) / kFurther_m;
+}
+
+/// Of all directions in which the tool may move.
+double largest_stiffness(const Eigen::Matrix3d& stiffness) {
+  const Eigen::Matrix3d symmetric = 0.5 * (stiffness + stiffness.transpose());
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(symmetric, Eigen::EigenvaluesOnly)
+      .eigenvalues()
+      .maxCoeff();
+}
+
+/// Largest stiffness within one period at a depth: along the push, or of all directions if the
+/// tool moves in space. 0 outside the validity of the model.
+double stiffness_at(ContactModel& model, const LoopModel& loop, double depth_m) {
+  if (!loop.to_model) {
+    const auto along = tangent_at(model, loop.push, depth_m, loop.push);
+    return along ? loop.push.dot(*along) : 0.0;
+  }
+  Eigen::Matrix3d stiffness;
+  for (int i = 0; i < 3; ++i) {
+    const auto column = tangent_at(model, loop.push, depth_m, Eigen::Vector3d::Unit(i));
+    if (!column) return 0.0;
+    stiffness.col(i) = *column;
+  }
+  return largest_stiffness(stiffness);
 }
 
 void find_stiffness(RenderingCheck& check, const HilSession& session, ContactModel& model,
-                    const Eigen::Vector3d& push) {
+                    const LoopModel& loop) {
   constexpr int kDepths = 4;
-  const double at_rest = push.dot(model.instantaneous_stiffness() * push);
-  const double relaxed = push.dot(model.equilibrium_stiffness() * push);
+  const auto size_of = [&loop](const Eigen::Matrix3d& stiffness) {
+    return loop.to_model ? largest_stiffness(stiffness) : loop.push.dot(stiffness * loop.push);
+  };
+  const double at_rest = size_of(model.instantaneous_stiffness());
+  const double relaxed = size_of(model.equilibrium_stiffness());
   check.stiffness_N_per_m = at_rest;
   check.equilibrium_share = at_rest > 0.0 ? std::clamp(relaxed / at_rest, 0.0, 1.0) : 1.0;
   const double deepest = deepest_asked_m(session, kAtLoads_m);
   for (int i = 1; i <= kDepths; ++i) {
     const double depth = deepest * i / kDepths;
-    const double tangent = tangent_at(model, push, depth);
+    const double tangent = stiffness_at(model, loop, depth);
     if (!(tangent > check.stiffness_N_per_m)) continue;
     check.stiffness_N_per_m = tangent;
     check.depth_m = depth;
@@ -168,7 +199,7 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
                              ? std::max(session.plant.encoder_step_m, limits.encoder_step_m)
                              : session.plant.encoder_step_m;
   check.rise_N = session.servo.slew_limit_N_per_s * session.servo.period_s;
-  find_stiffness(check, session, model, loop.push);
+  find_stiffness(check, session, model, loop);
 
   const double period_s = session.servo.period_s;
   const double late_s = 0.5 * period_s + check.delay_s;

@@ -56,7 +56,8 @@ struct RenderingCheck {
 };
 
 /// The stiffness is that of the model's own steps: pushed to four depths up to the session's
-/// deepest, then a little further within one period. Stability is that of the linear, two-sided
+/// deepest, then a little further within one period; of a tool that moves in space the largest of
+/// all directions. Stability is that of the linear, two-sided
 /// loop with the arm of the session's simulated operator; the slip element only ever takes energy
 /// and is left out. The model is at rest afterwards.
 ///

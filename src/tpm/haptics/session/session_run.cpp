@@ -267,6 +267,7 @@ ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
   ServoSettings servo{session.servo};
   servo.friction_N_s_per_m = rendering.friction_N_s_per_m;
   servo.delay_periods = guided ? rendering.delay_periods : 0;
+  servo.passive = rendering.passive();
   if (!guided) {
     servo.gate.reset();
     servo.energy_allowance_J = std::numeric_limits<double>::infinity();
