@@ -13,7 +13,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from drawing_files import save_drawing
 
-NAMES = {"condensed": "condensed", "condensed_field": "condensed, all positions", "zone": "zone",
+NAMES = {"condensed": "condensed", "condensed_field": "condensed, all positions",
          "full_network": "full network of 424 spheres"}
 
 

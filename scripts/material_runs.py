@@ -55,7 +55,7 @@ def main(tpm):
                 text = said(tpm, "simulate", path, "-o", output)
                 print(f"| {name} | simulate, {kind} | largest force {line(text, 'largest force: ([0-9.]+ [munk]?N)')},"
                       f" at the end {line(text, '^at the end, [^:]*: ([0-9.]+ [munk]?N)')} |")
-            for kind in ("condensed", "network", "zone", "planned"):
+            for kind in ("condensed", "network", "planned"):
                 session = read("hil_planned.json")
                 session["model"] = {"kind": kind, "scene": {k: scene[k] for k in ("organ", "material")}}
                 if kind == "planned":

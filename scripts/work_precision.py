@@ -24,7 +24,6 @@ LOOKS = {
     "collocation": (BLACK, "*"), "closed_form": (BLACK, "x"),
     "inertial": (SKY, "o"), "inertial, order 2": (SKY, "o"), "inertial, order 5": (SKY, "s"),
     "condensed": (GREEN, "o"), "condensed, 4 kHz": (GREEN, "^"), "condensed, all positions": (SKY, "s"),
-    "zone, 2 rings": (ORANGE, "v"), "zone, 3 rings": (ORANGE, "D"), "zone, 4 rings": (ORANGE, "P"),
     "full_network": (BLUE, "o"), "full_network, 4 kHz": (BLUE, "^"),
 }
 SPARE = [(colour, marker) for marker in "hp8d>" for colour in (GREY, GREEN, SKY, PINK, BLACK)]

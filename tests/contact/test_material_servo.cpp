@@ -10,7 +10,6 @@
 #include "tpm/base/random.hpp"
 #include "tpm/contact/condensed/condensed.hpp"
 #include "tpm/contact/servo_network.hpp"
-#include "tpm/contact/zone_network.hpp"
 #include "tpm/law/relaxation/relaxation_filter.hpp"
 #include "tpm/organ/body/liver.hpp"
 #include "tpmkit/error.hpp"
@@ -218,27 +217,6 @@ TEST_CASE("models at servo rate keep their claims with several branches and stif
     const Eigen::VectorXd expected = reference(bonds);
     ServoNetwork full = servo_network(bonds);
     CHECK(worst_error(full, expected) < test::allowed_error("servo_network.materials"));
-    ZoneNetwork zone(bonds, rest, scene.constraints, scene.probe.sphere, scene.probe.direction,
-                     {.period_s = kPeriod_s, .rings = 2});
-    CHECK(worst_error(zone, expected) < test::allowed_error("zone.materials"));
-  }
-}
-
-TEST_CASE("the claim of a zone follows its error, whatever the material", "[servo][heavy]") {
-  const OrganScene& scene = small_liver();
-  for (const auto& [name, field] : std::vector<std::pair<std::string, MaterialField>>{
-           {"one branch", material_of({0.3}, 0.5)},
-           {"two branches, 90 %", material_of({0.02, 5.0}, 0.9)},
-           {"cubic", stiffening(material_of({0.3}, 0.5))},
-           {"tumour", with_tumour(material_of({0.02, 5.0}, 0.5))}}) {
-    const BondSystem bonds(scene.network, field);
-    ZoneNetwork zone(bonds, scene.network.organ.position, scene.constraints, scene.probe.sphere,
-                     scene.probe.direction, {.period_s = kPeriod_s, .rings = 1});
-    const ModelErrors found = errors_of(zone, reference(bonds));
-    CAPTURE(name, found.error, found.claim);
-    CHECK(found.error > 5e-4);
-    CHECK(found.claim >= found.error);
-    CHECK(found.claim < test::allowed_error("zone.claim_over_error") * found.error);
   }
 }
 

@@ -50,6 +50,8 @@ TEST_CASE("Bad sessions: one line each, with the key") {
       Case{"/indentations/depths", Json::array({"0 mm"}), "key /indentations/depths/0"},
       Case{"/indentations/hold", "13 h", "takes 4.681e+04 s; expected 12 hours"},
       Case{"/model/kind", "magic", "/model/kind"},
+      Case{"/model/kind", "zone",
+           "key /model/kind: unknown word 'zone'; expected one of planned, linear, "},
       Case{"/model/tolerance", "1%", "none but with the kind 'planned'"},
       Case{"/model", Json{{"tolerance", "70%"}, {"scene", Json::object()}},
            "key /model/tolerance: '70%'; expected a share of the peak"},
@@ -75,21 +77,6 @@ HilRecording recorded(const test::TempFolder& folder, const Json& json = short_s
   return read_recording(folder / "r");
 }
 
-TEST_CASE("A session by a zone takes the fewest rings that never doubt its slowest push",
-          "[heavy]") {
-  const std::filesystem::path configs = std::filesystem::path(TPM_TEST_SOURCE_DIR) / "configs";
-  Json json = read_json(configs / "hil_planned.json");
-  for (const auto& [scene, taken] :
-       {std::pair{"liver_scene.json", "zone_2"}, std::pair{"liver_tumour.json", "zone_3"}}) {
-    const Json all = read_json(configs / scene);
-    json["model"] = {{"kind", "zone"},
-                     {"scene", {{"organ", all.at("organ")}, {"material", all.at("material")}}}};
-    const LoopModel loop = make_loop_model(parse_session(json, scene, configs));
-    CHECK_THAT(loop.name, Catch::StartsWith(taken));
-    CHECK(loop.model->step(Eigen::Vector3d::Zero()).valid);
-  }
-}
-
 /// A short push on a small liver, by a patch.
 Json patch_session(const std::string& kind) {
   const std::filesystem::path configs = std::filesystem::path(TPM_TEST_SOURCE_DIR) / "configs";
@@ -105,7 +92,7 @@ Json patch_session(const std::string& kind) {
 
 TEST_CASE("A patch is pushed by models that move several spheres, and verified", "[heavy]") {
   const test::TempFolder folder;
-  for (const char* const kind : {"curves", "zone", "planned"}) {
+  for (const char* const kind : {"curves", "planned"}) {
     const HilRecording recording = recorded(folder, patch_session(kind));
     const Verification v = verify(recording);
     CAPTURE(kind, v.all.max_N / v.all.peak_N);

@@ -66,7 +66,7 @@ TEST_CASE("a shape in one file runs in scenes, and is refused in one line") {
   "potential")")) + "}";
   CHECK(shaped > 1.01 * force(scene_by("backward_euler", linear)));
 
-  const test::DummyAnswer refused = run(scene_by("zone"));
+  const test::DummyAnswer refused = run(scene_by("servo_network"));
   CHECK(refused.code == 3);
   CHECK_THAT(refused.text, Catch::Contains("no formulation that takes a potential of any shape; "
                                            "expected one of linear, element, curves, condensed"));

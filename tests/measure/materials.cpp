@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/networks: measure_materials written|cost|servo|zones|lag
+// Prints the measured numbers of reports/networks: measure_materials written|cost|servo|lag
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +10,6 @@
 #include "organ_scene.hpp"
 #include "tpm/contact/condensed/condensed.hpp"
 #include "tpm/contact/servo_network.hpp"
-#include "tpm/contact/zone_network.hpp"
 #include "tpm/law/relaxation/fractional_branches.hpp"
 #include "tpm/organ/body/liver.hpp"
 #include "written_out_network.hpp"
@@ -215,54 +214,10 @@ void print_servo() {
                                             scene.probe.direction,
                                             ServoNetworkOptions{.period_s = kPeriod_s});
     });
-    compare("zone 2", [&] {
-      return std::make_unique<ZoneNetwork>(bonds, rest, scene.constraints, scene.probe.sphere,
-                                           scene.probe.direction,
-                                           ZoneNetworkOptions{.period_s = kPeriod_s, .rings = 2});
-    });
     compare("condensed", [&] {
       return std::make_unique<CondensedContact>(build_condensed(
           bonds, rest, scene.constraints, scene.probe.sphere, scene.probe.direction));
     });
-  }
-}
-
-/// Zones around a tumour along a slow push: errors and claims in parts of the largest force so far,
-/// by which a session tells what is valid.
-void print_zones() {
-  const OrganScene scene(paper_liver());
-  const Positions& rest = scene.network.organ.position;
-  constexpr double kDepth_m = 8e-3, kPeriod_s = 1e-3;
-  constexpr int kSteps = 8000;
-  std::vector<double> times;
-  for (int i = 1; i <= kSteps; ++i) times.push_back(kPeriod_s * i);
-  fmt::print("{:<30} {:>6} {:>12} {:>12} {:>14}\n", "8 mm in 8 s", "rings", "error/force",
-             "claim/force", "not valid");
-  for (const Named& named : materials(scene.network)) {
-    if (named.field.factor.size() == 0) continue;
-    const BondSystem bonds(scene.network, named.field);
-    Constraints guided = scene.constraints;
-    guided.slide(scene.probe.sphere, scene.probe.direction);
-    const Eigen::VectorXd expected =
-        QuasiStatic(bonds, rest, guided, scene.probe, {.tolerance = 1e-7})
-            .run(ramp_and_hold(kDepth_m, kSteps * kPeriod_s, kSteps * kPeriod_s + 1.0), times)
-            .response;
-    for (const int rings : {1, 2, 3}) {
-      ZoneNetwork zone(bonds, rest, scene.constraints, scene.probe.sphere, scene.probe.direction,
-                       {.period_s = kPeriod_s, .rings = rings});
-      double error = 0.0, claim = 0.0;
-      int doubted = 0;
-      for (int i = 1; i <= kSteps; ++i) {
-        const ContactAnswer answer = zone.step(kDepth_m * i / kSteps * scene.probe.direction);
-        const double force = expected[i - 1];
-        const double missed = std::abs(answer.force_N.dot(scene.probe.direction) + force);
-        error = std::max(error, missed / force);
-        claim = std::max(claim, answer.error_N / force);
-        doubted += answer.valid ? 0 : 1;
-      }
-      fmt::print("{:<30} {:>6} {:>12.2e} {:>12.2e} {:>14}\n", named.name, rings, error, claim,
-                 fmt::format("{} of {}", doubted, kSteps));
-    }
   }
 }
 
@@ -333,7 +288,6 @@ int main(int argc, char** argv) {
   if (asked("written")) print_written();
   if (asked("cost")) print_cost();
   if (asked("servo")) print_servo();
-  if (asked("zones")) print_zones();
   if (asked("lag")) print_lag();
   return 0;
 }

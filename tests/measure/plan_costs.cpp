@@ -9,7 +9,6 @@
 
 #include "tpm/contact/condensed/condensed.hpp"
 #include "tpm/contact/servo_network.hpp"
-#include "tpm/contact/zone_network.hpp"
 #include "tpm/organ/scene/scene.hpp"
 #include "tpm/plan/operations.hpp"
 
@@ -69,13 +68,6 @@ int main() {
   CondensedContact condensed =
       build_condensed(bonds, rest, tissue.constraints(), contact, into, {.depth_m = kDepth_m});
   row("condensed", condensed, OperationCount().add(Operation::condensed_step, 1.0));
-  for (const int rings : {1, 2, 3}) {
-    ZoneNetworkOptions options;
-    options.rings = rings;
-    options.portable = true;
-    ZoneNetwork zone(bonds, rest, tissue.constraints(), contact, into, options);
-    row(fmt::format("zone_{}", rings), zone, counted(zone.work()));
-  }
   ServoNetworkOptions options;
   options.portable = true;
   options.most_balances = 1;  // as many as counted

@@ -13,7 +13,6 @@
 
 #include "tpm/accuracy/contact_reference.hpp"
 #include "tpm/contact/servo_network.hpp"
-#include "tpm/contact/zone_network.hpp"
 #include "tpm/organ/scene/scene.hpp"
 #include "tpmkit/error.hpp"
 
@@ -63,13 +62,6 @@ std::vector<Built> models(const Setup& setup, const BondSystem& bonds) {
     auto model = make();
     all.push_back({std::move(name), std::move(model), cpu_s() - start});
   };
-  for (const int rings : {2, 3, 4}) {
-    add(fmt::format("zone of {} rings", rings), [&] {
-      return std::make_unique<ZoneNetwork>(
-          bonds, setup.rest(), setup.constraints, setup.contact, setup.into,
-          ZoneNetworkOptions{.period_s = kPeriod_s, .rings = rings});
-    });
-  }
   add("full network", [&] {
     return std::make_unique<ServoNetwork>(bonds, setup.rest(), setup.constraints, setup.contact,
                                           setup.into, ServoNetworkOptions{.period_s = kPeriod_s});

@@ -150,25 +150,6 @@ TEST_CASE("a budget that nothing meets has no pick, and the plan says what would
   CHECK(plan_json(plan)["choice"].is_null());
 }
 
-TEST_CASE("a zone around the contact is a candidate between linear models and the network",
-          "[heavy]") {
-  const Plan plan = make_plan(liver(ramp("4 mm", "8 mm/s")), request(0.02, 1000.0));
-  for (const char* name : {"zone_1", "zone_2", "zone_3"}) {
-    CAPTURE(name);
-    const PlannedCandidate& zone = named(plan, name);
-    CHECK(zone.formulation == "zone");
-    REQUIRE(zone.claimed_error);
-    CHECK(*zone.verified_error <= *zone.claimed_error + plan.reference.difference);
-    CHECK(*zone.verified_error < 0.5 * *named(plan, "linear_3").verified_error);
-    CHECK(*zone.period_s < *named(plan, "network_step").period_s);
-  }
-  // In fifty spheres three rings are all of them: nothing is left to be linear.
-  CHECK(*named(plan, "zone_3").verified_error < test::allowed_error("plan.zone_of_all_spheres"));
-  CHECK(*named(plan, "zone_1").period_s < *named(plan, "zone_3").period_s);
-  const Plan slow = make_plan(liver(ramp("4 mm", "8 mm/s")), request(0.02));
-  CHECK_THAT(named(slow, "zone_2").reason, Contains("period"));
-}
-
 TEST_CASE("where masses are felt the reference has them", "[heavy]") {
   const std::string poke = R"("protocol": {"kind": "knots", "knots": [
     {"time": "0 s", "depth": "0 mm"}, {"time": "0.02 s", "depth": "3 mm"},

@@ -10,7 +10,6 @@
 #include "tpm/accuracy/contact_reference.hpp"
 #include "tpm/contact/condensed/condensed.hpp"
 #include "tpm/contact/servo_network.hpp"
-#include "tpm/contact/zone_network.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/organ/scene/scene.hpp"
 
@@ -342,20 +341,14 @@ ServoModel network_model(std::string method, std::string variant, const Options&
           }};
 }
 
-ServoModel zone_model(int rings, double period_s) {
-  const ZoneNetworkOptions options{.period_s = period_s, .rings = rings};
-  return network_model<ZoneNetwork>("zone", fmt::format("{} rings", rings), options);
-}
-
 ServoModel full_model(double period_s) {
   return network_model<ServoNetwork>("full_network", "", ServoNetworkOptions{.period_s = period_s});
 }
 
-/// Limits: force within 0.5 % in 1 us, positions in 5 us, the zone in 25 us, the full
+/// Limits: force within 0.5 % in 1 us, positions in 5 us, the full
 /// network within 0.1 % in 50 us (median) and 150 us (99th percentile); models built in 2 s.
 std::vector<BenchmarkTarget> servo_targets(bool positions) {
   std::vector<BenchmarkTarget> targets{{"condensed", 5e-3, 1e-6, 0.0, 2.0},
-                                       {"zone, 3 rings", 5e-3, 25e-6, 0.0, 2.0},
                                        {"full_network", 1e-3, 50e-6, 150e-6, 0.0}};
   if (positions) targets.push_back({"condensed, all positions", 5e-3, 5e-6, 0.0, 2.0});
   return targets;
@@ -428,9 +421,7 @@ BenchmarkProblem servo_normal_problem() {
   const auto asked =
       std::make_shared<ServoCase>(servo_liver("liver_scene.json"), servo_taus_s(), true, motions);
   BenchmarkProblem problem =
-      servo_problem(asked, {condensed_model(false, kServoPeriod_s), zone_model(2, kServoPeriod_s),
-                            zone_model(3, kServoPeriod_s), zone_model(4, kServoPeriod_s),
-                            full_model(kServoPeriod_s)});
+      servo_problem(asked, {condensed_model(false, kServoPeriod_s), full_model(kServoPeriod_s)});
   problem.name = "servo_normal";
   problem.title = "Contact models along the normal";
   problem.text = fmt::format(
@@ -446,21 +437,20 @@ BenchmarkProblem servo_space_problem() {
   fast_condensed.variant = "4 kHz";
   ServoModel fast_full = full_model(kFastServoPeriod_s);
   fast_full.variant = "4 kHz";
-  return space_problem("liver_scene.json", "servo_space", "Contact models in space",
-                       "The liver of 424 spheres (configs/liver_scene.json) at sphere 71",
-                       {condensed_model(false, kServoPeriod_s), fast_condensed,
-                        condensed_model(true, kServoPeriod_s), zone_model(2, kServoPeriod_s),
-                        zone_model(3, kServoPeriod_s), zone_model(4, kServoPeriod_s),
-                        full_model(kServoPeriod_s), fast_full});
+  return space_problem(
+      "liver_scene.json", "servo_space", "Contact models in space",
+      "The liver of 424 spheres (configs/liver_scene.json) at sphere 71",
+      {condensed_model(false, kServoPeriod_s), fast_condensed,
+       condensed_model(true, kServoPeriod_s), full_model(kServoPeriod_s), fast_full});
 }
 
 BenchmarkProblem servo_inner_problem() {
-  return space_problem(
-      "liver_inner_fixed_scene.json", "servo_inner", "Contact models in space, inner layer fixed",
-      "The liver of 424 spheres with its inner layer fixed "
-      "(configs/liver_inner_fixed_scene.json)",
-      {condensed_model(false, kServoPeriod_s), condensed_model(true, kServoPeriod_s),
-       zone_model(3, kServoPeriod_s), full_model(kServoPeriod_s)});
+  return space_problem("liver_inner_fixed_scene.json", "servo_inner",
+                       "Contact models in space, inner layer fixed",
+                       "The liver of 424 spheres with its inner layer fixed "
+                       "(configs/liver_inner_fixed_scene.json)",
+                       {condensed_model(false, kServoPeriod_s),
+                        condensed_model(true, kServoPeriod_s), full_model(kServoPeriod_s)});
 }
 
 }  // namespace tpm::accuracy

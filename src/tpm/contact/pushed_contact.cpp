@@ -16,14 +16,12 @@ constexpr double kBalanceLength_m = 0.5e-3;
 constexpr double kBalance = 1e-11;  // of the stiffest bond times that length
 constexpr double kRestLength = 1e-9;
 
-Constraints with_contact_held(Constraints constraints, const PushedSpheres& contact) {
-  for (const std::size_t sphere : contact) {
-    if (sphere >= constraints.size() || !constraints.is_free(sphere)) {
-      throw bad_input("contact", fmt::format("sphere {} is not free", sphere + 1),
-                      "a sphere that nothing holds or guides");
-    }
-    constraints.fix(sphere);
+Constraints with_contact_held(Constraints constraints, std::size_t sphere) {
+  if (sphere >= constraints.size() || !constraints.is_free(sphere)) {
+    throw bad_input("contact", fmt::format("sphere {} is not free", sphere + 1),
+                    "a sphere that nothing holds or guides");
   }
+  constraints.fix(sphere);
   return constraints;
 }
 
@@ -40,18 +38,12 @@ void require_at_rest(const BondSystem& bonds, const Positions& rest) {
 
 }  // namespace
 
-Eigen::Vector3d PushedSpheres::sum(const Eigen::Matrix3Xd& force) const {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const std::size_t sphere : all_) sum += force.col(static_cast<Eigen::Index>(sphere));
-  return sum;
-}
-
 PushedContact::PushedContact(const BondSystem& bonds, Positions rest, Constraints constraints,
-                             PushedSpheres contact)
+                             std::size_t contact)
     : bonds_(bonds),
       rest_(std::move(rest)),
       constraints_(with_contact_held(std::move(constraints), contact)),
-      contact_(std::move(contact)),
+      contact_(contact),
       equilibrium_(bonds_, constraints_) {
   require_at_rest(bonds_, rest_);
 }
@@ -87,10 +79,8 @@ Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxe
     const double aim = std::min(done + stride, way);
     Positions next = here.position;
     if (went > 0.0) next += (aim - done) / went * (here.position - before);
-    for (const std::size_t sphere : contact_) {
-      const auto column = static_cast<Eigen::Index>(sphere);
-      next.col(column) = rest_.col(column) + from + aim / way * (displacement_m - from);
-    }
+    const auto column = static_cast<Eigen::Index>(contact_);
+    next.col(column) = rest_.col(column) + from + aim / way * (displacement_m - from);
     const EquilibriumSearch search = equilibrium_.find(next, viscous_state, load, tolerance_N);
     if (search.converged && search.stable) {
       before = std::move(here.position);
@@ -119,7 +109,7 @@ ContactFields PushedContact::fields(const Positions& position, const ViscousStat
   ContactFields fields;
   for (int axis = 0; axis < 3; ++axis) {
     Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-    for (const std::size_t sphere : contact_) unit(axis, static_cast<Eigen::Index>(sphere)) = 1.0;
+    unit(axis, static_cast<Eigen::Index>(contact_)) = 1.0;
     Eigen::Matrix3Xd pull = Eigen::Matrix3Xd::Zero(3, rest_.cols());
     bonds_.add_stiffness_times(position, viscous_state, unit, pull);
     Eigen::Matrix3Xd& field = fields.displacement[static_cast<std::size_t>(axis)];
@@ -128,7 +118,7 @@ ContactFields PushedContact::fields(const Positions& position, const ViscousStat
     field += unit;
     pull.setZero();
     bonds_.add_stiffness_times(position, viscous_state, field, pull);
-    fields.stiffness.col(axis) = contact_.sum(pull);
+    fields.stiffness.col(axis) = pull.col(static_cast<Eigen::Index>(contact_));
   }
   fields.stiffness = (0.5 * (fields.stiffness + fields.stiffness.transpose())).eval();
   return fields;

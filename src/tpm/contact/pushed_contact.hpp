@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -16,37 +15,15 @@ struct ContactFields {
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();  ///< at the contact, N/m
 };
 
-/// The spheres that a tool moves together, without turning: one, or a patch of a rigid face that is
-/// glued to them. The forces on them add up to that on the tool.
-class PushedSpheres {
- public:
-  // NOLINTNEXTLINE(google-explicit-constructor): one is the usual case
-  PushedSpheres(std::size_t sphere) : all_{sphere} {}
-  /// @param all each once, at least one
-  explicit PushedSpheres(std::vector<std::size_t> all) : all_(std::move(all)) {}
-
-  [[nodiscard]] auto begin() const { return all_.begin(); }
-  [[nodiscard]] auto end() const { return all_.end(); }
-  [[nodiscard]] bool has(std::size_t sphere) const {
-    return std::find(all_.begin(), all_.end(), sphere) != all_.end();
-  }
-  /// The sum of their columns.
-  [[nodiscard]] Eigen::Vector3d sum(const Eigen::Matrix3Xd& force) const;
-
- private:
-  std::vector<std::size_t> all_;
-};
-
-/// A tissue pushed at one of its spheres, or at several together, to given places: what reduced
-/// models are built from.
+/// A tissue pushed at one of its spheres to given places: what reduced models are built from.
 class PushedContact {
  public:
   /// @param constraints of the tissue without the probe
-  /// @param contact spheres that are free
+  /// @param contact a sphere that is free
   /// Throws Error(bad_input) for tools among the bonds, a contact that is not free, or bonds that
   /// do not have their rest length.
   PushedContact(const BondSystem& bonds, Positions rest, Constraints constraints,
-                PushedSpheres contact);
+                std::size_t contact);
   PushedContact(const PushedContact&) = delete;
   PushedContact& operator=(const PushedContact&) = delete;
 
@@ -54,7 +31,7 @@ class PushedContact {
   [[nodiscard]] const Positions& rest() const { return rest_; }
   /// With the contact fixed.
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
-  [[nodiscard]] const PushedSpheres& contact() const { return contact_; }
+  [[nodiscard]] std::size_t contact() const { return contact_; }
 
   /// The equilibrium with the contact displaced, found along a straight line from rest or from the
   /// nearest of those found before with the same `relaxed`.
@@ -80,7 +57,7 @@ class PushedContact {
   const BondSystem& bonds_;
   Positions rest_;
   Constraints constraints_;
-  PushedSpheres contact_;
+  std::size_t contact_;
   Equilibrium equilibrium_;
   std::vector<Found> found_;
 };

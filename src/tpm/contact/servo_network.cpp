@@ -82,7 +82,7 @@ void ServoNetwork::choose_bonds(const PushedContact& tissue) {
     const std::uint32_t from = bonds.end_a()[b];
     const std::uint32_t to = bonds.end_b()[b];
     const ServoBonds::Choice choice{b, spheres_->column(from), spheres_->column(to)};
-    if (tissue.contact().has(from) || tissue.contact().has(to)) {
+    if (from == tissue.contact() || to == tissue.contact()) {
       near.push_back(choice);
     } else if (spheres_->moves(from) || spheres_->moves(to)) {
       far.push_back(choice);

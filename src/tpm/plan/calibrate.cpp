@@ -195,7 +195,7 @@ class Bench {
 };
 
 double panel_product_s() {
-  constexpr std::size_t kSize = 384;  // beyond the innermost cache, as zones are
+  constexpr std::size_t kSize = 384;  // beyond the innermost cache
   const AlignedFloats numbers(kSize * kSize, 1e-3F), x(kSize, 1.0F);
   AlignedFloats y(kSize, 0.0F);
   const FloatPanel panel{numbers.data(), kSize, kSize};

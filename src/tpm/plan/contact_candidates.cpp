@@ -10,7 +10,6 @@
 
 #include "tpm/contact/condensed/condensed.hpp"
 #include "tpm/contact/servo_network.hpp"
-#include "tpm/contact/zone_network.hpp"
 #include "tpm/plan/plan_model.hpp"
 #include "tpmkit/error.hpp"
 
@@ -37,15 +36,11 @@ bool is_guided(const PlanScene& scene) {
                      [&](const Slider& slider) { return slider.sphere == probe.sphere; });
 }
 
-PushedSpheres contact_of(const PlanScene& scene) {
-  return PushedSpheres(spheres_of(scene.scene().contacts.front(), scene.network().organ));
-}
-
 /// Of the tissue, the contact free: where it is, a ContactModel is told.
 Constraints freedom_around(const PlanScene& scene) {
   Tissue tissue = scene.scene().tissue;
-  const PushedSpheres contact = contact_of(scene);
-  std::erase_if(tissue.sliders, [&](const Slider& slider) { return contact.has(slider.sphere); });
+  const std::size_t contact = scene.scene().probe().sphere;
+  std::erase_if(tissue.sliders, [&](const Slider& slider) { return slider.sphere == contact; });
   return tissue.constraints();
 }
 
@@ -133,10 +128,7 @@ class ContactCandidate : public PlanModel {
     if (!budget.rate_Hz) return "steps a servo's period, and there is none";
     if (!scene.by_depth()) return "sees spheres that are moved";
     if (scene.has_loads()) return "begins without loads";
-    if (!scene.single_sphere() && !(takes_patch() && scene.single_patch())) {
-      return takes_patch() ? "sees one sphere or patch that is moved"
-                           : "sees one sphere that is moved";
-    }
+    if (!scene.single_sphere()) return "sees one sphere that is moved";
     if (scene.jumps()) return "a servo's contact does not jump";
     const Probe& probe = scene.scene().probe();
     const Constraints constraints = scene.scene().tissue.constraints();
@@ -178,9 +170,6 @@ class ContactCandidate : public PlanModel {
   /// @param portable the same answer on every machine, where the model has the choice
   [[nodiscard]] virtual BuiltContact build(const PlanScene& scene, double period_s,
                                            bool portable) const = 0;
-
-  /// A patch that moves together is a contact too.
-  [[nodiscard]] virtual bool takes_patch() const { return false; }
 
  private:
   static constexpr bool kPortable = true;
@@ -246,46 +235,6 @@ class CondensedCandidate final : public ContactCandidate {
   }
 };
 
-/// The network near the contact, and what surrounds it as a linear tissue
-/// (docs/theory.md).
-class ZoneCandidate final : public ContactCandidate {
- public:
-  explicit ZoneCandidate(int rings) : rings_(rings) {}
-  [[nodiscard]] std::string name() const override { return fmt::format("zone_{}", rings_); }
-  [[nodiscard]] std::string formulation() const override { return "zone"; }
-  [[nodiscard]] std::string settings() const override {
-    return fmt::format("{} ring{} of bonds", rings_, rings_ == 1 ? "" : "s");
-  }
-  [[nodiscard]] OperationCount work_to_build(const PlanScene& scene) const override {
-    return newton_iteration_work(scene.driven()).times(500.0);
-  }
-
- protected:
-  [[nodiscard]] bool takes_patch() const override { return true; }
-  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s,
-                                   bool portable) const override {
-    ZoneNetworkOptions options;
-    options.period_s = period_s;
-    options.rings = rings_;
-    options.linear_depth_m = 0.4 * scene.protocol().peak();
-    options.frozen_depth_m = 0.5 * scene.protocol().peak();
-    options.deepest_m = kRange * scene.protocol().peak();
-    options.portable = portable;
-    const DrivenNetwork& driven = scene.driven();
-    const Probe& probe = scene.scene().probe();
-    auto zone = std::make_unique<ZoneNetwork>(driven.bonds, driven.rest, freedom_around(scene),
-                                              contact_of(scene), probe.direction, options);
-    BuiltContact built;
-    built.of_step = counted(zone->work());
-    built.of_step.add(Operation::contact_step, 1.0);
-    built.model = std::move(zone);
-    return built;
-  }
-
- private:
-  int rings_;
-};
-
 /// The nonlinear network with a stiffness that was factorised beforehand, in single precision.
 class ServoCandidate final : public ContactCandidate {
  public:
@@ -324,12 +273,6 @@ class ServoCandidate final : public ContactCandidate {
 PlanModels condensed_candidates() {
   PlanModels models;
   models.push_back(std::make_unique<CondensedCandidate>());
-  return models;
-}
-
-PlanModels zone_candidates() {
-  PlanModels models;
-  for (const int rings : {1, 2, 3}) models.push_back(std::make_unique<ZoneCandidate>(rings));
   return models;
 }
 

@@ -105,7 +105,6 @@ class PlanOffer {
 [[nodiscard]] PlanModels element_candidates();
 [[nodiscard]] PlanModels curves_candidates();
 [[nodiscard]] PlanModels condensed_candidates();
-[[nodiscard]] PlanModels zone_candidates();
 [[nodiscard]] PlanModels servo_network_candidates();
 [[nodiscard]] PlanModels network_step_candidates(const PlanScene& scene);
 [[nodiscard]] PlanModels collocation_candidates(const PlanScene& scene);

@@ -127,10 +127,6 @@ bool PlanScene::single_sphere() const {
   return scene_.contacts.size() == 1 && scene_.contacts.front().kind == ContactKind::sphere;
 }
 
-bool PlanScene::single_patch() const {
-  return scene_.contacts.size() == 1 && scene_.contacts.front().kind == ContactKind::patch;
-}
-
 Protocol PlanScene::corners() const {
   const std::vector<DriveGroup>& beside = driven().probes.loading().beside;
   if (beside.empty()) return protocol();

@@ -78,8 +78,6 @@ class PlanScene {
   [[nodiscard]] Protocol corners() const;
   /// One sphere driven itself and nothing else in contact.
   [[nodiscard]] bool single_sphere() const;
-  /// One patch and nothing else in contact.
-  [[nodiscard]] bool single_patch() const;
   /// What is imposed jumps, at the start or later.
   [[nodiscard]] bool jumps() const;
   /// Layers of which a sphere moves.

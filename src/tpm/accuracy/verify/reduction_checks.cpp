@@ -7,7 +7,6 @@
 #include "tpm/accuracy/verify/verification.hpp"
 #include "tpm/contact/condensed/condensed.hpp"
 #include "tpm/contact/servo_network.hpp"
-#include "tpm/contact/zone_network.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/organ/scene/scene.hpp"
 
@@ -111,12 +110,6 @@ std::vector<VerificationCheck> reduction_checks() {
                      return std::make_unique<CondensedContact>(
                          build_condensed(l.bonds(flaw), l.rest(), l.constraints(), l.contact(),
                                          l.into(), {.depth_m = kDeepest_m}));
-                   });
-  add_model_checks(checks, liver, "zone of 3 rings, 1 kHz", 5e-3,
-                   [](const ReducedLiver& l, double flaw) -> std::unique_ptr<ContactModel> {
-                     return std::make_unique<ZoneNetwork>(l.bonds(flaw), l.rest(), l.constraints(),
-                                                          l.contact(), l.into(),
-                                                          ZoneNetworkOptions{});
                    });
   add_model_checks(checks, liver, "full network in single precision, 1 kHz", 1e-3,
                    [](const ReducedLiver& l, double flaw) -> std::unique_ptr<ContactModel> {

@@ -27,37 +27,12 @@ std::vector<double> ends_of_steps(const Protocol& protocol, double step_s) {
 class Reference {
  public:
   Reference(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
-            const Probes& probes, bool contact_forces)
-      : bonds_(bonds),
-        probes_(probes),
-        contact_forces_(contact_forces),
-        network_(bonds, rest, guided(constraints, probes), probes,
+            const Probes& probes)
+      : network_(bonds, rest, guided(constraints, probes), probes,
                  {.tolerance = kReferenceTolerance}) {}
 
-  void run(const Protocol& protocol, double spacing_s, ComparedMotion& motion) const {
-    const std::vector<double> times_s = ends_of_steps(protocol, spacing_s);
-    if (!contact_forces_) {
-      motion.force_N = network_.run(protocol, times_s).response;
-      return;
-    }
-    Eigen::Matrix3Xd contact_N(3, static_cast<Eigen::Index>(times_s.size()));
-    Eigen::Index at = 0;
-    Eigen::Matrix3Xd force_N;
-    motion.force_N =
-        network_
-            .run(protocol, times_s,
-                 [&](const QuasiStaticState& state) {
-                   force_N.setZero(3, state.position.cols());
-                   bonds_.add_forces(state.position, {bonds_.mean_viscous(state.viscous), 0.0},
-                                     force_N);
-                   Eigen::Vector3d sum_N = Eigen::Vector3d::Zero();
-                   for (const Probe& probe : probes_) {
-                     sum_N += force_N.col(static_cast<Eigen::Index>(probe.sphere));
-                   }
-                   contact_N.col(at++) = sum_N;
-                 })
-            .response;
-    motion.contact_N = std::move(contact_N);
+  [[nodiscard]] Eigen::VectorXd force_N(const Protocol& protocol, double step_s) const {
+    return network_.run(protocol, ends_of_steps(protocol, step_s)).response;
   }
 
  private:
@@ -66,9 +41,6 @@ class Reference {
     return constraints;
   }
 
-  const BondSystem& bonds_;
-  Probes probes_;
-  bool contact_forces_;
   QuasiStatic network_;
 };
 
@@ -84,26 +56,22 @@ double mean_relaxation_time_s(const std::vector<WeightedTime>& branches) {
 std::vector<ComparedMotion> compared_motions(const BondSystem& bonds, const Positions& rest,
                                              const Constraints& constraints, const Probes& probes,
                                              const ComparedMotions& asked) {
-  const Reference reference(bonds, rest, constraints, probes, asked.contact_forces);
+  const Reference reference(bonds, rest, constraints, probes);
   std::vector<ComparedMotion> motions;
   for (const double duration : asked.durations) {
     ComparedMotion motion;
-    double ramp_s = duration * asked.mean_relaxation_time_s;
+    const double ramp_s = duration * asked.mean_relaxation_time_s;
     motion.step_s = ramp_s / asked.steps_of_ramp;
-    if (motion.step_s < asked.least_step_s) {
-      motion.step_s = asked.least_step_s;
-      ramp_s = asked.steps_of_ramp * motion.step_s;
-    }
     if (!motions.empty() && motions.back().step_s == motion.step_s) continue;
     const Protocol protocol = ramp_hold_release(ramp_s, asked.depth_m, true);
-    const double spacing_s = motion.step_s * asked.every;
     try {
-      reference.run(protocol, spacing_s, motion);
+      motion.force_N = reference.force_N(protocol, motion.step_s);
     } catch (const Error& error) {
       if (error.code() != ExitCode::numerical) throw;
-      reference.run(ramp_hold_release(ramp_s, asked.depth_m, false), spacing_s, motion);
+      motion.force_N =
+          reference.force_N(ramp_hold_release(ramp_s, asked.depth_m, false), motion.step_s);
     }
-    for (Eigen::Index i = 0; i < asked.every * motion.force_N.size(); ++i) {
+    for (Eigen::Index i = 0; i < motion.force_N.size(); ++i) {
       motion.depth_m.push_back(value_at(protocol, motion.step_s * static_cast<double>(i + 1)));
     }
     motions.push_back(std::move(motion));

@@ -11,10 +11,9 @@ namespace tpm::contact {
 struct ComparedMotion {
   double step_s = 0.0;
   std::vector<double> depth_m;  ///< at the end of each step
-  /// Of the quasi-static network after every so many steps (ComparedMotions::every), along the
-  /// push: the force on what pushes is minus that.
+  /// Of the quasi-static network after each step, along the push: the force on what pushes is
+  /// minus that.
   Eigen::VectorXd force_N;
-  Eigen::Matrix3Xd contact_N;  ///< the force on what pushes, if asked for
 };
 
 /// Which motions are compared, and how.
@@ -23,9 +22,6 @@ struct ComparedMotions {
   std::vector<double> durations;        ///< of the ramp, in mean relaxation times, > 0
   double mean_relaxation_time_s = 0.0;  ///< 0 where nothing relaxes
   int steps_of_ramp = 50;               ///< > 0
-  double least_step_s = 0.0;            ///< faster ramps are slowed down to this step
-  int every = 1;                        ///< steps between comparisons, a divisor of steps_of_ramp
-  bool contact_forces = false;
 };
 
 struct WeightedTime {

@@ -93,10 +93,6 @@ std::size_t by_exponentials(const FormulationChoice& choice) {
   return static_cast<std::size_t>(choice.exponentials) - 1;
 }
 
-std::size_t by_rings(const FormulationChoice& choice) {
-  return static_cast<std::size_t>(choice.rings) - 1;
-}
-
 /// What sees one contact along its push, whatever drives it.
 constexpr Capabilities kAlongPush{.network = true,
                                   .depth = true,
@@ -159,12 +155,6 @@ Formulations reduced_contacts_formulations() {
        130,
        {"step"}},
       condensed_candidates, condensed_model);
-  static const ReducedContact zone({"zone",
-                                    "the network near the contact, and around it a linear tissue",
-                                    kInSpace,
-                                    140,
-                                    {"rings", "step"}},
-                                   zone_candidates, by_rings);
   static const ReducedLoop network(
       {"servo_network",
        "the whole network in every period, with a stiffness factorised beforehand",
@@ -173,8 +163,8 @@ Formulations reduced_contacts_formulations() {
        {"step"},
        "network"},
       servo_network_candidates, network_model);
-  static const std::vector<const Formulation*> all{&linear,    &element, &curves,
-                                                   &condensed, &zone,    &network};
+  static const std::vector<const Formulation*> all{&linear, &element, &curves, &condensed,
+                                                   &network};
   return all;
 }
 

@@ -56,7 +56,7 @@ std::size_t PushedScene::only_sphere() const {
   throw bad_input(
       contact_place,
       fmt::format("a {}, and the model '{}' is pushed at one sphere", word_of(contact.kind), model),
-      "a sphere, or a model that moves several: planned, linear, curves, zone");
+      "a sphere, or a model that moves several: planned, linear, curves");
 }
 
 LoopModel PushedScene::begun(std::string_view kind, std::string_view how) const {

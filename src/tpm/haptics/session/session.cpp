@@ -137,7 +137,7 @@ void set_contact(HilSession& session, const SessionModelKeys& model, const Docum
   const DocumentPlace at = place.key("contact");
   if (session.law || session.model == "surface" || session.model == "element") {
     throw bad_input(at.where, fmt::format("is not for the kind '{}'", session.model),
-                    "a kind that moves spheres of a scene, such as planned or zone");
+                    "a kind that moves spheres of a scene, such as planned or curves");
   }
   session.contact = model.contact;
   session.contact_place = at.where;

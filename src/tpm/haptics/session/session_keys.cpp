@@ -88,7 +88,7 @@ const Block<SessionModelKeys>& model_block() {
        key("contact", &K::contact, contact_type(),
            "which spheres the tool moves; default the organ's contact sphere against its normal; "
            "not "
-           "for element, surface and law, and a patch only for planned, linear, curves and zone"),
+           "for element, surface and law, and a patch only for planned, linear and curves"),
        with_default(key("tolerance", &K::tolerance, text(),
                         "of a planned model, in parts of the peak force: \"1%\", \"0.01\", or "
                         "\"jnd\", what a hand can feel"),

@@ -104,8 +104,6 @@ std::vector<Key<FormulationKeys>> settings() {
           with_default(key("sweeps", &K::sweeps, whole<int>(1, 1e6), "over the bonds, a step"),
                        usual.sweeps),
           exponentials_key({}),
-          with_default(key("rings", &K::rings, whole<int>(1, 3), "of bonds that are kept"),
-                       usual.rings),
           with_default(key("solver", &K::solver, word(kStiffnessSolverWords),
                            "how linear systems are solved: by a factorisation, or by conjugate "
                            "gradients with multigrid; automatic counts what the factor takes"),
@@ -180,7 +178,6 @@ FormulationChoice formulation_of(const FormulationKeys& block, const DocumentPla
   choice.density_kg_m3 = block.density_kg_m3.value_or(choice.density_kg_m3);
   choice.sweeps = block.sweeps.value_or(choice.sweeps);
   choice.exponentials = block.exponentials.value_or(choice.exponentials);
-  choice.rings = block.rings.value_or(choice.rings);
   choice.step_s = block.step_s;
   return choice;
 }

@@ -53,7 +53,7 @@ struct FormulationKeys {
   std::optional<bool> masses, mass_spring;
   std::optional<SpringRule> springs;
   std::optional<double> damping_ratio, density_kg_m3, step_s;
-  std::optional<int> sweeps, exponentials, rings;
+  std::optional<int> sweeps, exponentials;
   std::optional<StiffnessSolver> solver;
 };
 /// Its kinds are the formulations that the program links, each with the keys that it takes.

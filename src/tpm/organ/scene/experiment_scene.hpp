@@ -22,7 +22,6 @@ struct FormulationChoice {
   std::optional<double> step_s = std::nullopt;  ///< of formulations with given steps, > 0
   int sweeps = 1;                               ///< of XPBD over the bonds, a step, >= 1
   int exponentials = 1;                         ///< of reduced contacts, 1 to 3
-  int rings = 2;                                ///< of bonds that a zone keeps, 1 to 3
   bool mass_spring = false;  ///< the mass-spring model on the same spheres, not the tissue
   SpringRule springs = SpringRule::like_the_bonds;
   double tolerance = 1e-6;  ///< QuasiStaticOptions, InertialOptions, MethodSettings
