@@ -886,6 +886,8 @@ std::string table_row(const ErrorCase& error_case, const Answer& answer, const T
   // The load at which a path meets an instability depends on roundings of the linear algebra.
   static const std::regex buckling(R"(a load of [0-9.]+ N(,? the tissue buckles) around [^:]* mm)");
   message = std::regex_replace(message, buckling, "a load of ... N$1 around sphere ...");
+  static const std::regex sagging(R"((that stay the tissue buckles) around [^:;]* mm)");
+  message = std::regex_replace(message, sagging, "$1 around sphere ...");
   message = replace_all(message, "|", "\\|");
   return "| " + error_case.file_type + " | " + error_case.what + " | " +
          std::to_string(answer.exit_code) + " | `" + message + "` |\n";

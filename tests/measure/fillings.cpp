@@ -4,12 +4,14 @@
 // added, the least outer support, and over five pushes spread over the surface the largest over the
 // smallest stiffness and the smallest over the median, under one sphere and under a rigid patch
 // over four spacings; how many spheres such a patch has; and the largest over the smallest under
-// patches of 15 spheres each, the number that four spacings span on an even layer.
+// patches of 15 spheres each, the number that four spacings span on an even layer, and under an
+// even pressure on the disc over four spacings, where a sphere at the rim counts with its share.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -33,15 +35,18 @@ const std::array<Eigen::Vector3d, 5> kPushes{
     {{0.1, 0.2, 1.0}, {1.0, 0.1, -0.2}, {-0.3, 1.0, 0.4}, {-0.6, -0.5, 0.8}, {0.7, -0.6, -0.5}}};
 
 constexpr std::size_t kOfPatch = 15;  // 4 pi over sqrt(3)/2: 14.5
+const double kOfSphere =              // radius in spacings of the disc that a sphere stands for
+    std::sqrt(std::sqrt(3.0) / (2.0 * std::numbers::pi));
 
 struct Stiffness {
-  double single = 0.0, patch = 0.0, alike = 0.0;
+  double single = 0.0, patch = 0.0, alike = 0.0, pressed = 0.0;
   std::size_t spheres = 0;
 };
 
-/// Of spheres that are driven along a normal together, N/m.
-double driven_together(const Equilibrium& equilibrium, const std::vector<Eigen::Index>& spheres,
-                       const Eigen::Vector3d& normal, Eigen::Index columns) {
+/// How far each of some spheres moves along a normal under a force of 1 N on each, m/N.
+Eigen::MatrixXd compliance_of(const Equilibrium& equilibrium,
+                              const std::vector<Eigen::Index>& spheres,
+                              const Eigen::Vector3d& normal, Eigen::Index columns) {
   const auto size = static_cast<Eigen::Index>(spheres.size());
   Eigen::MatrixXd compliance(size, size);
   for (Eigen::Index j = 0; j < size; ++j) {
@@ -52,7 +57,19 @@ double driven_together(const Equilibrium& equilibrium, const std::vector<Eigen::
       compliance(i, j) = normal.dot(field.col(spheres[static_cast<std::size_t>(i)]));
     }
   }
-  return compliance.ldlt().solve(Eigen::VectorXd::Ones(size)).sum();
+  return compliance;
+}
+
+/// Of the first spheres, driven together, N/m.
+double driven_together(const Eigen::MatrixXd& compliance, std::size_t spheres) {
+  const auto size = static_cast<Eigen::Index>(spheres);
+  return compliance.topLeftCorner(size, size).ldlt().solve(Eigen::VectorXd::Ones(size)).sum();
+}
+
+/// Force over mean displacement under an even pressure, N/m.
+/// @param share of each sphere that lies under it
+double pressed(const Eigen::MatrixXd& compliance, const Eigen::VectorXd& share) {
+  return share.sum() * share.sum() / share.dot(compliance * share);
 }
 
 /// N/m, instantaneous at rest, with the far 30 % of the depth fixed.
@@ -82,24 +99,36 @@ Stiffness pushed(Organ organ, const Eigen::Vector3d& towards, const TpmParameter
   const auto apart = [&](Eigen::Index i) { return (at.col(i) - at.col(contact)).norm(); };
   std::stable_sort(nearest.begin(), nearest.end(),
                    [&](Eigen::Index a, Eigen::Index b) { return apart(a) < apart(b); });
-  const auto stiffness_of = [&](std::size_t spheres) {
-    const auto last = nearest.begin() + static_cast<std::ptrdiff_t>(spheres);
-    return driven_together(equilibrium, {nearest.begin(), last}, normal, at.cols());
+  const double spacing = network.organ.spacing;
+  const auto within = [&](double radius) {
+    return static_cast<std::size_t>(
+        std::count_if(nearest.begin(), nearest.end(),
+                      [&](Eigen::Index i) { return apart(i) <= radius * spacing; }));
   };
   Stiffness found;
-  found.spheres =
-      static_cast<std::size_t>(std::count_if(nearest.begin(), nearest.end(), [&](Eigen::Index i) {
-        return apart(i) <= kPatch * network.organ.spacing;
-      }));
-  found.single = stiffness_of(1);
-  found.patch = stiffness_of(found.spheres);
-  found.alike = stiffness_of(kOfPatch);
+  found.spheres = within(kPatch);
+  nearest.resize(std::max(kOfPatch, within(kPatch + kOfSphere)));
+  const Eigen::MatrixXd compliance = compliance_of(equilibrium, nearest, normal, at.cols());
+  Eigen::VectorXd share(compliance.rows());
+  for (Eigen::Index i = 0; i < share.size(); ++i) {
+    const double inside = kPatch - apart(nearest[static_cast<std::size_t>(i)]) / spacing;
+    share[i] = std::clamp(0.5 + 0.5 * inside / kOfSphere, 0.0, 1.0);
+  }
+  found.single = driven_together(compliance, 1);
+  found.patch = driven_together(compliance, found.spheres);
+  found.alike = driven_together(compliance, kOfPatch);
+  found.pressed = pressed(compliance, share);
   return found;
+}
+
+double largest_over_smallest(const std::vector<double>& values) {
+  const auto [smallest, largest] = std::minmax_element(values.begin(), values.end());
+  return *largest / *smallest;
 }
 
 std::string spread(std::vector<double> values) {
   std::sort(values.begin(), values.end());
-  return fmt::format("{:.2f} | {:.2f}", values.back() / values.front(),
+  return fmt::format("{:.2f} | {:.2f}", largest_over_smallest(values),
                      values.front() / values[values.size() / 2]);
 }
 
@@ -107,7 +136,7 @@ void measure(std::size_t from, std::size_t to) {
   fmt::print(
       "| lattice | spheres | outer | off the lattice | least outer support | single max/min | "
       "single min/median | patch max/min | patch min/median | spheres of it | 15 spheres max/min "
-      "|\n|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "| pressure max/min |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   const test::Sphere ball(kRadius_m);
   const TpmParameters material;
   constexpr int kCounts = 20;
@@ -120,13 +149,14 @@ void measure(std::size_t from, std::size_t to) {
       request.lattice = lattice;
       const Organ organ = fill_solid(ball, request);
       const std::vector<double> support = outer_support(build_network(organ, {}, "ball"));
-      std::vector<double> single, patch, alike;
+      std::vector<double> single, patch, alike, even;
       std::size_t fewest = organ.size(), most = 0;
       for (const Eigen::Vector3d& towards : kPushes) {
         const Stiffness stiffness = pushed(organ, towards, material);
         single.push_back(stiffness.single);
         patch.push_back(stiffness.patch);
         alike.push_back(stiffness.alike);
+        even.push_back(stiffness.pressed);
         fewest = std::min(fewest, stiffness.spheres);
         most = std::max(most, stiffness.spheres);
       }
@@ -134,12 +164,10 @@ void measure(std::size_t from, std::size_t to) {
           organ.assumptions.size() > 2
               ? organ.assumptions.back().substr(0, organ.assumptions.back().find(' '))
               : "0";
-      fmt::print("| {} | {} | {} | {} | {:.2f} | {} | {} | {} to {} | {:.2f} |\n",
+      fmt::print("| {} | {} | {} | {} | {:.2f} | {} | {} | {} to {} | {:.2f} | {:.2f} |\n",
                  entry_of(kLatticeWords, lattice).text, organ.size(), support.size(), added,
                  *std::min_element(support.begin(), support.end()), spread(single), spread(patch),
-                 fewest, most,
-                 *std::max_element(alike.begin(), alike.end()) /
-                     *std::min_element(alike.begin(), alike.end()));
+                 fewest, most, largest_over_smallest(alike), largest_over_smallest(even));
       std::fflush(stdout);
     }
   }

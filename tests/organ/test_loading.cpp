@@ -305,6 +305,9 @@ TEST_CASE("scenes with several protocols that make no sense are refused") {
   json["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   json["contacts"][0]["protocol"] = kRamp;
   CHECK_THROWS_WITH(scene_of(json), Contains("/contacts/1/protocol") && Contains("is missing"));
+  json["protocol"] = kRamp;  // which nothing would follow
+  CHECK_THROWS_WITH(scene_of(json), Contains("key /protocol: is of no contact"));
+  json.erase("protocol");
   json["contacts"][1]["protocol"] = parse_json(
       R"({"kind": "knots", "knots": [{"time": "1 s", "depth": "0 mm"}, {"time": "2 s", "depth": "1 mm"}]})",
       "late");

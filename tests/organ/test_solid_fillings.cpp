@@ -110,6 +110,38 @@ TEST_CASE("three inner spheres are within reach of every outer one of a ball") {
   CHECK_THAT(organ.assumptions.back(), Contains("spheres off the lattice"));
 }
 
+TEST_CASE("a sphere held from one side alone slides, one held from around does not") {
+  const Vector3d up = Vector3d::UnitZ();
+  const std::vector<Vector3d> around{{0.6, 0.0, -0.8}, {-0.6, 0.0, -0.8}};
+  CHECK(steadiness(up, around) == Approx(1.0));
+  CHECK(steadiness(up, std::vector<Vector3d>{{0.0, 0.0, -0.3}}) == Approx(1.0));
+  // One bond aslant: along c^2, coupling c s, sideways s^2, so that 1/(1 + 4 tan^2) is left.
+  const double tangent = 0.75;
+  CHECK(steadiness(up, std::vector<Vector3d>{{0.6, 0.0, -0.8}}) ==
+        Approx(1.0 / (1.0 + 4.0 * tangent * tangent)));
+  CHECK(steadiness(up, {}) == 0.0);
+}
+
+TEST_CASE("no outer sphere of a ball is held from one side alone") {
+  const Sphere ball(0.05);
+  const auto [lattice, count] = GENERATE(table<Lattice, std::size_t>(
+      {{Lattice::fcc, 1251}, {Lattice::bcc, 1700}, {Lattice::cubic, 1000}}));
+  INFO(count << " " << entry_of(kLatticeWords, lattice).text);
+  const Organ organ = solid_of(ball, count, lattice);
+  CHECK(organ.size() == count);
+  std::vector<std::vector<Vector3d>> inner(organ.size());
+  for (const NeighbourPair& pair : pairs_within(organ.position, kSolidReach * organ.spacing)) {
+    if (organ.layer[pair.second] > 0) {
+      inner[pair.first].emplace_back(organ.position.col(static_cast<Eigen::Index>(pair.second)) -
+                                     organ.position.col(static_cast<Eigen::Index>(pair.first)));
+    }
+  }
+  for (std::size_t i = 0; i < organ.size() && organ.layer[i] == 0; ++i) {
+    INFO("sphere " << i + 1);
+    CHECK(steadiness(organ.normal.col(static_cast<Eigen::Index>(i)), inner[i]) >= kLeastSteadiness);
+  }
+}
+
 TEST_CASE("an outer sphere that the inside does not hold is refused by number and place") {
   // Two layers, and one sphere beside them in the outer one.
   Organ organ = block(3, 3, 1, 0.01, Lattice::cubic);

@@ -51,6 +51,8 @@ inline std::vector<ErrorCase> simulation_error_cases() {
       {type, "contact without a protocol", simulate,
        scene(R"(, "contacts": [{"kind": "sphere", )" + push +
              R"(}, {"kind": "sphere", "number": 80}])")},
+      {type, "protocol beside those of the contacts", simulate,
+       pushed(R"("contacts": [{"kind": "sphere", )" + push + "}]")},
       {type, "protocols that begin apart", simulate,
        pushed(R"("contacts": [{"kind": "sphere"}, {"kind": "sphere", "number": 80,
          "protocol": {"kind": "knots", "knots": [{"time": "1 s", "depth": "0 mm"},

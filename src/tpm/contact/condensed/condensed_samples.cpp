@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "tpm/base/text.hpp"
+#include "tpm/organ/balance/buckling.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::contact {
@@ -40,9 +41,11 @@ void CondensedSampler::find_moves(State& state, const ViscousState& viscous_stat
   ++factorisations_;
   if (!equilibrium_.factorise(state.position, viscous_state) || !equilibrium_.is_stable()) {
     throw Error(ExitCode::numerical, ErrorCause::buckled, "condensed model",
-                fmt::format("with the contact at {} mm the tissue buckles: its stiffness is not "
+                fmt::format("with the contact at {} mm the tissue buckles{}: its stiffness is not "
                             "positive; expected a smaller depth",
-                            significant(1e3 * state.contact.norm(), 4)));
+                            significant(1e3 * state.contact.norm(), 4),
+                            buckling_place(equilibrium_, state.position, viscous_state,
+                                           state.position.cols())));
   }
   state.moves.resize(3 * rest_.cols(), 3);
   Eigen::Matrix3Xd shift;
@@ -114,12 +117,14 @@ void CondensedSampler::move(State& state, const Eigen::Vector3d& contact,
     }
     stride *= 0.5;
     if (stride < kLeastStride * stride_m_) {
-      throw Error(ExitCode::numerical,
-                  search.stable ? ErrorCause::snapped_through : ErrorCause::buckled,
-                  "condensed model",
-                  fmt::format("with the contact at {} mm the tissue {}; expected a smaller depth",
-                              significant(1e3 * state.contact.norm(), 4),
-                              search.stable ? "snaps through" : "buckles"));
+      throw Error(
+          ExitCode::numerical, search.stable ? ErrorCause::snapped_through : ErrorCause::buckled,
+          "condensed model",
+          fmt::format("with the contact at {} mm the tissue {}; expected a smaller depth",
+                      significant(1e3 * state.contact.norm(), 4),
+                      search.stable ? "snaps through"
+                                    : "buckles" + buckling_place(equilibrium_, state.position,
+                                                                 viscous_state, rest_.cols())));
     }
   }
 }

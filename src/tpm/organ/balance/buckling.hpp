@@ -12,4 +12,11 @@ namespace tpm::organ {
 /// @param state the last in balance; the factorisation of the tissue is lost
 [[nodiscard]] std::string buckling_words(DrivenTissue& tissue, const TissueState& state);
 
+/// The place of buckling_words: " around sphere 12 at (1, 2, 3) mm", or nothing.
+/// @param equilibrium its factorisation is lost
+/// @param position the last in balance, m
+/// @param spheres the first columns of it; tools follow
+[[nodiscard]] std::string buckling_place(Equilibrium& equilibrium, const Positions& position,
+                                         const ViscousState& viscous, Eigen::Index spheres);
+
 }  // namespace tpm::organ

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "tpm/base/text.hpp"
+#include "tpm/organ/balance/buckling.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -69,11 +70,14 @@ Positions loaded_positions(const BondSystem& bonds, const Positions& rest,
     unstable = !found.stable;
     part *= 0.5;
     if (part >= kLeastPart) continue;
-    throw Error(
-        ExitCode::numerical, unstable ? ErrorCause::buckled : ErrorCause::unspecified, "loads",
-        fmt::format("at {} % of the loads that stay the tissue {}", significant(100.0 * aim, 3),
-                    unstable ? "buckles" : "finds no equilibrium"),
-        "weaker loads, a stiffer tissue or more anchors");
+    const std::string fault =
+        unstable ? "buckles" + buckling_place(equilibrium, position, relaxed, position.cols())
+                 : "finds no equilibrium";
+    throw Error(ExitCode::numerical, unstable ? ErrorCause::buckled : ErrorCause::unspecified,
+                "loads",
+                fmt::format("at {} % of the loads that stay the tissue {}",
+                            significant(100.0 * aim, 3), fault),
+                "weaker loads, a stiffer tissue or more anchors");
   }
   return position;
 }

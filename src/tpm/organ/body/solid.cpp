@@ -203,36 +203,74 @@ Positions shallow(const SolidFilling& filling) {
   return points;
 }
 
+void add_inner(const Surface& surface, SolidFilling& filling, const Positions& added) {
+  for (Eigen::Index i = 0; i < added.cols(); ++i) {
+    filling.inner.push_back(inner_sphere(surface, filling.next_point++, added.col(i)));
+  }
+}
+
 /// Adds what the outer spheres lack.
 /// @param wanted inner spheres within reach of each
 std::size_t add_support(const Surface& surface, SolidFilling& filling, int wanted,
                         std::size_t most) {
   const Positions added = support_below(surface, filling.outer, filling.normal, shallow(filling),
                                         filling.spacing, wanted, most);
-  for (Eigen::Index i = 0; i < added.cols(); ++i) {
-    filling.inner.push_back(inner_sphere(surface, filling.next_point++, added.col(i)));
-  }
+  add_inner(surface, filling, added);
   return static_cast<std::size_t>(added.cols());
 }
+
+/// The outer spheres and the shallow ones that they touch.
+class Held {
+ public:
+  Held(const SolidFilling& filling, const Positions& shallow)
+      : filling_(filling),
+        shallow_(shallow),
+        below_(static_cast<std::size_t>(filling.outer.cols())) {
+    above_.resize(static_cast<std::size_t>(shallow.cols()));
+    Positions all(3, filling.outer.cols() + shallow.cols());
+    all << filling.outer, shallow;
+    const std::size_t outer = below_.size();
+    for (const NeighbourPair& pair : pairs_within(all, kSolidReach * filling.spacing)) {
+      if (pair.first >= outer || pair.second < outer) continue;
+      below_[pair.first].push_back(pair.second - outer);
+      above_[pair.second - outer].push_back(pair.first);
+    }
+  }
+
+  /// Whether every outer sphere still has what it wants without a shallow one.
+  [[nodiscard]] bool can_spare(std::size_t place) const {
+    return std::all_of(above_[place].begin(), above_[place].end(), [&](std::size_t outer) {
+      if (below_[outer].size() <= static_cast<std::size_t>(kWantedInside)) return false;
+      std::vector<Vector3d> inner;
+      for (const std::size_t other : below_[outer]) {
+        if (other != place) {
+          inner.emplace_back(shallow_.col(static_cast<Eigen::Index>(other)) -
+                             filling_.outer.col(static_cast<Eigen::Index>(outer)));
+        }
+      }
+      return steadiness(filling_.normal.col(static_cast<Eigen::Index>(outer)), inner) >=
+             kLeastSteadiness;
+    });
+  }
+
+  void leave_out(std::size_t place) {
+    for (const std::size_t outer : above_[place]) std::erase(below_[outer], place);
+  }
+
+ private:
+  const SolidFilling& filling_;
+  const Positions& shallow_;
+  std::vector<std::vector<std::size_t>> below_, above_;
+};
 
 /// Leaves out lattice points, the shallowest first, without which every outer sphere still has
 /// what it wants below it; the deepest where there are not so many.
 void leave_out(SolidFilling& filling, std::size_t surplus) {
   if (surplus == 0) return;
-  const double reach = kSolidReach * filling.spacing;
   const Positions points = shallow(filling);
-  Positions all(3, filling.outer.cols() + points.cols());
-  all << filling.outer, points;
-  const auto outer = static_cast<std::size_t>(filling.outer.cols());
-  std::vector<int> inside(outer, 0);
-  std::vector<std::vector<std::size_t>> above(static_cast<std::size_t>(points.cols()));
-  for (const NeighbourPair& pair : pairs_within(all, reach)) {
-    if (pair.first >= outer || pair.second < outer) continue;
-    ++inside[pair.first];
-    above[pair.second - outer].push_back(pair.first);
-  }
+  Held held(filling, points);
   // shallow() keeps the order of the inner spheres, of which it takes the last of the lattice.
-  std::vector<std::pair<std::size_t, std::size_t>> order;  // inner sphere, its number in `above`
+  std::vector<std::pair<std::size_t, std::size_t>> order;  // inner sphere, its number in `points`
   std::size_t number = 0;
   for (std::size_t i = 0; i < filling.inner.size(); ++i) {
     if (filling.inner[i].depth <= kShallow * filling.spacing) order.emplace_back(i, number++);
@@ -243,12 +281,8 @@ void leave_out(SolidFilling& filling, std::size_t surplus) {
   std::vector<bool> out(filling.inner.size(), false);
   for (const auto& [sphere, place] : order) {
     if (surplus == 0) break;
-    const auto& held = above[place];
-    if (std::any_of(held.begin(), held.end(),
-                    [&](std::size_t i) { return inside[i] <= kWantedInside; })) {
-      continue;
-    }
-    for (const std::size_t i : held) --inside[i];
+    if (!held.can_spare(place)) continue;
+    held.leave_out(place);
     out[sphere] = true;
     --surplus;
   }
@@ -259,6 +293,17 @@ void leave_out(SolidFilling& filling, std::size_t surplus) {
   }
   std::size_t at = 0;
   std::erase_if(filling.inner, [&](const InnerSphere&) { return out[at++]; });
+}
+
+/// Adds spheres where inner ones hold an outer sphere from one side alone, and leaves out as many
+/// lattice points of a solid of a given number.
+void steady(const Surface& surface, const SolidRequest& request, SolidFilling& filling) {
+  const Positions added =
+      steadying_below(surface, filling.outer, filling.normal, shallow(filling), filling.spacing);
+  add_inner(surface, filling, added);
+  if (request.count && filling.count() > *request.count) {
+    leave_out(filling, filling.count() - *request.count);
+  }
 }
 
 /// Layers one spacing thick below the outer one, without gaps, sorted.
@@ -353,6 +398,7 @@ Organ fill_solid(const Surface& surface, const SolidRequest& request) {
       added > 0 && request.count) {
     filling = counted_filling(surface, request, std::move(filling), added, known);
   }
+  steady(surface, request, filling);
   require_sphere_count(filling.count());
   set_layers(filling.spacing, filling.inner);
   Organ organ;

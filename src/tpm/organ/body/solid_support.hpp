@@ -1,5 +1,7 @@
 #pragma once
+#include <Eigen/Core>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "tpm/organ/body/surface.hpp"
@@ -11,6 +13,17 @@ namespace tpm::organ {
 inline constexpr int kWantedInside = 3;
 /// Reach of a bond in spacings: the default support of a network.
 inline constexpr double kSolidReach = 1.5;
+/// Least steadiness of an outer sphere.
+inline constexpr double kLeastSteadiness = 0.4;
+
+/// What is left of the stiffness of inner bonds along the normal of an outer sphere where the
+/// sphere may give way sideways: 1 - c^T (K + s I)^-1 c with the tangential stiffness K and the
+/// coupling c of the inner bonds over their normal stiffness, and s = 1/4 for its six neighbours on
+/// the surface, which give way too. 1 where inner spheres lie evenly around the normal; little
+/// where all lie to one side, so that a push is answered by a slide. 0 without inner spheres.
+/// @param inner from the sphere to those within reach, m
+[[nodiscard]] double steadiness(const Eigen::Vector3d& normal,
+                                std::span<const Eigen::Vector3d> inner);
 
 /// Places to add below the outer spheres that have fewer than `wanted` inner spheres within reach:
 /// a lattice of which a plane lies just too deep, or an edge, leaves such spheres with nothing to
@@ -25,5 +38,12 @@ inline constexpr double kSolidReach = 1.5;
 [[nodiscard]] Positions support_below(const Surface& surface, const Positions& outer,
                                       const Eigen::Matrix3Xd& normal, const Positions& inner,
                                       double spacing, int wanted, std::size_t most);
+
+/// Places to add below the outer spheres that inner ones hold from one side alone: of the places of
+/// support_below, the one that makes the sphere steadiest. Outer spheres without any inner one are
+/// not asked for.
+[[nodiscard]] Positions steadying_below(const Surface& surface, const Positions& outer,
+                                        const Eigen::Matrix3Xd& normal, const Positions& inner,
+                                        double spacing);
 
 }  // namespace tpm::organ

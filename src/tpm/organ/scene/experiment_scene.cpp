@@ -40,6 +40,10 @@ ExperimentScene parse_checked_experiment(const Json& scene, std::string_view whe
                     "what is done to the tissue, such as {\"kind\": \"ramp_hold\", \"depth\": \"8 "
                     "mm\", \"rate\": \"4 mm/s\", \"hold\": \"29 s\"}");
   }
+  if (keys.protocol && first_has_own) {
+    throw bad_input(at_protocol.where, "is of no contact",
+                    "none beside contacts with protocols of their own");
+  }
   const DocumentPlace at_contacts = place.key("contacts");
   std::vector<SceneContact> contacts =
       keys.contacts ? contacts_of(*keys.contacts, tissue, at_contacts, folder)
