@@ -5,6 +5,7 @@
 
 - every relative link in a Markdown page leads to a file, and its anchor to a heading;
 - every docs/PAGE.md named in a source, a script or a page exists;
+- every script, configuration, test and example that a page of docs or reports names is there;
 - docs/README.md links every page of docs, docs/site and reports, and the site's start lists every page of docs once;
 - docs has at most 35 pages beside those of docs/site, and reports at most 16, one in each folder: MOST;
 - three questions, as a new user types them, are answered two links from README.md at most: QUESTIONS;
@@ -83,6 +84,19 @@ def lost_pages(root):
         for name in set(re.findall(r"\bdocs/[\w/]+\.md\b", file.read_text(encoding="utf-8"))):
             if not (root / name).exists() and not name.startswith(MADE):
                 yield f"{file.relative_to(root)}: names {name}: no such page"
+
+
+# A path in a page; `git show COMMIT:configs/OLD.json` is of another day. Words in capitals stand for names.
+PATH = re.compile(r"(?<![\w/.:-])(?:scripts|configs|tests|data|schemas|examples|packaging|apps)/[\w./-]*\w")
+
+
+def lost_files(root):
+    for page in tracked(root, ".md"):
+        for line in page.read_text(encoding="utf-8").splitlines():
+            for name in PATH.findall(line):
+                known = (root / name).exists() or next(root.glob(f"{name}*"), None)  # a pattern: tests/ROOM/test_NAME*
+                if not known and not re.search(r"NAME|ROOM", name) and "git show" not in line:
+                    yield f"{page.relative_to(root)}: names {name}: no such file"
 
 
 def unlisted_pages(root):
@@ -263,7 +277,7 @@ def false_excerpts(root, program):
 
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
-    faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *too_many_pages(root), *unanswered(root), *faults_of_paper(root),
+    faults = [*broken_links(root), *lost_pages(root), *lost_files(root), *unlisted_pages(root), *too_many_pages(root), *unanswered(root), *faults_of_paper(root),
               *differing_groups(root, program), *without_example(root, program), *short_manuals(root, program), *far_pages(root),
               *false_excerpts(root, program)]
     for fault in faults:
