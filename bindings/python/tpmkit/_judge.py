@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,7 +93,8 @@ def validate(
     tpmkit.Error
         What the program refuses, in its words.
     """
-    files = list(recordings) if isinstance(recordings, Sequence) and not isinstance(recordings, str) else [recordings]
+    several = isinstance(recordings, Iterable) and not isinstance(recordings, (str, os.PathLike))
+    files: list[PathLike] = list(recordings) if several else [recordings]  # type: ignore[arg-type, list-item]
     words = ["validate", os.fspath(law), *(os.fspath(f) for f in files), *_options(columns)]
     for option, value in (("--require", require), ("--placement", placement), ("--instrument", instrument)):
         words += [] if value is None else [option, os.fspath(value)]
