@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes docs/figures/first_look.png, the picture of README.md: the live page of a session on the simulated
+# Makes docs/figures/first_look.png, the picture of docs/haptics.md: the live page of a session on the simulated
 # device, photographed by Chromium, beside error against cost from reports/accuracy/servo_normal.csv.
 # Takes about a minute. Needs build/release/tpm (scripts/run.sh) and chromium.
 set -euo pipefail

@@ -72,7 +72,7 @@ test::Handle any_handle(base::Random& random) {
 struct Held {
   int handles = 0, found = 0, mean = 0, largest = 0, certain = 0, mass = 0, mass_between = 0,
       coulomb = 0, above = 0, step = 0;
-  std::vector<double> lower;  ///< limit in parts of the truth
+  std::vector<double> lower;  ///< limit in parts of the true value
 };
 
 void add(Held& held, const test::Handle& h, const DeviceIdentification& f) {
@@ -108,10 +108,10 @@ void print_held(const char* title, Held& held) {
   print_share("of these, right to 10 %", held.mass, held.certain);
   print_share("interval of the mass holds it", held.mass_between, n);
   print_share("interval of Coulomb friction (95 %) holds it", held.coulomb, n);
-  print_share("lower limit of viscous friction above the truth", held.above, n);
+  print_share("lower limit of viscous friction above the true value", held.above, n);
   if (n == 0) return;
   fmt::print(
-      "\nlower limit in parts of the truth: 5 % of handles below {:.3f}, half below {:.3f}, "
+      "\nlower limit in parts of the true value: 5 % of handles below {:.3f}, half below {:.3f}, "
       "95 % below {:.3f}, largest {:.3f}\n\n",
       at(0.05), at(0.5), at(0.95), at(1.0));
 }
@@ -129,7 +129,7 @@ void print_handles(int count) {
   print_held("Coulomb friction up to 0.05 N", with);
   const int above = without.above + with.above, found = without.found + with.found;
   if (found == 0) return;
-  fmt::print("lower limit of viscous friction above the truth, of all: {} of {}, {}\n", above,
+  fmt::print("lower limit of viscous friction above the true value, of all: {} of {}, {}\n", above,
              found, exact_interval(above, found));
 }
 

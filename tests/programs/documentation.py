@@ -5,6 +5,8 @@
 
 - every relative link in a Markdown page leads to a file, and its anchor to a heading;
 - every docs/PAGE.md named in a source, a script or a page exists;
+- every command of tpm in a page of docs or reports is one, and has the options that stand behind it;
+- every script, configuration, test and example that a page of docs or reports names is there;
 - docs/README.md links every page of docs, docs/site and reports, and the site's start lists every page of docs once;
 - docs has at most 35 pages beside those of docs/site, and reports at most 16, one in each folder: MOST;
 - three questions, as a new user types them, are answered two links from README.md at most: QUESTIONS;
@@ -83,6 +85,19 @@ def lost_pages(root):
         for name in set(re.findall(r"\bdocs/[\w/]+\.md\b", file.read_text(encoding="utf-8"))):
             if not (root / name).exists() and not name.startswith(MADE):
                 yield f"{file.relative_to(root)}: names {name}: no such page"
+
+
+# A path in a page; `git show COMMIT:configs/OLD.json` is of another day. Words in capitals stand for names.
+PATH = re.compile(r"(?<![\w/.:-])(?:scripts|configs|tests|data|schemas|examples|packaging|apps)/[\w./-]*\w")
+
+
+def lost_files(root):
+    for page in tracked(root, ".md"):
+        for line in page.read_text(encoding="utf-8").splitlines():
+            for name in PATH.findall(line):
+                known = (root / name).exists() or next(root.glob(f"{name}*"), None)  # a pattern: tests/ROOM/test_NAME*
+                if not known and not re.search(r"NAME|ROOM", name) and "git show" not in line:
+                    yield f"{page.relative_to(root)}: names {name}: no such file"
 
 
 def unlisted_pages(root):
@@ -189,6 +204,28 @@ def without_example(root, program):
             yield f"{call} --help: has no example that calls it"
 
 
+# Of programs of another day, which the page says.
+GONE = {("predict", "--verdict")}
+
+
+def false_commands(root, program):
+    from command_help import commands
+
+    options = {tuple(c.words): {name for _, rows in c.sections for item, _ in rows for name in re.findall(r"(?<![\w-])--?[A-Za-z][\w-]*", item)}
+               for c in commands(program)}
+    for page in [root / "README.md", *tracked(root / "docs", ".md"), *tracked(root / "reports", ".md")]:
+        for line in page.read_text(encoding="utf-8").splitlines():
+            for call in re.findall(r"(?:^\s*(?:\$ )?(?:time )?(?:build/release/)?|`|&& |\| )tpm ([a-z][^`#|&>]*)", re.sub(r"\$\([^)]*\)", "", line)):
+                words, command = call.split(), ()
+                while len(words) > len(command) and (*command, words[len(command)]) in options:
+                    command = (*command, words[len(command)])
+                if not command and "completion" not in line:  # an argument of a script
+                    yield f"{page.relative_to(root)}: tpm {call.strip()}: no such command"
+                for option in re.findall(r"(?<!\S)(--?[A-Za-z][\w-]*)", call) if command else ():
+                    if option not in options[command] and (*command, option) not in GONE:
+                        yield f"{page.relative_to(root)}: tpm {' '.join(command)} has no option {option}"
+
+
 MANUAL = ("NAME", "SYNOPSIS", "OPTIONS", "EXAMPLES", "EXIT STATUS", "ENVIRONMENT", "FILES", "SEE ALSO")
 
 
@@ -263,8 +300,8 @@ def false_excerpts(root, program):
 
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
-    faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *too_many_pages(root), *unanswered(root), *faults_of_paper(root),
-              *differing_groups(root, program), *without_example(root, program), *short_manuals(root, program), *far_pages(root),
+    faults = [*broken_links(root), *lost_pages(root), *lost_files(root), *unlisted_pages(root), *too_many_pages(root), *unanswered(root), *faults_of_paper(root),
+              *differing_groups(root, program), *without_example(root, program), *false_commands(root, program), *short_manuals(root, program), *far_pages(root),
               *false_excerpts(root, program)]
     for fault in faults:
         print(fault)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Callable
 
 import numpy as np
 
-from . import _core
+from . import _core, _kinds
 from ._run import shown
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ class Contact:
         A file that cannot be read; a rendering that would be unstable.
     """
 
+    @_kinds.told
     def __init__(
         self,
         file: str | os.PathLike[str],
@@ -125,6 +126,7 @@ class Contact:
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings]) + ">"
 
 
+@_kinds.told
 def run_session(
     session: str | os.PathLike[str],
     output: str | os.PathLike[str],

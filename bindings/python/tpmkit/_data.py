@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Iterator, Mapping
 
 from . import _core
+from ._kinds import told
 
 if TYPE_CHECKING:
     import xarray
@@ -37,11 +38,12 @@ def with_units(data: xarray.Dataset) -> xarray.Dataset:
     return data
 
 
+@told
 def example(name: str) -> Path:
     """A file that comes with tpmkit, by its path, ``example("configs/liver_poke.json")``, or by its name alone,
     ``example("recording.csv")``. Raises tpmkit.Error if there is none, or several of that name."""
     share = Path(_core.share_dir())
-    path = share / name
+    path = share / os.fspath(name)
     if path.is_file():
         return path
     if Path(name).name != name:
@@ -56,6 +58,7 @@ def example(name: str) -> Path:
                       + (f"one of {', '.join(there)}" if there else "a file of configs/ or data/, such as recording.csv"))
 
 
+@told
 def read_recording(path: str | os.PathLike[str], *, columns: Mapping[str, Any] | None = None) -> xarray.Dataset:
     """A measured recording as a Dataset over time_s (over the sample, if the file has no times): drive and
     response under their names with unit. `columns` as for `tpmkit.fit`; attrs: title, citation, provenance,
@@ -143,6 +146,7 @@ def open_simulation(path: str | os.PathLike[str]) -> xarray.Dataset:
     return with_units(xarray.Dataset(variables, coords=coords, attrs=attrs))
 
 
+@told
 def open(path: str | os.PathLike[str]) -> xarray.Dataset:  # noqa: A001: tpmkit.open, as xarray.open_dataset
     """Opens what tpm wrote, or a measured recording, as an xarray Dataset.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Mapping, Sequence, Union
@@ -330,6 +331,7 @@ class Fit:
             ax.legend(frameon=False)
         return ax
 
+    @told
     def save(self, folder: PathLike) -> list[str]:
         """Writes configuration, law, selection and figures, as `tpm fit` does. Figures are drawn by the
         Python that has matplotlib, in another process.
@@ -587,8 +589,8 @@ def fit(
         return _fit_table(_table_of(time, depth, force, units), options)
     if hasattr(files, "to_csv"):
         return _fit_table(files, options)
-    if isinstance(files, (str, os.PathLike)):
-        if os.path.isdir(files):
+    if isinstance(files, (str, os.PathLike)) or not isinstance(files, Iterable):
+        if os.path.isdir(os.fspath(files)):
             words = ["fit", os.fspath(files), "--no-draw", *_options(columns)]
             said = {"laws": law, "starts": starts, "seed": seed, **placement}
             for key, value in said.items():

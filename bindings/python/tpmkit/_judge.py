@@ -8,11 +8,13 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from . import _program
 from ._fit import PathLike, _options
+from ._kinds import told
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,6 +65,7 @@ class Validation:
         return "\n".join([f"<tpmkit.Validation {self.verdict}: {self.words}", *(f"  warning: {w}" for w in self.warnings)]) + ">"
 
 
+@told
 def validate(
     law: PathLike,
     recordings: PathLike | Sequence[PathLike],
@@ -90,7 +93,8 @@ def validate(
     tpmkit.Error
         What the program refuses, in its words.
     """
-    files = [recordings] if isinstance(recordings, (str, os.PathLike)) else list(recordings)
+    several = isinstance(recordings, Iterable) and not isinstance(recordings, (str, os.PathLike))
+    files: list[PathLike] = list(recordings) if several else [recordings]  # type: ignore[arg-type, list-item]
     words = ["validate", os.fspath(law), *(os.fspath(f) for f in files), *_options(columns)]
     for option, value in (("--require", require), ("--placement", placement), ("--instrument", instrument)):
         words += [] if value is None else [option, os.fspath(value)]
@@ -143,6 +147,7 @@ class Design:
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings]) + ">"
 
 
+@told
 def design(problem: PathLike | Mapping[str, Any], *, repetitions: int = 100, seed: int = 0) -> Design:
     """Which experiment would identify the parameters (`tpm design`).
 
@@ -161,6 +166,7 @@ def design(problem: PathLike | Mapping[str, Any], *, repetitions: int = 100, see
         return Design(_program.answer(["design", os.fspath(problem), "--repetitions", str(repetitions), "--seed", str(seed)]))
 
 
+@told
 def view(file: PathLike, output: PathLike) -> Path:
     """Writes a result, a session or a fit as one interactive page, which needs nothing else (`tpm view`).
 

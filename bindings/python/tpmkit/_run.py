@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping
 
-from . import _core
+from . import _core, _kinds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,6 +59,7 @@ def scene_text(scene: str | os.PathLike[str] | Mapping[str, Any]) -> tuple[str, 
     return _core.read_text(os.fspath(path)), os.fspath(path), os.fspath(path.parent)
 
 
+@_kinds.told
 def simulate(
     scene: str | os.PathLike[str] | Mapping[str, Any],
     *,
@@ -118,6 +119,7 @@ def simulate(
     return with_units(data)
 
 
+@_kinds.told
 def sweep(
     file: str | os.PathLike[str],
     output: str | os.PathLike[str],
@@ -198,6 +200,7 @@ class Plan:
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings]) + ">"
 
 
+@_kinds.told
 def plan(
     scene: str | os.PathLike[str] | Mapping[str, Any],
     *,
