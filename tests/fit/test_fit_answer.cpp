@@ -177,7 +177,7 @@ TEST_CASE("a unit fits the size of its value, and one that takes no prefix stays
   CHECK(sized_text(Dimension::stress, 12e9, 4) == "12 GPa");
   CHECK(sized_text(Dimension::time, 5e6, 4) == "5e+06 s");
   CHECK(sized_text({"Pa s^alpha", Dimension::viscosity, 1.0}, 1e7, 4) == "1e+07 Pa s^alpha");
-  CHECK(sized_text({"mN/s", Dimension::force, 1e-3}, 1e-9, 4) == "1e-06 mN/s");
+  CHECK(sized_text({"mN/s", Dimension::force, 1e-3}, 1e-9, 4) == "1 nN/s");
 }
 
 TEST_CASE("an answer that is too long sums up rows and lets warnings share a line",

@@ -49,6 +49,11 @@ double largest_factor(Dimension dimension) {
   return 1e9;
 }
 
+/// Whether a unit that carries the dimension of what changes is a rate of it ("mN/s", a force).
+bool per_second(const Unit& unit) {
+  return unit.symbol.ends_with("/s") && unit.dimension != Dimension::speed;
+}
+
 }  // namespace
 
 Unit sized_unit(const Unit& usual, double si) {
@@ -57,16 +62,21 @@ Unit sized_unit(const Unit& usual, double si) {
   if (!(size > 0.0) || !std::isfinite(size)) return usual;
   if (size / usual.to_si >= kLeast && size / usual.to_si < kMost) return usual;
   const double most = largest_factor(usual.dimension);
-  // "Pa s^alpha" and "mN/s" carry the dimension of what they resemble, but are not units of it.
-  if (most == 0.0 || !is_unit(usual.symbol)) return usual;
-  if (parse_unit(usual.symbol, {}).dimension != usual.dimension) return usual;
+  // A rate, "mN/s", is sized as what changes; "Pa s^alpha" carries the dimension of what it
+  // resembles, but is no unit of it.
+  const std::string_view rate = per_second(usual) ? "/s" : "";
+  const std::string changing = usual.symbol.substr(0, usual.symbol.size() - rate.size());
+  if (most == 0.0 || !is_unit(changing)) return usual;
+  if (parse_unit(changing, {}).dimension != usual.dimension) return usual;
   const std::string_view symbol = si_symbol(usual.dimension);
   const PrefixedUnit* chosen = &kPrefixes.front();
   for (const PrefixedUnit& unit : kPrefixes) {
     // A value that rounds up to the next prefix is written with that one.
     if (unit.factor <= most && size * (1.0 + 5e-5) >= unit.factor) chosen = &unit;
   }
-  return parse_unit(fmt::format("{}{}", chosen->prefix, symbol), usual.dimension, {});
+  Unit unit = parse_unit(fmt::format("{}{}", chosen->prefix, symbol), usual.dimension, {});
+  unit.symbol += rate;
+  return unit;
 }
 
 std::string sized_text(const Unit& usual, double si, int digits) {
