@@ -41,8 +41,8 @@ struct ParameterResult {
   /// The automatic bounds, where the best fit or an interval pressed on them and they were widened.
   std::optional<Limits> first_bounds;
   std::vector<Condition> conditional_on;
-  /// What the recording cannot tell it from ("drift or a slow branch"); it is then not identified,
-  /// whatever its profile says. See EstimatedParameter.
+  /// Effects that the recording cannot separate from it ("drift or a slow branch"); it is then not
+  /// identified, whatever its profile says. See EstimatedParameter.
   std::string not_separable;
   /// Of a fit with a drift of the zero, where no rest tells one: `lower` and `upper` then hold this
   /// interval, too.

@@ -12,7 +12,7 @@ namespace tpm::fit {
 
 class ExperimentResiduals;
 
-/// What correlated or rounded readings do to one estimate of ordinary least squares.
+/// Effect of correlated or rounded readings on one estimate of ordinary least squares.
 struct NoiseOfEstimate {
   double variance_ratio = 0.0;  ///< its variance over that for independent noise of size 1; 0: none
   double degrees = 1.0;         ///< of freedom of Student's t

@@ -10,7 +10,7 @@
 
 namespace tpm::fit {
 
-/// How far the deviance may rise inside a confidence set.
+/// Largest rise of the deviance inside a confidence set.
 struct Threshold {
   double level = 0.95;      ///< in (0, 1)
   bool scale_known = true;  ///< sigma known: chi-square; known up to a factor: F
@@ -29,7 +29,7 @@ struct Threshold {
   /// curve takes up as much of correlated noise as `inflation` parameters of independent noise
   /// would. Throws Error(bad_input) if it must be estimated and n <= k.
   [[nodiscard]] double variance_factor(double minimum_deviance) const;
-  /// Whether the size of the noise is known or can be estimated.
+  /// True if the size of the noise is known or can be estimated.
   [[nodiscard]] bool estimable() const { return scale_known || data_count > parameter_count; }
   /// Rise of the deviance allowed for `constrained` (>= 1) parameters at once.
   [[nodiscard]] double rise(double minimum_deviance, int constrained = 1) const;
@@ -68,7 +68,7 @@ struct ProfilePoint {
   double deviance;
 };
 
-/// How the walk along a profile ended on one side.
+/// End of the walk along a profile on one side.
 enum class ProfileEnd {
   not_walked,
   limit,     ///< the deviance rose by the threshold there
