@@ -275,6 +275,21 @@ std::string words_of(const NoiseOfEstimates& noise, Eigen::Index samples, bool l
 
 }  // namespace
 
+double computed_variance(const ExperimentResiduals& function) {
+  double sum = 0.0;
+  int values = 0;
+  for (const FitDatum& d : function.data()) {
+    if (d.held_out || !d.value) continue;
+    ++values;
+    if (!(d.sigma > 0.0)) continue;  // an estimated one
+    const NoiseKind kind = function.config().data[d.choice].noise.kind;
+    const bool of_share = kind == NoiseKind::log || kind == NoiseKind::relative_to_model;
+    const double off = kComputedShare * (of_share ? 1.0 : std::abs(*d.value)) / d.sigma;
+    sum += off * off;
+  }
+  return values > 0 ? sum / values : 0.0;
+}
+
 std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& function,
                                                    std::span<const FitParameter> parameters,
                                                    std::span<const double> natural) {
@@ -307,6 +322,7 @@ std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& fu
   const double freedom = n - static_cast<double>(p);
   const double seen_size =
       noise.correlated ? found.variance : rows->residual.squaredNorm() / freedom;
+  if (!scale_known && seen_size < computed_variance(function)) return std::nullopt;
   const Eigen::VectorXd off = limiting_steps(*rows, seen_size);
   noise.variance = scale_known ? 1.0 : seen_size;
   const bool limited = off.size() > 0 && off.maxCoeff() > 0.0;
