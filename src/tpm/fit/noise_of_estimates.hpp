@@ -59,7 +59,9 @@ constexpr double kComputedShare = 1e-9;
 /// loss, noise that is not normal or whose size is a parameter). Independent means: neither does
 /// the Ljung-Box test reject at 1 % nor the restricted likelihood ratio of phi = 0.
 ///
-/// Readings that are rounded to steps q hide the noise where it is smaller than half a step. The
+/// Readings that are rounded to steps q hide the noise where it is smaller than half a step (by a
+/// test at 5 %, for its size is estimated: else half of the fits whose noise is half a step are
+/// called limited). The
 /// errors of rounding are then no noise: each is at most half a step, and so an estimate is biased
 /// by at most (q/2) sum |d estimate / d reading|, which widens its interval.
 ///
