@@ -293,6 +293,10 @@ TEST_CASE("rows of a sample that was lost are left out, and it is said") {
   CHECK(file.recording.response == std::vector{0.0, 3.0, 5.0, 6.0});
   CHECK_THAT(columns_words(file.findings),
              Catch::Contains("missing: 2 of 6 rows have an empty cell or NaN, from line 3 on"));
+  write_file(folder / "d.csv",
+             "Time (s),Force (N),Depth (mm)\n0,0,0\n1,---,1\n2,3,2\n3,null,3\n4,-5,4\n5,6,5\n");
+  CHECK(read_recording_file(folder / "d.csv", {}).recording.response ==
+        std::vector{0.0, 3.0, -5.0, 6.0});
   // A column that is mostly empty is none.
   write_file(folder / "g.csv", "Time (s),Force (N),Depth (mm)\n0,0,0\n1,nan,1\n2,nan,2\n");
   CHECK_THROWS_WITH(read_recording_file(folder / "g.csv", {}),

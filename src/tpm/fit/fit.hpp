@@ -126,6 +126,7 @@ struct FitResult {
   int degrees_of_freedom = 0;          ///< values less estimated parameters
   std::optional<double> chi_square_p;  ///< only for a known noise scale and dof > 0
   double variance_factor = 1.0;
+  double least_variance = 0.0;             ///< Threshold::least_variance
   std::optional<Likelihood> likelihood;    ///< none where there is none, see likelihood_at
   std::optional<Correlation> correlation;  ///< over all recordings, if there are any
   double inflation = 1.0;                  ///< Threshold::inflation of the intervals

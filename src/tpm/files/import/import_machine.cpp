@@ -109,17 +109,18 @@ class SeriesReader {
         "blank", fmt::format("{} in these columns", lines_of(table_, end_, all))));
   }
 
-  /// A sample that was lost is an empty cell or "NaN". Where most rows have one, the column is
-  /// none.
+  /// A sample that was lost is an empty cell, "NaN", "null" or "---". Where most rows have one, the
+  /// column is none.
   void leave_out_missing_readings(const std::vector<Use>& uses) {
     const auto missing = [&](std::size_t i) {
       return std::ranges::any_of(uses, [&](const Use& use) {
         std::string field(field_at(table_.rows[i], use.column->index));
         std::ranges::transform(field, field.begin(),
                                [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-        static constexpr auto kNone =
-            std::to_array<std::string_view>({"", "nan", "-nan", "na", "n/a", "#n/a"});
-        return std::ranges::find(kNone, field) != kNone.end();
+        static constexpr auto kNone = std::to_array<std::string_view>(
+            {"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none"});
+        return std::ranges::find(kNone, field) != kNone.end() ||
+               field.find_first_not_of('-') == std::string::npos;  // "---"
       });
     };
     const auto first = std::ranges::find_if(rows_, missing);
