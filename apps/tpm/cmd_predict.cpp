@@ -13,6 +13,7 @@
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/files/json.hpp"
+#include "tpm/files/other_kind.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/predict/organ_prediction.hpp"
 #include "tpm/fit/show/prediction_report.hpp"
@@ -51,7 +52,7 @@ PredictionOptions prediction_options(const PredictOptions& options) {
 LawPrediction answer_of(const std::string& subject, const std::optional<ProtocolFile>& file,
                         const std::optional<PreparedRecording>& recording,
                         const PredictionOptions& options) {
-  if (is_organ_document(read_json(subject))) {
+  if (is_organ_document(read_json_of(subject, "law"))) {
     const OrganOfLaw organ = read_organ_of_law(subject);
     return file ? predict_organ(organ, file->protocol, file->times_s, options)
                 : predict_organ(organ, *recording, options);

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -16,6 +15,7 @@
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/instrument.hpp"
 #include "tpm/files/json.hpp"
+#include "tpm/files/other_kind.hpp"
 #include "tpm/fit/predict/organ_prediction.hpp"
 #include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/show/credibility_page.hpp"
@@ -98,13 +98,7 @@ PickedAnswer picked_answer(const Json& scene, const std::string& where, const Pl
 /// The law, or the organ that it was put on.
 void set_subject(ValidationRequest& request, std::vector<std::string>& digests,
                  const ValidateOptions& options) {
-  const std::string text = read_file(options.law);
-  const std::size_t begin = text.find_first_not_of(" \t\r\n");
-  if (begin != std::string::npos && std::isalnum(static_cast<unsigned char>(text[begin])) != 0) {
-    throw bad_input(options.law, "is no law and no scene, which stands before the recordings",
-                    "law.json of tpm fit, or scene.json of tpm material");
-  }
-  const Json document = read_json(options.law);
+  const Json document = read_json_of(options.law, "law");
   request.law_file = options.law;
   request.law_sha256 = sha256_hex(read_file(options.law));
   if (!is_organ_document(document)) {

@@ -183,7 +183,13 @@ TEST_CASE("a requirement is a share, an amount or what a hand can tell", "[valid
     CHECK_THAT(test::refusal_of([&] { (void)parse_requirement(bare, "--require"); }),
                Contains("has no unit"));
   }
-  for (const char* none : {"0", "0%", "-5%", "-3 mN", "20 kg"}) {
+  CHECK(parse_requirement("JND", "--require").of_force);
+  CHECK(parse_requirement("99.9%", "--require").share);
+  for (const char* all : {"100%", "200%", "1e3 %"}) {
+    CHECK_THAT(test::refusal_of([&] { (void)parse_requirement(all, "--require"); }),
+               Contains("as large as the quantity") && Contains("below 100 %"));
+  }
+  for (const char* none : {"0", "0%", "-5%", "-3 mN", "20 kg", "nan", "nan%", "inf%", "%", ""}) {
     CHECK_THROWS(parse_requirement(none, "--require"));
   }
   CHECK_THAT(test::refusal_of([] { (void)parse_requirement("big", "--require"); }),

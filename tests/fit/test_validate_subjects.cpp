@@ -276,6 +276,82 @@ TEST_CASE("an organ is compared as its law is, with the numbers of its network",
   CHECK(validate(request).verdict == ModelVerdict::seen);
 }
 
+TEST_CASE("what the place of an organ's spheres does to a quantity is in u_num", "[validate]") {
+  const LawFile law = quiet_law();
+  std::vector<double> times;
+  for (int i = 0; i <= 24; ++i) times.push_back(static_cast<double>(i));
+  const OrganMaterial on_liver = put_on_organ(
+      law, {motion_of_protocol(ramp_and_hold(4e-3, 1e-3, 20.0), times)},
+      Json::parse(R"({"organ": {"kind": "liver", "count": 60}, "contacts": [{"kind": "sphere"}],
+"anchors": [{"kind": "far_side", "fraction": 0.3}]})"),
+      "test", {}, {});
+  const OrganOfLaw organ = organ_of_law(on_liver, "test");
+  const OtherFillings others = other_fillings(organ);
+  INFO(others.words);
+  REQUIRE(others.organs.size() == kOtherFillings);
+  for (const auto& other : others.organs) {
+    // The same body and number of spheres, in other places; the probe comes from the same side.
+    CHECK(other->spheres() == organ.spheres());
+    const Organ &a = other->spheres_of_scene(), &b = organ.spheres_of_scene();
+    CHECK((a.position - b.position).norm() > 0.1 * b.spacing);
+    const Eigen::Vector3d contact = a.position.col(static_cast<Eigen::Index>(*a.contact));
+    CHECK((contact - b.position.col(static_cast<Eigen::Index>(*b.contact))).norm() < b.spacing);
+  }
+  ComparisonOptions options;
+  options.organ = &organ;
+  options.fillings = &others;
+  options.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
+  const PreparedRecording recording = quiet_recording(1.0);
+  const RecordingComparison r = compare_with_recording(law, recording, options);
+  options.fillings = nullptr;
+  const RecordingComparison without = compare_with_recording(law, recording, options);
+  // By hand: each filling's forces times the factor by which they come nearest to the organ's along
+  // the motion at the calibration's depth; then the standard deviation of the six.
+  const LawAlong along(law, recording, &organ);
+  const std::vector<Eigen::VectorXd> forces = along.by_filling(others, r.placement.contact);
+  REQUIRE(forces.size() == kOtherFillings + 1);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const QuantityComparison &q = r.quantities[i], &bare = without.quantities[i];
+    CAPTURE(q.name, q.u_num, bare.u_num);
+    const double lattice = q.of_filling.norm();
+    CHECK(lattice > 0.0);
+    CHECK(lattice < 0.05 * q.simulated);
+    CHECK_THAT(q.u_num, WithinRel(std::hypot(lattice, bare.u_num), 1e-9));
+    CHECK(q.numerical.front().name == "the place of the spheres");
+    CHECK(q.e.coverage > bare.e.coverage);  // six values tell a scatter with five degrees
+    std::vector<double> s;
+    for (const Eigen::VectorXd& f : forces) {
+      s.push_back(
+          read_quantity(options.quantities[i], r.parts, recording.recording, r.placement.contact, f)
+              .value()
+              .value);
+    }
+    double mean = 0.0, square = 0.0;
+    for (const double v : s) mean += v / 6.0;
+    for (const double v : s) square += (v - mean) * (v - mean) / 5.0;
+    CHECK_THAT(std::sqrt(square), WithinRel(lattice, 1e-6));
+  }
+  // Two recordings share it: it does not shrink with their number.
+  ValidationRequest request = request_for(law, recording);
+  request.recordings.push_back(quiet_recording(1.0, 6));
+  request.organ = std::shared_ptr<const OrganOfLaw>(new OrganOfLaw(organ_of_law(on_liver, "test")));
+  const Validation both = validate(request);
+  REQUIRE_FALSE(both.pooled.empty());
+  CHECK(both.pooled.front().u_shared >= 0.99 * r.quantities.front().of_filling.norm());
+  CHECK_THAT(to_terminal_text(both), Contains("5 other fillings of the body"));
+  CHECK_THAT(to_json(both).at("recordings").at(0).at("u_num_of_spheres").get<std::string>(),
+             Contains("5 other fillings"));
+}
+
+TEST_CASE("an organ without another filling says so", "[validate]") {
+  const LawFile law = quiet_law();
+  ValidationRequest request = request_for(law, quiet_recording(1.0));
+  request.organ =
+      std::shared_ptr<const OrganOfLaw>(new OrganOfLaw(organ_of_law(star_of(law), "test")));
+  CHECK_THAT(to_terminal_text(validate(request)),
+             Contains("without what the place of the spheres does: a star"));
+}
+
 TEST_CASE("bonds that keep the law's relaxation times hide none of their uncertainty",
           "[validate]") {
   const LawFile law = quiet_law();
@@ -351,6 +427,38 @@ TEST_CASE("parts of fitted data get no verdict, whatever was done to them", "[va
     if (i % 5 < 2) f = other.recording.response[i];
     return true;
   });
+}
+
+TEST_CASE("a drift of the zero that the rest tells is no model error", "[validate]") {
+  const LawFile law = quiet_law();
+  const test::StudyNoise noise;  // 2 mN
+  const auto with_drift = [&](double per_s, std::uint64_t seed) {
+    Random random(seed);
+    Recording r = test::study_recording(test::study_validation(200, 0.0), noise, random);
+    for (std::size_t i = 0; i < r.time_s.size(); ++i) r.response[i] += per_s * r.time_s[i];
+    return prepare_recording("drifting", std::move(r));
+  };
+  int covered = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Validation v = validate(request_for(law, with_drift(1e-3, seed)));
+    const RecordingComparison& r = v.recordings.front();
+    REQUIRE(r.placement.drift);
+    CHECK_THAT(r.placement.drift->per_s, WithinAbs(1e-3, 4.0 * r.placement.drift->u_per_s));
+    const QuantityComparison& q = test::study_quantity(r, QuantityKind::end_of_hold);
+    // By hand: u of the slope times the time from the middle of the rest to the middle of the last
+    // tenth of the hold.
+    const auto part = std::ranges::find(q.parts, "the drift of the zero", &UncertaintyPart::name);
+    REQUIRE(part != q.parts.end());
+    const double lever_s = 19.9 + 0.75 + 19.0 - r.placement.drift->origin_s;
+    CHECK_THAT(part->u, WithinRel(r.placement.drift->u_per_s * lever_s, 0.02));
+    covered += std::abs(q.e.error) <= q.e.expanded();
+    if (seed == 1) {
+      CHECK_THAT(to_terminal_text(v), Contains("taken out"));
+      CHECK(to_json(v).at("recordings").at(0).at("placement").contains("zero_drift_per_s"));
+    }
+  }
+  CHECK(covered >= 17);  // fewer of 20 at 95 %: one run in 40
+  CHECK_FALSE(validate(request_for(law, with_drift(0.0, 2))).recordings.front().placement.drift);
 }
 
 TEST_CASE("a force in the wrong unit is a model error with a hint", "[validate]") {

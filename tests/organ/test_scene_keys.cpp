@@ -5,6 +5,7 @@
 
 #include "odd_documents.hpp"
 #include "refusal.hpp"
+#include "temp_folder.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/other_kind.hpp"
@@ -227,6 +228,38 @@ TEST_CASE("a file of another kind is called by its name", "[keys]") {
              Contains("this is a sweep; use tpm sweep"));
   CHECK_THAT(test::refusal_of([] { require_not_other_kind(poke(), "hil", "s.json"); }),
              StartsWith("s.json: this is a scene; use tpm simulate"));
+}
+
+TEST_CASE("what is no JSON is called by what it is", "[keys]") {
+  CHECK(kind_without_json("time [s],force [N]\n0,1\n") == "a table of samples");
+  CHECK(kind_without_json("\xEF\xBB\xBFmade by hand\r\n\r\ntime\tforce\r\n0\t1\r\n") ==
+        "a table of samples");
+  CHECK(kind_without_json("\x89HDF\r\n").value_or("").starts_with("an HDF5 file"));
+  CHECK(kind_without_json("<html></html>") == "a web page");
+  for (const char* told : {"", " {\"a\": 1,\n", "[1,\n2]", "11111",
+                           "\x7F"
+                           "ELF,\x02\n"}) {
+    CHECK_FALSE(kind_without_json(told));
+  }
+  const test::TempFolder folder;
+  const auto law_in = [&](const char* name) {
+    return test::refusal_of([&] { (void)read_json_of(folder / name, "law"); });
+  };
+  write_file(folder / "a.csv", "time [s],force [N]\n0,1\n");
+  CHECK_THAT(law_in("a.csv"), Contains("this is a table of samples") && Contains("tpm fit"));
+  CHECK_THAT(law_in("."), Contains("is a folder") && Contains("a fitted law"));
+  write_file(folder / "law.json", "{}");
+  CHECK_THAT(law_in("."), Contains("the file in it") && Contains("law.json"));
+  // Others have a key `law`, too.
+  const auto refused = [](const char* text) {
+    return test::refusal_of([text] { require_not_other_kind(Json::parse(text), "law", "l.json"); });
+  };
+  CHECK_THAT(refused(R"({"law": "linear-1", "parameters": [], "data": []})"),
+             Contains("the configuration of a fit"));
+  CHECK_THAT(refused(R"({"protocol": {}})"), Contains("this is a protocol"));
+  CHECK_THAT(refused(R"({"fitted_law": {}, "scene": {}, "law": ""})"),
+             Contains("a law put on an organ"));
+  CHECK_NOTHROW(require_not_other_kind(Json::parse(R"({"law": "", "protocol": {}})"), "law", ""));
 }
 
 TEST_CASE("a misspelt key makes no other kind of a file", "[keys]") {

@@ -1,5 +1,6 @@
 #pragma once
 // Laws, recordings, pages and options that tpm validate refuses (test_errors.cpp).
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -54,15 +55,46 @@ inline std::vector<ErrorCase> validation_error_cases() {
     return with_files({{"l.json", law(fit)}, {"r.csv", recording}});
   };
   std::string still = "time [s],depth [mm],force [N]\n";
-  for (int i = 0; i < 40; ++i) still += std::to_string(0.1 * i) + ",1,0.1\n";
+  std::string sudden = still, few = still, strip = "time [s],strain [1],stress [kPa]\n",
+              pulled = "time [s],stress [kPa],strain [1]\n";
+  for (int i = 0; i < 40; ++i) {
+    const std::string t = std::to_string(0.1 * i);
+    const std::string rising = std::to_string(std::min(0.1 * i, 1.0));
+    still += t + ",1,0.1\n";
+    sudden += t + (i < 10 ? ",0.5,0\n" : ",2,0.2\n");
+    if (i < 5) few += t + "," + rising + "," + rising + "\n";
+    strip += t + "," + rising + "," + rising + "\n";
+    pulled += t + "," + rising + "," + rising + "\n";
+  }
   return {
       {type, "neither law nor recording", "validate", with_files({})},
       {type, "law without recording", "validate {}/l.json", with_files({{"l.json", law("")}})},
+      {type, "recording in the law's place", "validate {}/r.csv {}/r.csv",
+       files(validated_recording())},
+      {type, "recording in the law's place of tpm predict",
+       "predict {}/r.csv --depth 1mm --rate 1mm/s --hold 1s", files(validated_recording())},
+      {type, "recording in the law's place of tpm budget", "budget {}/r.csv {}/r.csv",
+       files(validated_recording())},
+      {type, "folder in the law's place", "validate {}/.. {}/r.csv", files(validated_recording())},
+      {type, "protocol in the law's place", command,
+       with_files({{"l.json", R"({"protocol": {"kind": "ramp_hold", "depth": "1 mm",
+"rate": "1 mm/s", "hold": "1 s"}})"},
+                   {"r.csv", validated_recording()}})},
+      {type, "configuration of a fit in the law's place", command,
+       with_files({{"l.json", R"({"title": "t", "law": "linear-1", "parameters": [], "data": []})"},
+                   {"r.csv", validated_recording()}})},
+      {type, "web page in the law's place", command,
+       with_files({{"l.json", "<html></html>"}, {"r.csv", validated_recording()}})},
       {type, "missing law", command, with_files({{"r.csv", validated_recording()}})},
       {type, "missing recording", command, with_files({{"l.json", law("")}})},
       {type, "law without uncertainty", command, files(validated_recording())},
       {type, "requirement that is none", command + " --require much", files(validated_recording())},
       {type, "requirement of 0", command + " --require 0%", files(validated_recording())},
+      {type, "requirement of less than 0", command + " --require=-5%",
+       files(validated_recording())},
+      {type, "requirement of 200 %", command + " --require 200%", files(validated_recording())},
+      {type, "requirement that is no number", command + " --require nan%",
+       files(validated_recording())},
       {type, "requirement without a unit", command + " --require 20", files(validated_recording())},
       {type, "unknown placement", command + " --placement best", files(validated_recording())},
       {type, "unknown quantity", command + " --quantity slope", files(validated_recording())},
@@ -76,6 +108,10 @@ inline std::vector<ErrorCase> validation_error_cases() {
        with_files({{"l.json", law("")}})},
       {type, "force counted negative", command, fitted(validated_recording(-1.0))},
       {type, "depth that does not rise", command, fitted(still)},
+      {type, "depth that jumps", command, fitted(sudden)},
+      {type, "five samples", command, fitted(few)},
+      {type, "strip, for a law of contact", command, fitted(strip)},
+      {type, "strip under a load, for a law of contact", command, fitted(pulled)},
       {type, "requirement in the unit of nothing", command + " --require '20 mm'",
        fitted(validated_recording())},
       {type, "quantity that the recording lacks", command + " --quantity work",

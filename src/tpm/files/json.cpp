@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tpm/files/file.hpp"
+#include "tpm/files/other_kind.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -73,7 +74,11 @@ Json parse_json(std::string_view text, std::string_view where) {
 }
 
 Json read_json(const std::filesystem::path& path) {
-  return parse_json(read_file(path), path.string());
+  const std::string text = read_file(path);
+  if (const auto called = kind_without_json(text)) {
+    throw bad_input(path.string(), fmt::format("this is {}", *called), "a JSON file");
+  }
+  return parse_json(text, path.string());
 }
 
 std::string to_text(const Json& value) {

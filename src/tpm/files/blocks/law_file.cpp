@@ -11,6 +11,7 @@
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/keys/more_types.hpp"
+#include "tpm/files/other_kind.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -212,7 +213,7 @@ Json files::to_json(const LawFile& law) {
 }
 
 LawFile read_law(const std::filesystem::path& path) {
-  return law_from_json(read_json(path), path.string());
+  return law_from_json(read_json_of(path, "law"), path.string());
 }
 
 void write_law(const std::filesystem::path& path, const LawFile& law) {

@@ -124,9 +124,14 @@ class EvidencePage {
         largest = q.at("numerical").at(0).at("name").get<std::string>();
       }
     }
+    std::string numbers =
+        fmt::format("u_num at most {} of S, the most of it {}", significant(worst, 1), largest);
+    const Json& first = validation_.at("recordings").at(0);
+    if (first.contains("u_num_of_spheres")) {
+      numbers += ", " + first.at("u_num_of_spheres").get<std::string>();
+    }
     std::map<std::string, Cell> cells{
-        {"calculation verification",
-         {fmt::format("u_num at most {} of S, the most of it {}", significant(worst, 1), largest)}},
+        {"calculation verification", {std::move(numbers)}},
         {"calibration",
          {fmt::format("{}, fitted to {}; u_input from {}",
                       validation_.at("subject").get<std::string>(), calibration,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/fit/autoregressive.hpp"
@@ -22,6 +23,8 @@ struct FittedSlopes {
   /// fit weighed its prior by (0: no prior), and the variance of what was measured by readings that
   /// `scores` does not hold.
   Eigen::VectorXd prior, prior_variance;
+  /// u of the scores where --contact-force held contact between two samples; else 0.
+  Eigen::VectorXd by_contact;
 };
 
 /// Contact and zero of a recording in the fit, and which were estimated.
@@ -53,6 +56,15 @@ PlacementInFit placement_in(const LawFile& law, const LawAlong& along, const Fit
   return in;
 }
 
+/// u of a contact that --contact-force put between two samples: a rectangle of one step of the
+/// drive.
+double contact_u_by_threshold(const PreparedRecording& recording, double contact) {
+  const std::size_t at = recording.phases.contact_index;
+  if (at == 0 || !is_at_threshold(recording, contact)) return 0.0;
+  const std::vector<double>& drive = recording.recording.drive;
+  return std::abs(drive[at] - drive[at - 1]) / std::numbers::sqrt3;
+}
+
 double precision_of(const std::optional<Measured>& measured) {
   return measured && measured->sd > 0.0 ? 1.0 / (measured->sd * measured->sd) : 0.0;
 }
@@ -64,6 +76,7 @@ FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
   const Recording& r = recording.recording;
   const LawAlong along(law, recording);
   const PlacementInFit in = placement_in(law, along, file, only_one, recording, parts, scatter);
+  const bool by_threshold = is_at_threshold(recording, in.contact);
   const LawAlong::At at = along.at(in.contact);
   std::vector<Eigen::Index> rows;
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
@@ -91,7 +104,7 @@ FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
   if (in.fits_zero) {
     columns.push_back({Eigen::VectorXd::Ones(n), precision_of(measured.rests.zero), zero_weights});
   }
-  if (in.fits_contact) {
+  if (in.fits_contact && !by_threshold) {
     columns.push_back(
         {at.by_contact(rows), indents ? precision_of(measured.onset.drive) : 0.0, onset_weights});
   }
@@ -109,6 +122,11 @@ FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
   for (Eigen::Index k = 0; k < width; ++k)
     j.col(p + k) = columns[static_cast<std::size_t>(k)].slope;
   slopes.gram = j.transpose() * j;
+  slopes.by_contact = Eigen::VectorXd::Zero(p + width);
+  if (by_threshold && !along.contact_of_law()) {
+    slopes.by_contact =
+        contact_u_by_threshold(recording, in.contact) * (j.transpose() * at.by_contact(rows));
+  }
   slopes.scores = Eigen::MatrixXd::Zero(std::ssize(r.time_s), p + width);
   slopes.scores(rows, Eigen::all) = j;
   for (Eigen::Index k = 0; k < width; ++k) {
@@ -125,6 +143,13 @@ FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
 }
 
 }  // namespace
+
+bool is_at_threshold(const PreparedRecording& recording, double contact) {
+  constexpr double kHeld = 1e-5;  // of the travel; a fit to several holds it within 1e-6
+  const double travel = recording.phases.peak_drive - recording.phases.contact_drive;
+  return recording.contact_held &&
+         std::abs(contact - recording.phases.contact_drive) <= kHeld * std::abs(travel);
+}
 
 std::optional<LawFile> with_calibration_covariance(const LawFile& law,
                                                    std::span<const PreparedRecording> calibration) {
@@ -162,6 +187,7 @@ std::optional<LawFile> with_calibration_covariance(const LawFile& law,
     };
     add(a, all[i].gram);
     add(b, noisy);
+    add(b, all[i].by_contact * all[i].by_contact.transpose());
     const Eigen::VectorXd& prior = all[i].prior;
     a.diagonal().segment(place, width) += prior;
     b.diagonal().segment(place, width) += prior.cwiseAbs2().cwiseProduct(all[i].prior_variance);

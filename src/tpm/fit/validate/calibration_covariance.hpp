@@ -18,14 +18,18 @@ namespace tpm::fit {
 /// reading against which it weighed them. W holds the weights of the readings in what was measured:
 /// the ramp's first part tells the onset and is fitted, too, so the two are not independent, and
 /// the sd of an onset allows for more than scatter. What has no such weights counts as independent:
-/// v^2 P is added to B. The sandwich holds for correlated readings, and for a law that leaves
-/// something out: then it is the scatter about the best law of its kind. Degrees of freedom: the
-/// sum over recordings.
+/// v^2 P is added to B, and (J' s u)(J' s u)' where --contact-force put contact between two samples
+/// of the drive (s the derivative by contact, u = step / sqrt 3). The sandwich holds for correlated
+/// readings, and for a law that leaves something out: then it is the scatter about the best law of
+/// its kind. Degrees of freedom: the sum over recordings.
 ///
 /// None where this is not what the fit did: noise that is not of one size, a recording that is
 /// missing.
 /// @param calibration in the order of the law's data
 [[nodiscard]] std::optional<LawFile> with_calibration_covariance(
     const LawFile& law, std::span<const PreparedRecording> calibration);
+
+/// Whether a contact of a fit is the sample at which the recording passes --contact-force.
+[[nodiscard]] bool is_at_threshold(const PreparedRecording& recording, double contact);
 
 }  // namespace tpm::fit

@@ -10,6 +10,7 @@
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/distributions.hpp"
+#include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/predict/organ_readings.hpp"
@@ -59,12 +60,15 @@ class Comparer {
     const auto& theirs = options_.calibration_instrument;
     result_.same_instrument = ours && theirs && ours->id == theirs->id;
     result_.creep = along_.load_imposed();
+    const bool own_zero = options_.known != KnownPlacement::surface && !result_.creep;
+    const auto drift = own_zero ? take_out_drift(prepared_) : std::nullopt;
     const std::optional<double>& asked_s = options_.motion.hold_asked_s;
     result_.parts = asked_s ? parts_of_press(prepared_, *asked_s) : parts_of(prepared_);
     result_.part = compared_part(r_, result_.parts, asked_s);
     result_.scatter = scatter_of(prepared_, result_.parts);
     result_.placement = place_for_validation(along_, prepared_, result_.parts, result_.scatter,
                                              options_.placement, known_placement());
+    result_.placement.drift = drift;
     at_ = along_.at(result_.placement.contact);
     refine();
     const auto n = static_cast<Eigen::Index>(r_.response.size());
@@ -126,13 +130,8 @@ class Comparer {
       add(refinement.name, grid_convergence(values, refinement.ratio).u);
     }
     if (!by_filling_.empty()) {
-      const auto n = std::ssize(by_filling_);
-      q.of_filling.resize(n);
-      for (Eigen::Index i = 0; i < n; ++i) {
-        q.of_filling[i] = times(s.weight, by_filling_[static_cast<std::size_t>(i)]);
-      }
-      q.of_filling.array() -= q.of_filling.mean();
-      q.of_filling /= std::sqrt(static_cast<double>(n - 1));
+      q.of_filling = root_of(mapped<double>(
+          by_filling_, [&](const Eigen::VectorXd& curve) { return times(s.weight, curve); }));
       add(kFilling, q.of_filling.norm());
     }
     if (claimed_limit_ > 0.0) {
@@ -275,6 +274,8 @@ class Comparer {
     q.parts.push_back({zero_name(), u_of(from_zero)});
     q.of_contact = by_contact * p.contact_u_sampled;
     q.parts.push_back({"the contact point", std::hypot(u_of(from_contact), q.of_contact)});
+    const double by_drift = p.drift ? p.drift->u(weight, r_.time_s) : 0.0;
+    q.parts.push_back({"the drift of the zero", by_drift});
     const Eigen::RowVectorXd by_law =
         times(s.weight, at_.by_law) + by_contact * p.contact_by_law + by_zero * p.zero_by_law;
     q.shared = by_law * along_.root();
@@ -293,7 +294,7 @@ class Comparer {
     }
     add_instrument(q, s, d);
     const double own_instrument = q.of_instrument.norm();
-    const double stated = std::hypot(stated_zero, q.of_contact);
+    const double stated = std::hypot(stated_zero, q.of_contact, by_drift);
     q.u_D = std::hypot(u_readings, own_instrument, stated);
     const double by_filling = q.of_filling.norm();
     const double of_numbers = std::sqrt(std::max(q.u_num * q.u_num - by_filling * by_filling, 0.0));
@@ -424,12 +425,8 @@ class Comparer {
       if (values.size() < 2) continue;
       square += std::pow(grid_convergence(values, refinement.ratio).u, 2);
     }
-    if (!by_filling_.empty()) {
-      Eigen::VectorXd at(std::ssize(by_filling_));
-      for (Eigen::Index i = 0; i < at.size(); ++i)
-        at[i] = by_filling_[static_cast<std::size_t>(i)][k];
-      square += (at.array() - at.mean()).square().sum() / static_cast<double>(at.size() - 1);
-    }
+    const auto at_sample = [k](const Eigen::VectorXd& curve) { return curve[k]; };
+    square += root_of(mapped<double>(by_filling_, at_sample)).squaredNorm();
     if (!options_.instrument && !options_.calibration_instrument) return square;
     for (const InstrumentEffect& effect : effects_of(slopes_of(k))) {
       const double ours = effect.validation * effect.u_validation;

@@ -34,4 +34,11 @@ GridConvergenceEstimate grid_convergence(const std::vector<double>& values, doub
   return g;
 }
 
+Eigen::RowVectorXd root_of(const std::vector<double>& values) {
+  if (values.size() < 2) return {};
+  Eigen::RowVectorXd root = Eigen::RowVectorXd::Map(values.data(), std::ssize(values));
+  root.array() -= root.mean();
+  return root / std::sqrt(static_cast<double>(values.size() - 1));
+}
+
 }  // namespace tpm::fit

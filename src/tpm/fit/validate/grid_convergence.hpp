@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -28,5 +29,8 @@ struct GridConvergenceEstimate {
 /// Throws Error(bad_input) for fewer values, another ratio, or values that are not finite.
 [[nodiscard]] GridConvergenceEstimate grid_convergence(const std::vector<double>& values,
                                                        double ratio, double largest_order = 2.0);
+
+/// Deviations of values from their mean over sqrt(n - 1): their squares sum to the variance.
+[[nodiscard]] Eigen::RowVectorXd root_of(const std::vector<double>& values);
 
 }  // namespace tpm::fit

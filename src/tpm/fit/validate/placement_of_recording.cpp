@@ -10,6 +10,7 @@
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/select/placement.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -131,6 +132,28 @@ std::string length_words(double value, Dimension dimension) {
   const Unit unit = shown_unit(dimension);
   return with_unit(significant(value / unit.to_si, 3), unit);
 }
+
+}  // namespace
+
+double ZeroDrift::u(const Eigen::VectorXd& weight, const std::vector<double>& time_s) const {
+  const auto time = Eigen::VectorXd::Map(time_s.data(), weight.size());
+  return u_per_s * std::abs(weight.dot((time.array() - origin_s).matrix()));
+}
+
+std::optional<ZeroDrift> take_out_drift(PreparedRecording& recording) {
+  constexpr double kSeen = 3.0;
+  const RestReadings rests = read_rests(recording);
+  if (!rests.zero || !rests.drift) return std::nullopt;
+  const ZeroDrift drift{rests.drift->value, rests.drift->sd, rests.origin_s};
+  if (!(std::abs(drift.per_s) > kSeen * drift.u_per_s)) return std::nullopt;
+  Recording& r = recording.recording;
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    r.response[i] -= drift.per_s * (r.time_s[i] - drift.origin_s);
+  }
+  return drift;
+}
+
+namespace {
 
 class HeldPlacement {
  public:

@@ -27,6 +27,18 @@ enum class KnownPlacement {
   surface,    ///< a session: depths count from its surface, where the rendered force is 0
 };
 
+/// The zero moves along a straight line.
+struct ZeroDrift {
+  double per_s = 0.0, u_per_s = 0.0;  ///< SI
+  double origin_s = 0.0;              ///< where it is uncorrelated with the zero
+  /// Of a sum of readings.
+  [[nodiscard]] double u(const Eigen::VectorXd& weight, const std::vector<double>& time_s) const;
+};
+
+/// The drift that the readings before contact tell (read_rests), where it is more than three of its
+/// standard uncertainties; takes it out of the readings. Less than that stays in them.
+[[nodiscard]] std::optional<ZeroDrift> take_out_drift(PreparedRecording& recording);
+
 /// Contact and zero of one recording, and how they follow readings and law to first order.
 struct ValidationPlacement {
   double contact = 0.0;  ///< drive, SI
@@ -41,6 +53,7 @@ struct ValidationPlacement {
   double contact_u_sampled = 0.0;
   std::optional<double> onset, onset_u;  ///< where the onset was found, whatever is used
   std::string contact_words;             ///< what it rests on
+  std::optional<ZeroDrift> drift;        ///< that was taken out of the readings
   /// Of a fitted placement: how far it lies from the held one, in standard uncertainties of both.
   std::optional<double> contact_moved, zero_moved;
 };

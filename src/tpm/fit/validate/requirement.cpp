@@ -39,7 +39,7 @@ Requirement parse_requirement(std::string_view text, std::string_view where) {
   const std::string expected = "a share such as 10%, an amount such as \"20 mN\", or jnd";
   Requirement r;
   r.stated = std::string(text);
-  if (text == "jnd") {
+  if (text == "jnd" || text == "JND") {
     r.value = kForceJnd;
     r.of_force = true;
     r.stated = fmt::format("jnd, {} %", significant(100.0 * kForceJnd, 3));
@@ -52,6 +52,11 @@ Requirement parse_requirement(std::string_view text, std::string_view where) {
         throw bad_input(where, fmt::format("'{}' has no unit", printable(text)), expected);
       }
       r.stated = fmt::format("{} %", significant(100.0 * *share, 6));
+    }
+    if (r.value >= 1.0) {
+      throw bad_input(where,
+                      fmt::format("'{}' allows an error as large as the quantity", printable(text)),
+                      "below 100 %, such as 10%, or an amount such as \"20 mN\"");
     }
   } else {
     const QuantityText parts = split_quantity(text);

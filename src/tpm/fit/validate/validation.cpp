@@ -144,9 +144,19 @@ std::string threshold_words(const ValidationRequest& request) {
   const LawUncertainty& u = *request.law.uncertainty;
   const bool alone = std::ranges::any_of(
       u.place, [&](std::size_t place) { return table[place].name == "contact"; });
-  const bool of_file = std::ranges::any_of(u.data, [](const FittedFile& file) {
-    return file.contact && std::ranges::find(file.held, "contact") == file.held.end();
-  });
+  // Contacts of several recordings are parameters, also where --contact-force holds them.
+  bool of_file = false;
+  for (std::size_t i = 0; i < u.data.size(); ++i) {
+    const FittedFile& file = u.data[i];
+    if (!file.contact || std::ranges::find(file.held, "contact") != file.held.end()) continue;
+    const auto& files = request.calibration.files;
+    const bool found = i < files.size() && files[i].recording;
+    if (u.data.size() > 1 && !found) {
+      return "whether the law was fitted with --contact-force is not known without its recordings; "
+             "if it was not, the difference is in E";
+    }
+    of_file = of_file || !found || !is_at_threshold(*files[i].recording, *file.contact);
+  }
   if (!alone && !of_file) return {};
   return "the law was fitted without --contact-force: its depths count from the onset, those of "
          "the recordings from where the force is passed; the difference is in E";
@@ -299,6 +309,10 @@ Validation validate(const ValidationRequest& request) {
   const LawFile& law = again ? *again : request.law;
   v.u_input_from = again ? "the scatter of the calibration's recordings (sandwich)"
                          : "the covariance in the law file";
+  if (request.contact_by_threshold && threshold_words(request).empty()) {
+    v.u_input_from += again ? ", with one step of the drive at the contact of each"
+                            : ", without the step of the drive at the calibration's contact";
+  }
   if (request.organ && !request.organ->times_follow() && law.spec.branches > 0) {
     v.u_input_from += "; S follows the relaxation times, which the bonds keep, as the law does";
   }

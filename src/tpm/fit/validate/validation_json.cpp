@@ -99,6 +99,10 @@ Json recording_json(const RecordingComparison& r, const Applicability& a, const 
   Json placement{{"contact", stored(p.contact)},    {"contact_u", stored(p.contact_u)},
                  {"contact_from", p.contact_words}, {"zero", stored(p.zero)},
                  {"zero_u", stored(p.zero_u)},      {"zero_readings", p.zero_readings}};
+  if (p.drift) {
+    placement["zero_drift_per_s"] = stored(p.drift->per_s);
+    placement["zero_drift_u_per_s"] = stored(p.drift->u_per_s);
+  }
   if (p.onset) placement["onset"] = stored(*p.onset);
   if (p.onset_u) placement["onset_u"] = stored(*p.onset_u);
   if (p.contact_moved) placement["contact_moved_in_u"] = stored(*p.contact_moved);

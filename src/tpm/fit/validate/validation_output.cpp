@@ -116,6 +116,11 @@ std::string placement_text(const RecordingComparison& r, const Unit& unit, Dimen
   }
   text += fmt::format("; zero {}, u {}, from {} readings", with_unit(number(p.zero, unit), unit),
                       with_unit(number(p.zero_u, unit, 2), unit), p.zero_readings);
+  if (p.drift) {
+    text += fmt::format("; its drift of {}/s, u {}/s, taken out",
+                        with_unit(number(p.drift->per_s, unit), unit),
+                        with_unit(number(p.drift->u_per_s, unit, 2), unit));
+  }
   if (p.zero_moved) {
     text += fmt::format("; the fit moved the zero by {} of its u", significant(*p.zero_moved, 2));
   }
