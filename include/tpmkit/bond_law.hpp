@@ -55,7 +55,7 @@ struct BondLaw {
   void tidy();
 };
 
-/// How the law of a bond between two materials follows from their laws.
+/// Rule by which the law of a bond between two materials follows from their laws.
 enum class BlendRule {
   mean,    ///< half of each side by side: the mean of the forces
   series,  ///< one half of each behind the other: the harmonic mean of the complex moduli

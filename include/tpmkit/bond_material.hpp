@@ -9,7 +9,7 @@
 
 namespace tpm {
 
-/// How the bonds within a layer pull.
+/// Law of the bonds within a layer.
 enum class LateralBond {
   elastic,       ///< modulus E', pulling and pushing
   tension_only,  ///< modulus E', as a rope

@@ -166,7 +166,7 @@ struct Spectrum {
   std::vector<double> loss_sd;
 };
 
-/// What the columns of a spectrum of that dimension hold.
+/// Quantities of the columns of a spectrum of that dimension.
 struct SpectrumQuantities {
   Quantity storage;
   Quantity loss;

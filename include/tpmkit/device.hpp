@@ -68,7 +68,7 @@ struct DeviceMounting {
   std::optional<double> angle_rad, base_angle_x_rad, base_angle_z_rad;
 };
 
-/// How a device is set up before a session.
+/// Settings of a device before a session.
 struct DevicePreparation {
   DeviceMounting mounting;
   double period_s = 1e-3;     ///< of the loop

@@ -11,7 +11,7 @@
 
 namespace tpm::fit {
 
-/// What the data say about one parameter.
+/// Verdict of the data on one parameter.
 enum class Verdict {
   identified,   ///< the interval is closed on both sides
   lower_only,   ///< only a lower limit: larger values up to the bound cannot be told apart
@@ -23,7 +23,7 @@ enum class Verdict {
 
 [[nodiscard]] std::string_view verdict_name(Verdict verdict) noexcept;
 
-/// What a fit with a drift of the zero says of a parameter; SI.
+/// Estimate of a parameter by a fit with a drift of the zero; SI.
 struct WithDrift {
   double estimate = 0.0;
   std::optional<double> lower, upper;
@@ -40,8 +40,8 @@ struct FittedParameter {
   bool nuisance = false;  ///< belongs to the recording or its noise, not to the material
   /// The law does not describe the data: estimate, limits and verdict hold only if it did.
   bool only_if_described = false;
-  /// What the recording cannot tell it from ("drift or a slow branch"): it is then not identified,
-  /// whatever the verdict. Empty: nothing.
+  /// Effects that the recording cannot separate from it ("drift or a slow branch"): it is then not
+  /// identified, whatever the verdict. Empty: nothing.
   std::string not_separable;
   /// The second answer, where no rest tells a drift of the zero: `lower` and `upper` hold its
   /// interval, too.

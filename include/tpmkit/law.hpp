@@ -11,7 +11,7 @@
 
 namespace tpm {
 
-/// How the elastic force of a contact grows with its depth u, relative to a reference depth u_ref.
+/// Growth of the elastic force of a contact with its depth u, relative to a reference depth u_ref.
 enum class Kernel {
   linear,  ///< W = u (the paper; a flat punch; a stretched strip)
   hertz,   ///< W = u_ref (u/u_ref)^(3/2): rigid sphere on a half space. Lee and Radok's solution
@@ -19,7 +19,7 @@ enum class Kernel {
   power,   ///< W = u_ref (u/u_ref)^m, 1 <= m: quasi-linear viscoelasticity after Fung
 };
 
-/// Which parameters describe the relaxing branches: two views of one law.
+/// Parameters that describe the relaxing branches: two views of one law.
 enum class BranchForm {
   parallel,  ///< generalised Maxwell (Prony): k_inf, k_i, tau_i
   series,    ///< Kelvin chain: k0 in series with units of a spring kc_i and a retardation time T_i
@@ -50,18 +50,18 @@ enum class Fractional {
   zener_pair,  ///< spring k_inf beside maxwell_pair
 };
 
-/// Whether a law has two spring-pots. They may change places without changing the law: alpha is
+/// True if a law has two spring-pots. They may change places without changing the law: alpha is
 /// the larger order by convention only.
 [[nodiscard]] constexpr bool has_two_springpots(Fractional law) {
   return law == Fractional::maxwell_pair || law == Fractional::kelvin_voigt_pair ||
          law == Fractional::zener_pair;
 }
-/// Whether a spring k_inf is parallel to the relaxing part.
+/// True if a spring k_inf is parallel to the relaxing part.
 [[nodiscard]] constexpr bool has_lasting_spring(Fractional law) {
   return law == Fractional::kelvin_voigt || law == Fractional::zener ||
          law == Fractional::zener_pair;
 }
-/// Whether the law has a relaxation time, as series combinations do.
+/// True if the law has a relaxation time, as series combinations do.
 [[nodiscard]] constexpr bool has_relaxation_time(Fractional law) {
   return law == Fractional::maxwell || law == Fractional::zener ||
          law == Fractional::maxwell_pair || law == Fractional::zener_pair;
@@ -102,7 +102,7 @@ struct LawSpec {
 /// Error(bad_input).
 [[nodiscard]] LawSpec parse_law_name(std::string_view text, std::string_view where);
 
-/// Whether the coefficients are secants at the reference depth, because kernel or tension is
+/// True if the coefficients are secants at the reference depth, because kernel or tension is
 /// nonlinear. Such coefficients can be compared only at one reference.
 [[nodiscard]] bool depends_on_reference(const LawSpec& spec) noexcept;
 

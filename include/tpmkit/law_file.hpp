@@ -20,7 +20,7 @@ struct LawFile {
   std::optional<double> fitted_to = std::nullopt;
   /// Uncertainty of the parameters: the block "fit" of the file.
   std::optional<LawUncertainty> uncertainty = std::nullopt;
-  /// Whether the law describes the data that it was fitted to. None: it was not tested.
+  /// True if the law describes the data that it was fitted to. None: it was not tested.
   std::optional<LawAdequacy> adequacy = std::nullopt;
 };
 

@@ -32,7 +32,7 @@ struct FittedFile {
   /// Of a recording that was fitted together with others: its own contact (m, or a relative length)
   /// and offset (N or Pa). Of a single one they stand among the law's parameters.
   std::optional<double> contact = std::nullopt, offset = std::nullopt;
-  /// Which of the two were not estimated: "contact", "offset".
+  /// Those of the two that were not estimated: "contact", "offset".
   std::vector<std::string> held = {};
   /// Limits of the force cell: readings at or beyond them were censored, SI.
   std::optional<double> clipped_above = std::nullopt, clipped_below = std::nullopt;
@@ -44,18 +44,18 @@ struct FittedFile {
   /// has the same, however its file is named or formatted. Empty: not stated.
   std::string samples_sha256 = {};
 
-  /// What the drift adds to a reading.
+  /// Addition of the drift to a reading.
   [[nodiscard]] double drifted(double time_s) const {
     return drift ? *drift * (time_s - drift_origin_s.value_or(0.0)) : 0.0;
   }
 
-  /// Whether a reading stands at a limit of the force cell.
+  /// True if a reading stands at a limit of the force cell.
   [[nodiscard]] bool clips(double reading) const {
     return (clipped_above && reading >= *clipped_above) ||
            (clipped_below && reading <= *clipped_below);
   }
 
-  /// Whether a sample at this time was fitted.
+  /// True if a sample at this time was fitted.
   [[nodiscard]] bool holds(double time_s) const {
     return !(from_s && time_s < *from_s) && !(to_s && time_s > *to_s);
   }
@@ -72,8 +72,8 @@ struct ReadingNoise {
   double lag_1 = 0.0;     ///< correlation of neighbouring residuals
 };
 
-/// Whether a law describes the recordings that it was fitted to: their residuals against the noise
-/// that was measured where nothing moves.
+/// Verdict whether a law describes the recordings that it was fitted to: their residuals against
+/// the noise that was measured where nothing moves.
 struct LawAdequacy {
   std::string verdict;                        ///< adequate, not_described or not_judged
   std::optional<double> residual_over_noise;  ///< of the worst recording; none if not judged

@@ -26,7 +26,7 @@ struct Response {
 
 enum class Want { values, values_and_sensitivity };
 
-/// How lambda1 enters. `exact` is lambda1(e(t)); the paper freezes it at one value.
+/// Form of lambda1. `exact` is lambda1(e(t)); the paper freezes it at one value.
 struct TensionRule {
   enum class Kind { exact, frozen_at_peak, frozen_at_value };
   Kind kind = Kind::exact;

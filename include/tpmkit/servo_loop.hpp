@@ -128,7 +128,7 @@ using RecordSink = std::function<void(const ServoRecord&)>;
                                                const RecordSink& sink,
                                                const std::function<bool()>& interrupted = {});
 
-/// What to do if the system refuses real-time scheduling.
+/// Response to a system that refuses real-time scheduling.
 enum class RealTimeWish {
   enforce,  ///< an error
   ignore,   ///< continue with a note

@@ -34,7 +34,7 @@ enum class StopCause : std::int32_t {
 
 [[nodiscard]] std::string_view word_of(StopCause cause);
 
-/// What happened in a cycle.
+/// Events of a cycle.
 enum ServoFlag : std::uint32_t {
   kTouching = 1U << 0U,
   kTimeGuarded = 1U << 1U,   ///< position of an earlier call

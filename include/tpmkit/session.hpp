@@ -25,7 +25,7 @@ struct SessionRequest {
   /// Empty: that of `device_file`, else "virtual" for Session::simulated_device() and "omega7" for
   /// every other device.
   std::string limits;
-  /// What was measured of the device (schemas/device.schema.json, `tpm hil identify`). Without it
+  /// Measurements of the device (schemas/device.schema.json, `tpm hil identify`). Without it
   /// hardware counts as 20 ms late and free of friction, and stiff tissues are refused.
   std::filesystem::path device_file;
   bool may_move = false;              ///< the device may move by itself to initialise

@@ -128,6 +128,8 @@ std::vector<ErrorCase> machine_cases() {
       {type, "wrong unit", import, machine("Time,Force,Depth\ns,mm,mm\n0,0,0\n1,1,1\n")},
       {type, "no number", import, machine(head + "0,0,0\n1,high,1\n")},
       {type, "NaN", import, machine(head + "0,0,0\n1,nan,1\n")},
+      {type, "NaN that leaves too few", "fit {}/m.csv --no-draw",
+       machine(head + "0,0,0\n1,1,1\n2,nan,2\n")},
       {type, "unsorted time", import, machine(head + "0,0,0\n2,1,1\n1,1,1\n")},
       {type, "negative standard deviation", import,
        machine("Time,Force,Depth,SD\ns,N,mm,N\n0,0,0,0\n1,1,1,-1\n")},

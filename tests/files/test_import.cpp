@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/header_words.hpp"
@@ -292,10 +293,33 @@ TEST_CASE("rows of a sample that was lost are left out, and it is said") {
   CHECK(file.recording.response == std::vector{0.0, 3.0, 5.0, 6.0});
   CHECK_THAT(columns_words(file.findings),
              Catch::Contains("missing: 2 of 6 rows have an empty cell or NaN, from line 3 on"));
+  write_file(folder / "d.csv",
+             "Time (s),Force (N),Depth (mm)\n0,0,0\n1,---,1\n2,3,2\n3,null,3\n4,-5,4\n5,6,5\n");
+  CHECK(read_recording_file(folder / "d.csv", {}).recording.response ==
+        std::vector{0.0, 3.0, -5.0, 6.0});
   // A column that is mostly empty is none.
   write_file(folder / "g.csv", "Time (s),Force (N),Depth (mm)\n0,0,0\n1,nan,1\n2,nan,2\n");
   CHECK_THROWS_WITH(read_recording_file(folder / "g.csv", {}),
                     Catch::Contains("g.csv:3: column 2 'Force': 'nan'"));
+}
+
+TEST_CASE("where a lost sample leaves too few, file, row and column are named") {
+  const TempFolder folder;
+  const auto refusal = [&](const std::string& cell) {
+    write_file(folder / "n.csv", "Time (s),Force (N),Depth (mm)\n0,0,0\n1,1,1\n2,2," + cell + "\n");
+    return test::refusal_of([&] { (void)read_recording_file(folder / "n.csv", {}); });
+  };
+  for (const char* const none : {"nan", "NaN", "n/a", ""}) {
+    CAPTURE(none);
+    CHECK_THAT(
+        refusal(none),
+        Catch::Contains("n.csv: 2 samples (1 of 3 rows have an empty cell or NaN, from line 4 "
+                        "on (column 3 'Depth'): left out); expected at least 3 rows"));
+  }
+  for (const char* const word : {"inf", "-inf", "hello", "1e999", "1,2"}) {
+    CAPTURE(word);
+    CHECK_THAT(refusal(word), Catch::Contains("n.csv:4: "));
+  }
 }
 
 TEST_CASE("rows of one time stamp become their mean, and it is said") {

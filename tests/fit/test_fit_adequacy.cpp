@@ -17,6 +17,7 @@ using namespace tpm::data;
 using namespace tpm::files;
 using namespace tpm::fit;
 using Catch::Contains;
+using Catch::EndsWith;
 using Catch::StartsWith;
 using test::AdequacyTrial;
 using test::Defect;
@@ -72,6 +73,27 @@ TEST_CASE("a law that does not describe its recording says so first and everywhe
   CHECK(law.adequacy->words == s.words.front());
   CHECK(predict_recording(law, recording, {}).flags.front() == s.words.front());
   CHECK(export_warnings(law, {}).front() == s.words.front());
+}
+
+TEST_CASE("where no law tried describes a recording, the laws that were not tried are named",
+          "[adequacy][wired]") {
+  AdequacyTrial trial;
+  trial.at_rest = 60;
+  trial.defect = Defect::ringing;
+  trial.defect_N = 0.1;
+  const PreparedRecording recording = prepared(trial);
+  SelectionOptions options;
+  options.laws = {parse_law_name("linear-1", "test"), parse_law_name("linear", "test")};
+  options.only_listed = true;
+  options.held_out = false;
+  options.setup.profiles = false;
+  const Selection classical = select_law(std::span(&recording, 1), options);
+  CHECK_THAT(classical.words.front(), StartsWith("no law tried describes this recording: ") &&
+                                          EndsWith("not tried: --family fractional"));
+  options.laws.push_back(parse_law_name("linear-fspringpot", "test"));
+  const Selection all = select_law(std::span(&recording, 1), options);
+  CHECK_THAT(all.words.front(), StartsWith("no law tried describes this recording: ") &&
+                                    !Contains("--family fractional"));
 }
 
 TEST_CASE("a law that describes its recording says how near it comes", "[adequacy][wired]") {

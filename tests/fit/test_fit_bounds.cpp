@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <optional>
 
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -56,6 +57,21 @@ FitResult fitted_power(const PreparedRecording& r, bool widen) {
   return run_fit(config, data_sets(one));
 }
 
+/// A material of 2 s, fitted with an automatic upper bound of 0.1 s.
+/// @param widest how far the bounds may go, if not as far as they are made
+FitResult fitted_below_its_tau(const std::optional<WidestBounds>& widest) {
+  const std::vector<PreparedRecording> one{pressed_from_the_start(0.0, 1.5)};
+  FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
+  for (EstimatedParameter& p : config.parameters) {
+    if (p.fit.name != "tau1") continue;
+    p.fit.lower = 0.01;
+    p.fit.start = 0.02;
+    p.fit.upper = 0.1;
+    if (widest) p.widest = widest;
+  }
+  return run_fit(config, data_sets(one));
+}
+
 }  // namespace
 
 TEST_CASE("The contact of a recording that begins in contact may lie two depths before it",
@@ -79,16 +95,7 @@ TEST_CASE("The contact of a recording that begins in contact may lie two depths 
 }
 
 TEST_CASE("Automatic bounds of the material are widened, and a note says so", "[bounds]") {
-  const PreparedRecording r = pressed_from_the_start(0.0, 1.5);
-  const std::vector<PreparedRecording> one{r};
-  FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
-  for (EstimatedParameter& p : config.parameters) {
-    if (p.fit.name != "tau1") continue;
-    p.fit.lower = 0.01;
-    p.fit.start = 0.02;
-    p.fit.upper = 0.1;  // 2 s
-  }
-  const FitResult fit = run_fit(config, data_sets(one));
+  const FitResult fit = fitted_below_its_tau({});
   const ParameterResult& tau = named(fit, "tau1");
   REQUIRE(tau.first_bounds);
   CHECK(tau.first_bounds->upper == 0.1);
@@ -98,17 +105,7 @@ TEST_CASE("Automatic bounds of the material are widened, and a note says so", "[
 }
 
 TEST_CASE("Bounds that could be widened by rounding alone stay, and nothing is said", "[bounds]") {
-  const PreparedRecording r = pressed_from_the_start(0.0, 1.5);
-  const std::vector<PreparedRecording> one{r};
-  FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
-  for (EstimatedParameter& p : config.parameters) {
-    if (p.fit.name != "tau1") continue;
-    p.fit.lower = 0.01;
-    p.fit.start = 0.02;
-    p.fit.upper = 0.1;  // 2 s
-    p.widest = WidestBounds{0.01, 0.1 * (1.0 + 1e-15)};
-  }
-  const FitResult fit = run_fit(config, data_sets(one));
+  const FitResult fit = fitted_below_its_tau(WidestBounds{0.01, 0.1 * (1.0 + 1e-15)});
   const ParameterResult& tau = named(fit, "tau1");
   CHECK(tau.at_upper_bound);
   CHECK_FALSE(tau.first_bounds);
@@ -117,17 +114,8 @@ TEST_CASE("Bounds that could be widened by rounding alone stay, and nothing is s
 }
 
 TEST_CASE("A widening tells the bounds apart however small it is", "[bounds]") {
-  const PreparedRecording r = pressed_from_the_start(0.0, 1.5);
-  const std::vector<PreparedRecording> one{r};
-  FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
-  for (EstimatedParameter& p : config.parameters) {
-    if (p.fit.name != "tau1") continue;
-    p.fit.lower = 0.01;
-    p.fit.start = 0.02;
-    p.fit.upper = 0.1;
-    p.widest = WidestBounds{0.01, 0.100001};
-  }
-  CHECK_THAT(fmt::format("{}", fmt::join(run_fit(config, data_sets(one)).flags, "\n")),
+  const FitResult fit = fitted_below_its_tau(WidestBounds{0.01, 0.100001});
+  CHECK_THAT(fmt::format("{}", fmt::join(fit.flags, "\n")),
              Contains("tau1 were widened from 0.01 s .. 0.1 s to 0.01 s .. 0.100001 s"));
 }
 
@@ -184,7 +172,8 @@ TEST_CASE("An interval that a bound of the contact point cuts says so", "[bounds
 }
 
 TEST_CASE("A profile that fails is not a flat profile", "[bounds]") {
-  // The creep of a Maxwell element without noise: u = F/k (1 + t/tau).
+  // The creep of a Maxwell element, u = F/k (1 + t/tau), with noise that is said to be smaller than
+  // rounding.
   PointSet creep;
   creep.header.id = "maxwell";
   creep.observable = Observable::indentation_depth;
@@ -206,7 +195,7 @@ TEST_CASE("A profile that fails is not a flat profile", "[bounds]") {
       "tau1": {"start": "3 s", "lower": "0.001 s", "upper": "1000 s", "scale": "log",
                "sets": ["tau1"]}},
     "data": [{"dataset": "maxwell", "protocol": {"kind": "creep"},
-              "noise": {"kind": "absolute", "absolute": "0.01 mm", "scale": "estimated"}}],
+              "noise": {"kind": "absolute", "absolute": "1e-18 mm"}}],
     "starts": {"count": 4, "seed": 0}})",
                                    "test");
   const FitResult fit = run_fit(parse_fit_config(document, "test"), {creep});

@@ -489,25 +489,3 @@ TEST_CASE("a drive that overshoots before it is held is fitted to the end of the
   }
   CHECK(prepare_recording("unloaded.csv", r).to_s < end_s + 6.0);
 }
-
-TEST_CASE("the samples after a step are left out, as long as they ring", "[placement]") {
-  PlacedTest test;
-  test.rest_s = 5.0;
-  test.ramp_s = 0.05;  // one sample
-  test.start_m = -0.1e-3;
-  Random random(13);
-  Recording r = test::measured(test, test::placed(test), random);
-  const PreparedRecording step = prepare_recording("step.csv", r);
-  CHECK(step.from_s > 5.1);
-  CHECK(step.from_s < 5.4);
-  CHECK_THAT(step.start_up, Contains("after the step are left out"));
-  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-    const double since = r.time_s[i] - 5.05;
-    if (since >= 0.0) r.response[i] += 0.05 * std::exp(-since / 0.3) * std::cos(40.0 * since);
-  }
-  const PreparedRecording ringing = prepare_recording("ringing.csv", r);
-  CHECK(ringing.from_s > 5.8);
-  CHECK_THAT(ringing.start_up, Contains("they ring"));
-  PlacedTest ramp;
-  CHECK(test::prepared(ramp, 3).start_up.empty());
-}

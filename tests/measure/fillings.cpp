@@ -1,11 +1,13 @@
 // Prints the tables of reports/networks: how evenly the surface of a solid ball answers.
-//     build/release/tests/measure_fillings [FROM TO]
+//     build/release/tests/measure_fillings [FROM TO [alike]]
 // For 20 numbers of spheres (or those between FROM and TO) and each lattice: spheres that were
 // added, the least outer support, and over five pushes spread over the surface the largest over the
 // smallest stiffness and the smallest over the median, under one sphere and under a rigid patch
 // over four spacings; how many spheres such a patch has; and the largest over the smallest under
 // patches of 15 spheres each, the number that four spacings span on an even layer, and under an
 // even pressure on the disc over four spacings, where a sphere at the rim counts with its share.
+// `alike`: the five pushes are one direction turned by symmetries of the lattice, so that they
+// differ in the filling alone.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -33,6 +35,9 @@ constexpr double kPatch = 2.0;  // radius in spacings
 
 const std::array<Eigen::Vector3d, 5> kPushes{
     {{0.1, 0.2, 1.0}, {1.0, 0.1, -0.2}, {-0.3, 1.0, 0.4}, {-0.6, -0.5, 0.8}, {0.7, -0.6, -0.5}}};
+
+const std::array<Eigen::Vector3d, 5> kAlike{
+    {{0.1, 0.2, 1.0}, {1.0, 0.1, -0.2}, {-0.2, 1.0, 0.1}, {-0.1, 0.2, -1.0}, {-1.0, -0.1, 0.2}}};
 
 constexpr std::size_t kOfPatch = 15;  // 4 pi over sqrt(3)/2: 14.5
 const double kOfSphere =              // radius in spacings of the disc that a sphere stands for
@@ -132,7 +137,7 @@ std::string spread(std::vector<double> values) {
                      values.front() / values[values.size() / 2]);
 }
 
-void measure(std::size_t from, std::size_t to) {
+void measure(std::size_t from, std::size_t to, const std::array<Eigen::Vector3d, 5>& pushes) {
   fmt::print(
       "| lattice | spheres | outer | off the lattice | least outer support | single max/min | "
       "single min/median | patch max/min | patch min/median | spheres of it | 15 spheres max/min "
@@ -151,7 +156,7 @@ void measure(std::size_t from, std::size_t to) {
       const std::vector<double> support = outer_support(build_network(organ, {}, "ball"));
       std::vector<double> single, patch, alike, even;
       std::size_t fewest = organ.size(), most = 0;
-      for (const Eigen::Vector3d& towards : kPushes) {
+      for (const Eigen::Vector3d& towards : pushes) {
         const Stiffness stiffness = pushed(organ, towards, material);
         single.push_back(stiffness.single);
         patch.push_back(stiffness.patch);
@@ -176,9 +181,10 @@ void measure(std::size_t from, std::size_t to) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return test::measured(
-      argc, argv, 0, 2, "measure_fillings [FROM TO]", [](const std::vector<std::string>& words) {
-        const bool all = words.size() < 2;
-        measure(all ? 0 : std::stoul(words[0]), all ? 6000 : std::stoul(words[1]));
-      });
+  return test::measured(argc, argv, 0, 3, "measure_fillings [FROM TO [alike]]",
+                        [](const std::vector<std::string>& words) {
+                          const bool all = words.size() < 2;
+                          measure(all ? 0 : std::stoul(words[0]), all ? 6000 : std::stoul(words[1]),
+                                  words.size() == 3 && words[2] == "alike" ? kAlike : kPushes);
+                        });
 }

@@ -13,7 +13,7 @@
 
 namespace tpm::accuracy {
 
-/// What one run of a setting brought.
+/// Result of one run of a setting.
 struct BenchmarkRun {
   MethodRun outcome;
   /// Wall time of each step, s, where the problem measures its steps one by one (contact models at
@@ -39,7 +39,8 @@ struct BenchmarkSetting {
   std::optional<double> step_s;  ///< where all steps are equally long: one has to fit its period
   /// @param time_steps measure BenchmarkRun::step_wall_s, if the problem knows how
   std::function<BenchmarkRun(bool time_steps)> run;
-  /// Which numbers of the reference's response it answers; empty: all. Asked after the reference.
+  /// Indices of the numbers of the reference's response that it answers; empty: all. Asked after
+  /// the reference.
   std::function<AnsweredPart()> part = {};
 
   [[nodiscard]] std::string curve() const {
@@ -76,7 +77,7 @@ struct BenchmarkReference {
 /// @param components divides the size
 [[nodiscard]] Eigen::VectorXd sizes_of(const Eigen::VectorXd& response, int components);
 
-/// What an answer of a closed form is good for: rounding.
+/// Accuracy of an answer of a closed form: rounding.
 inline constexpr double kExactFloor = 1e-14;
 
 /// Compares two answers. The floor is ten times their difference, so that they agree to a tenth of
@@ -89,7 +90,7 @@ inline constexpr double kExactFloor = 1e-14;
                                                    bool exact, double worst_floor,
                                                    std::string_view where, int components = 1);
 
-/// What a curve is to keep, over all its settings.
+/// Limits that a curve is to keep, over all its settings.
 struct BenchmarkTarget {
   std::string curve;
   double error = 0.0;          ///< in parts of the peak

@@ -6,7 +6,7 @@
 
 namespace tpm::contact {
 
-/// How the relaxing spring of an element is advanced over a period.
+/// Rule that advances the relaxing spring of an element over a period.
 enum class ElementRule {
   exact,          ///< under linear motion; stable for every relaxation time
   forward_euler,  ///< diverges for periods above twice the relaxation time

@@ -8,7 +8,7 @@
 
 namespace tpm::contact {
 
-/// How a law is stepped in a loop.
+/// Settings of a law that is stepped in a loop.
 struct LawContactSettings {
   double period_s = 1e-3;
   double longest_s = 60.0;        ///< of a session: the window of a fractional law

@@ -20,7 +20,7 @@ struct LawInLoop {
   [[nodiscard]] double force_N() const;
 };
 
-/// What putting one law in the place of another would do.
+/// Effect of putting one law in the place of another.
 struct HandOver {
   bool possible = false;
   double depth_m = 0.0, force_N = 0.0;

@@ -8,7 +8,7 @@
 
 namespace tpm::contact {
 
-/// How a tissue answers small displacements of its contact sphere.
+/// Response of a tissue to small displacements of its contact sphere.
 struct ContactFields {
   /// Of every sphere per displacement of the contact along x, y and z.
   std::array<Eigen::Matrix3Xd, 3> displacement;

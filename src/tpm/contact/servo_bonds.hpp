@@ -27,7 +27,7 @@ struct ServoWeights {
   [[nodiscard]] float longest_kept() const;  ///< the largest keep
 };
 
-/// What moving all spheres once for their forces takes, counted: for to say what a step costs.
+/// Operation count of one force evaluation; used to predict the cost of a step.
 struct BalanceWork {
   std::size_t bonds = 0;     ///< in all lanes, filled up ones too
   std::size_t blocks = 0;    ///< 3x3 blocks of a FrontalFactor that a solution reads

@@ -75,7 +75,7 @@ class ServoNetwork final : public ContactModel {
                                double depth_m) const;
   /// Solves for the part of the forces that starts at `first`, and moves the free spheres.
   void balance(std::size_t first) noexcept;
-  /// What each of three fields makes of the forces left, N.
+  /// Work of the forces left along each of three fields, N.
   [[nodiscard]] std::array<Eigen::Vector3d, 3> weighed(
       const std::array<const Field*, 3>& fields) const noexcept;
   void answer(const Eigen::Vector3d& displacement_m, double step_error_N) noexcept;

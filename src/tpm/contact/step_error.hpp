@@ -4,7 +4,7 @@
 
 namespace tpm::contact {
 
-/// What it costs to take elongations as linear within a servo period, estimated with a small linear
+/// Error of taking elongations as linear within a servo period, estimated with a small linear
 /// model of the tissue: its displacements are combinations of the fields that follow the contact at
 /// once and those that follow it when relaxed (a symmetric projection of the linear network). The
 /// model is advanced both ways, exactly and as the network is; the forces differ by the estimate.

@@ -72,7 +72,7 @@ class SurfaceNetwork final : public ContactModel {
     Eigen::Vector3d pushed_N;  ///< with what the ball pushes it
     /// At the end of the last period, and its change in that.
     Eigen::Vector3d before_N = Eigen::Vector3d::Zero(), change_N = Eigen::Vector3d::Zero();
-    /// What taking elongations as linear has cost so far.
+    /// Error so far of taking elongations as linear.
     Eigen::Vector3d linearisation_N = Eigen::Vector3d::Zero();
   };
   /// A sphere in reach of the ball while forces are balanced.

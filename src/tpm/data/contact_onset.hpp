@@ -21,7 +21,7 @@ struct Touch {
   bool instantaneous = false;        ///< the response rises with the first movement
 };
 
-/// What a search for contact or detachment looks at. All SI.
+/// Input of a search for contact or detachment. All SI.
 struct TouchSearch {
   const std::vector<double>& drive;
   const std::vector<double>& response;
@@ -45,7 +45,7 @@ struct Release {
 [[nodiscard]] std::optional<Release> find_release(const TouchSearch& search,
                                                   const DrivePiece& falling, double contact_floor);
 
-/// How far the response must be from its floor to be told from noise, SI.
+/// Least distance of the response from its floor that exceeds the noise, SI.
 [[nodiscard]] double touch_margin(const TouchSearch& search);
 
 }  // namespace tpm::data

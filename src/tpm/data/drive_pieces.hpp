@@ -12,7 +12,7 @@ namespace tpm::data {
 [[nodiscard]] double noise_sd(const std::vector<double>& time, const std::vector<double>& values,
                               std::size_t first, std::size_t last);
 
-/// How the drive moves.
+/// Motion of the drive.
 enum class Motion { still, rising, falling };
 
 /// Samples `first` to `last` (inclusive, first < last) of one motion.

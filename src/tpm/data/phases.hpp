@@ -9,7 +9,7 @@
 
 namespace tpm::data {
 
-/// What happens in a part of a recording.
+/// Kinds of parts of a recording.
 enum class PhaseKind {
   before_contact,  ///< the probe does not touch yet
   loading,         ///< the drive rises: the ramp
@@ -33,7 +33,7 @@ struct Phase {
                               ///< machine speeds up and slows down
 };
 
-/// What may be told instead of being found.
+/// Values that a caller may state, which are found otherwise.
 struct PhaseOptions {
   /// Contact is where the response passes this and stays there (SI, above 0), instead of where it
   /// leaves its noise.
@@ -42,7 +42,7 @@ struct PhaseOptions {
   std::size_t sustained_samples = 3;  ///< in a row that make a crossing, from 1
 };
 
-/// What happened in a recording. Indices count samples from 0.
+/// Phases of a recording. Indices count samples from 0.
 struct RecordingPhases {
   std::vector<Phase> phases;  ///< in order; together they cover all samples
   bool contact_found = false;

@@ -10,7 +10,7 @@
 
 namespace tpm::fit {
 
-/// Whether a law describes a recording.
+/// Verdict whether a law describes a recording.
 enum class Described {
   adequate,       ///< the residuals are no larger than the noise
   not_described,  ///< they are, at the level of the test
@@ -23,7 +23,7 @@ enum class Described {
 /// "2.4", "93" or "1204": how many times the noise something is.
 [[nodiscard]] std::string times_text(double times);
 
-/// What an adequacy test looks at. Responses in one unit, times in s, both in the order of time.
+/// Input of an adequacy test. Responses in one unit, times in s, both in the order of time.
 struct AdequacyData {
   std::span<const double> rest_time_s;  ///< samples in which nothing moves and nothing touches
   std::span<const double> rest;         ///< their readings, as many

@@ -39,7 +39,7 @@ class AutoregressiveNoise {
   double phi_, step_s_;
 };
 
-/// What the residuals of a fit say about phi and about the size of the noise.
+/// Estimates of phi and of the size of the noise from the residuals of a fit.
 struct AutoregressionEstimate {
   double phi = 0.0;
   double phi_variance = 0.0;  ///< from the curvature of the criterion; 0 where phi is on a bound

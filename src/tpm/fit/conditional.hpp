@@ -5,7 +5,7 @@
 
 namespace tpm::fit {
 
-/// Whether an estimated parameter belongs to the recordings or their noise (contact point, zero
+/// True if an estimated parameter belongs to the recordings or their noise (contact point, zero
 /// error, size of the noise) and not to the material.
 [[nodiscard]] bool is_nuisance(const FitConfig& config, std::size_t parameter);
 

@@ -7,7 +7,7 @@
 
 namespace tpm::fit {
 
-/// Whether more than one start found the minimum of a search. Ends that are as good within a
+/// Number of starts that found the minimum of a search. Ends that are as good within a
 /// twentieth of what an interval allows count as the same.
 struct Confirmation {
   int starts = 0;                             ///< that were followed to an end

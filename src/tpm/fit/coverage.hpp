@@ -8,7 +8,7 @@
 
 namespace tpm::fit {
 
-/// How often the intervals of one parameter contained the true value.
+/// Coverage of the intervals of one parameter: how often they contained the true value.
 struct ParameterCoverage {
   std::string name;
   int covered = 0;

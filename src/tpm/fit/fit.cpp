@@ -190,6 +190,7 @@ FitResult fit_searched(const ExperimentResiduals& function, ExperimentResiduals*
   Threshold threshold{config.level, config.scale_known(),
                       function.value_count() + prior_count(config),
                       static_cast<int>(parameters.size())};
+  threshold.least_variance = computed_variance(function);
   FitResult result = weighted != nullptr
                          ? balanced_search(*weighted, parameters, threshold)
                          : widened_search(function, parameters, threshold, config.profiles, {});
@@ -263,6 +264,7 @@ Threshold threshold_of(const FitResult& fit) {
                       fit.value_count + prior_count(fit.config),
                       static_cast<int>(fit.parameters.size()), fit.inflation};
   threshold.noise = fit.noise;
+  threshold.least_variance = fit.least_variance;
   return threshold;
 }
 

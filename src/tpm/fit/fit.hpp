@@ -41,8 +41,8 @@ struct ParameterResult {
   /// The automatic bounds, where the best fit or an interval pressed on them and they were widened.
   std::optional<Limits> first_bounds;
   std::vector<Condition> conditional_on;
-  /// What the recording cannot tell it from ("drift or a slow branch"); it is then not identified,
-  /// whatever its profile says. See EstimatedParameter.
+  /// Effects that the recording cannot separate from it ("drift or a slow branch"); it is then not
+  /// identified, whatever its profile says. See EstimatedParameter.
   std::string not_separable;
   /// Of a fit with a drift of the zero, where no rest tells one: `lower` and `upper` then hold this
   /// interval, too.
@@ -126,6 +126,7 @@ struct FitResult {
   int degrees_of_freedom = 0;          ///< values less estimated parameters
   std::optional<double> chi_square_p;  ///< only for a known noise scale and dof > 0
   double variance_factor = 1.0;
+  double least_variance = 0.0;             ///< Threshold::least_variance
   std::optional<Likelihood> likelihood;    ///< none where there is none, see likelihood_at
   std::optional<Correlation> correlation;  ///< over all recordings, if there are any
   double inflation = 1.0;                  ///< Threshold::inflation of the intervals

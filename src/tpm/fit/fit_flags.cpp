@@ -42,6 +42,12 @@ void flag_outliers(FitResult& result, const ExperimentResiduals& function) {
       significant(worst_z / unit, 3)));
 }
 
+/// Whether the noise is the least that is believed.
+bool is_met_exactly(const FitResult& result) {
+  return !result.config.scale_known() && result.degrees_of_freedom > 0 &&
+         result.least_variance > 0.0 && result.variance_factor <= result.least_variance;
+}
+
 void flag_noise(FitResult& result) {
   const bool estimated = std::ranges::any_of(result.config.data, &DataChoice::estimates_sigma);
   if (estimated) {
@@ -49,6 +55,13 @@ void flag_noise(FitResult& result) {
         fmt::format("the size of the noise is estimated from {} values: intervals are those of "
                     "many values, and too short for few",
                     result.value_count));
+  }
+  if (is_met_exactly(result)) {
+    result.flags.push_back(
+        fmt::format("the readings are met more nearly than is computed: intervals suppose noise of "
+                    "{:g} of each reading, which says how near the numbers are, not how near a "
+                    "measurement is",
+                    kComputedShare));
   }
   if (result.noise) {
     result.flags.push_back(result.noise->words);

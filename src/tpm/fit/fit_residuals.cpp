@@ -243,6 +243,7 @@ FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParamet
   }
   result.inflation = threshold.inflation;
   result.noise = threshold.noise;
+  result.least_variance = threshold.least_variance;
   result.degrees_of_freedom = threshold.data_count - threshold.parameter_count;
   result.variance_factor = threshold.scale_known || result.degrees_of_freedom > 0
                                ? threshold.variance_factor(result.best.deviance)

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "tpm/base/dense_algebra.hpp"
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
@@ -240,13 +241,19 @@ Correlation correlation_of_rows(const NoiseRows& rows, const Eigen::VectorXd& re
   return residual_correlation(parts);
 }
 
-/// Where the noise is below half a step, the half steps; 0 elsewhere.
-Eigen::VectorXd limiting_steps(const NoiseRows& rows, double variance) {
+/// Where the noise is below half a step by more than chance makes it seem, the half steps; 0
+/// elsewhere.
+/// @param degrees independent readings behind `variance`
+Eigen::VectorXd limiting_steps(const NoiseRows& rows, double variance, double degrees) {
   // Rounding itself scatters by a twelfth of the square of a step.
   constexpr double kHidden = 4.0 / 3.0;  // (1/4 + 1/12) q^2 = 4/3 (q/2)^2
   constexpr double kNone = 0.01;         // what is met so much better was not rounded: (q/20)^2
+  constexpr double kChance = 0.05;
+  constexpr double kFew = 0.5;  // few readings do not tell: half a step is the cautious answer
+  const double counted = std::max(degrees, 1.0);
+  const double chance = std::max(chi_squared_quantile(kChance, counted) / counted, kFew);
   const Eigen::ArrayXd square = rows.half_step.array().square();
-  return (square * kHidden > variance && square * kNone < variance)
+  return (square * kHidden * chance > variance && square * kNone < variance)
       .select(rows.half_step.array(), 0.0)
       .matrix();
 }
@@ -274,6 +281,21 @@ std::string words_of(const NoiseOfEstimates& noise, Eigen::Index samples, bool l
 }
 
 }  // namespace
+
+double computed_variance(const ExperimentResiduals& function) {
+  double sum = 0.0;
+  int values = 0;
+  for (const FitDatum& d : function.data()) {
+    if (d.held_out || !d.value) continue;
+    ++values;
+    if (!(d.sigma > 0.0)) continue;  // an estimated one
+    const NoiseKind kind = function.config().data[d.choice].noise.kind;
+    const bool of_share = kind == NoiseKind::log || kind == NoiseKind::relative_to_model;
+    const double off = kComputedShare * (of_share ? 1.0 : std::abs(*d.value)) / d.sigma;
+    sum += off * off;
+  }
+  return values > 0 ? sum / values : 0.0;
+}
 
 std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& function,
                                                    std::span<const FitParameter> parameters,
@@ -307,7 +329,10 @@ std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& fu
   const double freedom = n - static_cast<double>(p);
   const double seen_size =
       noise.correlated ? found.variance : rows->residual.squaredNorm() / freedom;
-  const Eigen::VectorXd off = limiting_steps(*rows, seen_size);
+  if (!scale_known && seen_size < computed_variance(function)) return std::nullopt;
+  const double square = noise.phi * noise.phi;
+  const Eigen::VectorXd off =
+      limiting_steps(*rows, seen_size, freedom * (1.0 - square) / (1.0 + square));
   noise.variance = scale_known ? 1.0 : seen_size;
   const bool limited = off.size() > 0 && off.maxCoeff() > 0.0;
   if (!noise.correlated && !limited) return std::nullopt;

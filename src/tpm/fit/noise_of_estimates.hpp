@@ -12,7 +12,7 @@ namespace tpm::fit {
 
 class ExperimentResiduals;
 
-/// What correlated or rounded readings do to one estimate of ordinary least squares.
+/// Effect of correlated or rounded readings on one estimate of ordinary least squares.
 struct NoiseOfEstimate {
   double variance_ratio = 0.0;  ///< its variance over that for independent noise of size 1; 0: none
   double degrees = 1.0;         ///< of freedom of Student's t
@@ -45,12 +45,23 @@ struct NoiseOfEstimates {
   std::string words;                ///< one sentence
 };
 
+/// What computing leaves of a reading, in parts of it: responses and minima are exact to about
+/// 1e-10, and no instrument reads nine digits.
+constexpr double kComputedShare = 1e-9;
+
+/// Mean square of that error of the values, in units of the declared noise: the least variance that
+/// an estimate of the noise can mean.
+[[nodiscard]] double computed_variance(const ExperimentResiduals& function);
+
 /// Nothing if residuals are independent and not limited by rounding, if the configuration ignores
-/// correlation, if there are no recordings, or where residuals are no plain differences (a robust
+/// correlation, if there are no recordings, if they are met to what computing leaves of them
+/// (computed_variance), or where residuals are no plain differences (a robust
 /// loss, noise that is not normal or whose size is a parameter). Independent means: neither does
 /// the Ljung-Box test reject at 1 % nor the restricted likelihood ratio of phi = 0.
 ///
-/// Readings that are rounded to steps q hide the noise where it is smaller than half a step. The
+/// Readings that are rounded to steps q hide the noise where it is smaller than half a step (by a
+/// test at 5 %, for its size is estimated: else half of the fits whose noise is half a step are
+/// called limited). The
 /// errors of rounding are then no noise: each is at most half a step, and so an estimate is biased
 /// by at most (q/2) sum |d estimate / d reading|, which widens its interval.
 ///

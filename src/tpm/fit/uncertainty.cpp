@@ -22,7 +22,7 @@ double Threshold::residual_degrees() const {
 
 double Threshold::variance_factor(double minimum_deviance) const {
   if (scale_known) return 1.0;
-  if (noise) return noise->variance;
+  if (noise) return std::max(noise->variance, least_variance);
   if (data_count <= parameter_count) {
     throw bad_input("noise",
                     fmt::format("the scale of the noise is to be estimated from {} data with {} "
@@ -30,7 +30,7 @@ double Threshold::variance_factor(double minimum_deviance) const {
                                 data_count, parameter_count),
                     "more data than parameters, or a known scale");
   }
-  return minimum_deviance / (inflation * residual_degrees());
+  return std::max(minimum_deviance / (inflation * residual_degrees()), least_variance);
 }
 
 double Threshold::rise(double minimum_deviance, int constrained) const {
@@ -325,15 +325,16 @@ class ProfileWalk {
   Place last_, before_;  ///< between which, or beyond which, the next point is looked for
 };
 
+/// @param multiplier half width of the linearised interval in standard errors
 double first_step(const FitParameter& p, std::size_t index, const Covariance& covariance,
-                  double rise) {
+                  double multiplier) {
   const double width = p.theta_upper() - p.theta_lower();
   double step = std::isfinite(width) ? width / 50.0 : 0.1;
   if (!covariance.full_rank) return step;
   const auto place = std::find(covariance.free.begin(), covariance.free.end(), index);
   if (place == covariance.free.end()) return step;
   const double sd = covariance.theta_sd[place - covariance.free.begin()];
-  const double from_sd = 0.3 * sd * std::sqrt(rise);
+  const double from_sd = 0.3 * sd * multiplier;
   return std::isfinite(width) ? std::min(from_sd, width / 10.0) : from_sd;
 }
 
@@ -395,7 +396,7 @@ Profile profile_likelihood(const ResidualFunction& function,
   const FitParameter& p = parameters[index];
   const double best = minima.front().deviance;
   const double rise = threshold.rise_of(index, best);
-  const double step = first_step(p, index, covariance, rise);
+  const double step = first_step(p, index, covariance, threshold.multiplier_of(index, best));
   const double rounding = rounding_step(function, parameters, minima.front(), index);
   Profile profile;
   std::optional<Range> all;

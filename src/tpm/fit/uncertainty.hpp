@@ -10,7 +10,7 @@
 
 namespace tpm::fit {
 
-/// How far the deviance may rise inside a confidence set.
+/// Largest rise of the deviance inside a confidence set.
 struct Threshold {
   double level = 0.95;      ///< in (0, 1)
   bool scale_known = true;  ///< sigma known: chi-square; known up to a factor: F
@@ -21,15 +21,19 @@ struct Threshold {
   double inflation = 1.0;
   /// Noise that is not the same for every estimate; then `inflation` is its own.
   std::optional<NoiseOfEstimates> noise = std::nullopt;
+  /// The least variance of a reading that is believed where it is estimated, in units of the
+  /// declared one: data that are met to the rounding of numbers have no noise to be estimated.
+  double least_variance = 0.0;
 
   /// Degrees of freedom of an estimated variance: max(n / inflation - k, 1).
   [[nodiscard]] double residual_degrees() const;
   /// Variance of one reading in units of the declared one: 1 if known, else deviance /
   /// (inflation residual_degrees()), which is deviance / (n - k) for independent readings: a smooth
   /// curve takes up as much of correlated noise as `inflation` parameters of independent noise
-  /// would. Throws Error(bad_input) if it must be estimated and n <= k.
+  /// would. Never below `least_variance`. Throws Error(bad_input) if it must be estimated and n <=
+  /// k.
   [[nodiscard]] double variance_factor(double minimum_deviance) const;
-  /// Whether the size of the noise is known or can be estimated.
+  /// True if the size of the noise is known or can be estimated.
   [[nodiscard]] bool estimable() const { return scale_known || data_count > parameter_count; }
   /// Rise of the deviance allowed for `constrained` (>= 1) parameters at once.
   [[nodiscard]] double rise(double minimum_deviance, int constrained = 1) const;
@@ -68,7 +72,7 @@ struct ProfilePoint {
   double deviance;
 };
 
-/// How the walk along a profile ended on one side.
+/// End of the walk along a profile on one side.
 enum class ProfileEnd {
   not_walked,
   limit,     ///< the deviance rose by the threshold there

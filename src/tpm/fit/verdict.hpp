@@ -9,15 +9,15 @@ namespace tpm::fit {
 /// From which limits the profile reached.
 [[nodiscard]] Verdict verdict_of(const ParameterResult& parameter);
 
-/// Whether it is the order of a spring-pot and 1: a dashpot, which is a special case of the law and
+/// True if it is the order of a spring-pot and 1: a dashpot, which is a special case of the law and
 /// no bound that the search was stopped by.
 [[nodiscard]] bool is_dashpot(const ParameterResult& parameter);
 
 /// The verdict with what it rests on: "identified, conditional on contact at its lower bound".
 [[nodiscard]] std::string verdict_text(const ParameterResult& parameter);
 
-/// What the unit of a parameter is chosen by (sized_unit()): its estimate, or the further limit
-/// where the estimate is near 0 and says nothing of the size of the interval.
+/// Number that the unit of a parameter is chosen by (sized_unit()): its estimate, or the further
+/// limit where the estimate is near 0 and says nothing of the size of the interval.
 [[nodiscard]] double size_of(const ParameterResult& parameter);
 
 /// "215.7 uN": a value in the unit in which a short answer shows the parameter, 4 significant
@@ -34,17 +34,18 @@ namespace tpm::fit {
 /// "eta1 = 5 Pa s is excluded by these data (...)" or "undetermined ...".
 [[nodiscard]] std::string hypothesis_words(const HypothesisResult& result, double level);
 
-/// What the data know of parameters that trade off along a direction, "their product E eta1",
-/// "their ratio E / eta1", "the product E eta1^2", "the ratios of E, eta1 and eta2", "their sum E1
+/// Combination that the data determine of parameters that trade off along a direction, "their
+/// product E eta1", "their ratio E / eta1", "the product E eta1^2", "the ratios of E, eta1 and
+/// eta2", "their sum E1
 /// + E2"; empty if it is nothing that simple.
 /// @param named parameters that move along the direction, two or more
 /// @param steps their components in theta, parallel
 [[nodiscard]] std::string known_combination(std::span<const FitParameter> named,
                                             std::span<const double> steps);
 
-/// Which combination of parameters the data see least; empty for fewer than two free parameters.
-/// Names what is known instead where a singular value is below a tenth of the largest, see
-/// known_combination.
+/// Combination of parameters that the data determine least; empty for fewer than two free
+/// parameters. Names what is known instead where a singular value is below a tenth of the largest,
+/// see known_combination.
 [[nodiscard]] std::string weakest_direction_words(const FitResult& result);
 
 }  // namespace tpm::fit

@@ -25,7 +25,8 @@ struct StudyFit {
   [[nodiscard]] std::optional<ProtocolChoice::Kind> experiment() const;
 };
 
-/// What all tissues are compared at: the first tissue's fit, with parameters fixed if so wished.
+/// Parameters at which all tissues are compared: the first tissue's fit, with parameters fixed if
+/// so wished.
 struct StudyMaterial {
   std::string name;
   std::size_t fit = 0;  ///< place in OrganStudyConfig::fits

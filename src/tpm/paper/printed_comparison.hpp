@@ -44,7 +44,7 @@ struct PrintedComparison {
 /// @param share R as a share of D, above 0 and below 1
 void judge_printed(PrintedComparison& comparison, double share);
 
-/// What the comparisons need.
+/// Input of the comparisons.
 struct PrintedExperiments {
   TpmParameters printed;  ///< 12 kPa, 5 Pa s, x = 30 mm
   PointSet relaxation, static_bands, creep;

@@ -10,7 +10,7 @@
 
 namespace tpm::paper {
 
-/// What a table assumes about the loading.
+/// Assumption of a table about the loading.
 enum class TableMode {
   as_printed,  ///< a step, Eqs. 15 and 16: the force at 0+ and for t -> infinity
   consistent,  ///< ramp-and-hold with the stated eta1: force at the end of the ramp and of the hold
@@ -71,7 +71,7 @@ struct BandRow {
   bool inside = false;
 };
 
-/// How many printed cells follow from the formulas.
+/// Number of printed cells that follow from the formulas.
 struct CellCounts {
   int cells = 0;
   int by_rounding = 0;

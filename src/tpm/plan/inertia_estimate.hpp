@@ -11,7 +11,7 @@ struct SeenMode {
   std::vector<double> weights;  ///< Gamma_0 Gamma_g omega^2 of each group g that is driven
 };
 
-/// How the network with masses moves about rest.
+/// Modes of the network with masses about rest.
 struct InertiaModes {
   std::vector<SeenMode> modes;
   double lowest_Hz = 0.0;      ///< frequency of the lowest mode
@@ -19,7 +19,7 @@ struct InertiaModes {
   double own_drag_kg_s = 0.0;  ///< of what an imposed depth drives, kg/s; 0 under a load
 };
 
-/// What masses do to the response where the network is linear about rest.
+/// Effect of masses on the response where the network is linear about rest.
 struct InertiaEstimate {
   double of_rates = 0.0;    ///< largest difference where what is imposed changes its rate, N or m
   double of_jumps = 0.0;    ///< the same where a load jumps; infinite where a depth does
@@ -38,7 +38,7 @@ struct InertiaEstimate {
 /// as lowest_mode and masses_kg do.
 [[nodiscard]] InertiaEstimate estimate_inertia(const PlanScene& scene);
 
-/// What of it no protocol changes. Throws as estimate_inertia does.
+/// Part of it that no protocol changes. Throws as estimate_inertia does.
 [[nodiscard]] InertiaModes inertia_modes(const PlanScene& scene);
 
 }  // namespace tpm::plan

@@ -19,7 +19,7 @@ struct PlanWork {
   double all_s = 0.0;            ///< of all runs and of what is built
 };
 
-/// What a plan will take, from its first run: `all_s` is a bound if the reference takes what is
+/// Expected cost of a plan, from its first run: `all_s` is a bound if the reference takes what is
 /// expected, which is within a factor of two; none where masses count, whose first run has none, or
 /// the plan is thorough.
 struct ExpectedPlanWork {
@@ -27,7 +27,7 @@ struct ExpectedPlanWork {
   std::optional<double> all_s;
 };
 
-/// What a plan is asked for.
+/// Request of a plan.
 struct PlanRequest {
   double tolerance = 0.01;  ///< of the error, in parts of the peak; 1e-6 to 0.5
   PlanMeasure measure;
@@ -70,7 +70,7 @@ struct PlannedCandidate {
   std::string reason;                  ///< why it is not feasible
 };
 
-/// What the pick is verified against.
+/// Reference that verifies the pick.
 struct PlanReference {
   std::string method, cross_check;   ///< in words
   double difference = 0.0;           ///< between the two, in parts of the peak
@@ -78,7 +78,7 @@ struct PlanReference {
   double peak = 0.0;                 ///< of the response, N or m
 };
 
-/// What switching a part of the physics off would change.
+/// Effect of switching a part of the physics off.
 struct PlanRelevance {
   std::string part;             ///< inertia, layers, tension, viscosity
   std::optional<double> error;  ///< in parts of the peak; none: not found, `note` says why
@@ -140,7 +140,7 @@ struct Plan {
   return error ? std::optional(shown_error(plan, *error)) : std::nullopt;
 }
 
-/// What the errors of a plan are about, in words.
+/// Quantity whose errors a plan states, in words.
 struct PlanClaim {
   std::string quantity;  ///< "contact force", "indentation depth" or "displacements of all spheres"
   std::string norm;
@@ -162,14 +162,14 @@ struct PlanClaim {
 [[nodiscard]] Trajectory run_planned(const Plan& plan, const ExperimentScene& scene,
                                      const std::vector<double>& times_s);
 
-/// How a hand will move a contact: what a session knows before it begins.
+/// Motion of a contact by a hand, as far as a session knows it before it begins.
 struct ContactRange {
   double depth_m = 0.0;        ///< deepest, > 0
   double speed_m_per_s = 0.0;  ///< fastest, > 0
   double hold_s = 1.0;         ///< longest rest at a depth, >= 0
 };
 
-/// What to plan for a contact that is moved as a hand likes: a scene whose protocol goes to the
+/// Scene to plan for a contact that a hand moves freely: one whose protocol goes to the
 /// whole and to half of the depth at full and at a fifth of the speed, rests there, and comes back.
 /// @param scene of which organ, material and contacts are used
 [[nodiscard]] ExperimentScene contact_scene(const ExperimentScene& scene,

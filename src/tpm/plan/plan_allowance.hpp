@@ -5,7 +5,7 @@
 
 namespace tpm::plan {
 
-/// How much work a plan may take, in seconds of nominal costs: on every machine the same.
+/// Largest work of a plan, in seconds of nominal costs: on every machine the same.
 class PlanAllowance {
  public:
   /// @param scene whose runs, and those of scenes made from it, count

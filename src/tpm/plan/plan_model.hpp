@@ -12,7 +12,7 @@
 
 namespace tpm::plan {
 
-/// What a model answers a period late at most, and how fast it has to be.
+/// Budget of a model: its largest delay, in periods, and its rate.
 struct PlanBudget {
   std::optional<double> rate_Hz;       ///< of a servo loop: every period needs its answer
   std::optional<double> wall_s_per_s;  ///< computing time per simulated second
@@ -22,14 +22,14 @@ struct PlanBudget {
   }
 };
 
-/// What a model says of itself before it is verified.
+/// Claim of a model before it is verified.
 struct ModelClaim {
   double error = 0.0;        ///< bound, in parts of the peak
   OperationCount work;       ///< of the whole protocol; at a servo rate of all its periods
   OperationCount of_period;  ///< the costliest period, where the model can be stepped by a servo
 };
 
-/// How much of the tissue a model knows.
+/// Part of the tissue that a model knows.
 enum class ModelReach {
   reduced,  ///< the contact alone
   full,     ///< the nonlinear network
@@ -69,7 +69,7 @@ class PlanModel {
   [[nodiscard]] virtual std::optional<std::string> why_no_servo() const { return std::nullopt; }
   /// contacts() has models.
   [[nodiscard]] virtual bool for_loop() const { return false; }
-  /// What a servo loop steps, at rest, one for each period; none unless for_loop(). Throws as
+  /// Model that a servo loop steps, at rest, one for each period; none unless for_loop(). Throws as
   /// claim() does.
   [[nodiscard]] virtual std::vector<std::unique_ptr<ContactModel>> contacts(
       const PlanSurrogate& /*surrogate*/, std::span<const double> /*periods_s*/) const {

@@ -4,7 +4,7 @@
 
 namespace tpm::plan {
 
-/// What switching inertia, the deepest moving layer, tension and viscosity off changes, each by a
+/// Effect of switching inertia, the deepest moving layer, tension and viscosity off, each by a
 /// run of the reference's formulation without it, as long as the plan may take such a run.
 [[nodiscard]] std::vector<PlanRelevance> plan_relevance(const PlanSurrogate& surrogate,
                                                         double tolerance,

@@ -11,7 +11,7 @@
 
 namespace tpm::plan {
 
-/// Which results a tolerance is about.
+/// Results that a tolerance is about.
 enum class PlanOutput {
   force,  ///< the response: contact force, or depth under a load
   field,  ///< the displacements of all spheres
@@ -78,15 +78,15 @@ class PlanScene {
   [[nodiscard]] Protocol corners() const;
   /// One sphere driven itself and nothing else in contact.
   [[nodiscard]] bool single_sphere() const;
-  /// What is imposed jumps, at the start or later.
+  /// True if the imposed quantity jumps, at the start or later.
   [[nodiscard]] bool jumps() const;
   /// Layers of which a sphere moves.
   [[nodiscard]] int moving_layers() const;
   [[nodiscard]] const RunNetwork& run_network() const { return *network_; }
-  /// What the network at rest answers; scenes that differ in their protocols alone share it.
+  /// Answers of the network at rest; scenes that differ in their protocols alone share them.
   [[nodiscard]] RestAnswers& at_rest() const { return *at_rest_; }
-  /// What the runs of this scene, and of all scenes that were changed from it or it from, took so
-  /// far.
+  /// Cost so far of the runs of this scene, and of all scenes that were changed from it or it
+  /// from.
   [[nodiscard]] WorkSpent& spent() const { return *spent_; }
 
   /// The network without masses. Throws Error(numerical) as QuasiStatic does, and after `most_s`.

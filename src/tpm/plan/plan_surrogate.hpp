@@ -14,7 +14,7 @@ struct ContactCurves {
   DepthCurve equilibrium, relaxing;
 };
 
-/// What the claims about a scene are made from: coarse runs of its network at few times, its linear
+/// Source of the claims about a scene: coarse runs of its network at few times, its linear
 /// behaviour about rest, and what masses would do. Everything is found when first asked for. What
 /// throws Error(numerical) does so each time.
 class PlanSurrogate {
@@ -51,7 +51,7 @@ class PlanSurrogate {
   [[nodiscard]] OperationCount work_to_compare() const;
   /// Where a run at ten times its tolerance leaves the model's limits.
   [[nodiscard]] const Validity& validity() const { return rough().validity; }
-  /// What that run, the first and coarsest, takes.
+  /// Cost of that run, the first and coarsest.
   [[nodiscard]] const OperationCount& work_of_first() const { return rough().work; }
   /// Its difference from that run.
   [[nodiscard]] double coarse_error() const;
@@ -70,7 +70,7 @@ class PlanSurrogate {
   [[nodiscard]] const ContactCurves& curves() const;
   [[nodiscard]] bool has_curves() const { return curves_.has_value(); }
 
-  /// What the runs take that any claim is made from; about, where the coarse one was not made.
+  /// Cost of the runs that any claim is made from; about, where the coarse one was not made.
   [[nodiscard]] OperationCount work_of_claims() const;
 
   /// A bound of the error of a model without masses that answers `model` at times(): `kSafety`

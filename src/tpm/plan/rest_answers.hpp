@@ -7,7 +7,7 @@
 
 namespace tpm::plan {
 
-/// What the linear network at rest answers, whatever the protocol is: found when first asked for,
+/// Answers of the linear network at rest, whatever the protocol is: found when first asked for,
 /// also by several threads. What throws does so each time.
 struct RestAnswers {
   std::once_flag spectrum_once, modes_once;

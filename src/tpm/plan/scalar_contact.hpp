@@ -8,7 +8,7 @@ namespace tpm::plan {
 /// force, and motion across is not seen.
 class ScalarContact final : public ContactModel {
  public:
-  /// What is known of the contact it stands for.
+  /// Known properties of the contact it stands for.
   struct Range {
     double instantaneous_N_per_m = 0.0, equilibrium_N_per_m = 0.0;  ///< stiffness at rest
     double deepest_m = 0.0;  ///< answers beyond are not valid

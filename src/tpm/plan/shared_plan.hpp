@@ -11,7 +11,7 @@
 
 namespace tpm::plan {
 
-/// What a shared plan answers to one protocol.
+/// Answer of a shared plan to one protocol.
 struct SharedAnswer {
   Eigen::VectorXd response;  ///< N, at each time asked for
   double claim = 0.0;        ///< bound of the error, in parts of the peak
@@ -41,7 +41,7 @@ class SharedPlan {
   [[nodiscard]] std::optional<SharedAnswer> answer(const Protocol& protocol, double tau_s,
                                                    const std::vector<double>& times_s);
 
-  /// What the grid for a range of protocols costs, in runs of the network.
+  /// Cost of the grid for a range of protocols, in runs of the network.
   /// @param depths largest over least; @param lengths likewise, of ramps in relaxation times
   [[nodiscard]] static double cost_in_runs(double depths, double lengths);
 

@@ -10,7 +10,7 @@
 
 namespace tpm::plan {
 
-/// What a choice of the number of spheres is asked for.
+/// Request of a choice of the number of spheres.
 struct SpheresRequest {
   double tolerance = 0.1;       ///< of the distance to the limit, in parts of its peak; 1e-3 to 0.5
   std::size_t most = 15'000;    ///< spheres that may be tried, 200 to 1,000,000
@@ -28,7 +28,7 @@ struct TriedSpheres {
   std::string reason;                   ///< why it was not run
 };
 
-/// How many spheres a scene needs.
+/// Number of spheres that a scene needs.
 struct SpheresPlan {
   SpheresRequest request;
   std::vector<TriedSpheres> tried;  ///< by rising number

@@ -31,7 +31,7 @@ class BlockLog {
                                         const std::function<void(const std::string&)>& note);
 
   [[nodiscard]] bool has(std::uint64_t block) const { return place_[block] != 0; }
-  /// How many blocks there are.
+  /// Number of blocks.
   [[nodiscard]] std::uint64_t size() const { return size_; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 

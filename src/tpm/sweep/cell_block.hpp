@@ -10,7 +10,7 @@
 
 namespace tpm::sweep {
 
-/// What became of a cell. One that is done has finite values only.
+/// Outcome of a cell. One that is done has finite values only.
 enum class CellStatus : std::uint8_t { done, skipped, failed };
 
 /// The model of a cell that ran on none.

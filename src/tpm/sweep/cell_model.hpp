@@ -14,7 +14,7 @@
 
 namespace tpm::sweep {
 
-/// What is found for each cell under one name: a number, or a curve.
+/// Result of each cell under one name: a number, or a curve.
 struct SweepVariable {
   std::string name;
   std::string unit;  ///< SI; may be empty
@@ -24,7 +24,7 @@ struct SweepVariable {
   [[nodiscard]] std::size_t width() const { return times_s.empty() ? 1 : times_s.size(); }
 };
 
-/// What a cell's run says of itself besides its values.
+/// Remarks of a cell's run besides its values.
 struct CellAnswer {
   /// Of the error, in parts of the largest response; 0 where there is none but rounding. Where the
   /// sweep states a tolerance the claim of the model that was chosen, else the method's estimate.
@@ -32,7 +32,7 @@ struct CellAnswer {
   std::uint8_t model = 0;  ///< in SweepModel::models()
 };
 
-/// What a sweep changes, and how far.
+/// Parameter that a sweep changes, and its range.
 struct SweptTarget {
   std::string target;  ///< as the model knows it
   std::size_t axis = 0;
@@ -57,7 +57,7 @@ class CellModel {
                          std::span<std::int64_t> counts) = 0;
 };
 
-/// What a sweep is made over, as SWEEP.json describes it.
+/// Subject of a sweep, as SWEEP.json describes it.
 class SweepModel {
  public:
   SweepModel() = default;
@@ -73,14 +73,14 @@ class SweepModel {
   [[nodiscard]] virtual std::vector<std::string> counted() const = 0;
   /// Names of the models that cells may run on; none where all run on one.
   [[nodiscard]] virtual std::vector<std::string> models() const { return {}; }
-  /// How the models of cells are chosen, in words; empty where there is no choice.
+  /// Rule that chooses the models of cells, in words; empty where there is no choice.
   [[nodiscard]] virtual std::string choice_of_models(
       const std::vector<SweptTarget>& /*swept*/) const {
     return {};
   }
   /// Names that expressions may use besides swept parameters, with their SI values.
   [[nodiscard]] virtual std::vector<std::pair<std::string, double>> constants() const { return {}; }
-  /// How many cells are worth being computed and stored together.
+  /// Number of cells that are worth being computed and stored together.
   [[nodiscard]] virtual std::uint64_t usual_block() const = 0;
   /// @param swept the parameters, in their order
   [[nodiscard]] virtual std::unique_ptr<CellModel> cell_model(

@@ -5,7 +5,7 @@
 
 namespace tpm::sweep {
 
-/// How the places between two ends are spread.
+/// Spacing of the places between two ends.
 enum class AxisScale { linear, logarithmic };
 
 /// The values that a swept parameter takes along its axis, SI, each by its number alone. What can

@@ -13,13 +13,13 @@ struct Shard {
   std::uint64_t index = 0;  ///< from 0
   std::uint64_t count = 1;
 
-  /// How many of so many blocks.
+  /// Number of its blocks among so many.
   [[nodiscard]] std::uint64_t size(std::uint64_t blocks) const {
     return blocks / count + (index < blocks % count ? 1 : 0);
   }
 };
 
-/// How a sweep is accompanied. Nothing of it changes what it finds.
+/// Observers of a sweep. Nothing of it changes what it finds.
 struct SweepControls {
   int workers = 0;  ///< threads; 0: all processors that this process may use
   Shard shard;
@@ -28,7 +28,7 @@ struct SweepControls {
   std::function<bool()> interrupted;
 };
 
-/// How a sweep went: for the sidecar, not for the results.
+/// Course of a sweep: for the sidecar, not for the results.
 struct SweepRun {
   std::uint64_t blocks = 0;          ///< of this shard
   std::uint64_t resumed_blocks = 0;  ///< of them, found in the log

@@ -40,7 +40,7 @@ struct SweepFormula {
   std::string name, text;
 };
 
-/// What SWEEP.json asks for (schemas/sweep.schema.json, docs/sweep.md). A cell is one combination
+/// Request of SWEEP.json (schemas/sweep.schema.json, docs/sweep.md). A cell is one combination
 /// of the axes' places, numbered with the last axis fastest.
 struct Sweep {
   std::string title, description;
@@ -56,7 +56,7 @@ struct Sweep {
 
   [[nodiscard]] std::uint64_t cells() const;
   [[nodiscard]] std::uint64_t blocks() const;
-  /// What is changed, for the model.
+  /// Changed parameters, for the model.
   [[nodiscard]] std::vector<SweptTarget> swept() const;
   /// The places on all axes of a cell.
   [[nodiscard]] std::vector<std::uint64_t> places(std::uint64_t cell) const;

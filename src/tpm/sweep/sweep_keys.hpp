@@ -4,7 +4,7 @@
 
 namespace tpm::sweep {
 
-/// What a sweep's file may hold. Its parts are read where they are used.
+/// Keys of a sweep's file. Its parts are read where they are used.
 [[nodiscard]] const FileKind& sweep_kind();
 
 }  // namespace tpm::sweep

@@ -34,7 +34,7 @@ struct SweepOutput {
   }
 };
 
-/// How a file says an output.
+/// Name of an output in a file.
 struct OutputForm {
   enum class When { fixed, at, over };
   SweepOutput::Kind meaning;

@@ -57,8 +57,8 @@ class SweepReader {
   [[nodiscard]] std::string parameter_unit(const std::string& name) const;
   /// As the model knows it.
   [[nodiscard]] std::string parameter_target(const std::string& name) const;
-  /// How many cells ran on each model, by name, and how the models were chosen, in words; nothing
-  /// where there was no choice.
+  /// Numbers of cells that ran on each model, by name, and the rule that chose the models, in
+  /// words; nothing where there was no choice.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> models() const;
   [[nodiscard]] std::string choice_of_models() const;
 

@@ -8,7 +8,7 @@
 
 namespace tpm::sweep {
 
-/// How many cells ended in which way.
+/// Numbers of cells by how they ended.
 struct CellTally {
   std::uint64_t done = 0, skipped = 0, failed = 0;
   std::vector<std::string> reasons;  ///< why, in the order of the cells; at most kMostReasons

@@ -39,7 +39,7 @@ class FirstFault {
   std::exception_ptr fault_;
 };
 
-/// How many threads are meant: all processors that this process may use if none are named.
+/// Number of threads: all processors that this process may use if none are named.
 [[nodiscard]] inline int worker_count(int named) {
   return named > 0 ? named : tbb::info::default_concurrency();
 }

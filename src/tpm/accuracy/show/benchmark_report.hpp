@@ -11,7 +11,7 @@
 
 namespace tpm::accuracy {
 
-/// What was run, and how.
+/// Problems that were run, and settings of the runs.
 struct BenchmarkRecord {
   std::vector<BenchmarkResult> results;
   BenchmarkOptions options;
@@ -25,7 +25,7 @@ struct BenchmarkRecord {
 /// The same for a program (docs/accuracy.md lists the keys).
 [[nodiscard]] Json to_json(const BenchmarkRecord& record);
 
-/// What such a record may hold.
+/// Keys that such a record may hold.
 [[nodiscard]] const FileKind& benchmark_kind();
 
 /// The problems that are there already, and what has to be run to have them all.
@@ -43,7 +43,7 @@ struct KeptBenchmark {
                                            const BenchmarkOptions& options,
                                            std::span<const std::string> named);
 
-/// What is measured so far, in the folder of a run that goes on.
+/// Measurements so far, in the folder of a run that goes on.
 inline constexpr const char* kBenchmarkPart = "benchmark.part.json";
 
 /// Adds a result, or puts it in the place of an earlier one, in the order of benchmark_entries().

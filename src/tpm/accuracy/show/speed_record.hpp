@@ -7,7 +7,7 @@
 
 namespace tpm::accuracy {
 
-/// What the rows of one measurement have in common.
+/// Values that the rows of one measurement share.
 struct SpeedOrigin {
   std::string commit;  ///< that the program was built from, as told; "unknown"
 };

@@ -80,9 +80,9 @@ inline constexpr int kPointsAlongMaps = 21;
 [[nodiscard]] std::vector<StabilityLimit> stability_limits();
 [[nodiscard]] std::vector<StabilityCorner> stability_corners();
 [[nodiscard]] std::vector<ServoRow> stability_at_servo_rates();
-/// How the networks of the study are held, in a sentence.
+/// Supports of the networks of the study, in a sentence.
 [[nodiscard]] std::string study_organ_words();
-/// Which parts of the study are run.
+/// Parts of the study to run.
 struct StabilityParts {
   bool maps = true, limits = true, corners = true, servo = true;
 };

@@ -9,7 +9,7 @@
 
 namespace tpm::accuracy {
 
-/// How a run is classified.
+/// Classes of a run.
 enum class StabilityClass {
   holds,               ///< the steady state within kHoldsWithin of the peak
   oscillates,          ///< about the reference, from step to step or slowly, without growing

@@ -16,7 +16,7 @@ struct ComparedMotion {
   Eigen::VectorXd force_N;
 };
 
-/// Which motions are compared, and how.
+/// Motions to compare, and settings of the comparison.
 struct ComparedMotions {
   double depth_m = 0.0;                 ///< > 0
   std::vector<double> durations;        ///< of the ramp, in mean relaxation times, > 0

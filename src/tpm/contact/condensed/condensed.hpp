@@ -11,7 +11,7 @@
 
 namespace tpm::contact {
 
-/// What a condensed model is built for.
+/// Range and period that a condensed model is built for.
 struct CondensedOptions {
   double depth_m = 8e-3;       ///< of the contact along the push, > 0
   double tangential_m = 2e-3;  ///< of the contact across it, > 0

@@ -6,7 +6,7 @@
 
 namespace tpm::contact {
 
-/// What the motion of the viscous state needs, as polynomials of w: symmetric matrices in the axes
+/// Matrices of the motion of the viscous state, as polynomials of w: symmetric matrices in the axes
 /// of the contact.
 class CondensedMatrices {
  public:

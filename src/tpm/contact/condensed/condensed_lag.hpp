@@ -6,7 +6,7 @@
 
 namespace tpm::contact {
 
-/// How far the viscous state lags behind the contact and has left rest at once:
+/// Lag of the viscous state behind the contact, weighted by how far it has left rest:
 ///
 ///     4 |w| |u - w| / D²,
 ///
@@ -17,7 +17,7 @@ namespace tpm::contact {
 [[nodiscard]] double condensed_lag(const Eigen::Vector3d& u, const Eigen::Vector3d& w,
                                    double depth_m) noexcept;
 
-/// What the claim of a condensed model has to add per condensed_lag(), N. The model is compared
+/// Addition to the claim of a condensed model per condensed_lag(), N. The model is compared
 /// with the quasi-static network where it lags: loaded to the depth, held, released and left alone,
 /// each for 0.2, 1 and 5 relaxation times (of several branches the mean of their logarithms). The
 /// result is twice the largest excess of an error over the claim so far, per lag.

@@ -17,7 +17,7 @@ struct CondensedFrame {
   [[nodiscard]] Eigen::Vector3d local(const Eigen::Vector3d& displacement_m) const {
     return axes.transpose() * displacement_m;
   }
-  /// What the scaled coordinate of u or w is a displacement over: 0, 1 the depths of u and w.
+  /// Length that scales a coordinate of u or w: 0, 1 the depths of u and w.
   [[nodiscard]] double scale_m(int coordinate) const {
     return coordinate < 2 ? half_depth_m : tangential_m;
   }
@@ -35,7 +35,7 @@ inline constexpr std::array<int, 3> kCondensedOfW{1, 4, 5};
 [[nodiscard]] std::vector<CondensedExponents> condensed_monomials(
     std::span<const int> depth_degree);
 
-/// How the potential is expanded: the degree in the depths, by that in the tangents.
+/// Expansion of the potential: the degree in the depths, by that in the tangents.
 inline constexpr std::array<int, 4> kCondensedDegrees{7, 5, 3, 1};
 
 /// Powers of the six coordinates of a place, up to 7.

@@ -26,15 +26,15 @@ struct CondensedSample {
   Eigen::Matrix<double, Eigen::Dynamic, 3> moves;    ///< d position (3 per sphere) / du
 };
 
-/// What the viscous state costs at a fictitious displacement w, all per relaxation time: with y the
-/// viscous elongations of all bonds, J = dy/dw, g the relaxing stiffness of the bonds and L = dl/du
-/// at u = w, the part of L that is not in the span of J is P = L - J (J' g J)^-1 J' g L.
+/// Dissipation of the viscous state at a fictitious displacement w, all per relaxation time: with y
+/// the viscous elongations of all bonds, J = dy/dw, g the relaxing stiffness of the bonds and L =
+/// dl/du at u = w, the part of L that is not in the span of J is P = L - J (J' g J)^-1 J' g L.
 struct CondensedMetric {
   Eigen::Vector3d w_m = Eigen::Vector3d::Zero();
   Eigen::Matrix3d metric = Eigen::Matrix3d::Zero();         ///< J' g J, N/m
   Eigen::Matrix3d second_metric = Eigen::Matrix3d::Zero();  ///< P' g P, N/m
   Eigen::Matrix3d second_energy = Eigen::Matrix3d::Zero();  ///< of P in the reduced energy, N/m
-  /// How all positions (3 per sphere) answer to viscous elongations along P, the contact fixed.
+  /// Response of all positions (3 per sphere) to viscous elongations along P, the contact fixed.
   Eigen::Matrix<double, Eigen::Dynamic, 3> second_moves;
 };
 

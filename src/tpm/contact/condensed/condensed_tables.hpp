@@ -7,7 +7,7 @@ namespace tpm::contact {
 /// Of w, then of q: a viscous state of a condensed model in the axes of the contact, m.
 using CondensedVector = Eigen::Matrix<double, 6, 1>;
 
-/// What stands before p^i s^n in the potential, a polynomial of the scaled tangential coordinates
+/// Coefficient of p^i s^n in the potential, a polynomial of the scaled tangential coordinates
 /// t:
 ///
 ///     constant + linear' t + t' square t/2 + sum over k of t_k t' cube_k t/6
@@ -33,7 +33,7 @@ struct CondensedTables {
   double middle_depth_m = 0.0, per_half_depth = 0.0, per_tangential = 0.0;
 };
 
-/// What the viscous state moves by, at w.
+/// Matrices that move the viscous state, at w.
 struct CondensedMatricesAt {
   Eigen::Matrix3d mobility;  ///< M^-1, m/N
   Eigen::Matrix3d coupling;  ///< N, N/m
@@ -42,7 +42,7 @@ struct CondensedMatricesAt {
 [[nodiscard]] CondensedMatricesAt condensed_matrices_at(const CondensedTables& tables,
                                                         const Eigen::Vector3d& w) noexcept;
 
-/// What a viscous state does with the contact at u.
+/// Effect of a viscous state with the contact at u.
 struct CondensedPull {
   CondensedVector velocity;  ///< of the viscous state per relaxation time, m
   Eigen::Vector3d force_N;   ///< on what is in contact: minus the gradient of the energy by u
@@ -66,7 +66,7 @@ struct CondensedState {
   bool kept = false;  ///< the latest step did not change the viscous state
 };
 
-/// What a step needs that depends on period and relaxation time.
+/// Coefficients of a step that depend on period and relaxation time.
 struct CondensedRates {
   using Matrix = Eigen::Matrix<double, 6, 6>;
   Matrix first = Matrix::Zero();                                            ///< x phi1(x A)

@@ -14,117 +14,14 @@
 #include "tpm/files/import/clock_text.hpp"
 #include "tpm/files/import/column_choice.hpp"
 #include "tpm/files/import/contact.hpp"
-#include "tpm/files/import/specimen_size.hpp"
+#include "tpm/files/import/machine_columns.hpp"
 #include "tpm/files/import/step_clock.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
 namespace {
 
-/// What to add to the command line. The unit itself is for the user to say.
-std::string unit_option(const MachineColumn& column, Dimension dimension) {
-  const std::string name =
-      column.name.empty() ? std::to_string(column.index + 1) : printable(column.name);
-  if (dimension == Dimension::dimensionless) {
-    return fmt::format("--unit \"{0}=%\", or --unit \"{0}=-\" for a plain number", name);
-  }
-  const std::string units = units_of(dimension);
-  return fmt::format("--unit \"{}=UNIT\" with a unit of {}{}{}", name, dimension_name(dimension),
-                     units.empty() ? "" : ": ", units);
-}
-
-Unit unit_of(const MachineColumn& column, Dimension dimension, const std::string& file) {
-  const std::string where = fmt::format("{}: {}", file, column.label());
-  if (is_unit(column.unit) || column.unit.empty()) return parse_unit(column.unit, dimension, where);
-  throw bad_input(where, fmt::format("unknown unit '{}'", printable(column.unit)),
-                  unit_option(column, dimension));
-}
-
-/// A column that is going to be read.
-struct Use {
-  const MachineColumn* column;
-  Quantity quantity;
-  Bound bound;
-  bool negate;
-  std::optional<Dimension> dimension = std::nullopt;  ///< if it is not that of the quantity
-  bool clock = false;                                 ///< its fields are "11:09:16.5"
-  bool volts = false;  ///< a detector's signal, which the deflection sensitivity makes a length
-};
-
-Dimension dimension_of(const Use& use) {
-  return use.dimension.value_or(quantity_dimension(use.quantity));
-}
-
-/// One message for all columns: what to add to the command line is said once.
-void require_units(const std::vector<Use>& uses, const std::string& file) {
-  std::string labels;
-  std::string options;
-  std::size_t missing = 0;
-  for (const Use& use : uses) {
-    const Dimension dimension = dimension_of(use);
-    // A strain without a unit may be a plain number or percent.
-    const bool plain = dimension == Dimension::dimensionless && use.quantity != Quantity::strain;
-    const bool clock = use.quantity == Quantity::time && use.clock;
-    if (!use.column->unit.empty() || plain || clock) continue;
-    ++missing;
-    labels += fmt::format("{}{}", labels.empty() ? "" : ", ", use.column->label());
-    options +=
-        fmt::format("{}{}", options.empty() ? "" : "; ", unit_option(*use.column, dimension));
-  }
-  if (missing == 0) return;
-  throw bad_input(fmt::format("{}: {}", file, labels),
-                  missing == 1 ? "has no unit" : "have no unit", options);
-}
-
-/// A column titled "F" in kPa holds a stress: the unit says what the title cannot.
-Quantity response_quantity(const MachineColumn& column, const ImportOptions& options) {
-  if (options.response_quantity) return *options.response_quantity;
-  const Quantity titled = column.meaning && column.meaning->role == ColumnRole::response
-                              ? column.meaning->quantity
-                              : Quantity::contact_force;
-  if (is_step_response(titled)) return titled;
-  const auto dimension = is_unit(column.unit)
-                             ? std::optional(parse_unit(column.unit, column.name).dimension)
-                             : std::nullopt;
-  if (dimension == Dimension::compliance) return Quantity::creep_compliance;
-  if (dimension == Dimension::stress) return Quantity::stress;
-  if (dimension == Dimension::force && titled == Quantity::stress) return Quantity::contact_force;
-  return titled;
-}
-
-/// Storage and loss in N/m are dynamic stiffnesses, else moduli.
-Quantity spectrum_quantity(const MachineColumn& column, bool loss) {
-  const bool stiffness = is_unit(column.unit) &&
-                         parse_unit(column.unit, column.name).dimension == Dimension::stiffness;
-  const auto known = spectrum_quantities(stiffness ? Dimension::stiffness : Dimension::stress);
-  return loss ? known.loss : known.storage;
-}
-
-bool has_dimension(const MachineColumn& column, Dimension dimension) {
-  return is_unit(column.unit) && parse_unit(column.unit, column.name).dimension == dimension;
-}
-
-/// An elongation in percent is a strain.
-Quantity drive_quantity(const MachineColumn& column, const ImportOptions& options) {
-  if (options.drive_quantity) return *options.drive_quantity;
-  const Quantity titled = column.meaning && column.meaning->role == ColumnRole::drive
-                              ? column.meaning->quantity
-                              : Quantity::indentation_depth;
-  if (titled == Quantity::strain && has_dimension(column, Dimension::length)) {
-    return Quantity::indentation_depth;  // a "deformation" in mm
-  }
-  const bool relative = titled == Quantity::indentation_depth && !column.unit.empty() &&
-                        has_dimension(column, Dimension::dimensionless);
-  return relative ? Quantity::strain : titled;
-}
-
-std::string finding_name(const Use& use) {
-  if (use.dimension == Dimension::angle) return "phase_angle";
-  if (use.column->meaning && use.column->meaning->role == ColumnRole::loss_tangent) {
-    return "loss_tangent";
-  }
-  return std::string(quantity_name(use.quantity));
-}
+using Use = ColumnUse;
 
 /// Builds the series column by column and says which column became what.
 class SeriesReader {
@@ -212,24 +109,31 @@ class SeriesReader {
         "blank", fmt::format("{} in these columns", lines_of(table_, end_, all))));
   }
 
-  /// A sample that was lost is an empty cell or "NaN". Where most rows have one, the column is
-  /// none.
+  /// A sample that was lost is an empty cell, "NaN", "null" or "---". Where most rows have one, the
+  /// column is none.
   void leave_out_missing_readings(const std::vector<Use>& uses) {
     const auto missing = [&](std::size_t i) {
       return std::ranges::any_of(uses, [&](const Use& use) {
         std::string field(field_at(table_.rows[i], use.column->index));
         std::ranges::transform(field, field.begin(),
                                [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-        static constexpr auto kNone =
-            std::to_array<std::string_view>({"", "nan", "-nan", "na", "n/a", "#n/a"});
-        return std::ranges::find(kNone, field) != kNone.end();
+        static constexpr auto kNone = std::to_array<std::string_view>(
+            {"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none"});
+        return std::ranges::find(kNone, field) != kNone.end() ||
+               field.find_first_not_of('-') == std::string::npos;  // "---"
       });
     };
     const auto first = std::ranges::find_if(rows_, missing);
     const auto count = static_cast<std::size_t>(std::ranges::count_if(rows_, missing));
     if (count == 0 || 2 * count >= rows_.size()) return;
-    missing_ = fmt::format("{} of {} rows have an empty cell or NaN, from line {} on: left out",
-                           count, rows_.size(), table_.rows[*first].line);
+    const DelimitedRow& row = table_.rows[*first];
+    const auto lost = std::ranges::find_if(uses, [&](const Use& use) {
+      const std::string_view field = field_at(row, use.column->index);
+      return use.clock ? field.empty() : !find_styled_number(field, header_.style);
+    });
+    missing_ = fmt::format("{} of {} rows have an empty cell or NaN, from line {} on{}: left out",
+                           count, rows_.size(), row.line,
+                           lost == uses.end() ? "" : fmt::format(" ({})", lost->column->label()));
     std::erase_if(rows_, missing);
   }
 
@@ -371,40 +275,6 @@ const MachineColumn* response_column(const ColumnChoice& choice, const MachineCo
     if (stress != nullptr) return stress;
   }
   return choice.find(ColumnRole::response, options.response_column, "--response");
-}
-
-/// A length, or how far the specimen was drawn, becomes a relative length or a strain by its length
-/// at rest, a force a stress by its cross section. Says which option is missing.
-void resolve_specimen(Use& drive, Use& response, const std::string& file,
-                      const ImportOptions& options) {
-  const auto unknown = [](const MachineColumn& column) {
-    return !column.unit.empty() && !is_unit(column.unit);
-  };
-  if (unknown(*drive.column) || unknown(*response.column)) return;  // refused when it is read
-  const bool length = has_dimension(*drive.column, Dimension::length);
-  const bool drawn = drive.quantity == Quantity::indentation_depth &&
-                     (options.rest_length_m || response.quantity == Quantity::stress);
-  const bool of_length = is_answered_by_stress(drive.quantity) && length;
-  const auto missing = [&](const Use& use, const char* what, const char* expected) {
-    throw bad_input(fmt::format("{}: {}", file, use.column->label()), what, expected);
-  };
-  if (drawn || of_length) {
-    if (!options.rest_length_m) {
-      missing(drive, drawn ? "a displacement beside a stress" : "a length of the specimen",
-              "--rest-length with its unloaded length, such as --rest-length \"20 mm\"");
-    }
-    if (drawn) drive.quantity = Quantity::strain;
-    drive.dimension = Dimension::length;
-  }
-  const bool force = response.quantity == Quantity::contact_force &&
-                     has_dimension(*response.column, Dimension::force);
-  if (!force || !is_answered_by_stress(drive.quantity)) return;
-  if (!options.area_m2) {
-    missing(response, "a force beside a strain or relative length",
-            "--area with the cross section of the specimen, such as --area \"12 mm^2\"");
-  }
-  response.quantity = Quantity::stress;
-  response.dimension = Dimension::force;
 }
 
 /// Refuses a recording that would go without what only a refused title could give.

@@ -78,9 +78,17 @@ void require_no_imposed_value(const ImportOptions& options, const std::string& f
                   "tpm data import, which writes points, or no --depth and --load");
 }
 
-}  // namespace
-
-namespace {
+/// Rows without a number are left out before anything asks how many there are: says which.
+void require_samples(const RecordingFile& read, const std::string& file) {
+  constexpr std::size_t kLeast = 3;
+  const std::size_t size = read.recording.response.size();
+  if (size >= kLeast) return;
+  for (const ImportFinding& finding : read.findings) {
+    if (finding.what != "missing") continue;
+    throw bad_input(file, fmt::format("{} samples ({})", size, finding.value),
+                    fmt::format("at least {} rows of numbers", kLeast));
+  }
+}
 
 std::string described_label(const fs::path& path, std::string_view key) {
   const fs::path description = with_ending(path, ".json");
@@ -160,6 +168,7 @@ MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& optio
     return SpectrumFile{std::move(spectrum), std::move(findings)};
   }
   RecordingFile result = assemble_recording(std::move(series), file, options, imported.usual);
+  require_samples(result, file);
   name_it(result.recording.header);
   return result;
 }

@@ -42,7 +42,7 @@ struct PlannedExperiment {
 /// "8 mm at 10 mm/s, held 100 s, every 0.1 s, 3 times"
 [[nodiscard]] std::string experiment_words(const PlannedExperiment& experiment);
 
-/// What the machine and the tissue bear. Candidates beyond are left out and counted.
+/// Limits of the machine and the tissue. Candidates beyond are left out and counted.
 struct MachineLimits {
   double rate_m_per_s = std::numeric_limits<double>::infinity();
   double depth_m = 12e-3;  ///< damage of liver in the paper; holds for creep, too
@@ -58,7 +58,7 @@ struct PlannedNoise {
   double relative = 0.0;  ///< >= 0
 };
 
-/// What the best design is best at. Smaller scores are better.
+/// Score by which the best design is chosen. Smaller scores are better.
 enum class Criterion {
   parameter,  ///< relative standard error of one parameter
   all,        ///< D-optimal: geometric mean of the axes of the confidence ellipsoid, relative
@@ -87,7 +87,7 @@ struct DesignProblem {
   }
 };
 
-/// What a design file may hold.
+/// Keys of a design file.
 [[nodiscard]] const FileKind& design_kind();
 
 /// Reads and checks a design file. Throws Error(bad_input) with the file and the key.
@@ -98,7 +98,7 @@ struct DesignProblem {
 /// coth(interval / (2 correlation_time)), at most `samples`; 1 without correlation.
 [[nodiscard]] double inflation(double interval_s, double correlation_time_s, double samples);
 
-/// What one recording says about the material, its own nuisance parameters projected out.
+/// Information of one recording about the material, its own nuisance parameters projected out.
 struct RecordingInformation {
   Eigen::MatrixXd fisher;          ///< in theta of the material parameters, k x k
   double samples = 0.0;            ///< > 0
@@ -129,7 +129,7 @@ struct ThetaCovariance {
 };
 [[nodiscard]] ThetaCovariance theta_covariance(const Eigen::MatrixXd& fisher);
 
-/// What an experiment would tell about one parameter. SI.
+/// Expected estimate of one parameter from an experiment. SI.
 struct ExpectedParameter {
   std::string name;
   double value = 0.0;
@@ -141,7 +141,7 @@ struct ExpectedParameter {
   double rival_correlation = 0.0;  ///< -1 .. 1
 };
 
-/// What a set of experiments would tell.
+/// Expected estimates from a set of experiments.
 struct Expectation {
   std::vector<ExpectedParameter> parameters;
   double score = 0.0;              ///< of the criterion; infinite if something needed stays unknown

@@ -41,7 +41,7 @@ struct RecoveryOptions {
   std::vector<double> margins;
 };
 
-/// What select_law returned with one margin of BIC.
+/// Choices of select_law with one margin of BIC.
 struct ChoiceCount {
   double margin = 0.0;
   int trials = 0;
@@ -57,8 +57,8 @@ struct ChoiceCount {
   [[nodiscard]] bool fulfilled() const;
 };
 
-/// How often select_law returned the law that generated the data, and how often the intervals of
-/// that law's own fit contained the true value.
+/// Counts: how often select_law returned the law that generated the data, and how often the
+/// intervals of that law's own fit contained the true value.
 struct RecoveryResult {
   LawSpec law;
   std::vector<double> true_values;  ///< SI, in the order of law_parameters()

@@ -7,8 +7,8 @@
 
 namespace tpm::fit {
 
-/// What one evaluation knows beside the evaluator's symbols and definitions; it comes before them,
-/// values before formulas.
+/// Names that one evaluation knows beside the evaluator's symbols and definitions; it comes before
+/// them, values before formulas.
 struct Scope {
   std::map<std::string, double, std::less<>> values;  ///< SI
   std::map<std::string, std::string, std::less<>> formulas;

@@ -57,7 +57,7 @@ struct GroupComparison {
 /// variance of the logarithm of depth; Error(bad_input) says both depths.
 void require_comparable_depths(const RecordingGroup& first, const RecordingGroup& second);
 
-/// Which parameters differ, in one sentence.
+/// Parameters that differ, in one sentence.
 [[nodiscard]] std::string conclusion(const GroupComparison& comparison);
 [[nodiscard]] Json to_json(const GroupComparison& comparison);
 [[nodiscard]] std::string to_terminal_text(const GroupComparison& comparison);

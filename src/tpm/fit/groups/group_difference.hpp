@@ -5,9 +5,9 @@
 
 namespace tpm::fit {
 
-/// How far the means of two groups of specimens lie apart, in theta: of a log parameter exp() is
-/// the ratio of the typical specimens. y_i = mu_g + u_i + e_i with u_i ~ N(0, tau^2) in both groups
-/// and e_i ~ N(0, s_i^2).
+/// Distance between the means of two groups of specimens lie apart, in theta: of a log parameter
+/// exp() is the ratio of the typical specimens. y_i = mu_g + u_i + e_i with u_i ~ N(0, tau^2) in
+/// both groups and e_i ~ N(0, s_i^2).
 struct GroupDifference {
   std::size_t first = 0, second = 0;  ///< specimens
   double difference = 0.0;            ///< mean of the second group less that of the first

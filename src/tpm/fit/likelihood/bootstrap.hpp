@@ -36,7 +36,7 @@ class Refittable {
       std::span<const std::size_t> readings) const = 0;
 };
 
-/// What is drawn with replacement.
+/// Units that are drawn with replacement.
 enum class Resampling {
   residuals,   ///< single standardised residuals: independent noise
   blocks,      ///< moving blocks of neighbouring residuals (Kuensch 1989): correlated noise

@@ -22,7 +22,7 @@
 
 namespace tpm::fit {
 
-/// How the readings of a data set were imposed.
+/// Protocol of the readings of a data set.
 struct ProtocolChoice {
   enum class Kind {
     ramp_hold,    ///< to each datum's depth at `rate`, then held; times count from the ramp's end
@@ -86,12 +86,12 @@ struct Target {
   [[nodiscard]] bool applies_to(std::size_t choice) const;
 };
 
-/// How far automatic bounds may be moved out, SI.
+/// Limits to which automatic bounds may be moved out, SI.
 struct WidestBounds {
   double lower = 0.0, upper = 0.0;
 };
 
-/// What a measurement of its own tells about a parameter: a normal distribution, SI.
+/// Knowledge of a parameter from a measurement of its own: a normal distribution, SI.
 struct Prior {
   double mean = 0.0;
   double sd = 1.0;        ///< > 0
@@ -118,7 +118,8 @@ struct EstimatedParameter {
   /// estimated, run_fit weighs it against the noise that it finds.
   std::optional<Prior> prior = std::nullopt;
   std::optional<DriftTerm> drift = std::nullopt;
-  /// What these data cannot tell the parameter from, in words; it is then not called identified.
+  /// Effects that these data cannot separate from the parameter, in words; it is then not called
+  /// identified.
   std::string not_separable = {};
 };
 
@@ -156,14 +157,14 @@ struct FitConfig {
   /// Asked before each evaluation; true ends the fit with Interrupted. Not part of the result.
   std::function<bool()> interrupted;
 
-  /// Whether the size of the noise is known: of all data sets, or of none.
+  /// True if the size of the noise is known: of all data sets, or of none.
   [[nodiscard]] bool scale_known() const { return data.front().noise.scale_known; }
 };
 
 /// The model that the configuration names.
 [[nodiscard]] std::unique_ptr<Model> make_model(const FitConfig& config);
 
-/// What is estimated, without the model parameters that it sets.
+/// Parameters that are estimated, without the model parameters that it sets.
 [[nodiscard]] std::vector<FitParameter> searched_parameters(const FitConfig& config);
 
 /// Number of estimated parameters that have a prior.

@@ -24,7 +24,7 @@ void parse_noise(const Json& j, DataChoice& data, Dimension readings, const Docu
 /// set's name if there are several of them.
 void name_noise_parameters(FitConfig& config);
 
-/// What is estimated: of the model in the order of the file, then of the noise.
+/// Reads the parameters to estimate: of the model in the order of the file, then of the noise.
 void parse_parameters(const Json& document, const Model& model, FitConfig& config,
                       const DocumentPlace& place);
 

@@ -5,7 +5,7 @@
 
 namespace tpm::fit {
 
-/// How far neighbouring residuals repeat each other. A dense recording holds fewer independent
+/// Correlation of neighbouring residuals. A dense recording holds fewer independent
 /// readings than samples; intervals that ignore this are too short.
 struct Correlation {
   double lag1 = 0.0;             ///< autocorrelation of neighbours, -1 .. 1

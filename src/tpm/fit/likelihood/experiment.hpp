@@ -33,13 +33,13 @@ struct FitDatum {
 struct TimeCourse {
   Protocol protocol;
   std::vector<double> times_s;
-  /// What an organ is driven by in place of a measured history; none: the history itself.
+  /// Protocol that drives an organ in place of a measured history; none: the history itself.
   std::optional<Protocol> followed = std::nullopt;
 
   [[nodiscard]] const Protocol& driven() const { return followed ? *followed : protocol; }
 };
 
-/// What was imposed, and the readings taken.
+/// Imposed protocol, and the readings taken.
 struct Experiment {
   std::variant<TimeCourse, Oscillation> imposed;
   /// Index into ExperimentResiduals::data(), one per time or reading of an oscillation.
@@ -51,7 +51,7 @@ struct Experiment {
 /// Data in memory: separate readings, a recording, or storage and loss over frequency.
 using DataSet = std::variant<PointSet, Recording, Spectrum>;
 
-/// What the data sets of a fit amount to.
+/// Experiments of the data sets of a fit.
 struct ExperimentSet {
   std::vector<FitDatum> data;
   std::vector<Experiment> experiments;

@@ -53,7 +53,7 @@ class ExperimentResiduals final : public ResidualFunction {
   void set_noise_scale(double scale);
   [[nodiscard]] bool has_censored() const;
 
-  /// How often each datum counts, in the order of data(); 0 leaves it out.
+  /// Sets how often each datum counts, in the order of data(); 0 leaves it out.
   void set_counts(std::vector<int> counts);
 
   /// Holds outliers out, which stay among the data.

@@ -4,7 +4,7 @@
 
 namespace tpm::fit {
 
-/// What the configuration of a fit may hold. Its parts are read where they are used
+/// Keys of the configuration of a fit. Its parts are read where they are used
 /// (config_parts.hpp).
 [[nodiscard]] const FileKind& fit_kind();
 

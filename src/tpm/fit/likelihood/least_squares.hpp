@@ -40,7 +40,7 @@ class ResidualFunction {
     return evaluate(natural, residual, &root);
   }
 
-  /// Whether the residuals are linear in a parameter while the others are fixed: a search can solve
+  /// True if the residuals are linear in a parameter while the others are fixed: a search can solve
   /// for it.
   [[nodiscard]] virtual bool linear_in(std::size_t /*parameter*/) const { return false; }
 
@@ -65,10 +65,10 @@ struct Minimum {
   std::string message;  ///< the optimiser's own words
 };
 
-/// Which parameters keep their value.
+/// Marks of the parameters that keep their value.
 using FixedMask = std::vector<bool>;
 
-/// How far the first step may go: nearly a full Gauss-Newton step, or a short one. Which valley a
+/// Length of the first step: nearly a full Gauss-Newton step, or a short one. Which valley a
 /// far start falls into can depend on it (NIST BoxBOD, first start; MGH17, first start).
 enum class FirstStep { bold, cautious };
 

@@ -8,7 +8,7 @@
 
 namespace tpm::fit {
 
-/// Whether a recording is one of creep: its drive is the stress of a law and its response the
+/// True if a recording is one of creep: its drive is the stress of a law and its response the
 /// strain, or its drive the force of an indentation and its response the depth.
 [[nodiscard]] bool is_load_imposed(const Recording& recording) noexcept;
 
@@ -32,7 +32,7 @@ namespace tpm::fit {
 [[nodiscard]] Quantity law_drive(const Recording& recording) noexcept;
 [[nodiscard]] Quantity law_response(const Recording& recording) noexcept;
 
-/// What was imposed, as a law is asked about it: at rest before the first sample.
+/// Imposed history, as a law is asked about it: at rest before the first sample.
 [[nodiscard]] Protocol imposed_history(const Recording& recording);
 
 /// Throws Error(bad_input), naming the recording, if it is one of creep.

@@ -6,7 +6,7 @@
 
 namespace tpm::fit {
 
-/// How a reading scatters about the true value. f is the model's answer, y the datum.
+/// Scatter of a reading about the true value. f is the model's answer, y the datum.
 enum class NoiseKind {
   relative_to_datum,  ///< normal, sigma = b |y|
   absolute,           ///< normal, sigma = a
@@ -34,7 +34,7 @@ struct Noise {
 [[nodiscard]] NoiseKind parse_noise_kind(std::string_view text, std::string_view where);
 [[nodiscard]] std::string_view noise_kind_name(NoiseKind kind) noexcept;
 
-/// Whether b and a are part of the standard deviation.
+/// True if b and a are part of the standard deviation.
 [[nodiscard]] bool uses_relative(NoiseKind kind);
 [[nodiscard]] bool uses_absolute(NoiseKind kind);
 
@@ -53,7 +53,7 @@ struct RobustLoss {
 [[nodiscard]] Loss parse_loss(std::string_view text, std::string_view where);
 [[nodiscard]] std::string_view loss_name(Loss loss) noexcept;
 
-/// What one datum adds: up to two residuals with their derivatives by f.
+/// Contribution of one datum: up to two residuals with their derivatives by f.
 struct DatumResidual {
   double r = 0.0, d_r = 0.0;
   double normalisation = 0.0, d_normalisation = 0.0;  ///< sqrt(2 ln(f/|y|) + kNormalisationOffset)

@@ -27,8 +27,8 @@ struct Oscillation {
   std::vector<Reading> readings;
 };
 
-/// What a spectrum asks of the law of its configuration, no reading chosen yet. A law of an
-/// indentation answers a dynamic stiffness, and a modulus only with
+/// Oscillation that a spectrum asks of the law of its configuration, no reading chosen yet. A law
+/// of an indentation answers a dynamic stiffness, and a modulus only with
 /// DataChoice::stiffness_per_modulus_m; a law of a strip answers a modulus.
 /// Throws Error(bad_input) naming the data set if there is no law, the protocol is no oscillation
 /// or the law does not answer such readings.

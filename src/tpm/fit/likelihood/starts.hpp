@@ -28,7 +28,7 @@ enum class StartKind {
     const ResidualFunction& function, std::span<const FitParameter> parameters,
     const std::vector<bool>& linear, std::size_t count, std::size_t keep, std::uint64_t seed);
 
-/// Whether fit_starts() gives projected or given starts.
+/// Kind of starts that fit_starts() gives: projected or given.
 [[nodiscard]] StartKind start_kind(const ExperimentResiduals& function);
 
 /// The starts of a configuration: a Latin hypercube of all parameters, or, where the model is

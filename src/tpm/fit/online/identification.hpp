@@ -25,7 +25,7 @@ struct IdentifyOptions {
   std::uint64_t seed = 0;
 };
 
-/// What was known after a sample.
+/// Estimates after a sample.
 struct IdentifiedSample {
   double time_s = 0.0;
   std::size_t law = 0;  ///< place in Identification::laws
@@ -44,7 +44,7 @@ struct Identification {
   std::size_t samples = 0;
   std::vector<std::string> flags;
 
-  /// What the identification amounts to: where it stopped, or its last sample.
+  /// Result of the identification: where it stopped, or its last sample.
   [[nodiscard]] const IdentifiedSample& result() const;
 };
 

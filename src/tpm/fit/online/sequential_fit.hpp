@@ -14,7 +14,7 @@
 
 namespace tpm::fit {
 
-/// How a law is fitted sample by sample.
+/// Settings of a fit sample by sample.
 struct SequentialSettings {
   double level = 0.95;
   double reference = 1e-3;  ///< depth that coefficients refer to: the planned one
@@ -26,7 +26,7 @@ struct SequentialSettings {
   std::uint64_t seed = 0;
 };
 
-/// What is known about one parameter after some samples; SI.
+/// Estimate of one parameter after some samples; SI.
 struct SequentialParameter {
   FitParameter parameter;
   std::size_t place = 0;  ///< in law_parameters()
@@ -41,7 +41,7 @@ struct SequentialParameter {
   [[nodiscard]] double relative_half_width() const;
 };
 
-/// What is known about a law after some samples.
+/// Estimate of a law after some samples.
 struct SequentialEstimate {
   std::size_t samples = 0;     ///< that count, from shortly before contact on
   double phi = 0.0;            ///< lag-1 correlation of the noise
@@ -75,12 +75,12 @@ class SequentialFit {
   /// None until a ramp has been seen and more samples than parameters.
   [[nodiscard]] const std::optional<SequentialEstimate>& estimate() const { return estimate_; }
   [[nodiscard]] const LawSpec& law() const { return spec_; }
-  /// How often the history was gone through again.
+  /// Number of times that the history was gone through again.
   [[nodiscard]] int passes() const { return passes_; }
 
  private:
   struct Linearisation;
-  /// What has been recorded so far, ready to be fitted.
+  /// Samples recorded so far, ready to be fitted.
   struct Prefix {
     PreparedRecording recording;
     FitConfig config;

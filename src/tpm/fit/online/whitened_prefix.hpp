@@ -39,7 +39,7 @@ class WhitenedPrefix final : public ResidualFunction {
   std::vector<double> time_s_, observed_;
 };
 
-/// Whether least squares with this matrix of normal equations have one answer.
+/// True if least squares with this matrix of normal equations have one answer.
 [[nodiscard]] bool tells_apart(const Eigen::MatrixXd& gram);
 
 /// The least of the ends of searches from some starts; not usable if there is none.

@@ -12,7 +12,7 @@
 
 namespace tpm::fit {
 
-/// What a stage of the chain from a recording to a hand belongs to.
+/// Kinds of stages of the chain from a recording to a hand.
 enum class BudgetKind {
   data,         ///< what was measured, and the law fitted to it
   tissue,       ///< what stands for the tissue: the organ, its spacing, masses
@@ -30,7 +30,7 @@ struct BudgetStage {
   std::vector<double> force_N;
 };
 
-/// What one step of the chain changes.
+/// Change by one step of the chain.
 struct BudgetLine {
   std::string name, from, to;
   BudgetKind kind = BudgetKind::data;
@@ -46,14 +46,14 @@ struct BudgetRandomPart {
   double largest = 0.0;  ///< half width of the band over time, in parts of the peak
 };
 
-/// What a stated instrument leaves unknown of the recording's force: scale, zero and depth.
+/// Uncertainty by a stated instrument of the recording's force: scale, zero and depth.
 struct BudgetInstrumentPart {
   std::string id;
   double level = 0.95;
   double largest = 0.0;  ///< half width over time, in parts of the peak
 };
 
-/// What the law's line and the parameters' scatter amount to, and what is lost by computing.
+/// Sum of the law's line, the parameters' scatter, and the errors of computing.
 struct ErrorBudget {
   std::string title;
   std::vector<double> time_s;
@@ -75,7 +75,7 @@ struct ErrorBudget {
 /// From this part of the peak on a line counts; smaller ones are named and compared with nothing.
 inline constexpr double kLeastLine = 1e-3;
 
-/// How the model in the loop is fed and what reaches the hand.
+/// Device of the budget: how it feeds the model in the loop, and what reaches the hand.
 struct BudgetDevice {
   double period_s = 1e-3;
   double encoder_step_m = 1e-5;

@@ -37,7 +37,7 @@ struct PredictionOptions {
   std::uint64_t seed = 0;
 };
 
-/// How one part of a recording compares with its prediction.
+/// Comparison of one part of a recording with its prediction.
 struct PredictionComparison {
   int samples = 0;
   double rms = 0.0, largest = 0.0;              ///< of prediction less measurement, SI

@@ -39,7 +39,7 @@ class FittedBonds {
   /// "Einf", "g1", "tau1", "stiffening".
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] std::size_t size() const { return names().size(); }
-  /// Whether relaxation times are among them.
+  /// True if relaxation times are among them.
   [[nodiscard]] bool has_times() const { return times_; }
 
   /// @param natural one value for each name, SI
@@ -49,7 +49,7 @@ class FittedBonds {
   [[nodiscard]] static std::vector<double> values(const OrganModel& model,
                                                   const BondMaterial& material);
 
-  /// How a model's parameters (rows) change with each of these (columns).
+  /// Change of a model's parameters (rows) with each of these (columns).
   [[nodiscard]] Eigen::MatrixXd along(const OrganModel& model) const;
 
  private:

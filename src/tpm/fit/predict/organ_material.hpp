@@ -42,7 +42,7 @@ struct MaterialMotion {
 [[nodiscard]] MaterialMotion motion_of_protocol(const Protocol& protocol,
                                                 std::vector<double> times_s);
 
-/// What the bonds are fitted to, and where their intervals come from.
+/// Data that the bonds are fitted to, and the source of their intervals.
 enum class MaterialIntervals {
   law,       ///< fitted to the law's force; the law's covariance, carried over to the bonds
   readings,  ///< fitted to the readings; their scatter, from derivatives at the estimate
@@ -55,7 +55,7 @@ enum class MaterialIntervals {
 
 struct OrganMaterialOptions {
   bool fit_times = false;  ///< relaxation times, too; else those of the law are kept
-  /// Whether bonds stiffen (W = l (1 + (l/s)^2)); none: if the law does.
+  /// True if bonds stiffen (W = l (1 + (l/s)^2)); none: if the law does.
   std::optional<bool> stiffens;
   /// The branches act on the stiffening W, too, not on l: servo models do not take that.
   bool branches_stiffen = false;
@@ -74,7 +74,7 @@ struct OrganMaterialParameter {
   bool at_bound = false;
 };
 
-/// How one force differs from another, in parts of the law's peak force.
+/// Difference of one force from another, in parts of the law's peak force.
 struct ForceMismatch {
   double largest = 0.0, rms = 0.0;
   double at_s = 0.0, depth_m = 0.0, rate_m_per_s = 0.0;  ///< where it is largest

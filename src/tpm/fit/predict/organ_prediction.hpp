@@ -46,7 +46,7 @@ class OrganOfLaw final : public Model {
   [[nodiscard]] const Json& scene() const { return scene_; }
   [[nodiscard]] const Organ& spheres_of_scene() const { return organ_.tissue->network.organ; }
   [[nodiscard]] const LawFile& law() const { return law_; }
-  /// Whether the bonds' relaxation times follow the law's; else they are kept, and the uncertainty
+  /// True if the bonds' relaxation times follow the law's; else they are kept, and the uncertainty
   /// of the law's times reaches the answer only as far as the moduli take it up.
   [[nodiscard]] bool times_follow() const { return bonds_.has_times(); }
   [[nodiscard]] std::size_t spheres() const { return organ_.tissue->network.organ.size(); }
@@ -70,7 +70,7 @@ class OrganOfLaw final : public Model {
 /// document, and for a law without uncertainty.
 [[nodiscard]] OrganOfLaw organ_of_law(const Json& material, std::string_view where);
 
-/// Whether a file is a scene or a material.json, and not a law.
+/// True if a file is a scene or a material.json, and not a law.
 [[nodiscard]] bool is_organ_document(const Json& document);
 
 /// From a scene.json, whose material.json stands beside it, or from a material.json itself. Throws

@@ -9,7 +9,7 @@ namespace tpm::fit {
 /// it first among the words of the phases.
 void find_clipping(PreparedRecording& recording);
 
-/// Whether a reading stands at a limit that was found.
+/// True if a reading stands at a limit that was found.
 [[nodiscard]] bool is_clipped(const PreparedRecording& recording, double reading);
 
 }  // namespace tpm::fit

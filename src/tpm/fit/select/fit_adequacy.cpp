@@ -268,7 +268,13 @@ void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings)
   }
   const auto tried = static_cast<std::size_t>(
       std::ranges::count_if(s.candidates, [](const Candidate& c) { return !c.failed; }));
-  state(chosen.fit, stated(chosen.fit, *worst, tried, other));
+  LawAdequacy adequacy = stated(chosen.fit, *worst, tried, other);
+  const bool springpots = std::ranges::any_of(
+      s.candidates, [](const Candidate& c) { return c.law.fractional != Fractional::none; });
+  if (rejected && !other && !springpots && tried > 1) {
+    adequacy.words += "; laws with spring-pots were not tried: --family fractional";
+  }
+  state(chosen.fit, std::move(adequacy));
   if (!rejected) return;
   chosen.identified = false;
   chosen.reason = "does not describe the data";

@@ -8,8 +8,8 @@
 
 namespace tpm::fit {
 
-/// What a rheometer measures of a linear material, whatever the specimen: storage and loss over
-/// frequency, a relaxation modulus G(t) or a creep compliance J(t).
+/// Function of a linear material that a rheometer measures, whatever the specimen: storage and loss
+/// over frequency, a relaxation modulus G(t) or a creep compliance J(t).
 struct MaterialFunction {
   std::string name;  ///< a path where the configuration is to be rerun
   std::variant<Spectrum, Recording> data;

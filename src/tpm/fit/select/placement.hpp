@@ -17,7 +17,7 @@ struct Measured {
   double sd = 0.0;
 };
 
-/// What the samples tell in which tissue cannot act: at rest before contact, and after the probe
+/// Readings in which tissue cannot act: at rest before contact, and after the probe
 /// was withdrawn.
 struct RestReadings {
   std::size_t before = 0, after = 0;  ///< samples
@@ -69,7 +69,7 @@ struct Onset {
 [[nodiscard]] std::optional<double> first_loading_exponent(const LawSpec& law,
                                                            std::optional<double> of_probe);
 
-/// Whether a drift of the zero can be told from a slow relaxation of the tissue.
+/// Verdict whether a drift of the zero can be told from a slow relaxation of the tissue.
 enum class DriftFinding {
   no_hold,        ///< nothing is held: no drift is asked for
   told,           ///< the rests tell a slope: it is in the fit
@@ -82,7 +82,7 @@ enum class DriftFinding {
 [[nodiscard]] DriftFinding drift_finding(const PreparedRecording& recording,
                                          const RestReadings& rests);
 
-/// What was measured of one recording's placement, for a law.
+/// Measured placement of one recording, for a law.
 struct MeasuredPlacement {
   RestReadings rests;
   Onset onset;
@@ -93,7 +93,7 @@ struct MeasuredPlacement {
                                                   const LawSpec& law,
                                                   std::optional<double> exponent);
 
-/// What was measured of recordings, for a choice among laws: many of them have one exponent, and
+/// Measured placements of recordings, for a choice among laws: many of them have one exponent, and
 /// the placement depends on nothing else of a law. Not for several threads.
 class PlacementMemory {
  public:

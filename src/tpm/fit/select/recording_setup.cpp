@@ -17,6 +17,7 @@
 #include "tpm/fit/select/loading_sense.hpp"
 #include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
+#include "tpm/fit/select/start_up.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -200,59 +201,6 @@ FitParameter readable(FitParameter fit) {
   fit.start = std::clamp(rounded(fit.start, kDigits), fit.lower, fit.upper);
   return fit;
 }
-
-namespace {
-
-/// The hold after a step: a ramp that has no sample between its ends.
-std::optional<Phase> hold_after_step(const PreparedRecording& r) {
-  constexpr std::size_t kAStep = 2;        // samples from end to end
-  constexpr std::size_t kFewestHeld = 30;  // of which some can be spared
-  for (std::size_t i = 0; i + 1 < r.phases.phases.size(); ++i) {
-    const Phase& ramp = r.phases.phases[i];
-    const Phase& hold = r.phases.phases[i + 1];
-    if (ramp.kind != PhaseKind::loading) continue;
-    const bool step = ramp.last - ramp.first <= kAStep;
-    if (!step || hold.kind != PhaseKind::hold || hold.last - hold.first < kFewestHeld) break;
-    return hold;
-  }
-  return std::nullopt;
-}
-
-/// The last sample in the first part of a hold that stands far out of its neighbours: a relaxation
-/// is monotone, and what rings is not.
-std::size_t end_of_ringing(const PreparedRecording& r, const Phase& hold) {
-  constexpr double kPart = 0.2, kFarOut = 6.0;  // of the hold; standard deviations
-  const std::vector<double>& y = r.recording.response;
-  const double far = kFarOut * r.phases.noise_sd_estimate;
-  const auto until =
-      hold.first + static_cast<std::size_t>(kPart * static_cast<double>(hold.last - hold.first));
-  std::size_t end = hold.first;
-  for (std::size_t i = hold.first + 2; i + 2 < until && far > 0.0; ++i) {
-    const double middle = median({y[i - 2], y[i - 1], y[i], y[i + 1], y[i + 2]});
-    if (std::abs(y[i] - middle) > far) end = i + 1;
-  }
-  return end;
-}
-
-void leave_out_start_up(PreparedRecording& r) {
-  constexpr double kTimesOfStep = 2.0;
-  const std::optional<Phase> hold = hold_after_step(r);
-  if (!hold) return;
-  const std::vector<double>& time = r.recording.time_s;
-  const double step_s = time[hold->first] - time[hold->first - 1];
-  const std::size_t ringing = end_of_ringing(r, *hold);
-  const double from_s = std::max(time[hold->first] + kTimesOfStep * step_s, time[ringing]);
-  if (from_s <= r.from_s) return;
-  const auto left_out =
-      std::ranges::count_if(time, [&](double t) { return t >= time[hold->first] && t < from_s; });
-  r.from_s = from_s;
-  r.start_up = fmt::format(
-      "{}: {} samples after the step are left out, to {} s: {} (--from-time leaves out more)",
-      r.name, left_out, significant(from_s, 4),
-      ringing > hold->first ? "they ring" : "the ramp within the step was not sampled");
-}
-
-}  // namespace
 
 void keep_baseline(PreparedRecording& r) {
   const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;

@@ -43,7 +43,7 @@ struct PreparedRecording {
 /// zero that the rest measured.
 void keep_baseline(PreparedRecording& recording);
 
-/// What belongs to a recording and not to the material.
+/// Parameters of a recording and not of the material.
 enum class Nuisance {
   automatic,  ///< offset always; contact where the data can tell the two apart
   none,
@@ -68,7 +68,7 @@ struct SetupOptions {
   std::vector<double> times_s;    ///< relaxation times that are stated, not fitted; empty: none are
   std::optional<double> contact;  ///< depth of contact that is held, SI; none: measured
   std::optional<double> zero;     ///< reading without a load that is held, SI; none: measured
-  /// Whether what was measured of zero, contact and drift enters the fit (measure_placement).
+  /// True if what was measured of zero, contact and drift enters the fit (measure_placement).
   bool measured = true;
   /// Of a choice among laws, so that each placement is measured once; none: measured each time.
   std::shared_ptr<PlacementMemory> placements = nullptr;

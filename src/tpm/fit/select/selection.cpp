@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "tpm/base/lists.hpp"
@@ -81,8 +82,8 @@ Candidate fit_to_recordings(const LawSpec& law, std::span<const PreparedRecordin
 
 /// The smallest deviance that counts: residuals at rounding level are all the same to us.
 double floored_deviance(const Candidate& c, int samples) {
-  constexpr double kRoundingSigma = 1e-10;  // of the noise unit, a hundredth of the peak
-  return std::max(c.fit.best.deviance, kRoundingSigma * kRoundingSigma * samples);
+  return std::max(
+      {c.fit.best.deviance, c.fit.least_variance * samples, std::numeric_limits<double>::min()});
 }
 
 void score(Candidate& c, int samples, double effective, bool few_readings) {

@@ -10,7 +10,7 @@
 
 namespace tpm::fit {
 
-/// How well a law that was fitted to some data predicts other data.
+/// Prediction of other data by a law that was fitted to some data.
 struct HeldOut {
   std::string what;  ///< "muscle_100s, fitted to the others", "second half of the hold"
   double rms = 0.0;  ///< of the prediction error, SI
@@ -135,7 +135,7 @@ void give_both_drift_answers(FitResult& fit, const std::vector<DataSet>& data);
 ///        the noise: McQuarrie, Statistics & Probability Letters 44 (1999) 79
 void rank_candidates(Selection& s, bool few_readings = false);
 
-/// What the fitted law does with the samples outside the window: "unloading and after: rms 12 % of
+/// Misfit of the fitted law outside the window: "unloading and after: rms 12 % of
 /// the peak; the law does not describe it", and which of them it does not predict. Empty if there
 /// are none.
 [[nodiscard]] std::vector<std::string> outside_words(const FitResult& fit);
@@ -143,7 +143,7 @@ void rank_candidates(Selection& s, bool few_readings = false);
 /// Fewer samples over a relaxation time than these cannot support it.
 inline constexpr int kLeastSamples = 3;
 
-/// What the protocols of recordings can tell, at best.
+/// Time spans that the protocols of recordings can resolve, at best.
 struct ProtocolSpans {
   double ramp_s = 0.0;  ///< shortest; infinite without a ramp
   double hold_s = 0.0;  ///< longest; 0 without a hold, infinite without a protocol
@@ -170,8 +170,8 @@ struct ProtocolSpans {
 /// note must not contradict its intervals.
 void reassess(Candidate& chosen, const ProtocolSpans& spans);
 
-/// What the protocol of a recording cannot tell about a fitted law: relaxation times shorter than
-/// the ramp or the sampling, or longer than the hold.
+/// Properties of a fitted law that the protocol of a recording cannot resolve: relaxation times
+/// shorter than the ramp or the sampling, or longer than the hold.
 [[nodiscard]] std::vector<std::string> protocol_warnings(
     const FitResult& fit, std::span<const PreparedRecording> recordings);
 

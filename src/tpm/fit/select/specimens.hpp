@@ -16,7 +16,7 @@ struct SpecimenRow {
   std::string specimen = {};     ///< whose repeat it is; empty: a specimen of its own
   std::optional<FitResult> fit;  ///< empty if it could not be fitted
   std::string reason;            ///< then why
-  /// Which of the fit's parameters stands for each of the common law's: a fit may number its
+  /// Index of the fit's parameter that stands for each of the common law's: a fit may number its
   /// branches in any order, here they are sorted by their relaxation times.
   std::vector<std::size_t> place;
 
@@ -63,8 +63,8 @@ struct SpecimenStudy {
 [[nodiscard]] std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows,
                                                           double level);
 
-/// What the recordings say of the common law's parameter i, in theta of `parameter`. A recording
-/// that does not determine it (PooledParameter::left_out) is counted, not listed.
+/// Estimates of the common law's parameter i by the recordings, in theta of `parameter`. A
+/// recording that does not determine it (PooledParameter::left_out) is counted, not listed.
 struct ParameterEstimates {
   FitParameter parameter;  ///< of log scale unless it may be negative
   std::vector<SpecimenEstimate> estimates;
@@ -77,7 +77,7 @@ struct ParameterEstimates {
 [[nodiscard]] ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows,
                                                      const SpecimenRow& like, std::size_t i);
 
-/// Whether a fit's parameter belongs to the recording (contact, offset), not to the specimen.
+/// True if a fit's parameter belongs to the recording (contact, offset), not to the specimen.
 [[nodiscard]] bool is_of_recording(const ParameterResult& p);
 
 /// Two files with the same bytes are one measurement. Throws Error(bad_input) naming both.

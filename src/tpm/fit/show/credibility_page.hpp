@@ -8,7 +8,7 @@
 
 namespace tpm::fit {
 
-/// What only the user can say of a model (ASME V&V 40).
+/// Statements about a model that only the user can make (ASME V&V 40).
 struct CredibilityWords {
   std::string question, context, risk;  ///< empty: not stated, and shown so
 };
@@ -48,7 +48,7 @@ struct CredibilityChange {
 [[nodiscard]] std::string credibility_page(const Json& record,
                                            const std::vector<CredibilityChange>& changes = {});
 
-/// Whether a page is what its record prints: no if someone changed a number that it shows, or if
+/// True if a page is what its record prints: no if someone changed a number that it shows, or if
 /// another version of this program wrote it.
 [[nodiscard]] bool shows_its_record(const std::filesystem::path& page, const Json& record);
 

@@ -25,7 +25,8 @@ namespace tpm::fit {
 /// Adds Young's moduli to an answer, before its other rows, and their warnings.
 void add_moduli(ShortAnswer& answer, const YoungModuli& moduli);
 
-/// How many starts were drawn and compared before FitResult::starts_run of them were followed.
+/// Number of starts that were drawn and compared before FitResult::starts_run of them were
+/// followed.
 [[nodiscard]] std::size_t starts_looked_at(const FitResult& fit);
 
 }  // namespace tpm::fit

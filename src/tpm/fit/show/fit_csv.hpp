@@ -28,9 +28,9 @@ namespace tpm::fit {
 /// Each pooled parameter.
 [[nodiscard]] std::string pooled_csv(const SpecimenStudy& study);
 
-/// How often intervals contain the true value: each parameter of a configuration.
+/// Coverage of intervals: each parameter of a configuration.
 [[nodiscard]] std::string coverage_csv(const CoverageResult& result);
-/// How often a law was returned from its own data: each law and margin.
+/// Counts of laws that were returned from their own data: each law and margin.
 [[nodiscard]] std::string recovery_csv(std::span<const RecoveryResult> results);
 
 /// Each Young's modulus.

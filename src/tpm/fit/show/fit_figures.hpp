@@ -17,7 +17,7 @@ struct ProfileLimit {
   double unit = 1.0;  ///< of the deviance's axis
 };
 
-/// What a panel of a profile draws: the profile, the limit, the best fit.
+/// Series of a panel of a profile: the profile, the limit, the best fit.
 /// @param least deviance, of the best fit
 [[nodiscard]] std::vector<Series> profile_series(const ParameterResult& result,
                                                  std::span<const ProfilePoint> points, double least,

@@ -47,7 +47,7 @@ struct CurveComparison {
   double chi_squared = 0.0;  ///< of whitened E over sigma; 0 without noise
 };
 
-/// Whether the motion lies inside what the law was fitted to.
+/// Verdict whether the motion lies inside the range that the law was fitted to.
 struct Applicability {
   double depth = 0.0, duration_s = 0.0, rate = 0.0;  ///< of the recording
   std::optional<double> fitted_depth, fitted_duration_s;
@@ -85,7 +85,7 @@ struct PickedAnswer {
 using PickAnswer =
     std::function<PickedAnswer(const Protocol& motion, const std::vector<double>& times_s)>;
 
-/// What rendering changes of a quantity, in parts of it, found from a session.
+/// Change of a quantity by rendering, in parts of it, found from a session.
 struct RenderingError {
   QuantityOfInterest quantity;
   double mean = 0.0;   ///< rendered over simulated, less 1
@@ -93,7 +93,7 @@ struct RenderingError {
   int presses = 0;
 };
 
-/// What a session knows of one of its presses.
+/// Motion of one press of a session.
 struct SessionMotion {
   std::vector<Knot> earlier;  ///< motion from the session's start to the press
   /// When the hand was asked to hold, of the recording's clock; none: it was not.
@@ -124,7 +124,7 @@ struct ComparisonOptions {
                                                          const PreparedRecording& recording,
                                                          const ComparisonOptions& options);
 
-/// Whether a quantity is a response: peak, end of the hold, at a time or a depth.
+/// True if a quantity is a response: peak, end of the hold, at a time or a depth.
 [[nodiscard]] bool is_of_response(QuantityKind kind);
 
 /// The unit in which a quantity is shown.

@@ -36,14 +36,14 @@ struct QuantityOfInterest {
 [[nodiscard]] QuantityOfInterest parse_quantity_of_interest(std::string_view text, Quantity drive,
                                                             std::string_view where);
 
-/// Whether a recording is one of creep: its load was imposed, and what it moved was measured.
+/// True if a recording is one of creep: its load was imposed, and what it moved was measured.
 [[nodiscard]] bool is_creep(Quantity response) noexcept;
 
 /// "peak force", "force at the end of the hold", "stress at 5 s"; of creep "depth at the corner".
 [[nodiscard]] std::string quantity_words(const QuantityOfInterest& quantity, Quantity drive,
                                          Quantity response);
 
-/// What the drive tells of a recording: all windows of quantities follow from it, so that a
+/// Parts of a recording by its drive: all windows of quantities follow from it, so that a
 /// simulation and its recording are read by the same samples.
 struct RecordingParts {
   std::size_t ramp_first = 0;                        ///< last sample before the drive moves
@@ -68,7 +68,7 @@ struct RecordingParts {
 [[nodiscard]] RecordingParts parts_of_press(const PreparedRecording& recording,
                                             double hold_asked_s);
 
-/// What part of a recording its quantities are read from.
+/// Part of a recording that its quantities are read from.
 struct ComparedPart {
   double from_s = 0.0, corner_s = 0.0, to_s = 0.0;  ///< of the recording's clock
   double depth = 0.0;                               ///< largest drive within it, SI

@@ -56,13 +56,13 @@ class LawAlong {
 
   /// Covariance of the law's coordinates is root root'.
   [[nodiscard]] const Eigen::MatrixXd& root() const { return coordinates_.root; }
-  /// Whether contact is a property of the law, as the slack length of a strip.
+  /// True if contact is a property of the law, as the slack length of a strip.
   [[nodiscard]] bool contact_of_law() const { return contact_of_law_; }
   [[nodiscard]] double contact_in_law() const { return law_.values[law_.values.size() - 2]; }
   [[nodiscard]] bool load_imposed() const { return load_imposed_; }
   [[nodiscard]] const OrganOfLaw* organ() const { return organ_; }
   [[nodiscard]] const LawFile& law() const { return law_; }
-  /// What is imposed beyond a contact point, as an organ is driven.
+  /// Imposed motion beyond a contact point, as an organ is driven.
   [[nodiscard]] Protocol motion() const { return motion_; }
 
  private:
@@ -84,7 +84,7 @@ class LawAlong {
   bool contact_of_law_ = false;
 };
 
-/// Whether a quantity is a load: as the drive of a recording it makes it one of creep.
+/// True if a quantity is a load: as the drive of a recording it makes it one of creep.
 [[nodiscard]] bool is_load(Quantity q) noexcept;
 
 /// A recording of creep with the load as its drive and what it moved as its response.

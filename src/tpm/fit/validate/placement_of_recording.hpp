@@ -9,7 +9,7 @@
 
 namespace tpm::fit {
 
-/// How contact and zero of a recording are found before it is compared.
+/// Rule that finds contact and zero of a recording before it is compared.
 enum class PlacementRule {
   held,    ///< the depth's own zero where contact begins there, else the onset; zero from before
   onset,   ///< always the onset
@@ -19,7 +19,7 @@ enum class PlacementRule {
 [[nodiscard]] std::string_view placement_rule_name(PlacementRule rule) noexcept;
 [[nodiscard]] PlacementRule parse_placement_rule(std::string_view text, std::string_view where);
 
-/// What is known of contact and zero beforehand.
+/// Knowledge of contact and zero beforehand.
 enum class KnownPlacement {
   nothing,    ///< both are found in the recording
   threshold,  ///< contact was defined by a response (--contact-force)

@@ -37,7 +37,7 @@ struct PooledOptions {
   Dimension response = Dimension::force;
 };
 
-/// Whether depth, rate and duration of the recordings agree to 2 %.
+/// True if depth, rate and duration of the recordings agree to 2 %.
 [[nodiscard]] bool equal_protocols(std::span<const Applicability> motions);
 
 /// Every quantity of the recordings once, as the first that has it has it.

@@ -9,7 +9,7 @@
 
 namespace tpm::fit {
 
-/// How large a model error may be: stated by the user before the comparison.
+/// Largest model error allowed: stated by the user before the comparison.
 struct Requirement {
   bool share = true;                               ///< of the measured value; else an amount
   double value = 0.0;                              ///< > 0: a share, or SI
@@ -22,7 +22,7 @@ struct Requirement {
 /// Throws Error(bad_input).
 [[nodiscard]] Requirement parse_requirement(std::string_view text, std::string_view where);
 
-/// What is said of a model error delta, known to be in [E - U, E + U].
+/// Verdict on a model error delta, known to be in [E - U, E + U].
 enum class ModelVerdict {
   no_requirement,  ///< none in the unit of the quantity
   adequate,        ///< |E| + U <= R

@@ -11,7 +11,7 @@
 
 namespace tpm::fit {
 
-/// What is known of the recordings that a law was fitted to.
+/// Properties of the recordings that a law was fitted to.
 struct CalibrationData {
   struct File {
     std::string name, sha256;
@@ -33,7 +33,7 @@ struct CalibrationData {
     const std::vector<std::string>& digests,
     const std::function<PreparedRecording(const std::string&)>& read);
 
-/// What is asked: see docs/validate.md.
+/// Request of a validation: see docs/validate.md.
 struct ValidationRequest {
   LawFile law;
   std::string law_file, law_sha256;
@@ -81,7 +81,7 @@ struct Validation {
 /// recordings of other quantities.
 [[nodiscard]] Validation validate(const ValidationRequest& request);
 
-/// What rendering changes of each quantity: the rendered force over that of the subject along the
+/// Change of each quantity by rendering: the rendered force over that of the subject along the
 /// hand's own motion, from a validation whose recordings are presses of a session.
 [[nodiscard]] std::vector<RenderingError> rendering_errors(const Validation& presses);
 

@@ -25,7 +25,7 @@ struct RulePoint {
   double measured_N_s_per_m = 0.0, predicted_N_s_per_m = 0.0;  ///< friction needed; may be infinite
 };
 
-/// How the rise of a force is limited.
+/// Limit of the rise of a force.
 enum class RiseLimit {
   none,
   slip,     ///< the session's slip element, 400 N/s
@@ -55,7 +55,7 @@ struct DeviceCorner {
   std::optional<std::pair<double, double>> assumed_friction_N_s_per_m = std::nullopt;
 };
 
-/// What `tpm hil stability` computes.
+/// Results of `tpm hil stability`.
 struct BoundaryStudy {
   PlantSettings plant;
   double relaxation_time_s = 0.01;            ///< where rate, delay and friction vary

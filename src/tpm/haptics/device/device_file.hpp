@@ -12,8 +12,8 @@
 
 namespace tpm::haptics {
 
-/// What a file says of one device (schemas/device.schema.json): its kind, limits in place of those
-/// of the list, and what was measured (`tpm hil identify` writes it).
+/// Contents of the file of one device (schemas/device.schema.json): its kind, limits in place of
+/// those of the list, and what was measured (`tpm hil identify` writes it).
 struct DeviceFile {
   std::string where;   ///< the file, for messages
   std::string kind;    ///< as limits_of() takes it, or "plugin"
@@ -26,7 +26,7 @@ struct DeviceFile {
   /// Largest delay from a position to its force, both paths together and without the hold of a
   /// command, s. Empty unless it was measured: an assumed one is not counted.
   std::optional<double> measured_delay_s;
-  /// What the viscous friction exceeds with 95 %, N s/m. Empty unless it was measured.
+  /// Lower bound of the viscous friction at 95 %, N s/m. Empty unless it was measured.
   std::optional<double> measured_friction_N_s_per_m;
 };
 

@@ -7,7 +7,7 @@
 
 namespace tpm::haptics {
 
-/// What may be asked of a kind of device. Numbers that nobody has measured here are marked.
+/// Limits of a kind of device. Numbers that nobody has measured here are marked.
 struct DeviceLimits {
   std::string kind;
   std::string name;                ///< as its maker writes it

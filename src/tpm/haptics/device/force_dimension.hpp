@@ -14,7 +14,7 @@
 
 namespace tpm::haptics {
 
-/// Which of several devices; nothing given: the only one of its kind.
+/// Choice among several devices; nothing given: the only one of its kind.
 struct DeviceSelection {
   std::optional<int> serial, index;
 };
@@ -74,7 +74,7 @@ class ForceDimension final : public HapticDevice {
   std::atomic<bool> open_{false}, moves_itself_{false}, cut_{false};
 };
 
-/// What the library sees: each device is opened and closed again, none moves.
+/// Devices that the library sees: each is opened and closed again, none moves.
 /// Throws Error(environment) as DhdLibrary does.
 [[nodiscard]] std::vector<SeenDevice> seen_devices(const std::filesystem::path& library);
 

@@ -18,7 +18,7 @@ struct OperatorPiece {
   Eigen::Vector3d across_to_m = Eigen::Vector3d::Zero();
 };
 
-/// What an operator means at an instant.
+/// Intention of an operator at an instant.
 struct OperatorAim {
   OperatorPiece::Aim aim = OperatorPiece::Aim::place;
   double value = 0.0;  ///< m or N
@@ -26,7 +26,7 @@ struct OperatorAim {
   Eigen::Vector3d across_m = Eigen::Vector3d::Zero(), across_m_per_s = Eigen::Vector3d::Zero();
 };
 
-/// What an operator means to do, for a simulated arm.
+/// Intended motion of an operator, for a simulated arm.
 class OperatorScript {
  public:
   OperatorScript() = default;

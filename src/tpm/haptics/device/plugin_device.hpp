@@ -30,7 +30,7 @@ class DevicePlugin {
   [[nodiscard]] bool enables_forces() const;
   /// Throws Error(environment) with the plugin's own words.
   [[nodiscard]] int count() const;
-  /// What a device says of itself, its limits checked. Throws Error(environment).
+  /// Description that a device gives of itself, its limits checked. Throws Error(environment).
   [[nodiscard]] tpm_device_description describe(int index) const;
 
  private:

@@ -36,11 +36,11 @@ struct PlantSettings {
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();  ///< from where
 };
 
-/// What of the settings is assumed, one line each.
+/// Assumptions among the settings, one line each.
 [[nodiscard]] std::vector<std::string> assumptions_of(const PlantSettings& settings);
 
-/// What device and arm do in a period around the place that the hand holds: distance and speed from
-/// distance, speed and a constant force, exactly.
+/// Motion of device and arm in a period around the place that the hand holds: distance and speed
+/// from distance, speed and a constant force, exactly.
 [[nodiscard]] Eigen::Matrix<double, 2, 3> place_propagator(const PlantSettings& settings);
 
 /// The motion of device and arm under held commands: exact for a constant force and an intended
@@ -49,7 +49,7 @@ class VirtualPlant {
  public:
   VirtualPlant(const PlantSettings& settings, OperatorScript script);
 
-  /// What the encoders say, m.
+  /// Reading of the encoders, m.
   [[nodiscard]] Eigen::Vector3d measured_m() const noexcept;
   /// A new command, N; true if the motors cannot give it.
   bool command(const Eigen::Vector3d& force_N) noexcept;

@@ -26,7 +26,7 @@ struct InverseAddress {
   bool poll = false;             ///< the thread of the messages looks again and again, for latency
 };
 
-/// What the service says of its devices; nothing is commanded. Throws Error(environment) where
+/// Devices that the service lists; nothing is commanded. Throws Error(environment) where
 /// nobody listens or answers, Error(bad_input) for what is no inventory.
 [[nodiscard]] InverseInventory inverse_inventory(const InverseAddress& address);
 

@@ -17,8 +17,8 @@ enum class InverseFormat { vector, values };
 
 [[nodiscard]] std::string_view word_of(InverseFormat format);
 
-/// What GET /version says, "3.5.0.0". Throws Error(environment) for a version before 3.1 or from 4
-/// on, or no version.
+/// Format by the answer of GET /version, "3.5.0.0". Throws Error(environment) for a version
+/// before 3.1 or from 4 on, or no version.
 [[nodiscard]] InverseFormat format_of_version(std::string_view version);
 /// The version in the answer to GET /version. Throws Error(bad_input).
 [[nodiscard]] std::string parse_version(std::string_view text);
@@ -30,7 +30,8 @@ inline constexpr std::size_t kMostInverseDevices = 16;
 /// The preset that puts the origin at the middle of the workspace.
 inline constexpr std::string_view kCentredPreset = "arm_front_centered";
 
-/// What acts on a force or a coordinate on its way between program and hand, as the service says.
+/// Settings that act on a force or a coordinate on its way between program and hand, as the service
+/// says.
 struct InverseSettings {
   std::string handedness;  ///< "left" or "right"
   std::string preset, basis = "XYZ";
@@ -82,7 +83,7 @@ struct InverseInventory {
 /// Later messages. Throws Error(bad_input) with the key, also if the device is not there.
 [[nodiscard]] InverseState parse_state(std::string_view text, std::string_view device_id);
 
-/// What a client asks of a device. Forces of several sources add up.
+/// Request of a client to a device. Forces of several sources add up.
 struct InverseCommand {
   std::optional<Eigen::Vector3d> force_N, position_m;
   std::string profile;  ///< of a program that registers itself; else empty
@@ -112,7 +113,7 @@ struct InverseEvent {
 struct InverseRequest {
   std::string target, body;
 };
-/// What makes neutral, over HTTP, the settings that are not: those of the session as
+/// Requests that make neutral, over HTTP, the settings that are not: those of the session as
 /// neutral_message() does, from 3.5 on; gravity compensation, which is the device's and has no
 /// message, in each version.
 /// @param carried share of the device's weight, 0 to 1

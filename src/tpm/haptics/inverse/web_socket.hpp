@@ -93,7 +93,7 @@ struct HttpHead {
 
   [[nodiscard]] std::size_t count(std::string_view name) const;
   [[nodiscard]] std::string value(std::string_view name) const;  ///< of the first; else empty
-  /// Whether a comma-separated list holds a word, whatever its case.
+  /// True if a comma-separated list holds a word, whatever its case.
   [[nodiscard]] bool lists(std::string_view name, std::string_view word) const;
 };
 
@@ -111,7 +111,7 @@ inline constexpr std::size_t kMostHeadBytes = 8192;
 /// Empty if the answer upgrades the connection of that key; otherwise what is wrong with it.
 [[nodiscard]] std::string upgrade_fault(const HttpHead& answer, std::string_view key);
 
-/// What a server answers to a request for an upgrade.
+/// Answer of a server to a request for an upgrade.
 struct UpgradeAnswer {
   bool upgraded = false;
   std::string bytes;  ///< a whole answer
@@ -122,7 +122,7 @@ struct UpgradeAnswer {
 /// Origin is a page and has to come from this machine and one of these ports.
 [[nodiscard]] UpgradeAnswer answer_upgrade(const HttpHead& request, int port,
                                            const std::vector<int>& page_ports);
-/// Whether Host is there once and names this machine and port.
+/// True if Host is there once and names this machine and port.
 [[nodiscard]] bool names_this_host(const HttpHead& request, int port);
 /// A whole answer that closes the connection.
 [[nodiscard]] std::string http_answer(std::string_view status, std::string_view type,

@@ -6,7 +6,7 @@
 
 namespace tpm::haptics {
 
-/// What the energy watch compares, and when it has seen enough.
+/// Settings of the energy watch: what it compares, and when it has seen enough.
 struct EnergyWatchSettings {
   double period_s = 1e-3;
   /// Friction that the device is known to have, N s/m: it takes up the energy that a constant force
@@ -24,7 +24,7 @@ struct EnergyWatchSettings {
 ///
 /// (forces against the motion). What the tissue stores and gives back is on both sides, so an
 /// honest release leaves Q as it is, and energy put in earlier is no credit for later activity.
-/// What is left is the leak of the constant force, K dx^2/2 a period, less the friction b of the
+/// The rest is the leak of the constant force, K dx^2/2 a period, less the friction b of the
 /// device. With b > K T/2 (the boundary of passivity) Q never falls; each fall of Q from its
 /// largest value of the last second is energy that the hand received from the rendering alone.
 ///

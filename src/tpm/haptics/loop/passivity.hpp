@@ -15,7 +15,7 @@ class PassivityControl {
 
   /// The hand moved by `moved_m` while `held_N` pushed on it.
   void observe(const Eigen::Vector3d& held_N, const Eigen::Vector3d& moved_m) noexcept;
-  /// What to add to the next force on the hand.
+  /// Addition to the next force on the hand.
   /// @param moved_m in the last period
   /// @param delivered_J to be taken back
   [[nodiscard]] Eigen::Vector3d damping_N(const Eigen::Vector3d& moved_m,

@@ -20,7 +20,7 @@ class TripleBuffer {
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kSlot;
     return true;
   }
-  /// What the last refresh() took.
+  /// Value that the last refresh() took.
   [[nodiscard]] const T& latest() const noexcept { return slots_[front_]; }
 
  private:

@@ -13,8 +13,8 @@
 
 namespace tpm::haptics {
 
-/// What a server shows and moves, around the middle of the workspace. The server calls these from
-/// its thread.
+/// Device that a server shows and moves, around the middle of the workspace. The server calls these
+/// from its thread.
 class ServedHand {
  public:
   virtual ~ServedHand() = default;

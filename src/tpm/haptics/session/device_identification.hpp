@@ -8,7 +8,7 @@
 
 namespace tpm::haptics {
 
-/// What a device was told and where it was, in one period.
+/// Command to a device and its place, in one period.
 struct IdentificationSample {
   double at_m = 0.0;     ///< along the direction of the forces, as the device reads it
   double force_N = 0.0;  ///< sent in this period, held until the next one
@@ -17,7 +17,7 @@ struct IdentificationSample {
   bool stale = false;    ///< the position is that of an earlier call
 };
 
-/// What was found of a device. Values that could not be identified are empty.
+/// Identified properties of a device. Values that could not be identified are empty.
 struct DeviceIdentification {
   /// From a position to the force that answers it, both paths together: only their sum can be
   /// measured. Without the hold of a command, whose half period comes in addition.

@@ -12,7 +12,7 @@ struct DeviceIdentifyOptions {
   std::function<bool()> interrupted;
 };
 
-/// What `tpm hil identify` measured.
+/// Measurements of `tpm hil identify`.
 struct IdentifyRun {
   DeviceIdentity device;
   DeviceIdentification found;

@@ -3,7 +3,7 @@
 
 namespace tpm::haptics {
 
-/// What a communication and jitter test has found.
+/// Result of a communication and jitter test.
 struct JitterCheck {
   DeviceIdentity device;
   double rate_Hz = 0.0, duration_s = 0.0;

@@ -10,7 +10,7 @@
 
 namespace tpm::haptics {
 
-/// What the page of a session shows (docs/haptics.md). One thread feeds it with records, in real
+/// Contents of the page of a session (docs/haptics.md). One thread feeds it with records, in real
 /// time the one that writes them and never the servo thread; any number may ask.
 class LiveView {
  public:
@@ -20,9 +20,9 @@ class LiveView {
   void see(const ServoRecord& row);
   void ended(const ServoOutcome& outcome);
 
-  /// What stays: session, phases, device, tissue at rest. An empty object before opened().
+  /// Fixed part: session, phases, device, tissue at rest. An empty object before opened().
   [[nodiscard]] std::string scene_json() const;
-  /// What changes. A number that is not finite is null.
+  /// Changing part. A number that is not finite is null.
   /// @param after the first point of the traces that is wanted
   [[nodiscard]] std::string state_json(std::uint64_t after) const;
   /// Somebody has asked for what changes.
@@ -71,7 +71,7 @@ class LiveView {
   mutable std::atomic<bool> watched_{false};
 };
 
-/// What the operator is asked to do, a sentence.
+/// Instruction to the operator, a sentence.
 [[nodiscard]] std::string instruction_of(const SessionPhase& phase);
 /// The same before the session begins, from a row of waiting.
 [[nodiscard]] std::string instruction_of(const ServoRecord& waiting);

@@ -11,12 +11,12 @@
 
 namespace tpm::haptics {
 
-/// How a contact is opened for a haptic loop of the caller's own.
+/// Settings of a contact that is opened for a haptic loop of the caller's own.
 struct LoopContactOptions {
   double rate_Hz = 0.0;  ///< of the caller's loop, 500 to 4000; 0: that of the file, or 1 kHz
   /// Whose limits apply, as limits_of() takes it. Empty: the device of `device_file`, else omega7.
   std::string device;
-  /// What was measured of it (schemas/device.schema.json). Empty: forces are taken to come one
+  /// Measurements of it (schemas/device.schema.json). Empty: forces are taken to come one
   /// period late, with the friction that is assumed of the device; nobody checks that.
   std::filesystem::path device_file;
   bool start_gate = true;    ///< forces wait until the tool is in free air and at rest

@@ -9,7 +9,7 @@ namespace tpm::haptics {
 [[nodiscard]] TissueShape shape_of(const Network& network, std::size_t contact,
                                    const Eigen::Vector3d& push);
 
-/// Which spheres of its scene's tissue a session moves: one, or a patch that moves together.
+/// Spheres of its scene's tissue that a session moves: one, or a patch that moves together.
 [[nodiscard]] SceneContact moved_contact(const HilSession& session, const Tissue& tissue);
 
 /// The network of a session's scene, pushed at its contact.

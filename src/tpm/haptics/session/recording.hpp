@@ -9,19 +9,19 @@
 
 namespace tpm::haptics {
 
-/// What a person adds to a recording. Codes, not names: the recording may be passed on. Nothing is
-/// required.
+/// Notes that a person adds to a recording. Codes, not names: the recording may be passed on.
+/// Nothing is required.
 struct SessionNotes {
   std::string date, operator_code, subject_code;
 };
 
-/// What stands before the rows of a recording: format, session with its scene, device, model, what
+/// Header before the rows of a recording: format, session with its scene, device, model, what
 /// was known of its rendering before (RenderingCheck).
 [[nodiscard]] Json recording_header(const HilSession& session, const DeviceIdentity& device,
                                     const LoopModel& model, bool real_time,
                                     const SessionNotes& notes = {}, const Json& rendering = {});
 
-/// What stands behind them: how the session ended.
+/// Footer behind them: how the session ended.
 [[nodiscard]] Json recording_closing(const ServoOutcome& outcome);
 
 [[nodiscard]] Json to_json(const DeviceIdentity& device);
@@ -49,7 +49,7 @@ struct HilRecording {
 /// header as that of a file. Throws Error(bad_input) with the key.
 [[nodiscard]] HilRecording read_recording(const std::filesystem::path& file);
 
-/// What of a recording is missing, one line for a person; empty if nothing is.
+/// Missing part of a recording, one line for a person; empty if nothing is.
 [[nodiscard]] std::string damage_line(const HilRecording& recording);
 
 /// "SIMULATED DEVICE" in words that suit the recording, or what the hardware is.

@@ -4,10 +4,10 @@
 
 namespace tpm::haptics {
 
-/// What stands before the rows of a recording.
+/// Keys of the header before the rows of a recording.
 [[nodiscard]] const FileKind& recording_header_kind();
 
-/// What stands behind them.
+/// Keys of the footer behind them.
 [[nodiscard]] const FileKind& recording_closing_kind();
 
 }  // namespace tpm::haptics

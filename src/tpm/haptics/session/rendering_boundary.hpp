@@ -34,7 +34,7 @@ struct RenderedContact {
 /// frequencies.
 [[nodiscard]] double predicted_passive_damping(const RenderedContact& contact);
 
-/// Which of the two ways to find a boundary.
+/// Method that finds a boundary, one of two.
 enum class BoundaryBy { measurement, prediction };
 
 /// Largest instantaneous stiffness that is passive on a device with that friction, N/m, by

@@ -35,7 +35,7 @@ enum class SessionPhaseKind {
 
 [[nodiscard]] std::string_view word_of(SessionPhaseKind kind);
 
-/// What the operator is asked to do, and for how long.
+/// Instruction to the operator, and its duration.
 struct SessionPhase {
   SessionPhaseKind kind = SessionPhaseKind::approach;
   std::string name;             ///< "indent to 4 mm at 2 mm/s"
@@ -55,7 +55,7 @@ inline constexpr std::string_view kPlannedModel = "planned";
 /// A session as its file says.
 struct HilSession {
   std::string title;
-  /// What is stepped in the loop: a formulation for_sessions(), or kPlannedModel.
+  /// Model that the loop steps: a formulation for_sessions(), or kPlannedModel.
   std::string model = std::string(kPlannedModel);
   double tool_radius_m = 0.010;                      ///< of the model `surface`, of its ball
   double contact_stiffness_N_per_m = 1e4;            ///< the same, of ball and sphere
@@ -72,7 +72,7 @@ struct HilSession {
   SessionServo servo;
   DevicePreparation preparation;
   PlantSettings plant;
-  /// What the file itself says of the device's friction; its delay is in `plant`, 0 if not said.
+  /// Friction of the device by the file itself; its delay is in `plant`, 0 if not said.
   std::optional<double> stated_friction_N_s_per_m;
   double cycle_timeout_s = 0.008;
   std::string text;  ///< of the file, for the record
@@ -91,7 +91,7 @@ struct HilSession {
 /// Throws Error(answer_is_no) if the session asks for more than a device can take.
 void require_within(const HilSession& session, const DeviceLimits& limits);
 
-/// What a run puts in place of parts of its session.
+/// Replacements that a run makes in its session.
 struct SessionChanges {
   std::filesystem::path law;     ///< the model is this law, whatever the file says
   std::filesystem::path motion;  ///< the phases are the motion of this recording of a depth

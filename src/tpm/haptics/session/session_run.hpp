@@ -11,13 +11,13 @@
 
 namespace tpm::haptics {
 
-/// Which device, and what it may do.
+/// Choice of the device, and what it may do.
 struct DeviceChoice {
   std::string kind = "virtual";   ///< as limits_of() takes it, or "plugin"
   std::filesystem::path library;  ///< of the vendor; empty: looked for
   std::filesystem::path replay;   ///< recording to be replayed
   std::filesystem::path plugin;   ///< of the kind "plugin": its shared library
-  /// What was measured of it (device_file.hpp); empty: nothing. Of the kind "virtual" that of the
+  /// Measurements of it (device_file.hpp); empty: nothing. Of the kind "virtual" that of the
   /// device which it stands for.
   std::filesystem::path file;
   DeviceSelection which;
@@ -26,7 +26,7 @@ struct DeviceChoice {
   bool take_as_ready = false;
 };
 
-/// What may be asked of it; a plugin is loaded and asked, a device file is read. Throws as
+/// Limits of it; a plugin is loaded and asked, a device file is read. Throws as
 /// make_device() and read_device_file().
 [[nodiscard]] DeviceLimits limits_of(const DeviceChoice& choice);
 
@@ -69,14 +69,14 @@ struct SessionRun {
 /// Forces below this are not felt through a handle, N; assumed.
 inline constexpr double kLeastFeltForce_N = 0.01;
 
-/// What the loop of a session is set to: what the session states, with what is known of its model
-/// and device.
+/// Settings of the loop of a session: those that the session states, with what is known of its
+/// model and device.
 /// @param guided a hand holds the device; else a recorded motion begins where it began, and nobody
 ///        feels it
 [[nodiscard]] ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
                                           const RenderingCheck& rendering, bool guided);
 
-/// What a device may do beside rendering forces.
+/// Abilities of a device beside rendering forces.
 struct DevicePermissions {
   bool may_move = false;       ///< to initialise itself
   bool take_as_ready = false;  ///< it is initialised, where nobody can tell

@@ -8,7 +8,7 @@
 
 namespace tpm::haptics {
 
-/// What `tpm hil stability` shows; keys are described in docs/haptics.md.
+/// Report of `tpm hil stability`; keys are described in docs/haptics.md.
 [[nodiscard]] Json boundary_json(const BoundaryStudy& study);
 [[nodiscard]] std::string boundary_text(const BoundaryStudy& study);
 /// The boundaries of passivity and of stability, and the three rules.

@@ -20,7 +20,7 @@ namespace tpm::haptics {
 [[nodiscard]] std::string run_text(const HilSession& session, const SessionRun& run);
 
 [[nodiscard]] Json verification_json(const HilRecording& recording, const Verification& v);
-/// What the difference between motion recorded and motion compared can cost, in words.
+/// Cost of the difference between motion recorded and motion compared, in words.
 [[nodiscard]] std::string motion_cost(const Verification& v, double per_newton,
                                       std::string_view unit);
 [[nodiscard]] std::string verification_text(const HilRecording& recording, const Verification& v);
@@ -28,7 +28,7 @@ namespace tpm::haptics {
 /// comparison, and every note.
 [[nodiscard]] ShortAnswer short_answer(const HilRecording& recording, const Verification& v);
 
-/// What a recording says about energy and limits, from its rows.
+/// Energy and limits of a recording, from its rows.
 struct RecordingSummary {
   std::uint64_t cycles = 0, missed = 0, time_guards = 0, saturations = 0, force_limited = 0,
                 slipped = 0, ramping_in = 0, damped = 0, beyond_model = 0;

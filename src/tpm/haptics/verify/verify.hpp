@@ -18,7 +18,7 @@ struct VerifyOptions {
   double window_tolerance = 1e-9;  ///< of its integrator, relative
 };
 
-/// How far the forces commanded are from the reference over some stretch.
+/// Distance of the forces commanded from the reference over some stretch.
 struct ForceFidelity {
   std::size_t instants = 0;
   double rms_N = 0.0, max_N = 0.0, peak_N = 0.0;
@@ -66,9 +66,9 @@ struct Verification {
   std::vector<BesideExperiment> experiment;
   std::string material;   ///< of the session's scene, as it stands there; for words
   std::size_t knots = 0;  ///< of the motion that the reference was moved through
-  /// How far what was recorded lies from the lines between the knots, at most.
+  /// Largest distance of the recorded motion from the lines between the knots.
   double motion_tolerance_m = 0.0;
-  /// What that can cost: times the instantaneous stiffness. None where every instant compared is a
+  /// Cost of that: times the instantaneous stiffness. None where every instant compared is a
   /// knot: what lies between is then part of the reference's error.
   std::optional<double> motion_error_N;
   double reference_error_N = 0.0;  ///< as the reference run estimates

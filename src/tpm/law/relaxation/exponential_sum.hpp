@@ -37,7 +37,7 @@ struct FractionalWeights {
 /// derivatives of the weights. One step over h in which u is linear is
 /// y_new = exp(-z) y + (1 - exp(-z))/z (u_new - u_old), z = r_j h.
 ///
-/// How good it is: for every t in [t_min, t_max] and every 0 < alpha <= 1, any tau,
+/// Accuracy: for every t in [t_min, t_max] and every 0 < alpha <= 1, any tau,
 ///
 ///     |sum - G|(t) <= e g,   |integral over [0, t] of (sum - G)| <= e g t
 ///

@@ -17,15 +17,15 @@ struct BallTool {
 
   /// Distance of centres at which they touch.
   [[nodiscard]] double reach_m() const { return radius_m + sphere_radius_m; }
-  /// How far the ball, moved aside from its start, goes along a direction until it touches a sphere
-  /// that it may touch; none if it meets none but on a flank, where it would slide off.
+  /// Distance that the ball, moved aside from its start, goes along a direction until it touches a
+  /// sphere that it may touch; none if it meets none but on a flank, where it would slide off.
   /// @param into unit vector
   [[nodiscard]] std::optional<double> depth_to_touch_m(const Positions& rest,
                                                        const Eigen::Vector3d& aside_m,
                                                        const Eigen::Vector3d& into) const;
 };
 
-/// How stiff the overlap of ball and sphere is where nothing else is asked for, N/m: so much more
+/// Default stiffness of the overlap of ball and sphere, N/m: so much more
 /// than tissue that it costs little depth, and not so much that rounding shows.
 inline constexpr double kUsualBallStiffness_N_per_m = 1e4;
 

@@ -51,7 +51,7 @@ struct DrivenNetwork {
 /// times the stiffest bond, N/m.
 [[nodiscard]] double usual_contact_stiffness_N_per_m(const BondSystem& bonds);
 
-/// What a tool does to the tissue at an instant.
+/// Place and force of a tool at an instant.
 struct ToolState {
   Eigen::Vector3d position;  ///< m
   Eigen::Vector3d force;     ///< on the tissue, N

@@ -82,7 +82,7 @@ class DrivenTissue {
   [[nodiscard]] LaneVector response_change(const LaneMatrix& displacement, const LaneMatrix& force,
                                            std::size_t group = 0) const;
 
-  /// How depths and loads lead to each other at a state.
+  /// Relation of depths and loads at a state.
   struct UnitField {
     /// The displacements per unit of what is imposed, probe included; with adjoint_sign() they are
     /// the adjoint of the response: a force R left on the free spheres changes it by that sign
@@ -125,7 +125,7 @@ class DrivenTissue {
   /// to velocities.
   /// @param imposed in the piece of the path
   void add_imposed_velocity(double imposed, double rate, Eigen::Matrix3Xd& velocity) const;
-  /// What the masses driven weigh in the force of a probe that moves them, kg.
+  /// Mass that the force of a probe accelerates, kg.
   [[nodiscard]] double driven_mass_kg(const Eigen::VectorXd& mass_kg) const;
 
  private:

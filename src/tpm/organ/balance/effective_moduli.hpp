@@ -5,7 +5,7 @@
 
 namespace tpm::organ {
 
-/// What a network of bonds is as a solid, by a relaxed test.
+/// Moduli of a network of bonds as a solid, by a relaxed test.
 struct EffectiveModuli {
   Eigen::Vector3d young_Pa = Eigen::Vector3d::Zero();  ///< along x, y and z
   double poisson = 0.0;                                ///< mean over the six pairs of axes

@@ -12,7 +12,7 @@ namespace tpm::organ {
 
 class LargeEquilibrium;
 
-/// How linear systems with the stiffness matrix are solved.
+/// Solver of linear systems with the stiffness matrix.
 enum class StiffnessSolver {
   automatic,  ///< direct, unless the factor is too large or takes too long; see EquilibriumOptions
   direct,     ///< by a factorisation (BlockLdlt)
@@ -34,7 +34,7 @@ struct EquilibriumOptions {
   double most_bytes = 8.0 * 1024.0 * 1024.0 * 1024.0;
 };
 
-/// What was chosen for a network, and why.
+/// Solver chosen for a network, and the reason.
 struct SolverChoice {
   bool direct = true;
   double operations = 0.0;  ///< of a factorisation, additions and multiplications

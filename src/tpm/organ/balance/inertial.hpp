@@ -6,7 +6,7 @@
 
 namespace tpm::organ {
 
-/// How the linear systems of CVODE's Newton iteration are solved.
+/// Solver of the linear systems of CVODE's Newton iteration.
 enum class NewtonSolver {
   /// y and the velocities eliminated by hand; 3x3 blocks, one a sphere, are left.
   eliminated,
@@ -14,7 +14,7 @@ enum class NewtonSolver {
   klu,
 };
 
-/// How CVODES steps.
+/// Family of formulas by which CVODES steps.
 enum class MotionFormula {
   bdf,
   /// The trapezoidal rule (Adams and Moulton's formula of order 2): it damps nothing by itself, and
@@ -44,7 +44,7 @@ struct InertialOptions {
   bool energy = false;  ///< keep account of the energy (InertialRun::energy)
 };
 
-/// What a run took.
+/// Cost of a run.
 struct InertialWork {
   long steps = 0;
   long rejected = 0;  ///< error tests failed

@@ -18,7 +18,7 @@ struct Inertia {
   double contact_damping_ratio = 0.0;
 };
 
-/// What an impact of tools on spheres exchanged.
+/// Exchange in an impact of tools on spheres.
 struct ToolImpact {
   double on_tissue_N_s = 0.0;  ///< impulse, summed as the response sums forces
   double work_J = 0.0;         ///< of the probe, which keeps its imposed speed
@@ -81,9 +81,10 @@ class InertialEquation {
 
   /// The gap of each contact with a tool, m; negative where they overlap.
   void gaps(double time_s, const ConstVector& state, Eigen::Ref<Vector> gap);
-  /// Whether a tool meets a sphere in this very instant: their gap is none, and closing.
+  /// True if a tool meets a sphere in this very instant: their gap is none, and closing.
   [[nodiscard]] bool meets(double time_s, const ConstVector& state);
-  /// What each contact pushes its sphere and tool apart with, N: spring and dashpot, never pulling.
+  /// Force by which each contact pushes its sphere and tool apart, N: spring and dashpot, never
+  /// pulling.
   [[nodiscard]] Vector contact_pushes_N(double time_s, const ConstVector& state);
   /// The inelastic impact of all that touches (inelastic_impact): changes velocities of the state.
   [[nodiscard]] ToolImpact strike(double time_s, Eigen::Ref<Vector> state);

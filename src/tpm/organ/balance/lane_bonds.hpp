@@ -39,7 +39,7 @@ class LaneBonds {
   /// V(l) of the relaxing bonds.
   void followed(const LaneMatrix& position, LaneMatrix& followed) const;
 
-  /// What y of the relaxing bonds of one group follows within a step.
+  /// Elongations that y of the relaxing bonds of one group follows within a step.
   struct Following {
     const ViscousWeights* weights;  ///< of y
     const double* followed;         ///< V(l) at the start of the step, by relaxing bond
@@ -91,7 +91,7 @@ class LaneBonds {
     double least;  ///< elongation below which the bond is slack, m
     std::size_t law;
   };
-  /// How a contact lies in every lane.
+  /// Geometry of a contact in every lane.
   struct ContactGeometry {
     Eigen::Matrix<double, kLanes, 3> direction;
     LaneVector overlap_force, turning;  ///< N (negative), N/m

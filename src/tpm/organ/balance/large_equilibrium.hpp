@@ -10,7 +10,7 @@
 
 namespace tpm::organ {
 
-/// How conjugate gradients are preconditioned.
+/// Preconditioner of conjugate gradients.
 enum class PreconditionerKind { block_jacobi, incomplete_cholesky, multigrid };
 
 inline constexpr std::array<Word<PreconditionerKind>, 3> kPreconditionerWords{
@@ -25,7 +25,7 @@ struct LargeEquilibriumOptions {
   std::uint64_t probe_seed = 1;
 };
 
-/// What the solutions of a LargeEquilibrium took so far.
+/// Cost so far of the solutions of a LargeEquilibrium.
 struct LargeEquilibriumWork {
   int solutions = 0;
   int preconditioners = 0;  ///< made anew

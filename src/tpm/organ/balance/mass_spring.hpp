@@ -4,7 +4,7 @@
 
 namespace tpm::organ {
 
-/// Which springs the mass-spring model has.
+/// Springs of the mass-spring model.
 enum class SpringRule {
   like_the_bonds,  ///< in proportion to the bonds' factors
   equal,           ///< one stiffness for all: the textbook's model

@@ -16,7 +16,7 @@ struct EquilibriumSearch {
   double residual_N = 0.0;  ///< largest force left on a free sphere
 };
 
-/// What a solution with the stiffness matrix came to.
+/// Outcome of a solution with the stiffness matrix.
 enum class TangentAnswer { solved, not_definite, failed };
 
 /// Replaces forces on the free spheres by displacements, with the stiffness at a position.

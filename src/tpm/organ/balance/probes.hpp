@@ -22,7 +22,7 @@ struct DriveGroup {
   Protocol protocol;
 };
 
-/// What acts on a network besides the probes of its first group.
+/// Actions on a network besides the probes of its first group.
 struct Loading {
   /// Groups with histories of their own, depths or loads. They begin when the first group's
   /// begins; beyond their ends their last values remain.
@@ -34,10 +34,10 @@ struct Loading {
   Positions unloaded = {};  ///< positions without them; empty as `dead_N` is
 };
 
-/// What a protocol drives, one or several at once. An imposed depth D moves each by share D, and
-/// the response is the sum of share times contact force. A load F pushes each with share F / (sum
-/// of shares), and the response is the mean depth, weighted by the shares. Either way what is
-/// imposed and the response are conjugate: their product is the work.
+/// Spheres and tools that a protocol drives, one or several at a time. An imposed depth D moves
+/// each by share D, and the response is the sum of share times contact force. A load F pushes each
+/// with share F / (sum of shares), and the response is the mean depth, weighted by the shares.
+/// Either way what is imposed and the response are conjugate: their product is the work.
 class Probes {
  public:
   // NOLINTNEXTLINE(google-explicit-constructor): one is the usual case
@@ -62,10 +62,10 @@ void require_valid(const Probe& probe, const Constraints& constraints);
 /// The same for each of all groups, and none may be driven twice.
 void require_valid(const Probes& probes, const Constraints& constraints);
 
-/// What all groups of probes impose as functions of one coordinate that never falls. With one
-/// group the coordinate is the imposed value itself. With several the corners of all histories
-/// are merged and the coordinate is their number, from 0: it rises by 1 over a piece, in which
-/// every imposed value is linear, and over an instant at which some jump.
+/// Histories that all groups of probes impose, as functions of one coordinate that never falls.
+/// With one group the coordinate is the imposed value itself. With several the corners of all
+/// histories are merged and the coordinate is their number, from 0: it rises by 1 over a piece, in
+/// which every imposed value is linear, and over an instant at which some jump.
 class ImposedPath {
  public:
   /// Of one group.
@@ -82,7 +82,7 @@ class ImposedPath {
   }
   /// The corners with their coordinates as values. Of a path that was made of a protocol.
   [[nodiscard]] std::span<const Knot> knots() const { return knots_; }
-  /// What a group imposes, m or N.
+  /// Value that a group imposes, m or N.
   [[nodiscard]] double value(std::size_t group, double at) const {
     return single() ? at : interpolated(group, at);
   }

@@ -34,7 +34,7 @@ struct TangentDirection {
       {};  ///< one for each law of the system; empty: nothing else changes
 };
 
-/// What a run took.
+/// Cost of a run.
 struct QuasiStaticWork {
   int steps = 0, rejected = 0;
   int iterations = 0;  ///< of all stages of a step at once
@@ -58,7 +58,7 @@ struct QuasiStaticOptions {
   bool energies = false;  ///< work and dissipation are integrated along
   EquilibriumOptions equilibrium = {.solver = StiffnessSolver::automatic};
   std::vector<TangentDirection> directions = {};  ///< of the derivatives to be found
-  /// What is left unbalanced of a derivative, as `tolerance`; none: that.
+  /// Tolerance of the balance of a derivative, as `tolerance`; none: that.
   std::optional<double> derivative_tolerance = std::nullopt;
 };
 

@@ -107,7 +107,7 @@ class StageBalance {
  private:
   friend class StageTangents;
 
-  /// How the viscous elongations of one law follow over a step, lane by lane.
+  /// Weights of the viscous elongations of one law over a step, lane by lane.
   struct LawWeights {
     ViscousWeights mean;                 ///< of_viscous only where there is one branch
     std::vector<ViscousWeights> branch;  ///< one for each branch
@@ -132,13 +132,13 @@ class StageBalance {
   /// Every viscous elongation in one lane, by (branch, bond).
   void viscous_in_lane(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
                        Eigen::Index lane, Eigen::MatrixXd& viscous) const;
-  /// What is stored because branches differ from their bond's mean, J.
+  /// Energy that is stored because branches differ from their bond's mean, J.
   /// @param viscous of one lane
   [[nodiscard]] double spread_J(const Eigen::MatrixXd& viscous) const;
   /// Puts viscous elongations of the relaxing bonds among those of all.
   void put_viscous(const Eigen::MatrixXd& viscous, Eigen::MatrixXd& of_bonds) const;
 
-  /// How states at fractions of a step follow from its stages, lane by lane.
+  /// Weights by which states at fractions of a step follow from its stages, lane by lane.
   struct Shapes {
     LaneSquare interpolation;  ///< of the way from the start
     StepWeights weights;
@@ -193,10 +193,10 @@ class StageBalance {
                            const DrivenTissue::UnitField& field);
   /// Errors of the other groups' responses are added to those of the first, in parts of theirs.
   void weigh_groups_beside(const TissueState& state, const ViscousState& viscous_state);
-  /// How corrections of the stages depend on each other, since each follows the others: where all
-  /// bonds relax alike, the inverse of that.
+  /// Dependence of the corrections of the stages on each other, since each follows the others:
+  /// where all bonds relax alike, the inverse of that.
   [[nodiscard]] LaneSquare mixing(const StepWeights& weights) const;
-  /// What to move the stages by where forces are left on their free spheres.
+  /// Correction of the stages where forces are left on their free spheres.
   /// @return bound of what the forces do to the response, N or m
   double correction(const LaneMatrix& force, const LaneSquare& mixing, LaneMatrix& d);
   void predict(const TissueState& state, double h, double rate);
@@ -252,7 +252,7 @@ class StageBalance {
   StepWeights weights_;
   std::vector<LaneBonds::Following> following_;
   LaneVector imposed_;
-  /// What tells the two collocations apart, for one relaxation time: by place measured, the
+  /// Difference of the two collocations, for one relaxation time: by place measured, the
   /// stages' and two more; beyond them 0.
   static constexpr int kErrorPlaces = 2 * kLanes;
   using AtErrorPlaces = Eigen::Matrix<double, kErrorPlaces, 1>;

@@ -13,7 +13,7 @@ class EdgeTable {
   /// @param vertices numbers of edges' ends are below this
   explicit EdgeTable(std::size_t vertices) : first_(vertices, kNone) {}
 
-  /// What stands at the edge of two vertices, in either order, and whether it was put there now.
+  /// Value at the edge of two vertices, in either order; true if it was put there now.
   std::pair<Value&, bool> at(int a, int b, const Value& fresh) {
     const auto [low, high] = std::minmax(a, b);
     std::size_t& first = first_[static_cast<std::size_t>(low)];

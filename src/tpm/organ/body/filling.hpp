@@ -8,7 +8,7 @@
 
 namespace tpm::organ {
 
-/// What a shell of spheres is asked to be. The surface fixes the size, so one of count and spacing
+/// Request of a shell of spheres. The surface fixes the size, so one of count and spacing
 /// is free and follows from the other: an outer layer of n spheres at spacing x covers n x^2
 /// sqrt(3)/2, the area of a triangular lattice. If both are given they must agree within 1 %.
 struct ShellRequest {
@@ -22,7 +22,7 @@ struct ShellRequest {
   std::optional<Eigen::Vector3d> landing;
 };
 
-/// What a solid filling is asked to be; exactly one of count and spacing.
+/// Request of a solid filling; exactly one of count and spacing.
 struct SolidRequest {
   std::optional<std::size_t> count;  ///< 2 to 1,000,000
   std::optional<double> spacing;     ///< x, m

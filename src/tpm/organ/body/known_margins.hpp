@@ -16,7 +16,7 @@ class KnownMargins {
   /// @param spacing about that of the points, m
   KnownMargins(const Surface& surface, double spacing);
 
-  /// How much deeper than `least` a point lies inside, m; above 0 or below as it is, and at most as
+  /// Depth of a point inside beyond `least`, m; above 0 or below as it is, and at most as
   /// far from 0.
   [[nodiscard]] double margin(const Eigen::Vector3d& point, double least);
 

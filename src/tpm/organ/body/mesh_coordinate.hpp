@@ -5,7 +5,7 @@
 
 namespace tpm::organ {
 
-/// What may stand in front of a text in UTF-8.
+/// Mark that may stand in front of a text in UTF-8.
 inline constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
 
 /// A corner of a mesh as its file states it: single precision, the precision of binary STL.

@@ -42,7 +42,7 @@ class MeshSurface final : public Surface {
   [[nodiscard]] double angle(const Corner& at) const;
   /// The triangle beyond the edge from a corner to the next one.
   [[nodiscard]] int beyond(const Corner& edge) const;
-  /// Whether that triangle meets its own at 30 degrees or more.
+  /// True if that triangle meets its own at 30 degrees or more.
   [[nodiscard]] bool is_crease(const Corner& edge) const;
   [[nodiscard]] bool on_crease(int vertex) const;
   /// The mean of the faces at a corner, weighed by angle.

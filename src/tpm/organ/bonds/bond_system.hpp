@@ -37,7 +37,8 @@ class RelaxationFactor {
 struct ViscousState {
   Eigen::VectorXd offset;              ///< m, one per bond
   RelaxationFactor relaxation_factor;  ///< 0 to 1
-  /// Which tool contacts are closed, one entry each; none: those that overlap or just touch.
+  /// Marks of the tool contacts that are closed, one entry each; none: those that overlap or just
+  /// touch.
   std::span<const char> closed = {};
 };
 
@@ -131,7 +132,7 @@ class BondSystem {
                                               RelaxationFactor relaxation_factor,
                                               std::span<const char> closed = {}) const;
 
-  /// What each bond pulls with, N: positive in tension.
+  /// Force of each bond, N: positive in tension.
   void tensions(const Positions& position, const ViscousState& viscous_state,
                 Eigen::VectorXd& tension) const;
 
@@ -155,7 +156,7 @@ class BondSystem {
   void add_stiffness_times(const Positions& position, const ViscousState& viscous_state,
                            const Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& force) const;
 
-  /// What add_forces derives from: minus its gradient are the forces. J.
+  /// Potential of add_forces: minus its gradient are the forces. J.
   [[nodiscard]] double potential_J(const Positions& position,
                                    const ViscousState& viscous_state) const;
 
@@ -190,7 +191,7 @@ class BondSystem {
   [[nodiscard]] std::shared_ptr<const PartGraph> part_graph(const std::vector<bool>& without) const;
 
  private:
-  /// How a bond lies.
+  /// Direction and length of a bond.
   struct Line {
     Eigen::Vector3d direction;  ///< unit vector from a to b
     double elongation;          ///< l, m

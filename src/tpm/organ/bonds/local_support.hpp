@@ -11,7 +11,7 @@ namespace tpm::organ {
 /// every lattice; support 1.5) have 0.33 and more everywhere, a shell without diagonal bonds 0.001.
 inline constexpr double kLooseSupport = 0.05;
 
-/// How well its surroundings carry each sphere: its stiffness along its normal at rest with all but
+/// Support of each sphere by its surroundings: its stiffness along its normal at rest with all but
 /// its bonded neighbours fixed, over that with the neighbours fixed too. 1 for a sphere that cannot
 /// move along its normal; 0 where nothing resists. Unlike the lowest eigenvalue of the network it
 /// does not fall with the number of spheres, and so tells a near mechanism (a shell whose curvature

@@ -7,7 +7,7 @@
 
 namespace tpm::organ {
 
-/// Which material the spheres of a network stand in. A bond between two spheres of one material and
+/// Material that the spheres of a network stand in. A bond between two spheres of one material and
 /// one factor has their law; between others it follows by `between`.
 struct MaterialField {
   MaterialField() = default;

@@ -17,9 +17,9 @@ namespace tpm::organ {
 /// A capability that a material asks of a formulation.
 using MaterialNeed = bool Capabilities::*;
 
-/// What the materials of some bonds ask of a formulation: `mixed`, `kernels`, `branches`,
-/// `any_potential`, `stiffening`, those that apply, in this order. Factors of place do not show in
-/// bonds: see needs_of(MaterialField).
+/// Abilities that the materials of some bonds need of a formulation: `mixed`, `kernels`,
+/// `branches`, `any_potential`, `stiffening`, those that apply, in this order. Factors of place do
+/// not show in bonds: see needs_of(MaterialField).
 [[nodiscard]] std::vector<MaterialNeed> needs_of(const BondSystem& bonds);
 /// `regions`, if there are any.
 [[nodiscard]] std::vector<MaterialNeed> needs_of(const MaterialField& field);

@@ -14,7 +14,7 @@ enum class BondKind {
   lateral,  ///< within a layer: elastic, modulus E'
 };
 
-/// How stiff a bond is against the paper's E A0/l0 (docs/theory.md).
+/// Stiffness of a bond against the paper's E A0/l0 (docs/theory.md).
 enum class StiffnessRule {
   /// A radial bond carries the mean over its ends of 1/S, S the sum of cos^2 (angle to the local
   /// normal) over the sphere's radial bonds; a lateral bond the mean over its ends of 2/n, n the
@@ -24,7 +24,7 @@ enum class StiffnessRule {
   per_bond,  ///< every bond has E A0/l0, as printed
 };
 
-/// How stiffness follows the spacing.
+/// Dependence of stiffness on the spacing.
 enum class SpacingLaw {
   paper,      ///< not at all
   continuum,  ///< in proportion to x, so that a block keeps its modulus under refinement

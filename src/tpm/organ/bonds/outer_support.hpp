@@ -11,7 +11,7 @@ namespace tpm::organ {
 /// that of the partner of the star, which the rule `normalised` gives a sphere.
 inline constexpr double kLeastOuterSupport = 0.2;
 
-/// What holds each sphere of the outer layer against a push along its normal, its neighbours
+/// Support of each sphere of the outer layer against a push along its normal, its neighbours
 /// fixed, in parts of the target: the sum of factor times cos^2 (angle to its normal) over its
 /// bonds to spheres that lie inside, or whose normal differs by 30 degrees or more (the other face
 /// of an edge). An absolute measure: a sphere that hardly anything holds is found however little

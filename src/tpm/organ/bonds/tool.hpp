@@ -50,7 +50,7 @@ struct ToolContact {
                                                          const Organ& organ,
                                                          double stiffness_N_per_m);
 
-/// How far a sphere and a tool are from touching, m; negative where they overlap.
+/// Gap between a sphere and a tool, m; negative where they overlap.
 /// @param sphere, tool where their centres are, or the middle of the tool's face, m
 [[nodiscard]] inline double contact_gap_m(const ToolContact& contact, const Eigen::Vector3d& sphere,
                                           const Eigen::Vector3d& tool) {
@@ -58,7 +58,7 @@ struct ToolContact {
   return (contact.normal ? apart.dot(*contact.normal) : apart.norm()) - contact.reach_m;
 }
 
-/// How deep the tool has come into a sphere, m; negative where there is a gap. A punch is as long
+/// Depth of the tool in a sphere, m; negative where there is a gap. A punch is as long
 /// as needed and acts on what lies under its face.
 /// @param place of the tool now, m
 /// @param centre of the sphere now, m

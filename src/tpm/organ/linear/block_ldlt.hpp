@@ -45,7 +45,7 @@ class BlockLdlt {
     std::uint32_t first;       ///< place
     std::size_t own, reached;  ///< coordinates
   };
-  /// What one thread needs to eliminate fronts.
+  /// Memory that one thread needs to eliminate fronts.
   struct Scratch {
     explicit Scratch(std::size_t longest);  ///< coordinates of a front
     std::vector<double> scaled;             ///< L D of the columns being eliminated

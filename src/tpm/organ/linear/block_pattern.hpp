@@ -9,8 +9,8 @@
 
 namespace tpm::organ {
 
-/// Which 3x3 blocks of a symmetric matrix may differ from 0, and the dense fronts in which it is
-/// factorised: found once for a graph, used by every matrix on it.
+/// Those 3x3 blocks of a symmetric matrix that may differ from 0, and the dense fronts in which it
+/// is factorised: found once for a graph, used by every matrix on it.
 class BlockPattern {
  public:
   /// @param nodes number of 3x3 blocks on the diagonal

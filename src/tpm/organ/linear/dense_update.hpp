@@ -18,7 +18,7 @@ struct DenseUpdate {
     DensePanel c, a, b;
     std::size_t first_row = 0;  ///< of A and C, a multiple of kRows: those before it stay
     std::size_t rows, columns, depth;
-    /// What is asked of C: all of it, or of column j what is in row j and below. More may be
+    /// Part of C to compute: all of it, or of column j the rows from j on. More may be
     /// computed, of columns rounded down to a multiple of 4.
     bool lower = false;
     /// B is lower triangular: of its row j what stands behind column j is 0.

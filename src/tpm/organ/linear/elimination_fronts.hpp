@@ -6,7 +6,7 @@
 
 namespace tpm::organ {
 
-/// How a symmetric matrix with a block per node is eliminated in dense fronts (multifrontal method;
+/// Elimination of a symmetric matrix with a block per node in dense fronts (multifrontal method;
 /// Duff & Reid 1983): which nodes are eliminated together, and which later nodes each front
 /// reaches.
 ///

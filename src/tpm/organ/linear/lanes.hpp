@@ -13,8 +13,8 @@ using LaneMatrix = Eigen::Matrix<double, kLanes, Eigen::Dynamic>;
 using LaneVector = Eigen::Matrix<double, kLanes, 1>;
 using LaneSquare = Eigen::Matrix<double, kLanes, kLanes>;
 
-/// How viscous elongations follow, lane by lane, from those at the start of a step and from
-/// elongations at its start and its stages.
+/// Weights by which viscous elongations follow, lane by lane, from those at the start of a step and
+/// from elongations at its start and its stages.
 struct ViscousWeights {
   LaneSquare of_stages;  ///< by (lane, stage)
   LaneVector of_start, of_viscous;

@@ -49,7 +49,7 @@ class Recorder {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// How much of the record stands in whole parts.
+  /// Part of the record that stands in whole parts.
   struct Whole {
     std::size_t curve = 0, outputs = 0;
     Validity validity;

@@ -44,7 +44,7 @@ struct CurvePoint {
 /// Parts of a run; each begins afresh, and a checkpoint can be written after it.
 inline constexpr std::size_t kRunParts = 16;
 
-/// What a run has found so far, rising in time.
+/// Results of a run so far, rising in time.
 struct SimulationRecord {
   std::vector<CurvePoint> curve;
   std::vector<QuasiStaticState> outputs;  ///< at the times of the scene's outputs
@@ -56,7 +56,7 @@ struct SimulationRecord {
   std::vector<ProbeImpact> impacts;  ///< where spheres have mass
 };
 
-/// What the stiffness of contacts changes: a run with mass against one whose contacts are softer.
+/// Effect of the stiffness of contacts: a run with mass against one whose contacts are softer.
 /// The stiffness of a contact is none of the tissue; a number that depends on it is no answer.
 struct ContactCheck {
   static constexpr double kSofter = 4.0;      ///< times softer the contacts of the other run are
@@ -73,7 +73,7 @@ struct ContactCheck {
   [[nodiscard]] bool depends_on_stiffness() const { return !(difference <= kTolerable); }
 };
 
-/// How a run is accompanied. Nothing of it changes what it finds.
+/// Observers of a run. Nothing of it changes what it finds.
 struct SimulationControls {
   std::function<void(std::size_t done, std::size_t total)> progress;  ///< of the points watched
   std::function<bool()> interrupted;                                  ///< asked at each point

@@ -6,7 +6,7 @@
 
 namespace tpm::organ {
 
-/// How rough a deformation is (organ/bonds/roughness.hpp), where the paper's Fig. 3 is looked at.
+/// Roughness of a deformation (organ/bonds/roughness.hpp), where the paper's Fig. 3 is looked at.
 struct Smoothness {
   double near_contact = 0.0;     ///< of the spheres that two lateral bonds reach from the probe's
   std::optional<double> at_rim;  ///< of the free spheres at sharp edges of the outer layer, if any

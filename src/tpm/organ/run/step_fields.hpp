@@ -13,7 +13,7 @@ struct StepField {
   std::vector<double> values;  ///< row after row
 };
 
-/// What files say of an output besides positions.
+/// Fields of an output besides positions.
 struct StepFields {
   std::vector<StepField> of_spheres;
   std::vector<std::int32_t> validity;  ///< ValidityWatch::flags of each sphere
@@ -32,7 +32,7 @@ struct StepFields {
 [[nodiscard]] StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
                                    const ValidityWatch& watch, const QuasiStaticState& state);
 
-/// What the bonds of a network pull with in a state, N: positive when a bond is in tension.
+/// Forces of the bonds of a network in a state, N: positive when a bond is in tension.
 [[nodiscard]] Eigen::VectorXd bond_forces_N(const BondSystem& bonds, const QuasiStaticState& state);
 
 /// Of each sphere the largest |force| among its bonds, N.

@@ -59,7 +59,7 @@ struct OrganKeys {
 };
 [[nodiscard]] const Kinds<OrganKeys, OrganKind>& organ_kinds();
 
-/// What the block `organ` leads to: the spheres, and the pairs to be joined if it names them.
+/// Result of the block `organ`: the spheres, and the pairs to be joined if it names them.
 struct OrganBlock {
   Organ organ;
   bool star = false;   ///< the four spheres of the element: bonds, anchors and guide are its own
@@ -129,7 +129,7 @@ struct MaterialKeys {
 };
 [[nodiscard]] const Block<MaterialKeys>& material_block();
 
-/// What a block `material` leads to.
+/// Result of a block `material`.
 struct MaterialBlock {
   MaterialField materials;
   bool by_constants = false;  ///< the block gives those of the paper's element

@@ -32,7 +32,7 @@ struct FormulationChoice {
   [[nodiscard]] const Formulation& entry() const;
 };
 
-/// What is kept of a run besides positions.
+/// Outputs of a run besides positions.
 struct Outputs {
   std::vector<double> times_s;  ///< rising
   bool force = true;
@@ -40,7 +40,7 @@ struct Outputs {
   bool viscous = false;
 };
 
-/// How something meets the tissue.
+/// Kinds of contact with the tissue.
 enum class ContactKind {
   sphere,  ///< one sphere is driven itself, as in the paper
   patch,   ///< those of its layer within a radius are driven together
@@ -88,7 +88,7 @@ struct ExperimentScene {
   [[nodiscard]] const Probe& probe() const { return contacts.front().probe; }
 };
 
-/// How far the organ reaches behind the probe, along its direction, m; infinite where the probe
+/// Extent of the organ behind the probe, along its direction, m; infinite where the probe
 /// pulls away from the outermost sphere.
 [[nodiscard]] double tissue_behind_m(const Organ& organ, const Probe& probe);
 

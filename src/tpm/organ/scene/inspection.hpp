@@ -14,7 +14,7 @@ struct Spread {
   double min = 0.0, mean = 0.0, max = 0.0;
 };
 
-/// What a network is like.
+/// Properties of a network.
 struct NetworkInspection {
   std::size_t radial_bonds = 0, lateral_bonds = 0;
   std::size_t free_coordinates = 0;

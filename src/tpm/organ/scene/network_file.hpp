@@ -14,7 +14,7 @@ namespace tpm::organ {
 /// @return the XDMF file
 std::filesystem::path write_network(const Tissue& tissue, const std::filesystem::path& path);
 
-/// What such a file says of spheres and bonds; a file of a simulation says it too.
+/// Writes the data sets of spheres and bonds, which files of simulations hold too.
 void write_network_datasets(const Tissue& tissue, Hdf5Writer& file);
 
 }  // namespace tpm::organ

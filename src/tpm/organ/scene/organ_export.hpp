@@ -43,7 +43,8 @@ struct ExportedBond {
 /// and protocol. Throws Error(bad_input) for a density that is not above 0.
 [[nodiscard]] std::string export_organ(const Tissue& tissue, const OrganExportOptions& options);
 
-/// What the engine cannot say of this organ; each stands among the comments, too.
+/// Properties of this organ that have no counterpart in the format; each stands among the comments,
+/// too.
 [[nodiscard]] std::vector<std::string> organ_export_warnings(const Tissue& tissue,
                                                              const OrganExportOptions& options);
 

@@ -14,7 +14,7 @@ struct ProtocolFile {
   std::vector<double> times_s;  ///< rising
 };
 
-/// Whether a document says what is done to a tissue: it has a block `protocol`.
+/// True if a document says what is done to a tissue: it has a block `protocol`.
 [[nodiscard]] bool has_protocol(const Json& document);
 
 /// The declaration of a file with these blocks.

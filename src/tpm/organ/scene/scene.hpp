@@ -21,7 +21,7 @@ struct Slider {
   Eigen::Vector3d direction;  ///< unit vector
 };
 
-/// What a scene says about the tissue: spheres, bonds, material, and constraints.
+/// Tissue of a scene: spheres, bonds, material, and constraints.
 struct Tissue {
   std::string title;
   bool liver = false;  ///< x is to the patient's right, y up, z to the back

@@ -52,7 +52,7 @@ class ImplicitBalance {
   void displace(Eigen::Matrix3Xd& vectors, const BlockLdlt& factor);
   [[nodiscard]] double potential(const Positions& position, const ViscousState& viscous_state,
                                  const Eigen::Matrix3Xd& load, const SphereAnchors* anchors) const;
-  /// What rounding and a share of the depth leave of a force, N.
+  /// Force that rounding and a share of the depth leave, N.
   [[nodiscard]] double tolerance_N(const Positions& position, double depth_m,
                                    const SphereAnchors* anchors) const;
 

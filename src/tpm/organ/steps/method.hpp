@@ -30,7 +30,7 @@ enum class StepRule {
   ida,
 };
 
-/// What is known of a rule before it is tried.
+/// Properties of a rule.
 struct StepRuleEntry {
   StepRule meaning;
   std::string_view text;  ///< its word in files, options and charts
@@ -67,7 +67,7 @@ inline constexpr std::array<StepRuleEntry, 12> kStepRules{{
   return std::string(kStepRules[static_cast<std::size_t>(rule)].text);
 }
 
-/// How a rule is used.
+/// Settings of a rule.
 struct MethodSettings {
   StepRule rule = StepRule::exponential;
   double step_s = 1e-3;     ///< of a rule with fixed steps, > 0; pieces of a protocol end on a step
@@ -76,7 +76,7 @@ struct MethodSettings {
   long most_rates = 50'000'000;  ///< evaluations of the forces after which it is `too_much_work`
 };
 
-/// How a run ended.
+/// Ends of a run.
 enum class MethodEnd {
   completed,
   diverged,  ///< a value is not finite, or beyond 1e3 times what was imposed

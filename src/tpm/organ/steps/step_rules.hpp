@@ -14,7 +14,7 @@ class FixedRule {
   /// One step from time_s to time_s + h.
   /// @param state where it begins; where it ends, if `completed`
   [[nodiscard]] virtual MethodEnd step(double time_s, double h, Eigen::VectorXd& state) = 0;
-  /// What is imposed jumps, y constant.
+  /// Makes the imposed value jump, y constant.
   [[nodiscard]] virtual MethodEnd jump(double time_s, Eigen::VectorXd& state) = 0;
 };
 

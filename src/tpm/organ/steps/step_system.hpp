@@ -55,7 +55,7 @@ class StepSystem {
 
   /// The state at rest, or with everything relaxed under `first` if it is constant for ever before.
   [[nodiscard]] virtual MethodEnd start(const Knot& first, bool relaxed, Vector& state) = 0;
-  /// What is imposed jumps to another value, y constant: positions without masses follow.
+  /// Makes the imposed value jump to another, y constant: positions without masses follow.
   [[nodiscard]] virtual MethodEnd jump(double imposed, const ConstVector& state) = 0;
   /// Contact force, N, or depth, m.
   [[nodiscard]] virtual MethodEnd response(double time_s, const ConstVector& state,

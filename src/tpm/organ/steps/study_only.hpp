@@ -5,7 +5,7 @@
 
 namespace tpm::organ {
 
-/// Whether a formulation is there for studies of step rules alone, and no scene should choose it:
+/// True if a formulation is there for studies of step rules alone, and no scene should choose it:
 /// explicit rules, whose stability limits the step on stiff tissue whatever accuracy is asked for
 /// (docs/accuracy.md).
 [[nodiscard]] inline bool is_study_only(std::string_view formulation) {

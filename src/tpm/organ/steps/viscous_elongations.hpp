@@ -23,7 +23,7 @@ class ViscousElongations {
   void set_mean(const ConstVector& y, Vector& mean) const;
   /// The same of shares that follow the elongation within a step, which bonds of a law have alike.
   [[nodiscard]] RelaxationFactor mean_relaxation_factor(const ConstVector& relaxation_factor) const;
-  /// What each y has of something that bonds have.
+  /// Copies a value of the bonds to each y.
   void spread(const Vector& of_bond, Vector& of_y) const;
 
  private:

@@ -9,7 +9,7 @@
 
 namespace tpm::paper {
 
-/// Whether what the paper prints stands up to recomputing it.
+/// Verdict of recomputing what the paper prints.
 enum class AuditVerdict {
   holds,
   holds_by_truncation,  ///< digits cut off instead of rounded
@@ -63,14 +63,14 @@ struct AuditDetail {
   bool exact = false;  ///< the printed digits follow
 };
 
-/// How many cells of printed tables follow (kind "table").
+/// Number of cells of printed tables that follow (kind "table").
 struct AuditCells {
   int cells = 0;
   int by_rounding = 0;
   int by_truncation = 0;
 };
 
-/// What came out of one claim.
+/// Result of one claim.
 struct Finding {
   std::string id;
   std::string topic;
@@ -96,7 +96,7 @@ struct Finding {
   [[nodiscard]] std::string verdict_words() const;
   /// The recomputed number, range or count of cells with its unit, four digits.
   [[nodiscard]] std::string recomputed_words() const;
-  /// What the recomputed number is compared with: `printed`, else `derived`.
+  /// Number that the recomputed one is compared with: `printed`, else `derived`.
   [[nodiscard]] const std::string& compared() const noexcept {
     return printed.empty() ? derived : printed;
   }

@@ -26,7 +26,7 @@ class ClaimReader {
   /// Key "unit", "" if missing.
   [[nodiscard]] Unit unit() const;
 
-  /// What key "with" binds.
+  /// Values that key "with" binds.
   [[nodiscard]] Scope scope() const;
   /// As above for one row of a table: its cells and constants, then "with".
   [[nodiscard]] Scope row_scope(const PrintedTable& table, std::size_t row) const;

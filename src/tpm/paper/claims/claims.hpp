@@ -70,7 +70,7 @@ struct ClaimSet {
 /// The paper's own claims: data/paper_claims.json of share_dir().
 [[nodiscard]] std::filesystem::path paper_claims_path();
 
-/// What a paper prints.
+/// Claims that a paper prints.
 [[nodiscard]] const FileKind& claims_kind();
 
 /// Only the tables of a claims file, which is all that `tpm paper tables` needs. Throws

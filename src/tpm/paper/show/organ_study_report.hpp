@@ -13,7 +13,7 @@ namespace tpm::paper {
 /// every load, each for all tissues and with the data.
 [[nodiscard]] std::vector<Figure> organ_study_figures(const OrganStudy& study);
 
-/// What "we ignore the displacement of the spheres A and C" costs at each material, a sentence for
+/// Cost of "we ignore the displacement of the spheres A and C" at each material, a sentence for
 /// each other tissue.
 [[nodiscard]] std::vector<std::string> cost_sentences(const OrganStudy& study);
 

@@ -33,7 +33,7 @@ struct PaperReport {
 /// @param requirement R of the validation, as a share of the measured value, above 0 and below 1
 [[nodiscard]] PaperReport make_paper_report(double requirement = 0.1);
 
-/// What came out, one verdict a sentence.
+/// Conclusions, one verdict a sentence.
 [[nodiscard]] std::vector<std::string> summary_sentences(const PaperReport& report);
 
 /// The report as a document.

@@ -16,7 +16,7 @@ void add_paper_figures(Document& document, const PaperReport& report);
 void add_validity(Document& document, const PaperReport& report);
 void add_assumptions(Document& document, const PaperReport& report);
 
-/// How many comparisons with the printed data are adequate, not adequate, undetermined.
+/// Numbers of comparisons with the printed data that are adequate, not adequate, undetermined.
 [[nodiscard]] std::string validation_sentence(const PaperReport& report);
 
 /// The errors of the section on validation beside the requirement.

@@ -7,7 +7,7 @@
 
 namespace tpm::plan {
 
-/// What a network is like, as docs/network.md describes the keys. Spheres are numbered
+/// Properties of a network, as docs/network.md describes the keys. Spheres are numbered
 /// from 1.
 [[nodiscard]] Json network_json(const Tissue& tissue, const NetworkInspection& inspection);
 [[nodiscard]] std::string network_text(const Tissue& tissue, const NetworkInspection& inspection);

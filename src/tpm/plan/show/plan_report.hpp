@@ -11,7 +11,7 @@
 
 namespace tpm::plan {
 
-/// What planning will take (`tpm plan --estimate`).
+/// Expected cost of planning (`tpm plan --estimate`).
 [[nodiscard]] Json expected_plan_json(const ExpectedPlanWork& work);
 [[nodiscard]] std::string expected_plan_text(const ExpectedPlanWork& work);
 /// A plan, as docs/json.md describes the keys.
@@ -20,7 +20,8 @@ namespace tpm::plan {
 /// The short answer: the pick with its errors and cost, the candidates that were run, what matters,
 /// robustness margins, and every warning.
 [[nodiscard]] ShortAnswer short_answer(const Plan& plan);
-/// What a user must know: masses that are left out, limits of validity that the scene passes.
+/// Remarks that a user must know: masses that are left out, limits of validity that the scene
+/// passes.
 [[nodiscard]] std::vector<std::string> plan_warnings(const Plan& plan);
 
 /// The choice of the number of spheres: the key `spheres_choice` of a plan.
@@ -33,10 +34,10 @@ namespace tpm::plan {
 /// else empty.
 [[nodiscard]] std::string offline_text(const Plan& plan);
 
-/// What the errors of a plan are about.
+/// Quantity whose errors a plan states.
 [[nodiscard]] Json claim_json(const Plan& plan);
 
-/// What the planned model answered, and the same in words.
+/// Answer of the planned model, and the same in words.
 [[nodiscard]] Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
                                     const std::vector<double>& times_s, const Trajectory& answer);
 [[nodiscard]] std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,

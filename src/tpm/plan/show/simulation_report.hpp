@@ -8,7 +8,7 @@
 
 namespace tpm::plan {
 
-/// What a run has shown, as docs/data_formats.md describes the keys. Spheres are numbered
+/// Result of a run, as docs/data_formats.md describes the keys. Spheres are numbered
 /// from 1.
 [[nodiscard]] Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
                                    const SimulationRun& run);

@@ -22,7 +22,7 @@ namespace tpm::sweep {
 [[nodiscard]] std::string fixed_words(const std::vector<FixedValue>& fixed, int digits);
 [[nodiscard]] Json fixed_json(const std::vector<FixedValue>& fixed);
 
-/// What a file of results holds: axes, variables with their ranges, cells and reasons.
+/// Contents of a file of results: axes, variables with their ranges, cells and reasons.
 [[nodiscard]] std::string sweep_text(const SweepReader& sweep);
 [[nodiscard]] Json sweep_json(const SweepReader& sweep);
 
@@ -34,7 +34,7 @@ namespace tpm::sweep {
 [[nodiscard]] std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all,
                                                       const std::string& title);
 
-/// What is drawn of a sweep.
+/// Figures of a sweep.
 struct SweepFigures {
   std::vector<std::string> variables;  ///< empty: all that are no counts
   std::optional<std::string> x, y;     ///< axes; none: the last and the one before

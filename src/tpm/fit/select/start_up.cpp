@@ -1,0 +1,95 @@
+#include "tpm/fit/select/start_up.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "tpm/base/median.hpp"
+#include "tpm/base/text.hpp"
+
+namespace tpm::fit {
+namespace {
+
+/// The hold after a step: a ramp that has no sample between its ends.
+std::optional<Phase> hold_after_step(const PreparedRecording& r) {
+  constexpr std::size_t kAStep = 2;        // samples from end to end
+  constexpr std::size_t kFewestHeld = 30;  // of which some can be spared
+  for (std::size_t i = 0; i + 1 < r.phases.phases.size(); ++i) {
+    const Phase& ramp = r.phases.phases[i];
+    const Phase& hold = r.phases.phases[i + 1];
+    if (ramp.kind != PhaseKind::loading) continue;
+    const bool step = ramp.last - ramp.first <= kAStep;
+    if (!step || hold.kind != PhaseKind::hold || hold.last - hold.first < kFewestHeld) break;
+    return hold;
+  }
+  return std::nullopt;
+}
+
+constexpr double kFarOut = 6.0;       // standard deviations of the noise
+constexpr double kStartUpPart = 0.2;  // of a hold that may be left out
+
+std::size_t end_of_start_up_part(const Phase& hold) {
+  return hold.first +
+         static_cast<std::size_t>(kStartUpPart * static_cast<double>(hold.last - hold.first));
+}
+
+/// The last sample in the first part of a hold that stands far out of its neighbours: a relaxation
+/// is monotone, and what rings is not.
+std::size_t end_of_ringing(const PreparedRecording& r, const Phase& hold) {
+  const std::vector<double>& y = r.recording.response;
+  const double far = kFarOut * r.phases.noise_sd_estimate;
+  const std::size_t until = end_of_start_up_part(hold);
+  std::size_t end = hold.first;
+  for (std::size_t i = hold.first + 2; i + 2 < until && far > 0.0; ++i) {
+    const double middle = median({y[i - 2], y[i - 1], y[i], y[i + 1], y[i + 2]});
+    if (std::abs(y[i] - middle) > far) end = i + 1;
+  }
+  return end;
+}
+
+/// Where the response has risen to its largest in the first part of a hold: tissue relaxes while
+/// the drive stands still, and what rises is a sensor that follows late. A drift rises to the end.
+std::size_t end_of_rise(const PreparedRecording& r, const Phase& hold) {
+  const double far = kFarOut * r.phases.noise_sd_estimate;
+  const std::size_t until = end_of_start_up_part(hold);
+  if (r.load_imposed || until <= hold.first) return hold.first;
+  const std::vector<double>& y = r.recording.response;
+  const double top = *std::max_element(y.begin() + static_cast<std::ptrdiff_t>(hold.first),
+                                       y.begin() + static_cast<std::ptrdiff_t>(until));
+  std::size_t end = hold.first;
+  while (y[end] < top - far) ++end;
+  const bool of_a_drift = end - hold.first > (until - hold.first) / 2;
+  return top - y[hold.first] > 2.0 * far && !of_a_drift ? end : hold.first;
+}
+
+}  // namespace
+
+void leave_out_start_up(PreparedRecording& r) {
+  constexpr double kTimesOfStep = 2.0;
+  // What is seen to end is a tail above the noise: it takes about as long again, twice, to vanish.
+  constexpr std::size_t kTimesOfSeen = 3;
+  const std::optional<Phase> hold = hold_after_step(r);
+  if (!hold) return;
+  const std::vector<double>& time = r.recording.time_s;
+  const double step_s = time[hold->first] - time[hold->first - 1];
+  const std::size_t ringing = end_of_ringing(r, *hold);
+  const std::size_t risen = end_of_rise(r, *hold);
+  const std::size_t seen = std::max(ringing, risen) - hold->first;
+  const std::size_t vanished =
+      std::min(hold->first + kTimesOfSeen * seen, std::max(end_of_start_up_part(*hold), ringing));
+  const double from_s = std::max(time[hold->first] + kTimesOfStep * step_s, time[vanished]);
+  if (from_s <= r.from_s) return;
+  const auto left_out =
+      std::ranges::count_if(time, [&](double t) { return t >= time[hold->first] && t < from_s; });
+  r.from_s = from_s;
+  r.start_up = fmt::format(
+      "{}: {} samples after the step are left out, to {} s: {} (--from-time leaves out more)",
+      r.name, left_out, significant(from_s, 4),
+      ringing > hold->first ? "they ring"
+      : risen > hold->first ? "they rise, which no tissue does at rest"
+                            : "the ramp within the step was not sampled");
+}
+
+}  // namespace tpm::fit

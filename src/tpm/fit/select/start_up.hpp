@@ -1,0 +1,11 @@
+#pragma once
+#include "tpm/fit/select/recording_setup.hpp"
+
+namespace tpm::fit {
+
+/// Moves the first fitted sample behind what follows a step: the ramp that was not sampled,
+/// ringing, and a response that still rises while the drive stands still, which no tissue does. At
+/// most a fifth of the hold; `start_up` says what.
+void leave_out_start_up(PreparedRecording& r);
+
+}  // namespace tpm::fit

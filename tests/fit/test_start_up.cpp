@@ -1,0 +1,82 @@
+// What follows a step before a law describes it: ringing, and sensors that follow late.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "placed_recordings.hpp"
+#include "tpm/fit/select/selection.hpp"
+
+using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::fit;
+using Catch::Matchers::Contains;
+using tpm::test::PlacedTest;
+
+TEST_CASE("the samples after a step are left out, as long as they ring", "[placement]") {
+  PlacedTest test;
+  test.rest_s = 5.0;
+  test.ramp_s = 0.05;  // one sample
+  test.start_m = -0.1e-3;
+  Random random(13);
+  Recording r = test::measured(test, test::placed(test), random);
+  const PreparedRecording step = prepare_recording("step.csv", r);
+  CHECK(step.from_s > 5.1);
+  CHECK(step.from_s < 5.4);
+  CHECK_THAT(step.start_up, Contains("after the step are left out"));
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    const double since = r.time_s[i] - 5.05;
+    if (since >= 0.0) r.response[i] += 0.05 * std::exp(-since / 0.3) * std::cos(40.0 * since);
+  }
+  const PreparedRecording ringing = prepare_recording("ringing.csv", r);
+  CHECK(ringing.from_s > 5.8);
+  CHECK_THAT(ringing.start_up, Contains("they ring"));
+  PlacedTest ramp;
+  CHECK(test::prepared(ramp, 3).start_up.empty());
+}
+
+TEST_CASE("the tail of what rings or starts up after a step biases no interval", "[placement]") {
+  PlacedTest test;
+  test.rest_s = 5.0;
+  test.ramp_s = 0.05;  // one sample
+  Random random(29);
+  Recording r = test::measured(test, test::placed(test), random);
+  const bool rings = GENERATE(true, false);
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    const double since = r.time_s[i] - 5.05;
+    if (since < 0.0) continue;
+    if (rings) r.response[i] += 0.05 * std::exp(-since / 0.1) * std::sin(44.0 * since);
+    if (!rings) r.response[i] *= 1.0 - std::exp(-(since + 0.05) / 0.15);
+  }
+  const PreparedRecording prepared = prepare_recording("step.csv", r);
+  CHECK(prepared.from_s > (rings ? 5.4 : 5.9));
+  CHECK(prepared.from_s < 10.0);
+  CHECK_THAT(prepared.start_up, Contains(rings ? "they ring" : "they rise"));
+  const std::vector<PreparedRecording> one{prepared};
+  const Selection s = select_law(one, {});
+  const FitResult& fit = s.candidates[s.recommended].fit;
+  REQUIRE(fit.adequacy);
+  CHECK(fit.adequacy->verdict == "adequate");
+  CHECK(law_name(fit.config.law.value()) == "linear-1");
+  for (const ParameterResult& p : fit.parameters) {
+    const double truth = p.parameter.name == "k_inf"  ? 60.0
+                         : p.parameter.name == "k1"   ? 45.0
+                         : p.parameter.name == "tau1" ? 2.0
+                                                      : 0.0;
+    if (truth == 0.0) continue;
+    INFO(p.words);
+    CHECK(p.lower.value() < truth);
+    CHECK(p.upper.value() > truth);
+  }
+}
+
+TEST_CASE("a drift of the zero after a step is no start-up", "[placement]") {
+  PlacedTest test;
+  test.rest_s = 5.0;
+  test.ramp_s = 0.05;
+  Random random(31);
+  Recording r = test::measured(test, test::placed(test), random);
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    const bool held = r.time_s[i] > 5.05;
+    r.response[i] = (held ? 0.2 : 0.0) + 5e-3 * r.time_s[i] + 1e-3 * random.normal();
+  }
+  CHECK_THAT(prepare_recording("drift.csv", r).start_up, !Contains("they rise"));
+}
