@@ -5,6 +5,7 @@
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/distributions.hpp"
+#include "tpm/base/namespaces.hpp"
 
 namespace tpm::fit {
 namespace {
