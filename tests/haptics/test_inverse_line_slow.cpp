@@ -49,6 +49,11 @@ TEST_CASE("By the command line, a delay is found or the stall named, and each se
       CHECK(*run.found_s >= 1e-3 * late_ms - 0.5e-3);
       CHECK(*run.largest_s >= *run.found_s);
       if (run.verified < 0) continue;  // ended before the hand was in place
+      if (run.cycles < 2) {  // a stall of the machine ended it as it began: nothing to verify
+        CHECK(is_of_a_stall(run.end));
+        CHECK(run.verified == 3);
+        continue;
+      }
       REQUIRE(run.verified == 0);
       CHECK((run.ran == 0) == (run.end == "finished"));
       CHECK((run.end == "finished" || is_of_a_stall(run.end)));

@@ -176,7 +176,8 @@ struct LineRun {
   std::vector<std::string> not_identified;
   double stalled_s = 0.0;
   int begun_again = 0;
-  std::string end;  ///< of the session
+  std::size_t cycles = 0;  ///< of the session
+  std::string end;         ///< of the session
   double peak_N = 0.0, largest_difference_N = 0.0;
   std::string said;
 };
@@ -224,11 +225,12 @@ inline LineRun run_on_the_line(const std::string& tpm, int late_ms) {
   ending = true;
   mover.join();
   if (!std::filesystem::exists(recording)) return run;
+  const HilRecording read = read_recording(recording);
+  run.cycles = read.rows.size();
+  run.end = read.closed ? read.closing.at("cause").get<std::string>() : "cut off";
   run.verified = called({tpm, "hil", "verify", recording, "--format", "json"}, "verify");
   if (run.verified != 0) return run;
   const Json answer = files::parse_json(text_of(folder / "verify"), "verify");
-  const HilRecording read = read_recording(recording);
-  run.end = read.closed ? read.closing.at("cause").get<std::string>() : "cut off";
   run.peak_N = answer.at("all").at("peak_N").get<double>();
   run.largest_difference_N = answer.at("all").at("max_N").get<double>();
   return run;
