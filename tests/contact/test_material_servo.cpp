@@ -202,7 +202,6 @@ TEST_CASE("servo bonds of several branches and a cubic potential pull as the net
 TEST_CASE("models at servo rate keep their claims with several branches and stiffening bonds",
           "[servo][heavy]") {
   const OrganScene& scene = small_liver();
-  const Positions& rest = scene.network.organ.position;
   struct Case {
     const char* name;
     MaterialField field;
