@@ -41,6 +41,13 @@ MODEL_COLOURS = ["#0072B2", "#C75400", "#00805E", "#B0508A", "#9C6B00", "#3A86B8
 DATA_COLOURS = ["#222222", "#8A5A00", "#5B2A86", "#666666"]
 # More markers than colours, so that the fifth series does not look like the first.
 DATA_MARKERS = ["o", "s", "D", "^", "v", "X", "P"]
+# What a run came to: the same look in every map of steps, smaller than other readings, as hundreds stand side by side.
+VERDICT_SIZE = 4.2
+VERDICTS = {
+    "holds": ("#8C8C8C", "."), "oscillates": ("#9C6B00", "s"), "wrong steady state": ("#5B2A86", "D"),
+    "energy grew": ("#C75400", "^"), "diverged": ("#222222", "v"), "Newton failed": ("#0072B2", "X"),
+    "buckled": ("#B0508A", "P"), "too much work": ("#3A86B8", "h"),
+}
 # Later lines are thinner: where curves coincide, all of them show.
 LINE_WIDTHS = [2.8, 1.8, 1.1, 0.8]
 THIN_LINE = 0.9
@@ -96,7 +103,7 @@ def legend_text(series):
 
 
 def is_dense(series):
-    return series["kind"] == "points" and len(series["x"]) > DENSE
+    return series["kind"] == "points" and len(series["x"]) > DENSE and series["label"] not in VERDICTS
 
 
 def looks(figure):
@@ -113,6 +120,9 @@ def looks(figure):
                 "width": min(LINE_WIDTHS[min(lines, len(LINE_WIDTHS) - 1)], WIDEST_OVER_OTHERS if covers else math.inf),
             }
             lines += 1
+        elif series["kind"] == "points" and series["label"] in VERDICTS:
+            colour, marker = VERDICTS[series["label"]]
+            chosen[series["label"]] = {"color": colour, "marker": marker, "size": VERDICT_SIZE}
         else:
             chosen[series["label"]] = {
                 "color": DATA_COLOURS[data % len(DATA_COLOURS)],
@@ -149,7 +159,7 @@ def draw_points(axes, series, look):
     dense = is_dense(series)
     colour = DENSE_COLOUR if dense else look["color"]
     face = "white" if is_assumed(series) else colour
-    style = dict(marker=look["marker"], markersize=DENSE_SIZE if dense else 5, markerfacecolor=face, markeredgecolor=colour, linestyle="none")
+    style = dict(marker=look["marker"], markersize=DENSE_SIZE if dense else look.get("size", 5), markerfacecolor=face, markeredgecolor=colour, linestyle="none")
     x, y, sd = inside(axes, series)
     axes.errorbar(x, y, yerr=sd, ecolor=colour, elinewidth=1, capsize=2.5, zorder=2 if dense else 5, clip_on=False, **style)
     return Line2D([], [], **style)

@@ -10,7 +10,7 @@ import sys
 from html import escape
 from pathlib import Path
 
-WIDTH, BOX_WIDTH, BOX_HEIGHT, GAP, TOP = 980, 340, 50, 20, 30
+WIDTH, BOX_WIDTH, BOX_HEIGHT, GAP, TOP = 1150, 560, 50, 20, 30
 LEFT = 150
 COLOURS = ("#b3541e", "#1f6f8b", "#5b7f2b")
 
@@ -140,7 +140,7 @@ def drawing(root: Path) -> str:
         out.append(f'<text x="{LEFT + 12}" y="{y + 38}" fill="#333">{escape(", ".join(f for f in rooms[name] if f != "."))}</text>')
     # Flows: a line at the right through the rooms of its steps.
     for i, (flow, steps) in enumerate(flows_of(page).items()):
-        x = LEFT + BOX_WIDTH + 70 + 150 * i
+        x = LEFT + BOX_WIDTH + 70 + 140 * i
         headers = public_headers(root)
         at = [headers[h.split("/")[1]] if h.startswith("tpmkit/") else h.split("/")[0] for _, h, _ in steps]
         visited = [at[0]] + [b for a, b in zip(at, at[1:]) if a != b]

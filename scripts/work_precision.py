@@ -58,8 +58,8 @@ def draw_limit(axes, series):
     if series["kind"] == "upright":
         for x in series["x"]:
             axes.axvline(x, color=BLACK, linewidth=1, linestyle=(0, (5, 2)), zorder=2)
-            axes.annotate(series["text"], (x, 0.02), xycoords=("data", "axes fraction"), xytext=(-2, 0), textcoords="offset points",
-                          rotation=90, ha="right", va="bottom", fontsize=7.5, color=BLACK)
+            axes.annotate(series["text"], (x, 0.98), xycoords=("data", "axes fraction"), xytext=(-2, 0), textcoords="offset points",
+                          rotation=90, ha="right", va="top", fontsize=7.5, color=BLACK)
     else:
         for y in series["y"]:
             axes.axhline(y, color=GREY, linewidth=0.9, linestyle=":", zorder=1)
@@ -77,6 +77,16 @@ def failure_rows(figure):
     return rows
 
 
+def fitting_names(names, width):
+    """As many names as go side by side into `width` (inches), and how many are left out."""
+    most = int(width * 72 / 3.6)  # letters of 6 points
+    for count in range(len(names), 0, -1):
+        text = ", ".join(names[:count]) + (f" and {len(names) - count} more" if count < len(names) else "")
+        if len(text) <= most:
+            return text
+    return f"{len(names)} methods"
+
+
 def draw_band(band, panel, rows, look):
     band.set_ylim(-0.5, len(rows) - 0.5)
     band.set_yticks(range(len(rows)), rows, fontsize=7)
@@ -90,7 +100,8 @@ def draw_band(band, panel, rows, look):
             band.plot(series["x"], [row] * len(series["x"]), linestyle="none", zorder=4, **marker_style(look[series["label"]]))
         unplaced = [s["label"] for s in row_series if not s["x"]]
         if unplaced:
-            band.text(0.01, row, ", ".join(unplaced), transform=band.get_yaxis_transform(), fontsize=6, va="center", color=BLACK)
+            width = band.get_position().width * band.figure.get_figwidth()
+            band.text(0.01, row, fitting_names(unplaced, width), transform=band.get_yaxis_transform(), fontsize=6, va="center", color=BLACK)
 
 
 def limits(panel):

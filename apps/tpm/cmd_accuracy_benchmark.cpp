@@ -160,7 +160,7 @@ void add_benchmark_command(CLI::App& accuracy, Session& session) {
                     "Errors and counts only, each run once: the same bytes from run to run");
   command->add_flag("--keep", choice->keep,
                     "Keep what the folder holds: run the problems that are missing there, or those "
-                    "named; goes on from a run that was interrupted");
+                    "named; resumes an interrupted run");
   command->add_flag("--list", choice->list,
                     "List what can be named, and do nothing: problems and formulations, with "
                     "--append-to the pieces of work");

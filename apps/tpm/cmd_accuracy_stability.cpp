@@ -61,7 +61,7 @@ int stability(const std::string& folder, int along, const StabilityParts& parts,
 
 void add_stability_command(CLI::App& accuracy, Session& session) {
   CLI::App* command = accuracy.add_subcommand(
-      "stability", "Where each step rule fails: maps, limits against theory, degenerate corners");
+      "stability", "Where each step rule fails: maps, limits against theory, limiting cases");
   auto folder = std::make_shared<std::string>("out/stability");
   add_folder_option(*command, *folder)->capture_default_str();
   auto along = std::make_shared<std::string>(std::to_string(kPointsAlongMaps));

@@ -158,7 +158,7 @@ int best(const SweepViewChoice& choice, const Session& session) {
     }
     say("\n");
   }
-  if (!choice.start.empty()) say("wrote {}: tpm fit goes on from there\n", choice.start);
+  if (!choice.start.empty()) say("wrote {}: tpm fit starts from there\n", choice.start);
   return 0;
 }
 

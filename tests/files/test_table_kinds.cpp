@@ -303,7 +303,7 @@ TEST_CASE("tables in every layout give the same recording") {
   }
   // Decimal commas between separating commas: nothing tells them apart.
   CHECK_THAT(read.refusal("Time [s],Depth [mm]\n0,05,0,12\n0,15,0,25\n0,25,0,31\n"),
-             Contains("commas in numbers cannot be told from separators"));
+             Contains("commas in numbers look like separators"));
   // Two blocks that both may be meant.
   const std::string two = titles + rows + "Zweiter Versuch\n" + titles + rows;
   CHECK_THAT(read.refusal(two), Contains("holds 2 blocks of samples") && Contains("--block"));

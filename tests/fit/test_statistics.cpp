@@ -1023,10 +1023,11 @@ TEST_CASE("simple trade-offs are named by what remains known") {
         "E1 and eta1 trade off: their product E1 eta1 is known much better than they are (singular "
         "values 1.4:0.01 of the scaled Jacobian)");
   CHECK(weakest_direction_words(result_with({e, eta}, {1.0, -1.0}, 0.4, true)) ==
-        "the data see least: E1 up and eta1 down together; they trade off (singular values 1.4:0.4 "
+        "least determined by the data: E1 up and eta1 down together; they trade off (singular "
+        "values 1.4:0.4 "
         "of the scaled Jacobian)");
   CHECK(weakest_direction_words(result_with({e, eta}, {0.1, 1.0}, 0.4, true)) ==
-        "the data see least: eta1 up (singular values 1.4:0.4 of the scaled Jacobian)");
+        "least determined by the data: eta1 up (singular values 1.4:0.4 of the scaled Jacobian)");
   FitResult unevaluated = result_with({e, eta}, {0.1, 1.0}, 0.4, true);
   unevaluated.covariance.weakest_direction.resize(0);
   CHECK(weakest_direction_words(unevaluated).empty());

@@ -349,7 +349,7 @@ TEST_CASE("an organ without another filling says so", "[validate]") {
   request.organ =
       std::shared_ptr<const OrganOfLaw>(new OrganOfLaw(organ_of_law(star_of(law), "test")));
   CHECK_THAT(to_terminal_text(validate(request)),
-             Contains("without what the place of the spheres does: a star"));
+             Contains("without the effect of the places of the spheres: a star"));
 }
 
 TEST_CASE("bonds that keep the law's relaxation times hide none of their uncertainty",

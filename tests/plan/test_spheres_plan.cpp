@@ -50,7 +50,7 @@ TEST_CASE("a line in the spacing has its limit, and its scatter the uncertainty"
 
   terms.col(1).setConstant(0.1);  // the same on every filling: no line through these is the one
   CHECK_THAT(test::refusal_of([&] { (void)spacing_limit(terms, exact); }),
-             Contains("cannot be told apart"));
+             Contains("are linearly dependent"));
   terms.col(1) = area;
 
   // Scatter in proportion to the spacing: 95 of 100 intervals have the true limit.

@@ -204,10 +204,6 @@ def without_example(root, program):
             yield f"{call} --help: has no example that calls it"
 
 
-# Of programs of another day, which the page says.
-GONE = {("predict", "--verdict")}
-
-
 def false_commands(root, program):
     from command_help import commands
 
@@ -222,7 +218,7 @@ def false_commands(root, program):
                 if not command and "completion" not in line:  # an argument of a script
                     yield f"{page.relative_to(root)}: tpm {call.strip()}: no such command"
                 for option in re.findall(r"(?<!\S)(--?[A-Za-z][\w-]*)", call) if command else ():
-                    if option not in options[command] and (*command, option) not in GONE:
+                    if option not in options[command]:
                         yield f"{page.relative_to(root)}: tpm {' '.join(command)} has no option {option}"
 
 

@@ -40,6 +40,22 @@ def faults_of_views():
     return faults
 
 
+def faults_of_verdicts():
+    """A verdict has one look in every map of steps, however many runs have it; names that do not fit are counted."""
+    sys.path.insert(0, str(SCRIPT.parent))
+    import draw_figures
+    import work_precision
+    holds, diverged = series("holds", "model", [1.0] * 200), series("diverged", "model", [1.0] * 150)
+    faults = []
+    maps = [draw_figures.looks({"panels": [panel("", {}, part)]}) for part in ([holds, diverged], [diverged])]
+    if maps[0]["diverged"] != maps[1]["diverged"] or maps[0]["diverged"] == maps[0]["holds"] or draw_figures.is_dense(diverged):
+        faults.append(f"verdicts look different from map to map, or alike: {maps}")
+    for names, wanted in ((["rk4", "ida"], "rk4, ida"), (["a long name of a method"] * 4, "a long name of a method and 3 more")):
+        if work_precision.fitting_names(names, 2.0) != wanted:
+            faults.append(f"names beside a band: {work_precision.fitting_names(names, 2.0)}; expected {wanted}")
+    return faults
+
+
 def main():
     axis = {"quantity": "BIC", "unit": "", "logarithmic": False}
     figure = {"id": "a", "title": "", "caption": "", "panels": [
@@ -50,7 +66,7 @@ def main():
     of_names["x"]["names"] = ["peak force", "half time"]
     numbered = panel("", axis, of_names["series"])
     figures = [figure] + [{"id": id, "title": "", "caption": "", "panels": [p]} for id, p in (("b", of_names), ("c", numbered))]
-    faults = faults_of_views()
+    faults = faults_of_views() + faults_of_verdicts()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "figures.json").write_text(json.dumps({"figures": figures}))

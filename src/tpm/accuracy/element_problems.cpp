@@ -142,12 +142,12 @@ BenchmarkProblem bond_fitted_problem() {
 
 BenchmarkProblem star_creep_problem() {
   const PosedBond bond = posed_bond(kFittedEta1_Pa_s, creep(0.98, 60.0), times_every(1.0, 60.0));
-  return exact_problem(
-      bond, "star_creep", "Creep of the star under 0.98 N",
-      "The larger of the paper's loads, put on at once and kept for 60 s; eta1 = 257.3 kPa s, the "
-      "true lambda1 of each depth. The exact answer is a quadrature over depth.",
-      {.steps_s = {10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 1e-2, 1e-3},
-       .tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10}});
+  return exact_problem(bond, "star_creep", "Creep of the star under 0.98 N",
+                       "The larger of the paper's loads, applied in a step and kept for 60 s; eta1 "
+                       "= 257.3 kPa s, the "
+                       "true lambda1 of each depth. The exact answer is a quadrature over depth.",
+                       {.steps_s = {10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 1e-2, 1e-3},
+                        .tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10}});
 }
 
 BenchmarkProblem bond_mass_problem() {
@@ -173,7 +173,7 @@ BenchmarkProblem bond_mass_problem() {
   rules.tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10};
   BenchmarkProblem problem;
   problem.name = "bond_mass";
-  problem.title = "One bond with a mass, loaded at once";
+  problem.title = "One bond with a mass, loaded in a step";
   problem.text =
       "A sphere of liver (10 mm radius, 4.4 g) on the paper's bond (eta1 = 5 Pa s), 0.5 N put on "
       "at "

@@ -130,8 +130,8 @@ BenchmarkProblem organ_poke_problem() {
 BenchmarkProblem organ_creep_problem() {
   return massless_problem(
       "organ_creep", "Organ, 300 s of creep",
-      "The same liver with eta1 = 257.3 kPa s under the smaller of the paper's loads, 0.196 N, put "
-      "on at once and kept for 300 s.",
+      "The same liver with eta1 = 257.3 kPa s under the smaller of the paper's loads, 0.196 N, "
+      "applied in a step and kept for 300 s.",
       liver(kFittedEta1_Pa_s), creep(0.196, 300.0), times_every(5.0, 300.0),
       {.steps_s = {20.0, 10.0, 5.0, 2.0, 1e-3},
        .tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6},

@@ -19,7 +19,7 @@ constexpr std::array<BenchmarkEntry, 11> kEntries{{
     {"organ_hold", "424 spheres, ramp and hold", organ_hold_problem},
     {"organ_poke", "424 spheres, poked at 100 mm/s", organ_poke_problem},
     {"organ_creep", "424 spheres, 300 s of creep", organ_creep_problem},
-    {"bond_mass", "one bond with a mass, loaded at once", bond_mass_problem},
+    {"bond_mass", "one bond with a mass, loaded in a step", bond_mass_problem},
     {"organ_poke_mass", "424 spheres with masses, poked at 100 mm/s", organ_poke_mass_problem},
     {"servo_normal", "contact models along the normal, 424 spheres", servo_normal_problem},
     {"servo_space", "contact models in space, 424 spheres", servo_space_problem},

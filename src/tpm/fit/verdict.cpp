@@ -333,8 +333,10 @@ std::string weakest_direction_words(const FitResult& result) {
   const std::string parts = movement_words(named);
   if (!c.full_rank)
     return fmt::format("rank-deficient: the data do not see {} ({})", parts, strength);
-  if (named.steps.size() == 1) return fmt::format("the data see least: {} ({})", parts, strength);
-  return fmt::format("the data see least: {} together; they trade off ({})", parts, strength);
+  if (named.steps.size() == 1)
+    return fmt::format("least determined by the data: {} ({})", parts, strength);
+  return fmt::format("least determined by the data: {} together; they trade off ({})", parts,
+                     strength);
 }
 
 }  // namespace tpm::fit

@@ -154,7 +154,7 @@ SpacingLimit spacing_limit(const Eigen::MatrixXd& terms, const Eigen::MatrixXd& 
   line = weight.asDiagonal() * line;
   if (Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(line.colwise().normalized()).rank() <
       line.cols()) {
-    throw Error(ExitCode::numerical, "spheres", "the terms of the line cannot be told apart",
+    throw Error(ExitCode::numerical, "spheres", "the terms of the line are linearly dependent",
                 "spacings and areas that differ");
   }
   const Eigen::MatrixXd weighted = weight.asDiagonal() * responses.transpose();

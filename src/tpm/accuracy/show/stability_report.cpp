@@ -77,7 +77,7 @@ Table servo_table(const StabilityStudy& study, const std::string& problem) {
 }
 
 Table corners_table(const StabilityStudy& study) {
-  Table table{"Degenerate corners, step 1 ms. An answer that is not the expected one is marked.",
+  Table table{"Limiting cases, step 1 ms. An answer that is not the expected one is marked.",
               {{"corner"}, {"what is done"}, {"what is right"}}};
   for (const StepRuleEntry& entry : kStepRules) table.columns.push_back({std::string(entry.text)});
   for (const StabilityCorner& corner : study.corners) {
@@ -178,7 +178,7 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
   document.title = "Where the step rules fail";
   document.subtitle =
       "Maps of the step against what the problem is made of, limits against theory, "
-      "degenerate corners, servo rates";
+      "limiting cases, servo rates";
   document.heading(2, "Summary");
   std::vector<Cell> items;
   for (const std::string& s : stability_sentences(study)) items.push_back({s});
@@ -193,7 +193,7 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
     document.table(servo_table(study, problem));
   }
   if (!study.corners.empty()) {
-    document.heading(2, "Degenerate corners");
+    document.heading(2, "Limiting cases");
     document.table(corners_table(study));
   }
   if (!study.maps.empty()) add_maps(document, study, figures);
@@ -296,8 +296,9 @@ std::vector<std::string> stability_sentences(const StabilityStudy& study) {
     }
   }
   if (!study.corners.empty()) {
-    sentences.push_back(fmt::format("{} corners, {} runs: {} came out otherwise than expected.",
-                                    study.corners.size(), cells, wrong));
+    sentences.push_back(
+        fmt::format("{} limiting cases, {} runs: {} came out otherwise than expected.",
+                    study.corners.size(), cells, wrong));
   }
   if (sentences.empty()) {  // maps alone
     std::size_t runs = 0;

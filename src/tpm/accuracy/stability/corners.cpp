@@ -68,7 +68,7 @@ StabilityCorner instantaneous_depth(std::string name, const BondElement& p, doub
                                     double step_s, std::string expected) {
   const Protocol protocol = step_and_hold(depth_m, kStudySteps * step_s);
   return tried(std::move(name),
-               significant(1e3 * depth_m, 3) + " mm at once and held for 300 steps of " +
+               significant(1e3 * depth_m, 3) + " mm in a step and held for 300 steps of " +
                    significant(step_s, 3) + " s",
                std::move(expected), massless_problem(p, protocol, step_s), step_s,
                of_theory(under_depth(p), step_s, kStudySteps - kComparedSteps));
@@ -129,7 +129,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
         kLoad_N / maxwell.modulus_to_stiffness_m() / maxwell.relaxing_Pa() * (1.0 + t / kTau_s);
   }
   flow.peak = flow.reference.maxCoeff();
-  corners.push_back(tried("E1 = 0, a load", "0.05 N at once and held; no tension",
+  corners.push_back(tried("E1 = 0, a load", "0.05 N in a step and held; no tension",
                           "it flows for as long as it is pushed: semi-implicit Euler and XPBD too "
                           "slowly by h/tau = 5 %, all else holds",
                           flow, kStep_s, [](StepRule rule) {
@@ -142,7 +142,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
   corners.push_back(instantaneous_depth("E2 = 0, a depth", loose, kCornerDepth_m, kStep_s,
                                         "tension only: all hold"));
   corners.push_back(
-      tried("E2 = 0, a load", "0.05 N at once and held",
+      tried("E2 = 0, a load", "0.05 N in a step and held",
             "tension carries it: all hold but XPBD, whose made-up mass is that of the "
             "stiffness at rest, 0",
             massless_problem(loose, creep(0.05, end), kStep_s), kStep_s, [](StepRule rule) {
@@ -155,7 +155,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
   nothing.peak = 1.0;
   nothing.problem = element_problem(loose, creep(0.05, end));
   corners.push_back(tried(
-      "E2 = E' = 0, a load", "0.05 N at once and held",
+      "E2 = E' = 0, a load", "0.05 N in a step and held",
       "nothing carries it: Newton fails, and XPBD diverges", nothing, kStep_s, [](StepRule rule) {
         return rule == StepRule::xpbd ? StabilityClass::diverged : StabilityClass::newton_failed;
       }));
@@ -266,13 +266,13 @@ void add_stars(std::vector<StabilityCorner>& corners) {
   checked.problem =
       network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, 0.004}}));
   set_star_reference(p, 0.004 / end, end, checked);
-  corners.push_back(tried("buckling", "star, B not guided, 0 to 4 mm in 300 steps",
-                          "its stiffness across the plane is negative at once: buckled; XPBD "
-                          "does not look and follows the straight path",
-                          checked, kStep_s, [](StepRule rule) {
-                            return rule == StepRule::xpbd ? StabilityClass::holds
-                                                          : StabilityClass::buckled;
-                          }));
+  corners.push_back(
+      tried("buckling", "star, B not guided, 0 to 4 mm in 300 steps",
+            "its stiffness across the plane is negative from the start: buckled; XPBD "
+            "does not look and follows the straight path",
+            checked, kStep_s, [](StepRule rule) {
+              return rule == StepRule::xpbd ? StabilityClass::holds : StabilityClass::buckled;
+            }));
 }
 
 void add_masses(std::vector<StabilityCorner>& corners) {
@@ -286,7 +286,7 @@ void add_masses(std::vector<StabilityCorner>& corners) {
     const CheckedProblem checked =
         problem_with_mass(p, mass, kDrag_per_s, 0.05, kStudySteps * kStep_s, kStep_s);
     corners.push_back(
-        tried("mass " + significant(mass, 2) + " kg", "0.05 N at once and held, drag 20 1/s",
+        tried("mass " + significant(mass, 2) + " kg", "0.05 N in a step and held, drag 20 1/s",
               mass < 1.0 ? "far above 2/omega: explicit rules grow, midpoint, Newmark and the "
                            "exponential rule on them ring, damped rules hold"
                          : "hardly moves: all hold",
@@ -304,7 +304,7 @@ void add_masses(std::vector<StabilityCorner>& corners) {
 
 std::vector<StabilityCorner> stability_corners() {
   std::vector<StabilityCorner> corners;
-  Progress progress("degenerate corners", 5);
+  Progress progress("limiting cases", 5);
   for (const auto& add : {add_relaxation_times, add_moduli, add_depths, add_stars, add_masses}) {
     add(corners);
     progress.advance();

@@ -64,13 +64,13 @@ void add_rest_limits(std::vector<StabilityLimit>& limits) {
   for (const auto& [rule, factor] :
        {std::pair{StepRule::forward_euler, "2"}, std::pair{StepRule::rk4, "2.785"}}) {
     const StepRule r = rule;
-    add_limit(limits, "element, the paper's eta1, a depth at once", r, std::string(factor) + " tau",
-              *stable_step_s(r, imposed), [&](double h) {
+    add_limit(limits, "element, the paper's eta1, a depth in a step", r,
+              std::string(factor) + " tau", *stable_step_s(r, imposed), [&](double h) {
                 return run_fails(*element_problem(paper, step_and_hold(0.004, kRestSteps * h)), r,
                                  h);
               });
     limits.back().at_papers_eta1 = true;
-    add_limit(limits, "element with tension, tau = 0.1 s, 0.3 N at once", r,
+    add_limit(limits, "element with tension, tau = 0.1 s, 0.3 N in a step", r,
               std::string(factor) + " tau/(1 - g/(k + tension'))",
               *stable_step_s(r, linear_element(slow, depth)), [&](double h) {
                 return run_fails(*element_problem(slow, creep(kLoad_N, kRestSteps * h)), r, h);
@@ -161,7 +161,7 @@ void add_organ_limits(std::vector<StabilityLimit>& limits) {
        {std::tuple{StepRule::semi_implicit_euler, 2.0, "2/omega_max"},
         std::tuple{StepRule::rk4, 2.0 * std::sqrt(2.0), "2 sqrt(2)/omega_max"}}) {
     const StepRule r = rule;
-    add_limit(limits, "424 elastic spheres, far outer layer fixed, no drag, 1e-6 N at once", r,
+    add_limit(limits, "424 elastic spheres, far outer layer fixed, no drag, 1e-6 N in a step", r,
               theory, factor / omega, [&](double h) {
                 return run_fails(*network_problem(elastic.driven, creep(1e-6, 3000.0 * h), mass), r,
                                  h);

@@ -28,7 +28,7 @@ MapPlan over_relaxation_time(int along) {
   return {"relaxation_time",
           "relaxation time",
           "s",
-          "element, a depth of 4 mm at once and held",
+          "element, a depth of 4 mm in a step and held",
           evenly_in_log(1e-4, 1e2, along),
           evenly_in_log(1e-5, 1e3, along),
           [](double tau, double h) {
@@ -74,7 +74,7 @@ MapPlan over_depth(int along) {
   return {"depth",
           "depth in the end",
           "m",
-          "element with tension, tau = 0.1 s, a load at once and held that leads to the depth",
+          "element with tension, tau = 0.1 s, a load in a step and held that leads to the depth",
           evenly_in_log(1e-3, 4e-2, along),
           evenly_in_log(1e-3, 1e3, along),
           [load](double depth, double h) {
@@ -119,7 +119,7 @@ MapPlan over_stiffness(int along) {
   };
   return in_motion(
       "stiffness", "E1 = E2", "Pa",
-      "sphere of 4.4 g, drag 20 1/s, tau = 0.1 s, a load at once and held that leads to 4 mm",
+      "sphere of 4.4 g, drag 20 1/s, tau = 0.1 s, a load in a step and held that leads to 4 mm",
       evenly_in_log(1e2, 1e8, along),
       [material](double x) { return sphere(material(x), kSphereMass_kg, kDrag_per_s); }, material);
 }
@@ -127,7 +127,7 @@ MapPlan over_stiffness(int along) {
 MapPlan over_mass(int along) {
   return in_motion(
       "mass", "mass", "kg",
-      "E1 = E2 = 12 kPa, drag 20 1/s, tau = 0.1 s, a load at once and held that leads to 4 mm",
+      "E1 = E2 = 12 kPa, drag 20 1/s, tau = 0.1 s, a load in a step and held that leads to 4 mm",
       evenly_in_log(1e-8, 1e1, along),
       [](double x) { return sphere(without_tension(kTau_s), x, kDrag_per_s); },
       [](double) { return without_tension(kTau_s); });
@@ -136,7 +136,8 @@ MapPlan over_mass(int along) {
 MapPlan over_damping(int along) {
   return in_motion(
       "damping", "drag", "1/s",
-      "sphere of 4.4 g, E1 = E2 = 12 kPa, tau = 0.1 s, a load at once and held that leads to 4 mm",
+      "sphere of 4.4 g, E1 = E2 = 12 kPa, tau = 0.1 s, a load in a step and held that leads to 4 "
+      "mm",
       evenly_in_log(1e-1, 1e6, along),
       [](double x) { return sphere(without_tension(kTau_s), kSphereMass_kg, x); },
       [](double) { return without_tension(kTau_s); });

@@ -382,8 +382,8 @@ void require_titles_for_fields(const DelimitedTable& table, const MachineHeader&
   if (titles == 0 || titles >= filled) return;
   throw bad_input(
       fmt::format("{}:{}", file, first.line),
-      fmt::format("{} fields below {} titles: commas in numbers cannot be told from separators",
-                  filled, titles),
+      fmt::format("{} fields below {} titles: commas in numbers look like separators", filled,
+                  titles),
       "another separator than the comma, numbers in quotes, or a title for each column");
 }
 

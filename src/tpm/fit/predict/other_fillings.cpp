@@ -59,7 +59,7 @@ OtherFillings other_fillings(const OrganOfLaw& organ) {
   OtherFillings found;
   Json scene = organ.scene();
   if (const std::string why = no_other_filling(scene); !why.empty()) {
-    found.words = fmt::format("without what the place of the spheres does: {}", why);
+    found.words = fmt::format("without the effect of the places of the spheres: {}", why);
     return found;
   }
   const auto own = scene.at("organ").value("seed", std::uint64_t{1});
@@ -77,7 +77,7 @@ OtherFillings other_fillings(const OrganOfLaw& organ) {
   if (std::ssize(seeds) < kOtherFillings) {
     found.organs.clear();
     found.words = fmt::format(
-        "without what the place of the spheres does: only {} of {} other "
+        "without the effect of the places of the spheres: only {} of {} other "
         "fillings stand",
         seeds.size(), kMostSeeds);
     return found;

@@ -97,7 +97,7 @@ void add_drift(LawPrediction& p, const FittedFile& file) {
   }
   const Unit unit = shown_unit(p.response_dimension());
   p.flags.push_back(
-      fmt::format("the zero drifts by {} {}/s, as the recording's rests tell; it is added",
+      fmt::format("the zero drifts by {} {}/s, as the readings at rest show; it is added",
                   significant(*file.drift / unit.to_si, 4), unit.symbol));
 }
 
@@ -169,7 +169,7 @@ std::optional<std::vector<double>> values_in_fit(const LawFile& law,
 
 namespace {
 
-/// Nothing is left to be found but a drift, which the rests tell.
+/// Only a drift is left to find; the rests show it.
 OwnPlacement held_placement(const LawFile& law, const PreparedRecording& recording,
                             const PredictionOptions& held) {
   OwnPlacement own{law.values, {}};

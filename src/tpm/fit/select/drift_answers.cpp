@@ -184,7 +184,8 @@ std::string drift_words(const DriftAnswers& answers, const FitResult& fit) {
   if (lasting == nullptr) return {};
   const FitParameter& k = lasting->parameter;
   std::string words = fmt::format(
-      "{}: not separable, for no rest without a load tells the drift well enough: {} = {} without "
+      "{}: not separable, because no rest without a load determines the drift well enough: {} = {} "
+      "without "
       "a "
       "drift of the zero",
       lasting->not_separable, k.name, in_sized_unit(*lasting, answers.k_inf));

@@ -58,7 +58,7 @@ Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int
   return judge_adequacy({rest_time, rest, time, reading, residual, parameters}, level);
 }
 
-/// The drift of a recording that the fit takes, where it is further from what the rests tell than
+/// The drift of a recording that the fit takes, where it is further from what the rests show than
 /// both uncertainties allow: what the law cannot follow then went into the drift. With the noise
 /// of the fit and of the rests independent, the difference of both has the sum of their variances;
 /// the weight of the rests in the fit only makes it smaller.
@@ -73,7 +73,7 @@ std::string drift_off(const FitResult& fit, std::size_t choice, double level) {
     const Prior& rests = *estimated.prior;
     if (std::abs(p.estimate - rests.mean) <= far * std::hypot(rests.sd, *p.standard_error))
       return {};
-    return fmt::format("it takes a drift of {}, and the rests tell {} +- {}",
+    return fmt::format("it takes a drift of {}, but the readings at rest show {} +- {}",
                        in_sized_unit(p, p.estimate), in_sized_unit(p, rests.mean),
                        in_sized_unit(p, rests.sd));
   }
@@ -96,7 +96,7 @@ std::string bend_of_rest(const RestedRecording& rested, double level) {
   }
   const auto bend = rest_bend(std::span(r.time_s).first(end), std::span(r.response).first(end));
   if (!bend || bend->noises < kSeen || bend->p_value >= kShare * level) return {};
-  return fmt::format("its zero bends at rest by {} noises, and the fit knows a line",
+  return fmt::format("its zero is curved at rest by {} noises, but the fit has a straight line",
                      times_text(bend->noises));
 }
 

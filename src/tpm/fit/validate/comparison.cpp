@@ -103,7 +103,8 @@ class Comparer {
       by_filling_ = along_.by_filling(*options_.fillings, result_.placement.contact);
       if (by_filling_.empty() && !options_.fillings->organs.empty()) {
         result_.fillings =
-            "without what the place of the spheres does: one of the other fillings gives way";
+            "without the effect of the places of the spheres: one of the other fillings is "
+            "unstable";
       }
     }
     if (!options_.pick) return;

@@ -504,7 +504,7 @@ QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double
                     "one protocol and no other load");
   }
   if (from && !options_.directions.empty()) {
-    throw bad_input("directions", "a run that goes on from a state",
+    throw bad_input("directions", "a run that resumes from a state",
                     "a run from rest: the derivatives of the state are not known");
   }
   require_times_within(protocol, times_s);

@@ -160,9 +160,9 @@ void Recorder::stop(double time_s) {
   throw Interrupted(fmt::format(
       "interrupted at t = {} s of {} s; {}", significant(time_s, 4),
       significant(scene_.protocol.end_s(), 4),
-      saved ? fmt::format("the same command goes on from t = {} s ({})",
+      saved ? fmt::format("the same command resumes from t = {} s ({})",
                           significant(whole_.state.time_s, 4), controls_.checkpoint.string())
-            : std::string("there is no checkpoint to go on from")));
+            : std::string("there is no checkpoint to resume from")));
 }
 
 PartOfProtocol::PartOfProtocol(const ExperimentScene& scene, double end_s)

@@ -169,7 +169,7 @@ FormPtr claim_form() {
        optional_key("report", map_form(reported), "further numbers"),
        optional_key("if_holds", some, "what follows if it holds"),
        optional_key("if_fails", some, "what follows if it fails"),
-       optional_key("if_open", some, "what follows if that cannot be said")});
+       optional_key("if_open", some, "what follows if it is undetermined")});
 }
 
 struct ClaimsKeys {

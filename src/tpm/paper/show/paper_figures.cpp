@@ -101,16 +101,17 @@ Figure static_force_figure(const PaperFigureData& data) {
   }
   Panel panel{"", {"indentation depth", "mm", false, 0.0, 8.4}, force_axis()};
   panel.series = {
-      line("relaxed force (t → ∞)", depth_mm, relaxed),
-      line("force at once (t = 0+)", depth_mm, instantaneous),
+      line("equilibrium force (t → ∞)", depth_mm, relaxed),
+      line("instantaneous force (t = 0+)", depth_mm, instantaneous),
       brackets("range over three pigs (Table 5)", data.static_bands.data, 1.0,
                [](const Datum& d) { return d.depth_m.value_or(0.0) * 1e3; }),
   };
-  return {"figure_06",
-          "Figure 6. Static force against depth",
-          "The paper's parameters (12 kPa, x = 30 mm). A slow indentation is compared with the "
-          "relaxed force. Only the four tabulated ranges are data; nothing is known between them.",
-          {std::move(panel)}};
+  return {
+      "figure_06",
+      "Figure 6. Static force against depth",
+      "The paper's parameters (12 kPa, x = 30 mm). A slow indentation is compared with the "
+      "equilibrium force. Only the four tabulated ranges are data; nothing is known between them.",
+      {std::move(panel)}};
 }
 
 }  // namespace
@@ -195,7 +196,8 @@ Figure rates_figure(const PaperFigureData& data) {
   return {"figure_10",
           "Figure 10. 4 mm reached at three speeds",
           "The model's own curves; no measurement belongs to them. With the stated 5 Pa s the "
-          "three differ only while the probe moves; a fitted dashpot remembers the ramp.",
+          "three differ only while the probe moves; with a fitted dashpot the peak depends on the "
+          "rate of the ramp.",
           {panel("(a) η₁ = 5 Pa s, as stated", data.paper), panel("(b) fitted", data.fitted)}};
 }
 

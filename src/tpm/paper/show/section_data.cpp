@@ -129,7 +129,7 @@ void add_assumptions(Document& document, const PaperReport& report) {
                                       : "its ranges are taken to be those at the end of the creep, "
                                         "not those of the whole curve.")});
   }
-  items.push_back({"The range of static forces is compared with the relaxed force, t → ∞."});
+  items.push_back({"The range of static forces is compared with the equilibrium force, t → ∞."});
   items.push_back(
       {"The creep data were taken with a 6 mm punch (derived from the loads and stresses of the "
        "original abstract); the model has the area of a 4 mm sphere's circle."});

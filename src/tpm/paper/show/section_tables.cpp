@@ -46,8 +46,8 @@ Table relaxation_table(const TablesResult& tables, double depth_m) {
   Table table{"",
               {{"x [mm]", true},
                {"λ₁ [kPa]"},
-               {"force at once [N]"},
-               {"relaxed force [N]"},
+               {"instantaneous force [N]"},
+               {"equilibrium force [N]"},
                {"liver, peak [N]", true},
                {"liver, 30 s [N]", true}}};
   for (const TableRow& row : tables.rows) {
@@ -65,7 +65,7 @@ Table relaxation_table(const TablesResult& tables, double depth_m) {
 }
 
 Table band_table(const TablesResult& tables) {
-  Table table{"Table 5: relaxed force against the range over three pigs",
+  Table table{"Table 5: equilibrium force against the range over three pigs",
               {{"depth [mm]", true}, {"force [N]"}, {"range [N]", true}, {"inside"}}};
   for (const BandRow& row : tables.bands) {
     table.rows.push_back({{fmt::format("{:.4g}", row.depth_m * 1e3)},

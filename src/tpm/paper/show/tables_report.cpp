@@ -110,9 +110,9 @@ TableSection depth_section(const TablesResult& result, double depth_m) {
 TableSection band_section(const TablesResult& result) {
   const BandRow& first = result.bands.front();
   TableSection section =
-      new_section(fmt::format("Relaxed force and static band, x = {} (paper: {})",
+      new_section(fmt::format("Equilibrium force and static band, x = {} (paper: {})",
                               spacing_text(first.spacing_m), first.printed_where),
-                  {"depth", "relaxed force"}, true);
+                  {"depth", "equilibrium force"}, true);
   section.columns.insert(section.columns.end(), {"measured band", ""});
   section.right_aligned.insert(section.right_aligned.end(), {true, false});
   for (const BandRow& row : result.bands) {
@@ -197,7 +197,7 @@ std::string short_row(const std::string& depth, const std::string& spacing,
 
 std::string band_words(const std::vector<BandRow>& bands) {
   const auto inside = std::ranges::count_if(bands, &BandRow::inside);
-  return fmt::format("Relaxed forces at x = {}: {} of {} inside the measured band.",
+  return fmt::format("Equilibrium forces at x = {}: {} of {} inside the measured band.",
                      spacing_text(bands.front().spacing_m), inside, bands.size());
 }
 
@@ -260,8 +260,8 @@ std::string tables_csv(const TablesResult& result) {
     }
   }
   for (const BandRow& row : result.bands) {
-    auto cells =
-        csv_cells("relaxed force", row.depth_m, row.spacing_m, row.printed_where, row.force, "N");
+    auto cells = csv_cells("equilibrium force", row.depth_m, row.spacing_m, row.printed_where,
+                           row.force, "N");
     cells[cells.size() - 2] = fmt::format("{} - {}", row.band_low, row.band_high);
     out += csv_line(cells);
   }

@@ -46,7 +46,7 @@ std::string moduli_text(const NetworkInspection& inspection) {
   const auto& at_once = inspection.instantaneous;
   if (!at_once) return {};
   std::string text = fmt::format(
-      "inside, by a relaxed test of {} spheres: E {} kPa ({} to {} along the axes), nu {}, "
+      "inside, by a patch test of {} spheres: E {} kPa ({} to {} along the axes), nu {}, "
       "anisotropy {}\n",
       at_once->spheres, significant(1e-3 * at_once->mean_young_Pa(), 3),
       significant(1e-3 * at_once->young_Pa.minCoeff(), 3),
