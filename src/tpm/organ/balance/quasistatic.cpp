@@ -10,6 +10,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/law/relaxation/sampled_function.hpp"
 #include "tpm/organ/balance/buckling.hpp"
+#include "tpm/organ/balance/contact_landing.hpp"
 #include "tpm/organ/balance/stage_tangents.hpp"
 #include "tpm/organ/balance/step_growth.hpp"
 #include "tpmkit/error.hpp"
@@ -24,9 +25,7 @@ constexpr double kLeastMove = 1e-9;  // of a jump
 // A step of p stages after a change of rate errs by about (h / (kFirstStep tau))^(p + 1), with the
 // shortest relaxation time.
 constexpr double kFirstStep = 28.0;
-constexpr double kMostGrowth = 30.0;    // from one step to the next
-constexpr double kLanded = 1.0 - 1e-6;  // of a step that was to end where a contact changes
-constexpr std::size_t kMostChangesTogether = 4;  // of a contact at one time
+constexpr double kMostGrowth = 30.0;  // from one step to the next
 
 /// One run: the state and how it is carried through the protocol.
 class Run {
@@ -58,7 +57,7 @@ class Run {
       if (begin && to.time_s <= begin->time_s) continue;
       if (begin && from.time_s < begin->time_s) from = {state_.time_s, state_.imposed};
       if (to.time_s == from.time_s) {
-        jump(to.value);
+        move_to(to.value, false);
       } else {
         cross(from, to);
       }
@@ -66,7 +65,7 @@ class Run {
     if (next_ < order_.size()) hold_on(knots.back());
     result_.work = work();
     result_.solver = tissue_.equilibrium().choice();
-    if (options_.energies) result_.energy = energy_of(state_, energy_);
+    if (options_.energies) result_.energy = with_stored(energy_, stored_J());
     result_.position = state_.position;
     result_.viscous = state_.viscous;
     return std::move(result_);
@@ -128,7 +127,7 @@ class Run {
     if (protocol_.equilibrium_at_start()) {
       move_to(first.value, true);
     } else if (first.value != 0.0) {
-      jump(first.value);
+      move_to(first.value, false);
     }
   }
 
@@ -145,8 +144,6 @@ class Run {
     follow(state_.imposed, false);
   }
 
-  void jump(double value) { move_to(value, false); }
-
   [[nodiscard]] double response_now() {
     if (!response_) response_ = tissue_.response(state_);
     return *response_;
@@ -160,11 +157,6 @@ class Run {
            tissue_.dead_energy_J(state.position);
   }
 
-  /// The account of the energy where the tissue is in a state.
-  template <class State>
-  [[nodiscard]] QuasiStaticEnergy energy_of(const State& state, QuasiStaticEnergy spent) const {
-    return with_stored(spent, stored_J(state));
-  }
   [[nodiscard]] static QuasiStaticEnergy with_stored(QuasiStaticEnergy spent, double stored_J) {
     spent.stored_J = stored_J;
     return spent;
@@ -251,9 +243,9 @@ class Run {
       if (tangents_) tangents_->accept();
       if (last) state_.time_s = to.time_s;
       state_.imposed = last ? to.value : state_.imposed;
-      if (landing_) {
-        change_contact(landing_->contact);
-        h = landing_->step_s;
+      if (landing_.cut()) {
+        change_contact(landing_.cut()->contact);
+        h = landing_.cut()->whole_s;
         landing_.reset();
         growth = StepGrowth(options_.stages + 1);
       } else {
@@ -262,30 +254,18 @@ class Run {
     }
   }
 
-  /// A step within which a contact with a tool closes or opens is cut to end there. False if it has
-  /// to be found again.
-  /// @param h of the step just balanced, s; of the next one to try
-  /// @param length of the piece, s
+  /// False if the step just balanced has to be found again, h long.
   [[nodiscard]] bool lands_on_contact(double& h, double length) {
     const auto change = stages_.contact_change(kStepShare * options_.tolerance);
-    if (!change) return true;
-    if (change->fraction * h <= kLeastStep * length) {
-      landing_.reset();
-      change_contact(change->contact);
-      return false;
-    }
-    if (landing_ && landing_->contact == change->contact && change->fraction > kLanded) return true;
-    landing_ = Landing{change->contact, landing_ ? landing_->step_s : h};
-    h *= change->fraction;
-    return false;
+    const auto answer = landing_.see(change, h, kLeastStep * length);
+    if (answer == ContactLanding::Answer::change_first) change_contact(change->contact);
+    return answer == ContactLanding::Answer::keep;
   }
 
   void change_contact(std::size_t contact) {
     stages_.change_contact(state_, contact);
     response_.reset();
-    changes_together_ = state_.time_s == changed_at_s_ ? changes_together_ + 1 : 1;
-    changed_at_s_ = state_.time_s;
-    if (changes_together_ <= kMostChangesTogether * state_.closed.size()) return;
+    if (landing_.may_change(state_.time_s, state_.closed.size())) return;
     throw failed(state_.imposed, "contacts with a tool open and close without end");
   }
 
@@ -420,8 +400,8 @@ class Run {
     }
     put(state.response);
     if (options_.energies) {
-      state.energy =
-          state.energy ? with_stored(spent, state.energy->stored_J) : energy_of(state, spent);
+      state.energy = state.energy ? with_stored(spent, state.energy->stored_J)
+                                  : with_stored(spent, stored_J(state));
     }
     observer_(state);
   }
@@ -435,14 +415,7 @@ class Run {
   DrivenTissue tissue_;
   StageBalance stages_;
   std::optional<StageTangents> tangents_;
-  /// A step that is to end where a contact closes or opens, and the length of the one before it.
-  struct Landing {
-    std::size_t contact;
-    double step_s;
-  };
-  std::optional<Landing> landing_;
-  double changed_at_s_ = -std::numeric_limits<double>::infinity();
-  std::size_t changes_together_ = 0;
+  ContactLanding landing_;
   TissueState state_;
   std::optional<double> response_;  ///< there, once known
   QuasiStaticEnergy energy_;
