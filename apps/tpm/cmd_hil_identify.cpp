@@ -3,6 +3,7 @@
 
 #include <ctime>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "answer.hpp"
@@ -107,11 +108,17 @@ int identify_hil(const IdentifyChoice& choice, const Session& session) {
         choice.duration);
   }
   const OutOfMemoryIsThrown while_the_device_is_open;
-  const IdentifyRun run = run_identification(device, hil, options);
-  if (run.outcome.cause == StopCause::signal && InterruptWatch::seen()) {
+  std::optional<IdentifyRun> measured;
+  try {
+    measured = run_identification(device, hil, options);
+  } catch (const Error&) {
+    if (!InterruptWatch::seen()) throw;
+  }
+  if (!measured || (measured->outcome.cause == StopCause::signal && InterruptWatch::seen())) {
     tell_user("tpm: interrupted; nothing was written\n");
     return InterruptWatch::exit_code();
   }
+  const IdentifyRun& run = *measured;
   const Json json = device_file_json(run, hardware ? date_now() : std::string());
   write_file(choice.output, to_text(json));
   if (session.json()) {

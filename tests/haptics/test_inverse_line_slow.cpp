@@ -25,7 +25,7 @@ bool is_of_a_stall(const std::string& end) {
 bool names_a_stall(const std::vector<std::string>& lines) {
   return std::any_of(lines.begin(), lines.end(), [](const std::string& line) {
     return line.find("stalled") != std::string::npos ||
-           line.find("ended early: ") != std::string::npos;
+           line.find("everything after ") != std::string::npos;
   });
 }
 

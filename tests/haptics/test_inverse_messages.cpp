@@ -2,6 +2,7 @@
 // refused.
 #include <catch2/catch.hpp>
 #include <string>
+#include <vector>
 
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/inverse/messages.hpp"
@@ -170,6 +171,215 @@ TEST_CASE("A message that is none is refused with the place in it") {
   CHECK(parse_inventory(R"({"session_id": 1})").devices.empty());
 }
 
+/// kInventory with one piece of text in place of another.
+std::string inventory_with(const std::string& before, const std::string& after) {
+  std::string text = kInventory;
+  text.replace(text.find(before), before.size(), after);
+  return text;
+}
+
+const InverseDeviceEntry& only(const InverseInventory& all) {
+  REQUIRE(all.devices.size() == 1);
+  return all.devices.front();
+}
+
+TEST_CASE("What an inventory leaves out, or says to be null, is as if it had no such setting") {
+  const auto settings = [](const std::string& config) {
+    return only(parse_inventory(
+                    R"({"inverse3": [{"device_id": "a", "config": {"handedness": "right")" +
+                    config + R"(}, "state": {"cursor_position": {"x": 0, "y": 0, "z": 0}}}]})"))
+        .settings;
+  };
+  const InverseSettings bare = settings("");
+  const std::vector<std::string> said = bare.lines();
+  CHECK_THAT(said.at(0), Contains("force gate not named"));
+  CHECK_THAT(said.at(1), Contains("damping not named"));
+  CHECK_THAT(said.at(2), Contains("preset '', basis XYZ"));
+  CHECK_THAT(said.at(4), Contains("gravity compensation not named; torque scaling not named"));
+  CHECK(bare.true_to_scale());
+  CHECK(bare.carried() == 0.0);
+  CHECK(settings(R"(, "preset": null, "mount": null, "filters": null, "torque_scaling": null)")
+            .lines() == said);
+  // One filter without the other, and damping by direction only.
+  const InverseSettings gate = settings(R"(, "filters": {"force_gate": {"gain": 0.25}})");
+  CHECK(gate.filters_named);
+  CHECK_FALSE(gate.damping_named);
+  CHECK(gate.force_gate_gain == 0.25);
+  const InverseSettings damping =
+      settings(R"(, "filters": {"damping": {"vector": {"x": 0, "y": 2, "z": 0}}})");
+  CHECK_FALSE(damping.filters_named);
+  CHECK(damping.damping_named);
+  CHECK(damping.damping == 0.0);
+  CHECK(damping.directional_damping.y() == 2.0);
+  // A mount of parts; gravity without a factor, or off with one.
+  const InverseSettings mount = settings(R"(, "mount": {"scale": {"x": 1, "y": 1, "z": 2}})");
+  CHECK(mount.mount_position_m.isZero());
+  CHECK_FALSE(mount.true_to_scale());
+  CHECK(settings(R"(, "gravity_compensation": {"enabled": true})").carried() == 0.0);
+  CHECK(
+      settings(R"(, "gravity_compensation": {"enabled": false, "scaling_factor": 1})").carried() ==
+      0.0);
+  CHECK_THAT(settings(R"(, "torque_scaling": {"enabled": false})").lines().back(),
+             Contains("torque scaling off"));
+}
+
+TEST_CASE("An inventory whose values are of another kind is refused with their place") {
+  const auto refusal = [](const std::string& before, const std::string& after) {
+    const std::string text = inventory_with(before, after);
+    return error_of([&] { (void)parse_inventory(text); });
+  };
+  const std::string config = "inventory/inverse3/0/config/";
+  CHECK_THAT(refusal(R"("049D")", R"("")"), Contains("inverse3/0/device_id: is empty"));
+  CHECK_THAT(refusal(R"("049D")", "\"" + std::string(65, 'x') + "\""), Contains("is too long"));
+  CHECK_THAT(refusal(R"("049D")", R"("a\u0007b")"), Contains("not printable"));
+  CHECK_THAT(refusal(R"("left")", "1"), Contains(config + "handedness: is no text"));
+  CHECK_THAT(refusal(R"("handedness": "left",)", ""), Contains("config: has no handedness"));
+  CHECK_THAT(refusal(R"({"permutation": "XYZ"})", "{}"), Contains("basis: has no permutation"));
+  CHECK_THAT(refusal(R"({"enabled": true, "scaling_factor": 0.8})", R"({"enabled": 1})"),
+             Contains("gravity_compensation/enabled: is neither true nor false"));
+  CHECK_THAT(refusal(R"({"gain": 0.3})", "0.3"), Contains("filters/force_gate: is no object"));
+  CHECK_THAT(refusal(R"({"gain": 0.3})", R"({"gain": true})"), Contains("gain: is no number"));
+  CHECK_THAT(refusal(R"({"w": 1, "x": 0, "y": 0, "z": 0})", R"({"w": 0, "x": 0, "y": 0, "z": 0})"),
+             Contains("mount/rotation: is no rotation"));
+  CHECK_THAT(refusal(R"({"w": 1, "x": 0, "y": 0, "z": 0})", R"({"w": 2, "x": 0, "y": 0, "z": 0})"),
+             Contains("is no rotation"));
+  CHECK_THAT(refusal(R"("x": 0.01)", R"("x": 1000001)"), Contains("cursor_position/x: is out of"));
+  CHECK_THAT(refusal("cursor_position", "position"), Contains("state: has no cursor_position"));
+  CHECK_THAT(refusal(R"("a": true)", R"("a": "down")"), Contains("neither true nor false"));
+  CHECK_THAT(refusal(R"({"w": 0.0, "x": 1.0,)", R"({"w": 0.0,)"), Contains("has no x"));
+  CHECK_THAT(error_of([] { (void)parse_inventory(std::string(kMostInventoryBytes + 1, ' ')); }),
+             Contains("too long"));
+  // The largest number that is one, and a rotation that is not quite of length 1.
+  CHECK(only(parse_inventory(inventory_with(R"("x": 0.01)", R"("x": -1000000)")))
+            .state.position_m.x() == -1e6);
+  const InverseInventory long_turn = parse_inventory(inventory_with(
+      R"({"w": 1, "x": 0, "y": 0, "z": 0})", R"({"w": 0, "x": 1.5, "y": 0, "z": 0})"));
+  CHECK(only(long_turn).settings.mount_rotation.x() == 1.0);
+}
+
+TEST_CASE("Sixteen devices are read and no more; an answer over HTTP has its data within") {
+  const auto of = [](int count) {
+    const std::string entry =
+        R"({"device_id":"a","config":{"handedness":"left"},"state":{"cursor_position":{"x":0,"y":0,"z":0}}})";
+    std::string all = entry;
+    for (int i = 1; i < count; ++i) all += "," + entry;
+    return parse_inventory(R"({"ok": true, "data": {"inverse3": [)" + all + "]}}").devices.size();
+  };
+  CHECK(of(16) == 16);
+  CHECK_THAT(error_of([&] { (void)of(17); }), Contains("no list of at most 16 devices"));
+}
+
+TEST_CASE("The first grip of a message counts, of any kind, with buttons by either name") {
+  const auto state = [](const std::string& grips) {
+    return parse_state(R"({"inverse3": [{"device_id": "other"}, {"device_id": "a", "state":
+                           {"cursor_position": {"x": 0, "y": 0, "z": 0},
+                            "transform": {"scale": {"x": 2, "y": 2, "z": 2}}}}])" +
+                           grips + "}",
+                       "a");
+  };
+  CHECK_FALSE(state("").has_grip);
+  CHECK(state("").workspace_scale.x() == 2.0);
+  CHECK_FALSE(state(R"(, "verse_grip": [])").has_grip);
+  CHECK_FALSE(state(R"(, "verse_grip": [{"device_id": "g"}])").has_grip);
+  const InverseState old = state(
+      R"(, "verse_grip": [{"state": {"buttons": {"button_0": false, "button_1": true, "button_2": null}}},
+                          {"state": {"buttons": {"button_0": true}}}],
+          "custom_verse_grip": [{"state": {"buttons": {"a": true}}}])");
+  CHECK(old.has_grip);
+  CHECK(old.buttons == 0b010U);
+  CHECK(old.grip.w() == 1.0);
+  const InverseState turned = state(
+      R"(, "custom_verse_grip": [{"state": {"orientation": {"w": 0, "x": 0, "y": 0, "z": -0.9}}}])");
+  CHECK(turned.grip.z() == -1.0);
+  CHECK(turned.buttons == 0);
+  CHECK_THAT(error_of([&] { (void)state(R"(, "verse_grip": 1)"); }), Contains("state/verse_grip"));
+  CHECK_THAT(error_of([] { (void)parse_state("{}", "a"); }), Contains("state: has no inverse3"));
+}
+
+TEST_CASE("A place is read in each form; what a client may not say is refused with its place") {
+  const auto said = [](const std::string& entry) {
+    return parse_command(R"({"inverse3": [{"device_id": "a", )" + entry + "}]}", "a");
+  };
+  const auto refusal = [&](const std::string& entry) {
+    return error_of([&] { (void)said(entry); });
+  };
+  for (const char* form : {"position", "vector", "values"}) {
+    const InverseCommand command = said(std::string(R"("commands": {"set_cursor_position": {")") +
+                                        form + R"(": {"x": 0, "y": 0, "z": 0.2}}})");
+    REQUIRE(command.position_m);
+    CHECK(command.position_m->z() == 0.2);
+    CHECK_FALSE(command.force_N);
+  }
+  CHECK_THAT(refusal(R"("commands": {"set_cursor_position": {}})"),
+             Contains("commands/set_cursor_position: has no values"));
+  CHECK_THAT(refusal(R"("commands": {"set_cursor_force": {}})"),
+             Contains("commands/set_cursor_force: has no values"));
+  CHECK_THAT(refusal(R"("commands": {"set_cursor_force": {"vector": [1, 0, 0]}})"),
+             Contains("set_cursor_force/vector: is no object"));
+  CHECK_THAT(refusal(R"("configure": {"force_gate": {}})"),
+             Contains("configure/force_gate: has no gain"));
+  CHECK_THAT(refusal(R"("configure": {"preset": {"preset": 1}})"), Contains("preset: is no text"));
+  // Null and unknown are nothing.
+  CHECK_FALSE(said(R"("commands": {"set_cursor_force": null, "set_joint_torques": {}})").force_N);
+  CHECK_FALSE(said(R"("configure": {"damping": {"vector": {}}})").damping);
+  const InverseCommand set =
+      said(R"("configure": {"damping": {"scalar": 0.5}, "force_gate": {"gain": 0.1}})");
+  CHECK(set.damping == 0.5);
+  CHECK(set.force_gate_gain == 0.1);
+  CHECK(set.preset.empty());
+  CHECK_FALSE(set.of_another_device);
+  // Some of a message may be for another device.
+  const InverseCommand both = parse_command(
+      R"({"inverse3": [{"device_id": "b", "commands": {"set_cursor_force": 7}}, {"device_id": "a"}]})",
+      "a");
+  CHECK(both.of_another_device);
+  CHECK_FALSE(both.force_N);
+  // A program registers with a name.
+  const auto session = [](const std::string& text) {
+    return parse_command(R"({"session": )" + text + "}", "a").profile;
+  };
+  CHECK(session("{}").empty());
+  CHECK(session(R"({"configure": {}})").empty());
+  CHECK(session(R"({"configure": {"profile": {"name": "a"}}})") == "a");
+  CHECK_THAT(error_of([&] { (void)session(R"({"configure": {"profile": {}}})"); }),
+             Contains("session/configure/profile: has no name"));
+}
+
+TEST_CASE("Versions and events are read with what they leave out") {
+  const auto no_version = [](const std::string& text) {
+    return error_of([&] { (void)parse_version(text); });
+  };
+  CHECK_THAT(no_version("{}"), Contains("version: has no project_version"));
+  CHECK_THAT(no_version(R"({"project_version": 3.5})"), Contains("project_version: is no text"));
+  CHECK_THAT(no_version(R"({"data": "3.5"})"), Contains("version/data: is no object"));
+  for (const char* other : {"3.", "3.x", "3:5", " 3.5", "-3.5", "3.-5", "3.99999999999"}) {
+    CHECK_THROWS_AS(format_of_version(other), Error);
+  }
+  CHECK(word_of(format_of_version("3.4.9")) == "values");
+  CHECK(word_of(format_of_version("3.5")) == "vector");
+  for (const bool simulated : {false, true}) {
+    const std::string text = version_message("3.5.0.0", simulated);
+    CHECK(parse_version(text) == "3.5.0.0");
+    CHECK((text.find("SIMULATED DEVICE") != std::string::npos) == simulated);
+    const Json state = Json::parse(state_message(1, "a", {}, simulated));
+    CHECK(state.at("inverse3").at(0).at("status").empty() != simulated);
+  }
+  const InverseEvent bare = parse_event(R"({"name": "device-disconnected"})");
+  CHECK(bare.level.empty());
+  CHECK(bare.device_id.empty());
+  CHECK(parse_event(R"({"name": "n", "data": {}})").safety_type.empty());
+  const auto with_words = [](std::size_t count) {
+    return parse_event(R"({"name": "n", "message": ")" + std::string(count, 'w') + "\"}").message;
+  };
+  CHECK(with_words(1000).size() == 1000);
+  CHECK_THAT(error_of([&] { (void)with_words(1001); }), Contains("event/message: is too long"));
+  CHECK_THAT(error_of([] { (void)parse_event(R"({"level": "error"})"); }),
+             Contains("event: has no name"));
+  // Quotes do not end a text.
+  CHECK(parse_event(event_message({"n", "l", R"(a"b\c)", "s", "m"})).device_id == R"(a"b\c)");
+  CHECK(parse_command(force_message(InverseFormat::vector, R"(a"b)", {1, 0, 0}), R"(a"b)").force_N);
+}
+
 TEST_CASE("What is not neutral is asked for over HTTP, each setting once and nothing else") {
   const auto asked = [](const InverseSettings& settings,
                         InverseFormat format = InverseFormat::vector) {
@@ -216,6 +426,32 @@ TEST_CASE("What is not neutral is asked for over HTTP, each setting once and not
   s.basis = "XZY";
   CHECK(asked(s).size() == 4);
   CHECK(asked(s, InverseFormat::values).empty());
+
+  // Another preset is replaced. The weight that is carried is a setting of the device, in each
+  // version.
+  s = neutral;
+  s.preset = "defaults";
+  REQUIRE(asked(s).size() == 1);
+  CHECK(asked(s)[0].target == "/inverse3/049D/config/preset?session=%237");
+  CHECK(Json::parse(asked(s)[0].body) == Json::parse(R"({"preset": "arm_front_centered"})"));
+  s = neutral;
+  s.gravity_scaling = 0.8;
+  REQUIRE(asked(s).size() == 1);
+  CHECK(asked(s)[0].target == "/inverse3/049D/config/gravity_compensation");
+  CHECK(Json::parse(asked(s)[0].body) == Json::parse(R"({"enabled": true, "scaling_factor": 1})"));
+  REQUIRE(asked(s, InverseFormat::values).size() == 1);
+  CHECK(asked(s, InverseFormat::values)[0].target == "/gravity_compensation");
+  CHECK(Json::parse(asked(s, InverseFormat::values)[0].body) ==
+        Json::parse(R"({"device_id": "049D", "enable": true, "gravity_scaling_factor": 1})"));
+  const std::vector<InverseRequest> off =
+      neutral_requests(InverseFormat::values, "049D", 7, s, 0.0);
+  REQUIRE(off.size() == 1);
+  CHECK(Json::parse(off[0].body).at("enable") == false);
+  s.gravity_named = false;  // nothing to set
+  CHECK(asked(s).empty());
+  const Json probe = Json::parse(probe_message("049D")).at("inverse3").at(0);
+  CHECK(probe.at("device_id") == "049D");
+  CHECK(probe.at("commands") == Json::parse(R"({"probe_position": {}})"));
 }
 
 }  // namespace

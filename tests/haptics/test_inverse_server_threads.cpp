@@ -184,6 +184,48 @@ TEST_CASE("One client drives, a second reads only until the first has left") {
   CHECK(newtons == 3.0);
 }
 
+TEST_CASE("What a client does wrong makes one line in the log, and moves nothing") {
+  Served served;
+  const auto client = served.client();
+  const auto lines_after = [&](const std::string& message) {
+    const std::size_t before = served.lines().size();
+    for (int i = 0; i < 3; ++i) (void)state_after(*client, message);
+    const std::vector<std::string> now = served.lines();
+    return std::vector<std::string>(now.begin() + static_cast<std::ptrdiff_t>(before), now.end());
+  };
+  const auto said = [](const char* id, const char* what) {
+    return fmt::format(R"({{"inverse3":[{{"device_id":"{}","commands":{}}}]}})", id, what);
+  };
+  const auto moved = [&](const char* id, double metres) {
+    return said(
+        id, fmt::format(R"({{"set_cursor_position":{{"vector":{{"x":0,"y":0,"z":{}}}}}}})", metres)
+                .c_str());
+  };
+  std::vector<std::string> lines = lines_after(said("ABCD", "{}"));
+  REQUIRE(lines.size() == 1);
+  CHECK_THAT(lines.front(), Contains("a device that is not here"));
+  lines = lines_after(moved("049D", 2.0));
+  REQUIRE(lines.size() == 1);
+  CHECK_THAT(lines.front(), Contains("asks for a place 2 m away"));
+  CHECK_FALSE(served.hand.goal_m);
+  // The second one does not move what the first one moves.
+  const auto first = served.client();
+  (void)state_after(*first, moved("049D", 0.1));
+  lines = lines_after(moved("049D", 0.2));
+  REQUIRE(lines.size() == 1);
+  CHECK_THAT(lines.front(), Contains("does not move the hand"));
+  // Commands are applied once and forgotten: a message without a force has none.
+  CHECK(state_after(*client, push_of(2.0)).force_N.z() == 2.0);
+  CHECK(state_after(*client, said("049D", R"({"probe_position":{}})")).force_N.z() == 0.0);
+  // Two entries of one device are two sources, which add up; those of another device are nothing.
+  const std::string one = R"({"device_id":"049D","commands":{"set_cursor_force":{"vector":)"
+                          R"({"x":0,"y":0,"z":1}}}})";
+  const std::string other = R"({"device_id":"ABCD","commands":{"set_cursor_force":{"vector":)"
+                            R"({"x":0,"y":0,"z":9}}}})";
+  const std::string both = fmt::format(R"({{"inverse3":[{},{},{}]}})", one, other, one);
+  CHECK(state_after(*client, both).force_N.z() == 2.0);
+}
+
 TEST_CASE("A message of 3 MB is closed with 1009, and all others go on") {
   Served served;
   const auto other = served.client();
@@ -223,6 +265,10 @@ TEST_CASE("A client that does not read is closed, and connections are counted") 
   all.push_back(served.client());
   CHECK_THROWS_AS(served.client(), Error);  // the ninth
   CHECK(served.server->counts().refused == 1);
+  CHECK_THROWS_AS(served.client(), Error);
+  CHECK(std::ranges::count_if(served.lines(), [](const std::string& line) {
+          return line.starts_with("8 connections are open");
+        }) == 1);
   (void)state_after(*all.front(), "{}");
 }
 
@@ -251,6 +297,11 @@ TEST_CASE("The server answers programs and its own page on this machine, and nob
   CHECK(parse_inventory(http_exchange(port, "/devices", "", kSoon_s)).devices.at(0).simulated);
   const test::RawClient dumb(port);  // asks for nothing
   CHECK(dumb.answer(5.0).empty());
+  // Each that was refused stands in the log once.
+  const std::vector<std::string> lines = served.lines();
+  CHECK(std::ranges::count_if(lines, [](const std::string& line) {
+          return line.find("refused: ") != std::string::npos;
+        }) == 4);
 }
 
 TEST_CASE("Sockets listen on this machine only, and send small pieces without waiting") {

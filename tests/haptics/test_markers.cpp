@@ -11,6 +11,7 @@
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"
+#include "tpm/haptics/loop/servo_step.hpp"
 #include "tpm/haptics/session/enter_key.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/session_run.hpp"
@@ -89,6 +90,29 @@ TEST_CASE("A button that goes down and a key set a marker, in the row and in the
                          {{"cycle", 1100}, {"by", "button"}},
                          {{"cycle", 1500}, {"by", "key"}}};
   CHECK(recording.closing.at("markers") == expected);
+}
+
+TEST_CASE("A simulated hand waits for its session also if its device is prepared after the loop") {
+  HilSession session = test::parsed(test::short_session());
+  session.servo.gate->rest_time_s = 3.0;  // by then its script would have pressed
+  const LoopModel loop = make_loop_model(session);
+  VirtualOmega7 device(session.plant, session.operator_script());
+  ServoStep step(
+      device, *loop.model,
+      loop_settings(session, loop, check_rendering(session, *loop.model, loop, "virtual"), true));
+  device.prepare(session.preparation);  // as run_in_real_time() does
+  device.enable_forces();
+  ServoRecord row;
+  double first_m = 0.0;
+  int waited = 0;
+  for (; waited < 5000; ++waited) {
+    REQUIRE(step.cycle(0, row) == StopCause::none);
+    if (row.phase >= 0) break;
+    if (waited == 0) first_m = row.tool_depth_m;
+    device.advance(session.servo.period_s);
+  }
+  CHECK(waited < 4000);
+  CHECK(row.tool_depth_m == Approx(first_m).margin(1e-4));
 }
 
 TEST_CASE("Enter in a terminal begins a session that waits for it, and then sets markers") {

@@ -341,7 +341,10 @@ InverseCommand parse_command(std::string_view text, std::string_view device_id) 
   }
   if (!message.has(key::device)) return command;
   message.at(key::device).each([&](const Part& part) {
-    if (part.at(key::id).text() != device_id) return;
+    if (part.at(key::id).text() != device_id) {
+      command.of_another_device = true;
+      return;
+    }
     if (part.has(key::commands)) {
       const Part said = part.at(key::commands);
       if (said.has(key::force)) {

@@ -89,6 +89,7 @@ struct InverseCommand {
   std::string profile;  ///< of a program that registers itself; else empty
   std::string preset;   ///< of the coordinates; empty: not asked for
   std::optional<double> force_gate_gain, damping;
+  bool of_another_device = false;  ///< some of the message
 };
 /// A message of a client. Other devices and unknown keys are skipped. Throws Error(bad_input) with
 /// the key: no object, a force that is no number.

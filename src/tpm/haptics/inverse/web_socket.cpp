@@ -197,8 +197,11 @@ std::optional<WebSocketReader::Header> WebSocketReader::header() {
     size = 0;
     for (; place < 2 + length_bytes; ++place)
       size = (size << 8U) | byte_at(buffer_, begin_ + place);
-    if (size < (length_bytes == 2 ? std::uint64_t{kLength16} : std::uint64_t{0x10000}) ||
-        (size >> 63U) != 0) {
+    if ((size >> 63U) != 0) {
+      fail(kCloseProtocolError, "the highest bit of a length is set");
+      return std::nullopt;
+    }
+    if (size < (length_bytes == 2 ? std::uint64_t{kLength16} : std::uint64_t{0x10000})) {
       fail(kCloseProtocolError, "a length is not written as short as it can be");
       return std::nullopt;
     }

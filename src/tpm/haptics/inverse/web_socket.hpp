@@ -62,6 +62,8 @@ class WebSocketReader {
   /// Code that the connection is to be closed with; 0: no fault.
   [[nodiscard]] std::uint16_t fault() const noexcept { return fault_; }
   [[nodiscard]] const char* fault_words() const noexcept { return words_; }
+  /// Whether a message has begun and is not complete.
+  [[nodiscard]] bool amid() const noexcept { return !buffer_.empty() || open_.has_value(); }
 
  private:
   struct Header {

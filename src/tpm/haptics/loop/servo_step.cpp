@@ -110,7 +110,6 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
   contact_.reset();
   if (!settings_.gate) return;
   gate_.emplace(*settings_.gate, settings_.period_s);
-  device_.await();
 }
 
 StopCause ServoStep::read(int missed, ServoRecord& row) noexcept {
@@ -424,6 +423,9 @@ bool ServoStep::free_in_space() noexcept {
 StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
   row.phase = -1;
   row.flags |= kWaiting;
+  // Not before: in real time a device is prepared after its loop has been made.
+  if (!awaited_) device_.await();
+  awaited_ = true;
   gate_->count(static_cast<std::uint64_t>(missed) + 1);
   StopCause cause = read(missed, row);
   if (cause != StopCause::none) return cause;

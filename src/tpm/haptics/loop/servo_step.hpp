@@ -137,7 +137,7 @@ class ServoStep {
   std::vector<char> late_cycles_;  ///< of the last cycles served, a ring
   std::size_t served_ = 0;
   int late_now_ = 0;
-  bool begun_ = false;
+  bool begun_ = false, awaited_ = false;
   StopCause cause_ = StopCause::none;
 };
 

@@ -35,12 +35,20 @@ struct InverseServer::Connection {
   Stage stage = Stage::asking;
   std::int64_t since_ns;  ///< of the stage
   std::int64_t session = 0;
-  bool events = false, centred = false, told_reader = false, shut = false;
+  bool events = false, centred = false, shut = false;
+  unsigned told = 0;  ///< bits of Once
   std::string head, out;
   WebSocketReader reader{WebSocketSide::server, kMostMessageBytes};
   std::size_t discarded = 0;
   int lines = 0;
 
+  /// What is said to the log once of a client, however often it does it.
+  enum class Once : unsigned { reads = 1, moves_not = 2, far = 4, another_device = 8 };
+  [[nodiscard]] bool first(Once what) {
+    const bool is_first = (told & static_cast<unsigned>(what)) == 0;
+    told |= static_cast<unsigned>(what);
+    return is_first;
+  }
   void enter(Stage next) {
     stage = next;
     since_ns = now_ns();
@@ -67,8 +75,9 @@ InverseServer::Counts InverseServer::counts() const noexcept {
 
 void InverseServer::say(Connection& c, const std::string& line) {
   if (!settings_.log || ++c.lines > kMostLines) return;
-  settings_.log(fmt::format("client {}: {}{}", c.session, line,
-                            c.lines == kMostLines ? " (its last line here)" : ""));
+  const std::string who = c.session == 0 ? "a connection" : fmt::format("client {}", c.session);
+  settings_.log(
+      fmt::format("{}: {}{}", who, line, c.lines == kMostLines ? " (its last line here)" : ""));
 }
 
 void InverseServer::serve() {
@@ -129,8 +138,13 @@ void InverseServer::accept_new(const Socket& listening, bool events) {
   if (!socket.open()) return;
   if (connections_.size() >= kMostConnections) {
     ++refused_;
+    if (settings_.log && !full_ && ++times_full_ <= kMostLines) {
+      settings_.log(fmt::format("{} connections are open: others are closed", kMostConnections));
+    }
+    full_ = true;
     return;  // closed
   }
+  full_ = false;
   ++connected_;
   connections_.push_back(std::make_unique<Connection>(std::move(socket)));
   connections_.back()->events = events;
@@ -141,7 +155,10 @@ void InverseServer::look_at(Connection& c) {
   using Stage = Connection::Stage;
   flush(c);
   const std::int64_t age_ns = now_ns() - c.since_ns;
-  if (c.stage == Stage::asking && age_ns > kTimeToAsk_ns) end_of(c);
+  if (c.stage == Stage::asking && age_ns > kTimeToAsk_ns) {
+    say(c, "asks for nothing");
+    end_of(c);
+  }
   if (c.stage != Stage::leaving) return;
   if (c.out.empty() && !c.shut) {
     // What is still under way is taken, so that the system does not withdraw the last words.
@@ -175,6 +192,7 @@ void InverseServer::take_head(Connection& c) {
   const std::optional<HttpHead> head = parse_http_head(c.head);
   if (!head) {
     ++refused_;
+    say(c, "refused: no request");
     send(c, http_answer("400 Bad Request", "text/plain", "no request\n"));
     return c.enter(Connection::Stage::leaving);
   }
@@ -222,6 +240,7 @@ void InverseServer::answer_http(Connection& c, const HttpHead& head) {
   const bool simulated = settings_.device.simulated;
   if (!names_this_host(head, port_)) {
     ++refused_;
+    say(c, "refused: Host is not this machine");
     return send(c, http_answer("403 Forbidden", "text/plain", "Host is not this machine\n"));
   }
   if (head.start[0] != "GET") {
@@ -302,25 +321,47 @@ void InverseServer::take_text(Connection& c, const std::string& text) {
 }
 
 void InverseServer::obey(Connection& c, const InverseCommand& command) {
+  using Once = Connection::Once;
   if (!command.profile.empty()) say(c, "registers as " + command.profile);
   if (command.force_gate_gain && *command.force_gate_gain == 0.0) {
     settings_.device.settings.force_gate_gain = 0.0;  // there is no gate to switch on
   }
   if (!command.preset.empty()) c.centred = command.preset == kCentredPreset;
-  if (command.position_m && command.position_m->norm() <= kFarthest_m &&
-      (mover_ == 0 || mover_ == c.session)) {
-    mover_ = c.session;
-    const Eigen::Vector3d middle_m = c.centred ? Eigen::Vector3d::Zero() : settings_.centre_m;
-    hand_.move_to(*command.position_m - middle_m);
+  if (command.of_another_device && c.first(Once::another_device)) {
+    say(c, "speaks to a device that is not here");
   }
-  if (!command.force_N) return;
+  if (command.position_m) move(c, *command.position_m);
+  if (!command.force_N) {
+    // Commands are applied once and forgotten.
+    if (driver_ == c.session) hand_.push(Eigen::Vector3d::Zero());
+    return;
+  }
   if (driver_ == 0) {
     driver_ = c.session;
     say(c, "drives");
   }
   if (driver_ == c.session) return hand_.push(*command.force_N);
-  if (!c.told_reader) say(c, fmt::format("reads only, client {} drives", driver_));
-  c.told_reader = true;
+  if (c.first(Once::reads)) say(c, fmt::format("reads only, client {} drives", driver_));
+}
+
+void InverseServer::move(Connection& c, const Eigen::Vector3d& position_m) {
+  using Once = Connection::Once;
+  if (position_m.norm() > kFarthest_m) {
+    if (c.first(Once::far)) {
+      say(c, fmt::format("asks for a place {:.3g} m away; expected at most {} m", position_m.norm(),
+                         kFarthest_m));
+    }
+    return;
+  }
+  if (mover_ == 0) mover_ = c.session;
+  if (mover_ != c.session) {
+    if (c.first(Once::moves_not)) {
+      say(c, fmt::format("does not move the hand, client {} does", mover_));
+    }
+    return;
+  }
+  hand_.move_to(position_m -
+                (c.centred ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : settings_.centre_m));
 }
 
 void InverseServer::fault(Connection& c, std::uint16_t code, const std::string& why) {
@@ -346,6 +387,9 @@ void InverseServer::release(Connection& c) {
 }
 
 void InverseServer::end_of(Connection& c) {
+  if (c.stage == Connection::Stage::open && c.reader.amid()) {
+    say(c, "gone in the middle of a message");
+  }
   c.socket.close();
   c.enter(Connection::Stage::gone);
   release(c);

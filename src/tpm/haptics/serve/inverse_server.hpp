@@ -78,6 +78,7 @@ class InverseServer {
   void take_messages(Connection& c);
   void take_text(Connection& c, const std::string& text);
   void obey(Connection& c, const InverseCommand& command);
+  void move(Connection& c, const Eigen::Vector3d& position_m);
   void fault(Connection& c, std::uint16_t code, const std::string& why);
   void release(Connection& c);
   void end_of(Connection& c);
@@ -93,6 +94,8 @@ class InverseServer {
   Socket listening_, events_;
   int port_ = 0, events_port_ = -1;
   std::vector<std::unique_ptr<Connection>> connections_;
+  bool full_ = false;  ///< a connection was refused since there was room
+  int times_full_ = 0;
   std::int64_t next_session_ = 1, driver_ = 0, mover_ = 0;  ///< sessions; 0: none
   std::atomic<std::uint64_t> connected_{0}, refused_{0}, messages_{0}, states_{0}, unreadable_{0},
       closed_for_fault_{0};

@@ -1,5 +1,7 @@
 #include "tpm/haptics/session/identify_run.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,6 +21,7 @@ constexpr double kLongestStroke_m = 0.020;  ///< from the start, beyond which no
 constexpr double kLeastPart_s = 1.0;
 /// Between two parts of a measurement, of which nothing is known.
 constexpr double kBetweenParts_s = 0.5;
+constexpr std::size_t kPause = 2;  ///< samples that stand for it
 /// A cycle may take so long: with these forces the watchdog of the device is enough.
 constexpr double kCycleTimeout_s = 0.5;
 
@@ -129,30 +132,16 @@ std::string end_of(const ServoOutcome& outcome) {
   return std::string(word_of(outcome.cause)) + (words.empty() ? "" : " (" + words + ")");
 }
 
+/// From what was measured, however it ended.
 void identify(IdentifyRun& run, const std::vector<IdentificationSample>& samples) {
-  const StopCause cause = run.outcome.cause;
-  if (cause == StopCause::finished || is_stall(cause)) {
-    run.found = identify_device(samples, run.period_s);
-    if (cause == StopCause::finished || run.found.delay_mean_s) return;
-  }
-  run.found.not_identified.push_back("everything: the measurement ended early: " +
-                                     end_of(run.outcome));
+  run.found = identify_device(samples, run.period_s);
+  if (run.ended_by.empty()) return;
+  run.found.not_identified.push_back(fmt::format("everything after {} s of {} s: {}",
+                                                 significant(run.measured_s, 3),
+                                                 significant(run.duration_s, 3), run.ended_by));
 }
 
 }  // namespace
-
-IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
-                                  const DeviceChoice& choice, const HilSession& like,
-                                  const DeviceIdentifyOptions& options) {
-  IdentifyRun run;
-  run.period_s = like.servo.period_s;
-  run.duration_s = options.duration_s;
-  run.real_time = options.real_time;
-  std::vector<IdentificationSample> samples;
-  move_handle(run, samples, device, choice, like, options);
-  identify(run, samples);
-  return run;
-}
 
 DelayCheck check_delay(const std::shared_ptr<HapticDevice>& device, const DeviceChoice& choice,
                        const HilSession& like, const DeviceIdentifyOptions& options) {
@@ -180,6 +169,12 @@ IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& lik
   session.plant.push = like.servo.push;
   session.phases = {
       {SessionPhaseKind::rest, "identification", options.duration_s, 0.0, 0.0, 0.0, 0.0}};
+  return run_identification_on([&] { return make_device(choice, session); }, choice, session,
+                               options);
+}
+
+IdentifyRun run_identification_on(const MakesDevice& make, const DeviceChoice& choice,
+                                  const HilSession& like, const DeviceIdentifyOptions& options) {
   IdentifyRun run;
   run.period_s = like.servo.period_s;
   run.duration_s = options.duration_s;
@@ -189,12 +184,22 @@ IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& lik
   for (;;) {
     const ServoCounts before = run.outcome.counts;
     const std::uint64_t cycles_before = run.outcome.cycles;
-    move_handle(run, samples, make_device(choice, session), choice, session, part);
+    try {
+      move_handle(run, samples, make(), choice, like, part);
+    } catch (const Error& error) {
+      const bool interrupted = options.interrupted && options.interrupted();
+      if (run.measured_s == 0.0 || interrupted || error.code() != ExitCode::environment) throw;
+      samples.resize(samples.size() - kPause);
+      run.ended_by += fmt::format(", and the device does not open again: {}", error.what());
+      break;
+    }
     const ServoOutcome& ended = run.outcome;
     part.duration_s -= static_cast<double>(ended.cycles) * run.period_s;
     run.outcome.counts.missed += before.missed;
     run.outcome.counts.late += before.late;
     run.outcome.cycles += cycles_before;
+    run.measured_s = static_cast<double>(run.outcome.cycles) * run.period_s;
+    run.ended_by = ended.cause == StopCause::finished ? std::string() : end_of(ended);
     if (!is_stall(ended.cause) || part.duration_s < kLeastPart_s ||
         run.begun_again == kMostBegunAgain) {
       break;
@@ -203,8 +208,7 @@ IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& lik
     // Nobody knows when the force of before ended; it is zero when the next part begins.
     const int between = static_cast<int>(kBetweenParts_s / run.period_s);
     const double last_m = samples.empty() ? 0.0 : samples.back().at_m;
-    samples.push_back({last_m, 0.0, between / 2, 0.0, true});
-    samples.push_back({last_m, 0.0, between / 2, 0.0, true});
+    samples.insert(samples.end(), kPause, {last_m, 0.0, between / 2, 0.0, true});
   }
   identify(run, samples);
   return run;
@@ -251,12 +255,14 @@ Json device_file_json(const IdentifyRun& run, const std::string& date) {
                    {"time", run.real_time ? "real" : "virtual"},
                    {"rate_Hz", rounded(1.0 / run.period_s, kDigits)},
                    {"duration_s", rounded(run.duration_s, kDigits)},
+                   {"measured_s", rounded(run.measured_s, kDigits)},
                    {"missed_periods", run.outcome.counts.missed},
                    {"stalls", f.stalls},
                    {"stalled_s", rounded(f.stalled_s, kDigits)},
                    {"begun_again", run.begun_again},
                    {"ended", word_of(run.outcome.cause)},
                    {"stroke_m", rounded(f.stroke_m, kDigits)}};
+  if (!run.ended_by.empty()) measurement["ended_by"] = run.ended_by;
   if (!date.empty()) measurement["date"] = date;
   if (run.real_time) {
     measurement["host"] = host_line();

@@ -16,8 +16,10 @@ struct DeviceIdentifyOptions {
 struct IdentifyRun {
   DeviceIdentity device;
   DeviceIdentification found;
-  ServoOutcome outcome;  ///< of the last part; missed periods and cycles of all
-  double period_s = 0.0, duration_s = 0.0;
+  ServoOutcome outcome;                     ///< of the last part; missed periods and cycles of all
+  double period_s = 0.0, duration_s = 0.0;  ///< asked for
+  double measured_s = 0.0;                  ///< of it
+  std::string ended_by;                     ///< why less was measured; empty: nothing is missing
   /// Ends by a stall, after each of which the measurement went on with a new connection.
   int begun_again = 0;
   bool real_time = false;
@@ -28,15 +30,18 @@ struct IdentifyRun {
 /// itself. The handle has to be free, or at most lightly held; forces begin when it is at rest.
 /// Stretches in which loop or device stalled are left out. A stall that ends the loop, as a
 /// watchdog or a lost connection does, is one too: the device is opened again, up to
-/// kMostBegunAgain times.
+/// kMostBegunAgain times. What was measured until an end, and before a device that does not open
+/// again, is used.
 /// @param like rate, push and watchdog; of the simulated device also its numbers
-/// Throws Error(environment) as a session does; an early end is in the outcome.
+/// Throws Error(environment) as a session does if the device does not open or is interrupted; an
+/// early end is in the outcome and in `ended_by`.
 [[nodiscard]] IdentifyRun run_identification(const DeviceChoice& choice, const HilSession& like,
                                              const DeviceIdentifyOptions& options);
 inline constexpr int kMostBegunAgain = 9;
-/// The same on a device that the caller has made, which is opened once.
-[[nodiscard]] IdentifyRun run_identification_on(const std::shared_ptr<HapticDevice>& device,
-                                                const DeviceChoice& choice, const HilSession& like,
+/// The same on devices of the caller's. @param make called before each beginning
+using MakesDevice = std::function<std::shared_ptr<HapticDevice>()>;
+[[nodiscard]] IdentifyRun run_identification_on(const MakesDevice& make, const DeviceChoice& choice,
+                                                const HilSession& like,
                                                 const DeviceIdentifyOptions& options);
 
 /// Outcome of the check of one second at the start of a session.
