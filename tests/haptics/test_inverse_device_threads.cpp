@@ -299,8 +299,8 @@ TEST_CASE("A measurement goes on after a lost connection, and says so") {
   faults.how = How::silence;
   StandInInverse silent(free, {}, false, faults);
   const IdentifyRun part = run_identification(choice_of(silent), session, options);
-  CHECK(part.measured_s > 1.0);
-  CHECK(part.measured_s < 3.0);
+  CHECK(part.measured_s > 0.0);
+  CHECK(part.measured_s < options.duration_s);
   REQUIRE(part.found.delay_mean_s);
   CHECK_THAT(*part.found.delay_mean_s, WithinAbs(1e-3 * kLate_ms, 0.5e-3 + 1e-9));
   REQUIRE_FALSE(part.found.not_identified.empty());

@@ -249,6 +249,9 @@ TEST_CASE("An inventory whose values are of another kind is refused with their p
   CHECK_THAT(refusal(R"({"w": 0.0, "x": 1.0,)", R"({"w": 0.0,)"), Contains("has no x"));
   CHECK_THAT(error_of([] { (void)parse_inventory(std::string(kMostInventoryBytes + 1, ' ')); }),
              Contains("too long"));
+  CHECK_THAT(error_of([] { (void)parse_inventory("7"); }), Contains("inventory: is no object"));
+  CHECK_THAT(error_of([] { (void)parse_inventory(R"({"data": []})"); }),
+             Contains("inventory/data: is no object"));
   // The largest number that is one, and a rotation that is not quite of length 1.
   CHECK(only(parse_inventory(inventory_with(R"("x": 0.01)", R"("x": -1000000)")))
             .state.position_m.x() == -1e6);

@@ -45,7 +45,7 @@ class Part {
     return json_->is_object() && json_->contains(name) && !json_->at(name).is_null();
   }
   [[nodiscard]] Part at(const char* name) const {
-    require(json_->is_object(), "is no object");
+    require_object();
     if (!has(name)) throw bad_input(where_, fmt::format("has no {}", name), "the Inverse protocol");
     return {json_->at(name), fmt::format("{}/{}", where_, name)};
   }
@@ -81,6 +81,7 @@ class Part {
       see({json_->at(i), fmt::format("{}/{}", where_, i)});
     }
   }
+  void require_object() const { require(json_->is_object(), "is no object"); }
   void require(bool right, std::string_view what) const {
     if (!right) throw bad_input(where_, what, "the Inverse protocol");
   }
@@ -301,6 +302,7 @@ InverseInventory parse_inventory(std::string_view text) {
   const Json json = message_json(text, kMostInventoryBytes);
   const Part whole(json, "inventory");
   const Part message = whole.has("data") ? whole.at("data") : whole;
+  message.require_object();
   InverseInventory inventory;
   if (message.has(key::session_id)) {
     inventory.session = static_cast<std::int64_t>(message.at(key::session_id).number());
@@ -331,7 +333,7 @@ InverseState parse_state(std::string_view text, std::string_view device_id) {
 InverseCommand parse_command(std::string_view text, std::string_view device_id) {
   const Json json = message_json(text, kMostMessageBytes);
   const Part message(json, "command");
-  message.require(json.is_object(), "is no object");
+  message.require_object();
   InverseCommand command;
   if (message.has(key::session)) {
     const Part session = message.at(key::session);
