@@ -20,6 +20,7 @@
 #include "option_kinds.hpp"
 #include "out_of_memory.hpp"
 #include "tpm/base/nearest_word.hpp"
+#include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/device/plugin_device.hpp"
 #include "tpm/haptics/session/enter_key.hpp"
@@ -324,6 +325,14 @@ void add_inverse_port(CLI::App& command, DeviceOptions& options, const char* of 
       ->capture_default_str();
 }
 
+/// Throws Error(usage) for a file that only another kind of device would read.
+void require_kind(const DeviceChoice& choice, const std::filesystem::path& file, const char* option,
+                  const char* kind) {
+  if (file.empty() || choice.kind == kind) return;
+  throw Error(ExitCode::usage, option, fmt::format("with --device {}", choice.kind),
+              fmt::format("--device {}", kind));
+}
+
 }  // namespace
 
 void add_device_options(CLI::App& command, DeviceOptions& options) {
@@ -392,6 +401,9 @@ DeviceChoice chosen_device(const DeviceOptions& options) {
   choice.replay = options.replay;
   choice.plugin = options.plugin;
   choice.file = options.file;
+  require_kind(choice, choice.replay, "--device-recording", "replay");
+  require_kind(choice, choice.plugin, "--plugin", "plugin");
+  if (!choice.file.empty()) (void)read_device_file(choice.file);  // also where nothing asks for it
   return choice;
 }
 

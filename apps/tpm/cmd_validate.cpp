@@ -257,12 +257,18 @@ ValidateOptions options_of(const Json& record, const std::string& page) {
   }
 }
 
-Json record_of(const ValidateOptions& options, const ValidationRequest& request,
-               const Validation& validation) {
+/// Each file can be read: known before a validation is computed.
+std::vector<CredibilityEvidence> evidence_of(const ValidateOptions& options) {
   std::vector<CredibilityEvidence> evidence;
   for (const std::string& text : options.evidence) {
     evidence.push_back(of_option([&] { return parse_evidence(text, "--evidence"); }));
+    (void)read_file(evidence.back().file);
   }
+  return evidence;
+}
+
+Json record_of(const ValidateOptions& options, const ValidationRequest& request,
+               const Validation& validation) {
   std::vector<std::string> others;
   for (const std::string& file :
        {options.session, options.instrument, options.calibration_instrument}) {
@@ -278,8 +284,8 @@ Json record_of(const ValidateOptions& options, const ValidationRequest& request,
   if (request.organ && material != options.law && std::filesystem::exists(material)) {
     others.push_back(material.string());
   }
-  return credibility_record(request, validation, options.words, invocation_of(options), evidence,
-                            others);
+  return credibility_record(request, validation, options.words, invocation_of(options),
+                            evidence_of(options), others);
 }
 
 /// The page itself stays: no command writes over what it reads.
@@ -332,6 +338,7 @@ int run_validate(const ValidateOptions& options, const Session& session) {
   if (!options.credibility.empty()) will_write({options.credibility});
   will_write_into(options.folder, {"validation.csv", "validation.json", "figures.json"});
   const auto csv = csv_beside(options.output, session);
+  (void)evidence_of(options);
   const ValidationRequest request = validation_request(options);
   const Validation validation = validate(request);
   std::string text = session.json() ? answer_text(session, to_json(validation),

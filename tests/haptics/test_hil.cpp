@@ -120,6 +120,21 @@ TEST_CASE("A patch is refused by models of one sphere, and a contact where there
       Contains("radius"));
 }
 
+TEST_CASE("What else presses on the tissue of a session is refused, whatever its model") {
+  for (const char* const kind :
+       {"condensed", "network", "curves", "linear", "planned", "surface"}) {
+    CAPTURE(kind);
+    Json session = patch_session(kind);
+    session["model"].erase("contact");
+    const Json two = {{{"kind", "sphere"}}, {{"kind", "sphere"}, {"number", 5}}};
+    CHECK_THROWS_WITH(parsed(with(session, "/model/scene/contacts", two)),
+                      Contains("/model/scene/contacts: the hand is the only contact"));
+    const Json weight = {{{"kind", "gravity"}, {"direction", {0, -1, 0}}}};
+    CHECK_THROWS_WITH(parsed(with(session, "/model/scene/loads", weight)),
+                      Contains("/model/scene/loads: a session starts from the tissue without"));
+  }
+}
+
 TEST_CASE("A session of the element verifies against the network, the closed form and CVODES") {
   const test::TempFolder folder;
   const HilRecording recording = recorded(folder);

@@ -302,9 +302,7 @@ CredibilityEvidence parse_evidence(std::string_view text, std::string_view where
         where, fmt::format("'{}'", printable(text)),
         fmt::format("CATEGORY=FILE, the category one of {}", fmt::join(kCategories, ", ")));
   }
-  CredibilityEvidence e{category, std::string(text.substr(equals + 1)), {}};
-  e.sha256 = sha256_hex(read_file(e.file));
-  return e;
+  return {category, std::string(text.substr(equals + 1))};
 }
 
 namespace {
@@ -349,7 +347,7 @@ Json credibility_record(const ValidationRequest& request, const Validation& vali
   for (const std::string& file : other_files) files[file] = sha256_hex(read_file(file));
   record["evidence"] = Json::array();
   for (const CredibilityEvidence& e : evidence) {
-    files[e.file] = e.sha256;
+    files[e.file] = sha256_hex(read_file(e.file));
     record["evidence"].push_back({{"category", e.category}, {"file", e.file}});
   }
   record["files"] = files;

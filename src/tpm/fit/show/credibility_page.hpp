@@ -16,11 +16,11 @@ struct CredibilityWords {
 /// A file that is evidence for one of the categories of the FDA's guidance.
 struct CredibilityEvidence {
   std::string category;  ///< "code verification"
-  std::string file, sha256;
+  std::string file;
 };
 
-/// "code verification=checks.json": the categories by their names; the file is read for its
-/// SHA-256. Throws Error(bad_input) naming them.
+/// "code verification=checks.json", the categories by their names. Throws Error(bad_input) naming
+/// them; the file is read by `credibility_record`, for its SHA-256.
 [[nodiscard]] CredibilityEvidence parse_evidence(std::string_view text, std::string_view where);
 
 /// Everything that a credibility page shows, as JSON: the words, the invocation that recomputes it,

@@ -42,11 +42,6 @@ PushedScene::PushedScene(const HilSession& session)
       contact_place(session.contact_place),
       tissue(parse_tissue(session.scene, session.scene_place, {})),
       deepest_m(deepest_of(session)) {
-  const auto& unused = tissue.unused_blocks;
-  if (std::find(unused.begin(), unused.end(), "loads") != unused.end()) {
-    throw bad_input(DocumentPlace{session.scene_place}.key("loads").where,
-                    "a session starts from the tissue without loads", "a scene without them");
-  }
   require_standing(tissue, session.scene_place);
   contact = moved_contact(session, tissue);
 }

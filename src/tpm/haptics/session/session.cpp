@@ -102,6 +102,19 @@ void require_within_reach(HilSession& session, const DeviceLimits& device,
   }
 }
 
+/// Refuses what else than the hand would press on the tissue.
+void require_hand_alone(const Json& scene, const std::string& where) {
+  if (scene.contains("contacts")) {
+    throw bad_input(DocumentPlace{where}.key("contacts").where,
+                    "the hand is the only contact of a session, and its motion the protocol",
+                    "a scene without contacts; a patch or another place as 'contact' of the model");
+  }
+  if (scene.contains("loads")) {
+    throw bad_input(DocumentPlace{where}.key("loads").where,
+                    "a session starts from the tissue without loads", "a scene without them");
+  }
+}
+
 /// The scene, or the law, from the block or from a file that it names.
 void set_tissue(HilSession& session, const SessionModelKeys& model, const DocumentPlace& place,
                 const std::filesystem::path& folder) {
@@ -129,6 +142,7 @@ void set_tissue(HilSession& session, const SessionModelKeys& model, const Docume
     session.scene =
         with_mesh_listed(without_schema_key(tissue.is_string() ? read_json(file) : tissue), where,
                          tissue.is_string() ? file.parent_path() : folder);
+    require_hand_alone(session.scene, where);
   }
 }
 
