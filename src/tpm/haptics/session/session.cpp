@@ -107,7 +107,7 @@ void require_hand_alone(const Json& scene, const std::string& where) {
   if (scene.contains("contacts")) {
     throw bad_input(DocumentPlace{where}.key("contacts").where,
                     "the hand is the only contact of a session, and its motion the protocol",
-                    "a scene without contacts; a patch or another place as 'contact' of the model");
+                    "no contacts; a patch or another place is 'contact' of the model");
   }
   if (scene.contains("loads")) {
     throw bad_input(DocumentPlace{where}.key("loads").where,
