@@ -6,12 +6,11 @@
 """
 import argparse, base64, json, os, socket
 
-options = argparse.ArgumentParser()
-options.add_argument("--port", type=int, default=10001)
-options.add_argument("--messages", type=int, default=1000)
-options.add_argument("--format", choices=["vector", "values"], default="vector",
-                     help="of a force: vector from version 3.5 of the service on, values before")
-options = options.parse_args()
+parser = argparse.ArgumentParser()
+parser.add_argument("--port", type=int, default=10001)
+parser.add_argument("--messages", type=int, default=1000)
+parser.add_argument("--format", choices=["vector", "values"], default="vector", help="of a force: values before version 3.5")
+options = parser.parse_args()
 
 link = socket.create_connection(("127.0.0.1", options.port), timeout=5)
 link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -19,22 +18,17 @@ key = base64.b64encode(os.urandom(16)).decode()
 link.sendall((f"GET / HTTP/1.1\r\nHost: localhost:{options.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
               f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n").encode())
 stream = link.makefile("rb")
-assert b" 101 " in stream.readline()
-while stream.readline() != b"\r\n":
-    pass
-
+assert b" 101 " in b"".join(iter(stream.readline, b"\r\n"))
 
 def receive():  # a text of one frame, not masked
     size = stream.read(2)[1]
     size = int.from_bytes(stream.read(2 if size == 126 else 8), "big") if size > 125 else size
     return json.loads(stream.read(size))
 
-
 def send(message):  # a text of one frame, masked
     text, mask = json.dumps(message).encode(), os.urandom(4)
     size = bytes([0x80 | len(text)]) if len(text) < 126 else bytes([0x80 | 126]) + len(text).to_bytes(2, "big")
     link.sendall(b"\x81" + size + mask + bytes(byte ^ mask[i % 4] for i, byte in enumerate(text)))
-
 
 device = receive()["inverse3"][0]
 print(device["device_id"], device["config"].get("simulated_device", "hardware"))

@@ -356,7 +356,7 @@ def letter_of(panel, panels):
 
 def lettered(letter, title):
     """A panel's title after its letter, unless it begins with one."""
-    if not letter or re.match(r"\([a-z]\) ", title):
+    if not letter or re.match(r"\([a-z]\)( |$)", title):
         return title
     return f"({letter}) {title}".strip()
 

@@ -145,9 +145,9 @@ def draw(options):
     print_tables(cases)
     plt.rcParams.update(draw_figures.STYLE)
     figure, axes = plt.subplots(1, 3, figsize=(draw_figures.PAGE_WIDTH, 3.5))
-    panels = [("shell", "factorise_s", "Shell: one factorisation", "processor time, s"),
-              ("solid", "factorise_s", "Solid: one factorisation", "processor time, s"),
-              ("shell", "factor_entries", "Shell: numbers of the factor", "numbers")]
+    panels = [("shell", "factorise_s", "(a) shell: one factorisation", "processor time [s]"),
+              ("solid", "factorise_s", "(b) solid: one factorisation", "processor time [s]"),
+              ("shell", "factor_entries", "(c) shell: entries of the factor", "entries")]
     handles = {}
     for axis, (kind, key, title, label) in zip(axes, panels):
         for colour, marker, solver in zip(draw_figures.MODEL_COLOURS, draw_figures.DATA_MARKERS, NAMES):

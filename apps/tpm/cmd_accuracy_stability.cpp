@@ -23,7 +23,7 @@ namespace {
 std::string tables_of(const StabilityParts& parts) {
   std::vector<std::string> names;
   if (parts.limits) names.emplace_back("limits.csv");
-  if (parts.corners) names.emplace_back("corners.csv");
+  if (parts.limiting_cases) names.emplace_back("limiting_cases.csv");
   if (parts.servo) names.emplace_back("servo.csv");
   if (parts.maps) names.emplace_back("map_*.csv, figures");
   return fmt::format("{}", fmt::join(names, ", "));
@@ -35,7 +35,7 @@ StabilityParts parts_of(const std::vector<std::string>& names) {
   const auto named = [&](const char* name) {
     return std::find(names.begin(), names.end(), name) != names.end();
   };
-  return {named("maps"), named("limits"), named("corners"), named("servo")};
+  return {named("maps"), named("limits"), named("limiting_cases"), named("servo")};
 }
 
 int stability(const std::string& folder, int along, const StabilityParts& parts,
@@ -68,13 +68,15 @@ void add_stability_command(CLI::App& accuracy, Session& session) {
   command->add_option("--points", *along, "Points along each axis of the maps, 2 to 200")
       ->capture_default_str();
   auto only = std::make_shared<std::vector<std::string>>();
-  command->add_option("--only", *only, "Parts to run: maps, limits, corners, servo (default: all)")
+  command
+      ->add_option("--only", *only,
+                   "Parts to run: maps, limits, limiting_cases, servo (default: all)")
       ->delimiter(',')
-      ->check(one_of_words({"maps", "limits", "corners", "servo"}));
+      ->check(one_of_words({"maps", "limits", "limiting_cases", "servo"}));
   add_format_option(*command, session);
   command->footer(
       "Examples:\n  tpm accuracy stability --folder out/stability\n  tpm accuracy stability "
-      "--points 5\n  tpm accuracy stability --only corners,servo");
+      "--points 5\n  tpm accuracy stability --only limiting_cases,servo");
   set_run(*command, session, [folder, along, only, &session] {
     constexpr std::uint64_t kMost = 200;
     const std::uint64_t points = parse_whole_number(*along, "--points", 2);

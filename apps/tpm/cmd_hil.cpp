@@ -412,7 +412,7 @@ RealTimeWish chosen_wish(const DeviceOptions& options) {
 }
 
 void add_hil_command(CLI::App& app, Session& session) {
-  CLI::App* hil = app.add_subcommand("hil", "A tissue felt through a haptic device");
+  CLI::App* hil = app.add_subcommand("hil", "A tissue rendered on a haptic device");
   hil->require_subcommand(1);
   hil->footer(
       "Example:\n  tpm hil devices\n  tpm hil run configs/hil_liver.json -o liver.tpmrec\n"

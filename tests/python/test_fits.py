@@ -123,8 +123,23 @@ class Fits(unittest.TestCase):
         by_arrays = tpmkit.fit(time=arrays[0], depth=arrays[1], force=arrays[2], units={"time": "s", "depth": "mm", "force": "N"})
         for fit in (by_table, by_arrays, tpmkit.fit(table.set_index("time (s)"))):
             self.assertTrue(fit.parameters.equals(self.fit.parameters))
-        with self.assertRaisesRegex(tpmkit.Error, "save: the fit is of a table in memory"):
-            by_table.save(self.folder.name)
+        saved = Path(self.folder.name) / "saved"
+        self.assertIn("law.json", by_table.save(saved))
+        self.assertTrue(pd.read_csv(saved / "recording.csv").equals(table))
+        self.assertEqual(tpmkit.Law.read(saved / "law.json").parameters, self.fit.law.parameters)
+        (saved / "recording.csv").write_text("another\n")
+        with self.assertRaisesRegex(tpmkit.Error, "recording.csv: exists and holds another recording"):
+            by_table.save(saved)
+
+    def test_a_law_takes_the_parameters_of_a_fit_by_their_names(self):
+        of_material = self.fit.parameters.estimate[["k_inf", "k1", "tau1"]]
+        law = tpmkit.Law("linear-1", of_material)
+        for name, value in of_material.items():
+            self.assertEqual([v for k, v in law.parameters.items() if k.startswith(f"{name}_")], [value])
+        with self.assertRaisesRegex(tpmkit.Error, "k1_N_per_m stands twice"):
+            tpmkit.Law("linear-1", {"k_inf": 1.0, "k1": 1.0, "k1_N_per_m": 1.0, "tau1": 1.0})
+        with self.assertRaisesRegex(tpmkit.Error, "expected them by name"):
+            tpmkit.Law("linear-1", [1.0, 2.0])
 
     def test_tables_and_arrays_that_say_too_little_are_refused_in_a_sentence(self):
         import pandas as pd

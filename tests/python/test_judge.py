@@ -40,7 +40,8 @@ class Judgements(unittest.TestCase):
 
     def test_a_law_is_validated_by_a_recording_that_it_has_not_seen(self):
         saved = self.folder / "saved"
-        tpmkit.fit(self.folder / "liver_1.csv", law="linear-1", starts=3).save(saved)
+        fit = tpmkit.fit(self.folder / "liver_1.csv", law="linear-1", starts=3)
+        fit.save(saved)
         judged = tpmkit.validate(saved / "law.json", self.folder / "liver_2.csv", require="5%")
         self.assertEqual(judged.verdict, "adequate")
         table = judged.quantities
@@ -51,6 +52,9 @@ class Judgements(unittest.TestCase):
             self.assertIn(warning, repr(judged))
         seen = tpmkit.validate(saved / "law.json", self.folder / "liver_1.csv", require="5%")
         self.assertEqual(seen.verdict, "calibration_residual")
+        for law in (fit, fit.law):
+            same = tpmkit.validate(law, self.folder / "liver_2.csv", require="5%")
+            self.assertTrue(same.quantities.equals(table))
         page = tpmkit.view(saved / "law.json", self.folder / "page.html")
         self.assertIn("<html", page.read_text()[:500])
         with self.assertRaisesRegex(tpmkit.Error, "none.h5"):

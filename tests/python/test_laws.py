@@ -71,8 +71,8 @@ class Laws(unittest.TestCase):
             with self.assertRaisesRegex(tpmkit.Error, r"an argument is of a wrong kind; expected what help\(tpmkit\.") as raised:
                 call()
             self.assertNotIn("std::", str(raised.exception))
-        with self.assertRaisesRegex(tpmkit.Error, r"^validate\(a Law, 'a.csv'\): an argument"):
-            tpmkit.validate(law, "a.csv")
+        with self.assertRaisesRegex(tpmkit.Error, r"^simulate\(a Law\): an argument"):
+            tpmkit.simulate(law)
         with self.assertRaisesRegex(tpmkit.Error, r"^Law.describe\(3\): an argument"):
             tpmkit.Law.describe(3)
         with self.assertRaisesRegex(tpmkit.Error, "times_s: 'now'; expected a list of numbers"):

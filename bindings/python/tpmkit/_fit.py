@@ -336,12 +336,22 @@ class Fit:
         """Writes configuration, law, selection and figures, as `tpm fit` does. Figures are drawn by the
         Python that has matplotlib, in another process.
 
+        A table in memory is written there as recording.csv, which the configuration names, and fitted once more.
+
         Returns the names of the files.
         """
-        if self._inputs.table is not None:
-            raise _core.Error("save: the fit is of a table in memory, and its configuration names a file; expected "
-                              "frame.to_csv(file) and tpmkit.fit(file)")
-        return self._core.write(os.fspath(folder))
+        table = self._inputs.table
+        if table is None:
+            return self._core.write(os.fspath(folder))
+        file = Path(folder) / "recording.csv"
+        if file.exists() and file.read_text(encoding="utf-8") != table:
+            raise _core.Error(f"{file}: exists and holds another recording; expected another folder")
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(table, encoding="utf-8", newline="")
+        except OSError as error:
+            raise _core.Error(f"{file}: {error.strerror}; expected a folder that can be written") from None
+        return [file.name, *_core.fit([str(file)], *self._inputs.options).write(os.fspath(folder))]
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, as `tpm fit --format json` writes it (keys in docs/fit_files.md)."""

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _program
-from ._fit import PathLike, _options
+from ._fit import Fit, PathLike, _options
 from ._kinds import told
+from ._law import Law
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,7 +68,7 @@ class Validation:
 
 @told
 def validate(
-    law: PathLike,
+    law: PathLike | Law | Fit,
     recordings: PathLike | Sequence[PathLike],
     *,
     require: str | None = None,
@@ -80,7 +81,7 @@ def validate(
     Parameters
     ----------
     law
-        law.json as `tpm fit` or `Fit.save` writes it, or the scene or material.json of `tpm material`.
+        A Fit or a Law; law.json as `tpm fit` or `Fit.save` writes it; the scene or material.json of `tpm material`.
     recordings
         One or several files. Of one that the law was fitted to the verdict is "calibration_residual".
     require
@@ -95,10 +96,17 @@ def validate(
     """
     several = isinstance(recordings, Iterable) and not isinstance(recordings, (str, os.PathLike))
     files: list[PathLike] = list(recordings) if several else [recordings]  # type: ignore[arg-type, list-item]
-    words = ["validate", os.fspath(law), *(os.fspath(f) for f in files), *_options(columns)]
+    words = [*(os.fspath(f) for f in files), *_options(columns)]
     for option, value in (("--require", require), ("--placement", placement), ("--instrument", instrument)):
         words += [] if value is None else [option, os.fspath(value)]
-    return Validation(_program.answer(words, answers=(0, 1)))
+    with tempfile.TemporaryDirectory() as folder:
+        if isinstance(law, Fit):
+            law = law.law
+        if isinstance(law, Law):
+            file = Path(folder) / "law.json"
+            law.write(file)
+            law = file
+        return Validation(_program.answer(["validate", os.fspath(law), *words], answers=(0, 1)))
 
 
 class Design:

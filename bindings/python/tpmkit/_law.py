@@ -32,6 +32,23 @@ def times_of(times: npt.ArrayLike, name: str = "times_s") -> Array:
     return array
 
 
+def _with_units(law: str, parameters: Mapping[str, float]) -> dict[str, float]:
+    """Parameters by name with SI unit, whose names may be those of a fit, which have none."""
+    try:
+        given = dict(parameters)
+    except (TypeError, ValueError):
+        raise _core.Error(f'law: parameters are {parameters!r:.60}; expected them by name: {{"k_inf": 60.0, ...}}, SI') from None
+    known = [key for key, _, _ in _core.law_parameters(law)]
+    named: dict[str, float] = {}
+    for name, value in given.items():
+        meant = [key for key in known if key.startswith(f"{name}_")]
+        key = meant[0] if name not in known and len(meant) == 1 else name
+        if key in named:
+            raise _core.Error(f"law: {key} stands twice; expected each parameter once")
+        named[key] = value
+    return named
+
+
 class Law:
     """One member of the family of laws (docs/laws.md) with its parameters.
 
@@ -43,8 +60,9 @@ class Law:
         Kernel, branches and more: "linear-1", "power-2", "hertz-fzener". `Law.describe(name)` lists the
         parameters.
     parameters
-        By name with SI unit: ``{"k_inf_N_per_m": 60, "k1_N_per_m": 40, "tau1_s": 0.5}``. Parameters with a
-        preset may be left out.
+        By name with SI unit: ``{"k_inf_N_per_m": 60, "k1_N_per_m": 40, "tau1_s": 0.5}``, or by the names of a fit,
+        in SI: ``{"k_inf": 60, "k1": 40, "tau1": 0.5}``, ``fit.parameters["estimate"]``. Parameters with a preset may
+        be left out.
     reference
         Depth (m) or change of relative length at which coefficients are secants, above 0. It has no
         meaning for linear laws.
@@ -77,7 +95,7 @@ class Law:
             "drive": drive,
             "response": response,
             key: reference,
-            "parameters": dict(parameters),
+            "parameters": _with_units(name, parameters),
             "provenance": provenance,
         }
         self._core = _core.Law.from_json(json.dumps(document))

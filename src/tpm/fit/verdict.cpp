@@ -90,13 +90,15 @@ std::string failure_words(const ParameterResult& p, double level) {
       profile.below == ProfileEnd::rounding || profile.above == ProfileEnd::rounding;
   std::string words = fmt::format(
       "{} = {}: its profile failed {} ({}), which does not mean that it is unknown", f.name,
-      in_unit(f, p.estimate), side,
+      in_sized_unit(p, p.estimate), side,
       rounding ? "an interval as narrow as the rounding of numbers: the data are met exactly"
                : "the walk reached neither a limit nor a bound");
-  if (p.lower) words += fmt::format("; lower {} limit {}", percent(level), in_unit(f, *p.lower));
-  if (p.upper) words += fmt::format("; upper {} limit {}", percent(level), in_unit(f, *p.upper));
+  if (p.lower)
+    words += fmt::format("; lower {} limit {}", percent(level), in_sized_unit(p, *p.lower));
+  if (p.upper)
+    words += fmt::format("; upper {} limit {}", percent(level), in_sized_unit(p, *p.upper));
   words += p.standard_error
-               ? fmt::format("; linearised standard error {}", in_unit(f, *p.standard_error))
+               ? fmt::format("; linearised standard error {}", in_sized_unit(p, *p.standard_error))
                : std::string("; no linearised standard error either");
   return words;
 }
@@ -122,7 +124,7 @@ std::string exchange_words(const ParameterResult& p) {
 std::string drift_note(const ParameterResult& p) {
   if (!p.with_drift) return {};
   return fmt::format(" with a drift of the zero or without ({} with one)",
-                     in_unit(p.parameter, p.with_drift->estimate));
+                     in_sized_unit(p, p.with_drift->estimate));
 }
 
 std::string range_words(const ParameterResult& p, double level) {
@@ -130,26 +132,26 @@ std::string range_words(const ParameterResult& p, double level) {
   switch (p.verdict) {
     case Verdict::identified: {
       const std::string interval =
-          fmt::format("{} to {}", in_unit(f, *p.lower), in_unit(f, *p.upper));
+          fmt::format("{} to {}", in_sized_unit(p, *p.lower), in_sized_unit(p, *p.upper));
       if (!p.not_separable.empty()) {
         return fmt::format(
             "{} = {} is not identified: {}: not separable; {} interval without drift {}", f.name,
-            in_unit(f, p.estimate), p.not_separable, percent(level), interval);
+            in_sized_unit(p, p.estimate), p.not_separable, percent(level), interval);
       }
       if (!p.unconfirmed.empty()) {
         return fmt::format("{} = {}, {}; {} interval of this minimum {}", f.name,
-                           in_unit(f, p.estimate), p.unconfirmed, percent(level), interval);
+                           in_sized_unit(p, p.estimate), p.unconfirmed, percent(level), interval);
       }
       return fmt::format("{} = {} is identified: {} interval {}{}{}", f.name,
-                         in_unit(f, p.estimate), percent(level), interval, drift_note(p),
+                         in_sized_unit(p, p.estimate), percent(level), interval, drift_note(p),
                          p.profile.connected ? "" : ", not all of it: separate ranges fit");
     }
     case Verdict::lower_only:
       return fmt::format("{} is at least {} ({} interval, one-sided){}{}", f.name,
-                         in_unit(f, *p.lower), percent(level), drift_note(p), bound_note(p));
+                         in_sized_unit(p, *p.lower), percent(level), drift_note(p), bound_note(p));
     case Verdict::upper_only:
       return fmt::format("{} is at most {} ({} interval, one-sided){}{}", f.name,
-                         in_unit(f, *p.upper), percent(level), drift_note(p), bound_note(p));
+                         in_sized_unit(p, *p.upper), percent(level), drift_note(p), bound_note(p));
     case Verdict::flat:
       if (exchanges(p, false) || exchanges(p, true)) {
         return fmt::format("{} is undetermined by these data{}", f.name, bound_note(p));
@@ -162,7 +164,7 @@ std::string range_words(const ParameterResult& p, double level) {
       break;
   }
   return fmt::format("{} = {} (no interval: profiles were switched off)", f.name,
-                     in_unit(f, p.estimate));
+                     in_sized_unit(p, p.estimate));
 }
 
 }  // namespace

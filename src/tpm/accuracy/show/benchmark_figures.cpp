@@ -119,9 +119,10 @@ void add_points(Panel& panel, const BenchmarkResult& result, const CostOf& cost_
   }
 }
 
-bool any_placed(const Panel& panel) {
+/// A panel of failures alone shows no choice.
+bool any_completed(const Panel& panel) {
   return std::any_of(panel.series.begin(), panel.series.end(),
-                     [](const Series& s) { return s.kind != Series::Kind::level && !s.x.empty(); });
+                     [](const Series& s) { return s.kind == Series::Kind::trail && !s.x.empty(); });
 }
 
 Axis error_axis(const BenchmarkResult& result) {
@@ -141,7 +142,7 @@ Figure wall_figure(const BenchmarkResult& result) {
   Panel per_step{
       "(b) fixed steps of 1 ms or less", {"wall time of a step", "s", true}, error_axis(result)};
   add_points(per_step, result, wall_per_step(), true, false);
-  if (any_placed(per_step)) {
+  if (any_completed(per_step)) {
     figure.caption +=
         " (b) Only what a servo loop can use: one step has to fit the period, 1 ms at 1 kHz and "
         "0.25 ms at 4 kHz.";
@@ -162,7 +163,7 @@ Figure count_figure(const BenchmarkResult& result) {
   figure.panels.push_back(std::move(rates));
   Panel factors{"(b)", {"factorisations per simulated second", "1/s", true}, error_axis(result)};
   add_points(factors, result, count_per_second(result, &MethodWork::factorisations), false, false);
-  if (any_placed(factors)) figure.panels.push_back(std::move(factors));
+  if (any_completed(factors)) figure.panels.push_back(std::move(factors));
   return figure;
 }
 

@@ -76,13 +76,13 @@ Table servo_table(const StabilityStudy& study, const std::string& problem) {
   return table;
 }
 
-Table corners_table(const StabilityStudy& study) {
+Table limiting_cases_table(const StabilityStudy& study) {
   Table table{"Limiting cases, step 1 ms. An answer that is not the expected one is marked.",
-              {{"corner"}, {"what is done"}, {"what is right"}}};
+              {{"case"}, {"what is done"}, {"what is right"}}};
   for (const StepRuleEntry& entry : kStepRules) table.columns.push_back({std::string(entry.text)});
-  for (const StabilityCorner& corner : study.corners) {
-    std::vector<Cell> row{{corner.name}, {corner.setup}, {corner.expected}};
-    for (const CornerCell& cell : corner.cells) {
+  for (const LimitingCase& limiting_case : study.limiting_cases) {
+    std::vector<Cell> row{{limiting_case.name}, {limiting_case.setup}, {limiting_case.expected}};
+    for (const LimitingCell& cell : limiting_case.cells) {
       std::string words = verdict_words(cell.verdict);
       if (!cell.right) {
         words += fmt::format(" (not as expected: {})", stability_class_name(cell.expected));
@@ -192,9 +192,9 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
   for (const std::string& problem : each_once(study.servo, &ServoRow::problem)) {
     document.table(servo_table(study, problem));
   }
-  if (!study.corners.empty()) {
+  if (!study.limiting_cases.empty()) {
     document.heading(2, "Limiting cases");
-    document.table(corners_table(study));
+    document.table(limiting_cases_table(study));
   }
   if (!study.maps.empty()) add_maps(document, study, figures);
   typeset(document);
@@ -243,14 +243,14 @@ std::string stability_servo_csv(const StabilityStudy& study) {
   return text;
 }
 
-/// One line per rule and corner.
-std::string stability_corners_csv(const StabilityStudy& study) {
+/// One line per rule and limiting case.
+std::string limiting_cases_csv(const StabilityStudy& study) {
   std::string text =
-      csv_line({"corner", "rule", "class", "error_of_peak", "expected", "right", "reason"});
-  for (const StabilityCorner& corner : study.corners) {
-    for (const CornerCell& cell : corner.cells) {
+      csv_line({"case", "rule", "class", "error_of_peak", "expected", "right", "reason"});
+  for (const LimitingCase& limiting_case : study.limiting_cases) {
+    for (const LimitingCell& cell : limiting_case.cells) {
       text +=
-          csv_line({corner.name, step_rule_name(cell.rule),
+          csv_line({limiting_case.name, step_rule_name(cell.rule),
                     std::string(stability_class_name(cell.verdict.found)),
                     number(cell.verdict.error), std::string(stability_class_name(cell.expected)),
                     cell.right ? "yes" : "no", cell.verdict.reason});
@@ -289,16 +289,16 @@ std::vector<std::string> stability_sentences(const StabilityStudy& study) {
         fmt::format("{} at 1 kHz, paper's eta1: {}.", row.problem, listed(row.cells, words, "; ")));
   }
   std::size_t wrong = 0, cells = 0;
-  for (const StabilityCorner& corner : study.corners) {
-    for (const CornerCell& cell : corner.cells) {
+  for (const LimitingCase& limiting_case : study.limiting_cases) {
+    for (const LimitingCell& cell : limiting_case.cells) {
       ++cells;
       wrong += cell.right ? 0 : 1;
     }
   }
-  if (!study.corners.empty()) {
+  if (!study.limiting_cases.empty()) {
     sentences.push_back(
         fmt::format("{} limiting cases, {} runs: {} came out otherwise than expected.",
-                    study.corners.size(), cells, wrong));
+                    study.limiting_cases.size(), cells, wrong));
   }
   if (sentences.empty()) {  // maps alone
     std::size_t runs = 0;
@@ -327,15 +327,17 @@ Json to_json(const StabilityStudy& study) {
     }
     json["servo"].push_back(std::move(rate));
   }
-  for (const StabilityCorner& corner : study.corners) {
-    Json entry{{"corner", corner.name}, {"setup", corner.setup}, {"expected", corner.expected}};
-    for (const CornerCell& cell : corner.cells) {
+  for (const LimitingCase& limiting_case : study.limiting_cases) {
+    Json entry{{"case", limiting_case.name},
+               {"setup", limiting_case.setup},
+               {"expected", limiting_case.expected}};
+    for (const LimitingCell& cell : limiting_case.cells) {
       Json of_rule = verdict_json(cell.rule, cell.verdict);
       of_rule["expected"] = stability_class_name(cell.expected);
       of_rule["right"] = cell.right;
       entry["rules"].push_back(std::move(of_rule));
     }
-    json["corners"].push_back(std::move(entry));
+    json["limiting_cases"].push_back(std::move(entry));
   }
   for (const StabilityMap& map : study.maps) {
     std::map<std::string, int> counts;
@@ -358,7 +360,8 @@ void write_stability(const StabilityStudy& study, const std::filesystem::path& f
   write_report(folder, stability_document(study, figures), figures, python, {{"runs", seconds}});
   write_file(folder / "stability.json", to_text(to_json(study)));
   if (!study.limits.empty()) write_file(folder / "limits.csv", stability_limits_csv(study));
-  if (!study.corners.empty()) write_file(folder / "corners.csv", stability_corners_csv(study));
+  if (!study.limiting_cases.empty())
+    write_file(folder / "limiting_cases.csv", limiting_cases_csv(study));
   if (!study.servo.empty()) write_file(folder / "servo.csv", stability_servo_csv(study));
   for (const std::string& id : map_ids(study)) {
     write_file(folder / fmt::format("map_{}.csv", id), stability_map_csv(study, id));

@@ -12,14 +12,14 @@ namespace tpm::accuracy {
 /// The maps of each rule, two to a figure, with the limit of theory drawn in.
 [[nodiscard]] std::vector<Figure> stability_figures(const StabilityStudy& study);
 
-/// Limits, corners and servo rates, and of each map how often each class was found.
+/// Limits, limiting cases and servo rates, and of each map how often each class was found.
 [[nodiscard]] Json to_json(const StabilityStudy& study);
 
-/// The sentences that matter most: limits against theory, corners that came out otherwise, what
+/// The sentences that matter most: limits against theory, limiting cases that came out otherwise, what
 /// holds at 1 kHz.
 [[nodiscard]] std::vector<std::string> stability_sentences(const StabilityStudy& study);
 
-/// Writes report.md, report.html, stability.json, limits.csv, corners.csv, servo.csv, map_ID.csv
+/// Writes report.md, report.html, stability.json, limits.csv, limiting_cases.csv, servo.csv, map_ID.csv
 /// for each map, figures.json and figures/*.svg into `folder`, and report.run.json, the only file
 /// that changes from run to run.
 /// @param python from find_drawing_python()

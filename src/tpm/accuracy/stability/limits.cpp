@@ -259,7 +259,7 @@ StabilityStudy run_stability_study(int along, const StabilityParts& parts) {
   StabilityStudy study;
   if (parts.maps) study.maps = stability_maps(along);
   if (parts.limits) study.limits = stability_limits();
-  if (parts.corners) study.corners = stability_corners();
+  if (parts.limiting_cases) study.limiting_cases = find_limiting_cases();
   if (parts.servo) study.servo = stability_at_servo_rates();
   return study;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Where each step rule fails: maps, limits, degenerate corners, servo rates. See docs/accuracy.md.
+// Where each step rule fails: maps, limits, limiting cases, servo rates. See docs/accuracy.md.
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,7 +38,7 @@ struct StabilityLimit {
   [[nodiscard]] double ratio() const { return found_s / theory_s; }
 };
 
-struct CornerCell {
+struct LimitingCell {
   StepRule rule = StepRule::forward_euler;
   StabilityVerdict verdict;
   StabilityClass expected = StabilityClass::holds;
@@ -47,11 +47,11 @@ struct CornerCell {
 };
 
 /// A degenerate case and what every rule did.
-struct StabilityCorner {
+struct LimitingCase {
   std::string name;
   std::string setup;
   std::string expected;  ///< in words
-  std::vector<CornerCell> cells;
+  std::vector<LimitingCell> cells;
 };
 
 struct ServoCell {
@@ -69,7 +69,7 @@ struct ServoRow {
 struct StabilityStudy {
   std::vector<StabilityMap> maps;
   std::vector<StabilityLimit> limits;
-  std::vector<StabilityCorner> corners;
+  std::vector<LimitingCase> limiting_cases;
   std::vector<ServoRow> servo;
 };
 
@@ -78,13 +78,13 @@ inline constexpr int kPointsAlongMaps = 21;
 /// @param along points along each axis, >= 2
 [[nodiscard]] std::vector<StabilityMap> stability_maps(int along = kPointsAlongMaps);
 [[nodiscard]] std::vector<StabilityLimit> stability_limits();
-[[nodiscard]] std::vector<StabilityCorner> stability_corners();
+[[nodiscard]] std::vector<LimitingCase> find_limiting_cases();
 [[nodiscard]] std::vector<ServoRow> stability_at_servo_rates();
 /// Supports of the networks of the study, in a sentence.
 [[nodiscard]] std::string study_organ_words();
 /// Parts of the study to run.
 struct StabilityParts {
-  bool maps = true, limits = true, corners = true, servo = true;
+  bool maps = true, limits = true, limiting_cases = true, servo = true;
 };
 /// Deterministic. Parts that are not run stay empty.
 /// @param along points along each axis of the maps, >= 2

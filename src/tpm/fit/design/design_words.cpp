@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/quantity_text.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
 
@@ -73,6 +75,12 @@ std::string hidden_time(double tau_s, const PlannedExperiment& e) {
   return {};
 }
 
+/// In the unit that fits the true value, as the limits beside it.
+std::string in_sized_unit(const FitParameter& p, double si) {
+  const Unit unit = sized_unit(p.unit, p.start);
+  return with_unit(significant(si / unit.to_si, 4), unit);
+}
+
 std::string limit_words(const DesignResult& result, std::size_t i, const DesignCandidate& c) {
   const ExpectedParameter& p = c.expected.parameters[i];
   if (const auto tau = characteristic_time(result.problem, i)) {
@@ -120,7 +128,7 @@ std::string parameter_sentence(const DesignResult& result, std::size_t i) {
   const DesignCandidate& best = result.ranked.front();
   const ExpectedParameter& expected = best.expected.parameters[i];
   const FitParameter& p = result.problem.parameter(i);
-  std::string text = fmt::format("{} = {}: {} expected, {}", p.name, in_unit(p, p.start),
+  std::string text = fmt::format("{} = {}: {} expected, {}", p.name, in_sized_unit(p, p.start),
                                  interval_words(p, expected),
                                  expected.identified ? "identified" : "not identified");
   if (!expected.identified) {
@@ -150,10 +158,11 @@ std::string experiment_words(const PlannedExperiment& e) {
 
 std::string interval_words(const FitParameter& p, const ExpectedParameter& expected) {
   if (!expected.lower && !expected.upper) return "any value";
-  if (!expected.lower) return fmt::format("below {}", in_unit(p, *expected.upper));
-  if (!expected.upper) return fmt::format("above {}", in_unit(p, *expected.lower));
-  return fmt::format("{}-{}", significant(*expected.lower / p.unit.to_si, 4),
-                     in_unit(p, *expected.upper));
+  if (!expected.lower) return fmt::format("below {}", in_sized_unit(p, *expected.upper));
+  if (!expected.upper) return fmt::format("above {}", in_sized_unit(p, *expected.lower));
+  const Unit unit = sized_unit(p.unit, p.start);
+  return fmt::format("{} .. {}", significant(*expected.lower / unit.to_si, 4),
+                     with_unit(significant(*expected.upper / unit.to_si, 4), unit));
 }
 
 std::string criterion_words(const DesignProblem& problem) {

@@ -55,6 +55,7 @@ MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& 
   }
   motion.drive = drive;
   motion.placement = placement;
+  motion.provenance = r.provenance;
   return motion;
 }
 

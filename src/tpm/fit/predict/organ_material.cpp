@@ -276,6 +276,7 @@ OrganMaterial law_along(const LawFile& law, const std::vector<MaterialMotion>& m
     course.name = motion.name;
     course.time_s = motion.time_s;
     course.measured_N = motion.measured_N;
+    course.provenance = motion.provenance;
     course.by_law = course.by_organ = motion.placement;
     for (const double t : course.time_s) course.depth_m.push_back(value_at(motion.protocol, t));
     course.law_N = law_stage(plain, motion.protocol, course.time_s).force_N;

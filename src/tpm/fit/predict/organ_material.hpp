@@ -29,7 +29,8 @@ struct MaterialMotion {
   std::vector<double> measured_N = {};
   /// Of a recording: its drive as recorded. `protocol` is what lies beyond the law's contact.
   std::optional<Protocol> drive = std::nullopt;
-  RecordingPlacement placement = {};  ///< of the recording, by the law
+  RecordingPlacement placement = {};             ///< of the recording, by the law
+  Provenance provenance = Provenance::measured;  ///< of the recording
 };
 
 /// The motion of a recording's ramp and hold, in as few straight pieces as keep it within 0.2 % of
@@ -85,7 +86,8 @@ struct ForceMismatch {
 struct MaterialCourse {
   std::string name;  ///< of the recording; empty: a protocol
   std::vector<double> time_s, depth_m, law_N, correspondence_N, organ_N, measured_N;
-  RecordingPlacement by_law;    ///< that of the law
+  Provenance provenance = Provenance::measured;  ///< of the recording
+  RecordingPlacement by_law;                     ///< that of the law
   RecordingPlacement by_organ;  ///< that of the organ: another one if the readings were fitted
   ForceMismatch organ;          ///< fitted organ less law
   std::optional<ForceMismatch> law_to_recording, organ_to_recording;

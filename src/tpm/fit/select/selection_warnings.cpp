@@ -119,6 +119,7 @@ std::vector<std::string> protocol_warnings(const FitResult& fit,
   if (hold_s == 0.0) {
     warnings.emplace_back("there is no hold: relaxation is seen only through the ramp");
   }
+  constexpr int kDigitsOfTime = 6;  // of a rounded one: "310 s", not "3.1e+02 s"
   for (const ParameterResult& p : fit.parameters) {
     const bool time = p.parameter.unit.dimension == Dimension::time;
     if (!time) continue;
@@ -132,7 +133,7 @@ std::vector<std::string> protocol_warnings(const FitResult& fit,
       warnings.push_back(fmt::format(
           "{} = {} is long for the longest hold ({} s): no plateau is seen; hold for at least {} s",
           p.parameter.name, in_sized_unit(p, p.estimate), significant(hold_s, 3),
-          significant(3.0 * p.estimate, 2)));
+          significant(rounded(3.0 * p.estimate, 2), kDigitsOfTime)));
     }
     if (p.estimate < kLeastSamples * step_s) {
       warnings.push_back(fmt::format(

@@ -26,7 +26,8 @@ Panel force_panel(const MaterialCourse& c, bool titled) {
   forces.x = {"time", "s"};
   forces.y = {"contact force", "N"};
   if (!c.measured_N.empty()) {
-    forces.series.push_back(line("recording", c.time_s, c.measured_N, "measured"));
+    forces.series.push_back(
+        line("recording", c.time_s, c.measured_N, std::string(provenance_name(c.provenance))));
     forces.series.back().kind = Series::Kind::points;
   }
   forces.series.push_back(line("law", c.time_s, c.law_N));

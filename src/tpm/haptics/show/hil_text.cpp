@@ -221,7 +221,7 @@ Json run_json(const HilSession& session, const SessionRun& run) {
           {"duration_s", rounded(session.duration_s(), kHilDigits)},
           {"phases", session.phases.size()},
           {"largest_force_N", rounded(run.largest_force_N, kHilDigits)},
-          {"felt", run.largest_force_N >= kLeastFeltForce_N},
+          {"perceptible", run.largest_force_N >= kLeastFeltForce_N},
           {"time", run.outcome.real_time ? "real" : "virtual"},
           {"outcome", recording_closing(run.outcome)}};
 }

@@ -202,15 +202,14 @@ std::string subject_text(const Plan& plan) {
   const PlanRequest& request = plan.request;
   std::string text = fmt::format("{}: {} spheres, {} bonds, {} s\n", plan.title, plan.spheres,
                                  plan.bonds, significant(plan.duration_s, 4));
-  text +=
-      fmt::format("{} within {} of the peak{}, {}; operations cost what {} says\n",
-                  claim_of(plan).quantity, share_text(request.tolerance),
-                  request.tolerance_source.empty() ? std::string()
-                                                   : fmt::format(" ({})", request.tolerance_source),
-                  budget_text(request.budget),
-                  request.costs.source == "nominal"
-                      ? "a usual machine has (nominal; tpm plan --calibrate measures this one)"
-                      : request.costs.source);
+  text += fmt::format(
+      "{} within {} of the peak{}, {}; costs of operations: {}\n", claim_of(plan).quantity,
+      share_text(request.tolerance),
+      request.tolerance_source.empty() ? std::string()
+                                       : fmt::format(" ({})", request.tolerance_source),
+      budget_text(request.budget),
+      request.costs.source == "nominal" ? "nominal (tpm plan --calibrate measures this machine)"
+                                        : request.costs.source);
   return text;
 }
 

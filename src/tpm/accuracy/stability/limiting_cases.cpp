@@ -15,7 +15,7 @@ namespace {
 
 using Expect = std::function<StabilityClass(StepRule)>;
 constexpr double kStep_s = 1e-3;
-constexpr double kCornerDepth_m = 0.004;
+constexpr double kLimitingDepth_m = 0.004;
 
 bool same_kind(StabilityClass a, StabilityClass b) {
   const auto grows = [](StabilityClass c) {
@@ -24,19 +24,19 @@ bool same_kind(StabilityClass a, StabilityClass b) {
   return a == b || (grows(a) && grows(b));
 }
 
-StabilityCorner tried(std::string name, std::string setup, std::string expected,
-                      const CheckedProblem& checked, double step_s, const Expect& expect) {
-  StabilityCorner corner{std::move(name), std::move(setup), std::move(expected), {}};
+LimitingCase tried(std::string name, std::string setup, std::string expected,
+                   const CheckedProblem& checked, double step_s, const Expect& expect) {
+  LimitingCase limiting_case{std::move(name), std::move(setup), std::move(expected), {}};
   for (const StepRuleEntry& entry : kStepRules) {
     MethodSettings settings;
     settings.rule = entry.meaning;
     settings.step_s = step_s;
     settings.most_rates = 2'000'000;
-    CornerCell cell{entry.meaning, checked.verdict(settings), expect(entry.meaning), false};
+    LimitingCell cell{entry.meaning, checked.verdict(settings), expect(entry.meaning), false};
     cell.right = same_kind(cell.verdict.found, cell.expected);
-    corner.cells.push_back(std::move(cell));
+    limiting_case.cells.push_back(std::move(cell));
   }
-  return corner;
+  return limiting_case;
 }
 
 StabilityClass all_hold(StepRule) {
@@ -64,8 +64,8 @@ LinearElement under_depth(const BondElement& p) {
   return e;
 }
 
-StabilityCorner instantaneous_depth(std::string name, const BondElement& p, double depth_m,
-                                    double step_s, std::string expected) {
+LimitingCase instantaneous_depth(std::string name, const BondElement& p, double depth_m,
+                                 double step_s, std::string expected) {
   const Protocol protocol = step_and_hold(depth_m, kStudySteps * step_s);
   return tried(std::move(name),
                significant(1e3 * depth_m, 3) + " mm in a step and held for 300 steps of " +
@@ -80,42 +80,43 @@ const char* const kByTheory =
 
 constexpr double kPaperSum_Pa = 24e3;  // E1 + E2
 
-void add_relaxation_times(std::vector<StabilityCorner>& corners) {
+void add_relaxation_times(std::vector<LimitingCase>& limiting_cases) {
   BondElement p = paper_element(1e-9 / kPaperSum_Pa);
-  corners.push_back(instantaneous_depth(
-      "eta1 -> 0 (1e-9 Pa s)", p, kCornerDepth_m, kStep_s,
+  limiting_cases.push_back(instantaneous_depth(
+      "eta1 -> 0 (1e-9 Pa s)", p, kLimitingDepth_m, kStep_s,
       "explicit rules diverge, Adams too or is too much work, midpoint and Newmark "
       "ring, all else holds"));
   // Functional iteration follows the relaxation time for as long as it runs.
-  for (CornerCell& cell : corners.back().cells) {
+  for (LimitingCell& cell : limiting_cases.back().cells) {
     if (cell.rule == StepRule::cvode_adams) {
       cell.expected = StabilityClass::too_much_work;
       cell.right = cell.verdict.found == cell.expected;
     }
   }
   p = paper_element(1e15 / kPaperSum_Pa);
-  corners.push_back(instantaneous_depth("eta1 -> infinity (1e15 Pa s)", p, kCornerDepth_m, kStep_s,
-                                        "an elastic element: all hold"));
+  limiting_cases.push_back(instantaneous_depth("eta1 -> infinity (1e15 Pa s)", p, kLimitingDepth_m,
+                                               kStep_s, "an elastic element: all hold"));
   for (const double ratio : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
-    StabilityCorner corner =
+    LimitingCase limiting_case =
         instantaneous_depth("h/tau = " + significant(ratio, 2), paper_element(kStep_s / ratio),
-                            kCornerDepth_m, kStep_s, kByTheory);
-    for (CornerCell& cell : corner.cells) {
+                            kLimitingDepth_m, kStep_s, kByTheory);
+    for (LimitingCell& cell : limiting_case.cells) {
       if (cell.rule != StepRule::cvode_adams || ratio < 1e4) continue;
       cell.expected = StabilityClass::too_much_work;
       cell.right = cell.verdict.found == cell.expected;
     }
-    corners.push_back(std::move(corner));
+    limiting_cases.push_back(std::move(limiting_case));
   }
 }
 
-void add_moduli(std::vector<StabilityCorner>& corners) {
+void add_moduli(std::vector<LimitingCase>& limiting_cases) {
   constexpr double kTau_s = 0.02;
   BondElement maxwell = paper_element(kTau_s);
   maxwell.branches.front().modulus_Pa = maxwell.instantaneous_Pa();
   maxwell.equilibrium_Pa = 0.0;
-  corners.push_back(instantaneous_depth("E1 = 0, a depth", maxwell, kCornerDepth_m, kStep_s,
-                                        "a Maxwell fluid: all hold, down to the tension"));
+  limiting_cases.push_back(instantaneous_depth("E1 = 0, a depth", maxwell, kLimitingDepth_m,
+                                               kStep_s,
+                                               "a Maxwell fluid: all hold, down to the tension"));
   maxwell.lateral_Pa = 0.0;
   const double end = kStudySteps * kStep_s;
   CheckedProblem flow;
@@ -129,19 +130,20 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
         kLoad_N / maxwell.modulus_to_stiffness_m() / maxwell.relaxing_Pa() * (1.0 + t / kTau_s);
   }
   flow.peak = flow.reference.maxCoeff();
-  corners.push_back(tried("E1 = 0, a load", "0.05 N in a step and held; no tension",
-                          "it flows for as long as it is pushed: semi-implicit Euler and XPBD too "
-                          "slowly by h/tau = 5 %, all else holds",
-                          flow, kStep_s, [](StepRule rule) {
-                            return rule == StepRule::semi_implicit_euler || rule == StepRule::xpbd
-                                       ? StabilityClass::wrong_steady_state
-                                       : StabilityClass::holds;
-                          }));
+  limiting_cases.push_back(
+      tried("E1 = 0, a load", "0.05 N in a step and held; no tension",
+            "it flows for as long as it is pushed: semi-implicit Euler and XPBD too "
+            "slowly by h/tau = 5 %, all else holds",
+            flow, kStep_s, [](StepRule rule) {
+              return rule == StepRule::semi_implicit_euler || rule == StepRule::xpbd
+                         ? StabilityClass::wrong_steady_state
+                         : StabilityClass::holds;
+            }));
   BondElement loose = paper_element(kTau_s);
   loose.equilibrium_Pa = loose.branches.front().modulus_Pa = 0.0;
-  corners.push_back(instantaneous_depth("E2 = 0, a depth", loose, kCornerDepth_m, kStep_s,
-                                        "tension only: all hold"));
-  corners.push_back(
+  limiting_cases.push_back(instantaneous_depth("E2 = 0, a depth", loose, kLimitingDepth_m, kStep_s,
+                                               "tension only: all hold"));
+  limiting_cases.push_back(
       tried("E2 = 0, a load", "0.05 N in a step and held",
             "tension carries it: all hold but XPBD, whose made-up mass is that of the "
             "stiffness at rest, 0",
@@ -154,19 +156,19 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
   nothing.reference.setZero(kComparedSteps);
   nothing.peak = 1.0;
   nothing.problem = element_problem(loose, creep(0.05, end));
-  corners.push_back(tried(
+  limiting_cases.push_back(tried(
       "E2 = E' = 0, a load", "0.05 N in a step and held",
       "nothing carries it: Newton fails, and XPBD diverges", nothing, kStep_s, [](StepRule rule) {
         return rule == StepRule::xpbd ? StabilityClass::diverged : StabilityClass::newton_failed;
       }));
 }
 
-void add_depths(std::vector<StabilityCorner>& corners) {
+void add_depths(std::vector<LimitingCase>& limiting_cases) {
   const BondElement p = paper_element(0.02);
-  corners.push_back(instantaneous_depth(
+  limiting_cases.push_back(instantaneous_depth(
       "beyond 12 mm", p, 0.015, kStep_s,
       "all hold: no rule fails at the depth where liver is damaged, results carry a flag"));
-  corners.push_back(
+  limiting_cases.push_back(
       instantaneous_depth("theta over pi/6", p, 0.020, kStep_s,
                           "all hold: 33.7 degrees at x = 30 mm, results carry a flag"));
 }
@@ -231,8 +233,8 @@ void set_star_reference(const BondElement& p, double rate, double end_s, Checked
   checked.peak = checked.reference.cwiseAbs().maxCoeff();
 }
 
-StabilityCorner pushed_star(std::string name, std::string setup, std::string expected,
-                            double depth_m, const Expect& expect) {
+LimitingCase pushed_star(std::string name, std::string setup, std::string expected, double depth_m,
+                         const Expect& expect) {
   const BondElement p = paper_element(0.02);
   const CornerStar star(p, true);
   const double end = kStudySteps * kStep_s;
@@ -243,8 +245,8 @@ StabilityCorner pushed_star(std::string name, std::string setup, std::string exp
   return tried(std::move(name), std::move(setup), std::move(expected), checked, kStep_s, expect);
 }
 
-void add_stars(std::vector<StabilityCorner>& corners) {
-  corners.push_back(pushed_star(
+void add_stars(std::vector<LimitingCase>& limiting_cases) {
+  limiting_cases.push_back(pushed_star(
       "bond of no length", "guided star, 0 to 20 mm in 300 steps: B ends on its partner D",
       "the direction of the bond is lost: rules that balance forces find no "
       "balance; CVODE and XPBD, which do not look, end with no number",
@@ -254,7 +256,7 @@ void add_stars(std::vector<StabilityCorner>& corners) {
                    ? StabilityClass::diverged
                    : StabilityClass::newton_failed;
       }));
-  corners.push_back(pushed_star(
+  limiting_cases.push_back(pushed_star(
       "inverted bond", "guided star, 0 to 25.04 mm in 300 steps: B passes D within a step",
       "the law of the bond goes on with the other sign: fixed steps hold; a rule that controls its "
       "error sees the jump",
@@ -266,7 +268,7 @@ void add_stars(std::vector<StabilityCorner>& corners) {
   checked.problem =
       network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, 0.004}}));
   set_star_reference(p, 0.004 / end, end, checked);
-  corners.push_back(
+  limiting_cases.push_back(
       tried("buckling", "star, B not guided, 0 to 4 mm in 300 steps",
             "its stiffness across the plane is negative from the start: buckled; XPBD "
             "does not look and follows the straight path",
@@ -275,7 +277,7 @@ void add_stars(std::vector<StabilityCorner>& corners) {
             }));
 }
 
-void add_masses(std::vector<StabilityCorner>& corners) {
+void add_masses(std::vector<LimitingCase>& limiting_cases) {
   BondElement p = paper_element(0.02);
   p.lateral_Pa = 0.0;
   for (const double mass : {1e-9, 1e3}) {
@@ -285,7 +287,7 @@ void add_masses(std::vector<StabilityCorner>& corners) {
     linear.drag_per_s = kDrag_per_s;
     const CheckedProblem checked =
         problem_with_mass(p, mass, kDrag_per_s, 0.05, kStudySteps * kStep_s, kStep_s);
-    corners.push_back(
+    limiting_cases.push_back(
         tried("mass " + significant(mass, 2) + " kg", "0.05 N in a step and held, drag 20 1/s",
               mass < 1.0 ? "far above 2/omega: explicit rules grow, midpoint, Newmark and the "
                            "exponential rule on them ring, damped rules hold"
@@ -302,14 +304,14 @@ void add_masses(std::vector<StabilityCorner>& corners) {
 
 }  // namespace
 
-std::vector<StabilityCorner> stability_corners() {
-  std::vector<StabilityCorner> corners;
+std::vector<LimitingCase> find_limiting_cases() {
+  std::vector<LimitingCase> limiting_cases;
   Progress progress("limiting cases", 5);
   for (const auto& add : {add_relaxation_times, add_moduli, add_depths, add_stars, add_masses}) {
-    add(corners);
+    add(limiting_cases);
     progress.advance();
   }
-  return corners;
+  return limiting_cases;
 }
 
 }  // namespace tpm::accuracy
