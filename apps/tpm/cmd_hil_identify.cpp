@@ -53,11 +53,14 @@ std::string identified_text(const IdentifyRun& run) {
         significant(1e3 * *f.delay_mean_s, 3), significant(1e3 * *f.delay_largest_s, 3),
         significant(1e3 * *f.delay_jitter_s, 2), significant(1e3 * f.resolution_s, 2), f.edges);
   }
-  if (f.viscous_lower_95_N_s_per_m) {
-    text += fmt::format(
-        "friction    viscous above {} N s/m with 95 % (estimate {}), Coulomb {} to {} N\n",
-        significant(*f.viscous_lower_95_N_s_per_m, 3), significant(*f.viscous_N_s_per_m, 3),
-        significant(*f.coulomb_low_N, 2), significant(*f.coulomb_high_N, 2));
+  if (f.coulomb_low_N) {
+    text += fmt::format("friction    {}Coulomb {} to {} N\n",
+                        f.viscous_lower_95_N_s_per_m
+                            ? fmt::format("viscous above {} N s/m with 95 % (estimate {}), ",
+                                          significant(*f.viscous_lower_95_N_s_per_m, 3),
+                                          significant(*f.viscous_N_s_per_m, 3))
+                            : std::string(),
+                        significant(*f.coulomb_low_N, 2), significant(*f.coulomb_high_N, 2));
   }
   if (f.mass_kg) {
     text += f.mass_certain

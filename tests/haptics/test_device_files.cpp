@@ -72,6 +72,57 @@ TEST_CASE("A device file is written as it is read") {
   CHECK(device_block().write(keys) == json);
 }
 
+Json measured_file() {
+  return {{"device", "omega7"},
+          {"delay",
+           {{"provenance", "measured"},
+            {"mean_s", 0.001},
+            {"largest_s", 0.0012},
+            {"jitter_s", 1e-4},
+            {"resolution_s", 5e-4}}},
+          {"viscous_friction",
+           {{"provenance", "measured"}, {"lower_95_N_s_per_m", 0.2}, {"estimate_N_s_per_m", 0.25}}},
+          {"coulomb_friction", {{"provenance", "measured"}, {"interval_N", {0.0, 0.01}}}},
+          {"moving_mass",
+           {{"provenance", "measured"}, {"mass_kg", 0.3}, {"interval_kg", {0.28, 0.32}}}},
+          {"measurement", {{"simulated_device", false}}}};
+}
+
+TEST_CASE("A device file whose numbers contradict each other is refused") {
+  const DeviceFile sound = parse_device_file(measured_file(), "d");
+  CHECK(sound.measured_period_s == 1e-3);
+  CHECK_FALSE(sound.simulated);
+  struct Row {
+    const char* key;
+    Json value;
+    const char* words;
+  };
+  const Row rows[] = {
+      {"/delay/mean_s", 0.02, "d: key /delay/mean_s: 0.02 is above largest_s, 0.0012"},
+      {"/delay/jitter_s", 0.02, "d: key /delay/jitter_s: 0.02 is above largest_s, 0.0012"},
+      {"/viscous_friction/lower_95_N_s_per_m", 5.0, "5 is above estimate_N_s_per_m, 0.25"},
+      {"/viscous_friction/lower_95_N_s_per_m", 50.0, "50; expected 0 to 10"},
+      {"/viscous_friction/estimate_N_s_per_m", -1.0, "0.2 is above estimate_N_s_per_m, -1"},
+      {"/coulomb_friction/interval_N", Json{0.1, 0.0}, "is 0.1 to 0"},
+      {"/coulomb_friction/interval_N", Json{-1.0, 0.0}, "is -1 to 0"},
+      {"/moving_mass/interval_kg", Json{0.4, 0.2}, "is 0.4 to 0.2"},
+      {"/moving_mass/mass_kg", 3.0, "3 lies outside interval_kg"}};
+  for (const Row& row : rows) {
+    Json json = measured_file();
+    json[Json::json_pointer(row.key)] = row.value;
+    CAPTURE(row.key, row.value.dump());
+    CHECK_THAT(test::refusal_of([&] { (void)parse_device_file(json, "d"); }), Contains(row.words));
+  }
+}
+
+TEST_CASE("What was measured on a simulated device says so") {
+  Json json = measured_file();
+  json["measurement"]["simulated_device"] = true;
+  CHECK(parse_device_file(json, "d").simulated);
+  json.erase("measurement");
+  CHECK_FALSE(parse_device_file(json, "d").simulated);
+}
+
 TEST_CASE("A rehearsal stands for the device of its file") {
   const test::TempFolder folder;
   write_file(folder / "d.json", R"({"device": "falcon", "limits": {"force_N": 2}})");

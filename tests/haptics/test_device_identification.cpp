@@ -9,11 +9,13 @@
 #include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/session/identify_run.hpp"
+#include "tpm/haptics/session/six_hands.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 namespace {
 
+using Catch::Matchers::StartsWith;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
@@ -118,6 +120,25 @@ TEST_CASE("A handle that is held has an interval of mass and no number") {
   CHECK_FALSE(found.mass_certain);
   CHECK(*found.mass_low_kg < 0.85);
   CHECK(*found.mass_high_kg > 0.85);
+}
+
+TEST_CASE("The damping of a hand that holds the handle is no friction of the device") {
+  for (const SafeHand& hand : kSafeHands) {
+    for (const double friction : {0.05, 0.3}) {
+      Handle h;
+      h.mass_kg = hand.mass_kg;
+      h.viscous_N_s_per_m = friction + hand.damping_N_s_per_m;
+      h.held_N_per_m = hand.stiffness_N_per_m;
+      const DeviceIdentification found = identify_device(moved(h), h.period_s);
+      CAPTURE(hand.name, friction, found.held_N_per_m,
+              found.viscous_lower_95_N_s_per_m.value_or(-1));
+      CHECK_FALSE(found.viscous_lower_95_N_s_per_m);
+      CHECK_FALSE(found.viscous_N_s_per_m);
+      REQUIRE(found.not_identified.size() == 1);
+      CHECK_THAT(found.not_identified[0],
+                 StartsWith("viscous friction: something holds the handle with "));
+    }
+  }
 }
 
 TEST_CASE(

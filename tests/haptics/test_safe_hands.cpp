@@ -55,6 +55,14 @@ TEST_CASE("Of measured hardware the largest delay and a period more count") {
   CHECK_THAT(check.verdict(), Contains("of six hands stable with: "));
 }
 
+TEST_CASE("A delay that a slower loop measured counts with the period of that loop") {
+  DeviceLimits limits = measured_omega(1.2e-3, 0.25);
+  limits.measured_period_s = 2e-3;  // known to half of it
+  CHECK_THAT(checked_on(test::short_session(), limits).delay_s, WithinRel(3.2e-3, 1e-12));
+  limits.measured_period_s = 0.25e-3;
+  CHECK_THAT(checked_on(test::short_session(), limits).delay_s, WithinRel(2.2e-3, 1e-12));
+}
+
 TEST_CASE("Of what a session states, the larger delay and the smaller friction count") {
   Json json = test::short_session();
   json["virtual_device"] = {{"delay_periods", 4}, {"damping_N_s_per_m", 0.05}};

@@ -122,6 +122,35 @@ TEST_CASE("The surface lets go at zero force, recovers, and is met again where i
   CHECK_THAT(answer.force_N, WithinRel(contact.stiffness_N_per_m() * 1e-4, 0.05));
 }
 
+/// 100 N/m that never pull, as a law without relaxing branches.
+class ElasticSurface final : public ContactModel {
+ public:
+  void reset() noexcept override {}
+  ContactAnswer step(const ToolPose& tool) noexcept override {
+    return {Eigen::Vector3d(0.0, 0.0, -100.0 * std::max(tool.displacement_m.z(), 0.0))};
+  }
+  [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
+  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
+    return 100.0 * Eigen::Matrix3d::Identity();
+  }
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return instantaneous_stiffness();
+  }
+};
+
+TEST_CASE("A surface that never pulls does not follow the tool into the air") {
+  ElasticSurface model;
+  OneSidedContact contact(model, Eigen::Vector3d::UnitZ());
+  CHECK(contact.press(1e-3).force_N == 0.1);
+  CHECK_FALSE(contact.press(-1e-6).touching);
+  const OneSidedContact::Answer away = contact.press(-2e-3);
+  CHECK_FALSE(away.touching);
+  CHECK_THAT(away.surface_m, WithinAbs(0.0, 2e-6));
+  const OneSidedContact::Answer back = contact.press(1e-3);
+  CHECK(back.touching);
+  CHECK(back.force_N == 0.1);
+}
+
 TEST_CASE("One-sided contact is a contact model itself, whatever it wraps") {
   ElementContact inner(slow_liver(), 1e-3), same(slow_liver(), 1e-3);
   OneSidedContact wrapped(inner, Eigen::Vector3d::UnitZ());

@@ -209,6 +209,27 @@ TEST_CASE("A session that cannot be prepared leaves no recording, and the next o
   CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
 }
 
+TEST_CASE("A file that was measured on another device, or on a simulated one, is refused") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  const Script script(operator_lines(session, folder));
+  DeviceChoice device = stand_in();
+  const auto said_of = [&](const char* key, const Json& value) {
+    Json file = read_json(stand_in().file);
+    file[Json::json_pointer(key)] = value;
+    device.file = folder / "device.json";
+    write_file(device.file, to_text(file));
+    SessionRunOptions options;
+    options.recording = folder / "r";
+    return message_of([&] { (void)run_session(session, device, options); });
+  };
+  CHECK_THAT(said_of("/serial", "1"), Contains("device.json: key /serial: was measured on the "
+                                               "device '1', and this is '4711'"));
+  CHECK_THAT(said_of("/measurement", Json{{"simulated_device", true}}),
+             Contains("key /measurement/simulated_device: was measured on a simulated device"));
+  CHECK_FALSE(std::filesystem::exists(folder / "r"));
+}
+
 TEST_CASE("The device is told the session's limit of the force") {
   const HilSession session =
       test::parsed(test::with(test::short_session(), "/limits/force", "3 N"));

@@ -32,7 +32,8 @@ void print_row(const char* what, const test::Handle& h) {
   }
   fmt::print("{:.3f},{:.3f},{:.3f},{:.4f},{},{:.4f},{:.4f} to {:.4f}\n", 1e3 * *f.delay_mean_s,
              1e3 * *f.delay_largest_s, 1e3 * *f.delay_jitter_s, *f.mass_kg,
-             f.mass_certain ? "yes" : "interval", *f.viscous_lower_95_N_s_per_m, *f.coulomb_low_N,
+             f.mass_certain ? "yes" : "interval",
+             f.viscous_lower_95_N_s_per_m.value_or(std::nan("")), *f.coulomb_low_N,
              *f.coulomb_high_N);
 }
 
@@ -77,7 +78,7 @@ struct Held {
 
 void add(Held& held, const test::Handle& h, const DeviceIdentification& f) {
   ++held.handles;
-  if (!f.delay_mean_s || !f.mass_kg) return;
+  if (!f.delay_mean_s || !f.mass_kg || !f.viscous_lower_95_N_s_per_m) return;
   ++held.found;
   const double late_s = h.position_late_s + h.force_late_s;
   held.mean += std::abs(*f.delay_mean_s - late_s) <= 0.5 * h.period_s ? 1 : 0;

@@ -54,6 +54,9 @@ DeviceFile parse_device_file(const Json& written, const std::string& where) {
   file.measured_delay_s = measured_number(keys.delay, &DeviceDelayKeys::largest_s);
   file.measured_friction_N_s_per_m =
       measured_number(keys.viscous_friction, &ViscousFrictionKeys::lower_95_N_s_per_m);
+  if (keys.delay) file.measured_period_s = 2.0 * keys.delay->resolution_s.value_or(0.0);
+  const auto simulated = keys.measurement.find("simulated_device");
+  file.simulated = simulated != keys.measurement.end() && *simulated == true;
   return file;
 }
 
@@ -104,6 +107,7 @@ DeviceLimits limits_in(const DeviceFile& file) {
   if (file.encoder_step_m) limits.encoder_step_m = *file.encoder_step_m;
   limits.measured_delay_s = file.measured_delay_s;
   limits.measured_friction_N_s_per_m = file.measured_friction_N_s_per_m;
+  limits.measured_period_s = file.measured_period_s;
   return limits;
 }
 
@@ -137,6 +141,7 @@ DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file) {
   if (file.encoder_step_m) limits.encoder_step_m = *file.encoder_step_m;
   limits.measured_delay_s = file.measured_delay_s;
   limits.measured_friction_N_s_per_m = file.measured_friction_N_s_per_m;
+  limits.measured_period_s = file.measured_period_s;
   return limits;
 }
 

@@ -28,6 +28,8 @@ struct DeviceFile {
   std::optional<double> measured_delay_s;
   /// Lower bound of the viscous friction at 95 %, N s/m. Empty unless it was measured.
   std::optional<double> measured_friction_N_s_per_m;
+  double measured_period_s = 0.0;  ///< of the loop that measured the delay; 0: not known
+  bool simulated = false;          ///< measured on a simulated device: says nothing of hardware
 };
 
 /// Throws Error(bad_input) with file and key.

@@ -1,9 +1,12 @@
 #include "tpm/haptics/device/device_keys.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/haptics/device/device_limits.hpp"
 
 namespace tpm::haptics {
 namespace {
@@ -62,6 +65,44 @@ const Block<DeviceLimitKeys>& device_limits_block() {
   return block;
 }
 
+/// Of a measurement: its mean and its spread are not above its largest value.
+std::optional<Fault> below_largest(const DeviceDelayKeys& delay) {
+  const auto above = [&delay](const std::optional<double>& part, const char* name) {
+    if (!part || *part <= delay.largest_s) return std::optional<Fault>();
+    return std::optional(Fault{name, fmt::format("{} is above largest_s, {}", shortest(*part),
+                                                 shortest(delay.largest_s))});
+  };
+  const auto mean = above(delay.mean_s, "mean_s");
+  return mean ? mean : above(delay.jitter_s, "jitter_s");
+}
+
+/// The limit of 95 % is a lower one. An estimate may be negative, the limit is 0 then.
+std::optional<Fault> below_estimate(const ViscousFrictionKeys& friction) {
+  const double estimate = friction.estimate_N_s_per_m.value_or(friction.lower_95_N_s_per_m);
+  if (friction.lower_95_N_s_per_m <= std::max(0.0, estimate)) return std::nullopt;
+  return Fault{"lower_95_N_s_per_m",
+               fmt::format("{} is above estimate_N_s_per_m, {}",
+                           shortest(friction.lower_95_N_s_per_m), shortest(estimate))};
+}
+
+std::optional<Fault> not_an_interval(const std::optional<std::vector<double>>& interval,
+                                     const char* name) {
+  if (!interval || (interval->front() >= 0.0 && interval->front() <= interval->back())) {
+    return std::nullopt;
+  }
+  return Fault{name,
+               fmt::format("is {} to {}", shortest(interval->front()), shortest(interval->back()))};
+}
+
+std::optional<Fault> mass_outside(const MovingMassKeys& mass) {
+  if (const auto fault = not_an_interval(mass.interval_kg, "interval_kg")) return fault;
+  if (!mass.mass_kg || !mass.interval_kg) return std::nullopt;
+  if (*mass.mass_kg >= mass.interval_kg->front() && *mass.mass_kg <= mass.interval_kg->back()) {
+    return std::nullopt;
+  }
+  return Fault{"mass_kg", fmt::format("{} lies outside interval_kg", shortest(*mass.mass_kg))};
+}
+
 const Block<DeviceDelayKeys>& delay_block() {
   using K = DeviceDelayKeys;
   static const Block<K> block(
@@ -74,7 +115,8 @@ const Block<DeviceDelayKeys>& delay_block() {
        key("jitter_s", &K::jitter_s, number(kZeroOrMore), "standard deviation"),
        key("resolution_s", &K::resolution_s, number(kZeroOrMore),
            "half a period of the loop that measured it"),
-       key("tries", &K::tries, whole<int>(1, 1e9), "how often it was measured")});
+       key("tries", &K::tries, whole<int>(1, 1e9), "how often it was measured")},
+      {{"a mean and a spread that are not above the largest delay", below_largest}});
   return block;
 }
 
@@ -84,9 +126,10 @@ const Block<ViscousFrictionKeys>& viscous_block() {
       "viscous_friction", "viscous friction of the device",
       {known_by<K>(),
        required(key("lower_95_N_s_per_m", &K::lower_95_N_s_per_m,
-                    number({.least = 0.0, .most = 100.0}),
+                    number({.least = 0.0, .most = kMostHandleFriction_N_s_per_m}),
                     "the friction is larger with 95 %; Coulomb friction is not counted")),
-       key("estimate_N_s_per_m", &K::estimate_N_s_per_m, number(), "best estimate")});
+       key("estimate_N_s_per_m", &K::estimate_N_s_per_m, number(), "best estimate")},
+      {{"a lower limit that is not above the estimate", below_estimate}});
   return block;
 }
 
@@ -104,7 +147,9 @@ const Block<CoulombFrictionKeys>& coulomb_block() {
   using K = CoulombFrictionKeys;
   static const Block<K> block(
       "coulomb_friction", "friction that does not depend on speed",
-      {known_by<K>(), key("interval_N", &K::interval_N, interval_type(), "lower and upper bound")});
+      {known_by<K>(), key("interval_N", &K::interval_N, interval_type(), "lower and upper bound")},
+      {{"an interval from its lower to its upper bound, both at least 0",
+        [](const K& coulomb) { return not_an_interval(coulomb.interval_N, "interval_N"); }}});
   return block;
 }
 
@@ -113,7 +158,9 @@ const Block<MovingMassKeys>& mass_block() {
   static const Block<K> block(
       "moving_mass", "mass that a hand moves",
       {known_by<K>(), key("mass_kg", &K::mass_kg, number(kAboveZero), "where it is known to 10 %"),
-       key("interval_kg", &K::interval_kg, interval_type(), "lower and upper bound")});
+       key("interval_kg", &K::interval_kg, interval_type(), "lower and upper bound")},
+      {{"an interval from its lower to its upper bound, both at least 0, that holds the mass",
+        mass_outside}});
   return block;
 }
 

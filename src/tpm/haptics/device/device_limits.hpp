@@ -7,6 +7,10 @@
 
 namespace tpm::haptics {
 
+/// Most viscous friction that a device may claim: no handle that a hand moves has more, and the
+/// gate trusts it.
+inline constexpr double kMostHandleFriction_N_s_per_m = 10.0;
+
 /// Limits of a kind of device. Numbers that nobody has measured here are marked.
 struct DeviceLimits {
   std::string kind;
@@ -30,6 +34,7 @@ struct DeviceLimits {
   std::optional<double> measured_friction_N_s_per_m = std::nullopt;
   /// Where each limit comes from, by its key in a device file; of devices known by a shipped file.
   std::vector<std::pair<std::string, std::string>> provenance = {};
+  double measured_period_s = 0.0;  ///< of the loop that measured the delay; 0: not known
 
   /// Its motors may move: it is neither simulated nor a replay.
   [[nodiscard]] bool hardware() const { return kind != "replay" && !plant && !simulated; }

@@ -50,8 +50,6 @@ void require_limit(const std::string& file, const char* name, double value, doub
 void require_sound(const std::string& file, const tpm_device_limits& limits) {
   constexpr double kMostForce_N = 50.0, kMostReach_m = 1.0, kAny = 1e9, kLeastRampIn_s = 0.1;
   constexpr double kMostRampIn_s = 60.0;
-  constexpr double kMostFriction =
-      10.0;  // no handle that a hand moves has more, and a gate trusts it
   constexpr int kMostDelay = 1000;
   require_limit(file, "force_N", limits.force_N, 0.0, kMostForce_N, false);
   require_limit(file, "reach_m", limits.reach_m, 0.0, kMostReach_m, false);
@@ -60,7 +58,8 @@ void require_sound(const std::string& file, const tpm_device_limits& limits) {
   require_limit(file, "slew_N_per_s", limits.slew_N_per_s, 0.0, kAny, false);
   require_limit(file, "least_ramp_in_s", limits.least_ramp_in_s, kLeastRampIn_s, kMostRampIn_s,
                 true);
-  require_limit(file, "friction_N_s_per_m", limits.friction_N_s_per_m, 0.0, kMostFriction, true);
+  require_limit(file, "friction_N_s_per_m", limits.friction_N_s_per_m, 0.0,
+                kMostHandleFriction_N_s_per_m, true);
   require_limit(file, "delay_periods", limits.delay_periods, 0.0, kMostDelay, true);
 }
 

@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -259,7 +260,18 @@ std::optional<std::string> WebSocketClient::receive(double timeout_s, bool poll)
 }
 
 void WebSocketClient::close() noexcept {
-  (void)send_frame(FrameKind::close, close_payload(kCloseNormal, ""), 0.01);
+  constexpr double kFarewell_s = 0.02;
+  if (send_frame(FrameKind::close, close_payload(kCloseNormal, ""), 0.01)) {
+    // Closing a socket with unread bytes resets the connection; the service could then lose the
+    // last messages, a zero force among them.
+    (void)::shutdown(socket_.handle(), SHUT_WR);
+    std::array<char, 4096> unread;
+    for (const auto until = after_s(kFarewell_s); LoopbackClock::now() < until;) {
+      const ssize_t count = ::recv(socket_.handle(), unread.data(), unread.size(), 0);
+      if (count == 0 || (count < 0 && !would_wait())) break;
+      if (count < 0 && !ready(socket_.handle(), POLLIN, until)) break;
+    }
+  }
   socket_.close();
   if (over_.empty()) over_ = "closed";
 }

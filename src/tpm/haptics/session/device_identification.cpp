@@ -10,6 +10,7 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/haptics/device/device_limits.hpp"
 
 namespace tpm::haptics {
 namespace {
@@ -397,18 +398,28 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
   for (const double d : delays) squares += (d - mean) * (d - mean);
   found.edges = static_cast<int>(delays.size());
   found.delay_mean_s = std::max(0.0, mean);
-  found.delay_largest_s =
-      std::max(*found.delay_mean_s, *std::max_element(delays.begin(), delays.end()));
   found.delay_jitter_s = std::sqrt(squares / static_cast<double>(delays.size() - 1));
+  found.delay_largest_s = std::max({*found.delay_mean_s, *found.delay_jitter_s,
+                                    *std::max_element(delays.begin(), delays.end())});
   // Neighbouring windows overlap by half: twice the variance for as many independent ones. The
   // limit of friction is that of 99 %: errors of friction that rubs are not quite those of least
   // squares, and simulated devices need this for 95 %
   // (tests/haptics/test_device_identification.cpp).
   constexpr double kOverlap = 2.0, kOneSided = 2.33, kBothSides = 1.96;
   const auto error = [&](Eigen::Index i) { return std::sqrt(kOverlap * s.spread(i, i)); };
-  found.viscous_N_s_per_m = s.value[1];
+  // The centring spring is a part of the forces: what is left of stiffness is a hand's.
+  const bool free = std::abs(s.value[3]) < std::max(3.0, kBothSides * error(3));
   constexpr double kSums = 0.98;  // sums and signs over samples are not quite the integrals
-  found.viscous_lower_95_N_s_per_m = std::max(0.0, kSums * s.value[1] - kOneSided * error(1));
+  if (free) {
+    found.viscous_N_s_per_m = s.value[1];
+    found.viscous_lower_95_N_s_per_m =
+        std::clamp(kSums * s.value[1] - kOneSided * error(1), 0.0, kMostHandleFriction_N_s_per_m);
+  } else {
+    // The damping of a hand is not friction of the device, and the gate would count it.
+    found.not_identified.push_back(
+        fmt::format("viscous friction: something holds the handle with {} N/m; let go of it",
+                    significant(s.value[3], 3)));
+  }
   const double coulomb_N = s.value[2];
   const double coulomb_margin_N = (1.0 - kSums) * std::abs(coulomb_N) + kBothSides * error(2);
   found.coulomb_low_N = std::max(0.0, coulomb_N - coulomb_margin_N);
@@ -416,8 +427,6 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
   found.held_N_per_m = s.value[3];
   found.mass_kg = s.value[0];
   constexpr double kWithin = 0.1, kMostStep_m = 10.5e-6, kMostCoulomb_N = 0.05;
-  // The centring spring is a part of the forces: what is left of stiffness is a hand's.
-  const bool free = std::abs(s.value[3]) < std::max(3.0, kBothSides * error(3));
   found.mass_certain = free && step_m <= kMostStep_m && coulomb_N <= kMostCoulomb_N &&
                        kBothSides * error(0) < kWithin * s.value[0];
   const double margin_kg = std::max(kWithin * s.value[0], kBothSides * error(0));

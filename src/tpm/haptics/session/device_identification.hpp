@@ -29,6 +29,7 @@ struct DeviceIdentification {
   /// Device and whatever holds it. `mass_certain`: to 10 %; else only the interval is known.
   std::optional<double> mass_kg, mass_low_kg, mass_high_kg;
   bool mass_certain = false;
+  /// Of the device: empty if something holds the handle, whose damping cannot be told apart.
   std::optional<double> viscous_N_s_per_m, viscous_lower_95_N_s_per_m;
   std::optional<double> coulomb_low_N, coulomb_high_N;
   double held_N_per_m = 0.0;  ///< stiffness of whatever holds the handle

@@ -234,6 +234,8 @@ Json device_file_json(const IdentifyRun& run, const std::string& date) {
     file.viscous_friction = {.provenance = KnownBy::measured,
                              .lower_95_N_s_per_m = digits(f.viscous_lower_95_N_s_per_m),
                              .estimate_N_s_per_m = digits(f.viscous_N_s_per_m)};
+  }
+  if (f.coulomb_low_N) {
     file.coulomb_friction = {
         .provenance = KnownBy::measured,
         .interval_N = std::vector{digits(f.coulomb_low_N), digits(f.coulomb_high_N)}};

@@ -96,8 +96,9 @@ void count_device(RenderingCheck& check, const HilSession& session, const Device
   const double stated_s = session.plant.delay_periods * period_s;
   if (limits.hardware()) {
     check.delay_measured = limits.measured_delay_s.has_value();
-    const double known_s =
-        check.delay_measured ? *limits.measured_delay_s + period_s : kUnmeasuredDelay_s;
+    const double known_s = check.delay_measured ? *limits.measured_delay_s +
+                                                      std::max(period_s, limits.measured_period_s)
+                                                : kUnmeasuredDelay_s;
     check.delay_s = std::max(known_s, stated_s);
     check.friction_N_s_per_m = limits.measured_friction_N_s_per_m.value_or(0.0);
     if (session.stated_friction_N_s_per_m) {

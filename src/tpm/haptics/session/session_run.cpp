@@ -129,6 +129,11 @@ std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
 void require_same_device(const DeviceChoice& choice, const DeviceIdentity& device) {
   if (choice.file.empty() || choice.kind == "virtual") return;
   const DeviceFile file = read_device_file(choice.file);
+  if (file.simulated && device.hardware) {
+    throw Error(ExitCode::environment, file.where + ": key /measurement/simulated_device",
+                "was measured on a simulated device, and this one has motors",
+                "the file of this device (tpm hil identify)");
+  }
   if (file.serial.empty() || file.serial == device.serial) return;
   throw Error(ExitCode::environment, file.where + ": key /serial",
               fmt::format("was measured on the device '{}', and this is '{}'",
