@@ -89,7 +89,7 @@ Validation compared(std::vector<PreparedRecording> recordings, bool asked = true
   request.recordings = std::move(recordings);
   if (asked) {
     for (const PreparedRecording& r : request.recordings) {
-      request.presses.push_back({{{r.recording.time_s.front() - 0.1, 0.0}}, kAskedHold_s});
+      request.presses.push_back({{}, kAskedHold_s});
     }
   }
   request.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
