@@ -93,19 +93,13 @@ class EvidencePage {
     return name;
   }
 
-  /// A SHA-256 by its beginning.
-  [[nodiscard]] static std::string shown(const std::string& value) {
-    constexpr std::size_t kShaDigits = 64;
-    const bool sha = value.size() == kShaDigits &&
-                     value.find_first_not_of("0123456789abcdef") == std::string::npos;
-    return sha ? value.substr(0, kShortSha) + " ..." : value;
-  }
-
   static void add_changes(Document& d, const std::vector<CredibilityChange>& changes) {
+    constexpr std::size_t kMost = 48;  // characters, so that what is now stands beside what was
     d.heading(2, "Changed since this page was written");
     Table table{"", {{"place"}, {"was"}, {"now"}}};
     for (const CredibilityChange& c : changes) {
-      table.rows.push_back({{c.place}, {shown(c.before)}, {shown(c.now), Tone::bad}});
+      table.rows.push_back(
+          {{c.place}, {printable(c.before, kMost)}, {printable(c.now, kMost), Tone::bad}});
     }
     d.table(std::move(table));
   }
