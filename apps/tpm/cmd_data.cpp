@@ -10,6 +10,7 @@
 #include "tpm/files/import/description.hpp"
 #include "tpm/files/import/pack.hpp"
 #include "tpm/files/json.hpp"
+#include "tpm/files/require_exists.hpp"
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
@@ -69,8 +70,12 @@ int show(const Session& session, const std::string& argument, bool all_rows) {
   return 0;
 }
 
-/// Every file is checked and every failure reported, one line each.
+/// Every file is checked and every failure reported, one line each. A file that is not there is
+/// bad input, not one that fails.
 int check(const Session& session, const std::vector<std::string>& files) {
+  for (const std::string& file : files) {
+    if (fs::path(file).has_extension()) require_exists(file);
+  }
   Json report = Json::array();
   bool sound = true;
   for (const std::string& file : files) {

@@ -20,6 +20,7 @@
 #include "option_kinds.hpp"
 #include "out_of_memory.hpp"
 #include "tpm/base/nearest_word.hpp"
+#include "tpm/files/require_exists.hpp"
 #include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/device/plugin_device.hpp"
@@ -64,6 +65,13 @@ std::string seen_text(const SeenDevice& device) {
   return fmt::format("{:<8} {}, serial {}: --device {} --serial {}{}\n", device.index, device.name,
                      device.serial, device.kind, device.serial,
                      limits_of(device.kind).tried ? "" : " (never tried with this device)");
+}
+
+/// Of what the system's loader would word in its own way, or look for elsewhere.
+void require_libraries(const DeviceOptions& options) {
+  for (const std::string& file : {options.plugin, options.library}) {
+    if (!file.empty()) require_exists(file);
+  }
 }
 
 /// What a plugin says of its devices; nothing is opened.
@@ -128,6 +136,7 @@ std::pair<Json, std::string> listed_inverse(const InverseAddress& address) {
 }
 
 int list_devices(const DeviceOptions& options, const Session& session) {
+  require_libraries(options);
   if (!options.plugin.empty()) return list_plugin(options, session);
   std::vector<SeenDevice> devices;
   std::string reason;
@@ -403,6 +412,7 @@ DeviceChoice chosen_device(const DeviceOptions& options) {
   choice.file = options.file;
   require_kind(choice, choice.replay, "--device-recording", "replay");
   require_kind(choice, choice.plugin, "--plugin", "plugin");
+  require_libraries(options);
   if (!choice.file.empty()) (void)read_device_file(choice.file);  // also where nothing asks for it
   return choice;
 }

@@ -7,6 +7,7 @@
 #include "command.hpp"
 #include "common_options.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/require_exists.hpp"
 #include "tpm/files/writable.hpp"
 #include "tpm/paper/show/organ_study_report.hpp"
 #include "tpm/show/draw.hpp"
@@ -21,10 +22,11 @@ struct ExperimentsOptions {
 
 int experiments(const ExperimentsOptions& options, const Session& session) {
   const std::string python = find_drawing_python();  // before minutes of work, not after
-  require_writable_folder(options.folder);
   const std::filesystem::path path = options.config.empty()
                                          ? share_dir() / "configs" / "organ_experiments.json"
                                          : std::filesystem::path(options.config);
+  require_exists(path);  // no folder is left for nothing
+  require_writable_folder(options.folder);
   will_write_into(options.folder,
                   {"report.md", "report.html", "experiments.json", "readings.csv", "fits.csv",
                    "curves.csv", "figures.json", "report.run.json"},

@@ -81,6 +81,25 @@ std::string on_terminal(const std::vector<const char*>& arguments, const char* n
 
 const std::string kRed = "\x1b[31m";
 
+/// Two that hold, one with a wrong value, and one in which a solver gives up.
+std::vector<VerificationCheck> stand_in_checks() {
+  const auto check = [](double tolerance, double measured) {
+    return VerificationCheck{"made", "value",   "this test",
+                             1.0,    tolerance, [measured](double) { return measured; }};
+  };
+  VerificationCheck stuck = check(0.1, 1.0);
+  stuck.measure = [](double) -> double {
+    throw Error(ExitCode::numerical, "made", "gave up", "an answer");
+  };
+  return {check(0.1, 1.05), check(0.1, 1.2), stuck, check(0.5, 1.2)};
+}
+
+std::ptrdiff_t occurrences(const std::string& text, const std::string& words) {
+  std::ptrdiff_t count = 0;
+  for (auto at = text.find(words); at != std::string::npos; at = text.find(words, at + 1)) ++count;
+  return count;
+}
+
 }  // namespace
 
 TEST_CASE("verification: closed forms hold, and fail with a wrong coefficient") {
@@ -101,6 +120,39 @@ TEST_CASE("verification: a check without a number has failed") {
   CHECK_FALSE(row.holds());
   row.measured = 0.5;
   CHECK(row.holds());
+}
+
+TEST_CASE("verification: of rows that hold and rows that fail, only the latter are red") {
+  const std::vector<VerificationGroup> groups{{"stand-in", "rows of this test", stand_in_checks}};
+  const VerificationRun run = run_verification(groups, 0.0);
+  REQUIRE(run.rows.size() == 4);
+  CHECK(run.failed() == 2);
+  CHECK(verification_words(run) == "4 checks: 2 FAILED.");
+  const std::vector<bool> holds{true, false, false, true};
+  const Json json = to_json(run);
+  CHECK(json.at("failed") == 2);
+  CHECK(json.at("holds") == false);
+  for (std::size_t i = 0; i < holds.size(); ++i) CHECK(json.at("rows")[i].at("holds") == holds[i]);
+  CHECK(json.at("rows")[1].at("measured") == 1.2);
+  CHECK_FALSE(json.at("rows")[2].contains("measured"));
+  CHECK(json.at("rows")[2].at("failure") == "made: gave up; expected an answer");
+  const std::string csv = verification_csv(run);
+  CHECK(occurrences(csv, ",holds,") == 2);
+  CHECK(occurrences(csv, ",fails,") == 2);
+  for (const VerificationLine& line : verification_lines(run)) {
+    CAPTURE(line.text);
+    CHECK(line.failed == (line.text.find("FAIL") != std::string::npos));
+  }
+  const test::TempFolder folder;
+  write_verification(run, folder / "page", 1.0);
+  const std::string page = read_file(folder / "page/report.html");
+  CHECK(occurrences(page, "bad\">FAILS") == 2);
+  CHECK(occurrences(page, "good\">holds") == 2);
+  CHECK(occurrences(page, "FAILS") == 2);
+  CHECK_THAT(page, Contains("bad\">1.2<") && Contains("bad\">made: gave up") &&
+                       Contains("bad\">4 checks: 2 FAILED.") &&
+                       Contains("bad\">stand-in: 2 of 4 hold"));
+  CHECK(occurrences(read_file(folder / "page/report.md"), "FAILS") == 2);
 }
 
 TEST_CASE("verification: names of groups") {
@@ -142,6 +194,29 @@ TEST_CASE("tpm accuracy verify: failing rows are red on a terminal, others never
   CHECK_THAT(on_terminal(flawed, "1"), Contains("FAILS") && !Contains(kRed));
   CHECK_THAT(on_terminal({"accuracy", "verify", "closed-forms"}, nullptr),
              Contains("all hold") && !Contains(kRed));
+}
+
+TEST_CASE("tpm accuracy verify: a flaw that only some checks can see", "[heavy]") {
+  const test::TempFolder folder;
+  const Run run =
+      run_program("accuracy verify closed-forms --flaw 0.00001% --format json --folder '" +
+                  (folder / "page") + "'");
+  CHECK(run.exit_code == 1);
+  const Json json = Json::parse(run.output);
+  std::ptrdiff_t failed = 0;
+  for (const Json& row : json.at("rows")) failed += row.at("holds") ? 0 : 1;
+  const auto checks = std::ssize(json.at("rows"));
+  REQUIRE(failed > 0);
+  REQUIRE(failed < checks);
+  CHECK(json.at("failed") == failed);
+  const std::string page = read_file(folder / "page/report.html");
+  CHECK(occurrences(page, "bad\">FAILS") == failed);
+  CHECK(occurrences(page, "good\">holds") == checks - failed);
+  // Beside the rows: how many fail, and that there is a flaw.
+  const std::string text =
+      on_terminal({"accuracy", "verify", "closed-forms", "--flaw", "0.00001%"}, nullptr);
+  CHECK(occurrences(text, kRed) == failed + 2);
+  CHECK(occurrences(text, kRed + "  FAILS") == failed);
 }
 
 TEST_CASE("the example in the help of tpm accuracy verify runs") {

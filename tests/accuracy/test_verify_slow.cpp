@@ -1,6 +1,6 @@
 // tpm accuracy verify: the groups that take longer.
 #include <catch2/catch.hpp>
-#include <chrono>
+#include <ctime>
 
 #include "tpm/accuracy/verify/verification.hpp"
 
@@ -20,11 +20,11 @@ TEST_CASE("verification: orders and reductions hold, and fail with a wrong coeff
   }
 }
 
-TEST_CASE("verification: everything takes at most two minutes") {
-  const auto start = std::chrono::steady_clock::now();
+TEST_CASE("verification: everything takes at most two minutes of one processor") {
+  const std::clock_t start = std::clock();
   const VerificationRun all = run_verification(verification_groups(), 0.0);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  const double processor_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   CHECK(all.rows.size() > 100);
   CHECK(all.failed() == 0);
-  CHECK(took.count() < 120.0);
+  CHECK(processor_s < 120.0);
 }

@@ -1,10 +1,11 @@
-// tpm validate on creep as tables have it: stress and strain, the stress imposed, with laws that
-// were fitted to creep.
+// tpm validate on creep: depth under a load, with a law that was fitted to relaxation; and as
+// tables have it, stress and strain, the stress imposed, with laws that were fitted to creep.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <string>
 
 #include "creep_recordings.hpp"
+#include "quiet_recordings.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "validation_studies.hpp"
@@ -14,7 +15,11 @@ namespace {
 
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+using test::creep_recording;
 using test::CreepTrial;
+using test::quiet_law;
+using test::request_for;
 
 PreparedRecording prepared(const CreepTrial& trial, double stiffer = 1.0) {
   Recording r = test::creep_recording_of(trial);
@@ -43,6 +48,44 @@ ValidationRequest request_with(PreparedRecording recording) {
 const CreepTrial kFaster{.rest_s = 4.0, .ramp_s = 1.0, .stress_Pa = 60.0, .noise = 3e-4, .seed = 7};
 
 }  // namespace
+
+TEST_CASE("creep has depth, ratio, half time and rate of the curve", "[validate]") {
+  // Depth 1 mm + 0.1 mm/s (t - corner) on a load that ends its ramp at 5 s.
+  PreparedRecording r = creep_recording(quiet_law(), 1.0, 4);
+  Eigen::VectorXd curve(501);
+  for (int i = 0; i <= 500; ++i) curve[i] = 1e-3 + 1e-4 * std::max(0.05 * i - 5.0, 0.0);
+  const RecordingParts parts = parts_of(r);
+  REQUIRE(parts.has_hold());
+  CHECK_THAT(parts.corner_s, WithinAbs(5.0, 1e-9));
+  const auto read = [&](QuantityKind kind) {
+    return read_quantity({kind}, parts, r.recording, 0.0, curve).value().value;
+  };
+  CHECK_THAT(read(QuantityKind::peak), WithinRel(1e-3, 1e-9));
+  CHECK_THAT(read(QuantityKind::rate), WithinRel(1e-4, 1e-9));
+  const double end = 1e-3 + 1e-4 * 19.0;  // mean of the last 2 s of 20 s
+  CHECK_THAT(read(QuantityKind::end_of_hold), WithinRel(end, 1e-9));
+  CHECK_THAT(read(QuantityKind::half_time), WithinRel(9.5, 1e-6));
+  CHECK(quantity_words({QuantityKind::peak}, Quantity::load, Quantity::indentation_depth) ==
+        "depth at the corner");
+}
+
+TEST_CASE("creep of the same material is as predicted, of a stiffer one it is not", "[validate]") {
+  const LawFile law = quiet_law();
+  const Validation same = validate(request_for(law, creep_recording(law, 1.0, 5)));
+  INFO(to_terminal_text(same));
+  CHECK(same.verdict == ModelVerdict::not_seen);
+  CHECK(same.recordings.front().creep);
+  CHECK(same.recordings.front().quantities.size() == 5);
+  ValidationRequest stiff = request_for(law, creep_recording(law, 1.1, 6));
+  stiff.requirement = parse_requirement("0.4 mm", "test");
+  const Validation other = validate(stiff);
+  const QuantityComparison& end =
+      test::study_quantity(other.recordings.front(), QuantityKind::end_of_hold);
+  // S = 0.1 N / 60 N/m, D that over 1.1.
+  CHECK_THAT(end.e.error, WithinAbs((0.1 / 60.0) * (1.0 - 1.0 / 1.1), 3.0 * end.e.u_val + 1e-6));
+  CHECK(end.verdict == ModelVerdict::adequate);
+  CHECK(validate(request_for(law, creep_recording(law, 1.1, 6))).verdict == ModelVerdict::seen);
+}
 
 TEST_CASE("creep in a table of stress and strain is validated with a law of creep",
           "[validate][creep]") {

@@ -87,11 +87,7 @@ Validation compared(std::vector<PreparedRecording> recordings, bool asked = true
   request.law_file = "law.json";
   request.law = hand_law();
   request.recordings = std::move(recordings);
-  if (asked) {
-    for (const PreparedRecording& r : request.recordings) {
-      request.presses.push_back({{{r.recording.time_s.front() - 0.1, 0.0}}, kAskedHold_s});
-    }
-  }
+  if (asked) request.presses.assign(request.recordings.size(), SessionMotion{{}, kAskedHold_s});
   request.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
   request.requirement = parse_requirement("10%", "test");
   return validate(request);

@@ -61,14 +61,15 @@ TEST_CASE("A session's presses are those that it asked for, each with what came 
     const Recording& r = presses[i].recording.recording;
     CHECK(r.header.sha256 == "abc");
     CHECK(r.time_s.size() >= 2000);
-    const std::vector<Knot>& earlier = presses[i].motion.earlier;
-    REQUIRE_FALSE(earlier.empty());
-    CHECK(earlier.back().time_s < r.time_s.front());
+    const std::vector<Knot>& knots = presses[i].motion.knots;
+    CHECK(knots.front().time_s == 0.0);
+    CHECK(knots.back().time_s >= r.time_s.back());
+    CHECK(knots.back().time_s < r.time_s.back() + 0.01);
     CHECK_THAT(r.time_s.back() - presses[i].motion.hold_asked_s.value(), WithinAbs(3.0, 0.01));
     const double deepest = *std::ranges::max_element(r.drive);
     CHECK_THAT(deepest, WithinAbs(i == 0 ? 2e-3 : 3e-3, 2e-4));
   }
-  CHECK(presses[1].motion.earlier.size() > presses[0].recording.recording.time_s.size());
+  CHECK(presses[1].motion.knots.size() > presses[0].motion.knots.size());
 }
 
 TEST_CASE("The law that was rendered answers the hand's motion, and a stiffer one does not") {
@@ -94,8 +95,8 @@ TEST_CASE("The law that was rendered answers the hand's motion, and a stiffer on
   INFO(to_terminal_text(same));
   for (const fit::RecordingComparison& r : same.recordings) {
     for (const fit::QuantityComparison& q : r.quantities) {
-      // A millisecond or two late, at 2 mm/s: well below 1 % of the force.
-      CHECK(std::abs(q.e.error) < 0.01 * q.measured);
+      // S follows every row of the hand's motion, not only those that are compared.
+      CHECK(std::abs(q.e.error) < 1e-7 * q.measured);
     }
     CHECK(r.part.whole());
   }
@@ -106,8 +107,8 @@ TEST_CASE("The law that was rendered answers the hand's motion, and a stiffer on
   }
   for (const fit::RenderingError& e : rendering_errors(same)) {
     CHECK(e.presses == 2);
-    CHECK(std::abs(e.mean) < 0.01);
-    CHECK(e.limit < 0.01);
+    CHECK(std::abs(e.mean) < 1e-7);
+    CHECK(e.limit < 1e-7);
   }
   CHECK(compared(1.1).verdict == fit::ModelVerdict::not_adequate);
 }

@@ -19,6 +19,7 @@
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/files_read.hpp"
 #include "tpm/files/replacement.hpp"
+#include "tpm/files/require_exists.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -150,7 +151,7 @@ std::string read_file(const fs::path& path, std::uint64_t most) {
   std::error_code ec;
   const auto status = fs::status(path, ec);
   if (fs::is_character_file(status)) most = std::min(most, kLargestFromDevice);
-  if (!fs::exists(status)) throw bad_input(path.string(), "no such file", "a readable file");
+  require_exists(path);
   if (fs::is_directory(status)) throw bad_input(path.string(), "is a folder", "a readable file");
   const bool pipe = is_named_pipe(path, status);
   const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC | (pipe ? O_NONBLOCK : 0)));

@@ -15,6 +15,7 @@
 #include "tpm/files/check_sum.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
+#include "tpm/files/require_exists.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::sweep {
@@ -118,6 +119,7 @@ BlockLog::BlockLog(std::filesystem::path path, const Sweep& sweep,
 BlockLog BlockLog::to_read(std::filesystem::path path, const Sweep& sweep,
                            const std::function<void(const std::string&)>& note) {
   BlockLog log(std::move(path), sweep);
+  require_exists(log.path_);
   log.open(O_RDONLY);
   std::string head;
   const std::string right = log_head(sweep.fingerprint);

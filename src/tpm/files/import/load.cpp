@@ -15,6 +15,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/description.hpp"
 #include "tpm/files/import/rows.hpp"
+#include "tpm/files/require_exists.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -46,9 +47,9 @@ CurveFiles find_files(const std::string& path_or_id) {
   if (path.extension() == ".csv" || path.extension() == ".json") {
     CurveFiles files{fs::path(path).replace_extension(".json"),
                      fs::path(path).replace_extension(".csv")};
+    require_exists(path);
     std::error_code none;
-    if (path.extension() == ".csv" && fs::exists(path, none) &&
-        !fs::exists(files.description, none)) {
+    if (path.extension() == ".csv" && !fs::exists(files.description, none)) {
       throw bad_input(
           path.string(), "has no description beside it",
           fmt::format("{} (tpm data import writes one)", files.description.filename().string()));

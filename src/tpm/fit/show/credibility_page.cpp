@@ -94,10 +94,12 @@ class EvidencePage {
   }
 
   static void add_changes(Document& d, const std::vector<CredibilityChange>& changes) {
+    constexpr std::size_t kMost = 48;  // characters, so that what is now stands beside what was
     d.heading(2, "Changed since this page was written");
     Table table{"", {{"place"}, {"was"}, {"now"}}};
     for (const CredibilityChange& c : changes) {
-      table.rows.push_back({{c.place}, {c.before}, {c.now, Tone::bad}});
+      table.rows.push_back(
+          {{c.place}, {printable(c.before, kMost)}, {printable(c.now, kMost), Tone::bad}});
     }
     d.table(std::move(table));
   }

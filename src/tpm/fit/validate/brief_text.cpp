@@ -47,6 +47,35 @@ void BriefText::add(const std::string& lines, Rank rank, std::string_view name) 
   }
 }
 
+void BriefText::add_table(const std::string& table, Rank rank, std::string_view rows) {
+  const std::size_t body = table.find('\n', table.find('\n') + 1) + 1;
+  const std::size_t first = items_.size();
+  add(table.substr(0, body), Rank::always);
+  const std::size_t head = items_.size();
+  add(table.substr(body), rank, rows);
+  const std::size_t end = items_.size();
+  add("\n", Rank::always);
+  ++tables_;
+  for (std::size_t i = first; i < items_.size(); ++i) {
+    items_[i].table = tables_;
+    items_[i].frame = i < head || i >= end;
+  }
+}
+
+/// Takes out the heads of tables without a row.
+void BriefText::keep_frames(std::vector<bool>& kept, std::size_t& lines) const {
+  std::vector<bool> has_row(static_cast<std::size_t>(tables_) + 1, false);
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    if (kept[i] && !items_[i].frame) has_row[static_cast<std::size_t>(items_[i].table)] = true;
+  }
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    if (!kept[i] || !items_[i].frame || has_row[static_cast<std::size_t>(items_[i].table)])
+      continue;
+    kept[i] = false;
+    lines -= lines_in(items_[i].lines);
+  }
+}
+
 void BriefText::add_line(std::string_view title, const std::string& words, Rank rank) {
   std::string lines = titled_line(title, words);
   if (rank == Rank::always) lines = first_lines(lines, kMostOfOne);
@@ -61,6 +90,7 @@ std::string BriefText::text() const {
   std::size_t lines = 0;
   for (const Item& item : items_) lines += lines_in(item.lines);
   std::vector<bool> kept(items_.size(), true);
+  std::vector<std::size_t> out;
   std::size_t room = kMostLines;
   if (lines > room) room -= 2;  // for what is left out
   for (Rank rank = Rank::detail; rank != Rank::always && lines > room;
@@ -69,14 +99,23 @@ std::string BriefText::text() const {
       if (items_[i].rank != rank) continue;
       kept[i] = false;
       lines -= lines_in(items_[i].lines);
+      out.push_back(i);
+      keep_frames(kept, lines);
     }
+  }
+  // Where a table went with its head there is room again.
+  for (auto i = out.rbegin(); i != out.rend(); ++i) {
+    const std::size_t more = lines_in(items_[*i].lines);
+    if (items_[*i].table != 0 || lines + more > room) continue;
+    kept[*i] = true;
+    lines += more;
   }
   std::vector<std::string> names;
   std::string text;
   for (std::size_t i = 0; i < items_.size(); ++i) {
     if (kept[i]) {
       text += items_[i].lines;
-    } else {
+    } else if (!items_[i].frame) {
       names.push_back(items_[i].name);
     }
   }

@@ -17,6 +17,9 @@ class BriefText {
 
   /// Lines as they are, each by itself; empty ones stay empty.
   void add(const std::string& lines, Rank rank, std::string_view name = {});
+  /// Rows below a head of two lines, and an empty line. Where no row is printed, the head is not
+  /// either.
+  void add_table(const std::string& table, Rank rank, std::string_view rows);
   /// "title          words", wrapped at kWidth. What is printed always takes three lines at most
   /// and ends in "..." there.
   void add_line(std::string_view title, const std::string& words, Rank rank);
@@ -31,8 +34,12 @@ class BriefText {
     std::string name;  ///< for the line that tells what was left out
     std::string lines;
     Rank rank = Rank::always;
+    int table = 0;  ///< that it is a row of, or if `frame` the head or the end of; 0: none
+    bool frame = false;
   };
+  void keep_frames(std::vector<bool>& kept, std::size_t& lines) const;
   std::vector<Item> items_;
+  int tables_ = 0;
 };
 
 }  // namespace tpm::fit

@@ -78,10 +78,11 @@ std::optional<double> limit_of(const Requirement& requirement, const QuantityCom
 }
 
 ModelVerdict verdict_of_all(const std::vector<QuantityComparison>& quantities) {
-  bool required = false, all_adequate = true, rejected = false, unknown = false;
+  bool required = false, all_adequate = true, rejected = false, unknown = false, any = false;
   for (const QuantityComparison& q : quantities) {
     if (q.verdict == ModelVerdict::residual) return ModelVerdict::residual;
     if (q.verdict == ModelVerdict::no_requirement) continue;
+    any = true;
     rejected = rejected || q.rejected;
     unknown = unknown || q.verdict == ModelVerdict::undetermined;
     if (q.limit) {
@@ -89,6 +90,7 @@ ModelVerdict verdict_of_all(const std::vector<QuantityComparison>& quantities) {
     }
     all_adequate = all_adequate && q.verdict == ModelVerdict::adequate;
   }
+  if (!any && !quantities.empty()) return ModelVerdict::no_requirement;
   if (required) {
     if (rejected) return ModelVerdict::not_adequate;
     return all_adequate ? ModelVerdict::adequate : ModelVerdict::undetermined;

@@ -48,7 +48,7 @@ class Comparer {
       : options_(options),
         prepared_(recording),
         r_(prepared_.recording),
-        along_(law, prepared_, options.organ, options.motion.earlier),
+        along_(law, prepared_, options.organ, options.motion.knots),
         degrees_of_law_(law.uncertainty->degrees_of_freedom.value_or(kInfinity)) {}
 
   RecordingComparison compare() {

@@ -95,7 +95,8 @@ struct RenderingError {
 
 /// Motion of one press of a session.
 struct SessionMotion {
-  std::vector<Knot> earlier;  ///< motion from the session's start to the press
+  /// From the session's start to the end of the press, every row of it; empty: the samples alone.
+  std::vector<Knot> knots;
   /// When the hand was asked to hold, of the recording's clock; none: it was not.
   std::optional<double> hold_asked_s;
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "tpm/data/straight_pieces.hpp"
 #include "tpm/fit/validate/functional.hpp"
@@ -19,9 +20,10 @@ namespace {
 // has an error of 1e-6 of the largest, which the difference must stand above.
 constexpr double kStep = 1e-4, kStepOfOrgan = 1e-2;
 
-Protocol history_of(Drive drive, const Recording& r, const std::vector<Knot>& earlier) {
-  std::vector<Knot> knots = earlier;
-  for (std::size_t i = 0; i < r.time_s.size(); ++i) knots.push_back({r.time_s[i], r.drive[i]});
+Protocol history_of(Drive drive, const Recording& r, std::vector<Knot> knots) {
+  if (knots.empty()) {
+    for (std::size_t i = 0; i < r.time_s.size(); ++i) knots.push_back({r.time_s[i], r.drive[i]});
+  }
   Protocol history(drive, std::move(knots), "measured history");
   history.set_equilibrium_at_start(true);
   return history;
@@ -69,7 +71,7 @@ PreparedRecording as_load_imposed(const PreparedRecording& recording) {
 }
 
 LawAlong::LawAlong(const LawFile& law, const PreparedRecording& recording, const OrganOfLaw* organ,
-                   const std::vector<Knot>& earlier)
+                   std::vector<Knot> motion)
     : law_(law),
       recording_(recording.recording),
       own_model_(organ != nullptr ? nullptr : std::make_shared<LawModel>(law.spec)),
@@ -77,7 +79,8 @@ LawAlong::LawAlong(const LawFile& law, const PreparedRecording& recording, const
       model_(organ != nullptr ? static_cast<const Model*>(organ) : own_model_.get()),
       coordinates_(fitted_coordinates(law, Placement::own)),
       load_imposed_(is_load(recording_.drive_quantity)),
-      whole_(history_of(load_imposed_ ? Drive::force : Drive::displacement, recording_, earlier)),
+      whole_(history_of(load_imposed_ ? Drive::force : Drive::displacement, recording_,
+                        std::move(motion))),
       motion_(whole_) {
   if (!load_imposed_) {
     require_quantities_of(law, recording);

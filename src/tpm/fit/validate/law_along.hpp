@@ -20,10 +20,11 @@ class LawAlong {
  public:
   /// @param recording of creep as as_load_imposed() gives it; outlives this
   /// @param organ answers in place of the law, on the ramp and hold alone; outlives this
-  /// @param earlier motion that the tissue has seen before the recording, which ends before it
+  /// @param motion that the tissue has seen, up to the end of the recording; empty: that of its
+  ///               samples
   /// Throws Error(bad_input) for a law without uncertainty or a recording of other quantities.
   LawAlong(const LawFile& law, const PreparedRecording& recording,
-           const OrganOfLaw* organ = nullptr, const std::vector<Knot>& earlier = {});
+           const OrganOfLaw* organ = nullptr, std::vector<Knot> motion = {});
 
   /// Values and derivatives at one contact point.
   struct At {

@@ -136,9 +136,16 @@ void judge_pooled(PooledQuantity& pooled, const std::vector<Member>& members,
     return m.quantity->verdict == ModelVerdict::undetermined && !m.quantity->limit;
   });
   if (options.requirement) {
-    if (options.requirement->share && pooled.relative) {
-      pooled.limit = options.requirement->value;
-    } else if (!pooled.relative) {
+    if (pooled.relative) {
+      const Member& largest = *std::ranges::max_element(members, {}, &Member::scale);
+      const auto limit = limit_of(*options.requirement, *largest.quantity, options.response, 0.0);
+      if (limit && options.requirement->share) {
+        pooled.limit = options.requirement->value;
+      } else if (limit) {
+        pooled.limit = *limit / largest.scale;
+        pooled.limit_at = largest.recording->name;
+      }
+    } else {
       QuantityComparison mean = *members.front().quantity;
       mean.measured = pooled.measured;
       mean.u_D = pooled.e.u_val;

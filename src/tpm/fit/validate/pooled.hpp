@@ -22,6 +22,9 @@ struct PooledQuantity {
   double between = 0.0;    ///< standard deviation between recordings beyond their own u (REML)
   double u_shared = 0.0;   ///< part of u_val that all recordings share
   std::optional<double> limit;
+  /// Of `relative`, if an amount is required: the recording whose S is the largest. The limit is
+  /// the amount over that S.
+  std::optional<std::string> limit_at;
   ModelVerdict verdict = ModelVerdict::not_seen;
   double p_value = 1.0;
   bool rejected = false;

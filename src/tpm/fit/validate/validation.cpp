@@ -401,6 +401,13 @@ Validation validate(const ValidationRequest& request) {
       unseen, unseen_motions,
       law.uncertainty->degrees_of_freedom.value_or(std::numeric_limits<double>::infinity()),
       pooling);
+  const auto limited_at = [](const PooledQuantity& p) { return p.limit_at.value_or(""); };
+  for (const std::string& name : each_once(v.pooled, limited_at)) {
+    if (name.empty()) continue;
+    v.remarks.push_back(fmt::format(
+        "the protocols differ: R is {} at {}, whose S is the largest, as a share of that S",
+        v.requirement, name));
+  }
   v.verdict = unseen.size() > 1 ? judge_together(v, unseen) : unseen.front().verdict;
   return v;
 }

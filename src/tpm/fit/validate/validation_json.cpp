@@ -132,6 +132,7 @@ Json pooled_json(const PooledQuantity& p) {
   j["u_shared"] = stored(p.u_shared);
   j["sd_between"] = stored(p.between);
   if (p.limit) j["R"] = stored(*p.limit);
+  if (p.limit_at) j["R_at"] = *p.limit_at;
   j["verdict"] = verdict_key(p.verdict);
   j["p_value"] = stored(p.p_value);
   j["rejected_by_holm"] = p.rejected;

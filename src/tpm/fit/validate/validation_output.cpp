@@ -69,10 +69,7 @@ void add_table(BriefText& text, TableSection section, Rank rank, std::string_vie
   document.sections.push_back(std::move(section));
   std::string table = render(document, TableStyle::text);
   while (!table.empty() && table.front() == '\n') table.erase(0, 1);
-  const std::size_t body = table.find('\n', table.find('\n') + 1) + 1;
-  text.add(table.substr(0, body), Rank::always);
-  text.add(table.substr(body), rank, rows);
-  text.add("\n", Rank::always);
+  text.add_table(table, rank, rows);
 }
 
 std::string joint_text(const JointTest& joint) {
@@ -192,6 +189,27 @@ std::string first_names(std::vector<std::string> names) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
+/// Names of the recordings, of presses of one session without its file: "session.tpmrec: ".
+struct RecordingNames {
+  std::string file;
+  std::vector<std::string> names;
+};
+
+RecordingNames names_of(const Validation& v) {
+  RecordingNames all{{}, mapped<std::string>(v.recordings, &RecordingComparison::name)};
+  const std::size_t colon = all.names.front().find(": ");
+  const bool of_session = std::ranges::all_of(
+      v.recordings, [](const RecordingComparison& r) { return r.part.hold_asked_s.has_value(); });
+  if (all.names.size() < 2 || !of_session || colon == std::string::npos) return all;
+  const std::string file = all.names.front().substr(0, colon + 2);
+  for (const std::string& name : all.names) {
+    if (!name.starts_with(file)) return all;
+  }
+  all.file = file;
+  for (std::string& name : all.names) name.erase(0, file.size());
+  return all;
+}
+
 void add_header(BriefText& text, const Validation& v) {
   text.add(fmt::format("{}: {}\n", v.law_file, v.subject), Rank::always);
   const std::string fitted =
@@ -199,12 +217,13 @@ void add_header(BriefText& text, const Validation& v) {
           ? std::string("files that the law does not name")
           : first_names(mapped<std::string>(v.calibration, &CalibrationData::File::name));
   const bool residual = v.verdict == ModelVerdict::residual;
-  text.add_words(fmt::format(
-      "{} with {}, fitted to {}; {}",
-      residual ? "compared (calibration residual, no validation)" : "validated",
-      first_names(mapped<std::string>(v.recordings, &RecordingComparison::name)), fitted,
-      v.requirement.empty() ? std::string("no requirement")
-                            : fmt::format("requirement: {}", v.requirement)));
+  const RecordingNames names = names_of(v);
+  text.add_words(
+      fmt::format("{} with {}{}, fitted to {}; {}",
+                  residual ? "compared (calibration residual, no validation)" : "validated",
+                  names.file, first_names(names.names), fitted,
+                  v.requirement.empty() ? std::string("no requirement")
+                                        : fmt::format("requirement: {}", v.requirement)));
   text.add("\n", Rank::always);
 }
 
@@ -281,20 +300,59 @@ void add_pooled(BriefText& text, const Validation& v) {
                             cell_words(p.verdict)});
   }
   add_table(text, std::move(section), Rank::quantity, "quantities");
+  bool remarked = false;
   for (const PooledQuantity& p : v.pooled) {
     if (p.remark.empty()) continue;
     text.add_line("must shrink", fmt::format("{}: {}", p.name, p.remark), Rank::remark);
+    remarked = true;
   }
+  if (remarked) text.add("\n", Rank::always);
+}
+
+/// Of several recordings.
+std::string applicability_text(const Validation& v, const std::vector<std::string>& names) {
+  std::vector<std::size_t> places(v.recordings.size());
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  const auto said = [&](std::size_t i) { return applicability_text(v.applicability[i]); };
+  const std::vector<std::string> each = each_once(places, said);
+  if (each.size() == 1) return each.front();
+  // Recordings of one protocol say the same.
+  const auto outside_of = [&](std::size_t i) {
+    return fmt::format("{}", fmt::join(v.applicability[i].outside, "; "));
+  };
+  std::vector<std::string> outside;
+  bool some_inside = false;
+  for (const std::string& words : each_once(places, outside_of)) {
+    some_inside = some_inside || words.empty();
+    if (words.empty()) continue;
+    std::vector<std::string> who;
+    for (const std::size_t i : places) {
+      if (outside_of(i) == words) who.push_back(names[i]);
+    }
+    outside.push_back(fmt::format("{} ({})", first_names(who), words));
+  }
+  std::string text = outside.empty()
+                         ? std::string("inside the calibration")
+                         : fmt::format("outside the calibration: {}{}", fmt::join(outside, "; "),
+                                       some_inside ? "; the others inside" : "");
+  std::vector<std::string> unknown;
+  for (const Applicability& a : v.applicability) {
+    unknown.insert(unknown.end(), a.unknown.begin(), a.unknown.end());
+  }
+  if (unknown.empty()) return text;
+  const auto itself = [](const std::string& word) { return word; };
+  return text + fmt::format(" (not known of all: {})", fmt::join(each_once(unknown, itself), ", "));
 }
 
 void add_each_recording(BriefText& text, const Validation& v) {
+  const std::vector<std::string> names = names_of(v).names;
   TableSection section;
   section.columns = {"recording"};
   const std::vector<QuantityComparison> quantities = each_quantity(v.recordings);
   for (const QuantityComparison& q : quantities) section.columns.push_back(q.name);
   section.columns.push_back("verdict");
   for (const RecordingComparison& r : v.recordings) {
-    std::vector<std::string> row{r.name};
+    std::vector<std::string> row{names[section.rows.size()]};
     for (const QuantityComparison& q : quantities) {
       const auto own = std::ranges::find(r.quantities, q.quantity, &QuantityComparison::quantity);
       row.push_back(own == r.quantities.end() ? "-" : error_text(own->e, unit_of(*own)));
@@ -313,7 +371,9 @@ void add_each_recording(BriefText& text, const Validation& v) {
   for (const RecordingComparison& r : v.recordings) {
     whole_said = whole_said || (r.part.whole() && part_is_said(r));
     if (r.part.whole()) continue;
-    text.add_line("compared", fmt::format("{}: {}", r.name, part_words(r, v.spec)), Rank::context);
+    const auto place = static_cast<std::size_t>(&r - v.recordings.data());
+    text.add_line("compared", fmt::format("{}: {}", names[place], part_words(r, v.spec)),
+                  Rank::context);
   }
   if (whole_said) {
     const bool all =
@@ -321,19 +381,7 @@ void add_each_recording(BriefText& text, const Validation& v) {
     text.add_line("compared", all ? "the whole of each press" : "the whole of all other presses",
                   Rank::context);
   }
-  // Recordings of one protocol say the same.
-  const auto said = [&](std::size_t i) { return applicability_text(v.applicability[i]); };
-  std::vector<std::size_t> places(v.recordings.size());
-  std::iota(places.begin(), places.end(), std::size_t{0});
-  for (const std::string& words : each_once(places, said)) {
-    std::vector<std::string> names;
-    for (const std::size_t i : places) {
-      if (said(i) == words) names.push_back(v.recordings[i].name);
-    }
-    const bool all = names.size() == places.size();
-    text.add_line("applicability", all ? words : fmt::format("{}: {}", first_names(names), words),
-                  Rank::context);
-  }
+  text.add_line("applicability", applicability_text(v, names), Rank::context);
 }
 
 }  // namespace

@@ -42,7 +42,9 @@ void find(void* handle, const char* name, Call& call, std::vector<std::string>& 
 }  // namespace
 
 DhdLibrary::DhdLibrary(const fs::path& file) {
-  load(file.empty() ? usual_places() : std::vector<fs::path>{file});
+  // A bare name would be looked for where the system keeps its libraries.
+  load(file.empty() ? usual_places()
+                    : std::vector<fs::path>{file.has_parent_path() ? file : fs::path(".") / file});
   try {
     find_symbols();
     require_version();

@@ -9,6 +9,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/require_exists.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/session/session_keys.hpp"
 #include "tpm/haptics/session/session_phases.hpp"
@@ -342,6 +343,7 @@ HilSession read_session(const std::filesystem::path& file, const SessionChanges&
       throw Error(ExitCode::usage, "--replay-motion", "the session feels no law",
                   "--law FILE beside it: the law knows the depth at which contact began");
     }
+    require_exists(changes.motion);
     for (const char* key : {"indentations", "slides", "creep"}) json.erase(key);
     // Named on a command line: beside the caller, not beside the session.
     json["motion"] = {{"recording", std::filesystem::absolute(changes.motion).string()}};

@@ -94,10 +94,15 @@ class PressReader {
       if (static_cast<std::size_t>(end - row) <= stride) break;
     }
     SessionPress press;
+    const auto add_knot = [&](const ServoRecord& row) {
+      press.motion.knots.push_back({recording_.time_s(row), depth_of(row)});
+    };
     for (auto row = rows_.begin(); row < begin; row += static_cast<std::ptrdiff_t>(stride)) {
-      press.motion.earlier.push_back({recording_.time_s(**row), depth_of(**row)});
+      add_knot(**row);
       if (static_cast<std::size_t>(begin - row) <= stride) break;
     }
+    // Of the press every row: what the hand did between samples is in the force of the next.
+    for (auto row = begin; row < end; ++row) add_knot(**row);
     if (of.last > of.first) press.motion.hold_asked_s = begin_s(of.last);
     press.recording = press_recording(std::move(r));
     presses_.made.push_back(std::move(press));

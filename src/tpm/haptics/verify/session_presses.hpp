@@ -11,7 +11,7 @@ namespace tpm::haptics {
 /// the surface as the device read it, and the force that was sent to the hand.
 struct SessionPress {
   fit::PreparedRecording recording;  ///< "session.tpmrec: indent to 4 mm at 2 mm/s", with its hold
-  fit::SessionMotion motion;         ///< what came before, and when the hand was asked to hold
+  fit::SessionMotion motion;         ///< from the session's start, and when the hand was to hold
 };
 
 struct SessionPresses {
