@@ -85,10 +85,10 @@ bool crept(std::span<const double> load, std::span<const double> other, double o
 void require_no_recession(const PreparedRecording& recording, std::span<const double> load,
                           double load_noise, std::span<const double> answer, double answer_noise) {
   constexpr double kStill = 0.005, kSure = 4.0, kFar = 0.1, kFirst = 0.6;
-  const auto peak = static_cast<std::size_t>(
-      std::ranges::find_if(load,
-                           [&](double v) { return v >= 0.99 * *std::ranges::max_element(load); }) -
-      load.begin());
+  const double least = *std::ranges::max_element(load) - 0.5 * kStill * range_of(load) -
+                       kSure * load_noise;  // of a load that is held
+  const auto reached = std::ranges::find_if(load, [&](double v) { return v >= least; });
+  const auto peak = static_cast<std::size_t>(reached - load.begin());
   const auto held = load.subspan(peak);
   const auto after = answer.subspan(peak);
   constexpr std::size_t kFewest = 20;
