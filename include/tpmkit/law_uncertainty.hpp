@@ -23,6 +23,12 @@ enum class Coordinate {
 /// d natural / d theta at a natural value.
 [[nodiscard]] double coordinate_slope(Coordinate coordinate, double natural);
 
+/// A rise of the drive between two samples that was not in the middle of the time between them.
+struct DelayedRise {
+  double begin_s = 0.0, end_s = 0.0;  ///< the samples
+  double delay_s = 0.0;               ///< of its centre, at most half the time between them
+};
+
 /// A file that a law was fitted to.
 struct FittedFile {
   std::string name;
@@ -40,6 +46,8 @@ struct FittedFile {
   /// s.
   std::optional<double> drift = std::nullopt, drift_origin_s = std::nullopt;
 
+  /// Rises of the drive within the time between two samples.
+  std::vector<DelayedRise> rises = {};
   /// SHA-256 of the samples' numbers (time, drive, response with 9 digits): a copy of the recording
   /// has the same, however its file is named or formatted. Empty: not stated.
   std::string samples_sha256 = {};

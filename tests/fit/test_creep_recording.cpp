@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "creep_recordings.hpp"
+#include "placed_recordings.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/fitted_law.hpp"
@@ -25,6 +26,8 @@ using Catch::Contains;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 using test::CreepTrial;
+using test::PlacedTest;
+using test::PressTrial;
 
 namespace {
 
@@ -305,4 +308,60 @@ TEST_CASE("where no rest tells a drift of a strain or a stress, k_inf is not ide
     CHECK_THAT(both->drift_per_s.front(), WithinRel(0.5, 0.2));
     CHECK_THAT(drift_words(*both, fit), Contains("kPa/s") || Contains(" Pa/s"));
   }
+}
+
+TEST_CASE("noise of the imposed channel counts in adequacy, of creep and of relaxation",
+          "[creep]") {
+  const std::uint64_t seed = GENERATE(23, 24, 25, 26);
+  CreepTrial trial;
+  trial.rest_s = 8.0;
+  trial.stress_noise_Pa = 1.0;  // 1 % of its range, as of the strain
+  trial.seed = seed;
+  const PreparedRecording creep = prepared_creep(trial);
+  CHECK(creep.load_imposed);
+  const FitResult fit = creep_fit(std::span(&creep, 1));
+  INFO(fit.adequacy.value().words);
+  CHECK(fit.adequacy.value().is_adequate());
+
+  PlacedTest pressed;
+  pressed.noise_N = 2e-3;
+  Random random(seed);
+  Recording r = test::measured(pressed, test::placed(pressed), random);
+  for (double& depth : r.drive) depth += 4e-5 * random.normal();
+  const PreparedRecording relaxing = prepare_recording("made.csv", std::move(r));
+  CHECK_FALSE(relaxing.load_imposed);
+  const FitResult relaxed = creep_fit(std::span(&relaxing, 1));
+  INFO(relaxed.adequacy.value().words);
+  CHECK(relaxed.adequacy.value().is_adequate());
+}
+
+TEST_CASE("a law that is wrong by more than the noise of both channels is still told", "[creep]") {
+  PlacedTest pressed;
+  pressed.material = {60.0, 90.0, 0.5};
+  pressed.noise_N = 1e-3;
+  Random random(7);
+  Recording r = test::measured(pressed, test::placed(pressed), random);
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    r.drive[i] += 1e-5 * random.normal();
+    if (r.time_s[i] > 7.0) r.response[i] += 0.03 * std::exp(-(r.time_s[i] - 7.0) / 12.0);
+  }
+  const PreparedRecording recording = prepare_recording("made.csv", std::move(r));
+  CHECK(creep_fit(std::span(&recording, 1)).adequacy.value().is_rejected());
+}
+
+TEST_CASE("a depth that relaxes under a held force is a force: the titles are swapped", "[creep]") {
+  PlacedTest pressed;
+  Random random(5);
+  Recording r = test::measured(pressed, test::placed(pressed), random);
+  std::swap(r.drive, r.response);
+  CHECK_THROWS_WITH(prepare_recording("swapped.csv", r),
+                    Contains("recording 'swapped.csv': the depth recedes by") &&
+                        Contains("titles of force and depth"));
+  // Creep whose depth drifts back, straight, or that is unloaded, is none.
+  PressTrial creeping;
+  Recording drifting = test::press_recording_of(creeping);
+  for (std::size_t i = 0; i < drifting.time_s.size(); ++i) {
+    drifting.drive[i] -= 1e-4 * drifting.time_s[i];
+  }
+  CHECK_NOTHROW(prepare_recording("drifting.csv", std::move(drifting)));
 }

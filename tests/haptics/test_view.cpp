@@ -163,7 +163,9 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   const std::string title = R"(R&D <b>"x"</b></script><script>alert(1)</script>)";
   Json fit = Json::parse(R"({"model": "law", "chi_square": 1.0, "confidence_level": 0.95,
     "parameters": [{"name": "k1", "estimate_SI": 45.0, "interval_SI": [44.0, null], "SI_unit": "N/m",
-                    "verdict": "no upper limit", "profile_SI_and_deviance": [[44, 4], [45, 0]]}],
+                    "verdict": "no upper limit", "profile_SI_and_deviance": [[44, 4], [45, 0]]},
+                   {"name": "drift", "estimate_SI": -9.87e-7, "interval_SI": [-6.93e-6, 4.96e-6],
+                    "SI_unit": "N/s", "verdict": "identified"}],
     "adequacy": {"verdict": "not_described", "words": "no law tried describes this recording"},
     "flags": []})");
   fit["title"] = title;
@@ -179,6 +181,8 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   CHECK(lead[2].at("text") == "warning: " + title);
   CHECK(page.description.at("table").at("rows")[0] ==
         Json({"k1", "45", "44 .. open", "N/m", "no upper limit"}));
+  CHECK(page.description.at("table").at("rows")[1] ==
+        Json({"drift", "-987", "-6930 .. 4960", "nN/s", "identified"}));
   CHECK(page.description.at("plots").size() == 2);  // the figure, and the profile
   const std::string html = page.html();
   CHECK(html.find("<script>alert") == std::string::npos);

@@ -139,7 +139,7 @@ RestNoise noise_of(const AdequacyData& data) {
   std::vector<double> all(data.rest.begin(), data.rest.end());
   all.insert(all.end(), data.reading.begin(), data.reading.end());
   const double quantum = quantum_of(all);
-  noise.variance += quantum * quantum / 12.0;
+  noise.variance += quantum * quantum / 12.0 + data.carried_variance;
   return noise;
 }
 

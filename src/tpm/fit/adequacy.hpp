@@ -31,6 +31,8 @@ struct AdequacyData {
   std::span<const double> reading;      ///< fitted readings
   std::span<const double> residual;     ///< reading less prediction, or the negative
   int parameters = 0;                   ///< fitted, 0 or more
+  /// Variance that the noise of the imposed channel adds to the residual and not to the rest.
+  double carried_variance = 0.0;
 };
 
 /// Straight trend of the readings at rest.

@@ -206,7 +206,11 @@ void mark_not_separable(FitResult& result) {
 
 void mark_conditions(FitResult& result, const ResidualFunction& function) {
   std::vector<ParameterResult>& all = result.parameters;
-  for (std::size_t i = 0; i < all.size(); ++i) all[i].nuisance = is_nuisance(result.config, i);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    all[i].nuisance = is_nuisance(result.config, i);
+    // A rise lies between its samples: that is no limit which anybody assumed.
+    if (result.config.parameters[i].rise) all[i].at_lower_bound = all[i].at_upper_bound = false;
+  }
   for (std::size_t held = 0; held < all.size(); ++held) {
     const ParameterResult& nuisance = all[held];
     if (!nuisance.nuisance || !(nuisance.at_lower_bound || nuisance.at_upper_bound)) continue;
@@ -218,6 +222,7 @@ void mark_conditions(FitResult& result, const ResidualFunction& function) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     for (const LimitingBound& bound : all[i].profile.limited_by) {
       const ParameterResult& nuisance = all[bound.parameter];
+      if (result.config.parameters[bound.parameter].rise) continue;
       if (!nuisance.nuisance || !dependents(result, function, bound)[i]) continue;
       add_condition(all[i], condition_of(nuisance, bound.upper, false));
     }

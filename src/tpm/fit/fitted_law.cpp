@@ -196,6 +196,14 @@ void set_drift(FittedFile& file, const FitResult& fit, std::size_t choice) {
   }
 }
 
+void set_rises(FittedFile& file, const FitResult& fit, std::size_t choice) {
+  for (std::size_t j = 0; j < fit.config.parameters.size(); ++j) {
+    const std::optional<RiseTerm>& rise = fit.config.parameters[j].rise;
+    if (!rise || rise->choice != choice) continue;
+    file.rises.push_back({rise->begin_s, rise->end_s, fit.best.natural[j]});
+  }
+}
+
 std::vector<FittedFile> fitted_files(const FitResult& fit) {
   std::vector<FittedFile> files;
   for (std::size_t i = 0; i < fit.config.data.size(); ++i) {
@@ -212,6 +220,7 @@ std::vector<FittedFile> fitted_files(const FitResult& fit) {
         set_placement(file, fit.config, model_parameters(fit.config, fit.best.natural, i), i);
       }
       set_drift(file, fit, i);
+      set_rises(file, fit, i);
       file.readings += static_cast<int>(std::count(r.fitted.begin(), r.fitted.end(), true));
     }
     for (const FittedDatum& d : fit.data) file.readings += d.datum.choice == i && !d.datum.held_out;

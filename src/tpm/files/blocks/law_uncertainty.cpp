@@ -107,6 +107,17 @@ const Block<NoiseKeys>& reading_noise_block() {
   return block;
 }
 
+const Block<DelayedRise>& delayed_rise_block() {
+  using R = DelayedRise;
+  static const Block<R> block(
+      "delayed_rise", "a rise of the drive within the time between two samples",
+      {required(key("begin_s", &R::begin_s, number(), "the sample before it")),
+       required(key("end_s", &R::end_s, number(), "the sample behind it")),
+       required(key("delay_s", &R::delay_s, number(),
+                    "of its centre against that of the straight line between them"))});
+  return block;
+}
+
 const Block<FittedFile>& fitted_file_block() {
   using F = FittedFile;
   static const Block<F> block(
@@ -130,7 +141,9 @@ const Block<FittedFile>& fitted_file_block() {
            "Pa"),
        key("clipped_below", &F::clipped_below, number(), "the same of the smallest reading"),
        key("drift", &F::drift, number(), "of the force cell's zero in this recording, N/s or Pa/s"),
-       key("drift_origin_s", &F::drift_origin_s, number(), "when the drift is 0, s")});
+       key("drift_origin_s", &F::drift_origin_s, number(), "when the drift is 0, s"),
+       key("rises", &F::rises, list(delayed_rise_block().type()),
+           "of the drive within the time between two samples")});
   return block;
 }
 
@@ -243,6 +256,10 @@ Json files::to_json(const LawUncertainty& uncertainty, const LawSpec& spec) {
     if (file.clipped_below) entry["clipped_below"] = *file.clipped_below;
     if (file.drift) entry["drift"] = *file.drift;
     if (file.drift_origin_s) entry["drift_origin_s"] = *file.drift_origin_s;
+    for (const DelayedRise& rise : file.rises) {
+      entry["rises"].push_back(
+          {{"begin_s", rise.begin_s}, {"end_s", rise.end_s}, {"delay_s", rise.delay_s}});
+    }
     data.push_back(std::move(entry));
   }
   Json json{{"parameters", std::move(names)},

@@ -51,6 +51,8 @@ void require_units(const std::vector<ColumnUse>& uses, const std::string& file) 
     labels += fmt::format("{}{}", labels.empty() ? "" : ", ", use.column->label());
     options +=
         fmt::format("{}{}", options.empty() ? "" : "; ", unit_option(*use.column, dimension));
+    // A column titled "Force" may hold a stress (response_quantity), as of muscle.
+    if (use.quantity == Quantity::contact_force) options += ", or of stress, such as kPa";
   }
   if (missing == 0) return;
   throw bad_input(fmt::format("{}: {}", file, labels),

@@ -105,9 +105,10 @@ ExperimentResiduals generating_residuals(const PreparedRecording& recording, con
 std::vector<double> true_estimates(const FitResult& fit, const Trials& trials) {
   const LawModel model(trials.law);
   return mapped<double>(fit.parameters, [&](const ParameterResult& p) {
-    // A drift of the zero belongs to the test, too, and is no parameter of the law.
-    const bool drift = p.nuisance && p.parameter.name == "drift";
-    return drift ? 0.0 : trials.true_values[model.index(p.parameter.name)];
+    // A drift of the zero and a delayed rise belong to the test, too, and are none of the law.
+    const bool of_test =
+        p.nuisance && (p.parameter.name == "drift" || p.parameter.name.starts_with("rise_delay"));
+    return of_test ? 0.0 : trials.true_values[model.index(p.parameter.name)];
   });
 }
 

@@ -105,10 +105,17 @@ struct DriftTerm {
   double origin_s = 0.0;
 };
 
+/// A rise of a recording's drive between two samples: the parameter is the delay of its centre
+/// against that of the straight line between them, s (with_delays).
+struct RiseTerm {
+  std::size_t choice = 0;             ///< place in FitConfig::data
+  double begin_s = 0.0, end_s = 0.0;  ///< the samples
+};
+
 /// An estimated parameter and the model parameters that take its value.
 struct EstimatedParameter {
   FitParameter fit;
-  std::vector<Target> sets;  ///< empty for a parameter of the noise and for a drift
+  std::vector<Target> sets;  ///< empty for a parameter of the noise, a drift and a rise
   /// A noise parameter whose start and bounds follow from the size of the data.
   bool from_data = false;
   /// Set where nobody stated the bounds: run_fit widens them up to these while the best fit or the
@@ -118,6 +125,7 @@ struct EstimatedParameter {
   /// estimated, run_fit weighs it against the noise that it finds.
   std::optional<Prior> prior = std::nullopt;
   std::optional<DriftTerm> drift = std::nullopt;
+  std::optional<RiseTerm> rise = std::nullopt;
   /// Effects that these data cannot separate from the parameter, in words; it is then not called
   /// identified.
   std::string not_separable = {};

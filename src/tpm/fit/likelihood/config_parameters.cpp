@@ -68,21 +68,29 @@ std::string without_second(const Json& j, std::string_view key, const DocumentPl
                   "the recording's response per second, such as \"1 mN/s\"");
 }
 
-/// A linear drift of the zero of one recording.
-EstimatedParameter parse_drift(const std::string& name, const Json& j, const FitConfig& config,
-                               const DocumentPlace& place) {
-  const DocumentPlace here = place.key("drift");
+/// The place in config.data of the recording that a drift or a rise belongs to.
+std::size_t recording_of(const std::string& kind, const Json& j, const FitConfig& config,
+                         const DocumentPlace& here) {
   if (j.contains("sets") || j.contains("for")) {
-    throw bad_input(here.where, "beside 'sets' or 'for'", "a drift of one recording alone");
+    throw bad_input(here.where, "beside 'sets' or 'for'",
+                    fmt::format("a {} of one recording alone", kind));
   }
-  const auto of = j.at("drift").at("of").get<std::string>();
+  const auto of = j.at(kind).at("of").get<std::string>();
   const auto found = std::ranges::find(config.data, of, &DataChoice::dataset);
   if (found == config.data.end() || found->protocol.kind != ProtocolChoice::Kind::measured) {
     throw bad_input(here.key("of").where,
                     fmt::format("'{}' is no recording of this fit", printable(of)),
                     "the name of a recording (protocol 'measured') under /data");
   }
-  const Dimension dimension = reading_dimension(config, *found);
+  return static_cast<std::size_t>(found - config.data.begin());
+}
+
+/// A linear drift of the zero of one recording.
+EstimatedParameter parse_drift(const std::string& name, const Json& j, const FitConfig& config,
+                               const DocumentPlace& place) {
+  const DocumentPlace here = place.key("drift");
+  const std::size_t choice = recording_of("drift", j, config, here);
+  const Dimension dimension = reading_dimension(config, config.data[choice]);
   const auto read = [&](const Json& object, std::string_view key, const DocumentPlace& at) {
     return parse_quantity(without_second(object, key, at), dimension, at.key(key).where);
   };
@@ -97,8 +105,7 @@ EstimatedParameter parse_drift(const std::string& name, const Json& j, const Fit
   fit.upper = read(j, "upper", place);
   require_valid(fit, place.where);
   parameter.prior = parse_prior(j, place, read);
-  parameter.drift = DriftTerm{static_cast<std::size_t>(found - config.data.begin()),
-                              quantity_at(j.at("drift"), "origin", Dimension::time, here)};
+  parameter.drift = DriftTerm{choice, quantity_at(j.at("drift"), "origin", Dimension::time, here)};
   return parameter;
 }
 
@@ -118,9 +125,31 @@ FitParameter parse_search(const std::string& name, const Json& j, Dimension dime
   return fit;
 }
 
+/// The delay of a rise of one recording's drive between two samples.
+EstimatedParameter parse_rise(const std::string& name, const Json& j, const FitConfig& config,
+                              const DocumentPlace& place) {
+  const DocumentPlace here = place.key("rise");
+  EstimatedParameter parameter;
+  parameter.fit = parse_search(name, j, Dimension::time, place);
+  if (j.contains("prior")) {
+    parameter.prior = parse_prior(
+        j, place, [](const Json& object, std::string_view key, const DocumentPlace& at) {
+          return quantity_at(object, key, Dimension::time, at);
+        });
+  }
+  const Json& rise = j.at("rise");
+  parameter.rise = RiseTerm{recording_of("rise", j, config, here),
+                            quantity_at(rise, "begin", Dimension::time, here),
+                            quantity_at(rise, "end", Dimension::time, here)};
+  if (config.organ) throw bad_input(here.where, "with the model 'organ'", "a law");
+  if (parameter.rise->begin_s < parameter.rise->end_s) return parameter;
+  throw bad_input(here.key("end").where, "not behind 'begin'", "a later sample");
+}
+
 EstimatedParameter parse_parameter(const std::string& name, const Json& j, const Model& model,
                                    const FitConfig& config, const DocumentPlace& place) {
   if (j.contains("drift")) return parse_drift(name, j, config, place);
+  if (j.contains("rise")) return parse_rise(name, j, config, place);
   EstimatedParameter parameter;
   const std::vector<std::size_t> scope = parse_scope(j, config, place);
   if (j.contains("sets")) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/fit/likelihood/delayed_rise.hpp"
 #include "tpm/work/interrupted.hpp"
 #include "tpmkit/error.hpp"
 
@@ -132,8 +133,7 @@ void ExperimentResiduals::evaluate_plain(std::span<const double> natural, Eigen:
   residual.resize(residual_count_);
   if (jacobian != nullptr) jacobian->setZero(residual_count_, std::ssize(config_.parameters));
   for (const Experiment& experiment : fitted()) {
-    const Response response =
-        respond_to(experiment, model_parameters(config_, natural, experiment.choice), want);
+    const Response response = respond_to(experiment, natural, want);
     const auto columns = columns_for(experiment.choice);
     std::vector<Eigen::Index> rows;
     for (const std::size_t datum : experiment.data) rows.push_back(plain_->row[datum]);
@@ -149,6 +149,9 @@ void ExperimentResiduals::evaluate_plain(std::span<const double> natural, Eigen:
       }
     }
     add_drifts(experiment, natural, rows, &plain_->factor, residual, jacobian);
+    if (jacobian != nullptr) {
+      add_rise_slopes(experiment, natural, response, rows, &plain_->factor, *jacobian);
+    }
   }
   put_priors(natural, residual, jacobian);
 }
@@ -164,7 +167,8 @@ int ExperimentResiduals::band_count() const {
 }
 
 Response ExperimentResiduals::respond_to(const Experiment& experiment,
-                                         std::span<const double> parameters, Want want) const {
+                                         std::span<const double> natural, Want want) const {
+  const std::vector<double> parameters = model_parameters(config_, natural, experiment.choice);
   if (const auto* oscillation = std::get_if<Oscillation>(&experiment.imposed)) {
     return respond(*oscillation, parameters, want);
   }
@@ -173,7 +177,9 @@ Response ExperimentResiduals::respond_to(const Experiment& experiment,
     return model_->respond_along(course.driven(), course.times_s, parameters,
                                  changes_for(experiment.choice));
   }
-  return model_->respond(course.driven(), course.times_s, parameters, want);
+  const std::vector<DelayedRise> rises = rises_of(experiment, natural);
+  if (rises.empty()) return model_->respond(course.driven(), course.times_s, parameters, want);
+  return model_->respond(with_delays(course.driven(), rises), course.times_s, parameters, want);
 }
 
 Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
@@ -190,8 +196,7 @@ Eigen::VectorXd ExperimentResiduals::answers(const std::vector<Experiment>& expe
     sensitivity->setZero(answer.size(), static_cast<Eigen::Index>(config_.parameters.size()));
   }
   for (const Experiment& experiment : experiments) {
-    const std::vector<double> values = model_parameters(config_, natural, experiment.choice);
-    const Response response = respond_to(experiment, values, want);
+    const Response response = respond_to(experiment, natural, want);
     const auto from_to = columns_for(experiment.choice);
     for (std::size_t k = 0; k < experiment.data.size(); ++k) {
       const auto row = static_cast<Eigen::Index>(experiment.data[k]);
@@ -204,6 +209,9 @@ Eigen::VectorXd ExperimentResiduals::answers(const std::vector<Experiment>& expe
     }
     const std::vector<Eigen::Index> rows(experiment.data.begin(), experiment.data.end());
     add_drifts(experiment, natural, rows, nullptr, answer, sensitivity);
+    if (sensitivity != nullptr) {
+      add_rise_slopes(experiment, natural, response, rows, nullptr, *sensitivity);
+    }
   }
   return answer;
 }
@@ -368,6 +376,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::thinned(std::size_t mo
   few->linear_ = linear_;
   few->order_ = order_;
   few->drifts_ = drifts_;
+  few->rises_ = rises_;
   few->prior_weight_ = prior_weight_;
   few->noise_scale_ = noise_scale_;
   for (Experiment experiment : experiments_) {
@@ -397,6 +406,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   other->linear_ = linear_;
   other->order_ = order_;
   other->drifts_ = drifts_;
+  other->rises_ = rises_;
   other->prior_weight_ = prior_weight_;
   other->noise_scale_ = noise_scale_;
   other->plain_ = plain_;

@@ -7,6 +7,7 @@
 #include "tpm/fit/likelihood/estimated_sigma.hpp"
 #include "tpm/fit/likelihood/experiment.hpp"
 #include "tpm/fit/likelihood/least_squares.hpp"
+#include "tpmkit/law_uncertainty.hpp"
 
 namespace tpm::fit {
 
@@ -94,8 +95,9 @@ class ExperimentResiduals final : public ResidualFunction {
   /// Factor of a datum's residuals.
   [[nodiscard]] double weight(std::size_t datum) const;
   /// The model's answer to an experiment, one value per reading.
-  [[nodiscard]] Response respond_to(const Experiment& experiment,
-                                    std::span<const double> parameters, Want want) const;
+  /// @param natural estimated parameters
+  [[nodiscard]] Response respond_to(const Experiment& experiment, std::span<const double> natural,
+                                    Want want) const;
   /// Largest value that is fitted of a data set, SI. Throws Error(bad_input) if all are 0.
   [[nodiscard]] double data_size(std::size_t choice) const;
   void resolve_noise_parameters();
@@ -132,6 +134,15 @@ class ExperimentResiduals final : public ResidualFunction {
     std::vector<Eigen::Index> row;  ///< of each datum; -1 of what is held out
   };
   void find_drifts();
+  /// The delays of an experiment's rises at these parameters.
+  [[nodiscard]] std::vector<DelayedRise> rises_of(const Experiment& experiment,
+                                                  std::span<const double> natural) const;
+  /// Adds the derivatives by the delays of rises, by differences of answers.
+  /// @param response the answer at these parameters
+  /// @param place, factor as of add_drifts
+  void add_rise_slopes(const Experiment& experiment, std::span<const double> natural,
+                       const Response& response, std::span<const Eigen::Index> place,
+                       const Eigen::VectorXd* factor, RowMatrix& slopes) const;
   /// Adds the drifts of the zero to the answers of an experiment.
   /// @param place row of each reading; negative: not wanted
   /// @param factor of each row, or null for 1
@@ -161,6 +172,7 @@ class ExperimentResiduals final : public ResidualFunction {
   std::vector<int> counts_;                               ///< empty: every datum counts once
   std::vector<bool> linear_;         ///< of each estimated parameter: linear_in
   std::vector<std::size_t> drifts_;  ///< estimated parameters that are a drift
+  std::vector<std::size_t> rises_;   ///< those that are the delay of a rise
   double prior_weight_ = 1.0;
   std::optional<double> noise_scale_;  ///< see set_noise_scale
   ExchangeOrder order_;

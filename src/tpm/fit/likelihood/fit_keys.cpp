@@ -44,6 +44,13 @@ FormPtr fit_parameter_form() {
       "drift", "a slope of the zero of a recording: slope (t - origin) is added to the answer",
       {required_key("of", text(1).form, "the recording"),
        required_key("origin", of_dimension(Dimension::time), "when the slope adds nothing")});
+  const FormPtr rise = object_form(
+      "rise",
+      "two samples of a recording between which the drive rises: the parameter is the delay of "
+      "the rise's centre against that of a straight line",
+      {required_key("of", text(1).form, "the recording"),
+       required_key("begin", of_dimension(Dimension::time), "the sample before"),
+       required_key("end", of_dimension(Dimension::time), "the sample behind")});
   return object_form(
       "fit_parameter", "a parameter that is estimated",
       {required_key("start", some_quantity(), "where the search begins"),
@@ -60,6 +67,9 @@ FormPtr fit_parameter_form() {
        optional_key("drift", drift,
                     "the parameter is a slope of the zero of this recording, in its response per "
                     "second such as \"1 mN/s\""),
+       optional_key("rise", rise,
+                    "the parameter is the delay of a rise of the drive between two samples, such "
+                    "as \"10 ms\""),
        optional_key("not_separable", text(1).form,
                     "what the data cannot tell the parameter from; it is then not called "
                     "identified")});

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/likelihood/delayed_rise.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpm/fit/select/clipping.hpp"
@@ -95,10 +97,9 @@ void add_drift(LawPrediction& p, const FittedFile& file) {
        {&p.response, &p.mean_lower, &p.mean_upper, &p.reading_lower, &p.reading_upper}) {
     for (std::size_t i = 0; i < values->size(); ++i) (*values)[i] += file.drifted(p.time_s[i]);
   }
-  const Unit unit = shown_unit(p.response_dimension());
-  p.flags.push_back(
-      fmt::format("the zero drifts by {} {}/s, as the readings at rest show; it is added",
-                  significant(*file.drift / unit.to_si, 4), unit.symbol));
+  const Unit rate = per_second(shown_unit(p.response_dimension()));
+  p.flags.push_back(fmt::format("the zero drifts by {}, as the readings at rest show; it is added",
+                                sized_text(rate, *file.drift, 4)));
 }
 
 void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& recording) {
@@ -205,6 +206,9 @@ OwnPlacement place_recording(const LawFile& law, const PreparedRecording& record
       result.drifting.drift = fit.best.natural[j];
       result.drifting.drift_origin_s = drift->origin_s;
     }
+    if (const std::optional<RiseTerm>& rise = fit.config.parameters[j].rise) {
+      result.drifting.rises.push_back({rise->begin_s, rise->end_s, fit.best.natural[j]});
+    }
   }
   return result;
 }
@@ -275,7 +279,8 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
   p.contact = values[values.size() - 2];
   p.offset = values.back();
   p.time_s = r.time_s;
-  fill_prediction(p, model, law, motion, u, values, r.response_sd, options);
+  fill_prediction(p, model, law, with_delays(motion, drifting.rises), u, values, r.response_sd,
+                  options);
   if (motion.drive() == Drive::force) {  // the noise of the law file is one of stresses
     p.reading_lower.clear();
     p.reading_upper.clear();

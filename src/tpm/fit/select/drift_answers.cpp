@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tpm/base/distributions.hpp"
+#include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -193,10 +194,10 @@ std::string drift_words(const DriftAnswers& answers, const FitResult& fit) {
   const Unit& rate = answers.rate;
   std::string drifts;
   for (const double drift : answers.drift_per_s) {
-    drifts += fmt::format("{}{}", drifts.empty() ? "" : ", ", significant(drift / rate.to_si, 3));
+    drifts += fmt::format("{}{}", drifts.empty() ? "" : ", ", sized_text(rate, drift, 3));
   }
-  return words + fmt::format(", {} with one of {} {}", in_sized_unit(*lasting, *answers.drifting),
-                             drifts, rate.symbol);
+  return words +
+         fmt::format(", {} with one of {}", in_sized_unit(*lasting, *answers.drifting), drifts);
 }
 
 }  // namespace tpm::fit

@@ -40,6 +40,46 @@ struct RestedRecording {
   std::size_t at_rest = 0;
 };
 
+/// A value less the line between its neighbours: what noise and corners leave of a course.
+std::vector<double> off_neighbours(std::span<const double> time_s, std::span<const double> values) {
+  std::vector<double> off;
+  for (std::size_t i = 1; i + 1 < values.size(); ++i) {
+    const double share = (time_s[i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);
+    off.push_back(values[i] - values[i - 1] - share * (values[i + 1] - values[i - 1]));
+  }
+  return off;
+}
+
+/// Variance that noise of the imposed channel, measured where it rests, adds to the residual: the
+/// law answers the measured channel, noise and all. A change within one sample meets the stiffness
+/// (or compliance) of the law there, which is how its answer bends where the channel does.
+double carried_variance(const RecordingFit& fit, const Recording& r, std::size_t at_rest) {
+  constexpr std::size_t kFewest = 10;
+  if (at_rest < kFewest) return 0.0;
+  std::vector<double> time, imposed, answer;
+  for (std::size_t i = 0; i < fit.time_s.size() && i < r.drive.size(); ++i) {
+    if (!fit.fitted[i] || !std::isfinite(fit.predicted[i])) continue;
+    time.push_back(fit.time_s[i]);
+    imposed.push_back(r.drive[i]);
+    answer.push_back(fit.predicted[i]);
+  }
+  const std::vector<double> bends = off_neighbours(time, imposed);
+  const std::vector<double> answers = off_neighbours(time, answer);
+  double squares = 0.0, products = 0.0;
+  for (std::size_t i = 0; i < bends.size(); ++i) {
+    squares += bends[i] * bends[i];
+    products += bends[i] * answers[i];
+  }
+  double rest_squares = 0.0;
+  const auto rest_time = std::span(r.time_s).first(at_rest);
+  const std::vector<double> rest = off_neighbours(rest_time, std::span(r.drive).first(at_rest));
+  for (const double off : rest) rest_squares += off * off;
+  if (!(squares > 0.0)) return 0.0;
+  constexpr double kOfLine = 1.5;  // a value less the mean of two others has 1.5 times its variance
+  const double stiffness = products / squares;
+  return stiffness * stiffness * rest_squares / (kOfLine * static_cast<double>(rest.size()));
+}
+
 Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int parameters,
                      double level) {
   const Recording& r = *rested.recording;
@@ -55,7 +95,8 @@ Adequacy adequacy_of(const RecordingFit& fit, const RestedRecording& rested, int
     reading.push_back(fit.observed[i]);
     residual.push_back(fit.observed[i] - fit.predicted[i]);
   }
-  return judge_adequacy({rest_time, rest, time, reading, residual, parameters}, level);
+  const double carried = carried_variance(fit, r, static_cast<std::size_t>(end));
+  return judge_adequacy({rest_time, rest, time, reading, residual, parameters, carried}, level);
 }
 
 /// The drift of a recording that the fit takes, where it is further from what the rests show than

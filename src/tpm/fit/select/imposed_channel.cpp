@@ -12,6 +12,7 @@
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/likelihood/starts.hpp"
 #include "tpm/work/give_up.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -61,6 +62,54 @@ bool was_held(std::span<const double> held, double held_noise, std::span<const d
   const double moved =
       std::abs(average_of(other.last(quarter)) - average_of(other.subspan(half, quarter)));
   return moved > kSure * other_noise / std::sqrt(static_cast<double>(quarter));
+}
+
+/// Whether the load stood still over the last half while the other channel went on by far more of
+/// its range than the load: creep, whichever channel has more noise.
+bool crept(std::span<const double> load, std::span<const double> other, double other_noise) {
+  constexpr double kLeast = 0.01, kMuchLess = 0.2, kSure = 8.0;
+  const auto moved = [](std::span<const double> values) {
+    const std::size_t quarter = values.size() / 4;
+    return average_of(values.last(quarter)) -
+           average_of(values.subspan(values.size() / 2, quarter));
+  };
+  const double by = moved(other);
+  const double error = other_noise / std::sqrt(static_cast<double>(other.size() / 4));
+  return by > std::max(kLeast * range_of(other), kSure * error) &&
+         std::abs(moved(load)) / range_of(load) < kMuchLess * by / range_of(other);
+}
+
+/// Refuses a strain or depth that recedes from its largest under a load that is held: tissue goes
+/// on under a load, and what falls under something held is a force that relaxes. The part of the
+/// fall that the first half holds tells relaxation from a drift, which is straight.
+void require_no_recession(const PreparedRecording& recording, std::span<const double> load,
+                          double load_noise, std::span<const double> answer, double answer_noise) {
+  constexpr double kStill = 0.005, kSure = 4.0, kFar = 0.1, kFirst = 0.6;
+  const double least = *std::ranges::max_element(load) - 0.5 * kStill * range_of(load) -
+                       kSure * load_noise;  // of a load that is held
+  const auto reached = std::ranges::find_if(load, [&](double v) { return v >= least; });
+  const auto peak = static_cast<std::size_t>(reached - load.begin());
+  const auto held = load.subspan(peak);
+  const auto after = answer.subspan(peak);
+  constexpr std::size_t kFewest = 20;
+  if (held.size() < kFewest) return;
+  if (range_of(held) > kStill * range_of(load) + 2.0 * kSure * load_noise) return;
+  const std::size_t tenth = held.size() / 10;
+  const auto level = [&](std::size_t at) { return average_of(after.subspan(at, tenth)); };
+  const double first = level(0), middle = level((after.size() - tenth) / 2),
+               last = level(after.size() - tenth);
+  const double fall = first - last;
+  if (!(fall > kFar * range_of(answer) && fall > kSure * answer_noise)) return;
+  if (!(first - middle > kFirst * fall)) return;
+  const Recording& r = recording.recording;
+  const std::string_view held_word = load_word(r), falling = answer_word(r);
+  throw bad_input(
+      fmt::format("recording '{}'", recording.name),
+      fmt::format(
+          "the {} recedes by {} % of its range while the {} is held, which no passive tissue does",
+          falling, significant(100.0 * fall / range_of(answer), 2), held_word),
+      fmt::format("the titles of {} and {} the other way round in the file, if they are swapped",
+                  held_word, falling));
 }
 
 /// The recording as its table has it.
@@ -124,8 +173,9 @@ void find_imposed_channel(PreparedRecording& recording) {
   const double stress_noise = noise_of_channel(time, stress);
   const double of_strain = strain_noise / range_of(strain);
   const double of_stress = stress_noise / range_of(stress);
-  const bool imposed =
-      of_strain > kMuchLess * of_stress && was_held(stress, stress_noise, strain, strain_noise);
+  require_no_recession(recording, stress, stress_noise, strain, strain_noise);
+  const bool imposed = was_held(stress, stress_noise, strain, strain_noise) &&
+                       (of_strain > kMuchLess * of_stress || crept(stress, strain, strain_noise));
   const bool both_noisy = std::min(of_strain, of_stress) > kNoisy;
   recording.load_imposed = imposed;
   if (imposed) recording.recording = with_imposed_load(std::move(recording.recording));

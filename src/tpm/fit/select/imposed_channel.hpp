@@ -4,10 +4,11 @@
 namespace tpm::fit {
 
 /// Finds which channel of a recording of stress and strain, or of force and depth, was imposed,
-/// before its phases are known: the load if it is the less noisy one, was held, and the strain or
-/// depth went on under it (creep). Drive and response then change places, and load_imposed is set:
-/// a fit imposes the load and compares the strain or depth. `warnings` say so, and what it biases
-/// if both channels are noisy.
+/// before its phases are known: the load if it was held while the strain or depth went on under it
+/// (creep), by much more of its range or in a noisier channel. Drive and response then change
+/// places, and load_imposed is set: a fit imposes the load and compares the strain or depth.
+/// `warnings` say so, and what it biases if both channels are noisy. Throws Error(bad_input) if the
+/// strain or depth relaxes under a held load: their titles are swapped.
 void find_imposed_channel(PreparedRecording& recording);
 
 /// Where the search for a law of creep begins: what fits find that take the strain as exact. The

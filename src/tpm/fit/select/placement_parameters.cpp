@@ -9,6 +9,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/select/unseen_rises.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -263,6 +264,7 @@ void add_placement(FitConfig& config, const LawModel& model,
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     const PreparedRecording& r = recordings[i];
     const auto scope = several ? std::vector<std::size_t>{i} : std::vector<std::size_t>{};
+    if (options.measured) add_rise_delays(config, r, i, several ? " " + r.name : "");
     if (!is_indentation(law) || r.load_imposed) {
       held += options.measured && drift_finding(r, {}) != DriftFinding::no_hold;
       const bool pressed = is_indentation(law);

@@ -372,6 +372,12 @@ Json config_json(const FitConfig& config) {
       entry["drift"] = {{"of", config.data[p.drift->choice].dataset},
                         {"origin", text(p.drift->origin_s, shown_unit(Dimension::time))}};
     }
+    if (p.rise) {
+      const Unit& second = shown_unit(Dimension::time);
+      entry["rise"] = {{"of", config.data[p.rise->choice].dataset},
+                       {"begin", text(p.rise->begin_s, second)},
+                       {"end", text(p.rise->end_s, second)}};
+    }
     if (!p.not_separable.empty()) entry["not_separable"] = p.not_separable;
     parameters[p.fit.name] = std::move(entry);
   }
@@ -422,7 +428,7 @@ FitResult fit_placement(const LawSpec& law, std::span<const double> values,
   const std::vector<LawParameter> parameters = law_parameters(law);
   std::erase_if(config.parameters, [&](const EstimatedParameter& p) {
     const bool own =
-        p.drift.has_value() ||
+        p.drift.has_value() || p.rise.has_value() ||
         (p.sets.size() == 1 && belongs_to_recording(law, parameters[p.sets.front().parameter]));
     return !own;
   });

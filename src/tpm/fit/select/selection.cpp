@@ -14,6 +14,7 @@
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
+#include "tpm/fit/select/unseen_rises.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
@@ -383,6 +384,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   describe(s);
   for (const PreparedRecording& r : recordings) {
     if (!r.start_up.empty()) s.words.push_back(r.start_up);
+    if (std::string rises = unseen_rise_words(r); !rises.empty()) s.words.push_back(rises);
   }
   return s;
 }

@@ -110,6 +110,9 @@ Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimate
                      {"from", estimated.prior->from}};
   }
   if (estimated.drift) j["drift_origin_s"] = number(estimated.drift->origin_s);
+  if (estimated.rise) {
+    j["rise_between_s"] = {number(estimated.rise->begin_s), number(estimated.rise->end_s)};
+  }
   if (p.nuisance) j["nuisance"] = true;
   if (p.only_if_described) j["only_if_described"] = true;
   if (p.first_bounds) {

@@ -8,6 +8,7 @@
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/fit/likelihood/parameter.hpp"
 #include "tpm/show/view_parts.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
@@ -122,8 +123,15 @@ void add_law(ViewPage& page, const Json& law, const std::filesystem::path& file)
                                {"rows", std::move(rows)}};
 }
 
-/// The unit in which a parameter is read, from that of SI.
+/// The unit in which a parameter is read, from that of SI. A drift ("N/s") is sized as what drifts.
 Unit read_unit(const std::string& si_unit, double si) {
+  constexpr std::string_view kPerSecond = "/s";
+  if (!is_unit(si_unit) && si_unit.ends_with(kPerSecond)) {
+    const std::string drifts = si_unit.substr(0, si_unit.size() - kPerSecond.size());
+    if (is_unit(drifts)) {
+      return sized_unit(per_second(shown_unit(parse_unit(drifts, {}).dimension)), si);
+    }
+  }
   if (!is_unit(si_unit)) return {si_unit, Dimension::dimensionless, 1.0};
   return sized_unit(shown_unit(parse_unit(si_unit, {}).dimension), si);
 }

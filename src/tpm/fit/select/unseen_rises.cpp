@@ -1,0 +1,116 @@
+#include "tpm/fit/select/unseen_rises.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/base/text.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
+
+namespace tpm::fit {
+namespace {
+
+/// What the drive does between two samples: whether it rises (1), falls (-1) or hardly moves.
+class Motions {
+ public:
+  explicit Motions(const PreparedRecording& r)
+      : r_(r.recording), jitter_(r.phases.drive_jitter_sd) {
+    const auto [low, high] = std::ranges::minmax_element(r_.drive);
+    range_ = *high - *low;
+  }
+
+  [[nodiscard]] int direction(std::size_t i) const {
+    constexpr double kMoves = 0.02, kSure = 8.0;  // of the range; standard deviations
+    const double change = r_.drive[i + 1] - r_.drive[i];
+    if (!(std::abs(change) > std::max(kMoves * range_, kSure * jitter_))) return 0;
+    return change > 0.0 ? 1 : -1;
+  }
+
+  [[nodiscard]] double speed(std::size_t i) const {
+    return std::abs(r_.drive[i + 1] - r_.drive[i]) / (r_.time_s[i + 1] - r_.time_s[i]);
+  }
+
+ private:
+  const Recording& r_;
+  double jitter_, range_ = 0.0;
+};
+
+}  // namespace
+
+std::vector<UnseenRise> unseen_rises(const PreparedRecording& r) {
+  constexpr std::size_t kCorners = 5;                // intervals of a rise
+  constexpr std::size_t kMost = 16;                  // rises of one recording
+  constexpr double kAnywhere = 0.5, kBlunt = 0.025;  // of an interval
+  const std::vector<double>& time = r.recording.time_s;
+  const Motions motions(r);
+  std::vector<UnseenRise> rises;
+  const std::size_t touched = r.phases.contact_found ? r.phases.contact_index : 0;
+  for (std::size_t i = 0; i + 1 < time.size() && time[i + 1] <= r.to_s;) {
+    const int direction = motions.direction(i);
+    std::size_t end = i + 1;
+    if (direction == 0) {
+      i = end;
+      continue;
+    }
+    while (end + 1 < time.size() && motions.direction(end) == direction) ++end;
+    const std::size_t count = end - i;
+    const auto add = [&](std::size_t at, double earliest, double latest) {
+      const double lasts_s = time[at + 1] - time[at];
+      if (at + 1 < touched || time[at + 1] > r.to_s) return;
+      rises.push_back({time[at], time[at + 1], earliest * lasts_s, latest * lasts_s});
+    };
+    double fastest = 0.0;
+    for (std::size_t at = i; at < end; ++at) fastest = std::max(fastest, motions.speed(at));
+    const double late = 0.5 * (1.0 - motions.speed(i) / fastest);
+    const double early = 0.5 * (1.0 - motions.speed(end - 1) / fastest);
+    const bool blunt = std::max(late, early) > kBlunt;
+    if (count == 1) {
+      add(i, -kAnywhere, kAnywhere);
+    } else if (count == 2 && blunt) {
+      add(i, late, kAnywhere);
+      add(end - 1, -kAnywhere, -early);
+    } else if (count <= kCorners && blunt) {
+      if (late > kBlunt) add(i, 0.0, late);
+      if (early > kBlunt) add(end - 1, -early, 0.0);
+    }
+    i = end;
+  }
+  if (rises.size() > kMost) rises.clear();  // a course of its own, which its samples describe
+  return rises;
+}
+
+void add_rise_delays(FitConfig& config, const PreparedRecording& r, std::size_t i,
+                     const std::string& suffix) {
+  const std::vector<UnseenRise> rises = unseen_rises(r);
+  for (std::size_t k = 0; k < rises.size(); ++k) {
+    const UnseenRise& rise = rises[k];
+    const double lasts_s = rise.end_s - rise.begin_s;
+    EstimatedParameter p;
+    p.fit = {fmt::format("rise_delay{}{}", rises.size() > 1 ? std::to_string(k + 1) : "", suffix),
+             shown_unit(Dimension::time),
+             Scale::linear,
+             0.5 * (rise.earliest_s + rise.latest_s),
+             -0.5 * lasts_s,
+             0.5 * lasts_s};
+    p.prior = Prior{p.fit.start, (rise.latest_s - rise.earliest_s) / std::sqrt(12.0),
+                    fmt::format("anywhere between the samples at {} and {} s",
+                                significant(rise.begin_s, 6), significant(rise.end_s, 6))};
+    p.rise = RiseTerm{i, rise.begin_s, rise.end_s};
+    config.parameters.push_back(std::move(p));
+  }
+}
+
+std::string unseen_rise_words(const PreparedRecording& r) {
+  const std::vector<UnseenRise> rises = unseen_rises(r);
+  if (rises.empty()) return {};
+  const UnseenRise& first = rises.front();
+  const std::string_view what = r.load_imposed ? load_word(r.recording) : "drive";
+  return fmt::format(
+      "{}: when the {} changed between the samples at {} and {} s{} is not known; the fit allows "
+      "for it (rise_delay), and faster sampling or a slower ramp would tell",
+      r.name, what, significant(first.begin_s, 6), significant(first.end_s, 6),
+      rises.size() > 1 ? fmt::format(" and in {} more such intervals", rises.size() - 1) : "");
+}
+
+}  // namespace tpm::fit

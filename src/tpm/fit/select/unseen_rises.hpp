@@ -1,0 +1,34 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "tpm/fit/select/recording_setup.hpp"
+
+namespace tpm::fit {
+
+/// An interval between two samples in which the drive rose or fell, and what is known of the delay
+/// of its centre against that of the straight line: a uniform distribution.
+struct UnseenRise {
+  double begin_s = 0.0, end_s = 0.0;
+  double earliest_s = 0.0, latest_s = 0.0;  ///< delay, s
+};
+
+/// Rises of up to the end of the window that the samples do not resolve. A rise within one
+/// interval may be anywhere in it. One of two intervals of unequal change goes at a constant speed,
+/// from that of the faster interval to that of a jump: it is late in the first and early in the
+/// second. Of three to five intervals, the first and the last hold a corner, at its sharpest where
+/// the drive is as fast there as at its fastest within the rise. Two of equal change, and more
+/// samples, show a rise well enough.
+[[nodiscard]] std::vector<UnseenRise> unseen_rises(const PreparedRecording& recording);
+
+/// Adds the delay of each of these rises to what is estimated, with a prior of the mean and
+/// standard deviation of its distribution.
+/// @param i place of the recording in config.data
+/// @param suffix of the names of the parameters
+void add_rise_delays(FitConfig& config, const PreparedRecording& recording, std::size_t i,
+                     const std::string& suffix);
+
+/// What the fit makes of these rises, in one sentence; empty without one.
+[[nodiscard]] std::string unseen_rise_words(const PreparedRecording& recording);
+
+}  // namespace tpm::fit

@@ -1,0 +1,174 @@
+// Rises of the drive that the samples do not resolve: steps, staircases, and ramps of few samples.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "placed_recordings.hpp"
+#include "tpm/fit/likelihood/delayed_rise.hpp"
+#include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/select/unseen_rises.hpp"
+
+using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::fit;
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+constexpr double kStep_s = 0.05;
+
+/// A linear solid of 60 and 45 N/m, 2 s, driven along knots that lie between its samples.
+Recording driven(std::vector<Knot> knots, double end_s, std::uint64_t seed) {
+  Recording r;
+  r.header.id = "made";
+  for (int i = 0; i * kStep_s < end_s; ++i) r.time_s.push_back(i * kStep_s);
+  const Protocol path(Drive::displacement, std::move(knots));
+  for (const double t : r.time_s) r.drive.push_back(value_at(path, t));
+  LawSpec spec = parse_law_name("linear-1", "test");
+  spec.reference = 4e-3;
+  const Eigen::VectorXd force =
+      LawModel(spec)
+          .respond(path, r.time_s, std::vector{60.0, 45.0, 2.0, 0.0, 0.0}, Want::values)
+          .value;
+  Random random(seed);
+  for (const double f : force) r.response.push_back(f + 4e-4 * random.normal());
+  return r;
+}
+
+/// Steps of 1 mm that take 20 ms each.
+std::vector<Knot> steps(const std::vector<double>& begins_s, double each_m, double end_s) {
+  std::vector<Knot> knots{{0.0, 0.0}};
+  double depth = 0.0;
+  for (const double begin : begins_s) {
+    knots.push_back({begin, depth});
+    depth += each_m;
+    knots.push_back({begin + 0.02, depth});
+  }
+  knots.push_back({end_s, depth});
+  return knots;
+}
+
+void check_truth(const FitResult& fit, double widest_k1) {
+  REQUIRE(fit.adequacy);
+  CHECK(fit.adequacy->verdict == "adequate");
+  for (const ParameterResult& p : fit.parameters) {
+    const double truth = p.parameter.name == "k_inf"  ? 60.0
+                         : p.parameter.name == "k1"   ? 45.0
+                         : p.parameter.name == "tau1" ? 2.0
+                                                      : 0.0;
+    if (truth == 0.0) continue;
+    INFO(p.words);
+    REQUIRE(p.lower);
+    REQUIRE(p.upper);
+    CHECK(*p.lower < truth);
+    CHECK(*p.upper > truth);
+    if (p.parameter.name == "k1") CHECK(*p.upper - *p.lower < widest_k1);
+    CHECK(p.conditional_on.empty());
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a delayed rise moves its centre and keeps its samples", "[rise]") {
+  const Protocol line(Drive::displacement, {{0.0, 0.0}, {1.0, 0.0}, {2.0, 1.0}, {5.0, 1.0}});
+  for (const double delay : {-0.5, -0.3, 0.2, 0.5}) {
+    const DelayedRise rise{1.0, 2.0, delay};
+    const Protocol moved = with_delays(line, std::span(&rise, 1));
+    CHECK(value_at(moved, 1.0) == 0.0);
+    CHECK(value_at(moved, 2.0) == 1.0);
+    // The time lost to a rise at `centre` is the integral of 1 - depth after it.
+    double below = 0.0;
+    constexpr int kParts = 20000;
+    for (int i = 0; i < kParts; ++i)
+      below += (1.0 - value_at(moved, 1.0 + (i + 0.5) / kParts)) / kParts;
+    CHECK_THAT(below, WithinAbs(0.5 + delay, 1e-4));
+  }
+  const DelayedRise elsewhere{1.5, 2.0, 0.1};
+  CHECK(with_delays(line, std::span(&elsewhere, 1)).knots().size() == line.knots().size());
+}
+
+TEST_CASE("a step between two samples biases no interval, wherever it lies", "[rise]") {
+  const double begin = GENERATE(5.001, 5.008, 5.015, 5.022, 5.029);
+  const PreparedRecording one =
+      prepare_recording("step.csv", driven(steps({begin}, 4e-3, 40.0), 35.0, 5));
+  const std::vector<UnseenRise> rises = unseen_rises(one);
+  REQUIRE(rises.size() == 1);
+  CHECK_THAT(rises.front().begin_s, WithinRel(5.0, 1e-12));
+  const Selection s = select_law(std::span(&one, 1), {});
+  const FitResult& fit = s.candidates[s.recommended].fit;
+  CHECK(law_name(fit.config.law.value()) == "linear-1");
+  check_truth(fit, 1.4);
+  CHECK(std::ranges::any_of(s.words, [](const std::string& words) {
+    return words.find("is not known; the fit allows for it") != std::string::npos;
+  }));
+}
+
+TEST_CASE("each step of a staircase between samples has a delay of its own", "[rise]") {
+  const std::uint64_t seed = GENERATE(1, 2, 3);
+  Random random(seed);
+  std::vector<double> begins;
+  for (int i = 0; i < 4; ++i) begins.push_back(5.0 + 8.0 * i + 0.03 * random.uniform());
+  const PreparedRecording one =
+      prepare_recording("stairs.csv", driven(steps(begins, 1e-3, 60.0), 45.0, seed));
+  CHECK(unseen_rises(one).size() == 4);
+  const Selection s = select_law(std::span(&one, 1), {});
+  check_truth(s.candidates[s.recommended].fit, 1.4);
+}
+
+TEST_CASE("a ramp of few samples is known but for its corners, one of many altogether", "[rise]") {
+  const auto ramp = [](double begin, double lasts) {
+    return prepare_recording(
+        "ramp.csv",
+        driven({{0.0, 0.0}, {begin, 0.0}, {begin + lasts, 4e-3}, {60.0, 4e-3}}, 35.0, 7));
+  };
+  const std::vector<UnseenRise> corners = unseen_rises(ramp(5.02, 0.15));
+  REQUIRE(corners.size() == 2);
+  CHECK(corners[0].earliest_s == 0.0);
+  CHECK_THAT(corners[0].latest_s, WithinRel(0.01, 1e-6));  // the corner at 5.02 s
+  CHECK(corners[1].latest_s == 0.0);
+  CHECK(unseen_rises(ramp(5.0, 0.15)).empty());  // corners at samples
+  CHECK(unseen_rises(ramp(5.02, 2.0)).empty());
+}
+
+TEST_CASE("the derivative by a delay is that of the answer", "[rise]") {
+  const PreparedRecording one =
+      prepare_recording("step.csv", driven(steps({5.01}, 4e-3, 40.0), 20.0, 5));
+  const FitConfig config =
+      recording_config(parse_law_name("linear-1", "test"), std::span(&one, 1), {});
+  const ExperimentResiduals residuals(config, data_sets(std::span(&one, 1)));
+  std::vector<double> at;
+  std::size_t rise = config.parameters.size();
+  for (std::size_t i = 0; i < config.parameters.size(); ++i) {
+    at.push_back(config.parameters[i].fit.start);
+    if (config.parameters[i].rise) rise = i;
+  }
+  REQUIRE(rise < config.parameters.size());
+  for (const double delay : {-0.02, 0.0, 0.02}) {
+    at[rise] = delay;
+    Eigen::VectorXd here, there, back;
+    RowMatrix jacobian;
+    REQUIRE(residuals.evaluate(at, here, &jacobian));
+    std::vector<double> moved = at;
+    moved[rise] = delay + 1e-4;
+    REQUIRE(residuals.evaluate(moved, there, nullptr));
+    const Eigen::VectorXd slope = (there - here) / 1e-4;
+    const auto column = jacobian.col(static_cast<Eigen::Index>(rise));
+    CHECK((slope - column).norm() < 5e-3 * column.norm());
+  }
+}
+
+TEST_CASE("a written configuration keeps its delayed rises", "[rise]") {
+  const PreparedRecording one =
+      prepare_recording("step.csv", driven(steps({5.01}, 4e-3, 40.0), 20.0, 5));
+  const FitConfig config =
+      recording_config(parse_law_name("linear-1", "test"), std::span(&one, 1), {});
+  const FitConfig read = parse_fit_config(config_json(config), "test");
+  REQUIRE(read.parameters.size() == config.parameters.size());
+  for (std::size_t i = 0; i < read.parameters.size(); ++i) {
+    REQUIRE(read.parameters[i].rise.has_value() == config.parameters[i].rise.has_value());
+    if (!read.parameters[i].rise) continue;
+    CHECK_THAT(read.parameters[i].rise->end_s, WithinRel(config.parameters[i].rise->end_s, 1e-12));
+    CHECK_THAT(read.parameters[i].prior->sd, WithinRel(config.parameters[i].prior->sd, 1e-6));
+  }
+}
