@@ -14,6 +14,7 @@
 #include "tpm/fit/predict/organ_material.hpp"
 #include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/show/organ_material_report.hpp"
+#include "tpm/organ/scene/experiment_scene.hpp"
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
 #include "tpmkit/error.hpp"
@@ -77,6 +78,7 @@ int run_material(const MaterialCommand& command, const Session& session) {
   }
   const LawFile law = read_law(command.law);
   const Json scene = checked(read_json(command.scene), scene_kind(), command.scene);
+  require_one_protocol(scene, DocumentPlace{command.scene});
   OrganMaterial result =
       put_on_organ(law, chosen_motions(command, law, scene), scene, command.scene,
                    std::filesystem::path(command.scene).parent_path(), material_options(command));

@@ -1,6 +1,7 @@
 #include "protocol_options.hpp"
 
 #include "command.hpp"
+#include "tpm/organ/scene/experiment_scene.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -51,6 +52,7 @@ std::optional<ProtocolFile> chosen_protocol(const RampOptions& options,
   }
   if (!files.front().ends_with(".json")) return std::nullopt;
   const Json document = read_json(files.front());
+  require_one_protocol(document, DocumentPlace{files.front()});
   if (!has_protocol(document)) return std::nullopt;
   return parse_protocol_file(document, files.front());
 }

@@ -1,5 +1,7 @@
 // The pages of tpm view hold what the files say: read back from the page's own text.
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cstdint>
 #include <cstring>
 #include <fstream>
 
@@ -106,6 +108,24 @@ TEST_CASE("the page of a result holds every state, to the precision of a float")
   CHECK(few.front() == times.front());
   CHECK(few.back() == times.back());
   CHECK_THAT(small.description.at("organ").at("shown").get<std::string>(), Contains("so that"));
+}
+
+TEST_CASE("the page of a result on a smooth table says what slides in its plane") {
+  const TempFolder folder;
+  const ExperimentScene scene = test::experiment(R"({
+    "organ": {"kind": "block", "cells": [2, 2, 2], "spacing": "10 mm", "lattice": "cubic", "contact": 1},
+    "anchors": [{"kind": "half_space", "point": ["0 mm", "0 mm", "1 mm"], "normal": [0, 0, -1], "slides": true},
+      {"kind": "spheres", "spheres": [26, 27]}],
+    "contacts": [{"kind": "sphere", "number": 5, "direction": [0, 0, -1]}],
+    "protocol": {"kind": "ramp_hold", "depth": "1 mm", "rate": "1 mm/s", "hold": "1 s"}})");
+  const RunNetwork network = network_to_run(scene);
+  const std::string file = folder / "r.h5";
+  write_simulation(scene, network, simulate(scene, network), file);
+  const ViewPage page = view_file(file);
+  const auto constraint =
+      numbers<std::uint32_t>(page.html(), page.description.at("organ").at("constraint"));
+  CHECK(std::count(constraint.begin(), constraint.end(), 3U) > 0);
+  CHECK(std::count(constraint.begin(), constraint.end(), 2U) == 2);
 }
 
 TEST_CASE("the page of a recording holds every sample, or the extremes of parts") {

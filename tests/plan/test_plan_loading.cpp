@@ -136,6 +136,34 @@ TEST_CASE("tissue that is all relaxed sags as far as tissue that relaxes") {
   }
 }
 
+TEST_CASE("what masses change is known without the mass of a tool whose depth is imposed") {
+  const std::string quick = R"("protocol": {"kind": "ramp_hold", "depth": "2 mm", "rate": "20 mm/s",
+    "hold": "0.5 s"})";
+  const auto planned = [&](const std::string& mass, const std::string& protocol) {
+    return make_plan(experiment(kLiver + R"("contacts": [{"kind": "ball", "radius": "10 mm")" +
+                                mass + "}], " + protocol + "}"),
+                     request(0.01));
+  };
+  const Plan without = planned("", quick);
+  REQUIRE(without.masses_left_out);
+  CHECK(*without.masses_left_out > 0.01);
+  CHECK(without.masses_unknown.empty());
+  CHECK(plan_json(without).at("masses_matter") == true);
+  // The mass of the tool changes nothing.
+  const PlanSurrogate heavy(PlanScene(experiment(
+                                kLiver + R"("contacts": [{"kind": "ball", "radius": "10 mm",
+    "mass_kg": 3}], )" + quick + "}")),
+                            {}, false);
+  CHECK_THAT(heavy.inertia_share(), WithinRel(*without.masses_left_out, 1e-6));
+  // Under a load it does.
+  const Plan loaded =
+      planned("", R"("protocol": {"kind": "creep", "load": "0.05 N", "duration": "2 s"})");
+  CHECK_FALSE(loaded.masses_left_out);
+  CHECK_THAT(loaded.masses_unknown, Contains("mass_kg of each tool"));
+  CHECK(plan_json(loaded).at("masses_matter").is_null());
+  CHECK_THAT(plan_warnings(loaded).front(), Contains("not known what masses would change"));
+}
+
 TEST_CASE("a plan with masses takes less than twice its reference") {
   const ExperimentScene scene = experiment(
       kLiver + R"("formulation": {"kind": "inertial"}, "protocol": {"kind": "knots", "knots": [

@@ -39,6 +39,15 @@ inline std::vector<ErrorCase> organ_law_error_cases() {
       {type, "two contacts", press,
        both(law, scene(R"(, "contacts": [{"kind": "sphere", "number": 1},
 {"kind": "sphere", "number": 2}])"))},
+      {type, "contact with a protocol of its own", press,
+       both(law, scene(R"(, "contacts": [{"kind": "sphere", "protocol":
+{"kind": "ramp_hold", "depth": "2 mm", "rate": "2 mm/s", "hold": "2 s"}}])"))},
+      {type, "gravity", press,
+       both(law, scene(R"(, "loads": [{"kind": "gravity", "direction": [0, 0, -1]}])"))},
+      {type, "scene in place of a recording", "validate {}/l.json {}/s.json", both(law, scene(""))},
+      {type, "motion of a scene with own protocols", "predict {}/l.json {}/s.json",
+       both(law, scene(R"(, "contacts": [{"kind": "sphere", "protocol":
+{"kind": "ramp_hold", "depth": "2 mm", "rate": "2 mm/s", "hold": "2 s"}}])"))},
   };
 }
 

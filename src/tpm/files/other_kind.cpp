@@ -46,6 +46,7 @@ constexpr auto kKindMarks = std::to_array<KindMarks>({
      "the answer of a fit",
      "the law.json that tpm fit wrote beside it",
      {"recommended", "laws"}},
+    {"wpd", "a recording", "tpm fit", {"datasetColl", "wpd"}},
     {"scene", "a scene", "tpm simulate", {"organ", "organ"}},
     {"hil", "a session", "tpm hil run", {"indentations", "indentations"}},
     {"hil", "a session", "tpm hil run", {"slides", "slides"}},

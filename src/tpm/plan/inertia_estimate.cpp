@@ -238,7 +238,8 @@ double of_jump(double jump, std::size_t group, const std::vector<SeenMode>& mode
 
 InertiaModes inertia_modes(const PlanScene& scene) {
   const DrivenNetwork& driven = scene.driven();
-  const Eigen::VectorXd mass = masses_kg(scene.scene(), scene.run_network());
+  constexpr double kAny_kg = 0.01;  // a tool that moves as imposed: its mass changes nothing
+  const Eigen::VectorXd mass = masses_kg(scene.scene(), scene.run_network(), kAny_kg);
   constexpr double kConverged = 1e-8;  // sets damping and the time looked at
   const LowestMode lowest =
       lowest_mode(driven.bonds, driven.rest, driven.constraints, mass, kConverged);

@@ -34,8 +34,8 @@ struct InertiaEstimate {
 /// Where contacts have protocols of their own each one's balanced field drives the same modes, and
 /// the response is that of the first. K is
 /// that of the lowest mode's frequency, alpha the damping of the scene. What the driven sphere's
-/// own mass weighs in the drag is in it, its impacts are not, as in InertialRun::response. Throws
-/// as lowest_mode and masses_kg do.
+/// own mass weighs in the drag is in it, its impacts are not, as in InertialRun::response. A tool
+/// whose depth is imposed needs no mass. Throws as lowest_mode and masses_kg do.
 [[nodiscard]] InertiaEstimate estimate_inertia(const PlanScene& scene);
 
 /// Part of it that no protocol changes. Throws as estimate_inertia does.

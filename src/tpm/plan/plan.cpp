@@ -94,10 +94,7 @@ class Planning {
     if (request.expected) {
       request.expected(expected_after(plan_.work.first_run_s, plan_.inertial, request));
     }
-    if (!plan_.inertial && masses_known(scene)) {
-      const double share = massless.inertia_share();
-      if (share > request.tolerance) plan_.masses_left_out = share;
-    }
+    if (!plan_.inertial) estimate_masses(massless);
     if (plan_.inertial) {
       surrogate_.emplace(scene_, request.measure, true);
     } else {
@@ -139,6 +136,15 @@ class Planning {
  private:
   void tell(const std::string& what) const {
     if (plan_.request.progress) plan_.request.progress(what);
+  }
+
+  void estimate_masses(const PlanSurrogate& massless) {
+    try {
+      const double share = massless.inertia_share();
+      if (share > plan_.request.tolerance) plan_.masses_left_out = share;
+    } catch (const Error& error) {
+      plan_.masses_unknown = error.what();
+    }
   }
 
   void limit_work() {
@@ -242,6 +248,7 @@ class Planning {
   void settle_masses_left_out() {
     const PlanRelevance& inertia = plan_.relevance.front();
     if (plan_.inertial || !inertia.error) return;
+    plan_.masses_unknown.clear();
     plan_.masses_left_out.reset();
     if (inertia.matters) plan_.masses_left_out = inertia.error;
   }

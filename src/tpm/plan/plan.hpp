@@ -112,6 +112,8 @@ struct Plan {
   /// network. The errors of `candidates` are against the reference and do not count it; claims that
   /// are shown do (shown_error()).
   std::optional<double> masses_left_out;
+  /// Why nothing is known of what they would change; empty where it is.
+  std::string masses_unknown;
   bool by_depth = true;
   bool own_protocols = false;  ///< contacts besides the first have protocols of their own
   double duration_s = 0.0;

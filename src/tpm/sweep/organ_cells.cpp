@@ -284,10 +284,6 @@ class OrganCell final : public CellModel {
       throw bad_input(place.key("material").key("E").where, "of a scene that is swept",
                       "the moduli of its bonds, which tpm network build prints");
     }
-    if (scene.has_own_protocols()) {
-      throw bad_input(place.key("contacts").where, "have protocols of their own in a sweep",
-                      "the scene's protocol alone");
-    }
     MaterialBlock material =
         parse_material(changed.value("material", Json::object()), scene.tissue.materials.lateral(),
                        scene.tissue.network.organ, place.key("material"));
@@ -425,6 +421,7 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::s
     }
   }
   setup.outputs = parse_sweep_outputs(document.at("outputs"), place.key("outputs"));
+  require_one_protocol(setup.scene, place.key("scene"));
   const ExperimentScene scene =
       parse_experiment(setup.scene, fmt::format("{}: scene", where), folder);
   if (scene.formulation.mass_spring) {

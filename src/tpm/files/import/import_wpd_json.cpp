@@ -6,6 +6,7 @@
 
 #include "tpm/files/import/import_digitizer.hpp"
 #include "tpm/files/json.hpp"
+#include "tpm/files/other_kind.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -171,6 +172,7 @@ DigitizedDataset read_old_dataset(const Json& json, const std::string& file) {
 
 std::vector<DigitizedDataset> read_wpd_json(std::string_view text, const std::string& file) {
   const Json project = parse_json(text, file);
+  require_not_other_kind(project, "wpd", file);
   std::vector<DigitizedDataset> datasets;
   if (project.is_object() && project.contains("wpd")) {
     for (const Json& json : list(project.at("wpd"), "dataSeries", file + ": wpd")) {

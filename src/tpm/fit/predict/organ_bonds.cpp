@@ -18,6 +18,12 @@ constexpr double kLateralRatio = 1.0;  // E' over instantaneous radial modulus: 
 
 SceneOrgan organ_of_scene(const Json& scene, std::string_view where,
                           const std::filesystem::path& folder) {
+  const DocumentPlace place{std::string(where)};
+  require_one_protocol(scene, place);
+  if (scene.contains("loads")) {
+    throw bad_input(place.key("loads").where, "act on the tissue before it is pushed",
+                    "a scene without them: the law knows no loads");
+  }
   Json bare = scene;
   std::optional<Probe> probe;
   if (scene.contains("contacts")) {
@@ -28,7 +34,7 @@ SceneOrgan organ_of_scene(const Json& scene, std::string_view where,
     const ExperimentScene experiment = parse_experiment(bare, where, folder);
     if (experiment.contacts.size() != 1 ||
         experiment.contacts.front().kind != ContactKind::sphere) {
-      throw bad_input(fmt::format("{}: /contacts", where), "more than one sphere that is driven",
+      throw bad_input(place.key("contacts").where, "is not one sphere that is driven",
                       "one contact of the kind sphere, or none for the organ's contact sphere");
     }
     probe = experiment.probe();

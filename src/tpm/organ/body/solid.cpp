@@ -219,6 +219,12 @@ std::size_t add_support(const Surface& surface, SolidFilling& filling, int wante
   return static_cast<std::size_t>(added.cols());
 }
 
+/// What an outer sphere wants below it.
+struct Wanted {
+  std::size_t inside;
+  double steadiness;
+};
+
 /// The outer spheres and the shallow ones that they touch.
 class Held {
  public:
@@ -238,9 +244,9 @@ class Held {
   }
 
   /// Whether every outer sphere still has what it wants without a shallow one.
-  [[nodiscard]] bool can_spare(std::size_t place) const {
+  [[nodiscard]] bool can_spare(std::size_t place, const Wanted& wanted) const {
     return std::all_of(above_[place].begin(), above_[place].end(), [&](std::size_t outer) {
-      if (below_[outer].size() <= static_cast<std::size_t>(kWantedInside)) return false;
+      if (below_[outer].size() <= wanted.inside) return false;
       std::vector<Vector3d> inner;
       for (const std::size_t other : below_[outer]) {
         if (other != place) {
@@ -249,7 +255,7 @@ class Held {
         }
       }
       return steadiness(filling_.normal.col(static_cast<Eigen::Index>(outer)), inner) >=
-             kLeastSteadiness;
+             wanted.steadiness;
     });
   }
 
@@ -264,7 +270,8 @@ class Held {
 };
 
 /// Leaves out lattice points, the shallowest first, without which every outer sphere still has
-/// what it wants below it; the deepest where there are not so many.
+/// what it wants below it; where there are not so many the deepest that no outer sphere touches. A
+/// thin body has none of those either: its outer spheres then make do with less.
 void leave_out(SolidFilling& filling, std::size_t surplus) {
   if (surplus == 0) return;
   const Positions points = shallow(filling);
@@ -279,18 +286,28 @@ void leave_out(SolidFilling& filling, std::size_t surplus) {
     return filling.inner[a.first].depth < filling.inner[b.first].depth;
   });
   std::vector<bool> out(filling.inner.size(), false);
-  for (const auto& [sphere, place] : order) {
-    if (surplus == 0) break;
-    if (!held.can_spare(place)) continue;
-    held.leave_out(place);
+  const auto leave = [&](std::size_t sphere) {
     out[sphere] = true;
     --surplus;
-  }
-  for (std::size_t i = 0; i < out.size() && surplus > 0; ++i) {
-    if (out[i]) continue;
-    out[i] = true;
-    --surplus;
-  }
+  };
+  const auto leave_shallow = [&](const Wanted& wanted) {
+    for (const auto& [sphere, place] : order) {
+      if (surplus == 0) return;
+      if (out[sphere] || !held.can_spare(place, wanted)) continue;
+      held.leave_out(place);
+      leave(sphere);
+    }
+  };
+  const auto leave_deepest = [&](double deeper_than) {
+    for (std::size_t i = 0; i < out.size() && surplus > 0; ++i) {
+      if (!out[i] && filling.inner[i].depth > deeper_than) leave(i);
+    }
+  };
+  leave_shallow({kWantedInside, kLeastSteadiness});
+  leave_deepest(kShallow * filling.spacing);
+  leave_shallow({2, 0.5 * kLeastSteadiness});
+  leave_shallow({1, 0.0});
+  leave_deepest(0.0);
   std::size_t at = 0;
   std::erase_if(filling.inner, [&](const InnerSphere&) { return out[at++]; });
 }

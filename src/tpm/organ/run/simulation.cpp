@@ -68,15 +68,18 @@ RunNetwork network_to_run(const ExperimentScene& scene) {
   return {std::move(msm), std::move(driven)};
 }
 
-Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& network) {
+Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& network,
+                          std::optional<double> of_imposed_kg) {
   const Organ& organ = network.network.organ;
   Eigen::VectorXd mass(network.driven.rest.cols());
   mass.head(organ.position.cols()) = sphere_masses_kg(organ, scene.formulation.density_kg_m3);
   Eigen::Index column = organ.position.cols();
   for (const SceneContact& contact : scene.contacts) {
     if (!contact.is_tool()) continue;
-    if (!contact.mass_kg) throw bad_input("scene", "a tool has no mass", "mass_kg of each tool");
-    mass[column++] = *contact.mass_kg;
+    std::optional<double> own = contact.mass_kg;
+    if (!own && scene.imposes_depth(contact)) own = of_imposed_kg;
+    if (!own) throw bad_input("scene", "a tool has no mass", "mass_kg of each tool");
+    mass[column++] = *own;
   }
   return mass;
 }

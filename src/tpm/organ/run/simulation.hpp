@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <optional>
 
 #include "tpm/organ/balance/driven_network.hpp"
 #include "tpm/organ/balance/inertial.hpp"
@@ -26,7 +27,9 @@ struct RunNetwork {
 [[nodiscard]] RunNetwork network_to_run(const ExperimentScene& scene);
 
 /// kg, of spheres and tools. Throws Error(bad_input) for a tool without mass.
-[[nodiscard]] Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& network);
+/// @param of_imposed_kg of tools without mass whose depth is imposed
+[[nodiscard]] Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& network,
+                                        std::optional<double> of_imposed_kg = std::nullopt);
 
 /// A point of the response. The same history is watched whatever is written: it is fine enough to
 /// be drawn, and dates what passes a limit.

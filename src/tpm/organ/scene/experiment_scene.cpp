@@ -22,6 +22,18 @@ void require_masses(const std::vector<SceneContact>& contacts, std::string_view 
 
 }  // namespace
 
+void require_one_protocol(const Json& scene, const DocumentPlace& place) {
+  if (!scene.is_object() || !scene.contains("organ") || !scene.contains("contacts")) return;
+  const Json& contacts = scene.at("contacts");
+  if (!contacts.is_array()) return;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (!contacts[i].is_object() || !contacts[i].contains("protocol")) continue;
+    throw bad_input(place.key("contacts").key(std::to_string(i)).key("protocol").where,
+                    "is of one contact alone",
+                    "one protocol for all, in the scene's block 'protocol'");
+  }
+}
+
 ExperimentScene parse_experiment(const Json& scene, std::string_view where,
                                  const std::filesystem::path& folder) {
   return parse_checked_experiment(checked(scene, scene_kind(), where), where, folder);
@@ -68,6 +80,10 @@ ExperimentScene parse_checked_experiment(const Json& scene, std::string_view whe
 bool ExperimentScene::has_own_protocols() const {
   return std::any_of(contacts.begin() + 1, contacts.end(),
                      [](const SceneContact& contact) { return contact.protocol.has_value(); });
+}
+
+bool ExperimentScene::imposes_depth(const SceneContact& contact) const {
+  return contact.protocol.value_or(protocol).drive() == Drive::displacement;
 }
 
 ExperimentScene read_experiment(const std::filesystem::path& scene) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/files/document_place.hpp"
 #include "tpm/organ/balance/equilibrium.hpp"
 #include "tpm/organ/balance/mass_spring.hpp"
 #include "tpm/organ/scene/scene.hpp"
@@ -84,9 +85,16 @@ struct ExperimentScene {
 
   /// Some contact besides the first has a protocol of its own.
   [[nodiscard]] bool has_own_protocols() const;
+  /// Whether a contact moves as it is imposed. The mass of such a tool changes no force on the
+  /// tissue.
+  [[nodiscard]] bool imposes_depth(const SceneContact& contact) const;
   /// The sphere that the first contact drives or aims at, and where to.
   [[nodiscard]] const Probe& probe() const { return contacts.front().probe; }
 };
+
+/// For commands that follow, or change, one protocol: throws Error(bad_input) with the key where a
+/// contact of a scene has one of its own. Other documents pass.
+void require_one_protocol(const Json& scene, const DocumentPlace& place);
 
 /// Extent of the organ behind the probe, along its direction, m; infinite where the probe
 /// pulls away from the outermost sphere.

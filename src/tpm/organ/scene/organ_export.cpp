@@ -240,6 +240,10 @@ std::vector<std::string> organ_export_warnings(const Tissue& tissue,
   if (!system.is_linear()) {
     warnings.emplace_back("stiffening with elongation: bonds keep their stiffness at rest");
   }
+  const std::vector<std::string>& unused = tissue.unused_blocks;
+  if (std::find(unused.begin(), unused.end(), "loads") != unused.end()) {
+    warnings.emplace_back("loads: gravity and pressures of the scene are left out");
+  }
   const auto bonds = exported_bonds(tissue, options.instantaneous);
   constexpr double kMuch_GB = 2.0;
   const double stack_GB = 1e-9 * sizeof(double) * mjcf_stack_numbers(tissue, bonds.size());

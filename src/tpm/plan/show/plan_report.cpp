@@ -22,6 +22,8 @@ Json number(const std::optional<double>& value) {
 }
 
 std::string share_text(double share) {
+  constexpr double kMostShare = 10.0;  // beyond, the figure says nothing
+  if (share > kMostShare) return fmt::format("over {} %", shortest(100.0 * kMostShare));
   return significant(100.0 * share, 3) + " %";
 }
 
@@ -233,7 +235,7 @@ std::vector<std::string> relevance_lines(const Plan& plan) {
   };
   for (const PlanRelevance& r : plan.relevance) {
     // Of masses that scene and reference leave out there is a warning.
-    if (r.part == "inertia" && !plan.inertial && r.matters) continue;
+    if (r.part == "inertia" && !plan.inertial && r.error && r.matters) continue;
     if (!r.error) {
       add(not_found, fmt::format("{} ({})", r.part, r.note));
     } else {
@@ -329,6 +331,11 @@ std::string expected_plan_text(const ExpectedPlanWork& work) {
                      time_text(rounded(*work.all_s, 1)));
 }
 
+Json masses_matter_json(const Plan& plan) {
+  const bool matter = plan.inertial || plan.masses_left_out.has_value();
+  return matter || plan.masses_unknown.empty() ? Json(matter) : Json(nullptr);
+}
+
 Json claim_json(const Plan& plan) {
   const PlanClaim claim = claim_of(plan);
   return {{"quantity", claim.quantity}, {"norm", claim.norm}, {"protocol", claim.protocol}};
@@ -345,6 +352,10 @@ std::vector<std::string> plan_warnings(const Plan& plan) {
         plan.request.for_loop ? "Nothing that a loop steps has masses."
                               : "For a model with masses, write \"formulation\": {\"kind\": "
                                 "\"inertial\"} in the scene."));
+  }
+  if (!plan.masses_unknown.empty()) {
+    warnings.push_back(fmt::format(
+        "not known what masses would change, and no error above counts it: {}", plan.masses_unknown));
   }
   warnings.insert(warnings.end(), plan.validity.begin(), plan.validity.end());
   return warnings;
@@ -374,7 +385,7 @@ Json plan_json(const Plan& plan) {
                                ? candidate_json(plan, plan.candidates[*plan.without_budget])
                                : Json(nullptr);
   json["needs_full_model"] = plan.needs_full;
-  json["masses_matter"] = plan.inertial || plan.masses_left_out.has_value();
+  json["masses_matter"] = masses_matter_json(plan);
   json["masses_left_out"] = number(plan.masses_left_out);
   json["reference"] = {{"method", plan.reference.method},
                        {"cross_check", plan.reference.cross_check},

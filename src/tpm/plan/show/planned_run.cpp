@@ -62,7 +62,7 @@ Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
        c.verified_response_error ? Json(rounded(shown_error(plan, *c.verified_response_error), 6))
                                  : Json(nullptr)},
       {"tolerance", plan.request.tolerance},
-      {"masses_matter", plan.inertial || plan.masses_left_out.has_value()}};
+      {"masses_matter", masses_matter_json(plan)}};
   add_trajectory(json, scene, times_s, answer);
   json["validity_passed"] = plan.validity;
   json["warnings"] = plan_warnings(plan);

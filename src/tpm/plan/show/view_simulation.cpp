@@ -122,7 +122,7 @@ void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::s
   // Files of version 0.1 name it by another word.
   const char* const constraint =
       file.has("/spheres/constraint") ? "/spheres/constraint" : "/spheres/held";
-  organ["constraint"] = page.put(whole_numbers(file, path, constraint, 3));
+  organ["constraint"] = page.put(whole_numbers(file, path, constraint, 4));
   organ["bonds"] = page.put(whole_numbers(file, path, "/bonds/ends", spheres));
   organ["time_s"] = page.put(shown_times);
   organ["displacement_m"] = page.put(states_of(file, path, "displacement_m", shown, spheres));
