@@ -1,7 +1,7 @@
 // Solids over many numbers of spheres: every outer sphere is held from inside by the absolute
 // measure, and the surface of a ball answers evenly. Fillings that left lattice points 0.7 spacings
-// clear of the outer layer and added nothing had 70 of 4,214 outer spheres of a ball of 30,000 (fcc)
-// without any bond to the inside.
+// clear of the outer layer and added nothing had 70 of 4,214 outer spheres of a ball of 30,000
+// (fcc) without any bond to the inside.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -41,9 +41,8 @@ void check_held(const Surface& surface, std::size_t count) {
     INFO(count << " " << entry_of(kLatticeWords, lattice).text);
     const std::vector<double> support =
         outer_support(build_network(solid_of(surface, count, lattice), {}, "solid"));
-    CHECK(std::count_if(support.begin(), support.end(), [](double own) {
-            return own < kLeastOuterSupport;
-          }) == 0);
+    CHECK(std::count_if(support.begin(), support.end(),
+                        [](double own) { return own < kLeastOuterSupport; }) == 0);
   }
 }
 

@@ -150,8 +150,8 @@ TEST_CASE("what masses change is known without the mass of a tool whose depth is
   CHECK(without.masses_unknown.empty());
   CHECK(plan_json(without).at("masses_matter") == true);
   // The mass of the tool changes nothing.
-  const PlanSurrogate heavy(PlanScene(experiment(
-                                kLiver + R"("contacts": [{"kind": "ball", "radius": "10 mm",
+  const PlanSurrogate heavy(PlanScene(experiment(kLiver +
+                                                 R"("contacts": [{"kind": "ball", "radius": "10 mm",
     "mass_kg": 3}], )" + quick + "}")),
                             {}, false);
   CHECK_THAT(heavy.inertia_share(), WithinRel(*without.masses_left_out, 1e-6));

@@ -341,11 +341,11 @@ const Block<SessionKeys>& session_block() {
 }
 
 const FileKind& session_kind() {
-  static const FileKind kind{
-      "hil", "A session of tpm hil",
-      "What is rendered, what the operator does, and where the loop stops. Quantities are texts of a "
-      "number and a unit, such as \"4 mm/s\"",
-      session_block().form()};
+  static const FileKind kind{"hil", "A session of tpm hil",
+                             "What is rendered, what the operator does, and where the loop stops. "
+                             "Quantities are texts of a "
+                             "number and a unit, such as \"4 mm/s\"",
+                             session_block().form()};
   return kind;
 }
 

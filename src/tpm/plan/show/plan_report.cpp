@@ -354,8 +354,9 @@ std::vector<std::string> plan_warnings(const Plan& plan) {
                                 "\"inertial\"} in the scene."));
   }
   if (!plan.masses_unknown.empty()) {
-    warnings.push_back(fmt::format(
-        "not known what masses would change, and no error above counts it: {}", plan.masses_unknown));
+    warnings.push_back(
+        fmt::format("not known what masses would change, and no error above counts it: {}",
+                    plan.masses_unknown));
   }
   warnings.insert(warnings.end(), plan.validity.begin(), plan.validity.end());
   return warnings;
