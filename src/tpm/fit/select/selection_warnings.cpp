@@ -121,7 +121,8 @@ std::vector<std::string> protocol_warnings(const FitResult& fit,
   }
   constexpr int kDigitsOfTime = 6;  // of a rounded one: "310 s", not "3.1e+02 s"
   for (const ParameterResult& p : fit.parameters) {
-    const bool time = p.parameter.unit.dimension == Dimension::time;
+    // A delay of a rise is no time constant.
+    const bool time = !p.nuisance && p.parameter.unit.dimension == Dimension::time;
     if (!time) continue;
     if (p.estimate < ramp_s) {
       warnings.push_back(fmt::format(
