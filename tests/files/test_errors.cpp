@@ -951,11 +951,14 @@ TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md 
 
 TEST_CASE("tpm data check reports every failing file and answers no") {
   const TempFolder folder;
-  with_files({{"c.json", kPointsJson}, {"c.csv", "depth_mm,force_N,provenance\n2,x,table\n"}})(
+  const std::string broken = "depth_mm,force_N,provenance\n2,x,table\n";
+  with_files(
+      {{"c.json", kPointsJson}, {"c.csv", broken}, {"d.json", kPointsJson}, {"d.csv", broken}})(
       folder);
-  const Answer answer = run("data check {}/c.csv evren_static {}/missing.csv", folder);
+  const Answer answer = run("data check {}/c.csv evren_static {}/d.csv", folder);
   CHECK(answer.exit_code == 1);
   CHECK(std::count(answer.error.begin(), answer.error.end(), '\n') == 2);
+  CHECK(run("data check {}/c.csv {}/missing.csv", folder).exit_code == 3);
   CHECK(run("data check evren_static", folder).exit_code == 0);
 }
 
