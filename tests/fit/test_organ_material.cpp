@@ -92,7 +92,7 @@ TEST_CASE("laws, motions and scenes that no organ can take are refused") {
                (void)put_on_organ(two_branches(100.0), {testing::ramp_to_2_mm()}, patch, "test", {},
                                   {});
              }),
-             Contains("more than one sphere"));
+             Contains("is not one sphere"));
   CHECK_THAT(test::refusal_of([&] {
                (void)motion_of_protocol(creep(1.0, 5.0), {0.0, 1.0});
              }),
