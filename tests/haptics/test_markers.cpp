@@ -184,10 +184,10 @@ TEST_CASE("A session whose largest force no hand feels says so, in text and in J
   run.model = make_loop_model(session);
   run.largest_force_N = 0.76e-3;
   CHECK_THAT(run_text(session, run), Contains("largest force 0.00076 N: no hand feels it"));
-  CHECK(run_json(session, run).dump().find("\"felt\":false") != std::string::npos);
+  CHECK(run_json(session, run).dump().find("\"perceptible\":false") != std::string::npos);
   run.largest_force_N = 0.098;
   CHECK_THAT(run_text(session, run), Contains("largest force 0.098 N\n"));
-  CHECK(run_json(session, run).dump().find("\"felt\":true") != std::string::npos);
+  CHECK(run_json(session, run).dump().find("\"perceptible\":true") != std::string::npos);
 }
 
 /// A check of 60 s at 1 kHz: nearly all wake-ups 20 us late, some and a few later.
