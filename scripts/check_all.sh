@@ -16,7 +16,7 @@ for preset in asan-ubsan tsan; do
   step "building and testing with the preset $preset (build/$preset)"
   configure "$preset" -DTPM_SANITIZE_EVERYTHING=ON
   build "$preset"
-  ctest --preset "$preset" --parallel "$(nproc)" --no-tests=error
+  run_tests "$preset"
 done
 
 step "failing system calls and kills (build/release)"

@@ -83,3 +83,17 @@ build() {
   [ -t 1 ] || quiet=(--quiet)
   NINJA_STATUS='   [%f of %t, %e s] ' ninja -C "$folder" -j "$(nproc)" "${quiet[@]}" "$@"
 }
+
+# run_tests PRESET: ctest; where tests fail, the end of what each of them said follows ctest's list
+run_tests() {
+  local found=$PWD/build/tests-$1.xml
+  ctest --preset "$1" --parallel "$(nproc)" --no-tests=error --output-junit "$found" && return
+  local failed=$?
+  python3 - "$found" <<'END'
+import sys, xml.etree.ElementTree as xml
+for test in xml.parse(sys.argv[1]).iter("testcase"):
+    if test.find("failure") is not None:
+        print(f"\n{test.get('name')}:", *test.findtext("system-out", "").splitlines()[-40:], sep="\n  ")
+END
+  return "$failed"
+}

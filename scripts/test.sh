@@ -14,5 +14,5 @@ step "building tpm and its tests (build/release)"
 build release
 
 step "tests"
-ctest --preset tests --parallel "$(nproc)" --no-tests=error
+run_tests tests
 step "done"

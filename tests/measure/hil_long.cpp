@@ -7,7 +7,7 @@
 
 #include <ctime>
 #include <filesystem>
-#include <optional>
+#include <memory>
 #include <string>
 
 #include "endless_motion.hpp"
@@ -48,7 +48,7 @@ void run(const std::string& file, double hours, const std::filesystem::path& fol
 
   test::EndlessMotion device(cycles(kRound_s), kDepth_m);
   const std::filesystem::path path = folder / "hour.rows";
-  std::optional<RowLogWriter> log(std::in_place, path, "{}", sizeof(ServoRecord));
+  auto log = std::make_unique<RowLogWriter>(path, "{}", sizeof(ServoRecord));
   fmt::print("{}\nsimulated_h,resident_MB,cpu_s\n", loop.name);
   const auto tell = [](double hour) {
     fmt::print("{:.2f},{:.3f},{:.1f}\n", hour, 1e-6 * test::resident_bytes(),
@@ -65,7 +65,7 @@ void run(const std::string& file, double hours, const std::filesystem::path& fol
         if (done % rounds_an_hour != 0) return;
         log->close("{}");
         log.reset();
-        log.emplace(path, "{}", sizeof(ServoRecord));
+        log = std::make_unique<RowLogWriter>(path, "{}", sizeof(ServoRecord));
       });
   log.reset();
   std::filesystem::remove(path);
