@@ -776,6 +776,8 @@ std::vector<ErrorCase> device_file_cases() {
       {type, "mean above the largest delay", run_session,
        device(R"({"device": "omega7", "delay": {"provenance": "measured", "mean_s": 0.02,
                   "largest_s": 0.001}})")},
+      {type, "encoder step of zero", run_session,
+       device(R"({"device": "omega7", "encoder_step": {"provenance": "measured", "step_m": 0}})")},
       {type, "device that nobody knows", "hil run {}/h.json --device gloves -o {}/out",
        with_files({{"h.json", kSession}})},
       {type, "duration of an identification", "hil identify --duration '1 s' -o {}/out",

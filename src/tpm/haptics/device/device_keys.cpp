@@ -138,7 +138,8 @@ const Block<EncoderStepKeys>& encoder_block() {
   static const Block<K> block(
       "encoder_step", "resolution of positions",
       {known_by<K>(),
-       required(key("step_m", &K::step_m, number({.least = 0.0, .most = 1e-3}), "of a position")),
+       required(key("step_m", &K::step_m, number({.least = 0.0, .most = 1e-3, .above = true}),
+                    "of a position")),
        key("noise_m", &K::noise_m, number(kZeroOrMore), "standard deviation of a position")});
   return block;
 }

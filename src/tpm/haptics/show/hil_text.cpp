@@ -19,7 +19,8 @@ namespace {
 constexpr int kHilDigits = 6;
 
 std::string us(double seconds) {
-  return significant(1e6 * seconds, 3);
+  const double value = 1e6 * seconds;
+  return value < 1000.0 ? significant(value, 3) : fmt::format("{:.0f}", value);
 }
 
 std::string device_words(const DeviceIdentity& device) {
