@@ -175,6 +175,28 @@ TEST_CASE("an amount that is required counts where protocols differ, too", "[val
   CHECK(validated("jnd", 1.25).verdict == ModelVerdict::not_adequate);
 }
 
+TEST_CASE(
+    "without a rest the text names what the zero leaves undetermined and the verdict on the rest",
+    "[validate]") {
+  const LawFile law = quiet_law();
+  PreparedRecording in_contact = quiet_recording(1.0);
+  // The recording begins on the ramp, a fifth of the way in.
+  Recording cut = in_contact.recording;
+  const auto moves = std::ranges::find_if(cut.drive, [](double d) { return d > 0.6e-3; });
+  const std::ptrdiff_t gone = moves - cut.drive.begin();
+  for (auto* column : {&cut.time_s, &cut.drive, &cut.response}) {
+    column->erase(column->begin(), column->begin() + gone);
+  }
+  ValidationRequest request = request_for(law, prepare_recording("cut", cut));
+  request.requirement = parse_requirement("10%", "test");
+  const Validation v = validate(request);
+  const std::string text = to_terminal_text(v);
+  INFO(text);
+  CHECK_THAT(text, Contains("undetermined   peak force, force at end of hold, relaxation ratio: "
+                            "depends on the zero of the force") &&
+                       Contains("nothing before contact tells the zero of the force"));
+}
+
 TEST_CASE("a table of which no row is printed has no head", "[validate]") {
   BriefText text;
   text.add_table("recording  E\n------------\na  1\nb  2\n", BriefText::Rank::recording,
