@@ -177,12 +177,12 @@ TEST_CASE("a radius is stated as an amount of it or a share", "[validate]") {
 }
 
 TEST_CASE("a new specimen adds the spread between those of the calibration", "[validate]") {
-  // Hardly any noise: D / S of recording j is its factor over the mean of all.
+  // Hardly any noise: D of recording j is its factor times the force of factor 1.
   const std::vector<double> factors{0.8, 1.0, 1.05, 1.3};
   double mean = 0.0, square = 0.0;
   for (const double f : factors) mean += f / 4.0;
   for (const double f : factors) square += (f - mean) * (f - mean) / 3.0;
-  const double tau = std::sqrt(square) / mean;
+  const double sd = std::sqrt(square);
   Random random(20);
   test::StudyNoise noise;
   noise.sigma_N = 1e-5;
@@ -191,13 +191,14 @@ TEST_CASE("a new specimen adds the spread between those of the calibration", "[v
   request.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
   const Validation v = validate(request);
   for (const SpecimenSpread& s : v.specimens) {
-    CHECK_THAT(s.tau(), WithinRel(tau, 0.01));
     CHECK_THAT(s.degrees, WithinRel(3.0, 0.01));
     CHECK_THAT(s.of_mean, WithinRel(0.5, 1e-9));
   }
   const QuantityComparison& end =
       test::study_quantity(v.recordings.front(), QuantityKind::end_of_hold);
-  CHECK_THAT(end.e.u_val, WithinRel(tau * std::sqrt(1.25) * end.simulated, 0.01));
+  const double tau = sd * end.measured / 1.2;
+  CHECK_THAT(end.of_specimen.norm(), WithinRel(tau, 0.01));
+  CHECK_THAT(end.e.u_val, WithinRel(tau * std::sqrt(1.25), 0.01));
   CHECK_THAT(end.e.degrees, WithinRel(3.0, 0.02));
   CHECK(end.parts.front().name == "the spread between specimens");
   CHECK(end.verdict == ModelVerdict::not_seen);
@@ -206,7 +207,7 @@ TEST_CASE("a new specimen adds the spread between those of the calibration", "[v
   CHECK_THAT(text, Contains("validated with new specimens: validation") &&
                        Contains("between its 4 recordings, each a specimen"));
   CHECK_THAT(to_json(v).at("new_specimen")[0].at("tau_share_of_S").get<double>(),
-             WithinRel(tau, 0.01));
+             WithinRel(v.specimens.front().tau(), 1e-5));
   // The same specimens: 20 % stiffer is a model error.
   request.new_specimen = false;
   CHECK(validate(request).verdict == ModelVerdict::seen);
