@@ -179,13 +179,15 @@ TEST_CASE(
     "without a rest the text names what the zero leaves undetermined and the verdict on the rest",
     "[validate]") {
   const LawFile law = quiet_law();
-  PreparedRecording in_contact = quiet_recording(1.0);
-  // The recording begins on the ramp, a fifth of the way in.
-  Recording cut = in_contact.recording;
-  const auto moves = std::ranges::find_if(cut.drive, [](double d) { return d > 0.6e-3; });
-  const std::ptrdiff_t gone = moves - cut.drive.begin();
+  Random random(11);
+  test::StudyNoise noise;
+  noise.sigma_N = 2e-4;
+  test::StudyTest slow;
+  slow.rate_mm_per_s = 0.5;
+  Recording cut = test::study_recording(slow, noise, random);
+  constexpr std::ptrdiff_t kGone = 42;  // the rest and the first steps of the ramp
   for (auto* column : {&cut.time_s, &cut.drive, &cut.response}) {
-    column->erase(column->begin(), column->begin() + gone);
+    column->erase(column->begin(), column->begin() + kGone);
   }
   ValidationRequest request = request_for(law, prepare_recording("cut", cut));
   request.requirement = parse_requirement("10%", "test");
@@ -194,7 +196,14 @@ TEST_CASE(
   INFO(text);
   CHECK_THAT(text, Contains("undetermined   peak force, force at end of hold, relaxation ratio: "
                             "depends on the zero of the force") &&
-                       Contains("nothing before contact tells the zero of the force"));
+                       Contains("half time, s"));
+  CHECK_THAT(v.recordings.front().placement.contact_words, Contains("onset"));
+  for (const QuantityComparison& q : v.recordings.front().quantities) {
+    const bool by_zero = q.quantity.kind != QuantityKind::half_time;
+    CHECK(q.unknown == by_zero);
+    CHECK((q.verdict == ModelVerdict::undetermined) == by_zero);
+  }
+  CHECK_THAT(conclusion_words(v), Contains("undetermined for 10%: peak force"));
 }
 
 TEST_CASE("a table of which no row is printed has no head", "[validate]") {
