@@ -35,7 +35,7 @@ constexpr const char* kSessionEnds = ".tpmrec";
 struct ValidateOptions {
   std::string law;  ///< or organ
   std::string session;
-  bool plan = false;
+  bool plan = false, new_specimen = false;
   PlanChoice planned;
   RecordingOptions recordings;
   std::vector<std::string> quantities;
@@ -168,6 +168,7 @@ void add_rendering(ValidationRequest& request, const ValidateOptions& options) {
   presses.requirement.reset();
   presses.at.reset();
   presses.calibration = {};
+  presses.new_specimen = false;
   add_presses(presses, options.session);
   request.session = options.session;
   const Validation rendered = validate(presses);
@@ -194,6 +195,7 @@ ValidationRequest validation_request(const ValidateOptions& options) {
     request.quantities.push_back(
         of_option([&] { return parse_quantity_of_interest(text, spec.drive, "--quantity"); }));
   }
+  request.new_specimen = options.new_specimen;
   request.contact_by_threshold = !options.recordings.contact_response.empty();
   if (!options.at.empty()) request.at = options.at;
   set_recordings(request, options);
@@ -212,20 +214,22 @@ ValidationRequest validation_request(const ValidateOptions& options) {
 
 /// What a credibility page needs to ask again.
 Json invocation_of(const ValidateOptions& o) {
-  return {{"law", o.law},
-          {"recordings", o.recordings.files},
-          {"reading", o.recordings.reading.texts},
-          {"units", o.recordings.reading.units},
-          {"contact_force", o.recordings.contact_response},
-          {"quantities", o.quantities},
-          {"require", o.requirement},
-          {"placement", o.placement},
-          {"instrument", o.instrument},
-          {"calibration_instrument", o.calibration_instrument},
-          {"at", o.at},
-          {"session", o.session},
-          {"evidence", o.evidence},
-          {"plan", o.plan ? o.planned.tolerance : std::string()}};
+  Json invocation{{"law", o.law},
+                  {"recordings", o.recordings.files},
+                  {"reading", o.recordings.reading.texts},
+                  {"units", o.recordings.reading.units},
+                  {"contact_force", o.recordings.contact_response},
+                  {"quantities", o.quantities},
+                  {"require", o.requirement},
+                  {"placement", o.placement},
+                  {"instrument", o.instrument},
+                  {"calibration_instrument", o.calibration_instrument},
+                  {"at", o.at},
+                  {"session", o.session},
+                  {"evidence", o.evidence},
+                  {"plan", o.plan ? o.planned.tolerance : std::string()}};
+  if (o.new_specimen) invocation["new_specimen"] = true;
+  return invocation;
 }
 
 ValidateOptions options_of(const Json& record, const std::string& page) {
@@ -244,6 +248,7 @@ ValidateOptions options_of(const Json& record, const std::string& page) {
     o.calibration_instrument = i.at("calibration_instrument");
     o.at = i.at("at");
     o.session = i.value("session", "");
+    o.new_specimen = i.value("new_specimen", false);
     o.evidence = i.at("evidence").get<std::vector<std::string>>();
     const std::string tolerance = i.value("plan", "");
     o.plan = !tolerance.empty();
@@ -406,6 +411,9 @@ void add_validate_command(CLI::App& app, Session& session) {
                       "description beside them has it");
   command->add_option("--calibration-instrument", options->calibration_instrument,
                       "Instrument of the recordings that the law was fitted to, as --instrument");
+  command->add_flag("--new-specimen", options->new_specimen,
+                    "The recordings are of new specimens: the spread between the recordings of "
+                    "the calibration, each of another specimen, is in u_input");
   command->add_option("--at-recording", options->at,
                       "Recording to whose protocol the pooled area metric is carried, where "
                       "protocols differ");

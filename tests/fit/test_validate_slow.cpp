@@ -176,4 +176,23 @@ TEST_CASE("|E| <= U without a model error, and [E - U, E + U] holds a known one"
   }
 }
 
+TEST_CASE("|E| <= U for new specimens, alone and together", "[validate]") {
+  constexpr int kExperiments = 60;
+  constexpr double kSpread = 0.1;
+  const test::StudyNoise noise;
+  Random random(22);
+  test::StudyCounts alone, without;
+  test::Count mean;
+  for (int i = 0; i < kExperiments; ++i) {
+    alone.add(test::study_new_specimens(3, 1, kSpread, noise, random).recordings.front(), 0.0, 0.0);
+    without.add(test::study_new_specimens(3, 1, kSpread, noise, random, false).recordings.front(),
+                0.0, 0.0);
+    const Validation v = test::study_new_specimens(3, 3, kSpread, noise, random);
+    mean.add(std::abs(v.pooled.front().e.error) <= v.pooled.front().e.expanded());
+  }
+  // 95 % of 60 are 57 +- 1.7; with the law's covariance alone few are inside.
+  for (const test::Count& c : {alone.peak, alone.end, mean}) CHECK(c.held >= 51);
+  for (const test::Count& c : {without.peak, without.end}) CHECK(c.held < 40);
+}
+
 }  // namespace tpm::fit

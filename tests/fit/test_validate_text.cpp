@@ -175,6 +175,37 @@ TEST_CASE("an amount that is required counts where protocols differ, too", "[val
   CHECK(validated("jnd", 1.25).verdict == ModelVerdict::not_adequate);
 }
 
+TEST_CASE(
+    "without a rest the text names what the zero leaves undetermined and the verdict on the rest",
+    "[validate]") {
+  const LawFile law = quiet_law();
+  Random random(11);
+  test::StudyNoise noise;
+  noise.sigma_N = 2e-4;
+  test::StudyTest slow;
+  slow.rate_mm_per_s = 0.5;
+  Recording cut = test::study_recording(slow, noise, random);
+  constexpr std::ptrdiff_t kGone = 42;  // the rest and the first steps of the ramp
+  for (auto* column : {&cut.time_s, &cut.drive, &cut.response}) {
+    column->erase(column->begin(), column->begin() + kGone);
+  }
+  ValidationRequest request = request_for(law, prepare_recording("cut", cut));
+  request.requirement = parse_requirement("10%", "test");
+  const Validation v = validate(request);
+  const std::string text = to_terminal_text(v);
+  INFO(text);
+  CHECK_THAT(text, Contains("undetermined   peak force, force at end of hold, relaxation ratio: "
+                            "depends on the zero of the force") &&
+                       Contains("half time, s"));
+  CHECK_THAT(v.recordings.front().placement.contact_words, Contains("onset"));
+  for (const QuantityComparison& q : v.recordings.front().quantities) {
+    const bool by_zero = q.quantity.kind != QuantityKind::half_time;
+    CHECK(q.unknown == by_zero);
+    CHECK((q.verdict == ModelVerdict::undetermined) == by_zero);
+  }
+  CHECK_THAT(conclusion_words(v), Contains("undetermined for 10%: peak force"));
+}
+
 TEST_CASE("a table of which no row is printed has no head", "[validate]") {
   BriefText text;
   text.add_table("recording  E\n------------\na  1\nb  2\n", BriefText::Rank::recording,

@@ -174,6 +174,68 @@ void several(int experiments) {
   say("area metric beyond the 95 % point of its draws, 5 recordings", "peak", area);
 }
 
+/// Specimens whose stiffness scatters by a tenth: |E| <= U for new ones, alone and the mean of
+/// five, and without --new-specimen.
+void new_specimens(int experiments, int calibrations) {
+  constexpr double kSpread = 0.1;
+  const StudyNoise noise;
+  Random random(57);
+  StudyCounts alone, without, joined;
+  Count together;
+  for (int i = 0; i < experiments; ++i) {
+    const auto add = [&](StudyCounts& counts, bool new_specimen) {
+      const Validation v =
+          study_new_specimens(calibrations, 1, kSpread, noise, random, new_specimen);
+      counts.add(v.recordings.front(), 0.0, 0.0);
+      if (new_specimen) together.add(v.recordings.front().joint.p_value >= 0.05);
+    };
+    add(alone, true);
+    add(without, false);
+    const Validation v = study_new_specimens(calibrations, 5, kSpread, noise, random);
+    joined.peak.add(std::abs(v.pooled[0].e.error) <= v.pooled[0].e.expanded());
+    joined.end.add(std::abs(v.pooled[1].e.error) <= v.pooled[1].e.expanded());
+  }
+  const std::string what =
+      fmt::format("specimens that scatter by 10 %, {} calibration recordings", calibrations);
+  say(what + ", a new specimen", alone);
+  say(what + ", a new specimen, T^2 below its 95 % point", "peak and end of hold", together);
+  say(what + ", mean over 5 new specimens", joined);
+  say(what + ", a new specimen, without --new-specimen", without);
+}
+
+/// Two probes whose radii are off by up to 1 % each; forces of a half space grow with R for the
+/// linear law, and one probe in both.
+void probes(int experiments) {
+  constexpr double kLimit = 0.01;
+  Instrument cell;
+  cell.id = "cell";
+  cell.radius = kLimit / std::numbers::sqrt3;
+  Random random(58);
+  StudyCounts other, same;
+  for (int i = 0; i < experiments; ++i) {
+    StudyNoise noise;
+    const auto radius = [&] { return 1.0 + kLimit * (2.0 * random.uniform() - 1.0); };
+    const double fitted = radius(), compared = radius();
+    const PreparedRecording calibration =
+        prepare_recording("calibration", study_recording({}, noise, random, fitted));
+    const LawFile law = study_fit({calibration});
+    ComparisonOptions options;
+    options.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
+    cell.probe = "a";
+    options.calibration_instrument = cell;
+    options.instrument = cell;
+    const auto with = [&](double factor) {
+      return prepare_recording("validation",
+                               study_recording(study_validation(40, 0.4), noise, random, factor));
+    };
+    same.add(compare_with_recording(law, with(fitted), options), 0.0, 0.0);
+    options.instrument->probe = "b";
+    other.add(compare_with_recording(law, with(compared), options), 0.0, 0.0);
+  }
+  say("no model error, flat punches off by up to 1 % of their radius, two probes", other);
+  say("no model error, a flat punch off by up to 1 % of its radius, one probe", same);
+}
+
 /// An error and the uncertainty stated for it, over many experiments, N.
 struct ErrorOfMany {
   int count = 0;
@@ -277,6 +339,11 @@ int main(int argc, char** argv) {
         if (wanted("branch")) branch_left_out(n, words.size() > 2 ? std::stoull(words[2]) : 53);
         if (wanted("instruments")) instruments(n);
         if (wanted("several")) several(n);
+        if (wanted("specimens")) {
+          new_specimens(n, 5);
+          new_specimens(n, 2);
+        }
+        if (wanted("probes")) probes(n);
         if (wanted("parts")) {
           fmt::print("| what | quantity | mean error, mN | its sd | u | sd / u |\n");
           fmt::print("|---|---|---|---|---|---|\n");

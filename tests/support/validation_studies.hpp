@@ -108,6 +108,44 @@ inline StudyTest study_validation(int rest, double contact_mm) {
   return test;
 }
 
+/// A law from recordings of specimens whose forces differ by these factors, as a request that has
+/// found them.
+inline ValidationRequest study_of_specimens(const std::vector<double>& stiffer,
+                                            const StudyNoise& noise, Random& random) {
+  std::vector<PreparedRecording> recordings;
+  for (const double factor : stiffer) {
+    recordings.push_back(prepare_recording("specimen " + std::to_string(recordings.size()),
+                                           study_recording({}, noise, random, factor)));
+  }
+  ValidationRequest request;
+  request.law_file = "law.json";
+  request.law = study_fit(recordings);
+  for (PreparedRecording& r : recordings) {
+    std::string name = r.name;
+    request.calibration.files.push_back({std::move(name), "", std::move(r), ""});
+  }
+  request.new_specimen = true;
+  return request;
+}
+
+/// Specimens whose stiffness scatters about 1, and recordings of new ones of their population.
+inline Validation study_new_specimens(int calibrations, int validations, double spread,
+                                      const StudyNoise& noise, Random& random,
+                                      bool new_specimen = true) {
+  std::vector<double> factors;
+  for (int i = 0; i < calibrations; ++i) factors.push_back(1.0 + spread * random.normal());
+  ValidationRequest request = study_of_specimens(factors, noise, random);
+  request.new_specimen = new_specimen;
+  request.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
+  for (int i = 0; i < validations; ++i) {
+    const double factor = 1.0 + spread * random.normal();
+    request.recordings.push_back(
+        prepare_recording("new " + std::to_string(i),
+                          study_recording(study_validation(40, 0.4), noise, random, factor)));
+  }
+  return validate(request);
+}
+
 inline const QuantityComparison& study_quantity(const RecordingComparison& r, QuantityKind kind) {
   return *std::ranges::find_if(
       r.quantities, [kind](const QuantityComparison& q) { return q.quantity.kind == kind; });

@@ -74,6 +74,7 @@ def validate(
     require: str | None = None,
     placement: str | None = None,
     instrument: PathLike | None = None,
+    new_specimen: bool = False,
     columns: Mapping[str, Any] | None = None,
 ) -> Validation:
     """Compares a law, or the organ that it was put on, with recordings that it has not seen (`tpm validate`).
@@ -86,6 +87,9 @@ def validate(
         One or several files. Of one that the law was fitted to the verdict is "calibration_residual".
     require
         How large the error of the model may be: "10%" of the measured value, "20 mN", or "jnd". None: no verdict.
+    new_specimen
+        The recordings are of new specimens: the spread between the recordings that the law was fitted to, each of
+        another specimen, adds to the uncertainty. Needs a law of two recordings or more, and these beside it.
     placement, instrument, columns
         As the options of `tpm validate`; `columns` as for `tpmkit.fit`.
 
@@ -99,6 +103,7 @@ def validate(
     words = [*(os.fspath(f) for f in files), *_options(columns)]
     for option, value in (("--require", require), ("--placement", placement), ("--instrument", instrument)):
         words += [] if value is None else [option, os.fspath(value)]
+    words += ["--new-specimen"] if new_specimen else []
     with tempfile.TemporaryDirectory() as folder:
         if isinstance(law, Fit):
             law = law.law

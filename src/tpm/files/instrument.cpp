@@ -15,9 +15,12 @@
 namespace tpm::files {
 namespace {
 
-constexpr const char* kLimitExpected =
-    "a limit such as \"0.5 % of reading\", \"0.1 % of range\" or an amount with its unit, and "
-    "\"(standard)\" or \"(k = 2)\" if it is an uncertainty";
+std::string limit_expected(std::string_view own) {
+  return fmt::format(
+      "a limit such as \"0.5 % of {}\"{} or an amount with its unit, and \"(standard)\" or \"(k = "
+      "2)\" if it is an uncertainty",
+      own, own == "reading" ? ", \"0.1 % of range\"" : "");
+}
 
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
@@ -26,11 +29,12 @@ std::string_view trimmed(std::string_view text) {
 }
 
 /// What the limit is divided by, and the text without saying so.
-double divisor_of(std::string_view& text, std::string_view where) {
+double divisor_of(std::string_view& text, std::string_view where, std::string_view own) {
   text = trimmed(text);
   if (!text.ends_with(')')) return std::numbers::sqrt3;
   const auto open = text.rfind('(');
-  if (open == std::string_view::npos) throw bad_input(where, "an unopened bracket", kLimitExpected);
+  if (open == std::string_view::npos)
+    throw bad_input(where, "an unopened bracket", limit_expected(own));
   const std::string_view inside = trimmed(text.substr(open + 1, text.size() - open - 2));
   text = trimmed(text.substr(0, open));
   if (inside == "standard" || inside == "standard uncertainty" || inside == "k = 1" ||
@@ -38,18 +42,20 @@ double divisor_of(std::string_view& text, std::string_view where) {
     return 1.0;
   }
   if (inside == "k = 2" || inside == "k=2") return 2.0;
-  throw bad_input(where, fmt::format("'({})'", printable(inside)), kLimitExpected);
+  throw bad_input(where, fmt::format("'({})'", printable(inside)), limit_expected(own));
 }
 
 void add_part(ChannelUncertainty& u, std::string_view text, Dimension dimension,
-              std::optional<double> range, std::string_view where) {
-  const double divisor = divisor_of(text, where);
-  constexpr std::string_view kReading = "of reading", kRange = "of range";
-  const bool of_reading = text.ends_with(kReading), of_range = text.ends_with(kRange);
-  if (!of_reading && !of_range) {
+              std::optional<double> range, std::string_view where, std::string_view own) {
+  const double divisor = divisor_of(text, where, own);
+  const std::string of_own_words = fmt::format("of {}", own);
+  constexpr std::string_view kRange = "of range";
+  const bool of_own = text.ends_with(of_own_words),
+             of_range = own == "reading" && text.ends_with(kRange);
+  if (!of_own && !of_range) {
     if (text.find('%') != std::string_view::npos) {
       throw bad_input(where, fmt::format("'{}' says a share of what", printable(text)),
-                      kLimitExpected);
+                      limit_expected(own));
     }
     const double limit = parse_quantity(text, dimension, where) / divisor;
     if (limit < 0.0) throw bad_input(where, "is negative", "0 or more");
@@ -57,14 +63,14 @@ void add_part(ChannelUncertainty& u, std::string_view text, Dimension dimension,
     return;
   }
   const std::string_view share_text =
-      trimmed(text.substr(0, text.size() - (of_reading ? kReading.size() : kRange.size())));
+      trimmed(text.substr(0, text.size() - (of_own ? of_own_words.size() : kRange.size())));
   std::string packed(share_text);
   std::erase(packed, ' ');
   const std::optional<double> share = find_share(packed);
   if (!share || !packed.ends_with('%') || *share < 0.0) {
-    throw bad_input(where, fmt::format("'{}'", printable(text)), kLimitExpected);
+    throw bad_input(where, fmt::format("'{}'", printable(text)), limit_expected(own));
   }
-  if (of_reading) {
+  if (of_own) {
     u.relative = std::hypot(u.relative, *share / divisor);
     return;
   }
@@ -78,7 +84,8 @@ void add_part(ChannelUncertainty& u, std::string_view text, Dimension dimension,
 }  // namespace
 
 ChannelUncertainty parse_channel_uncertainty(std::string_view text, Dimension dimension,
-                                             std::optional<double> range, std::string_view where) {
+                                             std::optional<double> range, std::string_view where,
+                                             std::string_view own) {
   ChannelUncertainty u;
   // A plus sign within a number is no mark between parts: "1e+2 um".
   std::size_t begin = 0;
@@ -87,7 +94,7 @@ ChannelUncertainty parse_channel_uncertainty(std::string_view text, Dimension di
     const bool between =
         !end && text[i] == '+' && i > 0 && text[i - 1] != 'e' && text[i - 1] != 'E';
     if (!end && !between) continue;
-    add_part(u, text.substr(begin, i - begin), dimension, range, where);
+    add_part(u, text.substr(begin, i - begin), dimension, range, where, own);
     begin = i + 1;
   }
   return u;
@@ -96,9 +103,9 @@ ChannelUncertainty parse_channel_uncertainty(std::string_view text, Dimension di
 Instrument read_instrument(const Json& block, Dimension response, Dimension drive,
                            std::string_view where) {
   if (!block.is_object()) throw bad_input(where, "is no object", "an object with \"id\"");
-  constexpr auto kKeys =
-      std::to_array<std::string_view>({"id", "force", "depth", "time", "zero", "resolution",
-                                       "noise", "force_range", "depth_range"});
+  constexpr auto kKeys = std::to_array<std::string_view>(
+      {"id", "force", "depth", "time", "zero", "resolution", "noise", "force_range", "depth_range",
+       "probe", "probe_radius", "radius"});
   Instrument instrument;
   for (const auto& [key, value] : block.items()) {
     const bool known = std::find(kKeys.begin(), kKeys.end(), key) != kKeys.end();
@@ -108,7 +115,7 @@ Instrument read_instrument(const Json& block, Dimension response, Dimension driv
       throw bad_input(here, "unknown key" + did_you_mean(key, keys),
                       fmt::format("one of {}", fmt::join(keys, ", ")));
     }
-    if (!value.is_string()) throw bad_input(here, "is no text", kLimitExpected);
+    if (!value.is_string()) throw bad_input(here, "is no text", limit_expected("reading"));
     instrument.stated[key] = value.get<std::string>();
   }
   const auto text = [&](const char* key) {
@@ -142,7 +149,29 @@ Instrument read_instrument(const Json& block, Dimension response, Dimension driv
   }
   instrument.resolution = range("resolution", response);
   instrument.noise = range("noise", response);
+  const bool indents = (response == Dimension::force && drive == Dimension::length) ||
+                       (response == Dimension::length && drive == Dimension::force);
+  for (const char* key : {"probe", "probe_radius", "radius"}) {
+    if (text(key) == nullptr || indents) continue;
+    throw bad_input(at(key), "of a recording that is no force over a depth",
+                    "a probe where one indents");
+  }
+  if (text("probe") != nullptr) instrument.probe = *text("probe");
+  instrument.probe_radius = range("probe_radius", Dimension::length);
+  if (text("radius") != nullptr) {
+    const ChannelUncertainty u = parse_channel_uncertainty(*text("radius"), Dimension::length,
+                                                           std::nullopt, at("radius"), "radius");
+    if (u.absolute > 0.0 && !instrument.probe_radius) {
+      throw bad_input(at("radius"), "an amount of a radius that is not stated",
+                      "\"probe_radius\" beside it, such as \"2 mm\", or \"0.5 % of radius\"");
+    }
+    instrument.radius = std::hypot(u.relative, u.absolute / instrument.probe_radius.value_or(1.0));
+  }
   return instrument;
+}
+
+std::string Instrument::probe_id() const {
+  return probe.empty() ? "instrument " + id : "probe " + probe;
 }
 
 double Instrument::reading_floor() const {

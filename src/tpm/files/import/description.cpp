@@ -124,6 +124,7 @@ const Block<RecordedSegment>& segment_block() {
 /// The sentence of each key of the block "instrument", which read_instrument() reads.
 struct InstrumentKeys {
   std::string id, force, depth, time, zero, resolution, noise, force_range, depth_range;
+  std::string probe, probe_radius, radius;
 };
 
 const Block<InstrumentKeys>& instrument_block() {
@@ -144,7 +145,13 @@ const Block<InstrumentKeys>& instrument_block() {
            "standard deviation of a reading of the response, such as '0.2 mN'"),
        key("force_range", &K::force_range, text(),
            "of the response, for a share of it, such as '10 N'"),
-       key("depth_range", &K::depth_range, text(), "of the drive, for a share of it")});
+       key("depth_range", &K::depth_range, text(), "of the drive, for a share of it"),
+       key("probe", &K::probe, text(),
+           "name of the tip; equal in two recordings: it is the same one (left out: the "
+           "instrument's own)"),
+       key("probe_radius", &K::probe_radius, text(),
+           "radius of a spherical or flat tip, such as '2 mm'"),
+       key("radius", &K::radius, text(), "of that radius, such as '10 um' or '0.5 % of radius'")});
   return block;
 }
 

@@ -181,13 +181,15 @@ class EvidencePage {
     const std::string file = validation_.at("law_file").get<std::string>();
     Table table{
         fmt::format("{}, SHA-256 {}", file, validation_.at("law_sha256").get<std::string>()),
-        {{"parameter"}, {"value", true}, {"standard uncertainty", true}}};
+        {{"parameter"}, {"meaning"}, {"value", true}, {"standard uncertainty", true}}};
     table.stacks = true;  // its caption is long
     const Json& parameters = record_.at("law").at("parameters");
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       const std::string at = fmt::format("/law/parameters/{}/", i);
-      table.rows.push_back({number_cell(at + "name"), number_cell(at + "value", kLawDigits),
-                            number_cell(at + "u", 2)});
+      const bool said = parameters[i].contains("meaning");  // not by earlier versions
+      table.rows.push_back({number_cell(at + (said ? "symbol" : "name")),
+                            said ? number_cell(at + "meaning") : Cell{"-"},
+                            number_cell(at + "value", kLawDigits), number_cell(at + "u", 2)});
     }
     d.table(std::move(table));
     d.paragraph(fmt::format("Does the law describe what it was fitted to: {}",
@@ -235,6 +237,9 @@ class EvidencePage {
     if (!validation_.contains("pooled")) return;
     Table table{"mean over the recordings",
                 {{"quantity"},
+                 {"n", true},
+                 {"S", true},
+                 {"D", true},
                  {"E", true},
                  {"U", true},
                  {"R", true},
@@ -245,9 +250,16 @@ class EvidencePage {
     for (std::size_t k = 0; k < validation_.at("pooled").size(); ++k) {
       const std::string at = fmt::format("/validation/pooled/{}/", k);
       std::vector<Cell> row{quantity_cell(at)};
-      for (const char* key : {"E", "U", "R", "area_metric/area", "area_metric/upper_95_of_draws"}) {
-        row.push_back(number_cell(at + key, 3));
-      }
+      constexpr auto kShown =
+          std::to_array<std::pair<const char*, int>>({{"recordings", 4},
+                                                      {"S", 4},
+                                                      {"D", 4},
+                                                      {"E", 3},
+                                                      {"U", 3},
+                                                      {"R", 3},
+                                                      {"area_metric/area", 3},
+                                                      {"area_metric/upper_95_of_draws", 3}});
+      for (const auto& [key, digits] : kShown) row.push_back(number_cell(at + key, digits));
       row.push_back(verdict_cell(at + "verdict"));
       table.rows.push_back(std::move(row));
     }
@@ -314,7 +326,10 @@ Json law_record(const LawFile& law) {
   const std::vector<LawParameter> all = law_parameters(law.spec);
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (belongs_to_recording(law.spec, all[i])) continue;
-    Json entry{{"name", law_key(all[i])}};
+    const std::string_view unit = si_symbol(all[i].dimension);
+    Json entry{{"name", law_key(all[i])},
+               {"symbol", unit.empty() ? all[i].name : fmt::format("{}, {}", all[i].name, unit)},
+               {"meaning", all[i].meaning}};
     // JSON has no infinity.
     if (std::isfinite(law.values[i])) entry["value"] = rounded(law.values[i], kLawDigits);
     const auto& places = law.uncertainty->place;

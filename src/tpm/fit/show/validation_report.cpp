@@ -45,7 +45,7 @@ std::vector<ShownError> shown_errors(const Validation& v) {
 }
 
 Figure error_figure(const Validation& v) {
-  Figure figure{"validation_error", fmt::format("{}: model error", law_name(v.spec)),
+  Figure figure{"validation_error", fmt::format("Model error of a {}", v.subject),
                 "E = S - D of each quantity with U (95 %), in percent of the measured value, and "
                 "what is allowed."};
   Panel panel{.x = {"", ""}, .y = {"E, of the measured value", "%"}};

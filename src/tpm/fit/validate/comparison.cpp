@@ -15,6 +15,7 @@
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/predict/organ_readings.hpp"
 #include "tpm/fit/validate/grid_convergence.hpp"
+#include "tpm/fit/validate/instrument_effects.hpp"
 #include "tpm/fit/validate/joint_test.hpp"
 #include "tpmkit/error.hpp"
 
@@ -25,21 +26,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Of the value: the closed forms err by less (LawModel).
 constexpr double kNumericalError = 1e-9;
 constexpr const char* kFilling = "the place of the spheres";
-
-/// One error of an instrument: how E follows from it in the validation and in the calibration.
-struct InstrumentEffect {
-  const char* name;
-  double validation = 0.0, calibration = 0.0;  ///< d E / d error
-  double u_validation = 0.0, u_calibration = 0.0;
-};
-
-/// How S and D follow errors of the channels: relative ones of depth, time and response, absolute
-/// ones of time, depth and response.
-struct ChannelSlopes {
-  double depth_scale, time_scale, time_shift, travel;  ///< of S
-  double simulated, by_simulated;                      ///< of S, by the law's response
-  double measured, by_measured;                        ///< of D, by the readings
-};
 
 /// What all quantities of a recording are computed from.
 class Comparer {
@@ -60,6 +46,8 @@ class Comparer {
     const auto& theirs = options_.calibration_instrument;
     result_.same_instrument = ours && theirs && ours->id == theirs->id;
     result_.creep = along_.load_imposed();
+    result_.probe = probe_words(ours, theirs);
+    probe_ = probe_effect(ours, theirs);
     const bool own_zero = options_.known != KnownPlacement::surface && !result_.creep;
     const auto drift = own_zero ? take_out_drift(prepared_) : std::nullopt;
     const std::optional<double>& asked_s = options_.motion.hold_asked_s;
@@ -187,42 +175,8 @@ class Comparer {
             measured_[k],    1.0};
   }
   [[nodiscard]] std::vector<InstrumentEffect> effects_of(const ChannelSlopes& by) const {
-    std::vector<InstrumentEffect> effects;
-    const auto add = [&](const char* name, double by_s, double by_d, auto uncertainty) {
-      const double ours = options_.instrument ? uncertainty(*options_.instrument) : 0.0;
-      const double theirs =
-          options_.calibration_instrument ? uncertainty(*options_.calibration_instrument) : 0.0;
-      if (ours > 0.0 || theirs > 0.0) effects.push_back({name, by_d, by_s, ours, theirs});
-    };
-    const auto relative = [](const std::optional<ChannelUncertainty>& c) {
-      return c ? c->relative : 0.0;
-    };
-    const auto absolute = [](const std::optional<ChannelUncertainty>& c) {
-      return c ? c->absolute : 0.0;
-    };
-    // A scale error of the force is in the law as it is in the readings; one of the depth is in the
-    // law with the other sign than where the law is asked.
-    // Of creep the force is what is imposed, and the depth what is read.
-    const bool creep = result_.creep;
-    const auto& read = [creep](const Instrument& i) -> const std::optional<ChannelUncertainty>& {
-      return creep ? i.depth : i.force;
-    };
-    const auto& imposed = [creep](const Instrument& i) -> const std::optional<ChannelUncertainty>& {
-      return creep ? i.force : i.depth;
-    };
-    add(creep ? "scale of the depth" : "scale of the force", by.simulated, -by.measured,
-        [&](const Instrument& i) { return relative(read(i)); });
-    add(creep ? "depth channel" : "force channel", by.by_simulated, -by.by_measured,
-        [&](const Instrument& i) { return absolute(read(i)); });
-    add(creep ? "scale of the force" : "scale of the depth", -by.depth_scale, by.depth_scale,
-        [&](const Instrument& i) { return relative(imposed(i)); });
-    add(creep ? "force channel" : "depth channel", -by.travel, by.travel,
-        [&](const Instrument& i) { return absolute(imposed(i)); });
-    add("scale of the time", -by.time_scale, by.time_scale,
-        [&](const Instrument& i) { return relative(i.time); });
-    add("time between channels", -by.time_shift, by.time_shift,
-        [&](const Instrument& i) { return absolute(i.time); });
-    return effects;
+    return instrument_effects(by, options_.instrument, options_.calibration_instrument,
+                              result_.creep);
   }
 
   void add(const QuantityOfInterest& quantity) {
@@ -291,15 +245,19 @@ class Comparer {
       } else {
         q.remark = fmt::format("depends on {}, which nothing before {} and no instrument tells",
                                zero_name(), result_.creep ? "the load" : "contact");
+        q.unknown = true;
       }
     }
     add_instrument(q, s, d);
+    add_probe(q, s);
+    if (options_.specimens != nullptr) add_specimen(q, s);
     const double own_instrument = q.of_instrument.norm();
     const double stated = std::hypot(stated_zero, q.of_contact, by_drift);
     q.u_D = std::hypot(u_readings, own_instrument, stated);
     const double by_filling = q.of_filling.norm();
     const double of_numbers = std::sqrt(std::max(q.u_num * q.u_num - by_filling * by_filling, 0.0));
-    q.u_own = std::hypot(u_readings, stated, of_numbers);
+    const double specimen = q.of_specimen.norm();
+    q.u_own = std::hypot(u_readings, std::hypot(stated, of_numbers, specimen));
     CombinedUncertainty sum;
     sum.add(u_readings, result_.scatter.degrees);
     sum.add(q.u_input, degrees_of_law_);
@@ -309,7 +267,10 @@ class Comparer {
     sum.add(stated, kInfinity);
     const double shared = q.shared.norm();
     sum.add(std::sqrt(std::max(shared * shared - q.u_input * q.u_input, 0.0)), kInfinity);
-    q.u_input = shared;
+    sum.add(std::abs(q.of_probe), kInfinity);
+    const double of_population = std::hypot(specimen, q.of_mean * specimen);
+    if (of_population > 0.0) sum.add(of_population, q.specimen_degrees);
+    q.u_input = std::hypot(shared, q.of_probe, of_population);
     q.e.u_val = sum.u();
     q.e.degrees = sum.degrees();
     q.e.coverage = coverage_factor(q.e.degrees);
@@ -338,6 +299,36 @@ class Comparer {
     }
   }
 
+  /// The law holds the calibration's probe, and S would grow with that of the recording.
+  void add_probe(QuantityComparison& q, const Functional& s) const {
+    if (!probe_.stated || probe_.same) return;
+    const double slope =
+        slope_by_radius(times(s.weight, at_.value), times(s.weight, depth_scale_), result_.creep);
+    q.of_probe = -slope * probe_.u_validation;
+    const double theirs = slope * probe_.u_calibration;
+    q.parts.push_back({"the radius of the probe", std::abs(q.of_probe)});
+    q.parts.push_back({"the radius of the calibration's probe", std::abs(theirs)});
+    extend(q.shared, theirs);
+  }
+
+  void add_specimen(QuantityComparison& q, const Functional& s) const {
+    const auto found = std::ranges::find_if(*options_.specimens, [&](const SpecimenSpread& own) {
+      return own.quantity == q.quantity && own.creep == result_.creep;
+    });
+    if (found == options_.specimens->end()) {
+      q.remark =
+          "the spread between specimens is not known: fewer than two recordings of the calibration "
+          "have it";
+      q.unknown = true;
+      return;
+    }
+    q.of_specimen = s.value * found->deviations;
+    q.of_mean = found->of_mean;
+    q.specimen_degrees = found->degrees;
+    q.parts.push_back(
+        {"the spread between specimens", q.of_specimen.norm() * std::hypot(1.0, q.of_mean)});
+  }
+
   static void extend(Eigen::RowVectorXd& row, double value) {
     row.conservativeResize(row.size() + 1);
     row[row.size() - 1] = value;
@@ -361,7 +352,7 @@ class Comparer {
       q.verdict = judge_error(q.e, q.limit);
       q.p_value = error_p_value(q.e, q.limit);
       if (options_.requirement && !q.limit) q.verdict = ModelVerdict::no_requirement;
-      if (!q.remark.empty()) {
+      if (q.unknown) {
         q.verdict = ModelVerdict::undetermined;
         q.p_value = 1.0;
       } else if (q.verdict == ModelVerdict::undetermined) {
@@ -393,7 +384,11 @@ class Comparer {
       for (Eigen::Index j = 0; j < count; ++j) {
         const QuantityComparison& b = result_.quantities[static_cast<std::size_t>(j)];
         covariance(i, j) += a.shared.dot(b.shared) + a.of_instrument.dot(b.of_instrument) +
-                            a.of_filling.dot(b.of_filling) + a.of_contact * b.of_contact;
+                            a.of_filling.dot(b.of_filling) + a.of_contact * b.of_contact +
+                            a.of_probe * b.of_probe;
+        if (a.of_specimen.size() == b.of_specimen.size()) {
+          covariance(i, j) += (1.0 + a.of_mean * b.of_mean) * a.of_specimen.dot(b.of_specimen);
+        }
       }
       // What only this quantity has: numerical errors, and a zero that was stated.
       const double own = a.e.u_val * a.e.u_val - covariance(i, i);
@@ -435,6 +430,8 @@ class Comparer {
       square +=
           result_.same_instrument ? std::pow(ours + theirs, 2) : ours * ours + theirs * theirs;
     }
+    const double by_radius = slope_by_radius(at_.value[k], depth_scale_[k], result_.creep);
+    square += std::pow(by_radius * std::hypot(probe_.u_validation, probe_.u_calibration), 2);
     return square;
   }
 
@@ -480,6 +477,7 @@ class Comparer {
   std::vector<LawAlong::Refinement> refinements_;
   std::vector<Eigen::VectorXd> by_filling_;  ///< of the organ, then of other fillings
   double claimed_limit_ = 0.0;
+  ProbeEffect probe_;
   RecordingComparison result_;
 };
 

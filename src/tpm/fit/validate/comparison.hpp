@@ -10,6 +10,7 @@
 #include "tpm/fit/validate/joint_test.hpp"
 #include "tpm/fit/validate/placement_of_recording.hpp"
 #include "tpm/fit/validate/requirement.hpp"
+#include "tpm/fit/validate/specimen_spread.hpp"
 
 namespace tpm::fit {
 
@@ -28,6 +29,7 @@ struct QuantityComparison {
   double p_value = 1.0;   ///< before Holm
   bool rejected = false;  ///< beyond R (or 0) after Holm over the recording's quantities
   std::string remark;     ///< what must shrink, or why there is no verdict
+  bool unknown = false;   ///< a part of u_val is not known: the remark says which
   /// Root of the covariance of what recordings of one calibration share (law, common instrument):
   /// one a direction; its norm is part of u_val.
   Eigen::RowVectorXd shared;
@@ -36,8 +38,13 @@ struct QuantityComparison {
   /// Deviations of other fillings of an organ from their mean, over sqrt(n - 1): of u_num, shared
   /// by recordings of one organ.
   Eigen::RowVectorXd of_filling;
+  double of_probe = 0.0;  ///< effect of the radius of the recording's own probe, of u_input
+  /// Deviations of a new specimen, of the norm that it adds to u_input (SpecimenSpread); those of
+  /// the law's mean over specimens are `of_mean` times them, and shared by all recordings.
+  Eigen::RowVectorXd of_specimen;
+  double of_mean = 0.0, specimen_degrees = 0.0;
   double of_contact = 0.0;  ///< effect of contact between two samples (contact_u_sampled)
-  double u_own = 0.0;       ///< the rest of u_val
+  double u_own = 0.0;       ///< the rest of u_val, with of_specimen
 };
 
 /// The difference of the whole curve, which gets no verdict.
@@ -65,6 +72,7 @@ struct RecordingComparison {
   ValidationPlacement placement;
   std::optional<Instrument> instrument;
   bool same_instrument = false;  ///< as the calibration's
+  std::string probe;             ///< what is known of the two probes; empty: nothing is stated
   bool creep = false;            ///< the load was imposed
   std::string fillings;          ///< what u_num holds of the place of an organ's spheres
   std::string pick;              ///< name of the reduced model that answered; empty: none
@@ -113,14 +121,17 @@ struct ComparisonOptions {
   std::vector<RenderingError> rendering;
   std::optional<Instrument> instrument, calibration_instrument;
   bool calibration_data = false;
+  /// The recording is of a new specimen: how those of the calibration differ. None: not asked for.
+  const std::vector<SpecimenSpread>* specimens = nullptr;
 };
 
 /// Compares a law with one recording (docs/validate.md):
 ///
 ///     E = Q(S) - Q(readings less zero),   u_val^2 = u_num^2 + u_input^2 + u_D^2,   U = k u_val,
 ///
-/// Q the same functional at the same samples. u_input^2 = g' C g with the law's covariance; u_D
-/// from the scatter of the readings, through zero and contact as well, and from the instrument.
+/// Q the same functional at the same samples. u_input^2 = g' C g with the law's covariance, and
+/// what the radii of two probes and a new specimen add; u_D from the scatter of the readings,
+/// through zero and contact as well, and from the instrument.
 [[nodiscard]] RecordingComparison compare_with_recording(const LawFile& law,
                                                          const PreparedRecording& recording,
                                                          const ComparisonOptions& options);

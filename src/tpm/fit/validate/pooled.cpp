@@ -30,35 +30,67 @@ bool one_instrument(const std::vector<Member>& members) {
          });
 }
 
+/// Probes whose radius is in u_input of two recordings or more.
+std::vector<std::string> common_probes(const std::vector<Member>& members) {
+  std::vector<std::string> once, common;
+  for (const Member& m : members) {
+    if (m.quantity->of_probe == 0.0) continue;
+    const std::string id = m.recording->instrument.value().probe_id();
+    const bool again = std::ranges::find(once, id) != once.end();
+    if (again && std::ranges::find(common, id) == common.end()) common.push_back(id);
+    once.push_back(id);
+  }
+  return common;
+}
+
+/// Place of its probe among those; their number if it is none of them.
+std::size_t place_of_probe(const Member& m, const std::vector<std::string>& common) {
+  if (m.quantity->of_probe == 0.0) return common.size();
+  const auto found = std::ranges::find(common, m.recording->instrument.value().probe_id());
+  return static_cast<std::size_t>(found - common.begin());
+}
+
 /// The effects of what recordings share, one row each.
 struct SharedEffects {
   Eigen::MatrixXd rows;
-  Eigen::Index filling = 0, fillings = 0;  ///< columns of the fillings of an organ
+  Eigen::Index filling = 0, fillings = 0;    ///< columns of the fillings of an organ
+  Eigen::Index specimen = 0, specimens = 0;  ///< of the law's mean over specimens
 };
 
 SharedEffects shared_of(const std::vector<Member>& members, bool instrument) {
-  Eigen::Index columns = 0, of_instrument = 0, of_filling = 0;
+  Eigen::Index columns = 0, of_instrument = 0, of_filling = 0, of_specimen = 0;
+  const std::vector<std::string> probes = common_probes(members);
+  const auto of_probe = static_cast<Eigen::Index>(probes.size());
   for (const Member& m : members) {
     columns = std::max(columns, m.quantity->shared.size());
     of_filling = std::max(of_filling, m.quantity->of_filling.size());
+    of_specimen = std::max(of_specimen, m.quantity->of_specimen.size());
     if (instrument) of_instrument = std::max(of_instrument, m.quantity->of_instrument.size());
   }
+  const Eigen::Index specimen = columns + of_filling, probe = specimen + of_specimen;
   Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(members.size()),
-                                                 columns + of_filling + of_instrument);
+                                                 probe + of_probe + of_instrument);
   for (std::size_t j = 0; j < members.size(); ++j) {
     const Member& m = members[j];
     const auto row = static_cast<Eigen::Index>(j);
     shared.row(row).head(m.quantity->shared.size()) = m.quantity->shared / m.scale;
     shared.row(row).segment(columns, m.quantity->of_filling.size()) =
         m.quantity->of_filling / m.scale;
+    shared.row(row).segment(specimen, m.quantity->of_specimen.size()) =
+        m.quantity->of_mean / m.scale * m.quantity->of_specimen;
+    const std::size_t place = place_of_probe(m, probes);
+    if (place < probes.size()) {
+      shared(row, probe + static_cast<Eigen::Index>(place)) = m.quantity->of_probe / m.scale;
+    }
     if (instrument) shared.row(row).tail(of_instrument) = m.quantity->of_instrument / m.scale;
   }
-  return {std::move(shared), columns, of_filling};
+  return {std::move(shared), columns, of_filling, specimen, of_specimen};
 }
 
-double own_of(const Member& m, bool instrument) {
+double own_of(const Member& m, bool instrument, const std::vector<std::string>& probes) {
   const double apart = instrument ? 0.0 : m.quantity->of_instrument.norm();
-  return std::hypot(m.quantity->u_own, apart) / m.scale;
+  const double probe = place_of_probe(m, probes) < probes.size() ? 0.0 : m.quantity->of_probe;
+  return std::hypot(m.quantity->u_own, apart, probe) / m.scale;
 }
 
 void set_mean(PooledQuantity& pooled, const std::vector<Member>& members,
@@ -88,9 +120,12 @@ void set_mean(PooledQuantity& pooled, const std::vector<Member>& members,
   sum.add(effects.standard_error, static_cast<double>(members.size() - 1));
   const double of_fillings =
       mean_shared.segment(all_share.filling, all_share.fillings).norm() / weights;
-  sum.add(std::sqrt(std::max(pooled.u_shared * pooled.u_shared - of_fillings * of_fillings, 0.0)),
-          degrees_of_law);
+  const double of_specimens =
+      mean_shared.segment(all_share.specimen, all_share.specimens).norm() / weights;
+  const double apart = of_fillings * of_fillings + of_specimens * of_specimens;
+  sum.add(std::sqrt(std::max(pooled.u_shared * pooled.u_shared - apart, 0.0)), degrees_of_law);
   sum.add(of_fillings, static_cast<double>(std::max<Eigen::Index>(all_share.fillings - 1, 1)));
+  if (of_specimens > 0.0) sum.add(of_specimens, members.front().quantity->specimen_degrees);
   pooled.e = {effects.mean, sum.u(), sum.degrees(), coverage_factor(sum.degrees())};
 }
 
@@ -132,9 +167,8 @@ void judge_pooled(PooledQuantity& pooled, const std::vector<Member>& members,
                   const PooledOptions& options) {
   const bool residual =
       std::ranges::any_of(members, [](const Member& m) { return m.recording->calibration; });
-  const bool unknown = std::ranges::any_of(members, [](const Member& m) {
-    return m.quantity->verdict == ModelVerdict::undetermined && !m.quantity->limit;
-  });
+  const auto unknown =
+      std::ranges::find_if(members, [](const Member& m) { return m.quantity->unknown; });
   if (options.requirement) {
     if (pooled.relative) {
       const Member& largest = *std::ranges::max_element(members, {}, &Member::scale);
@@ -155,9 +189,10 @@ void judge_pooled(PooledQuantity& pooled, const std::vector<Member>& members,
   pooled.verdict = judge_error(pooled.e, pooled.limit);
   pooled.p_value = error_p_value(pooled.e, pooled.limit);
   if (options.requirement && !pooled.limit) pooled.verdict = ModelVerdict::no_requirement;
-  if (unknown) {
+  if (unknown != members.end()) {
     pooled.verdict = ModelVerdict::undetermined;
-    pooled.remark = "depends on the zero of the force, which one recording at least does not tell";
+    pooled.remark = fmt::format("{} ({})", unknown->quantity->remark, unknown->recording->name);
+    pooled.unknown = true;
     pooled.p_value = 1.0;
   } else if (pooled.verdict == ModelVerdict::undetermined) {
     const double own = std::sqrt(
@@ -229,7 +264,8 @@ std::vector<PooledQuantity> pool_recordings(std::span<const RecordingComparison>
     const bool instrument = one_instrument(members);
     const SharedEffects shared = shared_of(members, instrument);
     std::vector<double> own;
-    for (const Member& m : members) own.push_back(own_of(m, instrument));
+    const std::vector<std::string> probes = common_probes(members);
+    for (const Member& m : members) own.push_back(own_of(m, instrument, probes));
     set_mean(pooled, members, shared, own, degrees_of_law);
     set_area(pooled, members, shared.rows, own, options.at);
     judge_pooled(pooled, members, options);

@@ -29,6 +29,7 @@ struct PooledQuantity {
   double p_value = 1.0;
   bool rejected = false;
   std::string remark;
+  bool unknown = false;  ///< a part of u_val of a recording is not known: the remark says which
   /// In the unit of the quantity; of `relative` standardised, or at the protocol that was named.
   std::optional<AreaMetric> area;
   std::optional<std::string> area_at;  ///< recording whose protocol it was carried to
@@ -49,8 +50,9 @@ struct PooledOptions {
 
 /// The mean E of each quantity that two or more recordings have, by random effects with Hartung and
 /// Knapp's modified standard error (random_effects()) over the recordings' own uncertainties, and
-/// beside it, not reduced by their number, what they share: the law, one instrument. The area
-/// metric by u-pooling, with draws that share the same. `rejected` is left to whoever judges all.
+/// beside it, not reduced by their number, what they share: the law, one instrument, one probe. The
+/// area metric by u-pooling, with draws that share the same. `rejected` is left to whoever judges
+/// all.
 [[nodiscard]] std::vector<PooledQuantity> pool_recordings(
     std::span<const RecordingComparison> recordings, std::span<const Applicability> motions,
     double degrees_of_law, const PooledOptions& options);

@@ -14,6 +14,7 @@
 #include "tpm/fit/select/loading_sense.hpp"
 #include "tpm/fit/validate/calibration_covariance.hpp"
 #include "tpm/fit/validate/fitted_copy.hpp"
+#include "tpm/fit/validate/instrument_effects.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -160,6 +161,42 @@ std::string threshold_words(const ValidationRequest& request) {
   if (!alone && !of_file) return {};
   return "the law was fitted without --contact-force: its depths count from the onset, those of "
          "the recordings from where the force is passed; the difference is in E";
+}
+
+/// How the recordings of a calibration differ from the law, each taken for one specimen. Shares of
+/// the law, so it answers in place of an organ.
+std::vector<SpecimenSpread> spread_of_calibration(const ValidationRequest& request,
+                                                  const LawFile& law) {
+  const std::vector<CalibrationData::File>& files = request.calibration.files;
+  if (!request.presses.empty()) {
+    throw Error(ExitCode::usage, "--new-specimen", "with a session",
+                "recordings of a specimen that the law was not fitted to");
+  }
+  constexpr std::size_t kFewest = 2;
+  if (files.size() < kFewest) {
+    throw Error(ExitCode::usage, "--new-specimen",
+                fmt::format("the law was fitted to {} recording{}", files.size(),
+                            files.size() == 1 ? "" : "s"),
+                "a law fitted to two recordings or more, each of another specimen");
+  }
+  std::vector<RecordingComparison> compared;
+  std::vector<int> readings;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (!files[i].recording) {
+      throw Error(ExitCode::usage, "--new-specimen",
+                  fmt::format("the calibration's {} was not found, or not read", files[i].name),
+                  "all recordings of the calibration beside the law, as they were fitted");
+    }
+    ComparisonOptions options;
+    options.quantities = request.quantities;
+    options.placement = request.placement;
+    if (request.contact_by_threshold) options.known = KnownPlacement::threshold;
+    options.calibration_data = true;
+    compared.push_back(compare_with_recording(law, *files[i].recording, options));
+    const auto& data = law.uncertainty->data;
+    readings.push_back(i < data.size() && data[i].readings > 0 ? data[i].readings : 1);
+  }
+  return specimen_spreads(compared, readings);
 }
 
 /// All of them, or none.
@@ -316,6 +353,12 @@ Validation validate(const ValidationRequest& request) {
   if (request.organ && !request.organ->times_follow() && law.spec.branches > 0) {
     v.u_input_from += "; S follows the relaxation times, which the bonds keep, as the law does";
   }
+  v.new_specimen = request.new_specimen;
+  if (request.new_specimen) {
+    v.specimens = spread_of_calibration(request, law);
+    v.u_input_from += fmt::format("; and the spread between its {} recordings, each a specimen",
+                                  request.calibration.files.size());
+  }
   v.spec = law.spec;
   v.subject = law_words(law.spec);
   if (request.organ)
@@ -357,6 +400,7 @@ Validation validate(const ValidationRequest& request) {
     }
     if (i < request.instruments.size()) options.instrument = request.instruments[i];
     options.calibration_instrument = request.calibration.instrument;
+    if (request.new_specimen) options.specimens = &v.specimens;
     options.calibration_data = was_fitted(request, recording);
     RecordingComparison comparison = compare_with_recording(law, recording, options);
     if (!options.calibration_data) {
@@ -369,6 +413,11 @@ Validation validate(const ValidationRequest& request) {
     }
     if (const std::string words = unit_words(comparison); !words.empty())
       v.remarks.push_back(words);
+    if (const std::string words =
+            probe_difference_words(options.instrument, options.calibration_instrument);
+        !words.empty()) {
+      v.remarks.push_back(fmt::format("{}: {}", recording.name, words));
+    }
     Applicability motion = motion_of(recording, comparison.parts,
                                      comparison.creep ? 0.0 : comparison.placement.contact);
     compare_with_calibration(motion, request);

@@ -44,6 +44,9 @@ struct ValidationRequest {
   std::optional<Requirement> requirement;
   PlacementRule placement = PlacementRule::held;
   bool contact_by_threshold = false;
+  /// The recordings are of new specimens of the population that those of the calibration are from,
+  /// each of another specimen: their spread is in u_input.
+  bool new_specimen = false;
   std::optional<std::string> at;            ///< see PooledOptions::at
   std::shared_ptr<const OrganOfLaw> organ;  ///< answers in place of the law
   PickAnswer pick = nullptr;                ///< answers in place of the organ
@@ -62,6 +65,9 @@ struct Validation {
   std::string law_file, law_sha256, requirement;
   PlacementRule placement = PlacementRule::held;
   std::string u_input_from;  ///< where the covariance of the law's parameters comes from
+  bool new_specimen = false;
+  std::vector<SpecimenSpread>
+      specimens;  ///< of a new specimen: how those of the calibration differ
   std::vector<RecordingComparison> recordings;
   std::vector<Applicability> applicability;  ///< one a recording
   std::vector<PooledQuantity> pooled;        ///< over those that the law was not fitted to

@@ -114,6 +114,7 @@ Json recording_json(const RecordingComparison& r, const Applicability& a, const 
                   {"from", r.scatter.told_by}};
   if (r.instrument) j["instrument"] = r.instrument->stated;
   j["same_instrument"] = r.same_instrument;
+  if (!r.probe.empty()) j["probe"] = r.probe;
   j["applicability"] = applicability_json(a);
   j["verdict"] = verdict_key(r.verdict);
   return j;
@@ -174,6 +175,17 @@ Json to_json(const Validation& v) {
   j["requirement"] = v.requirement.empty() ? Json("none") : Json(v.requirement);
   j["placement"] = placement_rule_name(v.placement);
   j["u_input_from"] = v.u_input_from;
+  if (v.new_specimen) {
+    j["new_specimen"] = array_json(v.specimens, [&v](const SpecimenSpread& s) {
+      const LawSpec& law = v.spec;
+      return Json{{"quantity", s.creep ? quantity_words(s.quantity, law.response, law.drive)
+                                       : quantity_words(s.quantity, law.drive, law.response)},
+                  {"load_imposed", s.creep},
+                  {"recordings", s.recordings},
+                  {"tau_share_of_S", stored(s.tau())},
+                  {"degrees_of_freedom", stored(s.degrees)}};
+    });
+  }
   j["recordings"] = Json::array();
   for (std::size_t i = 0; i < v.recordings.size(); ++i) {
     j["recordings"].push_back(recording_json(v.recordings[i], v.applicability[i], v.spec));

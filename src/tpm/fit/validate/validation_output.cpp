@@ -159,6 +159,11 @@ std::string instrument_text(const RecordingComparison& r) {
       r.instrument->id);
 }
 
+/// Both, with what is known of the probes.
+std::string instrument_and_probe_text(const RecordingComparison& r) {
+  return instrument_text(r) + (r.probe.empty() ? "" : "; " + r.probe);
+}
+
 std::string applicability_text(const Applicability& a) {
   std::string text = a.outside.empty()
                          ? std::string("inside the calibration")
@@ -218,12 +223,12 @@ void add_header(BriefText& text, const Validation& v) {
           : first_names(mapped<std::string>(v.calibration, &CalibrationData::File::name));
   const bool residual = v.verdict == ModelVerdict::residual;
   const RecordingNames names = names_of(v);
-  text.add_words(
-      fmt::format("{} with {}{}, fitted to {}; {}",
-                  residual ? "compared (calibration residual, no validation)" : "validated",
-                  names.file, first_names(names.names), fitted,
-                  v.requirement.empty() ? std::string("no requirement")
-                                        : fmt::format("requirement: {}", v.requirement)));
+  text.add_words(fmt::format(
+      "{} with {}{}{}, fitted to {}; {}",
+      residual ? "compared (calibration residual, no validation)" : "validated",
+      v.new_specimen ? "new specimens: " : "", names.file, first_names(names.names), fitted,
+      v.requirement.empty() ? std::string("no requirement")
+                            : fmt::format("requirement: {}", v.requirement)));
   text.add("\n", Rank::always);
 }
 
@@ -262,14 +267,17 @@ void add_recording(BriefText& text, const Validation& v, std::size_t index) {
   const Unit unit = response_unit(r);
   if (part_is_said(r)) text.add_line("compared", part_words(r, v.spec), Rank::context);
   text.add_line("together", joint_text(r.joint), Rank::detail);
-  text.add_line("whole curve", curve_text(r.curve, unit), Rank::detail);
+  text.add_line(
+      "whole curve",
+      curve_text(r.curve, unit) + (v.new_specimen ? " (without the spread between specimens)" : ""),
+      Rank::detail);
   if (!r.pick.empty()) text.add_line("S from", answer_text(r), Rank::context);
   text.add_line(
       "placement",
       placement_text(r, unit, quantity_dimension(r.creep ? v.spec.response : v.spec.drive)),
       Rank::context);
   text.add_line("scatter", scatter_text(r.scatter, unit), Rank::detail);
-  text.add_line("instrument", instrument_text(r), Rank::detail);
+  text.add_line("instrument", instrument_and_probe_text(r), Rank::detail);
   text.add_line("applicability", applicability_text(v.applicability[index]), Rank::context);
 }
 
@@ -303,7 +311,8 @@ void add_pooled(BriefText& text, const Validation& v) {
   bool remarked = false;
   for (const PooledQuantity& p : v.pooled) {
     if (p.remark.empty()) continue;
-    text.add_line("must shrink", fmt::format("{}: {}", p.name, p.remark), Rank::remark);
+    text.add_line(p.unknown ? "undetermined" : "must shrink",
+                  fmt::format("{}: {}", p.name, p.remark), Rank::remark);
     remarked = true;
   }
   if (remarked) text.add("\n", Rank::always);
