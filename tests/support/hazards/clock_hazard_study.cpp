@@ -241,9 +241,10 @@ ClockHazardRow row_of(const ClockHazard& hazard, const HilSession& session, bool
   row.expected = hazard.expected;
   row.bound_s = hazard.bound_s;
   row.lasts_s = hazard.lasts_s;
+  bool by_fault = false;  // and not by a stall of the machine before it
   const auto done = [&] {
     return row.tries == kMostTries ||
-           (in_time ? row.within : row.tries > 0 && row.cause == row.expected);
+           (in_time ? row.within : row.tries > 0 && row.cause == row.expected && by_fault);
   };
   while (!done()) {
     ++row.tries;
@@ -255,6 +256,7 @@ ClockHazardRow row_of(const ClockHazard& hazard, const HilSession& session, bool
     row.largest_force_N = in_time ? run.largest_N : std::max(row.largest_force_N, run.largest_N);
     const bool finished = row.expected == StopCause::finished;
     row.to_zero_s = finished ? 0.0 : run.to_zero_s.value_or(1e9);
+    by_fault = finished || run.to_zero_s.has_value();
     const bool counted =
         !finished || row.consecutive_missed + 2 >= std::lround(1e3 * hazard.lasts_s);
     const bool felt = hazard.at == 0 || row.largest_force_N > 0.0;  // it came in the tissue
