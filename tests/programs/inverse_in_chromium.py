@@ -130,8 +130,12 @@ def z_of(seen):
 
 
 def check_hand(chromium, address, folder):
+    def at_rest(s):  # connected a moment before the first state is shown
+        texts = s["texts"]
+        return texts["link"] == "connected" and texts["at"].count(",") == 2 and abs(z_of(s) - 4.0) < 0.5
+
     chromium.open(address)
-    until(chromium, lambda s: s["texts"]["link"] == "connected" and abs(z_of(s) - 4.0) < 0.5, "the hand at rest")
+    until(chromium, at_rest, "the hand at rest")
     drag(chromium, -6.0)
     fits(chromium, "hand", folder, lambda s: z_of(s) < -4.0)
 
