@@ -67,12 +67,12 @@ const std::string kStep = R"("protocol": {"kind": "creep", "load": "0.05 N", "du
 const std::string kPush =
     R"("protocol": {"kind": "knots", "knots": [{"time": "0 s", "depth": "0 mm"},
   {"time": "20 ms", "depth": "2 mm"}, {"time": "3 s", "depth": "2.4 mm"}]}, )";
-const std::string kSine = R"("contacts": [{"kind": "sphere", "number": 3, "protocol":
+const std::string kSine = R"("contacts": [{"kind": "sphere", "protocol":
   {"kind": "sine", "depth": "2 mm", "frequency": "7 Hz", "cycles": 2}}], )";
 const std::string kTwo =
-    R"("contacts": [{"kind": "sphere", "number": 3, "protocol": {"kind": "knots",
+    R"("contacts": [{"kind": "sphere", "protocol": {"kind": "knots",
   "knots": [{"time": "0 s", "depth": "0 mm"}, {"time": "30 ms", "depth": "1 mm"}, {"time": "3 s", "depth": "1 mm"}]}},
-  {"kind": "sphere", "number": 12, "protocol": {"kind": "knots", "knots": [{"time": "0 s", "load": "0 N"},
+  {"kind": "sphere", "number": 60, "protocol": {"kind": "knots", "knots": [{"time": "0 s", "load": "0 N"},
   {"time": "37 ms", "load": "0.04 N"}, {"time": "77 ms", "load": "0 N"}, {"time": "3 s", "load": "0 N"}]}}], )";
 
 }  // namespace
