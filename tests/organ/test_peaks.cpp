@@ -1,5 +1,5 @@
 // Largest responses do not depend on the outputs asked for: few and many outputs, and closed forms
-// of one sphere. A run that looked at 200 even times and the outputs alone missed 17 % of the peak
+// of one sphere. A run that looked at 200 even times and the outputs alone missed 14 % of the peak
 // of a short pulse of load.
 #include <algorithm>
 #include <catch2/catch.hpp>
