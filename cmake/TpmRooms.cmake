@@ -18,9 +18,8 @@ endmacro()
 set(TPM_ARRANGING accuracy accuracy/show accuracy/stability accuracy/verify fit/design fit/expression fit/online fit/predict fit/select
     fit/show haptics/boundary haptics/formulations haptics/serve haptics/session haptics/show haptics/verify organ/scene paper paper/claims
     paper/show plan plan/formulations plan/show show sweep/show)
-if(TPM_QUICK_TO_BUILD)
-  list(APPEND TPM_ARRANGING data files files/blocks files/hdf5 files/import organ/run)
-endif()
+# Those that are not optimised either in copies under sanitizers, or where TPM_QUICK_TO_BUILD asks for it.
+set(TPM_ARRANGING_QUICKLY data files files/blocks files/hdf5 files/import organ/run)
 
 # tpm_folders_of(LIST ROOM): the folders of a room that hold sources, as ROOM or ROOM/FOLDER.
 function(tpm_folders_of list room)
@@ -82,13 +81,19 @@ function(tpm_room_objects list room suffix flags)
   set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/haptics/session/page_server.cpp
     PROPERTIES COMPILE_OPTIONS "${TPM_HTTPLIB_CFLAGS_OTHER}" SKIP_PRECOMPILE_HEADERS ON
                SKIP_UNITY_BUILD_INCLUSION ON)
+  set(arranging ${TPM_ARRANGING})
+  set(arranging_flags ${TPM_ARRANGING_FLAGS})
+  if(suffix OR TPM_QUICK_TO_BUILD)
+    list(APPEND arranging ${TPM_ARRANGING_QUICKLY})
+    set(arranging_flags -O0)
+  endif()
   set(objects)
   foreach(folder IN LISTS ARGN)
     set(way fast)
     set(own_flags ${flags})
-    if(folder IN_LIST TPM_ARRANGING)
+    if(folder IN_LIST arranging)
       set(way arranging)
-      list(APPEND own_flags ${TPM_ARRANGING_FLAGS})
+      list(APPEND own_flags ${arranging_flags})
     endif()
     set(carrier tpm_room_headers_${way}${suffix})
     if(TPM_COMMON_HEADERS AND NOT TARGET ${carrier})  # headers that most files include are read once for each way

@@ -29,8 +29,9 @@ step "no loop over a part of a temporary"  # for (x : read_json(file).at("rows")
 ended=$(git ls-files '*.cpp' '*.hpp' | xargs grep -nE 'for \(.* : (\w+_)?json\(.*\)\.(at|items|begin|front|back)\b' || true)
 [[ -z "$ended" ]] || die "a loop reads what has ended; give it a name before the loop: $ended"
 
-step "building the slow tests (build/release)"
-configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=ON -DTPM_PYTHON=ON
+step "building the slow tests and sanitized copies, warnings as errors (build/release)"
+configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=ON -DTPM_PYTHON=ON -DTPM_SANITIZED_COPIES=ON \
+  -DTPM_WARNINGS=ON -DTPM_WARNINGS_AS_ERRORS=ON
 build release
 step "slow tests"
 slow_log=build/ctest-slow.log
@@ -48,9 +49,6 @@ step "clang-tidy on $(tidy_scope)"
 configure tidy
 tidy_changed build/tidy
 
-step "building with warnings as errors, and with sanitizers (build/check)"
-configure check
-build check
 step "fast tests with sanitized rooms, tests with threads under ThreadSanitizer"
 sanitized_log=build/ctest-sanitized.log
 run_tests sanitized >"$sanitized_log" || die "$(tail -n 80 "$sanitized_log")"

@@ -8,7 +8,8 @@ source scripts/install_packages.sh
 install_missing "to build, run and test tpm" "${packages_run[@]}" "${packages_test[@]}"
 find_python numpy matplotlib scipy h5py
 
-configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=OFF
+# shellcheck disable=SC2086  # several options in one word
+configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=OFF -DTPM_SANITIZED_COPIES=OFF ${TPM_CMAKE_OPTIONS-}
 step "building tpm and its tests (build/release)"
 build release
 
