@@ -191,7 +191,8 @@ TEST_CASE("a new specimen adds the spread between those of the calibration", "[v
   request.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
   const Validation v = validate(request);
   for (const SpecimenSpread& s : v.specimens) {
-    CHECK_THAT(s.degrees, WithinRel(3.0, 0.01));
+    CHECK(s.degrees() == 3);
+    CHECK_THAT(s.with_own, WithinRel(s.tau(), 0.01));
     CHECK_THAT(s.of_mean, WithinRel(0.5, 1e-9));
   }
   const QuantityComparison& end =
@@ -212,6 +213,28 @@ TEST_CASE("a new specimen adds the spread between those of the calibration", "[v
   request.new_specimen = false;
   CHECK(validate(request).verdict == ModelVerdict::seen);
   CHECK_FALSE(to_json(validate(request)).contains("new_specimen"));
+}
+
+TEST_CASE("a spread between specimens that is estimated as 0 is no better known", "[validate]") {
+  // Recordings of one specimen, with noise: n - 1 degrees of freedom tell of a tau up to the limit.
+  Random random(22);
+  test::StudyNoise noise;
+  noise.sigma_N = 2e-2;
+  ValidationRequest request = test::study_of_specimens({1.0, 1.0, 1.0}, noise, random);
+  request.recordings = {quiet_recording(1.0)};
+  request.quantities = {{QuantityKind::peak}};
+  const Validation v = validate(request);
+  REQUIRE(v.specimens.size() == 1);
+  const SpecimenSpread& spread = v.specimens.front();
+  REQUIRE(spread.tau() == 0.0);
+  const QuantityComparison& peak = test::study_quantity(v.recordings.front(), QuantityKind::peak);
+  const double whole = spread.with_own * std::abs(peak.simulated) * std::hypot(1.0, spread.of_mean);
+  CHECK(peak.e.degrees < 1.0001 * 2.0 * std::pow(peak.e.u_val / whole, 4.0));
+  CHECK_THAT(spread.tau_at_most(),  // chi^2 with two degrees: -2 ln 0.95
+             WithinRel(spread.with_own * std::sqrt(-1.0 / std::log(0.95) - 1.0), 1e-9));
+  CHECK_THAT(said_of(v),
+             Contains("no spread between the 3 recordings of the calibration is seen") &&
+                 Contains("% of S is not excluded"));
 }
 
 TEST_CASE("the spread between specimens is refused where nothing tells it", "[validate]") {

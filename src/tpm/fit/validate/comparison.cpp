@@ -269,7 +269,10 @@ class Comparer {
     sum.add(std::sqrt(std::max(shared * shared - q.u_input * q.u_input, 0.0)), kInfinity);
     sum.add(std::abs(q.of_probe), kInfinity);
     const double of_population = std::hypot(specimen, q.of_mean * specimen);
-    if (of_population > 0.0) sum.add(of_population, q.specimen_degrees);
+    if (q.specimen_degrees > 0) {
+      sum.add_difference(of_population, std::hypot(1.0, q.of_mean) * q.specimen_with_own,
+                         q.specimen_degrees);
+    }
     q.u_input = std::hypot(shared, q.of_probe, of_population);
     q.e.u_val = sum.u();
     q.e.degrees = sum.degrees();
@@ -324,7 +327,8 @@ class Comparer {
     }
     q.of_specimen = s.value * found->deviations;
     q.of_mean = found->of_mean;
-    q.specimen_degrees = found->degrees;
+    q.specimen_with_own = std::abs(s.value) * found->with_own;
+    q.specimen_degrees = found->degrees();
     q.parts.push_back(
         {"the spread between specimens", q.of_specimen.norm() * std::hypot(1.0, q.of_mean)});
   }

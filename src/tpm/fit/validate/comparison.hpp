@@ -42,9 +42,11 @@ struct QuantityComparison {
   /// Deviations of a new specimen, of the norm that it adds to u_input (SpecimenSpread); those of
   /// the law's mean over specimens are `of_mean` times them, and shared by all recordings.
   Eigen::RowVectorXd of_specimen;
-  double of_mean = 0.0, specimen_degrees = 0.0;
-  double of_contact = 0.0;  ///< effect of contact between two samples (contact_u_sampled)
-  double u_own = 0.0;       ///< the rest of u_val, with of_specimen
+  double of_mean = 0.0;
+  double specimen_with_own = 0.0;  ///< with the recordings' own u: its square has specimen_degrees
+  int specimen_degrees = 0;        ///< 0: no new specimen
+  double of_contact = 0.0;         ///< effect of contact between two samples (contact_u_sampled)
+  double u_own = 0.0;              ///< the rest of u_val, with of_specimen
 };
 
 /// The difference of the whole curve, which gets no verdict.

@@ -107,10 +107,12 @@ void set_mean(PooledQuantity& pooled, const std::vector<Member>& members,
   const RandomEffects effects = random_effects(estimates);
   const double spread = effects.tau_squared.value_or(0.0);
   Eigen::RowVectorXd mean_shared = Eigen::RowVectorXd::Zero(shared.cols());
-  double weights = 0.0;
+  double weights = 0.0, specimens_with_own = 0.0;
   for (std::size_t j = 0; j < members.size(); ++j) {
     const double s = estimates[j].standard_error;
     const double weight = 1.0 / (s * s + spread);
+    const QuantityComparison& q = *members[j].quantity;
+    specimens_with_own += weight * q.of_mean * q.specimen_with_own / members[j].scale;
     mean_shared += weight * shared.row(static_cast<Eigen::Index>(j));
     weights += weight;
   }
@@ -125,7 +127,9 @@ void set_mean(PooledQuantity& pooled, const std::vector<Member>& members,
   const double apart = of_fillings * of_fillings + of_specimens * of_specimens;
   sum.add(std::sqrt(std::max(pooled.u_shared * pooled.u_shared - apart, 0.0)), degrees_of_law);
   sum.add(of_fillings, static_cast<double>(std::max<Eigen::Index>(all_share.fillings - 1, 1)));
-  if (of_specimens > 0.0) sum.add(of_specimens, members.front().quantity->specimen_degrees);
+  if (const int degrees = members.front().quantity->specimen_degrees; degrees > 0) {
+    sum.add_difference(of_specimens, specimens_with_own / weights, degrees);
+  }
   pooled.e = {effects.mean, sum.u(), sum.degrees(), coverage_factor(sum.degrees())};
 }
 

@@ -84,6 +84,11 @@ void CombinedUncertainty::add(double u, double degrees) {
   if (degrees < kManyDegrees) fourth_over_degrees_ += u * u * u * u / degrees;
 }
 
+void CombinedUncertainty::add_difference(double u, double whole, double degrees) {
+  square_ += u * u;
+  fourth_over_degrees_ += whole * whole * whole * whole / degrees;
+}
+
 double CombinedUncertainty::u() const {
   return std::sqrt(square_);
 }

@@ -56,8 +56,11 @@ struct ErrorWithUncertainty {
 class CombinedUncertainty {
  public:
   void add(double u, double degrees);
+  /// u^2 is the difference of a variance `whole`^2 with these degrees of freedom and a known one:
+  /// its own uncertainty is that of the whole, also where the difference is 0.
+  void add_difference(double u, double whole, double degrees);
   [[nodiscard]] double u() const;
-  /// u^4 / sum (u_i^4 / nu_i), at least 1.
+  /// u^4 / sum (u_i^4 / nu_i), at least 1; of a difference whole^4 / nu.
   [[nodiscard]] double degrees() const;
 
  private:

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/fit/select/random_effects.hpp"
 #include "tpm/fit/validate/pooled.hpp"
 
@@ -54,13 +55,19 @@ SpecimenSpread spread_of(const std::vector<CalibrationShare>& members, std::size
   }
   const double norm = spread.deviations.norm();
   if (norm > 0.0) spread.deviations *= std::sqrt(tau_squared) / norm;
-  const double of_spread = tau_squared / (tau_squared + own_square);
-  spread.degrees = (n - 1.0) * of_spread * of_spread;
+  spread.with_own = std::sqrt(tau_squared + own_square);
   spread.of_mean = weights > 0.0 ? std::sqrt(weight_squares) / weights : 1.0 / std::sqrt(n);
   return spread;
 }
 
 }  // namespace
+
+double SpecimenSpread::tau_at_most() const {
+  constexpr double kExcluded = 0.05;
+  const double whole = with_own * with_own, own = whole - tau() * tau();
+  return std::sqrt(
+      std::max(whole * degrees() / chi_squared_quantile(kExcluded, degrees()) - own, 0.0));
+}
 
 std::vector<SpecimenSpread> specimen_spreads(std::span<const RecordingComparison> calibration,
                                              std::span<const int> readings) {

@@ -165,6 +165,26 @@ std::string threshold_words(const ValidationRequest& request) {
 
 /// How the recordings of a calibration differ from the law, each taken for one specimen. Shares of
 /// the law, so it answers in place of an organ.
+/// Quantities whose spread between specimens is estimated as 0: how large a one is not excluded.
+void add_unseen_spread(Validation& v) {
+  std::string names;
+  double at_most = 0.0;
+  int recordings = 0;
+  for (const SpecimenSpread& s : v.specimens) {
+    if (s.tau() > 0.0) continue;
+    names += fmt::format("{}{}", names.empty() ? "" : ", ",
+                         s.creep ? quantity_words(s.quantity, v.spec.response, v.spec.drive)
+                                 : quantity_words(s.quantity, v.spec.drive, v.spec.response));
+    at_most = std::max(at_most, s.tau_at_most());
+    recordings = std::max(recordings, s.recordings);
+  }
+  if (names.empty()) return;
+  v.remarks.push_back(
+      fmt::format("no spread between the {} recordings of the calibration is seen in {}: one of {} "
+                  "% of S is not excluded",
+                  recordings, names, significant(100.0 * at_most, 2)));
+}
+
 std::vector<SpecimenSpread> spread_of_calibration(const ValidationRequest& request,
                                                   const LawFile& law) {
   const std::vector<CalibrationData::File>& files = request.calibration.files;
@@ -375,6 +395,7 @@ Validation validate(const ValidationRequest& request) {
   v.remarks = request.remarks;
   v.remarks.insert(v.remarks.end(), request.calibration.remarks.begin(),
                    request.calibration.remarks.end());
+  add_unseen_spread(v);
   if (const std::string words = threshold_words(request); !words.empty())
     v.remarks.push_back(words);
   const std::optional<OtherFillings> fillings =

@@ -183,7 +183,8 @@ Json to_json(const Validation& v) {
                   {"load_imposed", s.creep},
                   {"recordings", s.recordings},
                   {"tau_share_of_S", stored(s.tau())},
-                  {"degrees_of_freedom", stored(s.degrees)}};
+                  {"tau_share_of_S_at_most", stored(s.tau_at_most())},
+                  {"degrees_of_freedom", s.degrees()}};
     });
   }
   j["recordings"] = Json::array();
