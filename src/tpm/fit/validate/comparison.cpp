@@ -273,6 +273,11 @@ class Comparer {
       sum.add_difference(of_population, std::hypot(1.0, q.of_mean) * q.specimen_with_own,
                          q.specimen_degrees);
     }
+    if (q.specimen_degrees > 0 && sum.untold()) {
+      q.remark =
+          "the spread between specimens is not known: the calibration's own uncertainty hides it";
+      q.unknown = true;
+    }
     q.u_input = std::hypot(shared, q.of_probe, of_population);
     q.e.u_val = sum.u();
     q.e.degrees = sum.degrees();

@@ -98,6 +98,10 @@ double CombinedUncertainty::degrees() const {
   return std::max(square_ * square_ / fourth_over_degrees_, 1.0);
 }
 
+bool CombinedUncertainty::untold() const {
+  return square_ * square_ < fourth_over_degrees_;
+}
+
 double coverage_factor(double degrees) {
   const double p = 0.5 + 0.5 * kLevel;
   return degrees < kManyDegrees ? student_quantile(p, degrees) : normal_quantile(p);

@@ -62,6 +62,9 @@ class CombinedUncertainty {
   [[nodiscard]] double u() const;
   /// u^4 / sum (u_i^4 / nu_i), at least 1; of a difference whole^4 / nu.
   [[nodiscard]] double degrees() const;
+  /// A difference whose whole is so large beside u that the formula gives less than one degree of
+  /// freedom: no coverage factor says what u is then.
+  [[nodiscard]] bool untold() const;
 
  private:
   double square_ = 0.0, fourth_over_degrees_ = 0.0;
