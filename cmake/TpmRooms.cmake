@@ -271,7 +271,7 @@ endfunction()
 
 # Rooms under address and undefined in the copy: those that read input, keep memory by hand, solve, or run in the servo
 # loop; their folders show, shapes and formulations are left out.
-set(TPM_SANITIZED_ROOMS base work data law files organ contact fit haptics paper CACHE STRING
+set(TPM_SANITIZED_ROOMS base work data law files organ contact haptics CACHE STRING
     "Rooms under address and undefined in sanitized copies")
 
 # A copy of the library in which the rooms named run under sanitizers; the others are those of

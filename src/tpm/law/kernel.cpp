@@ -92,8 +92,15 @@ KernelShape::Jet KernelShape::jet(double u) const {
   return {k, {k.slope, by_exponent, 0.0, 0.0}};
 }
 
+double KernelShape::slope(double u) const {
+  double of_kernel = 1.0;
+  if (kernel_ == Kernel::hertz) of_kernel = 1.5 * std::sqrt(u / reference_);
+  if (kernel_ == Kernel::power) of_kernel = exponent_ * std::pow(u / reference_, exponent_ - 1.0);
+  return share_ == 0.0 ? of_kernel : of_kernel + share_ * (tension_.at(u).slope - of_kernel);
+}
+
 KernelShape::Tangent KernelShape::tangent(double u) const {
-  const TensionShape::Tangent t = tension_.tangent(u);
+  const auto t = has_share_ ? tension_.tangent(u) : TensionShape::Tangent{0.0, 0.0};
   double of_kernel = 1.0;
   double by_exponent = 0.0;
   if (kernel_ != Kernel::linear) {
@@ -105,7 +112,7 @@ KernelShape::Tangent KernelShape::tangent(double u) const {
     }
   }
   return {(1.0 - share_) * of_kernel + share_ * t.slope, (1.0 - share_) * by_exponent,
-          t.slope - of_kernel, share_ * t.d_spacing};
+          has_share_ ? t.slope - of_kernel : 0.0, share_ * t.d_spacing};
 }
 
 double KernelShape::quartic_error(double a, double b) const {

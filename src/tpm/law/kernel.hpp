@@ -39,6 +39,8 @@ class KernelShape {
   };
   [[nodiscard]] Values at(double u) const;
   [[nodiscard]] double value(double u) const;
+  /// V'(u) for u > 0.
+  [[nodiscard]] double slope(double u) const;
   /// V'(u) for u >= 0, just inside the contact at 0, and its derivatives.
   struct Tangent {
     double slope, d_exponent, d_share, d_spacing;

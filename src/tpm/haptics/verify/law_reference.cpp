@@ -1,7 +1,10 @@
 #include "tpm/haptics/verify/law_reference.hpp"
 
+#include <algorithm>
 #include <boost/math/quadrature/gauss.hpp>
+#include <boost/math/tools/roots.hpp>
 #include <cmath>
+#include <cstdint>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/law/contact_history.hpp"
@@ -9,6 +12,23 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::haptics {
+namespace {
+
+/// A depth from low to high where a force that grows with it changes its sign; an end where none
+/// does.
+template <class Force>
+double where_no_force_is(const Force& force_at, double low, double high) {
+  if (!(high > low)) return low;
+  const double at_low = force_at(low), at_high = force_at(high);
+  if (!(at_high > 0.0)) return high;
+  if (at_low > 0.0) return low;
+  std::uintmax_t most = 100;
+  const auto [before, after] = boost::math::tools::toms748_solve(
+      force_at, low, high, at_low, at_high, boost::math::tools::eps_tolerance<double>(), most);
+  return 0.5 * (before + after);
+}
+
+}  // namespace
 
 std::vector<double> law_forces_by_gauss(const LawFile& file, std::span<const double> time_s,
                                         std::span<const double> depth_m) {
@@ -34,7 +54,7 @@ std::vector<double> law_forces_by_gauss(const LawFile& file, std::span<const dou
     for (Eigen::Index j = 0; j < rate.size(); ++j) {
       end[j] += boost::math::quadrature::gauss<double, 8>::integrate(
           [&](double s) {
-            return std::exp(-rate[j] * (h - s)) * law.kernel.tangent(a + speed * s).slope * speed;
+            return std::exp(-rate[j] * (h - s)) * law.kernel.slope(a + speed * s) * speed;
           },
           start, stop);
     }
@@ -60,13 +80,9 @@ std::vector<double> law_forces_by_gauss(const LawFile& file, std::span<const dou
     double force = force_at(tool);
     touching = force > 0.0;
     double end = tool;
-    if (!touching) {  // the surface goes where no force is: bisection
-      double low = std::min(tool, 0.0), high = std::max(surface, tool);
-      for (int k = 0; k < 60 && high > low; ++k) {
-        const double middle = 0.5 * (low + high);
-        (force_at(middle) > 0.0 ? high : low) = middle;
-      }
-      end = std::max(tool, 0.5 * (low + high));
+    if (!touching) {
+      end =
+          std::max(tool, where_no_force_is(force_at, std::min(tool, 0.0), std::max(surface, tool)));
       force = 0.0;
     }
     y = moved(surface, end, h);
