@@ -43,6 +43,9 @@ int serve_hil(const ServeChoice& choice, const Session& session) {
   ServeOptions options;
   options.port = serve_port(choice.port, "--port");
   options.events_port = serve_port(choice.events_port, "--events-port");
+  if (options.port != 0 && options.events_port == options.port) {
+    throw Error(ExitCode::usage, "--events-port", choice.events_port, "another port than --port");
+  }
   options.duration_s = serve_duration_s(choice.duration);
   options.poll = choice.poll;
   const HilSession hil = read_session(choice.session);

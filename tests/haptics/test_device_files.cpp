@@ -123,6 +123,23 @@ TEST_CASE("What was measured on a simulated device says so") {
   CHECK_FALSE(parse_device_file(json, "d").simulated);
 }
 
+TEST_CASE("A limit keeps what it is known by, whatever file is named beside it") {
+  // A file of tpm hil identify has no limits: those of the kind stay as assumed as they were.
+  const DeviceLimits kind = limits_of("inverse3");
+  const DeviceFile measured = parse_device_file(Json::parse(R"({"device": "inverse3"})"), "d");
+  CHECK(limits_by_file(kind, measured).known_by("force_N") == kind.known_by("force_N"));
+  CHECK_THAT(std::string(kind.known_by("force_N")), Contains("assumed"));
+  const DeviceFile said = parse_device_file(
+      Json::parse(R"({"device": "inverse3", "limits": {"force_N": 2, "reach_m": 0.05,
+        "provenance": {"force_N": "measured with a scale"}}})"),
+      "d");
+  CHECK(limits_by_file(kind, said).known_by("force_N") == "measured with a scale");
+  CHECK_THAT(std::string(limits_by_file(kind, said).known_by("reach_m")),
+             Contains("names no source"));
+  CHECK(limits_by_file(kind, said).known_by("stiffness_N_per_m") ==
+        kind.known_by("stiffness_N_per_m"));
+}
+
 TEST_CASE("A rehearsal stands for the device of its file") {
   const test::TempFolder folder;
   write_file(folder / "d.json", R"({"device": "falcon", "limits": {"force_N": 2}})");

@@ -33,7 +33,7 @@ TEST_CASE("A service is opened in both formats, made neutral, and what it says i
     faults.version = old ? "3.1.1.0" : "3.5.0.0";
     StandInInverse service(PlantSettings{}, {}, false, faults);
     InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                         limits_of("inverse3"), false);
+                         limits_of("inverse3"));
     const DeviceIdentity& identity = device.open();
     CHECK(identity.kind == "inverse3");
     CHECK(identity.serial == "049D");
@@ -129,7 +129,7 @@ TEST_CASE("A service that is not what it should be is refused with the reason") 
   f = {};
   f.no_events = true;
   CHECK_THAT(refusal(f), Contains("no WebSocket"));
-  InverseDevice nobody({1, 1, 1, ""}, limits_of("inverse3"), false);
+  InverseDevice nobody({1, 1, 1, ""}, limits_of("inverse3"));
   CHECK_THAT(error_of([&] { (void)nobody.open(); }),
              Contains("port 1 of this machine: nobody answers"));
 }
@@ -147,7 +147,7 @@ TEST_CASE("The first position is one of now, not one that was waiting") {
   f.unasked_states = 3;
   StandInInverse service(PlantSettings{}, {}, false, f);
   InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"), false);
+                       limits_of("inverse3"));
   (void)device.open();
   device.prepare({});
   device.enable_forces();
@@ -163,7 +163,7 @@ TEST_CASE("The first position is one of now, not one that was waiting") {
   for (const bool real_time : {false, true}) {
     StandInInverse silent(PlantSettings{}, {}, true, f);
     InverseDevice opened({silent.port(), silent.events_port(), silent.port(), ""},
-                         limits_of("inverse3"), false);
+                         limits_of("inverse3"));
     (void)opened.open();
     std::this_thread::sleep_for(50ms);
     DevicePreparation preparation = in_real_time(0.016);
@@ -189,7 +189,7 @@ TEST_CASE("A state is as old as the message that it answers") {
     f.jitter_s = jitter_s;
     StandInInverse service(PlantSettings{}, {}, true, f);
     InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                         limits_of("inverse3"), false);
+                         limits_of("inverse3"));
     (void)device.open();
     device.prepare(in_real_time(2.0));
     device.enable_forces();
@@ -215,7 +215,7 @@ TEST_CASE("A device that keeps the clock has no virtual time") {
   faults.simulated = false;
   StandInInverse service(PlantSettings{}, {}, false, faults);
   InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"), false);
+                       limits_of("inverse3"));
   CHECK(device.open().hardware);
   CHECK_THAT(error_of([&] { device.prepare({}); }), Contains("expected --clock real"));
 }
@@ -317,7 +317,7 @@ SessionRun run_on(const StandInFaults& faults,
   StandInInverse service(plant_of(session, 0), session.operator_script(), false, faults);
   const auto device = std::make_shared<InverseDevice>(
       InverseAddress{service.port(), service.events_port(), service.port(), "049D"},
-      limits_of("inverse3"), false);
+      limits_of("inverse3"));
   DeviceLimits limits = limits_of("inverse3");
   limits.simulated = true;  // its delay is not what is tried here
   SessionRunOptions options;
@@ -361,6 +361,38 @@ TEST_CASE("Each way in which a service fails ends the session with its cause") {
   }
 }
 
+TEST_CASE("A workspace that is scaled, turned or moved during a session ends it") {
+  for (const char* transform : {R"({"scale":{"x":10,"y":10,"z":10}})",
+                                R"({"rotation":{"w":0.7071,"x":0.7071,"y":0,"z":0}})",
+                                R"({"position":{"x":0.05,"y":0,"z":0}})"}) {
+    CAPTURE(transform);
+    StandInFaults faults;
+    faults.how = How::workspace;
+    faults.transform = transform;
+    faults.from = 2000;
+    const SessionRun run = run_on(faults);
+    CHECK(run.outcome.cause == StopCause::software);
+    CHECK_THAT(run.outcome.device.error_text, Contains("has moved, turned or scaled"));
+  }
+  // From the first state on: refused, but for a workspace that only lies elsewhere.
+  for (const char* transform : {R"({"scale":{"x":10,"y":10,"z":10}})",
+                                R"({"rotation":{"w":0.7071,"x":0.7071,"y":0,"z":0}})"}) {
+    CAPTURE(transform);
+    StandInFaults faults;
+    faults.how = How::workspace;
+    faults.transform = transform;
+    StandInInverse service(PlantSettings{}, {}, true, faults);
+    InverseDevice device(InverseAddress{service.port(), service.events_port(), service.port(), ""},
+                         limits_of("inverse3"));
+    CHECK_THROWS_WITH(device.open(), Contains("the service scales coordinates") ||
+                                         Contains("the service turns coordinates"));
+  }
+  StandInFaults elsewhere;
+  elsewhere.how = How::workspace;
+  elsewhere.transform = R"({"position":{"x":0.05,"y":0,"z":0}})";
+  CHECK(run_on(elsewhere).outcome.cause == StopCause::finished);
+}
+
 TEST_CASE("Events of the service end a session with their words") {
   struct Case {
     InverseEvent event;
@@ -368,7 +400,7 @@ TEST_CASE("Events of the service end a session with their words") {
   };
   for (const Case& c :
        {Case{{"device-disconnected", "warning", "049D", "", "lost"}, StopCause::unplugged},
-        Case{{"device-busy", "warning", "049D", "", "taken"}, StopCause::software},
+        Case{{"device-busy", "warning", "049d", "", "taken\nby another"}, StopCause::software},
         Case{{"device-safety-triggered", "error", "049D", "ebrake_triggered", "brake"},
              StopCause::software},
         // Of another device, or none that takes forces away.
@@ -389,7 +421,7 @@ TEST_CASE(
     "A thread of messages without commands sends zero, and states that stop are no position") {
   StandInInverse service(PlantSettings{}, {}, true);
   InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"), false);
+                       limits_of("inverse3"));
   (void)device.open();
   DevicePreparation preparation;
   preparation.real_time = true;
@@ -415,7 +447,7 @@ TEST_CASE(
 TEST_CASE("Forces that are cut from another thread are zero at the service before that returns") {
   StandInInverse service(PlantSettings{}, {}, true);
   InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"), false);
+                       limits_of("inverse3"));
   (void)device.open();
   DevicePreparation preparation;
   preparation.real_time = true;
@@ -442,7 +474,7 @@ TEST_CASE("Answers that are dropped now and then end nothing") {
   faults.how = How::drop_every_third;
   StandInInverse service(PlantSettings{}, {}, true, faults);
   InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                       limits_of("inverse3"), false);
+                       limits_of("inverse3"));
   (void)device.open();
   DevicePreparation preparation;
   preparation.real_time = true;

@@ -184,6 +184,22 @@ TEST_CASE("One client drives, a second reads only until the first has left") {
   CHECK(newtons == 3.0);
 }
 
+TEST_CASE("A client drives as long as it asks for a force") {
+  Served served;
+  const auto first = served.client(), second = served.client();
+  // A force of zero drives nothing.
+  (void)state_after(*first, push_of(0.0));
+  CHECK(state_after(*second, push_of(2.0)).force_N.z() == 2.0);
+  CHECK(state_after(*first, push_of(3.0)).force_N.z() == 2.0);
+  // The driver falls silent and stays: after two seconds another may.
+  double newtons = 0.0;
+  for (int i = 0; i < 6000 && newtons != 3.0; ++i) {
+    newtons = state_after(*first, push_of(3.0)).force_N.z();
+    std::this_thread::sleep_for(10ms);
+  }
+  CHECK(newtons == 3.0);
+}
+
 TEST_CASE("What a client does wrong makes one line in the log, and moves nothing") {
   Served served;
   const auto client = served.client();
@@ -288,6 +304,8 @@ TEST_CASE("The server answers programs and its own page on this machine, and nob
   CHECK_THAT(answer(upgrade + "Host: evil.example\r\n"), Contains("403 Forbidden"));
   CHECK_THAT(answer(host + upgrade + "Origin: http://evil.example\r\n"), Contains("403 Forbidden"));
   CHECK_THAT(answer("Host: evil.example\r\n"), Contains("403 Forbidden"));
+  CHECK_THAT(answer(host + "Origin: http://evil.example\r\n", "GET /devices HTTP/1.1"),
+             Contains("403 Forbidden"));
   CHECK_THAT(answer(host), Contains("SIMULATED DEVICE"));
   CHECK_THAT(answer(host, "POST / HTTP/1.1"), Contains("405 "));
   CHECK_THAT(answer(host, "GET /etc/passwd HTTP/1.1"), Contains("404 "));
@@ -301,7 +319,20 @@ TEST_CASE("The server answers programs and its own page on this machine, and nob
   const std::vector<std::string> lines = served.lines();
   CHECK(std::ranges::count_if(lines, [](const std::string& line) {
           return line.find("refused: ") != std::string::npos;
-        }) == 4);
+        }) == 5);
+}
+
+TEST_CASE("A port that is taken is named with its option") {
+  NotingHand hand;
+  const Socket taken = listen_on_loopback(0);
+  InverseServerSettings settings;
+  settings.events_port = port_of(taken);
+  CHECK_THROWS_WITH(InverseServer(hand, settings),
+                    Contains(fmt::format("--events-port {}", port_of(taken))));
+  settings.port = port_of(taken);
+  settings.events_port = 0;
+  CHECK_THROWS_WITH(InverseServer(hand, settings),
+                    Contains(fmt::format("--port {}", port_of(taken))));
 }
 
 TEST_CASE("Sockets listen on this machine only, and send small pieces without waiting") {

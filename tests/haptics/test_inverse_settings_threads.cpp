@@ -26,7 +26,7 @@ TEST_CASE("What no message sets is set over HTTP, read back and recorded") {
     f.version = version;
     StandInInverse service(PlantSettings{}, {}, false, f);
     const InverseAddress address{service.port(), service.events_port(), service.port(), ""};
-    InverseDevice device(address, limits_of("inverse3"), false);
+    InverseDevice device(address, limits_of("inverse3"));
     const std::vector<std::string> lines = device.open().assumptions;
     CHECK(service.settings().carried() == 1.0);
     CHECK_THAT(fmt::format("{}", fmt::join(lines, "\n")),
@@ -34,12 +34,12 @@ TEST_CASE("What no message sets is set over HTTP, read back and recorded") {
     CHECK(service.posts().size() == 1);
     InverseAddress half = address;
     half.gravity_carried = 0.5;
-    InverseDevice again(half, limits_of("inverse3"), false);
+    InverseDevice again(half, limits_of("inverse3"));
     CHECK_THAT(fmt::format("{}", fmt::join(again.open().assumptions, "\n")),
                Contains("gravity compensation on, factor 0.5"));
     InverseAddress none = address;
     none.gravity_carried = 0.0;
-    InverseDevice last(none, limits_of("inverse3"), false);
+    InverseDevice last(none, limits_of("inverse3"));
     (void)last.open();
     CHECK(service.settings().carried() == 0.0);
     f.keeps = {"gravity_compensation"};
@@ -98,7 +98,7 @@ TEST_CASE("Each setting that changes a force is neutral over HTTP, recorded, or 
     DeviceLimits limits = limits_of("inverse3");
     limits.simulated = true;  // its delay is not what is tried here
     const auto device =
-        std::make_shared<InverseDevice>(choice_of(service).inverse, limits_of("inverse3"), false);
+        std::make_shared<InverseDevice>(choice_of(service).inverse, limits_of("inverse3"));
     (void)run_session_on(session, device, limits, {}, options);
     const bool of_device = std::string_view(c.name) == "gravity_compensation";
     CHECK(service.posts() ==

@@ -51,7 +51,7 @@ inline InverseHazardRow refused(const char* hazard, const char* expected,
   const InverseAddress address{service->port(), service->events_port(), service->port(), ""};
   if (dead) service.reset();
   const std::int64_t began_ns = now_ns();
-  InverseDevice device(address, limits_of("inverse3"), false);
+  InverseDevice device(address, limits_of("inverse3"));
   try {
     (void)device.open();
   } catch (const Error& error) {
@@ -71,7 +71,7 @@ inline InverseHazardRow ended(const char* hazard, const char* expected, double b
     ++row.tries;
     StandInInverse service(PlantSettings{}, {}, true, faults);
     InverseDevice device({service.port(), service.events_port(), service.port(), ""},
-                         limits_of("inverse3"), false);
+                         limits_of("inverse3"));
     (void)device.open();
     DevicePreparation preparation;
     preparation.real_time = true;

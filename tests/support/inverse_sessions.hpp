@@ -53,7 +53,7 @@ inline std::string error_of(const std::function<void()>& call) {
 inline std::string refusal(const StandInFaults& faults, const std::string& id = {}) {
   StandInInverse service(PlantSettings{}, {}, false, faults);
   InverseAddress address{service.port(), service.events_port(), service.port(), id};
-  InverseDevice device(address, limits_of("inverse3"), false);
+  InverseDevice device(address, limits_of("inverse3"));
   return error_of([&] { (void)device.open(); });
 }
 

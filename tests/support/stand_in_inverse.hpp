@@ -44,7 +44,16 @@ struct StandInFaults {
   double jitter_s = 0.0;          ///< at most so much more, in no order
   /// From this message with a force on, what `how` says, a connection is closed once; 0: never.
   int from = 0;
-  enum class How { silence, garbage, other_device, close, drop_every_third } how = How::silence;
+  enum class How {
+    silence,
+    garbage,
+    other_device,
+    close,
+    drop_every_third,
+    workspace
+  } how = How::silence;
+  /// In each state, of How::workspace after `from`.
+  std::string transform = R"({"scale":{"x":10,"y":10,"z":10}})";
 };
 
 /// A service on loopback with a simulated device, for tests of the client: the codec of the library
@@ -359,7 +368,13 @@ inline std::optional<std::vector<std::string>> StandInInverse::answer(const std:
     if (faults_.how == How::other_device) id = "FFFF";
   }
   if (--answers_left_ < 0) return none;
-  return std::vector<std::string>{state_message(7, id, state, faults_.simulated)};
+  std::string said = state_message(7, id, state, faults_.simulated);
+  if (faults_.how == How::workspace && forces_ >= faults_.from) {
+    const std::string before = "\"state\":{";
+    said.replace(said.find(before), before.size(),
+                 before + "\"transform\":" + faults_.transform + ",");
+  }
+  return std::vector<std::string>{said};
 }
 
 inline void StandInInverse::talk(Socket socket, bool events) {

@@ -117,6 +117,13 @@ DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file) {
                     fmt::format("is of '{}', not of '{}'", printable(file.kind), limits.kind),
                     fmt::format("the file of a device '{}'", limits.kind));
   }
+  const auto say = [&](const char* key) {
+    const auto named = [key](const auto& entry) { return entry.first == key; };
+    const auto words = std::ranges::find_if(file.provenance, named);
+    std::erase_if(limits.provenance, named);
+    limits.provenance.emplace_back(
+        key, words == file.provenance.end() ? "device file, which names no source" : words->second);
+  };
   const auto lower = [&](const std::optional<double>& said, double& limit, const char* key) {
     if (!said) return;
     if (*said > limit) {
@@ -124,6 +131,7 @@ DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file) {
                       fmt::format("at most {}, the limit of '{}'", shortest(limit), limits.kind));
     }
     limit = *said;
+    say(key);
   };
   lower(file.force_N, limits.force_N, "force_N");
   lower(file.reach_m, limits.reach_m, "reach_m");
@@ -137,6 +145,7 @@ DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file) {
                                   shortest(limits.least_ramp_in_s), limits.kind));
     }
     limits.least_ramp_in_s = *file.least_ramp_in_s;
+    say("least_ramp_in_s");
   }
   if (file.encoder_step_m) limits.encoder_step_m = *file.encoder_step_m;
   limits.measured_delay_s = file.measured_delay_s;

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "tpm/haptics/device/device_file.hpp"
 #include "tpmkit/error.hpp"
 
@@ -19,6 +21,12 @@ const DeviceLimits kDeviceLimits[] = {
 };
 
 }  // namespace
+
+std::string_view DeviceLimits::known_by(std::string_view key) const {
+  const auto found =
+      std::ranges::find_if(provenance, [key](const auto& entry) { return entry.first == key; });
+  return found == provenance.end() ? std::string_view("assumed") : found->second;
+}
 
 DeviceLimits limits_of(std::string_view kind) {
   for (const DeviceLimits& limits : kDeviceLimits) {

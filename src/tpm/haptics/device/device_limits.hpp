@@ -36,6 +36,8 @@ struct DeviceLimits {
   std::vector<std::pair<std::string, std::string>> provenance = {};
   double measured_period_s = 0.0;  ///< of the loop that measured the delay; 0: not known
 
+  /// Provenance of the limit with this key; "assumed" where nothing is said.
+  [[nodiscard]] std::string_view known_by(std::string_view key) const;
   /// Its motors may move: it is neither simulated nor a replay.
   [[nodiscard]] bool hardware() const { return kind != "replay" && !plant && !simulated; }
 };

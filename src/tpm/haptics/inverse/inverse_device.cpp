@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <cstring>
 
@@ -40,6 +41,20 @@ std::optional<ForcesOff> end_of(const InverseEvent& event) {
   return harmless ? std::nullopt : std::optional(ForcesOff::software);
 }
 
+/// Identifiers are told in capitals or small letters.
+bool same_id(std::string_view a, std::string_view b) {
+  return std::ranges::equal(
+      a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
+constexpr double kTurned_rad = 1e-6, kMoved_m = 1e-6, kScaled = 1e-9;
+
+/// A metre and a direction of the program are those of the device.
+bool is_true(const InverseState& s) {
+  return s.workspace_scale.isApprox(Eigen::Vector3d::Ones(), kScaled) &&
+         s.workspace_rotation.angularDistance(Eigen::Quaterniond::Identity()) < kTurned_rad;
+}
+
 std::string words_of(const InverseEvent& event) {
   return event.safety_type.empty() ? event.name
                                    : fmt::format("{}: {}", event.name, event.safety_type);
@@ -57,10 +72,9 @@ InverseInventory inverse_inventory(const InverseAddress& address) {
   return parse_inventory(*text);
 }
 
-InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits, bool said_by_user)
+InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits)
     : address_(std::move(address)),
       limits_(limits),
-      said_by_user_(said_by_user),
       wake_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
 
 InverseDevice::~InverseDevice() {
@@ -146,7 +160,6 @@ void InverseDevice::require_neutral() const {
     throw service_fault(fmt::format("the service exchanges axes: basis {}", printable(s.basis)),
                         "basis XYZ");
   }
-  constexpr double kTurned_rad = 1e-6;
   const double turned_rad = s.mount_rotation.angularDistance(Eigen::Quaterniond::Identity());
   if (!(turned_rad < kTurned_rad)) {
     throw service_fault(fmt::format("the service turns coordinates: a mount by {} rad", turned_rad),
@@ -191,9 +204,11 @@ void InverseDevice::identify() {
     identity_.assumptions.push_back("events of the service are not heard: its version has none");
   }
   identity_.assumptions.push_back(
-      fmt::format("{} N, {} mm from the middle of the workspace, {} N/m ({})", limits_.force_N,
-                  1e3 * limits_.reach_m, limits_.stiffness_N_per_m,
-                  said_by_user_ ? "device file" : "assumed: no data sheet was found"));
+      fmt::format("at most {} N ({})", limits_.force_N, limits_.known_by("force_N")));
+  identity_.assumptions.push_back(fmt::format("{} mm from the middle of the workspace ({})",
+                                              1e3 * limits_.reach_m, limits_.known_by("reach_m")));
+  identity_.assumptions.push_back(fmt::format("at most {} N/m ({})", limits_.stiffness_N_per_m,
+                                              limits_.known_by("stiffness_N_per_m")));
 }
 
 const DeviceIdentity& InverseDevice::open() {
@@ -223,8 +238,15 @@ const DeviceIdentity& InverseDevice::open() {
   }
   make_neutral();
   if (!device_.settings.true_to_scale() ||
-      !device_.state.workspace_scale.isApprox(Eigen::Vector3d::Ones(), 1e-9)) {
+      !device_.state.workspace_scale.isApprox(Eigen::Vector3d::Ones(), kScaled)) {
     throw service_fault("the service scales coordinates", "a mount and a workspace of scale 1");
+  }
+  const double turned_rad =
+      device_.state.workspace_rotation.angularDistance(Eigen::Quaterniond::Identity());
+  if (!(turned_rad < kTurned_rad)) {
+    throw service_fault(
+        fmt::format("the service turns coordinates: a workspace by {} rad", turned_rad),
+        "a workspace that is not turned");
   }
   identify();
   return identity_;
@@ -258,6 +280,7 @@ void InverseDevice::ask_for_first_state() {
   while (service_->receive(0.0)) {
   }
   waiting_ = {};
+  workspace_m_.reset();
   (void)exchange(probe_message(device_.id), kPatience_s);
 }
 
@@ -317,6 +340,12 @@ void InverseDevice::take_state(const std::string& text) {
   try {
     const InverseState state = parse_state(text, device_.id);
     unreadable_in_a_row_ = 0;
+    if (!workspace_m_) workspace_m_ = state.workspace_position_m;
+    if (!is_true(state) || !((state.workspace_position_m - *workspace_m_).norm() < kMoved_m)) {
+      // Another program may set the workspace of this session: the surface would be elsewhere.
+      fail(ForcesOff::software, "the service has moved, turned or scaled the workspace");
+      return;
+    }
     if (asked_ns) answer_.write({state, *asked_ns});  // else it came after all patience
   } catch (const Error&) {
     ++unreadable_;
@@ -332,7 +361,7 @@ void InverseDevice::look_for_events() {
   while (const std::optional<std::string> text = events_->receive(0.0)) {
     try {
       const InverseEvent event = parse_event(*text);
-      const bool ours = event.device_id.empty() || event.device_id == device_.id;
+      const bool ours = event.device_id.empty() || same_id(event.device_id, device_.id);
       const std::optional<ForcesOff> end = end_of(event);
       if (ours && end) fail(*end, words_of(event));
     } catch (const Error&) {

@@ -42,11 +42,11 @@ struct InverseAddress {
 ///
 /// open() makes force gate and damping of the service 0, lets it carry the device's weight, and
 /// reads all back; a service in which one of them stays or is not told, or in another scale, is
-/// refused.
+/// refused. A workspace that is moved, turned or scaled later ends the session.
 class InverseDevice final : public HapticDevice {
  public:
-  /// @param limits ceilings of the force, marked as assumed in the identity unless `said_by_user`
-  InverseDevice(InverseAddress address, const DeviceLimits& limits, bool said_by_user);
+  /// @param limits named in the identity with what they are known by
+  InverseDevice(InverseAddress address, const DeviceLimits& limits);
   ~InverseDevice() override;
 
   const DeviceIdentity& open() override;
@@ -94,7 +94,6 @@ class InverseDevice final : public HapticDevice {
 
   InverseAddress address_;
   const DeviceLimits limits_;
-  const bool said_by_user_;
   std::string version_;
   InverseFormat format_ = InverseFormat::vector;
   std::unique_ptr<WebSocketClient> service_, events_;
@@ -119,6 +118,7 @@ class InverseDevice final : public HapticDevice {
   // Of the thread of the messages.
   std::thread messages_;
   UnansweredMessages waiting_;
+  std::optional<Eigen::Vector3d> workspace_m_;  ///< where the service puts it at the first state
   std::atomic<std::uint64_t> sent_{0}, unanswered_{0}, unreadable_{0};
   std::uint32_t orders_seen_ = 0;
   std::int64_t next_look_ns_ = 0;

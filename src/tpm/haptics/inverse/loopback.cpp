@@ -130,7 +130,7 @@ Socket connect_to_loopback(int port, double timeout_s) {
   return socket;
 }
 
-Socket listen_on_loopback(int port) {
+Socket listen_on_loopback(int port, std::string_view option) {
   Socket socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   const int yes = 1;
   (void)::setsockopt(socket.handle(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
@@ -139,7 +139,7 @@ Socket listen_on_loopback(int port) {
   if (!socket.open() ||
       ::bind(socket.handle(), reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0 ||
       ::listen(socket.handle(), kMostWaiting) != 0) {
-    throw Error(ExitCode::environment, fmt::format("--port {}", port), "the port cannot be had",
+    throw Error(ExitCode::environment, fmt::format("{} {}", option, port), "the port cannot be had",
                 "one that is free, or 0 for any");
   }
   set_up(socket.handle());

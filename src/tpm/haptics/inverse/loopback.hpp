@@ -31,8 +31,9 @@ class Socket {
 /// A connection to a port of this machine, 127.0.0.1, that does not wait and does not collect small
 /// pieces (TCP_NODELAY). Throws Error(environment) with the port.
 [[nodiscard]] Socket connect_to_loopback(int port, double timeout_s);
-/// Listens on 127.0.0.1 only. @param port 0: one that is free. Throws Error(environment).
-[[nodiscard]] Socket listen_on_loopback(int port);
+/// Listens on 127.0.0.1 only. @param port 0: one that is free @param option names it in a message
+/// Throws Error(environment).
+[[nodiscard]] Socket listen_on_loopback(int port, std::string_view option = "--port");
 [[nodiscard]] int port_of(const Socket& listening);
 /// The next connection, set up as that of connect_to_loopback(); not open if there is none.
 [[nodiscard]] Socket accepted(const Socket& listening);

@@ -65,6 +65,13 @@ class Part {
     require(text.size() <= most && printable(text, most) == text, "is too long or not printable");
     return text;
   }
+  [[nodiscard]] bool is(std::string_view words) const {
+    return json_->is_string() && json_->get<std::string>() == words;
+  }
+  /// What can be shown of a text; empty for anything else.
+  [[nodiscard]] std::string words(std::size_t most = kMostCharacters) const {
+    return json_->is_string() ? printable(json_->get<std::string>(), most) : std::string();
+  }
   [[nodiscard]] Eigen::Vector3d vector() const {
     return {at("x").number(), at("y").number(), at("z").number()};
   }
@@ -107,9 +114,13 @@ InverseState state_of(const Part& state) {
   read.position_m = state.at(key::cursor_position).vector();
   read.velocity_m_per_s = vector_or_zero(state, key::cursor_velocity);
   read.force_N = vector_or_zero(state, key::cursor_force);
-  if (state.has("transform") && state.at("transform").has(key::scale)) {
-    read.workspace_scale = state.at("transform").at(key::scale).vector();
+  if (!state.has("transform")) return read;
+  const Part workspace = state.at("transform");
+  read.workspace_position_m = vector_or_zero(workspace, key::position);
+  if (workspace.has(key::rotation)) {
+    read.workspace_rotation = workspace.at(key::rotation).quaternion();
   }
+  if (workspace.has(key::scale)) read.workspace_scale = workspace.at(key::scale).vector();
   return read;
 }
 
@@ -180,7 +191,8 @@ InverseDeviceEntry entry_of(const Part& part) {
                                    info.at("minor_version").number());
     }
   }
-  entry.simulated = config.has(key::simulated);
+  // Anything else than these words is no word of a simulation: hardware keeps its guards.
+  entry.simulated = config.has(key::simulated) && config.at(key::simulated).is(kSimulatedWords);
   entry.settings = settings_of(config);
   entry.state = state_of(part.at(key::state));
   return entry;
@@ -380,12 +392,12 @@ InverseEvent parse_event(std::string_view text) {
   constexpr std::size_t kMostWords = 1000;
   InverseEvent read;
   read.name = event.at(key::name).text();
-  if (event.has("level")) read.level = event.at("level").text();
-  if (event.has("message")) read.message = event.at("message").text(kMostWords);
+  if (event.has("level")) read.level = event.at("level").words();
+  if (event.has("message")) read.message = event.at("message").words(kMostWords);
   if (!event.has("data")) return read;
   const Part data = event.at("data");
-  if (data.has(key::id)) read.device_id = data.at(key::id).text();
-  if (data.has("safety_type")) read.safety_type = data.at("safety_type").text();
+  if (data.has(key::id)) read.device_id = data.at(key::id).words();
+  if (data.has("safety_type")) read.safety_type = data.at("safety_type").words();
   return read;
 }
 

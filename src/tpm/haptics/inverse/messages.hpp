@@ -58,7 +58,10 @@ struct InverseSettings {
 struct InverseState {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero(), velocity_m_per_s = Eigen::Vector3d::Zero(),
                   force_N = Eigen::Vector3d::Zero();
-  Eigen::Vector3d workspace_scale = Eigen::Vector3d::Ones();
+  /// From the device's coordinates to those of the program.
+  Eigen::Vector3d workspace_position_m = Eigen::Vector3d::Zero(),
+                  workspace_scale = Eigen::Vector3d::Ones();
+  Eigen::Quaterniond workspace_rotation = Eigen::Quaterniond::Identity();
   // Of the first grip.
   bool has_grip = false;
   Eigen::Quaterniond grip = Eigen::Quaterniond::Identity();
@@ -99,6 +102,8 @@ struct InverseCommand {
 struct InverseEvent {
   std::string name, level, device_id, safety_type, message;
 };
+/// An event needs no more than a name: what else it says is read as far as it is text, and
+/// shortened. Throws Error(bad_input) without a name.
 [[nodiscard]] InverseEvent parse_event(std::string_view text);
 
 /// A force, N; with `profile` the program registers itself, once.

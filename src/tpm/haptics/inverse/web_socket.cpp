@@ -71,11 +71,6 @@ bool is_key(std::string_view key) {
          std::ranges::all_of(key.substr(0, kKeyCharacters - 2), known);
 }
 
-bool is_origin_of(std::string_view origin, int port) {
-  return origin == fmt::format("http://127.0.0.1:{}", port) ||
-         origin == fmt::format("http://localhost:{}", port);
-}
-
 /// Length of a sequence of UTF-8 and the range of its second byte (RFC 3629, 4); 0: none begins so.
 struct Utf8Sequence {
   std::size_t bytes;
@@ -365,6 +360,11 @@ std::string http_answer(std::string_view status, std::string_view type, std::str
       "HTTP/1.1 {}\r\nConnection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: "
       "nosniff\r\n{}Content-Type: {}\r\nContent-Length: {}\r\n\r\n{}",
       status, more_fields, type, body.size(), body);
+}
+
+bool is_origin_of(std::string_view origin, int port) {
+  return origin == fmt::format("http://127.0.0.1:{}", port) ||
+         origin == fmt::format("http://localhost:{}", port);
 }
 
 bool names_this_host(const HttpHead& request, int port) {

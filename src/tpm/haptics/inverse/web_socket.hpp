@@ -124,6 +124,8 @@ struct UpgradeAnswer {
 /// Origin is a page and has to come from this machine and one of these ports.
 [[nodiscard]] UpgradeAnswer answer_upgrade(const HttpHead& request, int port,
                                            const std::vector<int>& page_ports);
+/// A page of this machine at this port.
+[[nodiscard]] bool is_origin_of(std::string_view origin, int port);
 /// True if Host is there once and names this machine and port.
 [[nodiscard]] bool names_this_host(const HttpHead& request, int port);
 /// A whole answer that closes the connection.

@@ -15,8 +15,9 @@ namespace {
 
 constexpr std::size_t kMostWaitingBytes = 262'144;  // that a client does not read
 constexpr std::size_t kMostDiscarded = 16'777'216;  // after the last word to a client
-constexpr std::int64_t kTimeToAsk_ns = 2'000'000'000, kTimeToLeave_ns = 2'000'000'000;
-constexpr int kMostLines = 20;  // in the log, of one client
+constexpr std::int64_t kTimeToAsk_ns = 2'000'000'000, kTimeToLeave_ns = 2'000'000'000,
+                       kTimeToDrive_ns = 2'000'000'000;  ///< of silence, then others may
+constexpr int kMostLines = 20;                           // in the log, of one client
 constexpr int kLook_ms = 50;
 constexpr double kFarthest_m = 1.0;  // a place that a hand is asked to go to
 
@@ -36,7 +37,8 @@ struct InverseServer::Connection {
   std::int64_t since_ns;  ///< of the stage
   std::int64_t session = 0;
   bool events = false, centred = false, shut = false;
-  unsigned told = 0;  ///< bits of Once
+  std::int64_t pushed_ns = 0;  ///< its last force as the driver
+  unsigned told = 0;           ///< bits of Once
   std::string head, out;
   WebSocketReader reader{WebSocketSide::server, kMostMessageBytes};
   std::size_t discarded = 0;
@@ -58,8 +60,10 @@ struct InverseServer::Connection {
 InverseServer::InverseServer(ServedHand& hand, InverseServerSettings settings)
     : hand_(hand),
       settings_(std::move(settings)),
-      listening_(listen_on_loopback(settings_.port)),
-      events_(settings_.events_port < 0 ? Socket() : listen_on_loopback(settings_.events_port)),
+      listening_(listen_on_loopback(settings_.port, "--port")),
+      events_(settings_.events_port < 0
+                  ? Socket()
+                  : listen_on_loopback(settings_.events_port, "--events-port")),
       port_(port_of(listening_)),
       events_port_(events_.open() ? port_of(events_) : -1),
       thread_([this] { serve(); }) {}
@@ -159,6 +163,10 @@ void InverseServer::look_at(Connection& c) {
     say(c, "asks for nothing");
     end_of(c);
   }
+  if (c.stage == Stage::open && driver_ == c.session && c.session != 0 &&
+      now_ns() - c.pushed_ns > kTimeToDrive_ns) {
+    stop_driving(c);
+  }
   if (c.stage != Stage::leaving) return;
   if (c.out.empty() && !c.shut) {
     // What is still under way is taken, so that the system does not withdraw the last words.
@@ -242,6 +250,12 @@ void InverseServer::answer_http(Connection& c, const HttpHead& head) {
     ++refused_;
     say(c, "refused: Host is not this machine");
     return send(c, http_answer("403 Forbidden", "text/plain", "Host is not this machine\n"));
+  }
+  if (head.count("origin") != 0 && !is_origin_of(head.value("origin"), port_)) {
+    ++refused_;
+    say(c, "refused: Origin is a page of somebody else");
+    return send(c,
+                http_answer("403 Forbidden", "text/plain", "Origin is a page of somebody else\n"));
   }
   if (head.start[0] != "GET") {
     return send(
@@ -336,11 +350,15 @@ void InverseServer::obey(Connection& c, const InverseCommand& command) {
     if (driver_ == c.session) hand_.push(Eigen::Vector3d::Zero());
     return;
   }
-  if (driver_ == 0) {
+  if (driver_ == 0 && !command.force_N->isZero()) {
     driver_ = c.session;
     say(c, "drives");
   }
-  if (driver_ == c.session) return hand_.push(*command.force_N);
+  if (driver_ == c.session) {
+    c.pushed_ns = now_ns();
+    return hand_.push(*command.force_N);
+  }
+  if (driver_ == 0) return;  // zero, and the hand feels none
   if (c.first(Once::reads)) say(c, fmt::format("reads only, client {} drives", driver_));
 }
 
@@ -372,14 +390,16 @@ void InverseServer::fault(Connection& c, std::uint16_t code, const std::string& 
   release(c);
 }
 
+void InverseServer::stop_driving(Connection& c) {
+  driver_ = 0;
+  hand_.let_go();
+  say(c, "drives no more");
+}
+
 /// Whatever this client held is free again.
 void InverseServer::release(Connection& c) {
   if (c.session == 0) return;
-  if (driver_ == c.session) {
-    driver_ = 0;
-    hand_.let_go();
-    say(c, "drives no more");
-  }
+  if (driver_ == c.session) stop_driving(c);
   if (mover_ == c.session) {
     mover_ = 0;
     hand_.move_to(std::nullopt);

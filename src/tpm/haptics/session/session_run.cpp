@@ -251,7 +251,7 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
     return std::make_shared<VirtualOmega7>(session.plant, session.operator_script(), limits);
   }
   if (choice.kind == "inverse3") {
-    return std::make_shared<InverseDevice>(choice.inverse, limits_of(choice), !choice.file.empty());
+    return std::make_shared<InverseDevice>(choice.inverse, limits_of(choice));
   }
   if (limits.hardware()) {
     return std::make_shared<ForceDimension>(choice.library, choice.kind, choice.which);
