@@ -171,13 +171,8 @@ class Plan:
             return {"verdict": "not_adequate", "words": "no model meets tolerance and budget"}
         error = self._dict["choice"]["verified_error"]
         verdict = "adequate" if error <= tolerance else "not_adequate"
-        words = f"{self.choice}: verified error {100 * error:.3g} % of the peak, {100 * tolerance:.3g} % allowed"
-        left_out = self._dict["masses_left_out"]
-        if left_out is not None:
-            words += f"; {100 * left_out:.3g} % of it by masses, which the model leaves out"
-        elif self._dict["masses_matter"] is None:
-            words += "; not known what masses would change"
-        return {"verdict": verdict, "words": words}
+        return {"verdict": verdict,
+                "words": f"{self.choice}: verified error {100 * error:.3g} % of the peak, {100 * tolerance:.3g} % allowed"}
 
     @property
     def warnings(self) -> list[str]:
