@@ -183,7 +183,8 @@ const Block<DeviceKeys>& device_block() {
        key("name", &K::name, text(), "as its maker writes it"),
        key("description", &K::description, text(), "what else is to be said of it"),
        key("serial", &K::serial, text(),
-           "of the device that was measured; a session on another one is refused"),
+           "of the device that was measured; a session on another one is refused, and so is one on "
+           "a device that says a serial while a file with something measured has none"),
        key("limits", &K::limits, device_limits_block().type(), "what may be asked of it"),
        key("delay", &K::delay, delay_block().type(), "from a position to its force"),
        key("viscous_friction", &K::viscous_friction, viscous_block().type(),
