@@ -387,6 +387,35 @@ TEST_CASE("Of several devices one is chosen by its kind, its serial number or it
   REQUIRE(seen.size() == 4);
   CHECK(seen[3].kind == "falcon");
   CHECK(seen[3].serial == 4714);
+  CHECK_FALSE(seen[3].simulated);
+}
+
+TEST_CASE("The list of devices marks one behind a link on which a simulator may be") {
+  const test::TempFolder folder;
+  const auto listed = [&](const char* format) {
+    const std::string line = "'" TPM_TEST_PROGRAM "' hil devices --dhd-library '" TPM_STAND_IN_DHD
+                             "' --format " +
+                             std::string(format) + " > '" + (folder / "listed") + "'";
+    REQUIRE(std::system(line.c_str()) == 0);
+    return read_file(folder / "listed");
+  };
+  const auto marked = [&] {
+    const Json answer = Json::parse(listed("json"));
+    return answer.at("force_dimension").at("devices")[0].at("simulated_device").get<bool>();
+  };
+  for (const char* mode : {"3", "4"}) {
+    CAPTURE(mode);
+    const Script script(std::string("com_mode ") + mode + "\n");
+    CHECK_THAT(listed("text"), Contains("omega.7, SIMULATED DEVICE, serial 4711: --device omega7"));
+    CHECK(marked());
+  }
+  // A link that nobody knows may lead to motors.
+  for (const char* mode : {"0", "1", "9"}) {
+    CAPTURE(mode);
+    const Script script(std::string("com_mode ") + mode + "\n");
+    CHECK_THAT(listed("text"), Contains("omega.7, serial 4711: --device omega7"));
+    CHECK_FALSE(marked());
+  }
 }
 
 TEST_CASE("A session that asks for more than a device can take is refused") {
