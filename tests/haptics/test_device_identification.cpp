@@ -260,7 +260,10 @@ TEST_CASE("The simulated device is identified, and its file is one that a sessio
   CHECK_THAT(*run.found.mass_kg, WithinRel(0.4, 0.1));
   CHECK(*run.found.viscous_lower_95_N_s_per_m <= 0.7);
   CHECK(*run.found.viscous_lower_95_N_s_per_m > 0.5);
-  const DeviceFile file = parse_device_file(device_file_json(run, ""), "device.json");
+  const Json written = device_file_json(run, "");
+  CHECK(written.at("delay").at("hold") ==
+        "the hold of a command, half a period in the mean, is not included");
+  const DeviceFile file = parse_device_file(written, "device.json");
   CHECK(file.kind == "virtual");
   REQUIRE(file.measured_delay_s);
   CHECK_THAT(*file.measured_delay_s, WithinAbs(4e-3, 1e-3));

@@ -115,6 +115,8 @@ const Block<DeviceDelayKeys>& delay_block() {
        key("jitter_s", &K::jitter_s, number(kZeroOrMore), "standard deviation"),
        key("resolution_s", &K::resolution_s, number(kZeroOrMore),
            "half a period of the loop that measured it"),
+       key("hold", &K::hold, text(1),
+           "in words, that the hold of a command is not in these numbers"),
        key("tries", &K::tries, whole<int>(1, 1e9), "how often it was measured")},
       {{"a mean and a spread that are not above the largest delay", below_largest}});
   return block;
