@@ -50,7 +50,7 @@ struct Ended {
 constexpr int kEndedInOrder = 98;
 
 /// How often the device saw it.
-int seen(const std::string& file, const std::string& what) {
+int times_seen(const std::string& file, const std::string& what) {
   std::ifstream events(file);
   std::string name;
   int times = 0;
@@ -91,12 +91,12 @@ Ended ended_by(const End& end, bool real_time, bool survives = false) {
   REQUIRE(::waitpid(child, &result.status, WUNTRACED) == child);
   if (WIFSTOPPED(result.status)) {
     result.stopped_by = WSTOPSIG(result.status);
-    result.forces_off_then = seen(folder / "events", "forces_off");
+    result.forces_off_then = times_seen(folder / "events", "forces_off");
     (void)::kill(child, SIGCONT);
     REQUIRE(::waitpid(child, &result.status, 0) == child);
   }
-  result.forces_on = seen(folder / "events", "thread_of_forces_on");
-  result.forces_off = seen(folder / "events", "forces_off");
+  result.forces_on = times_seen(folder / "events", "thread_of_forces_on");
+  result.forces_off = times_seen(folder / "events", "forces_off");
   CHECK(result.forces_on == 1);
   return result;
 }
