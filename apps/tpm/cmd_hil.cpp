@@ -50,6 +50,7 @@ Json seen_json(const SeenDevice& device) {
           {"device", known ? Json(device.kind) : Json()},
           {"name", device.name},
           {"serial", device.serial < 0 ? Json() : Json(device.serial)},
+          {"simulated_device", device.simulated},
           {"tried", known && limits_of(device.kind).tried},
           {"problem", device.problem}};
 }
@@ -58,12 +59,13 @@ std::string seen_text(const SeenDevice& device) {
   if (!device.problem.empty()) {
     return fmt::format("{:<8} cannot be opened: {}\n", device.index, device.problem);
   }
+  const char* simulated = device.simulated ? ", SIMULATED DEVICE" : "";
   if (device.kind.empty()) {
-    return fmt::format("{:<8} {}, type {}, serial {}: no --device of tpm\n", device.index,
-                       device.name, device.type, device.serial);
+    return fmt::format("{:<8} {}{}, type {}, serial {}: no --device of tpm\n", device.index,
+                       device.name, simulated, device.type, device.serial);
   }
-  return fmt::format("{:<8} {}, serial {}: --device {} --serial {}{}\n", device.index, device.name,
-                     device.serial, device.kind, device.serial,
+  return fmt::format("{:<8} {}{}, serial {}: --device {} --serial {}{}\n", device.index,
+                     device.name, simulated, device.serial, device.kind, device.serial,
                      limits_of(device.kind).tried ? "" : " (never tried with this device)");
 }
 

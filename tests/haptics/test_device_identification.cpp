@@ -50,6 +50,32 @@ TEST_CASE("A second is enough for the delay to half a period, with and without a
   CHECK_FALSE(checked_delay_s(samples, stuck.period_s));
 }
 
+TEST_CASE("The check of a second tells the largest delay that it saw, not the mean") {
+  const auto checked_s = [](const Handle& h, std::uint64_t seed) {
+    std::vector<IdentificationSample> samples = moved(h, seed);
+    samples.resize(1000);
+    return checked_delay_s(samples, h.period_s).value();
+  };
+  Handle grows;
+  grows.force_late_s = 1e-3;
+  grows.later_s = 2e-3;
+  grows.later_from_s = 0.45;
+  grows.later_until_s = 0.6;
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    CAPTURE(seed);
+    CHECK(checked_s(grows, seed) > 2.3e-3);  // for most of the second it is 1 ms
+    CHECK(checked_s(grows, seed) < 3.5e-3);
+  }
+  Handle jitters;
+  jitters.force_late_s = 4e-3;
+  jitters.jitter_s = 3e-3;
+  constexpr int kSeconds = 8;
+  double sum_s = 0.0;
+  for (std::uint64_t seed = 1; seed <= kSeconds; ++seed) sum_s += checked_s(jitters, seed);
+  CHECK(sum_s / kSeconds > 5.6e-3);  // the mean is about 4.9 ms
+  CHECK(sum_s / kSeconds < 7.0e-3);
+}
+
 TEST_CASE("The check before a session finds the delay of the simulated device") {
   for (const int periods : {0, 3, 10}) {
     HilSession session = test::parsed(test::short_session());
@@ -234,7 +260,10 @@ TEST_CASE("The simulated device is identified, and its file is one that a sessio
   CHECK_THAT(*run.found.mass_kg, WithinRel(0.4, 0.1));
   CHECK(*run.found.viscous_lower_95_N_s_per_m <= 0.7);
   CHECK(*run.found.viscous_lower_95_N_s_per_m > 0.5);
-  const DeviceFile file = parse_device_file(device_file_json(run, ""), "device.json");
+  const Json written = device_file_json(run, "");
+  CHECK(written.at("delay").at("hold") ==
+        "the hold of a command, half a period in the mean, is not included");
+  const DeviceFile file = parse_device_file(written, "device.json");
   CHECK(file.kind == "virtual");
   REQUIRE(file.measured_delay_s);
   CHECK_THAT(*file.measured_delay_s, WithinAbs(4e-3, 1e-3));

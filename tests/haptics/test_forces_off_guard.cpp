@@ -43,7 +43,20 @@ class EndingModel final : public EmptySpace {
 struct Ended {
   int status = 0;
   int forces_off = 0, forces_on = 0;  ///< how often the device saw that
+  int stopped_by = 0;                 ///< a signal, after which it was told to go on; 0: none
+  int forces_off_then = 0;
 };
+
+constexpr int kEndedInOrder = 98;
+
+/// How often the device saw it.
+int times_seen(const std::string& file, const std::string& what) {
+  std::ifstream events(file);
+  std::string name;
+  int times = 0;
+  for (long long number = 0; events >> name >> number;) times += name == what ? 1 : 0;
+  return times;
+}
 
 /// What the library of the device saw of a process that ended so.
 Ended ended_by(const End& end, bool real_time, bool survives = false) {
@@ -71,16 +84,19 @@ Ended ended_by(const End& end, bool real_time, bool survives = false) {
     const ServoOutcome outcome = real_time
                                      ? run_in_real_time(device, model, settings, sink, options)
                                      : run_in_virtual_time(*device, *model, settings, sink);
+    if (outcome.cause == StopCause::signal) ::_exit(kEndedInOrder);
     ::_exit(survives && outcome.cause == StopCause::finished ? 0 : 99);
   }
   Ended result;
-  REQUIRE(::waitpid(child, &result.status, 0) == child);
-  std::ifstream events(folder / "events");
-  std::string name;
-  for (long long number = 0; events >> name >> number;) {
-    result.forces_on += name == "thread_of_forces_on" ? 1 : 0;
-    result.forces_off += name == "forces_off" ? 1 : 0;
+  REQUIRE(::waitpid(child, &result.status, WUNTRACED) == child);
+  if (WIFSTOPPED(result.status)) {
+    result.stopped_by = WSTOPSIG(result.status);
+    result.forces_off_then = times_seen(folder / "events", "forces_off");
+    (void)::kill(child, SIGCONT);
+    REQUIRE(::waitpid(child, &result.status, 0) == child);
   }
+  result.forces_on = times_seen(folder / "events", "thread_of_forces_on");
+  result.forces_off = times_seen(folder / "events", "forces_off");
   CHECK(result.forces_on == 1);
   return result;
 }
@@ -118,11 +134,29 @@ TEST_CASE("A process that ends itself in the middle of a session switches the fo
 TEST_CASE("A signal that ends a process lets the session stop in order first") {
   const bool real_time = GENERATE(false, true);
   CAPTURE(real_time);
-  for (const int signal : {SIGHUP, SIGQUIT, SIGTERM, SIGINT, SIGUSR1, SIGALRM}) {
+  for (const int signal :
+       {SIGHUP, SIGQUIT, SIGTERM, SIGINT, SIGUSR1, SIGALRM, SIGRTMIN, SIGRTMIN + 5, SIGRTMAX}) {
     CAPTURE(signal);
     const Ended ended = ended_by([signal] { (void)::kill(::getpid(), signal); }, real_time);
     CHECK(ended_by_signal(ended, signal));
     CHECK(ended.forces_off >= 1);
+  }
+}
+
+TEST_CASE("A signal that stops a process ends the session first, and forces are off then") {
+  const bool real_time = GENERATE(false, true);
+  CAPTURE(real_time);
+  for (const int signal : {SIGTSTP, SIGTTIN, SIGTTOU}) {
+    CAPTURE(signal);
+    const auto stop = [signal] {
+      (void)::setpgid(0, 0);  // such signals stop no group of processes that nobody looks after
+      (void)::kill(::getpid(), signal);
+    };
+    const Ended ended = ended_by(stop, real_time);
+    CHECK(ended.stopped_by == signal);
+    CHECK(ended.forces_off_then >= 1);
+    CHECK(WIFEXITED(ended.status));
+    CHECK(WEXITSTATUS(ended.status) == kEndedInOrder);
   }
 }
 

@@ -113,10 +113,36 @@ TEST_CASE("The view counts what was missed, what was lost, and keeps the cause o
   CHECK(state.at("counts").at("missed") == 6);
   CHECK(state.at("counts").at("late") == 1);
   CHECK(state.at("counts").at("time_guards") == 1);
+  CHECK(state.at("counts").at("most_consecutive_missed") == 6);
+  CHECK(state.at("counts").at("most_late_of_1000") == 1);
   CHECK(state.at("loop").at("lost_records") == 1);
   CHECK(state.at("over") == true);
   CHECK(state.at("cause") == word_of(StopCause::watchdog));
   CHECK(state.at("tool_depth_m") == late.tool_depth_m);  // the row of the stop has none
+}
+
+TEST_CASE("The view tells the most periods missed in a row, and the most late cycles of 1000") {
+  PageOf page(1);
+  std::uint64_t cycle = 1;
+  const auto seen = [&](int rows, int missed) {
+    for (int i = 0; i < rows; ++i) {
+      cycle += static_cast<std::uint64_t>(missed);
+      ServoRecord row = PageOf::row(cycle++);
+      row.missed = missed;
+      page.view().see(row);
+    }
+  };
+  seen(3, 2);
+  CHECK(page.state().at("counts").at("most_consecutive_missed") == 2);
+  CHECK(page.state().at("counts").at("most_late_of_1000") == 3);
+  seen(1, 7);
+  seen(998, 0);
+  seen(2, 1);  // the first of the four are more than 1000 cycles ago
+  CHECK(page.state().at("counts").at("most_consecutive_missed") == 7);
+  CHECK(page.state().at("counts").at("most_late_of_1000") == 4);
+  seen(5, 1);
+  CHECK(page.state().at("counts").at("most_late_of_1000") == 7);
+  CHECK(page.state().at("loop").at("lost_records") == 0);
 }
 
 TEST_CASE("A number that is not finite is null on the page") {

@@ -5,7 +5,9 @@
 #include "late_hand.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
 #include "tpm/haptics/device/device_file.hpp"
+#include "tpm/haptics/session/loop_contact.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/session/six_hands.hpp"
 
@@ -44,6 +46,42 @@ TEST_CASE("Hardware that nobody has measured counts as 20 ms late and free of fr
   CHECK_THAT(
       test::refusal_of([&] { (void)run_session(test::parsed(test::short_session()), omega, {}); }),
       Contains("not measured on this device"));
+}
+
+TEST_CASE("A measured friction does not count on hardware of which nobody measured the delay") {
+  const char* absent = R"({"device": "omega7",
+    "viscous_friction": {"provenance": "measured", "lower_95_N_s_per_m": 4.0}})";
+  const char* assumed =
+      R"({"device": "omega7", "delay": {"provenance": "assumed", "largest_s": 1e-4},
+    "viscous_friction": {"provenance": "measured", "lower_95_N_s_per_m": 4.0}})";
+  for (const char* text : {absent, assumed}) {
+    CAPTURE(text);
+    const DeviceLimits limits =
+        limits_by_file(limits_of("omega7"), parse_device_file(Json::parse(text), "d"));
+    CHECK(limits.measured_friction_N_s_per_m == 4.0);
+    RenderingCheck check = checked_on(test::short_session(), limits);
+    CHECK(check.delay_s == 0.020);
+    CHECK(check.friction_N_s_per_m == 0.0);
+    CHECK_FALSE(check.acceptable());
+    CHECK_THAT(check.verdict(), Contains("(not measured on this device: 20 ms and no friction "
+                                         "count), friction 0 N s/m"));
+    // A session that states a longer delay is told what counts then.
+    Json json = test::short_session();
+    json["virtual_device"] = {{"delay_periods", 30}, {"damping_N_s_per_m", 5.0}};
+    check = checked_on(json, limits);
+    CHECK(check.friction_N_s_per_m == 0.0);
+    CHECK_THAT(check.verdict(), Contains("30 ms and no friction count"));
+    // The C interface asks the same gate.
+    const test::TempFolder folder;
+    write_file(folder / "d.json", text);
+    write_file(folder / "s.json", test::short_session().dump());
+    LoopContactOptions options;
+    options.device_file = folder / "d.json";
+    options.accept_unstable = true;
+    const LoopContact contact(folder / "s.json", options);
+    CHECK(contact.rendering().delay_s == 0.020);
+    CHECK(contact.rendering().friction_N_s_per_m == 0.0);
+  }
 }
 
 TEST_CASE("Of measured hardware the largest delay and a period more count") {

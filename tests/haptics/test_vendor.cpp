@@ -227,7 +227,28 @@ TEST_CASE("A file that was measured on another device, or on a simulated one, is
                                                "device '1', and this is '4711'"));
   CHECK_THAT(said_of("/measurement", Json{{"simulated_device", true}}),
              Contains("key /measurement/simulated_device: was measured on a simulated device"));
+  CHECK_THAT(said_of("/name", "omega.3"), Contains("device.json: key /name: was measured on the "
+                                                   "device 'omega.3', and this is 'omega.7'"));
+  CHECK_THAT(said_of("/serial", ""),
+             Contains("device.json: key /serial: is missing: what was measured may be of another "
+                      "device than this, '4711'; expected the file of this device"));
   CHECK_FALSE(std::filesystem::exists(folder / "r"));
+}
+
+TEST_CASE("A file in which nothing was measured is for any device of its kind") {
+  Json json = test::short_session();
+  for (const char* key : {"E1", "E2", "Eprime"}) {
+    json["model"]["scene"]["material"][key] = "2 kPa";  // the gate lets it pass at 20 ms
+  }
+  json.erase("creep");
+  const HilSession session = test::parsed(json);
+  const test::TempFolder folder;
+  const Script script(operator_lines(session, folder));
+  DeviceChoice device = stand_in();
+  device.file = folder / "device.json";
+  write_file(device.file, R"({"device": "omega7", "name": "any Omega", "limits": {"force_N": 8},
+                              "delay": {"provenance": "assumed", "largest_s": 0.001}})");
+  CHECK(ran(session, device, folder / "r").run.device.serial == "4711");  // and not refused
 }
 
 TEST_CASE("The device is told the session's limit of the force") {
@@ -366,6 +387,35 @@ TEST_CASE("Of several devices one is chosen by its kind, its serial number or it
   REQUIRE(seen.size() == 4);
   CHECK(seen[3].kind == "falcon");
   CHECK(seen[3].serial == 4714);
+  CHECK_FALSE(seen[3].simulated);
+}
+
+TEST_CASE("The list of devices marks one behind a link on which a simulator may be") {
+  const test::TempFolder folder;
+  const auto listed = [&](const char* format) {
+    const std::string line = "'" TPM_TEST_PROGRAM "' hil devices --dhd-library '" TPM_STAND_IN_DHD
+                             "' --format " +
+                             std::string(format) + " > '" + (folder / "listed") + "'";
+    REQUIRE(std::system(line.c_str()) == 0);
+    return read_file(folder / "listed");
+  };
+  const auto marked = [&] {
+    const Json answer = Json::parse(listed("json"));
+    return answer.at("force_dimension").at("devices")[0].at("simulated_device").get<bool>();
+  };
+  for (const char* mode : {"3", "4"}) {
+    CAPTURE(mode);
+    const Script script(std::string("com_mode ") + mode + "\n");
+    CHECK_THAT(listed("text"), Contains("omega.7, SIMULATED DEVICE, serial 4711: --device omega7"));
+    CHECK(marked());
+  }
+  // A link that nobody knows may lead to motors.
+  for (const char* mode : {"0", "1", "9"}) {
+    CAPTURE(mode);
+    const Script script(std::string("com_mode ") + mode + "\n");
+    CHECK_THAT(listed("text"), Contains("omega.7, serial 4711: --device omega7"));
+    CHECK_FALSE(marked());
+  }
 }
 
 TEST_CASE("A session that asks for more than a device can take is refused") {

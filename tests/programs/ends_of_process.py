@@ -5,8 +5,8 @@
 
 A session in real time receives each signal 0.3 s after forces are on, on the stand-in for the vendor's library
 (BUILD/tests/stand_in_dhd) and on a device plugin. The plugin also crashes, exits and throws by itself in a call that
-writes a force. The log is the device's own. Exit code 1 if forces stay on where they need not: only SIGKILL leaves no
-time. Needs a C compiler.
+writes a force. The log is the device's own; of a process that a signal stops it is read while the process is stopped.
+Exit code 1 if forces stay on where they need not: only SIGKILL leaves no time. Needs a C compiler.
 """
 import json
 import os
@@ -19,6 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 OFF = ("forces_off", "cut_forces", "stop")
+STOPS = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 
 PLUGIN = r"""
 #define tpm_device_plugin_get example_get
@@ -77,8 +78,10 @@ def events_of(log):
 def ended(command, environment, log, send, switched_on):
     """Exit code, events after the end began, last words of tpm. `switched_on`: how often forces go on until then."""
     log.unlink(missing_ok=True)
+    # Signals that stop a process do so in a group that somebody looks after: its parent, from another one.
     process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                               text=True, stdin=subprocess.DEVNULL)
+                               text=True, stdin=subprocess.DEVNULL,
+                               preexec_fn=os.setpgrp if send in STOPS else None)
     until = time.monotonic() + 60
     while (events_of(log).count("thread_of_forces_on") < switched_on and process.poll() is None
            and time.monotonic() < until):
@@ -94,9 +97,14 @@ def ended(command, environment, log, send, switched_on):
                 process.send_signal(signal.SIGINT)
                 process.communicate()
                 return None, [], "the session goes on"
+    events = None
+    if send in STOPS:
+        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
+        events = events_of(log)[before:]  # while it is stopped
+        process.send_signal(signal.SIGCONT)
     words = process.communicate(timeout=60)[1].strip().splitlines()
     code = process.returncode
-    events = [e for e in events_of(log)[before:] if e in OFF + ("close",)]
+    events = [e for e in (events_of(log)[before:] if events is None else events) if e in OFF + ("close",)]
     return 128 - code if code < 0 else code, events, words[-1] if words else "-"
 
 
@@ -122,7 +130,8 @@ def main():
         print("| device | end | exit code | log of the device after it | last words of tpm |\n| --- | --- | --- | --- | --- |")
         # On the stand-in forces go on twice: the check of a second, and the session.
         tries = [("stand-in", stand_in, s, None) for s in
-                 ("SIGHUP", "SIGQUIT", "SIGINT", "SIGTERM", "SIGUSR1", "SIGPIPE", "SIGXFSZ", "SIGSEGV", "SIGABRT", "SIGKILL")]
+                 ("SIGHUP", "SIGQUIT", "SIGINT", "SIGTERM", "SIGUSR1", "SIGRTMIN", "SIGRTMAX", "SIGTSTP",
+                  "SIGTTIN", "SIGTTOU", "SIGPIPE", "SIGXFSZ", "SIGSEGV", "SIGABRT", "SIGKILL")]
         tries += [("plugin", plugin, s, None) for s in ("SIGHUP", "SIGQUIT", "SIGPIPE", "SIGSEGV")]
         tries += [("plugin", plugin, None, end) for end in ("segv", "abort", "exit", "throw")]
         words = {"segv": "crashes in a call", "abort": "calls abort()", "exit": "calls exit(3)",

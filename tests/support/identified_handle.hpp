@@ -16,6 +16,7 @@ using namespace haptics;
 struct Handle {
   double mass_kg = 0.3, viscous_N_s_per_m = 0.5, coulomb_N = 0.0;
   double position_late_s = 0.0, force_late_s = 0.0, jitter_s = 0.0;
+  double later_s = 0.0, later_from_s = 0.0, later_until_s = 0.0;  ///< of forces, for a while
   double encoder_step_m = 1e-5, held_N_per_m = 0.0;
   double period_s = 1e-3;
   /// Of the loop that moves it: cycles that wake late, and stalls of 2 ms to a longest time.
@@ -64,7 +65,9 @@ inline std::vector<IdentificationSample> moved(const Handle& h, std::uint64_t se
         sample.late_s = part * part_s;
         missed = 0;
         samples.push_back(sample);
-        newest_s = std::max(newest_s, time_s + h.force_late_s + h.jitter_s * even(random));
+        const bool later = time_s >= h.later_from_s && time_s < h.later_until_s;
+        const double late_s = h.force_late_s + (later ? h.later_s : 0.0);
+        newest_s = std::max(newest_s, time_s + late_s + h.jitter_s * even(random));
         coming.emplace_back(newest_s, sample.force_N);
       }
       while (!coming.empty() && coming.front().first <= time_s + 1e-9) {

@@ -12,11 +12,15 @@
 namespace tpm::haptics {
 namespace {
 
+template <class Part>
+bool is_measured(const std::optional<Part>& part) {
+  return part && part->provenance == KnownBy::measured;
+}
+
 /// A number of a part that says it was measured; empty for an assumed one.
 template <class Part>
 std::optional<double> measured_number(const std::optional<Part>& part, double Part::*number) {
-  if (!part || part->provenance != KnownBy::measured) return std::nullopt;
-  return *part.*number;
+  return is_measured(part) ? std::optional(*part.*number) : std::nullopt;
 }
 
 std::filesystem::path shipped_folder() {
@@ -55,6 +59,9 @@ DeviceFile parse_device_file(const Json& written, const std::string& where) {
   file.measured_friction_N_s_per_m =
       measured_number(keys.viscous_friction, &ViscousFrictionKeys::lower_95_N_s_per_m);
   if (keys.delay) file.measured_period_s = 2.0 * keys.delay->resolution_s.value_or(0.0);
+  file.measured = is_measured(keys.delay) || is_measured(keys.viscous_friction) ||
+                  is_measured(keys.encoder_step) || is_measured(keys.coulomb_friction) ||
+                  is_measured(keys.moving_mass);
   const auto simulated = keys.measurement.find("simulated_device");
   file.simulated = simulated != keys.measurement.end() && *simulated == true;
   return file;

@@ -18,7 +18,7 @@ struct DeviceFile {
   std::string where;   ///< the file, for messages
   std::string kind;    ///< as limits_of() takes it, or "plugin"
   std::string name;    ///< as its maker writes it; may be empty
-  std::string serial;  ///< of the device that was measured; empty: any of the kind
+  std::string serial;  ///< of the device that was measured; empty: it says none
   std::optional<double> force_N, reach_m, stiffness_N_per_m, damping_N_s_per_m, slew_N_per_s,
       least_ramp_in_s, encoder_step_m, friction_N_s_per_m;
   /// Where a limit comes from, by its key.
@@ -29,6 +29,7 @@ struct DeviceFile {
   /// Lower bound of the viscous friction at 95 %, N s/m. Empty unless it was measured.
   std::optional<double> measured_friction_N_s_per_m;
   double measured_period_s = 0.0;  ///< of the loop that measured the delay; 0: not known
+  bool measured = false;           ///< something in it was measured: it is of one device
   bool simulated = false;          ///< measured on a simulated device: says nothing of hardware
 };
 

@@ -115,6 +115,8 @@ const Block<DeviceDelayKeys>& delay_block() {
        key("jitter_s", &K::jitter_s, number(kZeroOrMore), "standard deviation"),
        key("resolution_s", &K::resolution_s, number(kZeroOrMore),
            "half a period of the loop that measured it"),
+       key("hold", &K::hold, text(1),
+           "in words, that the hold of a command is not in these numbers"),
        key("tries", &K::tries, whole<int>(1, 1e9), "how often it was measured")},
       {{"a mean and a spread that are not above the largest delay", below_largest}});
   return block;
@@ -183,7 +185,8 @@ const Block<DeviceKeys>& device_block() {
        key("name", &K::name, text(), "as its maker writes it"),
        key("description", &K::description, text(), "what else is to be said of it"),
        key("serial", &K::serial, text(),
-           "of the device that was measured; a session on another one is refused"),
+           "of the device that was measured; a session on another one is refused, and so is one on "
+           "a device that says a serial while a file with something measured has none"),
        key("limits", &K::limits, device_limits_block().type(), "what may be asked of it"),
        key("delay", &K::delay, delay_block().type(), "from a position to its force"),
        key("viscous_friction", &K::viscous_friction, viscous_block().type(),

@@ -26,6 +26,7 @@ struct DeviceDelayKeys {
   KnownBy provenance = KnownBy::assumed;
   double largest_s = 0.0;
   std::optional<double> mean_s, jitter_s, resolution_s;
+  std::optional<std::string> hold;  ///< in words: the hold of a command is not in them
   std::optional<int> tries;
 };
 

@@ -54,23 +54,6 @@ void close_device(const DhdLibrary& library, char id) {
   (void)(library.initialises() ? library.calls().drd_close(id) : library.calls().close(id));
 }
 
-/// Of a device that is open.
-void look_at(const DhdCalls& call, char id, SeenDevice& seen) {
-  seen.type = call.get_system_type(id);
-  seen.kind = kind_of(seen.type);
-  const char* name = call.get_system_name(id);
-  seen.name = name == nullptr ? "no name" : printable(name);
-  unsigned short serial = 0;
-  if (call.get_serial_number(&serial, id) >= 0) seen.serial = serial;
-}
-
-/// Of the last call in this thread.
-std::string words_of(const DhdCalls& call) {
-  const int number = call.error_get_last();
-  const char* words = call.error_get_last_text();
-  return fmt::format("error {} ({})", number, printable(words == nullptr ? "no words" : words));
-}
-
 DeviceLink link_of(int mode) {
   switch (mode) {
     case 0:
@@ -84,6 +67,30 @@ DeviceLink link_of(int mode) {
     default:
       return DeviceLink::unknown;
   }
+}
+
+/// A link that is not known may lead to motors.
+bool is_simulated(DeviceLink link) {
+  return link == DeviceLink::simulated || link == DeviceLink::network;
+}
+
+/// Of a device that is open.
+void look_at(const DhdCalls& call, char id, SeenDevice& seen) {
+  seen.type = call.get_system_type(id);
+  seen.kind = kind_of(seen.type);
+  const char* name = call.get_system_name(id);
+  seen.name = name == nullptr ? "no name" : printable(name);
+  unsigned short serial = 0;
+  if (call.get_serial_number(&serial, id) >= 0) seen.serial = serial;
+  seen.link = link_of(call.get_com_mode(id));
+  seen.simulated = is_simulated(seen.link);
+}
+
+/// Of the last call in this thread.
+std::string words_of(const DhdCalls& call) {
+  const int number = call.error_get_last();
+  const char* words = call.error_get_last_text();
+  return fmt::format("error {} ({})", number, printable(words == nullptr ? "no words" : words));
 }
 
 std::vector<SeenDevice> look_around(const DhdLibrary& library, int count) {
@@ -195,11 +202,9 @@ void ForceDimension::identify() {
   if (call_.get_version(&firmware, id_) >= 0) identity_.firmware = fmt::format("{:.2f}", firmware);
   identity_.library = library_->file();
   identity_.library_version = library_->version();
-  identity_.link = link_of(call_.get_com_mode(id_));
+  identity_.link = seen.link;
   identity_.left_handed = call_.is_left_handed(id_);
-  // A link that is not known may lead to motors.
-  identity_.hardware =
-      identity_.link != DeviceLink::simulated && identity_.link != DeviceLink::network;
+  identity_.hardware = !seen.simulated;
   gripper_ = call_.has_gripper != nullptr && call_.has_gripper(id_);
   if (!limits_.tried) {
     identity_.assumptions.push_back(fmt::format(

@@ -23,10 +23,12 @@ struct DeviceSelection {
 struct SeenDevice {
   int index = 0;
   int type = -1;
-  int serial = -1;      ///< -1: not known
-  std::string kind;     ///< as limits_of() takes it; empty: of a type that is not known here
-  std::string name;     ///< the library's
-  std::string problem;  ///< why it could not be opened; else empty
+  int serial = -1;   ///< -1: not known
+  std::string kind;  ///< as limits_of() takes it; empty: of a type that is not known here
+  std::string name;  ///< the library's
+  DeviceLink link = DeviceLink::unknown;
+  bool simulated = false;  ///< a simulator may be behind its link, or its plugin says so
+  std::string problem;     ///< why it could not be opened; else empty
 };
 
 /// A device with three driven translations through the library of Force Dimension.

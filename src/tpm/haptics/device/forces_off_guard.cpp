@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdlib>
@@ -15,6 +16,8 @@ namespace {
 constexpr std::array kCrashes{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT, SIGSYS, SIGXCPU};
 constexpr std::array kEnds{SIGHUP,  SIGQUIT,   SIGINT,  SIGTERM, SIGUSR1, SIGUSR2,
                            SIGALRM, SIGVTALRM, SIGPROF, SIGPOLL, SIGPWR,  SIGSTKFLT};
+/// A stopped process sends no command, and nobody watches its device.
+constexpr std::array kStops{SIGTSTP, SIGTTIN, SIGTTOU};
 constexpr std::array kFailedWrites{SIGPIPE, SIGXFSZ};
 constexpr std::size_t kSignals = 65;
 
@@ -52,6 +55,12 @@ extern "C" void tpm_remember_end(int signal) {
   end_signal = signal;
 }
 
+/// Whether a call that it interrupts goes on. A terminal sends SIGTTIN and SIGTTOU again for each
+/// call that does, so that it would never come back.
+bool restarts(int signal) noexcept {
+  return std::find(kStops.begin(), kStops.end(), signal) == kStops.end();
+}
+
 void take(int signal, void (*handler)(int), bool also_from_others) noexcept {
   const auto at = static_cast<std::size_t>(signal);
   if (sigaction(signal, nullptr, &before[at]) != 0) return;
@@ -59,7 +68,9 @@ void take(int signal, void (*handler)(int), bool also_from_others) noexcept {
   if (!nobody && !also_from_others) return;
   struct sigaction action {};
   action.sa_handler = handler;
-  action.sa_flags = handler == tpm_cut_forces_and_end ? SA_NODEFER | SA_ONSTACK : SA_RESTART;
+  action.sa_flags = handler == tpm_cut_forces_and_end ? SA_NODEFER | SA_ONSTACK
+                    : restarts(signal)                ? SA_RESTART
+                                                      : 0;
   sigemptyset(&action.sa_mask);
   taken[at] = sigaction(signal, &action, nullptr) == 0;
 }
@@ -72,12 +83,17 @@ void take_all() {
   end_signal = 0;
   for (const int signal : kCrashes) take(signal, tpm_cut_forces_and_end, true);
   for (const int signal : kEnds) take(signal, tpm_remember_end, false);
+  for (const int signal : kStops) take(signal, tpm_remember_end, false);
+  // The C library keeps the first of them for itself: their numbers are known at run time only.
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) take(signal, tpm_remember_end, false);
   for (const int signal : kFailedWrites) take(signal, SIG_IGN, false);
 }
 
 void give_all_back() noexcept {
   for (const int signal : kCrashes) give_back(signal);
   for (const int signal : kEnds) give_back(signal);
+  for (const int signal : kStops) give_back(signal);
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) give_back(signal);
   for (const int signal : kFailedWrites) give_back(signal);
 }
 

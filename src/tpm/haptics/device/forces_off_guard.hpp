@@ -16,17 +16,17 @@ namespace tpm::haptics {
 ///     SIGXCPU): HapticDevice::cut_forces() of every guarded device, then the action that stood
 ///     before;
 ///   - std::exit and std::quick_exit: the same;
-///   - SIGHUP, SIGQUIT, SIGINT, SIGTERM and others that end a process and that nobody else handles:
-///   the
-///     loop sees ended_by_signal() and stops in order; when the last guard goes, the signal is
-///     raised again, so that the process ends as it would have;
+///   - SIGHUP, SIGQUIT, SIGINT, SIGTERM and others that end a process, those of real time too, and
+///     that nobody else handles: the loop sees ended_by_signal() and stops in order; when the last
+///     guard goes, the signal is raised again, so that the process ends as it would have;
+///   - SIGTSTP (Ctrl-Z), SIGTTIN and SIGTTOU that nobody else handles: the same. The session is
+///     over, and the process stops then, with forces off;
 ///   - SIGPIPE and SIGXFSZ that nobody else handles are ignored: the write fails instead, which is
-///   an
-///     exception.
+///     an exception.
 ///
-/// SIGKILL and a loss of power leave no time; the watchdog of the device switches off then.
-/// cut_forces() of a library is called from a signal handler, which libraries do not promise to
-/// allow: if it does not come back within two seconds, the process ends all the same.
+/// SIGKILL, SIGSTOP and a loss of power leave no time; the watchdog of the device switches off
+/// then. cut_forces() of a library is called from a signal handler, which libraries do not promise
+/// to allow: if it does not come back within two seconds, the process ends all the same.
 class ForcesOffGuard {
  public:
   /// @param device must live as long as this

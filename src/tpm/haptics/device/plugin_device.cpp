@@ -354,6 +354,7 @@ std::vector<SeenDevice> seen_devices(const DevicePlugin& plugin) {
       seen.kind = std::string(kPluginKind);
       seen.name = printable(text_of(description.name));
       seen.serial = serial_number(text_of(description.serial));
+      seen.simulated = description.hardware == 0;
     } catch (const Error& error) {
       seen.problem = error.what();
     }

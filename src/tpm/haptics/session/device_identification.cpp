@@ -285,6 +285,28 @@ Lengths lengths_of(double period_s) {
   return {half, half + longest + 16};
 }
 
+/// Each edge of the force has a delay of its own.
+std::vector<double> edge_delays(const Timeline& line, const DelayFit& fit, const Lengths& lengths,
+                                double least_m) {
+  const auto [half, margin] = lengths;
+  const double period_s = line.period_s;
+  std::vector<double> delays;
+  for (std::size_t i = 1; i < line.sent_s.size(); ++i) {
+    const double jump = line.force_N[i] - line.force_N[i - 1];
+    if (std::abs(jump) < kEdge_N) continue;
+    const double acts_s = line.sent_s[i] + fit.delay_s;
+    const auto c = static_cast<std::size_t>(std::lround(acts_s / period_s));
+    if (c < margin || c + margin >= line.size()) continue;
+    if (!line.covers(c - half - kSlope, c + half + kSlope)) continue;
+    const double seen = motion_around(line, c, half, least_m).dot(fit.solution.value);
+    const double meant = force_around(line, c, half, fit.delay_s);
+    const double off =
+        (acts_s - static_cast<double>(c) * period_s) / (static_cast<double>(half) * period_s);
+    delays.push_back(fit.delay_s + (meant - seen) / (jump * bump(off)));
+  }
+  return delays;
+}
+
 double stroke_of(const std::vector<IdentificationSample>& samples) {
   const auto [low, high] = std::minmax_element(
       samples.begin(), samples.end(), [](const auto& a, const auto& b) { return a.at_m < b.at_m; });
@@ -307,7 +329,12 @@ std::optional<double> checked_delay_s(const std::vector<IdentificationSample>& s
   if (windows.centre.size() < kFewestWindows) return std::nullopt;
   const DelayFit fit = fit_delay(line, windows, half);
   if (!(fit.explained > kLeastExplained) || !(fit.solution.value[0] > 0.0)) return std::nullopt;
-  return fit.delay_s;
+  const std::vector<double> delays = edge_delays(line, fit, {half, margin}, 2.0 * step_m);
+  if (delays.empty()) return fit.delay_s;
+  // Edges of a constant delay differ by noise of up to the resolution, also if a hand holds the
+  // handle.
+  const double largest_s = *std::max_element(delays.begin(), delays.end());
+  return largest_s - fit.delay_s > 0.5 * period_s ? largest_s : fit.delay_s;
 }
 
 IdentifyingForce::IdentifyingForce(double period_s, std::uint64_t seed) noexcept
@@ -362,7 +389,7 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
     return found;
   }
   const DelayFit fit = fit_delay(line, windows, half);
-  const double delay_s = fit.delay_s, explained = fit.explained;
+  const double explained = fit.explained;
   const Solution& s = fit.solution;
   if (!(explained > kLeastExplained) || !(s.value[0] > 0.0)) {
     found.not_identified.push_back(fmt::format(
@@ -371,21 +398,7 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
         significant(100.0 * std::max(explained, 0.0), 2)));
     return found;
   }
-  // Each edge has a delay of its own.
-  std::vector<double> delays;
-  for (std::size_t i = 1; i < line.sent_s.size(); ++i) {
-    const double jump = line.force_N[i] - line.force_N[i - 1];
-    if (std::abs(jump) < kEdge_N) continue;
-    const double acts_s = line.sent_s[i] + delay_s;
-    const auto c = static_cast<std::size_t>(std::lround(acts_s / period_s));
-    if (c < margin || c + margin >= line.size()) continue;
-    if (!line.covers(c - half - kSlope, c + half + kSlope)) continue;
-    const double seen = motion_around(line, c, half, least_m).dot(s.value);
-    const double meant = force_around(line, c, half, delay_s);
-    const double off =
-        (acts_s - static_cast<double>(c) * period_s) / (static_cast<double>(half) * period_s);
-    delays.push_back(delay_s + (meant - seen) / (jump * bump(off)));
-  }
+  const std::vector<double> delays = edge_delays(line, fit, {half, margin}, least_m);
   if (delays.size() < 10) {
     found.not_identified.emplace_back(
         "delay: the loop or the device stalled at all but a few edges of the force (tpm hil "

@@ -60,8 +60,9 @@ struct DeviceIdentification {
 [[nodiscard]] DeviceIdentification identify_device(const std::vector<IdentificationSample>& samples,
                                                    double period_s);
 
-/// The delay alone, from a measurement of about a second: the mean of all edges, s. Empty if the
-/// motion does not follow from the forces, as when a hand holds the handle still or moves it.
+/// The delay alone, from a measurement of about a second, s: the largest of all edges if it lies
+/// more than the resolution, half a period, above the mean, which is returned otherwise. Empty if
+/// the motion does not follow from the forces, as when a hand holds the handle still or moves it.
 [[nodiscard]] std::optional<double> checked_delay_s(
     const std::vector<IdentificationSample>& samples, double period_s);
 

@@ -228,6 +228,7 @@ Json device_file_json(const IdentifyRun& run, const std::string& date) {
                   .mean_s = digits(f.delay_mean_s),
                   .jitter_s = digits(f.delay_jitter_s),
                   .resolution_s = rounded(f.resolution_s, kDigits),
+                  .hold = "the hold of a command, half a period in the mean, is not included",
                   .tries = f.edges};
   }
   if (f.viscous_lower_95_N_s_per_m) {

@@ -46,7 +46,7 @@ using MakesDevice = std::function<std::shared_ptr<HapticDevice>()>;
 
 /// Outcome of the check of one second at the start of a session.
 struct DelayCheck {
-  std::optional<double> delay_s;  ///< mean, both paths together; empty: not found
+  std::optional<double> delay_s;  ///< both paths together, see checked_delay_s(); empty: not found
   StopCause cause = StopCause::none;
 };
 /// Measures the delay of a device for a second with the forces of the identification, once the

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::size_t kMostPoints = 500;  // 20 s
 constexpr double kWindow_s = 1.0;         // over which the rate is counted
+constexpr std::size_t kLateOf = 1000;     // cycles of which late ones are counted
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 std::uint64_t cycles_in(double time_s, const HilSession& session) {
@@ -149,6 +150,7 @@ void LiveView::count(const ServoRecord& row) {
   counts.late += flagged(kLate);
   const auto missed = static_cast<std::uint64_t>(row.missed);
   counts.missed += missed;
+  if (row.stop != StopCause::finished) count_late(row.missed);
   const std::uint64_t expected = state_.begun ? state_.last.cycle + 1 + missed : missed;
   if (row.cycle > expected) state_.lost += row.cycle - expected;
   late_.note(nanoseconds(row.woke_late_s));
@@ -162,6 +164,19 @@ void LiveView::count(const ServoRecord& row) {
     window_served_ = 0;
     take_times();
   }
+}
+
+/// As the loop does (servo_step.cpp): of all cycles but the one at which the session is over.
+void LiveView::count_late(int missed) {
+  ServoCounts& counts = state_.counts;
+  counts.most_consecutive_missed = std::max(counts.most_consecutive_missed, missed);
+  late_last_.push_back(missed > 0);
+  late_now_ += missed > 0 ? 1 : 0;
+  if (late_last_.size() > kLateOf) {
+    late_now_ -= late_last_.front() ? 1 : 0;
+    late_last_.pop_front();
+  }
+  counts.most_late = std::max(counts.most_late, late_now_);
 }
 
 void LiveView::take_times() {

@@ -52,6 +52,7 @@ class LiveView {
     std::string detail;
   };
   void count(const ServoRecord& row);
+  void count_late(int missed);
   [[nodiscard]] Eigen::Vector3d tool_of(const ServoRecord& row) const;
   void take_point(const ServoRecord& row);
   void take_shape(const ServoRecord& row);
@@ -66,6 +67,8 @@ class LiveView {
   Eigen::Matrix3Xd displacement_m_;
   OperatorScript script_;
   TimeHistogram late_, busy_;
+  std::deque<bool> late_last_;  ///< of the last 1000 rows, which had missed a period
+  int late_now_ = 0;            ///< of them
   std::uint64_t next_point_ = 0, window_from_ = 0, window_served_ = 0;
   double least_N_ = 0.0, most_N_ = 0.0;  ///< commanded, since the last point
   mutable std::atomic<bool> watched_{false};

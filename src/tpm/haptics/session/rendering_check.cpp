@@ -100,7 +100,9 @@ void count_device(RenderingCheck& check, const HilSession& session, const Device
                                                       std::max(period_s, limits.measured_period_s)
                                                 : kUnmeasuredDelay_s;
     check.delay_s = std::max(known_s, stated_s);
-    check.friction_N_s_per_m = limits.measured_friction_N_s_per_m.value_or(0.0);
+    // A device of which nobody measured the delay counts as one of which nothing is known.
+    check.friction_N_s_per_m =
+        check.delay_measured ? limits.measured_friction_N_s_per_m.value_or(0.0) : 0.0;
     if (session.stated_friction_N_s_per_m) {
       check.friction_N_s_per_m =
           std::min(check.friction_N_s_per_m, *session.stated_friction_N_s_per_m);
@@ -143,8 +145,9 @@ std::string RenderingCheck::verdict() const {
       "stiffness {} N/m at {} Hz, {} periods of delay{}, friction {} N s/m",
       significant(stiffness_N_per_m, 3), significant(rate_Hz, 4), delay_periods,
       delay_measured ? ""
-                     : fmt::format(" ({}: 20 ms and no friction count)",
-                                   delay_note.empty() ? "not measured on this device" : delay_note),
+                     : fmt::format(" ({}: {} ms and no friction count)",
+                                   delay_note.empty() ? "not measured on this device" : delay_note,
+                                   significant(1e3 * delay_s, 3)),
       significant(friction_N_s_per_m, 2));
   if (!stable()) {
     return fmt::format(

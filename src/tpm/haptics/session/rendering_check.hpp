@@ -63,9 +63,9 @@ struct RenderingCheck {
 ///
 /// Delay and friction that count:
 ///   - hardware: what was measured on it (device_file.hpp), the largest delay seen plus a period;
-///   if
-///     nobody measured it, 20 ms and no friction; and in either case the larger delay and the
-///     smaller friction of these and of what the session states;
+///     if nobody measured its delay, 20 ms and no friction, also where a friction was measured; and
+///     in either case the larger delay and the smaller friction of these and of what the session
+///     states;
 ///   - the simulated device: what the session states; a simulated plugin: what it says.
 /// @param limits of the device
 [[nodiscard]] RenderingCheck check_rendering(const HilSession& session, ContactModel& model,

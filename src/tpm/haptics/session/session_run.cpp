@@ -125,7 +125,8 @@ std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
   return std::make_shared<PluginDevice>(choice.plugin, choice.which);
 }
 
-/// A file that was measured on another device says nothing of this one.
+/// A file that was measured on another device says nothing of this one. One that measured nothing,
+/// as those that are shipped, is for any device of its kind.
 void require_same_device(const DeviceChoice& choice, const DeviceIdentity& device) {
   if (choice.file.empty() || choice.kind == "virtual") return;
   const DeviceFile file = read_device_file(choice.file);
@@ -134,11 +135,23 @@ void require_same_device(const DeviceChoice& choice, const DeviceIdentity& devic
                 "was measured on a simulated device, and this one has motors",
                 "the file of this device (tpm hil identify)");
   }
-  if (file.serial.empty() || file.serial == device.serial) return;
-  throw Error(ExitCode::environment, file.where + ": key /serial",
-              fmt::format("was measured on the device '{}', and this is '{}'",
-                          printable(file.serial), printable(device.serial)),
-              "the file of this device (tpm hil identify)");
+  const auto other = [&file](const char* key, const std::string& theirs, const std::string& ours) {
+    return Error(ExitCode::environment, fmt::format("{}: key /{}", file.where, key),
+                 theirs.empty()
+                     ? fmt::format("is missing: what was measured may be of another device than "
+                                   "this, '{}'",
+                                   printable(ours))
+                     : fmt::format("was measured on the device '{}', and this is '{}'",
+                                   printable(theirs), printable(ours)),
+                 "the file of this device (tpm hil identify)");
+  };
+  const bool must_say = file.measured && device.hardware;
+  if (file.serial != device.serial && (!file.serial.empty() || must_say)) {
+    throw other("serial", file.serial, device.serial);
+  }
+  if (file.measured && !file.name.empty() && !device.name.empty() && file.name != device.name) {
+    throw other("name", file.name, device.name);
+  }
 }
 
 /// Limits with the delay of the device as it is now: the larger one of file and check counts.
