@@ -275,7 +275,7 @@ set(TPM_SANITIZED_ROOMS base work data law files organ contact haptics CACHE STR
     "Rooms under address and undefined in sanitized copies")
 
 # A copy of the library in which the rooms named run under sanitizers; the others are those of
-# tpmkit. The fast tests, compiled once, run with tpmkit and with the copy. A folder's own inline
+# tpmkit. The fast tests of these rooms, compiled once, run with tpmkit and with the copy. A folder's own inline
 # functions stay its own (-Bsymbolic-functions), or those of the tests would take their place.
 function(tpm_sanitized_copy copy sanitize)
   set(flags -fsanitize=${sanitize} -fno-omit-frame-pointer -fno-sanitize-recover=all -O1 -g1 -Wno-maybe-uninitialized)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What a maintainer checks beyond scripts/test.sh: formatting, the slow tests (with Chromium, ParaView, the
-# Python package, notebooks and full disks), every source compiled with warnings as errors, the fast tests with the rooms of
+# Python package, notebooks and full disks), every source compiled with warnings as errors, the fast tests of the rooms in
 # TPM_SANITIZED_ROOMS (cmake/TpmRooms.cmake) under AddressSanitizer and UndefinedBehaviorSanitizer, those
 # with threads under ThreadSanitizer, half a minute of fuzzing, clang-tidy on what changed. Stops at the first failure; ends with the
 # closing lines of the slow tests. Everything under sanitizers: presets asan-ubsan and tsan.
@@ -49,7 +49,7 @@ step "clang-tidy on $(tidy_scope)"
 configure tidy
 tidy_changed build/tidy
 
-step "fast tests with sanitized rooms, tests with threads under ThreadSanitizer"
+step "fast tests of sanitized rooms, tests with threads under ThreadSanitizer"
 sanitized_log=build/ctest-sanitized.log
 run_tests sanitized >"$sanitized_log" || die "$(tail -n 80 "$sanitized_log")"
 tail -n 4 "$sanitized_log"
