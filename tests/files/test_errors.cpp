@@ -933,7 +933,8 @@ std::string rows_only_in(const std::string& text, const std::string& other) {
 
 }  // namespace
 
-TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md says which") {
+TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md says which",
+          "[heavy]") {
   std::string table =
       "# What tpm says to bad input\n\n"
       "Written by `tests/files/test_errors.cpp`, which runs the program on each of these files; "

@@ -43,7 +43,8 @@ TEST_CASE("A service is opened in both formats, made neutral, and what it says i
     std::string all;
     for (const std::string& line : identity.assumptions) all += line + "\n";
     CHECK_THAT(all, Contains("force gate 0") && Contains("preset 'arm_front_centered'") &&
-                        Contains("4 N, 80 mm") && Contains("assumed"));
+                        Contains("at most 4 N (assumed: ") &&
+                        Contains("80 mm from the middle of the workspace (assumed: "));
     CHECK(service.last_profile() == "org.tpmkit:tpm-hil");
     device.prepare({});
     device.enable_forces();

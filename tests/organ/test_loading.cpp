@@ -239,7 +239,8 @@ TEST_CASE("the areas of the outer spheres are those of the surface") {
   CHECK_THAT(outer_areas_m2(organ).sum(), WithinRel(surface, 0.01));
 }
 
-TEST_CASE("a tissue of a stated modulus has it, and no other Poisson ratio than its network's") {
+TEST_CASE("a tissue of a stated modulus has it, and no other Poisson ratio than its network's",
+          "[heavy]") {
   Json json = block_scene();
   json["organ"] = parse_json(R"({"kind": "liver", "count": 3000, "filling": "solid"})", "organ");
   json["anchors"] = {{{"kind", "far_side"}}};
