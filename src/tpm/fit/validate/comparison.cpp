@@ -167,7 +167,6 @@ class Comparer {
             times(s.weight, at_.value),    s.weight.sum(),
             times(d.weight, measured_),    d.weight.sum()};
   }
-  /// Of one sample of the curve.
   [[nodiscard]] ChannelSlopes slopes_of(Eigen::Index k) const {
     return {depth_scale_[k], time_scale_[k],
             time_shift_[k],  -at_.by_contact[k],

@@ -206,7 +206,6 @@ std::string quaternion_text(const Eigen::Quaterniond& q) {
   return fmt::format(R"({{"w":{},"x":{},"y":{},"z":{}}})", q.w(), q.x(), q.y(), q.z());
 }
 
-/// Text within quotes; identifiers are printable.
 std::string json_text(std::string_view text) {
   return Json(std::string(text)).dump();
 }
