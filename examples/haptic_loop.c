@@ -4,12 +4,14 @@
  *   largest force 0.2292 N at 4.000 mm, of 5000 steps
  *   a step: p50 0.25 us, p99 0.50 us, largest 25.25 us
  *
- * (times differ between machines). There is no device here: the tool follows a line, down at 4 mm/s to
- * a depth of 4 mm, and stays there. Put the calls of your device where it says so.
+ * (times differ between machines). There is no device here: the tool follows a line, down at 4 mm/s
+ * to a depth of 4 mm, and stays there. Put the calls of your device where it says so, and name the
+ * file that `tpm hil identify` wrote of it: `haptic_loop SESSION_OR_LAW device.json`.
  */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 #include <tpmkit/haptics.h>
 
@@ -21,8 +23,8 @@ static double now_us(void) {
   return 1e6 * (double)t.tv_sec + 1e-3 * (double)t.tv_nsec;
 }
 
-static int by_size(const void *a, const void *b) {
-  const double x = *(const double *)a, y = *(const double *)b;
+static int by_size(const void* a, const void* b) {
+  const double x = *(const double*)a, y = *(const double*)b;
   return (x > y) - (x < y);
 }
 
@@ -33,19 +35,25 @@ static double depth_m(double time_s) {
   return depth < deepest ? depth : deepest;
 }
 
-int main(int argc, char **argv) {
+int main(int argc, char** argv) {
   static double took_us[STEPS];
   char why[TPM_HAPTICS_MESSAGE];
-  tpm_haptics_contact *contact;
+  tpm_haptics_contact* contact;
   tpm_haptics_info info = TPM_HAPTICS_INFO_INIT;
   tpm_haptics_state state = TPM_HAPTICS_STATE_INIT;
   double largest_N = 0.0, at_m = 0.0;
 
-  if (argc != 2) {
-    fprintf(stderr, "haptic_loop SESSION_OR_LAW\n");
+  if (argc != 2 && argc != 3) {
+    fprintf(stderr, "haptic_loop SESSION_OR_LAW [DEVICE_FILE]\n");
     return TPM_HAPTICS_USAGE;
   }
-  const int opened = tpm_haptics_open(argv[1], NULL, &contact, why, sizeof why);
+  tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+  if (argc == 3) {
+    options.device_file = argv[2];
+  } else {
+    strcpy(options.device, "virtual"); /* nothing has motors here */
+  }
+  const int opened = tpm_haptics_open(argv[1], &options, &contact, why, sizeof why);
   if (opened != TPM_HAPTICS_OK) {
     fprintf(stderr, "haptic_loop: %s\n", why);
     return opened;

@@ -10,6 +10,7 @@
 
 #include <atomic>
 #include <cstdio>
+#include <cstring>
 
 #ifdef TPM_WITH_CHAI3D
 #include "chai3d.h"
@@ -41,7 +42,10 @@ int main(int argc, char** argv) {
   if (argc != 2) return TPM_HAPTICS_USAGE;
   char why[TPM_HAPTICS_MESSAGE];
   tpm_haptics_contact* tissue = nullptr;
-  const int opened = tpm_haptics_open(argv[1], nullptr, &tissue, why, sizeof why);
+  tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+  // The stand-in has no motors. Of a device: options.device_file, written by `tpm hil identify`.
+  std::strcpy(options.device, "virtual");
+  const int opened = tpm_haptics_open(argv[1], &options, &tissue, why, sizeof why);
   if (opened != TPM_HAPTICS_OK) {
     std::fprintf(stderr, "chai3d_tool: %s\n", why);
     return opened;

@@ -9,6 +9,7 @@
 #include <tpmkit/haptics.h>
 
 #include <cstdio>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <stdexcept>
@@ -24,9 +25,11 @@
 
 class TissueNode : public rclcpp::Node {
  public:
-  explicit TissueNode(const std::string& session_or_law) : rclcpp::Node("tpm_tissue") {
+  /// @param options those of your device: its `device_file`
+  TissueNode(const std::string& session_or_law, const tpm_haptics_options& options)
+      : rclcpp::Node("tpm_tissue") {
     char why[TPM_HAPTICS_MESSAGE];
-    if (tpm_haptics_open(session_or_law.c_str(), nullptr, &tissue_, why, sizeof why) !=
+    if (tpm_haptics_open(session_or_law.c_str(), &options, &tissue_, why, sizeof why) !=
         TPM_HAPTICS_OK) {
       throw std::runtime_error(why);
     }
@@ -59,10 +62,15 @@ class TissueNode : public rclcpp::Node {
 };
 
 int main(int argc, char** argv) {
-  if (argc != 2) return TPM_HAPTICS_USAGE;
+  if (argc != 2 && argc != 3) return TPM_HAPTICS_USAGE;
+  tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+  if (argc == 3) options.device_file = argv[2];  // written by `tpm hil identify`
+#ifndef TPM_WITH_ROS2
+  std::strcpy(options.device, "virtual");  // the stand-in has no motors
+#endif
   try {
     rclcpp::init(argc, argv);
-    rclcpp::spin(std::make_shared<TissueNode>(argv[1]));
+    rclcpp::spin(std::make_shared<TissueNode>(argv[1], options));
     rclcpp::shutdown();
     return 0;
   } catch (const std::exception& error) {

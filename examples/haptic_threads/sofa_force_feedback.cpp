@@ -9,6 +9,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <stdexcept>
 #include <string>
 
@@ -21,9 +22,10 @@
 class TpmForceFeedback : public sofa::component::haptics::ForceFeedback {
  public:
   /// Throws std::runtime_error with the line of tpmkit. Call it from init(), not in the loop.
-  explicit TpmForceFeedback(const std::string& session_or_law) {
+  /// @param options those of your device: its `device_file`, written by `tpm hil identify`
+  TpmForceFeedback(const std::string& session_or_law, const tpm_haptics_options& options) {
     char why[TPM_HAPTICS_MESSAGE];
-    if (tpm_haptics_open(session_or_law.c_str(), nullptr, &tissue_, why, sizeof why) !=
+    if (tpm_haptics_open(session_or_law.c_str(), &options, &tissue_, why, sizeof why) !=
         TPM_HAPTICS_OK) {
       throw std::runtime_error(why);
     }
@@ -61,8 +63,10 @@ class TpmForceFeedback : public sofa::component::haptics::ForceFeedback {
 #ifndef TPM_WITH_SOFA
 int main(int argc, char** argv) {
   if (argc != 2) return TPM_HAPTICS_USAGE;
+  tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+  std::strcpy(options.device, "virtual");  // the stand-in has no motors
   try {
-    TpmForceFeedback feedback(argv[1]);
+    TpmForceFeedback feedback(argv[1], options);
     const double largest_N = run_scripted_driver(feedback);
     std::printf("stand-in for SOFA: %d periods, largest force %.4f N along z\n", kScriptedPeriods,
                 largest_N);

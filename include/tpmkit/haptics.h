@@ -5,7 +5,9 @@
  *
  *     tpm_haptics_contact *contact;
  *     char why[TPM_HAPTICS_MESSAGE];
- *     if (tpm_haptics_open("session.json", NULL, &contact, why, sizeof why) != TPM_HAPTICS_OK) ...
+ *     tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+ *     options.device_file = "device.json";  // what `tpm hil identify` measured on your device
+ *     if (tpm_haptics_open("session.json", &options, &contact, why, sizeof why) != TPM_HAPTICS_OK) ...
  *     for (;;) {
  *       ...read position_m from your device, and the time t_s from your clock...
  *       tpm_haptics_step_at(contact, t_s, position_m, force_N);
@@ -101,10 +103,13 @@ typedef struct tpm_haptics_options {
   double longest_s;          /**< of a law file: spring-pots keep their history so long; default 600 */
   uint32_t no_start_gate;    /**< 1: forces do not wait until the tool is in free air and at rest */
   uint32_t accept_unstable;  /**< 1: open what would be unstable; not for a device with motors */
-  char device[32];           /**< whose limits apply, as `tpm hil run --device`; "": that of device_file, else omega7 */
+  char device[32];           /**< whose limits apply, as `tpm hil run --device`; "": that of device_file, else
+                                  omega7; "virtual": nothing has motors, as in a test of your loop */
   const char *device_file;   /**< limits, delay and friction measured on your device (`tpm hil identify`,
-                                  schemas/device.schema.json); NULL: one period of delay and the friction
-                                  that is assumed of the kind, which nobody checks */
+                                  schemas/device.schema.json). NULL, or a file without a measured delay: a device
+                                  with motors counts as 20 ms late and free of friction, and a tissue above
+                                  49 N/m (at 1 kHz) is refused. A device that tpm does not know, or of a plugin,
+                                  states all its limits in the file */
 } tpm_haptics_options;
 
 #define TPM_HAPTICS_OPTIONS_INIT \
@@ -160,7 +165,7 @@ TPM_HAPTICS_API const char *tpm_haptics_version(void);
 
 /** Opens a contact. It takes from milliseconds (a law) to a minute (an organ that is planned).
  * @param file a session or a law
- * @param options NULL: the defaults
+ * @param options NULL: the defaults, those of an Omega.7 on which nothing was measured
  * @param contact set to the contact, or to NULL
  * @param message may be NULL; one line of text that says what is wrong, empty if nothing is
  * @param message_size its room, with the closing 0; TPM_HAPTICS_MESSAGE is enough

@@ -22,18 +22,22 @@ namespace {
 
 using Catch::Matchers::Contains;
 
+/// Of a loop that moves nothing.
+tpm_haptics_options without_motors() {
+  tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+  std::strcpy(options.device, "virtual");
+  return options;
+}
+
 /// A contact of a session that is written to a file first.
 class Opened {
  public:
-  explicit Opened(const Json& json, tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT) {
+  explicit Opened(const Json& json, tpm_haptics_options options = without_motors()) {
     options.no_start_gate = 1;
     write_file(folder_ / "session.json", to_text(json));
     open(folder_ / "session.json", options);
   }
-  explicit Opened(const std::string& file) {
-    const tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
-    open(file, options);
-  }
+  explicit Opened(const std::string& file) { open(file, without_motors()); }
   ~Opened() { tpm_haptics_close(contact_); }
   Opened(const Opened&) = delete;
   Opened& operator=(const Opened&) = delete;
@@ -115,9 +119,7 @@ TEST_CASE("A contact opened in C sends the forces of tpm hil run, to the bit") {
   REQUIRE(run_session(read_session(folder / "session.json"), {}, options).outcome.cause ==
           StopCause::finished);
   const HilRecording recording = read_recording(folder / "r");
-  tpm_haptics_options same = TPM_HAPTICS_OPTIONS_INIT;
-  std::strcpy(same.device, "virtual");  // whose friction and delay the run had
-  const Opened contact(session, same);
+  const Opened contact(session);  // with the friction and the delay of the run
   std::size_t different = 0, felt = 0;
   for (const ServoRecord& row : recording.rows) {
     if (row.stop != StopCause::none) break;
@@ -353,6 +355,59 @@ TEST_CASE("A device file in C brings the measured delay, and what it allows") {
   std::strcpy(options.device, "omega7");
   CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_BAD_INPUT, options),
              Contains("is of 'falcon', not of 'omega7'"));
+}
+
+TEST_CASE("Hardware in C that nobody has measured counts as 20 ms late and free of friction") {
+  const test::TempFolder folder;
+  write_file(folder / "session.json", to_text(test::short_session()));
+  CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_REFUSED),
+             Contains("not measured on this device: 20 ms and no friction count") &&
+                 Contains("at most 48.8 N/m keep six hands below 5 mJ") &&
+                 Contains("a device file with a measured delay"));
+  tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+  options.accept_unstable = 1;
+  const Opened accepted(test::short_session(), options);
+  CHECK(accepted.info().delay_s == 0.020);
+  // What was measured on a simulated device says nothing of motors.
+  const std::string file = folder / "device.json";
+  options = TPM_HAPTICS_OPTIONS_INIT;
+  options.device_file = file.c_str();
+  write_file(file, R"({"device": "omega7", "measurement": {"simulated_device": true},
+                       "delay": {"provenance": "measured", "largest_s": 0.0}})");
+  CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_REFUSED, options),
+             Contains("not measured on this device"));
+}
+
+TEST_CASE("A device that only its file knows, and one of a plugin, are opened in C") {
+  const test::TempFolder folder;
+  write_file(folder / "session.json", to_text(test::short_session()));
+  const std::string kind = GENERATE(as<std::string>{}, "my_robot", "plugin");
+  CAPTURE(kind);
+  Json device{{"device", kind},
+              {"limits",
+               {{"force_N", 9.0},
+                {"reach_m", 0.08},
+                {"stiffness_N_per_m", 2000.0},
+                {"damping_N_s_per_m", 10.0},
+                {"slew_N_per_s", 1000.0},
+                {"least_ramp_in_s", 0.2}}},
+              {"delay", {{"provenance", "measured"}, {"largest_s", 0.002}}}};
+  const std::string file = folder / "device.json";
+  tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+  options.device_file = file.c_str();
+  write_file(file, to_text(device));
+  const Opened contact(test::short_session(), options);
+  CHECK(contact.info().delay_s == Approx(0.003));
+  device["limits"]["stiffness_N_per_m"] = 100.0;
+  write_file(file, to_text(device));
+  CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_REFUSED, options),
+             Contains("too stiff for the device") && Contains("at most 100 N/m"));
+  device["limits"].erase("force_N");
+  write_file(file, to_text(device));
+  CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_BAD_INPUT, options),
+             Contains("device.json: key /limits: states no force_N"));
+  std::strcpy(options.device, "gloves");
+  CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_USAGE, options), Contains("gloves"));
 }
 
 TEST_CASE("Spheres are drawn where the contact pushes them") {

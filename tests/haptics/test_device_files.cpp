@@ -140,6 +140,20 @@ TEST_CASE("A limit keeps what it is known by, whatever file is named beside it")
         kind.known_by("stiffness_N_per_m"));
 }
 
+TEST_CASE("A device that only its file knows has the limits of its file") {
+  DeviceFile file = parse_device_file(Json::parse(R"({"device": "plugin", "limits": {
+    "force_N": 5, "reach_m": 0.06, "stiffness_N_per_m": 900, "damping_N_s_per_m": 4,
+    "slew_N_per_s": 800, "least_ramp_in_s": 0.2}})"),
+                                      "d");
+  CHECK(limits_from(file).stiffness_N_per_m == 900.0);
+  CHECK(limits_from(file, "plugin").hardware());
+  CHECK(limits_from(parse_device_file(Json{{"device", "falcon"}}, "d")).reach_m == 0.04);
+  CHECK_THAT(test::refusal_of([&] { (void)limits_from(file, "omega7"); }),
+             Contains("is of 'plugin', not of 'omega7'"));
+  file.force_N.reset();
+  CHECK_THAT(test::refusal_of([&] { (void)limits_from(file); }), Contains("states no force_N"));
+}
+
 TEST_CASE("A rehearsal stands for the device of its file") {
   const test::TempFolder folder;
   write_file(folder / "d.json", R"({"device": "falcon", "limits": {"force_N": 2}})");

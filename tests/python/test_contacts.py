@@ -27,7 +27,7 @@ class Contacts(unittest.TestCase):
         self.folder.cleanup()
 
     def test_a_push_is_that_of_the_element(self):
-        contact = tpmkit.Contact(self.file, start_gate=False)
+        contact = tpmkit.Contact(self.file, start_gate=False, device="virtual")
         contact.push(np.zeros(601))  # forces have grown to their limit
         depths = 4e-6 * np.minimum(np.arange(1, 2001), 1000)
         forces = contact.push(depths)
@@ -43,7 +43,7 @@ class Contacts(unittest.TestCase):
             self.assertIn(words, repr(contact))
 
     def test_single_steps_and_many_agree(self):
-        one, many = (tpmkit.Contact(self.file, start_gate=False) for _ in range(2))
+        one, many = (tpmkit.Contact(self.file, start_gate=False, device="virtual") for _ in range(2))
         positions = np.zeros((1500, 3))
         positions[:, 2] = 1e-3 - 2e-6 * np.arange(1500)
         forces = many.steps(positions)
@@ -52,10 +52,10 @@ class Contacts(unittest.TestCase):
         self.assertTrue(many.state["valid"])
 
     def test_it_waits_for_the_tool_and_stops_at_a_jump(self):
-        contact = tpmkit.Contact(self.file)
+        contact = tpmkit.Contact(self.file, device="virtual")
         contact.step([0.0, 0.0, 5e-3])
         self.assertTrue(contact.state["waiting"])
-        contact = tpmkit.Contact(self.file, start_gate=False)
+        contact = tpmkit.Contact(self.file, start_gate=False, device="virtual")
         contact.push(np.zeros(10))
         with self.assertRaisesRegex(tpmkit.Error, "position jumped"):
             contact.step([0.0, 0.0, -0.05])
@@ -71,7 +71,7 @@ class Contacts(unittest.TestCase):
     def test_a_law_file_is_felt(self):
         law = tpmkit.Law("linear", {"k_inf_N_per_m": 60.0}, reference=3e-3)
         law.write(Path(self.folder.name) / "law.json")
-        contact = tpmkit.Contact(Path(self.folder.name) / "law.json", start_gate=False)
+        contact = tpmkit.Contact(Path(self.folder.name) / "law.json", start_gate=False, device="virtual")
         contact.push(np.zeros(600))
         np.testing.assert_allclose(contact.push(1e-6 * np.arange(2000)), 60e-6 * np.arange(2000), atol=1e-12)
 
@@ -107,6 +107,10 @@ class Contacts(unittest.TestCase):
             tpmkit.Contact(self.file, device_file=file)
         with self.assertRaisesRegex(tpmkit.Error, "is of 'omega7', not of 'falcon'"):
             tpmkit.Contact(self.file, device="falcon", device_file=file)
+
+    def test_hardware_that_nobody_measured_counts_as_late_and_free_of_friction(self):
+        with self.assertRaisesRegex(tpmkit.Error, "not measured on this device: 20 ms and no friction count"):
+            tpmkit.Contact(self.file)
 
     def test_errors(self):
         with self.assertRaisesRegex(tpmkit.Error, "none.json"):

@@ -36,10 +36,11 @@ class Contact:
         Open what would be unstable on the device.
     device
         Whose limits apply, as `tpm hil run --device` takes it. Default: the device of `device_file`, else omega7.
+        "virtual" where nothing has motors: forces are computed, and nobody feels them.
     device_file
         What is known of your device: limits, and the delay and friction that `tpm hil identify` measured
-        (schemas/device.schema.json). Without it forces are taken to come one period late, with the friction that is
-        assumed of the device; nobody checks that.
+        (schemas/device.schema.json). Without a measured delay a device with motors counts as 20 ms late and free of
+        friction, and a tissue above 49 N/m (at 1 kHz) is refused.
 
     Raises
     ------

@@ -118,6 +118,14 @@ DeviceLimits limits_in(const DeviceFile& file) {
   return limits;
 }
 
+DeviceLimits limits_from(const DeviceFile& file, std::string_view kind) {
+  const std::string_view said = kind.empty() ? std::string_view(file.kind) : kind;
+  const std::vector<std::string> known = device_kinds();
+  const bool is_known = std::ranges::find(known, said) != known.end();
+  if (!is_known && said == file.kind) return limits_in(file);
+  return limits_by_file(limits_of(said), file);
+}
+
 DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file) {
   if (file.kind != limits.kind) {
     throw bad_input(file.where + ": key /device",

@@ -44,6 +44,13 @@ struct DeviceFile {
 /// Limits of a device that is known by its file alone. Throws Error(bad_input) if one is missing.
 [[nodiscard]] DeviceLimits limits_in(const DeviceFile& file);
 
+/// Limits of the device that a file describes: those of its kind as far as the file says no others,
+/// of a kind that the program does not know, or a plugin, the file's own.
+/// @param kind that the device is said to be; empty: that of the file
+/// Throws Error(bad_input) as limits_in() and limits_by_file(), Error(usage) for an unknown kind
+/// that is not the file's.
+[[nodiscard]] DeviceLimits limits_from(const DeviceFile& file, std::string_view kind = {});
+
 /// Limits of a kind of device as far as a file says others. Throws Error(bad_input) if the file is
 /// of another kind, or a limit is above that of the kind.
 [[nodiscard]] DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file);

@@ -74,6 +74,17 @@ HilSession session_of(const std::filesystem::path& file, const LoopContactOption
   return session;
 }
 
+/// Limits of the caller's device. What was measured on a simulated one says nothing of motors.
+DeviceLimits limits_that_apply(const LoopContactOptions& options) {
+  if (options.device_file.empty()) {
+    return limits_of(options.device.empty() ? "omega7" : std::string_view(options.device));
+  }
+  const DeviceFile file = read_device_file(options.device_file);
+  DeviceLimits limits = limits_from(file, options.device);
+  if (file.simulated && limits.hardware()) limits.measured_delay_s.reset();
+  return limits;
+}
+
 /// The session without its end, and without its start if nobody waits for one.
 HilSession endless(HilSession session, const LoopContactOptions& options) {
   // The state of spring-pots is kept for the length of the session only.
@@ -102,24 +113,14 @@ struct LoopContact::Stepped {
 
 LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOptions& options)
     : session_(session_of(file, options)), loop_(make_loop_model(session_)) {
-  DeviceLimits limits;
-  if (!options.device_file.empty()) {
-    const DeviceFile device = read_device_file(options.device_file);
-    limits =
-        limits_by_file(limits_of(options.device.empty() ? device.kind : options.device), device);
-  } else {
-    limits = limits_of(options.device.empty() ? "omega7" : options.device);
-  }
-  if (options.device_file.empty() && limits.hardware()) {
-    // The loop is the caller's, and so is the device: what is assumed of its kind counts.
-    limits.measured_delay_s = 0.0;
-    limits.measured_friction_N_s_per_m = limits.friction_N_s_per_m;
-  }
+  const DeviceLimits limits = limits_that_apply(options);
   require_within(session_, limits);
   rendering_ = check_rendering(session_, *loop_.model, loop_, limits);
   if (!rendering_.acceptable() && !options.accept_unstable) {
-    throw Error(ExitCode::answer_is_no, file.string(), rendering_.verdict(),
-                "a softer tissue, a higher rate, or a device file with a measured delay");
+    throw Error(
+        ExitCode::answer_is_no, file.string(), rendering_.verdict(),
+        "a device file with a measured delay (tpm hil identify), a softer tissue or a higher "
+        "rate; the device 'virtual' where nothing has motors");
   }
   settings_ = loop_settings(endless(session_, options), loop_, rendering_, true);
   displacement_m_ = Eigen::Matrix3Xd::Zero(3, spheres());

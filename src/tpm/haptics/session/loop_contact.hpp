@@ -15,9 +15,10 @@ namespace tpm::haptics {
 struct LoopContactOptions {
   double rate_Hz = 0.0;  ///< of the caller's loop, 500 to 4000; 0: that of the file, or 1 kHz
   /// Whose limits apply, as limits_of() takes it. Empty: the device of `device_file`, else omega7.
+  /// "virtual" for a loop that moves nothing.
   std::string device;
-  /// Measurements of it (schemas/device.schema.json). Empty: forces are taken to come one
-  /// period late, with the friction that is assumed of the device; nobody checks that.
+  /// Measurements of it (schemas/device.schema.json), see limits_from(). Without a delay measured
+  /// on it hardware counts as 20 ms late and free of friction (check_rendering()).
   std::filesystem::path device_file;
   bool start_gate = true;    ///< forces wait until the tool is in free air and at rest
   double longest_s = 600.0;  ///< of a law file: for how long spring-pots keep their history, > 0

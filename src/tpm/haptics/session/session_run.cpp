@@ -204,11 +204,8 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
   const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
   run.rendering = check_rendering(session, *stepped, run.model, limits);
   if (choice.kind == "virtual") {
-    DeviceLimits real = limits_of("omega7");
-    if (!choice.file.empty()) {
-      const DeviceFile file = read_device_file(choice.file);
-      real = limits_by_file(limits_of(file.kind), file);
-    }
+    const DeviceLimits real =
+        choice.file.empty() ? limits_of("omega7") : limits_from(read_device_file(choice.file));
     run.on_hardware = check_rendering(session, *stepped, run.model, real);
     run.hardware_kind = real.kind;
   }
