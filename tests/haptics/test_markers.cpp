@@ -219,10 +219,26 @@ TEST_CASE("A check tells p99.99 beside the watchdog, the bound 3/T, and names wh
   const std::string json = check_json(check).dump();
   CHECK_THAT(json, Contains("\"upper_95_per_s\":0.05"));
   CHECK_THAT(json, Contains("\"once_an_hour_extrapolated_s\":0.000811"));
-  // Two stalls: there is no bound of none, they are counted.
+  CHECK_THAT(json, Contains("\"extrapolation\":\"811 us once an hour, if the tail"));
+  // Two stalls in 60 s: with 95 % fewer than 6.296 in that time (half of chi-squared, 6 degrees).
   const JitterCheck stalled = check_with(100, 99'500, 2, 9'000'000);
-  CHECK_THAT(check_text(stalled), Contains("stalls beyond it: 2\n") && !Contains("3/T"));
-  CHECK_THAT(check_json(stalled).dump(), Contains("\"upper_95_per_s\":null"));
+  CHECK_THAT(check_text(stalled),
+             Contains("stalls beyond it: 2: fewer than 378 an hour with 95 % (Poisson, in 60 s)"));
+  CHECK_THAT(check_json(stalled).dump(), Contains("\"upper_95_per_s\":0.10493"));
+}
+
+TEST_CASE("A check that is too short to extrapolate says so, in text and in JSON") {
+  JitterCheck check;
+  check.rate_Hz = 1000.0;
+  check.duration_s = 5.0;
+  check.watchdog_s = 0.008;
+  check.outcome.cycles = 5000;
+  for (int i = 0; i < 5000; ++i) check.outcome.woke_late.note(19'500);
+  CHECK_THAT(check_text(check),
+             Contains("extrapolated, not measured: too short: 5000 cycles, 20,000 needed\n"));
+  const Json stalls = check_json(check).at("stalls");
+  CHECK(stalls.at("extrapolation") == "too short: 5000 cycles, 20,000 needed");
+  CHECK(stalls.at("once_an_hour_extrapolated_s").is_null());
 }
 
 }  // namespace

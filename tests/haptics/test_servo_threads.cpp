@@ -16,6 +16,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/loop/empty_space.hpp"
+#include "tpm/haptics/session/identify_run.hpp"
 #include "tpm/haptics/session/jitter_check.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/verify/verify.hpp"
@@ -329,11 +330,23 @@ TEST_CASE("The jitter check counts and reports") {
   DeviceChoice device;
   HilSession session;
   session.servo.period_s = 2e-3;
-  session.plant.least_watchdog_s = 1.0;
   const JitterCheck check = check_jitter(device, session, 0.5, RealTimeWish::ignore);
+  CHECK_THAT(check.device.assumptions.back(),
+             Catch::Contains("a watchdog that waits 1 s at least"));
   CHECK(check.watchdog_s == session.preparation.watchdog_s);
   CHECK(check.outcome.woke_late.count() > 0);
   CHECK_FALSE(check.verdict.empty());
+}
+
+TEST_CASE("A machine that stalls does not end an identification by the simulated watchdog") {
+  HilSession session;
+  session.servo.period_s = 2e-3;
+  DeviceIdentifyOptions options;
+  options.duration_s = 1.0;
+  options.real_time = true;
+  const IdentifyRun run = run_identification(DeviceChoice{}, session, options);
+  CHECK(run.outcome.cause != StopCause::watchdog);
+  CHECK_THAT(run.device.assumptions.back(), Catch::Contains("a watchdog that waits 1 s at least"));
 }
 
 TEST_CASE("Quantiles of times are the upper edges of their bins, and beyond the bins the largest") {

@@ -26,7 +26,8 @@ void assess(JitterCheck& check);
 
 /// Runs the servo loop on the clock with forces of zero, with the rate, watchdog, limit of a
 /// hanging cycle and limits of lateness of a session: is this machine, with this device, up to it?
-/// Goes on to the end whatever is late, unless the device's watchdog cuts it off. Throws as
+/// Goes on to the end whatever is late, unless the device's watchdog cuts it off; that of the
+/// simulated one forgives a second (forgive_stalls()). Throws as
 /// run_session does.
 [[nodiscard]] JitterCheck check_jitter(const DeviceChoice& device, const HilSession& session,
                                        double duration_s, RealTimeWish wish,

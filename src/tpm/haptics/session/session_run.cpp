@@ -277,6 +277,11 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
   return std::make_shared<ReplayDevice>(motion_of(recording), recording.name);
 }
 
+void forgive_stalls(HilSession& session) {
+  constexpr double kOfRehearsals_s = 1.0;
+  session.plant.least_watchdog_s = std::max(session.plant.least_watchdog_s, kOfRehearsals_s);
+}
+
 ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
                             const RenderingCheck& rendering, bool guided) {
   ServoSettings servo{session.servo};

@@ -69,6 +69,10 @@ struct SessionRun {
 /// Forces below this are not felt through a handle, N; assumed.
 inline constexpr double kLeastFeltForce_N = 0.01;
 
+/// In real time a machine that stalls ends no rehearsal, check or identification on the simulated
+/// Omega.7: its watchdog waits for a second at least.
+void forgive_stalls(HilSession& session);
+
 /// Settings of the loop of a session: those that the session states, with what is known of its
 /// model and device.
 /// @param guided a hand holds the device; else a recorded motion begins where it began, and nobody

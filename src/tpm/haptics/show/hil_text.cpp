@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <string_view>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/printed_number.hpp"
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
@@ -60,13 +62,13 @@ std::vector<std::pair<double, std::uint64_t>> octaves(const TimeHistogram& times
   return result;
 }
 
-/// Lateness that is exceeded once an hour if the tail beyond 99.9 % falls as an exponential does; 0
-/// if too few cycles were late to say.
-double once_an_hour_s(const JitterCheck& check) {
+/// Lateness that is exceeded once an hour if the tail beyond 99.9 % falls as an exponential does;
+/// empty if there were too few cycles to say.
+std::optional<double> once_an_hour_s(const JitterCheck& check) {
   constexpr double kHour_s = 3600.0, kShare = 1e-3, kFurther = 1e-4;
   constexpr std::uint64_t kFewest = 20'000;
   const TimeHistogram& late = check.outcome.woke_late;
-  if (late.count() < kFewest) return 0.0;
+  if (late.count() < kFewest) return std::nullopt;
   const double at_s = late.quantile_s(1.0 - kShare), further_s = late.quantile_s(1.0 - kFurther);
   const double slope_s = (further_s - at_s) / std::log(kShare / kFurther);
   return further_s + slope_s * std::max(0.0, std::log(kFurther * kHour_s * check.rate_Hz));
@@ -85,18 +87,36 @@ double watched_s(const JitterCheck& check) {
   return static_cast<double>(check.outcome.cycles) / check.rate_Hz;
 }
 
+/// Upper limit of the stalls a second at 95 %: of a Poisson count, 3/T where there was none. Empty
+/// without cycles.
+std::optional<double> most_stalls_per_s(const JitterCheck& check) {
+  constexpr double kShare = 0.95, kOfNone = 3.0;
+  if (check.outcome.cycles == 0) return std::nullopt;
+  const auto stalls = static_cast<double>(stalls_of(check));
+  const double most =
+      stalls == 0.0 ? kOfNone : 0.5 * chi_squared_quantile(kShare, 2.0 * (stalls + 1.0));
+  return most / watched_s(check);
+}
+
+/// The extrapolation in words.
+std::string extrapolation_of(const JitterCheck& check) {
+  if (const auto hour_s = once_an_hour_s(check)) {
+    return fmt::format("{} us once an hour, if the tail beyond 99.9 % falls as an exponential",
+                       us(*hour_s));
+  }
+  return fmt::format("too short: {} cycles, 20,000 needed", check.outcome.woke_late.count());
+}
+
 Json stalls_json(const JitterCheck& check) {
-  const std::uint64_t stalls = stalls_of(check);
-  const double hour_s = once_an_hour_s(check);
-  Json json{
-      {"beyond_watchdog", stalls},
-      {"p9999_s", rounded(check.outcome.woke_late.quantile_s(0.9999), kHilDigits)},
-      {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
-      {"once_an_hour_extrapolated_s", hour_s > 0.0 ? Json(rounded(hour_s, kHilDigits)) : Json()}};
-  json["upper_95_per_s"] = stalls == 0 && check.outcome.cycles > 0
-                               ? Json(rounded(3.0 / watched_s(check), kHilDigits))
-                               : Json();
-  return json;
+  const auto or_null = [](const std::optional<double>& value) {
+    return value ? Json(rounded(*value, kHilDigits)) : Json();
+  };
+  return {{"beyond_watchdog", stalls_of(check)},
+          {"p9999_s", rounded(check.outcome.woke_late.quantile_s(0.9999), kHilDigits)},
+          {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
+          {"once_an_hour_extrapolated_s", or_null(once_an_hour_s(check))},
+          {"extrapolation", extrapolation_of(check)},
+          {"upper_95_per_s", or_null(most_stalls_per_s(check))}};
 }
 
 std::string stalls_text(const JitterCheck& check) {
@@ -104,17 +124,13 @@ std::string stalls_text(const JitterCheck& check) {
   std::string text = fmt::format(
       "p99.99 of the wake-ups {} us, the watchdog waits for {} us; stalls beyond it: {}",
       us(check.outcome.woke_late.quantile_s(0.9999)), us(check.watchdog_s), stalls);
-  if (stalls == 0 && check.outcome.cycles > 0) {
-    text += fmt::format(": fewer than {} an hour with 95 % (3/T of {} s)",
-                        significant(3.0 * 3600.0 / watched_s(check), 3),
-                        significant(watched_s(check), 3));
+  if (const auto most = most_stalls_per_s(check)) {
+    constexpr double kHour_s = 3600.0;
+    text +=
+        fmt::format(": fewer than {} an hour with 95 % ({} {} s)", significant(kHour_s * *most, 3),
+                    stalls == 0 ? "3/T of" : "Poisson, in", significant(watched_s(check), 3));
   }
-  const double hour_s = once_an_hour_s(check);
-  return text + (hour_s > 0.0
-                     ? fmt::format("\nextrapolated, not measured: {} us once an hour, if the tail "
-                                   "beyond 99.9 % falls as an exponential\n",
-                                   us(hour_s))
-                     : std::string("\n"));
+  return text + fmt::format("\nextrapolated, not measured: {}\n", extrapolation_of(check));
 }
 
 Json fidelity_json(const ForceFidelity& f) {
