@@ -107,6 +107,28 @@ long long event_ns(const std::string& file, const std::string& event) {
   return -1;
 }
 
+TEST_CASE("A device that is not the one of its file gets no force, not even for the check before") {
+  const test::TempFolder folder;
+  const std::string events = folder / "events";
+  write_file(folder / "script", hand_in_place(folder) + "events " + events + "\n");
+  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+  DeviceChoice device;
+  device.kind = "omega7";
+  device.library = TPM_STAND_IN_DHD;
+  device.file = folder / "device.json";
+  Json file = read_json(TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json");
+  file["serial"] = "1";
+  write_file(device.file, to_text(file));
+  SessionRunOptions options = on_the_clock(folder / "r");
+  options.check_delay = true;
+  CHECK_THROWS_WITH(run_session(patient_session(), device, options),
+                    Catch::Contains("was measured on the device '1', and this is '4711'"));
+  (void)unsetenv("TPM_STAND_IN_SCRIPT");
+  CHECK(event_ns(events, "open") > 0);
+  CHECK(event_ns(events, "close") > 0);
+  CHECK(event_ns(events, "thread_of_forces_on") == -1);
+}
+
 TEST_CASE("A call that hangs: forces are off before it ends, the cause is told") {
   bool seen = false;
   for (int attempt = 0; attempt < 10 && !seen; ++attempt) {

@@ -104,6 +104,7 @@ void move_handle(IdentifyRun& run, std::vector<IdentificationSample>& samples,
   const ForcesOffGuard guard(*device);
   try {
     run.device = device->open();
+    if (options.opened) options.opened(run.device);
     if (options.real_time) {
       RealTimeOptions real;
       real.wish = options.wish;

@@ -10,6 +10,8 @@ struct DeviceIdentifyOptions {
   RealTimeWish wish = RealTimeWish::ignore;
   std::uint64_t seed = 1;  ///< of the edges of the force
   std::function<bool()> interrupted;
+  /// Called when the device is open and its forces are still off; what it throws ends the run.
+  std::function<void(const DeviceIdentity&)> opened;
 };
 
 /// Measurements of `tpm hil identify`.

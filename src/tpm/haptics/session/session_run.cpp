@@ -176,6 +176,7 @@ void check_at_start(SessionRun& run, const HilSession& session, const DeviceChoi
   second.real_time = options.real_time;
   second.wish = options.wish;
   second.interrupted = options.interrupted;
+  second.opened = [&choice](const DeviceIdentity& device) { require_same_device(choice, device); };
   const DelayCheck check = check_delay(make(), choice, session, second);
   if (check.cause != StopCause::finished) {
     throw Error(ExitCode::environment, "delay of the device",
