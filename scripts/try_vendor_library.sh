@@ -5,7 +5,7 @@
 #
 #   scripts/try_vendor_library.sh /opt/sdk/lib/release/lin-x86_64-gcc/libdrd.so.3
 #   scripts/try_vendor_library.sh LIBRARY --device omega7 --may-move     options of tpm hil check and run
-#   TPM_SESSION=my_session.json, TPM_BUILD=build/release choose what is run, TPM_RUN_OPTIONS="--clock virtual" how
+#   TPM_SESSION=my_session.json, TPM_BUILD=build/release choose what is run, TPM_RUN_OPTIONS="--device-file device.json" how
 set -uo pipefail
 cd "$(dirname "$0")/.."
 

@@ -84,8 +84,9 @@ typedef struct tpm_device_preparation {
   double max_force_N;  /**< the device must never be asked for more */
   double watchdog_s;   /**< cut the forces after this time without a command */
   uint32_t may_move;   /**< 1: the device may move by itself to initialise */
-  uint32_t real_time;  /**< 1: the loop keeps the clock; 0: its cycles follow each other without waiting, and
-                            a simulated device must not count the time of the clock */
+  uint32_t real_time;  /**< 1: the loop keeps the clock, always for a device that says `hardware`; 0: its cycles
+                            follow each other without waiting, and a simulated device must not count the time of
+                            the clock */
 } tpm_device_preparation;
 
 typedef struct tpm_device_status {

@@ -18,7 +18,8 @@ struct HilSession;  // the content of a session file
 /// Options of a session run.
 struct SessionRequest {
   std::filesystem::path recording;  ///< file for the records of all periods
-  /// Real time; otherwise virtual time, as fast as possible with the same bits on each run.
+  /// Real time; otherwise virtual time, as fast as possible with the same bits on each run, which
+  /// is refused on a device with motors.
   bool real_time = false;
   RealTimeWish wish = RealTimeWish::ignore;
   /// Device kind whose limits of force, stiffness and delay apply (`tpm hil devices` lists them).

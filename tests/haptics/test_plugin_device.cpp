@@ -101,6 +101,14 @@ TEST_CASE("A session that asks for more than a plugin's device can take is refus
       Contains("is not told how its device is mounted"));
 }
 
+TEST_CASE("A plugin whose device has motors is not driven in virtual time") {
+  (void)setenv("TPM_BAD_PLUGIN", "hardware", 1);
+  PluginDevice device(TPM_TEST_BAD_DEVICE_PLUGIN);
+  CHECK_THAT(test::refusal_of([&] { device.prepare({}); }),
+             Contains("a device with motors keeps the clock; expected --clock real"));
+  (void)unsetenv("TPM_BAD_PLUGIN");
+}
+
 TEST_CASE("What is wrong with a plugin is told in one line") {
   CHECK_THAT(test::refusal_of([] { (void)PluginDevice("none.so"); }),
              Contains("./none.so: cannot be loaded"));

@@ -7,6 +7,7 @@
 //   gripper|buttons NUMBER   what the hand does; without `gripper` the device has none
 //   wait NUMBER       forces set before the operator begins
 //   init_ms NUMBER    that drdAutoInit takes; drdStop ends it, unless stubborn NUMBER is not 0
+//   clock 1           it does not say that time passes by calls: virtual time is refused
 //   max_force         is an event with the limit in mN behind its name
 //   watchdog_by_clock 0   commands need not come in time by the clock: for loops in virtual time,
 //   and
@@ -63,6 +64,7 @@ struct StandIn {
   bool stubborn = false;
   std::atomic<int> cause{0};
   bool by_clock = true;
+  bool without_clock = true;
   std::atomic<long long> last_command_ns{0};  // 0: forces are off
 };
 
@@ -143,6 +145,7 @@ void read_line(StandIn& s, std::istringstream& words, const std::string& key) {
     if (key == "initialised") s.initialised = whole != 0;
     if (key == "init_ms") s.init_ms = whole;
     if (key == "watchdog_by_clock") s.by_clock = whole != 0;
+    if (key == "clock") s.without_clock = whole == 0;
     if (key == "stubborn") s.stubborn = whole != 0;
     if (key == "gripper") s.gripper_m = value;
     if (key == "buttons") s.buttons = static_cast<unsigned>(whole);
@@ -213,6 +216,12 @@ void dawdle_if_due(long call) {
 }  // namespace
 
 extern "C" {
+
+/// Of no library of the vendor's: time passes in dhdSetForce, so that a loop in virtual time may
+/// drive this.
+int tpm_stand_in_without_clock() {
+  return here().without_clock ? 1 : 0;
+}
 
 int dhdGetDeviceCount() {
   read_script();

@@ -22,6 +22,7 @@ static int describe(int index, tpm_device_description *d, char *message) {
   (void)index, (void)message;
   if (is("describe")) return TPM_DEVICE_FAILED;
   snprintf(d->name, sizeof d->name, "bad");
+  d->hardware = is("hardware") ? 1 : 0;
   d->limits.force_N = is("force") ? NAN : 10.0;
   d->limits.reach_m = 0.075;
   d->limits.stiffness_N_per_m = 4000.0;

@@ -112,6 +112,7 @@ void DhdLibrary::find_symbols() {
   find(handle_, "dhdSetDeviceAngleRad", c.set_device_angle, not_needed);
   find(handle_, "dhdSetBaseAngleXRad", c.set_base_angle_x, not_needed);
   find(handle_, "dhdSetBaseAngleZRad", c.set_base_angle_z, not_needed);
+  find(handle_, "tpm_stand_in_without_clock", c.stand_in_without_clock, not_needed);
   if (c.get_gripper_gap == nullptr) c.has_gripper = nullptr;
   find(handle_, "drdOpenID", c.drd_open_id, without_drd);
   find(handle_, "drdClose", c.drd_close, without_drd);

@@ -49,6 +49,9 @@ struct DhdCalls {
   bool (*drd_is_initialized)(char id);
   int (*drd_auto_init)(char id);
   int (*drd_stop)(bool keep_force, char id);
+  /// Of the stand-ins of tests alone: not 0 where time passes by calls and not by the clock, so
+  /// that a loop in virtual time may drive it. Null in the vendor's library.
+  int (*stand_in_without_clock)();
 };
 
 /// The vendor's library, loaded for as long as this lives.

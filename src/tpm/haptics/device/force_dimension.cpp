@@ -315,6 +315,11 @@ void ForceDimension::set_mounting(const DeviceMounting& mounting) {
 }
 
 void ForceDimension::prepare(const DevicePreparation& preparation) {
+  const bool without_clock =
+      call_.stand_in_without_clock != nullptr && call_.stand_in_without_clock() != 0;
+  if (!preparation.real_time && identity_.hardware && !without_clock) {
+    throw fault("a device with motors keeps the clock", "--clock real");
+  }
   require_initialised(preparation);
   prepared_ = true;
   set_mounting(preparation.mounting);

@@ -167,6 +167,13 @@ bool DevicePlugin::enables_forces() const {
   return plugin_->size >= kEnd && plugin_->enable_forces != nullptr;
 }
 
+bool DevicePlugin::is_stand_in_without_clock() const {
+  using Call = int (*)();
+  const auto call = reinterpret_cast<Call>(  // NOLINT: what it is for
+      dlsym(handle_, "tpm_stand_in_without_clock"));
+  return call != nullptr && call() != 0;
+}
+
 std::string DevicePlugin::name() const {
   return printable(plugin_->name);
 }
@@ -249,6 +256,9 @@ const DeviceIdentity& PluginDevice::open() {
 }
 
 void PluginDevice::prepare(const DevicePreparation& preparation) {
+  if (!preparation.real_time && identity_.hardware && !plugin_->is_stand_in_without_clock()) {
+    throw plugin_fault(plugin_->file(), "a device with motors keeps the clock", "--clock real");
+  }
   const DeviceMounting& mounting = preparation.mounting;
   if (mounting.effector_mass_kg || mounting.angle_rad || mounting.base_angle_x_rad ||
       mounting.base_angle_z_rad) {

@@ -28,6 +28,9 @@ class DevicePlugin {
   [[nodiscard]] std::string name() const;
   /// It switches forces on in a call of its own, not in prepare().
   [[nodiscard]] bool enables_forces() const;
+  /// It is a stand-in of a test, in which time passes by calls and not by the clock: it has a
+  /// function tpm_stand_in_without_clock(), whose answer is not 0.
+  [[nodiscard]] bool is_stand_in_without_clock() const;
   /// Throws Error(environment) with the plugin's own words.
   [[nodiscard]] int count() const;
   /// Description that a device gives of itself, its limits checked. Throws Error(environment).

@@ -154,6 +154,15 @@ void require_same_device(const DeviceChoice& choice, const DeviceIdentity& devic
   }
 }
 
+constexpr const char* kCallersOwn = "the caller's own";
+
+/// Of a device of the caller's; those of this library refuse in prepare().
+void require_clock(const DeviceChoice& choice, const DeviceIdentity& device, bool real_time) {
+  if (choice.kind != kCallersOwn || real_time || !device.hardware) return;
+  throw Error(ExitCode::usage, "device '" + printable(device.name) + "'",
+              "a device with motors keeps the clock", "a session in real time");
+}
+
 /// Limits with the delay of the device as it is now: the larger one of file and check counts.
 DeviceLimits checked_limits(const DeviceLimits& limits, const DelayCheck& check) {
   DeviceLimits now = limits;
@@ -223,6 +232,7 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
   try {
     run.device = device->open();
     require_same_device(choice, run.device);
+    require_clock(choice, run.device, options.real_time);
     if (options.opened) options.opened(run.device, run.model);
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time,
@@ -313,7 +323,7 @@ SessionRun run_session_on(const HilSession& session, const std::shared_ptr<Hapti
                           const DeviceLimits& limits, const DevicePermissions& permissions,
                           const SessionRunOptions& options) {
   DeviceChoice choice;
-  choice.kind = "the caller's own";
+  choice.kind = kCallersOwn;
   choice.may_move = permissions.may_move;
   choice.take_as_ready = permissions.take_as_ready;
   return run_on(session, choice, limits, options, false, [&] { return device; });
