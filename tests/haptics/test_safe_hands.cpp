@@ -93,6 +93,24 @@ TEST_CASE("Of measured hardware the largest delay and a period more count") {
   CHECK_THAT(check.verdict(), Contains("of six hands stable with: "));
 }
 
+TEST_CASE(
+    "Hardware with a longer delay than any that was tried is refused, however soft the tissue") {
+  Json soft = test::short_session();
+  for (const char* key : {"E1", "E2", "Eprime"}) {
+    soft["model"]["scene"]["material"][key] = "1 kPa";
+  }
+  CHECK(checked_on(soft, measured_omega(0.020, 0.25)).acceptable());
+  const RenderingCheck check = checked_on(soft, measured_omega(0.0205, 0.25));
+  CHECK(check.safe_in_hands());
+  CHECK_FALSE(check.acceptable());
+  CHECK_THAT(check.verdict(), Contains("the delay is longer than any that is guarded") &&
+                                  Contains("measured at most 20 ms"));
+  CHECK(to_json(check).at("delay_guarded") == false);
+  // The simulated device has the delay that its session states.
+  soft["virtual_device"] = {{"delay_periods", 30}};
+  CHECK(checked_on(soft, limits_of("virtual")).acceptable());
+}
+
 TEST_CASE("A delay that a slower loop measured counts with the period of that loop") {
   DeviceLimits limits = measured_omega(1.2e-3, 0.25);
   limits.measured_period_s = 2e-3;  // known to half of it

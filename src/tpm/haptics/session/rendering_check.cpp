@@ -100,6 +100,7 @@ void count_device(RenderingCheck& check, const HilSession& session, const Device
                                                       std::max(period_s, limits.measured_period_s)
                                                 : kUnmeasuredDelay_s;
     check.delay_s = std::max(known_s, stated_s);
+    check.longest_delay_s = kLongestDelay_s + std::max(period_s, limits.measured_period_s);
     // A device of which nobody measured the delay counts as one of which nothing is known.
     check.friction_N_s_per_m =
         check.delay_measured ? limits.measured_friction_N_s_per_m.value_or(0.0) : 0.0;
@@ -173,6 +174,10 @@ std::string RenderingCheck::verdict() const {
         what, significant(hands_N_per_m, 3), significant(1e3 * kMostIntoHand_J, 2),
         delay_measured ? "" : "; tpm hil identify measures the delay");
   }
+  if (!delay_is_guarded()) {
+    return fmt::format("the delay is longer than any that is guarded: {}; measured at most {} ms",
+                       what, significant(1e3 * kLongestDelay_s, 3));
+  }
   if (!passive()) {
     return fmt::format(
         "stable with the operator's arm (up to {} N/m), not passive: {}; passive with every "
@@ -241,6 +246,7 @@ Json to_json(const RenderingCheck& check) {
             {"rate_Hz", rounded(check.rate_Hz, kDigits)},
             {"safe_in_hands", check.safe_in_hands()},
             {"delay_measured", check.delay_measured},
+            {"delay_guarded", check.delay_is_guarded()},
             {"delay_s", rounded(check.delay_s, kDigits)},
             {"delay_periods", check.delay_periods},
             {"friction_N_s_per_m", rounded(check.friction_N_s_per_m, kDigits)},

@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,8 +12,9 @@ namespace tpm::haptics {
 /// Can this tissue be rendered on this device? Found before a session begins.
 struct RenderingCheck {
   double rate_Hz = 0.0;
-  double delay_s = 0.0;        ///< that counts, both paths of the device
-  int delay_periods = 0;       ///< the same in whole periods, rounded up
+  double delay_s = 0.0;   ///< that counts, both paths of the device
+  int delay_periods = 0;  ///< the same in whole periods, rounded up
+  double longest_delay_s = std::numeric_limits<double>::infinity();  ///< that is guarded
   bool delay_measured = true;  ///< false: hardware that nobody has measured
   /// Why the delay counts as not measured although a file says it; empty otherwise.
   std::string delay_note;
@@ -47,8 +49,11 @@ struct RenderingCheck {
   }
   /// None of six hands receives more energy than it may, also if the rendering is not passive.
   [[nodiscard]] bool safe_in_hands() const { return stiffness_N_per_m <= hands_N_per_m; }
+  /// Of hardware: gate and supervisor were tried for a delay as long as this, see six_hands.hpp.
+  [[nodiscard]] bool delay_is_guarded() const { return delay_s <= longest_delay_s * (1.0 + 1e-12); }
   [[nodiscard]] bool acceptable() const {
-    return stable() && within_device() && follows_encoder() && safe_in_hands();
+    return stable() && within_device() && follows_encoder() && safe_in_hands() &&
+           delay_is_guarded();
   }
   static constexpr double kRoom = 0.8;
   /// One line: passive, stable, or why not.
@@ -66,6 +71,7 @@ struct RenderingCheck {
 ///     if nobody measured its delay, 20 ms and no friction, also where a friction was measured; and
 ///     in either case the larger delay and the smaller friction of these and of what the session
 ///     states;
+///     A delay measured above kLongestDelay_s (six_hands.hpp) is refused;
 ///   - the simulated device: what the session states; a simulated plugin: what it says.
 /// @param limits of the device
 [[nodiscard]] RenderingCheck check_rendering(const HilSession& session, ContactModel& model,

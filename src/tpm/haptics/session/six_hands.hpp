@@ -34,6 +34,11 @@ inline constexpr double kMostIntoHand_J = 5e-3;
 /// Delay of hardware whose delay nobody has measured, both paths, s.
 inline constexpr double kUnmeasuredDelay_s = 0.020;
 
+/// Longest measured delay for which it was tried that none of the hands receives kMostIntoHand_J
+/// (reports/haptics/report.md), and the longest that the supervisor supposes, s. Hardware with a
+/// longer one is refused.
+inline constexpr double kLongestDelay_s = 0.020;
+
 /// Largest stiffness that is rendered, N/m:
 ///
 ///     K (T/2 + delay) <= b + 1 N s/m,
