@@ -7,8 +7,10 @@
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/plugin_device.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
+#include "tpm/haptics/session/identify_run.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 
@@ -99,6 +101,22 @@ TEST_CASE("A session that asks for more than a plugin's device can take is refus
   CHECK_THAT(
       test::refusal_of([&] { (void)run_session(test::parsed(json), plugin_choice(), options); }),
       Contains("is not told how its device is mounted"));
+}
+
+TEST_CASE("The file of an identified plugin has its limits: a loop in C needs no plugin") {
+  IdentifyRun run;
+  run.device.kind = "plugin";
+  run.device.hardware = true;
+  run.period_s = 1e-3;
+  run.limits = limits_of(plugin_choice());
+  const DeviceFile file = parse_device_file(device_file_json(run, ""), "d");
+  const DeviceLimits limits = limits_from(file);
+  CHECK(limits.hardware());
+  CHECK(limits.force_N == run.limits.force_N);
+  CHECK(limits.stiffness_N_per_m == run.limits.stiffness_N_per_m);
+  CHECK(limits.known_by("reach_m") == "stated by the plugin");
+  // Beside the plugin the same file is taken, too.
+  CHECK(limits_by_file(run.limits, file).slew_N_per_s == run.limits.slew_N_per_s);
 }
 
 TEST_CASE("A plugin whose device has motors is not driven in virtual time") {

@@ -82,8 +82,8 @@ ServoSettings identifying_settings(const HilSession& like, const DeviceLimits& l
 void move_handle(IdentifyRun& run, std::vector<IdentificationSample>& samples,
                  const std::shared_ptr<HapticDevice>& device, const DeviceChoice& choice,
                  const HilSession& like, const DeviceIdentifyOptions& options) {
-  const DeviceLimits limits = limits_of(choice);
-  const ServoSettings servo = identifying_settings(like, limits, options.duration_s);
+  run.limits = limits_of(choice);
+  const ServoSettings servo = identifying_settings(like, run.limits, options.duration_s);
   const auto model = std::make_shared<IdentifyingModel>(servo.push, servo.period_s, options.seed);
   samples.reserve(samples.size() + servo.phase_ends.back() + 1);
   const RecordSink sink = [&](const ServoRecord& row) {
@@ -140,6 +140,22 @@ void identify(IdentifyRun& run, const std::vector<IdentificationSample>& samples
   run.found.not_identified.push_back(fmt::format("everything after {} s of {} s: {}",
                                                  significant(run.measured_s, 3),
                                                  significant(run.duration_s, 3), run.ended_by));
+}
+
+DeviceLimitKeys limits_that_a_plugin_states(const DeviceLimits& limits) {
+  DeviceLimitKeys keys;
+  keys.force_N = limits.force_N;
+  keys.reach_m = limits.reach_m;
+  keys.stiffness_N_per_m = limits.stiffness_N_per_m;
+  keys.damping_N_s_per_m = limits.damping_N_s_per_m;
+  keys.slew_N_per_s = limits.slew_N_per_s;
+  keys.least_ramp_in_s = limits.least_ramp_in_s;
+  keys.provenance.emplace();
+  for (const char* key : {"force_N", "reach_m", "stiffness_N_per_m", "damping_N_s_per_m",
+                          "slew_N_per_s", "least_ramp_in_s"}) {
+    keys.provenance->emplace_back(key, "stated by the plugin");
+  }
+  return keys;
 }
 
 }  // namespace
@@ -224,6 +240,7 @@ Json device_file_json(const IdentifyRun& run, const std::string& date) {
   file.device = run.device.kind;
   file.name = run.device.name;
   if (!run.device.serial.empty()) file.serial = run.device.serial;
+  if (run.device.kind == "plugin") file.limits = limits_that_a_plugin_states(run.limits);
   if (f.delay_largest_s) {
     file.delay = {.provenance = KnownBy::measured,
                   .largest_s = digits(f.delay_largest_s),

@@ -17,6 +17,7 @@ struct DeviceIdentifyOptions {
 /// Measurements of `tpm hil identify`.
 struct IdentifyRun {
   DeviceIdentity device;
+  DeviceLimits limits;  ///< of it, as limits_of() says
   DeviceIdentification found;
   ServoOutcome outcome;                     ///< of the last part; missed periods and cycles of all
   double period_s = 0.0, duration_s = 0.0;  ///< asked for
@@ -59,7 +60,8 @@ struct DelayCheck {
                                      const DeviceIdentifyOptions& options);
 inline constexpr double kDelayCheck_s = 1.0;
 
-/// A device file (schemas/device.schema.json). @param date of the measurement; may be empty
+/// A device file (schemas/device.schema.json). That of a plugin has the limits that the plugin
+/// states, so that limits_from() needs no plugin. @param date of the measurement; may be empty
 [[nodiscard]] Json device_file_json(const IdentifyRun& run, const std::string& date);
 
 }  // namespace tpm::haptics
