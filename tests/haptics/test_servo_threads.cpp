@@ -7,6 +7,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <thread>
 
@@ -127,6 +128,25 @@ TEST_CASE("A device that is not the one of its file gets no force, not even for 
   CHECK(event_ns(events, "open") > 0);
   CHECK(event_ns(events, "close") > 0);
   CHECK(event_ns(events, "thread_of_forces_on") == -1);
+}
+
+TEST_CASE("A device with motors is not driven in virtual time") {
+  const test::TempFolder folder;
+  const std::string events = folder / "events";
+  write_file(folder / "script", hand_in_place(folder) + "clock 1\nevents " + events + "\n");
+  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+  DeviceChoice device;
+  device.kind = "omega7";
+  device.library = TPM_STAND_IN_DHD;
+  device.file = TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json";
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  CHECK_THROWS_WITH(run_session(patient_session(), device, options),
+                    Catch::Contains("a device with motors keeps the clock; expected --clock real"));
+  (void)unsetenv("TPM_STAND_IN_SCRIPT");
+  CHECK(event_ns(events, "close") > 0);
+  CHECK(event_ns(events, "thread_of_forces_on") == -1);
+  CHECK_FALSE(std::filesystem::exists(folder / "r"));
 }
 
 TEST_CASE("A call that hangs: forces are off before it ends, the cause is told") {

@@ -195,19 +195,6 @@ TEST_CASE("An initialisation that does not end when told so is left behind") {
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
 }
 
-TEST_CASE("A device with motors is not driven in virtual time") {
-  const HilSession session = test::parsed(test::short_session());
-  const test::TempFolder folder;
-  const Script script(operator_lines(session, folder) + "clock 1\n");
-  SessionRunOptions options;
-  options.recording = folder / "r";
-  CHECK_THAT(message_of([&] { (void)run_session(session, stand_in(), options); }),
-             Contains("omega7: a device with motors keeps the clock; expected --clock real"));
-  CHECK(script.happened("close"));
-  CHECK_FALSE(script.happened("thread_of_forces_on"));
-  CHECK_FALSE(std::filesystem::exists(folder / "r"));
-}
-
 TEST_CASE("A session that cannot be prepared leaves no recording, and the next one runs") {
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
