@@ -42,6 +42,11 @@ bool same_id(std::string_view a, std::string_view b) {
       a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
+Eigen::Vector3d limited(const Eigen::Vector3d& force_N, double most_N) noexcept {
+  const double size_N = force_N.norm();
+  return size_N <= most_N ? force_N : Eigen::Vector3d(force_N * (most_N / size_N));
+}
+
 std::string words_of(const InverseEvent& event) {
   return event.safety_type.empty() ? event.name
                                    : fmt::format("{}: {}", event.name, event.safety_type);
@@ -80,6 +85,8 @@ void InverseDevice::prepare(const DevicePreparation& preparation) {
                         "a service that answers each message");
   }
   seen_ = answer_.latest();
+  written_ = 0;
+  forces_.begin(session_ns());
 }
 
 /// A position of now: open() may be long ago.
@@ -113,11 +120,7 @@ Eigen::Vector3d InverseDevice::force_to_send() noexcept {
     fail(ForcesOff::watchdog, "no command in the watchdog's time");
     return Eigen::Vector3d::Zero();
   }
-  const double size_N = order.force_N.norm();
-  if (!(size_N <= preparation_.max_force_N)) {
-    return Eigen::Vector3d(order.force_N * (preparation_.max_force_N / size_N));
-  }
-  return order.force_N;
+  return limited(order.force_N, preparation_.max_force_N);
 }
 
 /// One message and the states that come; false if none came in time.
@@ -233,7 +236,14 @@ void InverseDevice::say_goodbye() noexcept {
 
 DeviceAnswer InverseDevice::read(Eigen::Vector3d& position_m) noexcept {
   const bool newer = answer_.refresh();
-  if (newer) seen_ = answer_.latest();
+  if (newer) {
+    seen_ = answer_.latest();
+    if (!seen_.state.force_named) {
+      forces_.no_report();
+    } else {
+      forces_.report(seen_.state.force_N, session_ns());
+    }
+  }
   const double age_s = seconds_between(seen_.asked_ns, now_ns());
   if (preparation_.real_time && age_s > preparation_.watchdog_s) {
     fail(ForcesOff::unplugged, "the service sends no state");
@@ -250,6 +260,8 @@ DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
   if (cut_ || fault_ != ForcesOff::none) return DeviceAnswer::failed;
   const bool clipped = force_N.norm() > preparation_.max_force_N;
   if (clipped) ++status_.saturations;
+  ++written_;
+  forces_.command(limited(force_N, preparation_.max_force_N), session_ns());
   order_.write({force_N, now_ns()});
   if (preparation_.real_time) {
     orders_.fetch_add(1, std::memory_order_release);
@@ -277,6 +289,17 @@ DeviceStatus InverseDevice::status() noexcept {
     std::memcpy(status_.error_text, fault_words_.data(), sizeof status_.error_text);
   }
   return status_;
+}
+
+/// Time for the comparison of forces. In virtual time the clock says nothing.
+std::int64_t InverseDevice::session_ns() const noexcept {
+  if (preparation_.real_time) return now_ns();
+  return static_cast<std::int64_t>(static_cast<double>(written_) * preparation_.period_s * 1e9);
+}
+
+std::vector<std::string> InverseDevice::findings() const {
+  const std::string found = forces_.finding();
+  return found.empty() ? std::vector<std::string>() : std::vector<std::string>{found};
 }
 
 HandState InverseDevice::hand() noexcept {

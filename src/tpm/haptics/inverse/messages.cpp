@@ -96,6 +96,7 @@ InverseState state_of(const Part& state) {
   read.position_m = state.at(key::cursor_position).vector();
   read.velocity_m_per_s = vector_or_zero(state, key::cursor_velocity);
   read.force_N = vector_or_zero(state, key::cursor_force);
+  read.force_named = state.has(key::cursor_force);
   if (!state.has("transform")) return read;
   const Part workspace = state.at("transform");
   read.workspace_position_m = vector_or_zero(workspace, key::position);

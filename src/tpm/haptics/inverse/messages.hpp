@@ -62,6 +62,7 @@ struct InverseState {
   Eigen::Vector3d workspace_position_m = Eigen::Vector3d::Zero(),
                   workspace_scale = Eigen::Vector3d::Ones();
   Eigen::Quaterniond workspace_rotation = Eigen::Quaterniond::Identity();
+  bool force_named = true;  ///< false: the message named no force
   // Of the first grip.
   bool has_grip = false;
   Eigen::Quaterniond grip = Eigen::Quaterniond::Identity();
