@@ -107,6 +107,16 @@ InverseState state_of(const Part& state) {
   return read;
 }
 
+std::uint32_t buttons_of(const Part& said) {
+  std::uint32_t buttons = 0;
+  for (std::uint32_t i = 0; i < std::size(key::button_names); ++i) {
+    for (const char* name : key::button_names[i]) {
+      if (said.has(name) && said.at(name).flag()) buttons |= 1U << i;
+    }
+  }
+  return buttons;
+}
+
 /// Of the first grip that a message lists.
 void add_grip(InverseState& state, const Part& message) {
   for (const char* kind : key::grips) {
@@ -117,12 +127,7 @@ void add_grip(InverseState& state, const Part& message) {
       state.has_grip = true;
       if (said.has(key::orientation)) state.grip = said.at(key::orientation).quaternion();
       if (!said.has(key::buttons)) return;
-      const Part pressed = said.at(key::buttons);
-      for (std::uint32_t i = 0; i < std::size(key::button_names); ++i) {
-        for (const char* name : key::button_names[i]) {
-          if (pressed.has(name) && pressed.at(name).flag()) state.buttons |= 1U << i;
-        }
-      }
+      state.buttons = buttons_of(said.at(key::buttons));
     });
   }
 }
@@ -277,6 +282,14 @@ InverseCommand parse_command(std::string_view text, std::string_view device_id) 
     if (session.has(key::configure) && session.at(key::configure).has(key::profile)) {
       command.profile = session.at(key::configure).at(key::profile).at(key::name).text();
     }
+  }
+  if (message.has(key::grips[0])) {
+    message.at(key::grips[0]).each([&](const Part& grip) {
+      if (!grip.has(key::id) || !grip.at(key::id).is(kSimulatedGrip)) return;
+      if (!grip.has(key::commands)) return;
+      const Part said = grip.at(key::commands);
+      if (said.has(key::set_buttons)) command.buttons = buttons_of(said.at(key::set_buttons));
+    });
   }
   if (!message.has(key::device)) return command;
   message.at(key::device).each([&](const Part& part) {

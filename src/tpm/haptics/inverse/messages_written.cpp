@@ -30,16 +30,31 @@ std::string state_text(const InverseState& state) {
       vector_text(state.force_N));
 }
 
-std::string grips_text(const InverseState& state) {
-  if (!state.has_grip) return {};
+std::string pressed_text(std::uint32_t buttons) {
   std::string pressed;
   for (std::uint32_t i = 0; i < std::size(key::button_names); ++i) {
     pressed += fmt::format(R"({}"{}":{})", i == 0 ? "" : ",", key::button_names[i][0],
-                           (state.buttons >> i & 1U) != 0);
+                           (buttons >> i & 1U) != 0);
   }
+  return "{" + pressed + "}";
+}
+
+/// A simulated device has no power supply that could fail: it is ready from the first message on.
+std::string status_text(bool simulated, bool driven) {
+  if (!simulated) return "{}";
   return fmt::format(
-      R"(,"{}":[{{"device_id":"grip","state":{{"orientation":{},"buttons":{{{}}}}}}}])",
-      key::grips[0], quaternion_text(state.grip), pressed);
+      R"({{"{}":"{}","calibrated":true,"in_use":{},"power_supply":true,"ready":true,"started":true}})",
+      key::simulated, key::simulated_words, driven);
+}
+
+std::string grips_text(const InverseState& state, bool simulated) {
+  if (!state.has_grip) return {};
+  const std::string status =
+      simulated ? fmt::format(R"({{"{}":"{}"}})", key::simulated, key::simulated_words) : "{}";
+  return fmt::format(
+      R"(,"{}":[{{"device_id":"{}","state":{{"orientation":{},"buttons":{}}},"status":{}}}])",
+      key::grips[0], simulated ? kSimulatedGrip : "grip", quaternion_text(state.grip),
+      pressed_text(state.buttons), status);
 }
 
 std::string session_text(std::string_view profile) {
@@ -65,10 +80,6 @@ std::string config_text(const InverseDeviceEntry& d) {
       vector_text(s.mount_scale), s.force_gate_gain, s.damping, vector_text(s.directional_damping));
 }
 
-std::string status_text(bool simulated) {
-  return simulated ? fmt::format(R"({{"{}":"{}"}})", key::simulated, key::simulated_words) : "{}";
-}
-
 }  // namespace
 
 std::string force_message(InverseFormat format, std::string_view device_id,
@@ -84,6 +95,11 @@ std::string neutral_message(std::string_view device_id, std::string_view profile
                      R"("commands":{{"probe_position":{{}}}}}}]}})",
                      session_text(profile), json_text(device_id), kCentredPreset,
                      vector_text(Eigen::Vector3d::Zero()));
+}
+
+std::string press_message(std::uint32_t buttons) {
+  return fmt::format(R"({{"{}":[{{"device_id":"{}","commands":{{"{}":{}}}}}]}})", key::grips[0],
+                     kSimulatedGrip, key::set_buttons, pressed_text(buttons));
 }
 
 std::string probe_message(std::string_view device_id) {
@@ -139,8 +155,8 @@ std::string inventory_message(const InverseInventory& inventory) {
   for (const InverseDeviceEntry& d : inventory.devices) {
     devices += fmt::format(R"({}{{"device_id":{},"config":{},"state":{},"status":{}}})",
                            devices.empty() ? "" : ",", json_text(d.id), config_text(d),
-                           state_text(d.state), status_text(d.simulated));
-    if (grips.empty()) grips = grips_text(d.state);
+                           state_text(d.state), status_text(d.simulated, d.state.driven));
+    if (grips.empty()) grips = grips_text(d.state, d.simulated);
   }
   return fmt::format(R"({{"session_id":{},"inverse3":[{}]{}}})", inventory.session, devices, grips);
 }
@@ -149,7 +165,8 @@ std::string state_message(std::int64_t session, std::string_view device_id,
                           const InverseState& state, bool simulated) {
   return fmt::format(
       R"({{"session_id":{},"inverse3":[{{"device_id":{},"state":{},"status":{}}}]{}}})", session,
-      json_text(device_id), state_text(state), status_text(simulated), grips_text(state));
+      json_text(device_id), state_text(state), status_text(simulated, state.driven),
+      grips_text(state, simulated));
 }
 
 std::string version_message(std::string_view version, bool simulated) {

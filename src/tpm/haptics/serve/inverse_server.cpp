@@ -224,6 +224,7 @@ void InverseServer::take_head(Connection& c) {
 InverseState InverseServer::state_for(const Connection& c) const {
   InverseState state = hand_.state();
   if (!c.centred) state.position_m += settings_.centre_m;
+  state.driven = driver_ != 0;
   return state;
 }
 
@@ -238,6 +239,7 @@ InverseInventory InverseServer::inventory(const Connection* c) const {
   } else {
     device.state = hand_.state();
     device.state.position_m += settings_.centre_m;
+    device.state.driven = driver_ != 0;
   }
   return all;
 }
@@ -345,6 +347,10 @@ void InverseServer::obey(Connection& c, const InverseCommand& command) {
     say(c, "speaks to a device that is not here");
   }
   if (command.position_m) move(c, *command.position_m);
+  if (command.buttons) {
+    presser_ = c.session;
+    hand_.press(*command.buttons);
+  }
   if (!command.force_N) {
     // Commands are applied once and forgotten.
     if (driver_ == c.session) hand_.push(Eigen::Vector3d::Zero());
@@ -403,6 +409,10 @@ void InverseServer::release(Connection& c) {
   if (mover_ == c.session) {
     mover_ = 0;
     hand_.move_to(std::nullopt);
+  }
+  if (presser_ == c.session) {
+    presser_ = 0;
+    hand_.press(0);
   }
 }
 
