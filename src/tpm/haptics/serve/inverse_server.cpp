@@ -37,6 +37,7 @@ struct InverseServer::Connection {
   std::int64_t since_ns;  ///< of the stage
   std::int64_t session = 0;
   bool events = false, centred = false, shut = false;
+  bool turned_away = false;    ///< beyond the number that is served: told so, and nothing more
   std::int64_t pushed_ns = 0;  ///< its last force as the driver
   unsigned told = 0;           ///< bits of Once
   std::string head, out;
@@ -140,13 +141,24 @@ void InverseServer::send_events() {
 void InverseServer::accept_new(const Socket& listening, bool events) {
   Socket socket = accepted(listening);
   if (!socket.open()) return;
-  if (connections_.size() >= kMostConnections) {
+  const auto count = [this](bool turned_away) {
+    return static_cast<std::size_t>(std::ranges::count_if(connections_, [&](const auto& c) {
+      return c->turned_away == turned_away && c->stage != Connection::Stage::gone;
+    }));
+  };
+  if (count(false) >= kMostConnections) {
     ++refused_;
     if (settings_.log && !full_ && ++times_full_ <= kMostLines) {
-      settings_.log(fmt::format("{} connections are open: others are closed", kMostConnections));
+      settings_.log(fmt::format("{} connections are open: others are refused", kMostConnections));
     }
     full_ = true;
-    return;  // closed
+    if (count(true) >= kMostConnections) return;  // closed without a word
+    connections_.push_back(std::make_unique<Connection>(std::move(socket)));
+    Connection& c = *connections_.back();
+    c.turned_away = true;
+    send(c, http_answer("503 Service Unavailable", "text/plain",
+                        fmt::format("{} connections are open\n", kMostConnections)));
+    return c.enter(Connection::Stage::leaving);
   }
   full_ = false;
   ++connected_;
@@ -202,6 +214,13 @@ void InverseServer::take_head(Connection& c) {
     ++refused_;
     say(c, "refused: no request");
     send(c, http_answer("400 Bad Request", "text/plain", "no request\n"));
+    return c.enter(Connection::Stage::leaving);
+  }
+  if (head->count("transfer-encoding") != 0) {
+    ++refused_;
+    say(c, "refused: a body in chunks");
+    send(c, http_answer("501 Not Implemented", "text/plain",
+                        "a body in chunks (Transfer-Encoding) is not read\n"));
     return c.enter(Connection::Stage::leaving);
   }
   if (head->count("upgrade") == 0) return answer_http(c, *head);
