@@ -129,12 +129,11 @@ TEST_CASE("A service that gates forces during a session is noticed if it reports
 TEST_CASE("What was noticed of forces is recorded and said, and the session goes on") {
   const test::TempFolder folder;
   Json json = inverse_session();
-  json.erase("creep");  // an operator who keeps a force would push a gated device away
+  json.erase("creep");  // who keeps a force would push a device that gates too deep
   const HilSession session = test::parsed(json);
   StandInFaults faults;
   faults.from = 1;
   faults.how = How::gate;
-  faults.rendered = 0.0;
   StandInInverse service(plant_of(session, 0), session.operator_script(), false, faults);
   const auto device =
       std::make_shared<InverseDevice>(choice_of(service).inverse, limits_of("inverse3"));
@@ -151,8 +150,9 @@ TEST_CASE("What was noticed of forces is recorded and said, and the session goes
   CAPTURE(word_of(run.outcome.cause), run.outcome.detail, run.largest_force_N);
   CHECK(run.outcome.cause == StopCause::finished);
   REQUIRE(run.findings.size() == 1);
-  CHECK_THAT(run.findings.front(), Contains("the service reported 0 N where "));
-  CHECK_THAT(run_text(session, run), Contains("the device noticed: the service reported 0 N"));
+  CHECK_THAT(run.findings.front(),
+             Contains("the service reported ") && Contains(" N was commanded"));
+  CHECK_THAT(run_text(session, run), Contains("the device noticed: the service reported "));
   CHECK(run_json(session, run).at("outcome").at("device_findings").size() == 1);
   const HilRecording recording = read_recording(options.recording);
   CHECK(recording.closing.at("device_findings").at(0) == run.findings.front());
