@@ -1,3 +1,4 @@
+// Declared in tpm/haptics/inverse/inverse_device.hpp.
 // How a session on an Inverse3 begins: the service is found, its device chosen, what acts on a
 // force made neutral and read back.
 #include <fmt/format.h>

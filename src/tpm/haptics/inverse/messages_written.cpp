@@ -1,3 +1,4 @@
+// Declared in tpm/haptics/inverse/messages.hpp.
 // What client and server of the Inverse protocol say.
 #include <fmt/format.h>
 
