@@ -474,7 +474,7 @@ void add_hil_command(CLI::App& app, Session& session) {
       "Examples:\n  tpm hil run configs/hil_omega7.json --device virtual -o session.tpmrec\n"
       "  tpm fit recording.csv --folder fitted && tpm hil run configs/hil_omega7.json --law "
       "fitted/law.json\n"
-      "  tpm hil run session.json --device inverse3 --device-file inverse.json");
+      "  tpm hil run configs/hil_inverse3.json --device inverse3 --device-file inverse.json");
   set_run(*run, session, [choice, &session] { return run_hil(*choice, session); });
 
   add_hil_serve_command(*hil, session);

@@ -118,13 +118,25 @@ TEST_CASE("Forces of one message add up, and other commands are read") {
   CHECK(neutral.damping == 0.0);
   CHECK(neutral.preset == kCentredPreset);
   CHECK_FALSE(parse_command("{}", "a").force_N);
+  CHECK(parse_command(press_message(0b110U), "a").buttons == 0b110U);
+  CHECK(parse_command(press_message(0), "a").buttons == 0U);
+  // Another grip, or a command that is none here, presses nothing.
+  for (const char* other :
+       {R"({"wireless_verse_grip":[{"device_id":"61548","commands":{"set_buttons":{"a":true}}}]})",
+        R"({"wireless_verse_grip":[{"device_id":"SIMULATED_GRIP","commands":{"vibrate":{}}}]})",
+        R"({"wireless_verse_grip":[{}]})"}) {
+    CHECK_FALSE(parse_command(other, "a").buttons);
+  }
 }
 
 TEST_CASE("What a server writes, a client reads as it was") {
   InverseInventory all = parse_inventory(kInventory);
   all.devices[0].simulated = true;
   const std::string text = inventory_message(all);
-  CHECK_THAT(text, Contains("SIMULATED DEVICE"));
+  CHECK_THAT(text, Contains("SIMULATED DEVICE") && Contains("SIMULATED_GRIP"));
+  all.devices[0].simulated = false;  // hardware says of itself what it is
+  CHECK_FALSE(Contains("SIMULATED").match(inventory_message(all)));
+  all.devices[0].simulated = true;
   const InverseInventory again = parse_inventory(text);
   CHECK(again.session == all.session);
   const InverseDeviceEntry &before = all.devices[0], &after = again.devices.at(0);

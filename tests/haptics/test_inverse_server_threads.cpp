@@ -279,8 +279,14 @@ TEST_CASE("A client that does not read is closed, and connections are counted") 
     all.push_back(served.client());
   }
   all.push_back(served.client());
-  CHECK_THROWS_AS(served.client(), Error);  // the ninth
-  CHECK(served.server->counts().refused == 1);
+  CHECK_THROWS_WITH(served.client(), Contains("it answers '503' in place of an upgrade"));
+  CHECK(served.server->counts().refused == 1);  // the ninth
+  // On the port of events as well.
+  CHECK_THROWS_WITH(WebSocketClient(served.server->events_port(), "/", kSoon_s, kMostMessageBytes),
+                    Contains("it answers '503' in place of an upgrade"));
+  const test::RawClient raw(served.server->port());
+  CHECK_THAT(raw.answer(kSoon_s), Contains("HTTP/1.1 503 Service Unavailable") &&
+                                      Contains("\r\n\r\n8 connections are open\n"));
   CHECK_THROWS_AS(served.client(), Error);
   CHECK(std::ranges::count_if(served.lines(), [](const std::string& line) {
           return line.starts_with("8 connections are open");
@@ -309,6 +315,9 @@ TEST_CASE("The server answers programs and its own page on this machine, and nob
   CHECK_THAT(answer(host), Contains("SIMULATED DEVICE"));
   CHECK_THAT(answer(host, "POST / HTTP/1.1"), Contains("405 "));
   CHECK_THAT(answer(host, "GET /etc/passwd HTTP/1.1"), Contains("404 "));
+  CHECK_THAT(answer(host + "Transfer-Encoding: chunked\r\n", "POST /devices HTTP/1.1"),
+             Contains("501 Not Implemented") &&
+                 Contains("\r\n\r\na body in chunks (Transfer-Encoding) is not read\n"));
   CHECK_THAT(answer("\x01\x02\r\n"), Contains("400 "));
   CHECK_THAT(http_exchange(port, "/version", "", kSoon_s), Contains("SIMULATED DEVICE"));
   CHECK(parse_version(http_exchange(port, "/3.0/version", "", kSoon_s)) == "3.5.0.0");
@@ -319,7 +328,7 @@ TEST_CASE("The server answers programs and its own page on this machine, and nob
   const std::vector<std::string> lines = served.lines();
   CHECK(std::ranges::count_if(lines, [](const std::string& line) {
           return line.find("refused: ") != std::string::npos;
-        }) == 5);
+        }) == 6);
 }
 
 TEST_CASE("A port that is taken is named with its option") {

@@ -23,7 +23,8 @@ TEST_CASE("schema and reader of a session agree on odd ones", "[keys]") {
       {of_source("configs/hil_liver.json"), of_source("configs/hil_law.json"),
        of_source("configs/hil_planned.json"), of_source("configs/hil_surface.json"),
        of_source("configs/hil_fine.json"), of_source("configs/hil_omega7.json"),
-       example_of(session_kind())},
+       of_source("configs/hil_inverse3.json"), of_source("configs/hil_inverse3_free.json"),
+       of_source("configs/hil_inverse3_held.json"), example_of(session_kind())},
       test::kOddDocuments);
 }
 

@@ -7,6 +7,18 @@
 namespace tpm::haptics {
 namespace {
 
+TEST_CASE("A body in chunks is put together, and a part of one is none") {
+  CHECK(unchunked("2\r\n{}\r\n0\r\n\r\n") == "{}");
+  CHECK(unchunked("3;name=value\r\n[1,\r\nA\r\n0123456789\r\n0\r\n\r\n") == "[1,0123456789");
+  CHECK(unchunked("0\r\n\r\n") == "");
+  for (const char* part :
+       {"", "2\r\n{", "2\r\n{}", "2\r\n{}\r\n", "2\r\n{}xx0\r\n\r\n", "x\r\n", "-1\r\n",
+        "ffffffffffffffff\r\n{}\r\n", "fffffffffffffffff\r\n{}\r\n", " 2\r\n{}\r\n0\r\n\r\n"}) {
+    CAPTURE(part);
+    CHECK_FALSE(unchunked(part));
+  }
+}
+
 using namespace std::string_literals;
 
 constexpr FrameMask kMask = {0x37, 0xFA, 0x21, 0x3D};  // of the RFC's examples

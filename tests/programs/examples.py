@@ -144,6 +144,13 @@ def no_recording(tpm, work):
     check(run.stderr.endswith("tpm data show literature_values\n"), run.stderr)
 
 
+def example_client(tpm, work):
+    """The client of tpm hil serve is installed, too, and needs nothing but Python."""
+    client = tpm.file.parent.parent / "share/tpmkit/examples/inverse_client.py"
+    run = subprocess.run([sys.executable, client, "--help"], cwd=work, capture_output=True, text=True, check=False)
+    check(run.returncode == 0 and "--messages" in run.stdout, run.stderr)
+
+
 def main():
     program_build = Path(sys.argv[2])
     with tempfile.TemporaryDirectory() as name:
@@ -157,6 +164,7 @@ def main():
         without_permission(tpm, work)
         shipped_stand_in(tpm, work)
         no_recording(tpm, work)
+        example_client(tpm, work)
     for fault in FAULTS:
         print(fault)
     print(f"{len(FAULTS)} faults")

@@ -19,7 +19,6 @@
 #include <thread>
 #include <vector>
 
-#include "hil_scenes.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
@@ -85,31 +84,21 @@ inline bool until(const std::function<bool()>& met, double seconds) {
   return met();
 }
 
+inline Json shipped(const std::string& name) {
+  return files::read_json(std::string(TPM_TEST_SOURCE_DIR "/configs/") + name);
+}
+
 /// A device and a hand, behind a tissue that is next to nothing.
 inline Json served(int late_periods, bool held) {
-  Json json = short_session();
-  for (const char* modulus : {"E1", "E2", "Eprime"}) {
-    json["model"]["scene"]["material"][modulus] = "10 Pa";
-  }
-  json["model"]["scene"]["material"]["eta1"] = "20 Pa s";
-  json["virtual_device"] = {{"delay_periods", late_periods}, {"arm_set_point", "-4 mm"}};
-  if (!held) {
-    json["virtual_device"].update(
-        {{"arm_mass_kg", 0.0}, {"arm_damping_N_s_per_m", 0.0}, {"arm_stiffness", "0 N/m"}});
-  }
+  Json json = shipped(held ? "hil_inverse3_held.json" : "hil_inverse3_free.json");
+  json["virtual_device"]["delay_periods"] = late_periods;
   return json;
 }
 
 /// What the client renders: within the limits of the device, patient with a busy machine.
 inline Json rendered() {
-  Json json = short_session();
-  for (const char* modulus : {"E1", "E2", "Eprime"}) {
-    json["model"]["scene"]["material"][modulus] = "4 kPa";
-  }
-  json["model"]["scene"]["material"]["eta1"] = "8e3 Pa s";
-  json.erase("creep");
-  json["limits"] = {
-      {"force", "3 N"}, {"watchdog", "16 ms"}, {"cycle_timeout", "1 s"}, {"late_cycles", 1000}};
+  Json json = shipped("hil_inverse3.json");
+  json["limits"].update({{"watchdog", "16 ms"}, {"cycle_timeout", "1 s"}, {"late_cycles", 1000}});
   return json;
 }
 

@@ -50,8 +50,12 @@ struct StandInFaults {
     other_device,
     close,
     drop_every_third,
-    workspace
+    workspace,
+    gate,         ///< it renders, and reports, `rendered` of a force
+    gate_unseen,  ///< it renders as much, and reports the command
+    no_report     ///< its states name no force
   } how = How::silence;
+  double rendered = 0.5;  ///< of a force, of How::gate and How::gate_unseen after `from`
   /// In each state, of How::workspace after `from`.
   std::string transform = R"({"scale":{"x":10,"y":10,"z":10}})";
 };
@@ -102,7 +106,7 @@ class StandInInverse {
   VirtualPlant plant_;
   std::int64_t lived_until_ns_ = 0;
   double largest_N_ = 0.0;
-  Eigen::Vector3d last_N_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d last_N_ = Eigen::Vector3d::Zero(), rendered_N_ = last_N_;
   std::string last_profile_;
   InverseFormat last_format_ = InverseFormat::vector;
   std::uint32_t buttons_ = 0;
@@ -344,13 +348,16 @@ inline std::optional<std::vector<std::string>> StandInInverse::answer(const std:
           text.find("\"values\"") == text.npos ? InverseFormat::vector : InverseFormat::values;
       last_N_ = *command.force_N;
       largest_N_ = std::max(largest_N_, last_N_.norm());
-      (void)plant_.command(last_N_);
+      const bool gates = faults_.from > 0 && forces_ >= faults_.from &&
+                         (faults_.how == How::gate || faults_.how == How::gate_unseen);
+      rendered_N_ = gates ? Eigen::Vector3d(faults_.rendered * last_N_) : last_N_;
+      (void)plant_.command(rendered_N_);
       if (!on_the_clock_) plant_.advance();
     }
     state.position_m = plant_.measured_m();
     if (set_.preset != kCentredPreset) state.position_m += stand_in::kCentre_m;
     state.velocity_m_per_s = plant_.velocity_m_per_s();
-    state.force_N = last_N_;
+    state.force_N = faults_.how == How::gate_unseen ? last_N_ : rendered_N_;
     state.has_grip = true;
     state.grip = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
     state.buttons = buttons_;
@@ -373,6 +380,10 @@ inline std::optional<std::vector<std::string>> StandInInverse::answer(const std:
     const std::string before = "\"state\":{";
     said.replace(said.find(before), before.size(),
                  before + "\"transform\":" + faults_.transform + ",");
+  }
+  if (faults_.how == How::no_report) {
+    const std::string name = "\"current_cursor_force\"";
+    said.replace(said.find(name), name.size(), "\"unnamed\"");
   }
   return std::vector<std::string>{said};
 }

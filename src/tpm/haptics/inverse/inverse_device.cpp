@@ -1,7 +1,6 @@
 #include "tpm/haptics/inverse/inverse_device.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -11,22 +10,18 @@
 #include <chrono>
 #include <cstring>
 
+#include "tpm/haptics/inverse/service_terms.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 namespace {
 
-constexpr double kPatience_s = 2.0;  // of everything before a session
 constexpr double kMessagesPerPeriod = 4.0;
 constexpr double kMostUnanswered_s = 0.004;  // after which another message is sent
 constexpr int kMostUnreadable = 20;          // in a row
 constexpr std::int64_t kLookForEvents_ns = 2'000'000;
-constexpr std::string_view kProfile = "org.tpmkit:tpm-hil";
-
-Error service_fault(std::string_view what, std::string_view expected) {
-  return {ExitCode::environment, "inverse3", what, expected};
-}
+constexpr double kMoved_m = 1e-6;
 
 double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
   return static_cast<double>(to_ns - from_ns) * 1e-9;
@@ -47,12 +42,9 @@ bool same_id(std::string_view a, std::string_view b) {
       a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
-constexpr double kTurned_rad = 1e-6, kMoved_m = 1e-6, kScaled = 1e-9;
-
-/// A metre and a direction of the program are those of the device.
-bool is_true(const InverseState& s) {
-  return s.workspace_scale.isApprox(Eigen::Vector3d::Ones(), kScaled) &&
-         s.workspace_rotation.angularDistance(Eigen::Quaterniond::Identity()) < kTurned_rad;
+Eigen::Vector3d limited(const Eigen::Vector3d& force_N, double most_N) noexcept {
+  const double size_N = force_N.norm();
+  return size_N <= most_N ? force_N : Eigen::Vector3d(force_N * (most_N / size_N));
 }
 
 std::string words_of(const InverseEvent& event) {
@@ -62,16 +54,6 @@ std::string words_of(const InverseEvent& event) {
 
 }  // namespace
 
-InverseInventory inverse_inventory(const InverseAddress& address) {
-  WebSocketClient service(address.port, "/", kPatience_s, kMostInventoryBytes);
-  const std::optional<std::string> text = service.receive(kPatience_s);
-  if (!text) {
-    throw service_fault(service.over().empty() ? "the service is silent" : service.over(),
-                        "a service that begins with its inventory");
-  }
-  return parse_inventory(*text);
-}
-
 InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits)
     : address_(std::move(address)),
       limits_(limits),
@@ -80,176 +62,6 @@ InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits)
 InverseDevice::~InverseDevice() {
   stop();
   if (messages_.joinable()) messages_.join();
-}
-
-std::string InverseDevice::take_text(double timeout_s) {
-  std::optional<std::string> text = service_->receive(timeout_s);
-  if (text) return std::move(*text);
-  throw service_fault(service_->over().empty() ? "the service is silent" : service_->over(),
-                      "a service that answers each message");
-}
-
-/// The device that is meant, of those in the inventory.
-void InverseDevice::choose(const InverseInventory& inventory) {
-  std::vector<std::string> ids;
-  const InverseDeviceEntry* meant = nullptr;
-  for (const InverseDeviceEntry& entry : inventory.devices) {
-    ids.push_back(entry.id);
-    if (address_.device_id.empty() ? inventory.devices.size() == 1
-                                   : entry.id == address_.device_id) {
-      meant = &entry;
-    }
-  }
-  if (meant == nullptr) {
-    throw service_fault(fmt::format("the service has {} such devices{}", ids.size(),
-                                    ids.empty() ? "" : fmt::format(": {}", fmt::join(ids, ", "))),
-                        "one device, or --inverse-id with one of them");
-  }
-  session_ = inventory.session;
-  device_ = *meant;
-}
-
-/// What the service says of its devices now, as this session sees them.
-InverseInventory InverseDevice::read_back() {
-  if (format_ == InverseFormat::vector) {
-    return parse_inventory(http_exchange(
-        address_.port, fmt::format("/devices?session=%23{}", session_), "", kPatience_s));
-  }
-  return parse_inventory(http_exchange(address_.old_http_port, "/3.0/devices", "", kPatience_s));
-}
-
-void InverseDevice::make_neutral() {
-  while (service_->receive(0.0)) {
-    // States that nobody has asked for answer nothing.
-  }
-  if (!service_->send(neutral_message(device_.id, kProfile))) (void)take_text(0.0);
-  device_.state = parse_state(take_text(kPatience_s), device_.id);
-  learn_settings();
-  const std::vector<InverseRequest> requests =
-      neutral_requests(format_, device_.id, session_, device_.settings, address_.gravity_carried);
-  for (const InverseRequest& request : requests) {
-    try {
-      (void)http_exchange(format_ == InverseFormat::vector ? address_.port : address_.old_http_port,
-                          request.target, request.body, kPatience_s);
-    } catch (const Error&) {
-      // What the service says below counts, not what it answers here.
-    }
-  }
-  if (!requests.empty()) learn_settings();
-  require_neutral();
-}
-
-/// What acts on a force or a coordinate, as the service says now.
-void InverseDevice::learn_settings() {
-  const InverseInventory now = read_back();
-  const auto found = std::ranges::find(now.devices, device_.id, &InverseDeviceEntry::id);
-  if (found == now.devices.end()) {
-    throw service_fault("the settings cannot be read back: the device is not listed", "");
-  }
-  device_.settings = found->settings;
-}
-
-void InverseDevice::require_neutral() const {
-  const InverseSettings& s = device_.settings;
-  if (!s.preset.empty() && s.preset != kCentredPreset) {
-    throw service_fault(
-        fmt::format("the preset of the service stays at '{}'", printable(s.preset)),
-        fmt::format("'{}': positions count from the middle of the workspace", kCentredPreset));
-  }
-  if (s.basis != "XYZ") {
-    throw service_fault(fmt::format("the service exchanges axes: basis {}", printable(s.basis)),
-                        "basis XYZ");
-  }
-  const double turned_rad = s.mount_rotation.angularDistance(Eigen::Quaterniond::Identity());
-  if (!(turned_rad < kTurned_rad)) {
-    throw service_fault(fmt::format("the service turns coordinates: a mount by {} rad", turned_rad),
-                        "a mount that is not turned");
-  }
-  if (!s.filters_named || !s.damping_named) {
-    throw service_fault(
-        fmt::format("the service of version {} does not say what its {} does to a force", version_,
-                    s.filters_named ? "damping" : "force gate"),
-        "a service that lists both filters: install version 3.5 or later");
-  }
-  if (s.force_gate_gain != 0.0) {
-    throw service_fault(
-        fmt::format("the force gate of the service stays at {}", s.force_gate_gain),
-        "a service whose force gate can be set to 0: it changes forces on their way to the hand");
-  }
-  if (s.gravity_named && s.carried() != address_.gravity_carried) {
-    throw service_fault(
-        fmt::format("the service stays at carrying {} of the device's weight", s.carried()),
-        fmt::format("{}, or --inverse-gravity with what it keeps", address_.gravity_carried));
-  }
-  if (s.damping != 0.0 || !s.directional_damping.isZero()) {
-    throw service_fault(fmt::format("the damping of the service stays at {}, by direction {}",
-                                    s.damping, fmt::join(s.directional_damping, " ")),
-                        "a service whose damping can be set to 0");
-  }
-}
-
-void InverseDevice::identify() {
-  identity_ = {};
-  identity_.kind = std::string(limits_.kind);
-  identity_.name = device_.type.empty() ? "Inverse3" : device_.type;
-  identity_.serial = device_.id;
-  identity_.firmware = device_.firmware;
-  identity_.library = fmt::format("service on port {}", address_.port);
-  identity_.library_version = fmt::format("service {}, format '{}'", version_, word_of(format_));
-  identity_.link = DeviceLink::network;
-  identity_.left_handed = device_.settings.handedness == "left";
-  identity_.hardware = !device_.simulated;
-  identity_.assumptions = device_.settings.lines();
-  if (events_ == nullptr) {
-    identity_.assumptions.push_back("events of the service are not heard: its version has none");
-  }
-  identity_.assumptions.push_back(
-      fmt::format("at most {} N ({})", limits_.force_N, limits_.known_by("force_N")));
-  identity_.assumptions.push_back(fmt::format("{} mm from the middle of the workspace ({})",
-                                              1e3 * limits_.reach_m, limits_.known_by("reach_m")));
-  identity_.assumptions.push_back(fmt::format("at most {} N/m ({})", limits_.stiffness_N_per_m,
-                                              limits_.known_by("stiffness_N_per_m")));
-}
-
-const DeviceIdentity& InverseDevice::open() {
-  const auto version_at = [](int port, const char* target) -> std::string {
-    try {
-      return parse_version(http_exchange(port, target, "", kPatience_s));
-    } catch (const Error&) {
-      return {};
-    }
-  };
-  // The WebSocket first: where nobody listens at all, its message says so.
-  service_ =
-      std::make_unique<WebSocketClient>(address_.port, "/", kPatience_s, kMostInventoryBytes);
-  version_ = version_at(address_.port, "/version");
-  if (version_.empty()) version_ = version_at(address_.port, "/3.0/version");
-  if (version_.empty()) version_ = version_at(address_.old_http_port, "/3.0/version");
-  if (version_.empty()) {
-    throw service_fault(
-        fmt::format("no version is told on ports {} and {}", address_.port, address_.old_http_port),
-        "GET /version or /3.0/version");
-  }
-  format_ = format_of_version(version_);
-  choose(parse_inventory(take_text(kPatience_s)));
-  if (format_ == InverseFormat::vector) {
-    events_ = std::make_unique<WebSocketClient>(address_.events_port, "/", kPatience_s,
-                                                kMostMessageBytes);
-  }
-  make_neutral();
-  if (!device_.settings.true_to_scale() ||
-      !device_.state.workspace_scale.isApprox(Eigen::Vector3d::Ones(), kScaled)) {
-    throw service_fault("the service scales coordinates", "a mount and a workspace of scale 1");
-  }
-  const double turned_rad =
-      device_.state.workspace_rotation.angularDistance(Eigen::Quaterniond::Identity());
-  if (!(turned_rad < kTurned_rad)) {
-    throw service_fault(
-        fmt::format("the service turns coordinates: a workspace by {} rad", turned_rad),
-        "a workspace that is not turned");
-  }
-  identify();
-  return identity_;
 }
 
 void InverseDevice::prepare(const DevicePreparation& preparation) {
@@ -273,6 +85,8 @@ void InverseDevice::prepare(const DevicePreparation& preparation) {
                         "a service that answers each message");
   }
   seen_ = answer_.latest();
+  written_ = 0;
+  forces_.begin(session_ns());
 }
 
 /// A position of now: open() may be long ago.
@@ -306,11 +120,7 @@ Eigen::Vector3d InverseDevice::force_to_send() noexcept {
     fail(ForcesOff::watchdog, "no command in the watchdog's time");
     return Eigen::Vector3d::Zero();
   }
-  const double size_N = order.force_N.norm();
-  if (!(size_N <= preparation_.max_force_N)) {
-    return Eigen::Vector3d(order.force_N * (preparation_.max_force_N / size_N));
-  }
-  return order.force_N;
+  return limited(order.force_N, preparation_.max_force_N);
 }
 
 /// One message and the states that come; false if none came in time.
@@ -341,7 +151,8 @@ void InverseDevice::take_state(const std::string& text) {
     const InverseState state = parse_state(text, device_.id);
     unreadable_in_a_row_ = 0;
     if (!workspace_m_) workspace_m_ = state.workspace_position_m;
-    if (!is_true(state) || !((state.workspace_position_m - *workspace_m_).norm() < kMoved_m)) {
+    if (!is_scaled_as_device(state) || !is_turned_as_device(state) ||
+        !((state.workspace_position_m - *workspace_m_).norm() < kMoved_m)) {
       // Another program may set the workspace of this session: the surface would be elsewhere.
       fail(ForcesOff::software, "the service has moved, turned or scaled the workspace");
       return;
@@ -425,7 +236,14 @@ void InverseDevice::say_goodbye() noexcept {
 
 DeviceAnswer InverseDevice::read(Eigen::Vector3d& position_m) noexcept {
   const bool newer = answer_.refresh();
-  if (newer) seen_ = answer_.latest();
+  if (newer) {
+    seen_ = answer_.latest();
+    if (!seen_.state.force_named) {
+      forces_.no_report();
+    } else {
+      forces_.report(seen_.state.force_N, session_ns());
+    }
+  }
   const double age_s = seconds_between(seen_.asked_ns, now_ns());
   if (preparation_.real_time && age_s > preparation_.watchdog_s) {
     fail(ForcesOff::unplugged, "the service sends no state");
@@ -442,6 +260,8 @@ DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
   if (cut_ || fault_ != ForcesOff::none) return DeviceAnswer::failed;
   const bool clipped = force_N.norm() > preparation_.max_force_N;
   if (clipped) ++status_.saturations;
+  ++written_;
+  forces_.command(limited(force_N, preparation_.max_force_N), session_ns());
   order_.write({force_N, now_ns()});
   if (preparation_.real_time) {
     orders_.fetch_add(1, std::memory_order_release);
@@ -469,6 +289,17 @@ DeviceStatus InverseDevice::status() noexcept {
     std::memcpy(status_.error_text, fault_words_.data(), sizeof status_.error_text);
   }
   return status_;
+}
+
+/// Time for the comparison of forces. In virtual time the clock says nothing.
+std::int64_t InverseDevice::session_ns() const noexcept {
+  if (preparation_.real_time) return now_ns();
+  return static_cast<std::int64_t>(static_cast<double>(written_) * preparation_.period_s * 1e9);
+}
+
+std::vector<std::string> InverseDevice::findings() const {
+  const std::string found = forces_.finding();
+  return found.empty() ? std::vector<std::string>() : std::vector<std::string>{found};
 }
 
 HandState InverseDevice::hand() noexcept {

@@ -5,8 +5,10 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/inverse/force_comparison.hpp"
 #include "tpm/haptics/inverse/loopback.hpp"
 #include "tpm/haptics/inverse/messages.hpp"
 #include "tpm/haptics/inverse/unanswered_messages.hpp"
@@ -42,7 +44,8 @@ struct InverseAddress {
 ///
 /// open() makes force gate and damping of the service 0, lets it carry the device's weight, and
 /// reads all back; a service in which one of them stays or is not told, or in another scale, is
-/// refused. A workspace that is moved, turned or scaled later ends the session.
+/// refused. A workspace that is moved, turned or scaled later ends the session. A reported force
+/// that is not the commanded one is a finding (ForceComparison).
 class InverseDevice final : public HapticDevice {
  public:
   /// @param limits named in the identity with what they are known by
@@ -56,6 +59,7 @@ class InverseDevice final : public HapticDevice {
   DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
   DeviceStatus status() noexcept override;
   HandState hand() noexcept override;
+  std::vector<std::string> findings() const override;
   void stop() noexcept override;
   void cut_forces() noexcept override;
 
@@ -91,6 +95,7 @@ class InverseDevice final : public HapticDevice {
   void fail(ForcesOff cause, std::string_view words) noexcept;
   void say_goodbye() noexcept;
   void wake() noexcept;
+  [[nodiscard]] std::int64_t session_ns() const noexcept;
 
   InverseAddress address_;
   const DeviceLimits limits_;
@@ -105,6 +110,8 @@ class InverseDevice final : public HapticDevice {
   // Of the loop's thread.
   DeviceStatus status_;
   Seen seen_;
+  ForceComparison forces_;
+  std::int64_t written_ = 0;  ///< forces
   // Between the loop and the thread of the messages.
   TripleBuffer<Order> order_;
   TripleBuffer<Seen> answer_;

@@ -178,7 +178,10 @@ std::string http_exchange(int port, std::string_view target, std::string_view bo
     throw port_fault(port, fmt::format("answers {} with '{}'", target,
                                        printable(head ? head->start[1] : answer)));
   }
-  return answer.substr(answer.find("\r\n\r\n") + 4);
+  std::string said = answer.substr(answer.find("\r\n\r\n") + 4);
+  if (!head->lists("transfer-encoding", "chunked")) return said;
+  if (const std::optional<std::string> whole = unchunked(said)) return *whole;
+  throw port_fault(port, fmt::format("answers {} with a part of its chunks", target));
 }
 
 WebSocketClient::WebSocketClient(int port, std::string_view target, double timeout_s,

@@ -7,32 +7,14 @@
 #include <functional>
 
 #include "tpm/files/json.hpp"
+#include "tpm/haptics/inverse/message_keys.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 namespace {
 
-/// The names of the protocol, each once: readers and writers use these.
-namespace key {
-constexpr const char *device = "inverse3", *id = "device_id", *config = "config", *state = "state",
-                     *commands = "commands", *configure = "configure", *session = "session",
-                     *session_id = "session_id", *force = "set_cursor_force",
-                     *place = "set_cursor_position", *position = "position",
-                     *cursor_position = "cursor_position", *cursor_velocity = "cursor_velocity",
-                     *cursor_force = "current_cursor_force", *gate = "force_gate", *gain = "gain",
-                     *damping = "damping", *scalar = "scalar", *vector = "vector",
-                     *values = "values", *profile = "profile", *name = "name",
-                     *simulated = "simulated_device", *orientation = "orientation",
-                     *buttons = "buttons", *version = "project_version", *filters = "filters",
-                     *handedness = "handedness", *preset = "preset", *basis = "basis",
-                     *permutation = "permutation", *mount = "mount", *rotation = "rotation",
-                     *scale = "scale", *gravity = "gravity_compensation", *enabled = "enabled",
-                     *factor = "scaling_factor", *torque = "torque_scaling";
-}  // namespace key
+namespace key = inverse_key;
 
-constexpr const char* kGrips[] = {"wireless_verse_grip", "verse_grip", "custom_verse_grip"};
-constexpr const char* kButtons[][2] = {{"a", "button_0"}, {"b", "button_1"}, {"c", "button_2"}};
-constexpr const char* kSimulatedWords = "SIMULATED DEVICE";
 constexpr std::size_t kMostCharacters = 64;  // of an identifier
 constexpr double kMostNumber = 1e6;          // metres, newtons and the like
 
@@ -114,6 +96,7 @@ InverseState state_of(const Part& state) {
   read.position_m = state.at(key::cursor_position).vector();
   read.velocity_m_per_s = vector_or_zero(state, key::cursor_velocity);
   read.force_N = vector_or_zero(state, key::cursor_force);
+  read.force_named = state.has(key::cursor_force);
   if (!state.has("transform")) return read;
   const Part workspace = state.at("transform");
   read.workspace_position_m = vector_or_zero(workspace, key::position);
@@ -124,9 +107,19 @@ InverseState state_of(const Part& state) {
   return read;
 }
 
+std::uint32_t buttons_of(const Part& said) {
+  std::uint32_t buttons = 0;
+  for (std::uint32_t i = 0; i < std::size(key::button_names); ++i) {
+    for (const char* name : key::button_names[i]) {
+      if (said.has(name) && said.at(name).flag()) buttons |= 1U << i;
+    }
+  }
+  return buttons;
+}
+
 /// Of the first grip that a message lists.
 void add_grip(InverseState& state, const Part& message) {
-  for (const char* kind : kGrips) {
+  for (const char* kind : key::grips) {
     if (!message.has(kind)) continue;
     message.at(kind).each([&](const Part& grip) {
       if (state.has_grip || !grip.has(key::state)) return;
@@ -134,12 +127,7 @@ void add_grip(InverseState& state, const Part& message) {
       state.has_grip = true;
       if (said.has(key::orientation)) state.grip = said.at(key::orientation).quaternion();
       if (!said.has(key::buttons)) return;
-      const Part pressed = said.at(key::buttons);
-      for (std::uint32_t i = 0; i < std::size(kButtons); ++i) {
-        for (const char* name : kButtons[i]) {
-          if (pressed.has(name) && pressed.at(name).flag()) state.buttons |= 1U << i;
-        }
-      }
+      state.buttons = buttons_of(said.at(key::buttons));
     });
   }
 }
@@ -192,68 +180,11 @@ InverseDeviceEntry entry_of(const Part& part) {
     }
   }
   // Anything else than these words is no word of a simulation: hardware keeps its guards.
-  entry.simulated = config.has(key::simulated) && config.at(key::simulated).is(kSimulatedWords);
+  entry.simulated =
+      config.has(key::simulated) && config.at(key::simulated).is(key::simulated_words);
   entry.settings = settings_of(config);
   entry.state = state_of(part.at(key::state));
   return entry;
-}
-
-std::string vector_text(const Eigen::Vector3d& v) {
-  return fmt::format(R"({{"x":{},"y":{},"z":{}}})", v.x(), v.y(), v.z());
-}
-
-std::string quaternion_text(const Eigen::Quaterniond& q) {
-  return fmt::format(R"({{"w":{},"x":{},"y":{},"z":{}}})", q.w(), q.x(), q.y(), q.z());
-}
-
-std::string json_text(std::string_view text) {
-  return Json(std::string(text)).dump();
-}
-
-std::string state_text(const InverseState& state) {
-  return fmt::format(
-      R"({{"cursor_position":{},"cursor_velocity":{},"current_cursor_force":{},"control_domain":)"
-      R"("cartesian","control_mode":"force"}})",
-      vector_text(state.position_m), vector_text(state.velocity_m_per_s),
-      vector_text(state.force_N));
-}
-
-std::string grips_text(const InverseState& state) {
-  if (!state.has_grip) return {};
-  std::string pressed;
-  for (std::uint32_t i = 0; i < std::size(kButtons); ++i) {
-    pressed += fmt::format(R"({}"{}":{})", i == 0 ? "" : ",", kButtons[i][0],
-                           (state.buttons >> i & 1U) != 0);
-  }
-  return fmt::format(
-      R"(,"{}":[{{"device_id":"grip","state":{{"orientation":{},"buttons":{{{}}}}}}}])", kGrips[0],
-      quaternion_text(state.grip), pressed);
-}
-
-std::string session_text(std::string_view profile) {
-  if (profile.empty()) return {};
-  return fmt::format(R"("session":{{"configure":{{"profile":{{"name":{}}}}}}},)",
-                     json_text(profile));
-}
-
-std::string config_text(const InverseDeviceEntry& d) {
-  const InverseSettings& s = d.settings;
-  return fmt::format(
-      R"({{"type":{},{}"device_info":{{"major_version":0,"minor_version":0,"id":{}}},)"
-      R"("gravity_compensation":{{"enabled":{},"scaling_factor":{}}},"handedness":{},)"
-      R"("torque_scaling":{{"enabled":{}}},"preset":{},"basis":{{"permutation":{}}},)"
-      R"("mount":{{"position":{},"rotation":{},"scale":{}}},)"
-      R"("filters":{{"force_gate":{{"gain":{}}},"damping":{{"scalar":{},"vector":{}}}}}}})",
-      json_text(d.type),
-      d.simulated ? fmt::format(R"("{}":"{}",)", key::simulated, kSimulatedWords) : std::string(),
-      json_text(d.id), s.gravity_compensation, s.gravity_scaling, json_text(s.handedness),
-      s.torque_scaling.value_or(false), json_text(s.preset), json_text(s.basis),
-      vector_text(s.mount_position_m), quaternion_text(s.mount_rotation),
-      vector_text(s.mount_scale), s.force_gate_gain, s.damping, vector_text(s.directional_damping));
-}
-
-std::string status_text(bool simulated) {
-  return simulated ? fmt::format(R"({{"{}":"{}"}})", key::simulated, kSimulatedWords) : "{}";
 }
 
 }  // namespace
@@ -352,6 +283,14 @@ InverseCommand parse_command(std::string_view text, std::string_view device_id) 
       command.profile = session.at(key::configure).at(key::profile).at(key::name).text();
     }
   }
+  if (message.has(key::grips[0])) {
+    message.at(key::grips[0]).each([&](const Part& grip) {
+      if (!grip.has(key::id) || !grip.at(key::id).is(kSimulatedGrip)) return;
+      if (!grip.has(key::commands)) return;
+      const Part said = grip.at(key::commands);
+      if (said.has(key::set_buttons)) command.buttons = buttons_of(said.at(key::set_buttons));
+    });
+  }
   if (!message.has(key::device)) return command;
   message.at(key::device).each([&](const Part& part) {
     if (part.at(key::id).text() != device_id) {
@@ -398,103 +337,6 @@ InverseEvent parse_event(std::string_view text) {
   if (data.has(key::id)) read.device_id = data.at(key::id).words();
   if (data.has("safety_type")) read.safety_type = data.at("safety_type").words();
   return read;
-}
-
-std::string force_message(InverseFormat format, std::string_view device_id,
-                          const Eigen::Vector3d& force_N, std::string_view profile) {
-  return fmt::format(
-      R"({{{}"inverse3":[{{"device_id":{},"commands":{{"set_cursor_force":{{"{}":{}}}}}}}]}})",
-      session_text(profile), json_text(device_id), word_of(format), vector_text(force_N));
-}
-
-std::string neutral_message(std::string_view device_id, std::string_view profile) {
-  return fmt::format(R"({{{}"inverse3":[{{"device_id":{},"configure":{{"preset":{{"preset":"{}"}},)"
-                     R"("force_gate":{{"gain":0}},"damping":{{"scalar":0,"vector":{}}}}},)"
-                     R"("commands":{{"probe_position":{{}}}}}}]}})",
-                     session_text(profile), json_text(device_id), kCentredPreset,
-                     vector_text(Eigen::Vector3d::Zero()));
-}
-
-std::string probe_message(std::string_view device_id) {
-  return fmt::format(R"({{"inverse3":[{{"device_id":{},"commands":{{"probe_position":{{}}}}}}]}})",
-                     json_text(device_id));
-}
-
-std::vector<InverseRequest> neutral_requests(InverseFormat format, std::string_view device_id,
-                                             std::int64_t session, const InverseSettings& settings,
-                                             double carried) {
-  const InverseSettings& s = settings;
-  std::vector<InverseRequest> all;
-  if (s.gravity_named && s.carried() != carried) {
-    // Before 3.5 under other names, and none of them in the device's path.
-    if (format == InverseFormat::values) {
-      all.push_back({"/gravity_compensation",
-                     fmt::format(R"({{"device_id":{},"enable":{},"gravity_scaling_factor":{}}})",
-                                 json_text(device_id), carried > 0.0, carried)});
-    } else {
-      all.push_back(
-          {fmt::format("/inverse3/{}/config/gravity_compensation", device_id),
-           fmt::format(R"({{"enabled":{},"scaling_factor":{}}})", carried > 0.0, carried)});
-    }
-  }
-  if (format == InverseFormat::values) return all;
-  const auto of_session = [&](const char* name, std::string body) {
-    all.push_back({fmt::format("/inverse3/{}/config/{}?session=%23{}", device_id, name, session),
-                   std::move(body)});
-  };
-  if (!s.preset.empty() && s.preset != kCentredPreset) {
-    of_session(key::preset, fmt::format(R"({{"preset":"{}"}})", kCentredPreset));
-  }
-  if (s.basis != "XYZ") of_session(key::basis, R"({"permutation":"XYZ"})");
-  const bool turned = s.mount_rotation.angularDistance(Eigen::Quaterniond::Identity()) != 0.0;
-  // A mount beside a preset is ambiguous to the service.
-  if (s.preset.empty() && (turned || !s.true_to_scale())) {
-    of_session(key::mount,
-               fmt::format(R"({{"transform":{{"position":{},"rotation":{},"scale":{}}}}})",
-                           vector_text(s.mount_position_m),
-                           quaternion_text(Eigen::Quaterniond::Identity()),
-                           vector_text(Eigen::Vector3d::Ones())));
-  }
-  if (s.force_gate_gain != 0.0) of_session(key::gate, R"({"gain":0})");
-  if (s.damping != 0.0 || !s.directional_damping.isZero()) {
-    of_session(key::damping,
-               fmt::format(R"({{"scalar":0,"vector":{}}})", vector_text(Eigen::Vector3d::Zero())));
-  }
-  return all;
-}
-
-std::string inventory_message(const InverseInventory& inventory) {
-  std::string devices, grips;
-  for (const InverseDeviceEntry& d : inventory.devices) {
-    devices += fmt::format(R"({}{{"device_id":{},"config":{},"state":{},"status":{}}})",
-                           devices.empty() ? "" : ",", json_text(d.id), config_text(d),
-                           state_text(d.state), status_text(d.simulated));
-    if (grips.empty()) grips = grips_text(d.state);
-  }
-  return fmt::format(R"({{"session_id":{},"inverse3":[{}]{}}})", inventory.session, devices, grips);
-}
-
-std::string state_message(std::int64_t session, std::string_view device_id,
-                          const InverseState& state, bool simulated) {
-  return fmt::format(
-      R"({{"session_id":{},"inverse3":[{{"device_id":{},"state":{},"status":{}}}]{}}})", session,
-      json_text(device_id), state_text(state), status_text(simulated), grips_text(state));
-}
-
-std::string version_message(std::string_view version, bool simulated) {
-  return fmt::format(
-      R"({{"project_name":"tpm hil serve, compatible with the Inverse service",)"
-      R"("{}":{}{}}})",
-      key::version, json_text(version),
-      simulated ? fmt::format(R"(,"{}":"{}")", key::simulated, kSimulatedWords) : std::string());
-}
-
-std::string event_message(const InverseEvent& event) {
-  return fmt::format(
-      R"({{"name":{},"category":"device","level":{},"data":{{"device_id":{},"safety_type":{}}},)"
-      R"("message":{}}})",
-      json_text(event.name), json_text(event.level), json_text(event.device_id),
-      json_text(event.safety_type), json_text(event.message));
 }
 
 }  // namespace tpm::haptics

@@ -30,6 +30,9 @@ inline constexpr std::size_t kMostInverseDevices = 16;
 /// The preset that puts the origin at the middle of the workspace.
 inline constexpr std::string_view kCentredPreset = "arm_front_centered";
 
+/// Identifier of the grip beside a simulated device.
+inline constexpr std::string_view kSimulatedGrip = "SIMULATED_GRIP";
+
 /// Settings that act on a force or a coordinate on its way between program and hand, as the service
 /// says.
 struct InverseSettings {
@@ -62,6 +65,8 @@ struct InverseState {
   Eigen::Vector3d workspace_position_m = Eigen::Vector3d::Zero(),
                   workspace_scale = Eigen::Vector3d::Ones();
   Eigen::Quaterniond workspace_rotation = Eigen::Quaterniond::Identity();
+  bool force_named = true;  ///< false: the message named no force
+  bool driven = false;      ///< a program drives the device; written only
   // Of the first grip.
   bool has_grip = false;
   Eigen::Quaterniond grip = Eigen::Quaterniond::Identity();
@@ -92,6 +97,8 @@ struct InverseCommand {
   std::string profile;  ///< of a program that registers itself; else empty
   std::string preset;   ///< of the coordinates; empty: not asked for
   std::optional<double> force_gate_gain, damping;
+  /// Of the simulated grip: a, b, c. An addition of tpm hil serve to the protocol.
+  std::optional<std::uint32_t> buttons;
   bool of_another_device = false;  ///< some of the message
 };
 /// A message of a client. Other devices and unknown keys are skipped. Throws Error(bad_input) with
@@ -112,6 +119,8 @@ struct InverseEvent {
                                         std::string_view profile = {});
 /// Makes neutral what a session may set: force gate and damping 0, the origin by kCentredPreset.
 [[nodiscard]] std::string neutral_message(std::string_view device_id, std::string_view profile);
+/// Presses buttons of the simulated grip of tpm hil serve.
+[[nodiscard]] std::string press_message(std::uint32_t buttons);
 /// Asks for a state and commands nothing.
 [[nodiscard]] std::string probe_message(std::string_view device_id);
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 
 #include "tpmkit/error.hpp"
 
@@ -314,6 +315,24 @@ std::optional<HttpHead> parse_http_head(std::string_view bytes) {
     head.fields.emplace_back(lower(name), std::string(trimmed(line.substr(colon + 1))));
   }
   return head;
+}
+
+std::optional<std::string> unchunked(std::string_view body) {
+  std::string whole;
+  while (true) {
+    const std::size_t line_end = body.find("\r\n");
+    if (line_end == body.npos) return std::nullopt;
+    std::size_t size = 0;
+    const auto [end, fault] = std::from_chars(body.data(), body.data() + line_end, size, 16);
+    // Behind the size there may be an extension, after ';'.
+    const bool read = fault == std::errc{} && (end == body.data() + line_end || *end == ';');
+    if (!read) return std::nullopt;
+    body.remove_prefix(line_end + 2);
+    if (size == 0) return whole;
+    if (size > body.size() || body.substr(size, 2) != "\r\n") return std::nullopt;
+    whole.append(body.substr(0, size));
+    body.remove_prefix(size + 2);
+  }
 }
 
 std::string web_socket_accept(std::string_view key) {

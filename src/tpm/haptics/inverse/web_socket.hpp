@@ -105,6 +105,9 @@ inline constexpr std::size_t kMostHeadBytes = 8192;
 /// A head up to and with its empty line; empty for anything else.
 [[nodiscard]] std::optional<HttpHead> parse_http_head(std::string_view bytes);
 
+/// A body that came in chunks (RFC 9112, 7.1), as it was; empty: it is not whole.
+[[nodiscard]] std::optional<std::string> unchunked(std::string_view body);
+
 /// Sec-WebSocket-Accept of a key (RFC 6455, 4.2.2).
 [[nodiscard]] std::string web_socket_accept(std::string_view key);
 /// A key of 16 bytes, in base64.

@@ -37,6 +37,7 @@ struct InverseServer::Connection {
   std::int64_t since_ns;  ///< of the stage
   std::int64_t session = 0;
   bool events = false, centred = false, shut = false;
+  bool turned_away = false;    ///< beyond the number that is served: told so, and nothing more
   std::int64_t pushed_ns = 0;  ///< its last force as the driver
   unsigned told = 0;           ///< bits of Once
   std::string head, out;
@@ -140,13 +141,24 @@ void InverseServer::send_events() {
 void InverseServer::accept_new(const Socket& listening, bool events) {
   Socket socket = accepted(listening);
   if (!socket.open()) return;
-  if (connections_.size() >= kMostConnections) {
+  const auto count = [this](bool turned_away) {
+    return static_cast<std::size_t>(std::ranges::count_if(connections_, [&](const auto& c) {
+      return c->turned_away == turned_away && c->stage != Connection::Stage::gone;
+    }));
+  };
+  if (count(false) >= kMostConnections) {
     ++refused_;
     if (settings_.log && !full_ && ++times_full_ <= kMostLines) {
-      settings_.log(fmt::format("{} connections are open: others are closed", kMostConnections));
+      settings_.log(fmt::format("{} connections are open: others are refused", kMostConnections));
     }
     full_ = true;
-    return;  // closed
+    if (count(true) >= kMostConnections) return;  // closed without a word
+    connections_.push_back(std::make_unique<Connection>(std::move(socket)));
+    Connection& c = *connections_.back();
+    c.turned_away = true;
+    send(c, http_answer("503 Service Unavailable", "text/plain",
+                        fmt::format("{} connections are open\n", kMostConnections)));
+    return c.enter(Connection::Stage::leaving);
   }
   full_ = false;
   ++connected_;
@@ -204,6 +216,13 @@ void InverseServer::take_head(Connection& c) {
     send(c, http_answer("400 Bad Request", "text/plain", "no request\n"));
     return c.enter(Connection::Stage::leaving);
   }
+  if (head->count("transfer-encoding") != 0) {
+    ++refused_;
+    say(c, "refused: a body in chunks");
+    send(c, http_answer("501 Not Implemented", "text/plain",
+                        "a body in chunks (Transfer-Encoding) is not read\n"));
+    return c.enter(Connection::Stage::leaving);
+  }
   if (head->count("upgrade") == 0) return answer_http(c, *head);
   const UpgradeAnswer answer = answer_upgrade(*head, c.events ? events_port_ : port_, {port_});
   send(c, answer.bytes);
@@ -224,6 +243,7 @@ void InverseServer::take_head(Connection& c) {
 InverseState InverseServer::state_for(const Connection& c) const {
   InverseState state = hand_.state();
   if (!c.centred) state.position_m += settings_.centre_m;
+  state.driven = driver_ != 0;
   return state;
 }
 
@@ -238,6 +258,7 @@ InverseInventory InverseServer::inventory(const Connection* c) const {
   } else {
     device.state = hand_.state();
     device.state.position_m += settings_.centre_m;
+    device.state.driven = driver_ != 0;
   }
   return all;
 }
@@ -345,6 +366,10 @@ void InverseServer::obey(Connection& c, const InverseCommand& command) {
     say(c, "speaks to a device that is not here");
   }
   if (command.position_m) move(c, *command.position_m);
+  if (command.buttons) {
+    presser_ = c.session;
+    hand_.press(*command.buttons);
+  }
   if (!command.force_N) {
     // Commands are applied once and forgotten.
     if (driver_ == c.session) hand_.push(Eigen::Vector3d::Zero());
@@ -403,6 +428,10 @@ void InverseServer::release(Connection& c) {
   if (mover_ == c.session) {
     mover_ = 0;
     hand_.move_to(std::nullopt);
+  }
+  if (presser_ == c.session) {
+    presser_ = 0;
+    hand_.press(0);
   }
 }
 

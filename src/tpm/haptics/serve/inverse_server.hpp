@@ -25,6 +25,8 @@ class ServedHand {
   virtual void move_to(const std::optional<Eigen::Vector3d>& position_m) noexcept = 0;
   /// Nobody drives any more.
   virtual void let_go() noexcept = 0;
+  /// Buttons of the grip, a, b, c, until the next; a hand without a grip has none.
+  virtual void press(std::uint32_t /*buttons*/) noexcept {}
 };
 
 /// After which a silent driver's force is zero.
@@ -98,7 +100,8 @@ class InverseServer {
   std::vector<std::unique_ptr<Connection>> connections_;
   bool full_ = false;  ///< a connection was refused since there was room
   int times_full_ = 0;
-  std::int64_t next_session_ = 1, driver_ = 0, mover_ = 0;  ///< sessions; 0: none
+  std::int64_t next_session_ = 1, driver_ = 0, mover_ = 0,
+               presser_ = 0;  ///< sessions; 0: none
   std::atomic<std::uint64_t> connected_{0}, refused_{0}, messages_{0}, states_{0}, unreadable_{0},
       closed_for_fault_{0};
   std::atomic<bool> ending_{false};

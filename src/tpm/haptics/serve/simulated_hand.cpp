@@ -116,7 +116,15 @@ void SimulatedHand::advance(double seconds) noexcept {
 
 InverseState SimulatedHand::state() noexcept {
   (void)shown_.refresh();
-  return shown_.latest();
+  InverseState shown = shown_.latest();
+  shown.has_grip = true;
+  shown.buttons = buttons_;
+  const double away_m = std::hypot(shown.position_m.x(), shown.position_m.y());
+  if (away_m > 0.0) {
+    const Eigen::Vector3d axis(-shown.position_m.y() / away_m, shown.position_m.x() / away_m, 0.0);
+    shown.grip = Eigen::AngleAxisd(kLean_rad_per_m * away_m, axis);
+  }
+  return shown;
 }
 
 void SimulatedHand::push(const Eigen::Vector3d& force_N) noexcept {

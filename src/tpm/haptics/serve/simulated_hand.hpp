@@ -26,6 +26,9 @@ struct SimulatedHandSettings {
 ///
 /// along each axis; the forces are those of `delay_periods` ago. Where the script asks for a push
 /// in place of a place, the goal is where the hand is and the push is added.
+///
+/// The hand holds a grip that leans with it: by kLean_rad_per_m about the axis across its way from
+/// the middle of the workspace. Its buttons are those that a client presses.
 class SimulatedHand final : public HapticDevice, public ServedHand {
  public:
   explicit SimulatedHand(SimulatedHandSettings settings);
@@ -44,6 +47,9 @@ class SimulatedHand final : public HapticDevice, public ServedHand {
   void push(const Eigen::Vector3d& force_N) noexcept override;
   void move_to(const std::optional<Eigen::Vector3d>& position_m) noexcept override;
   void let_go() noexcept override;
+  void press(std::uint32_t buttons) noexcept override { buttons_ = buttons; }
+
+  static constexpr double kLean_rad_per_m = 10.0;
 
   /// Largest force that was rendered, N; of the loop's thread.
   [[nodiscard]] double largest_N() const noexcept { return largest_N_; }
@@ -60,7 +66,8 @@ class SimulatedHand final : public HapticDevice, public ServedHand {
   SimulatedHandSettings settings_;
   Eigen::Matrix<double, 2, 3> propagator_;
   DeviceIdentity identity_;
-  Wish wish_;  ///< of the server's thread
+  Wish wish_;                  ///< of the server's thread
+  std::uint32_t buttons_ = 0;  ///< the same
   TripleBuffer<Wish> asked_;
   TripleBuffer<InverseState> shown_;
   Eigen::Vector3d at_m_, speed_m_per_s_ = Eigen::Vector3d::Zero();

@@ -153,7 +153,9 @@ const FileKind& recording_closing_kind() {
              optional_key("busy", times_form(), "of a cycle"),
              optional_key("stop_took_s", number().form, "until forces were off"),
              optional_key("clock", clock, "in real time"),
-             optional_key("markers", list_form(marker, 0), "set by the operator")})};
+             optional_key("markers", list_form(marker, 0), "set by the operator"),
+             optional_key("device_findings", list_form(text().form, 0),
+                          "what the device noticed and that ended nothing")})};
   };
   static const FileKind kind = made();
   return kind;

@@ -246,7 +246,9 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
           device->prepare(preparation);
           log.appear();
         });
+    run.findings = device->findings();
     Json closing = recording_closing(run.outcome);
+    if (!run.findings.empty()) closing["device_findings"] = run.findings;
     if (!markers.list().empty()) closing["markers"] = markers.list();
     log.close(to_text(closing));
   } catch (...) {

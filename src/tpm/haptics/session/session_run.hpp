@@ -63,7 +63,8 @@ struct SessionRun {
   std::optional<RenderingCheck> on_hardware = std::nullopt;
   std::string hardware_kind;  ///< of that device
   ServoOutcome outcome;
-  double largest_force_N = 0.0;  ///< that was sent to the device
+  double largest_force_N = 0.0;       ///< that was sent to the device
+  std::vector<std::string> findings;  ///< of the device (HapticDevice::findings)
 };
 
 /// Forces below this are not felt through a handle, N; assumed.

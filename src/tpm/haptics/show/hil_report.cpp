@@ -320,6 +320,11 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
                      r.closing.at("device_error_text").get<std::string>()),
          Tone::bad});
   }
+  if (r.closed && r.closing.contains("device_findings")) {
+    for (const Json& line : r.closing.at("device_findings")) {
+      lines.push_back({"the device noticed: " + line.get<std::string>(), Tone::fair});
+    }
+  }
   lines.push_back({fmt::format(
       "{} cycles; missed periods {}; time guards {}; saturations {}; limited by force {}, "
       "slipped {}, limited while ramping in {}; damped {}",

@@ -223,6 +223,8 @@ std::string check_text(const JitterCheck& check) {
 
 Json run_json(const HilSession& session, const SessionRun& run) {
   const bool tested = session.law && session.law->adequacy;
+  Json outcome = recording_closing(run.outcome);
+  if (!run.findings.empty()) outcome["device_findings"] = run.findings;
   return {{"simulated_device", !run.device.hardware},
           {"title", session.title},
           {"device", to_json(run.device)},
@@ -240,7 +242,7 @@ Json run_json(const HilSession& session, const SessionRun& run) {
           {"largest_force_N", rounded(run.largest_force_N, kHilDigits)},
           {"perceptible", run.largest_force_N >= kLeastFeltForce_N},
           {"time", run.outcome.real_time ? "real" : "virtual"},
-          {"outcome", recording_closing(run.outcome)}};
+          {"outcome", outcome}};
 }
 
 std::string run_text(const HilSession& session, const SessionRun& run) {
@@ -276,6 +278,7 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
   if (o.device.error != 0) {
     text += fmt::format("the device said: error {} ({})\n", o.device.error, o.device.error_text);
   }
+  for (const std::string& line : run.findings) text += "the device noticed: " + line + "\n";
   return text;
 }
 

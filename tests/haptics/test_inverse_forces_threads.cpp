@@ -1,0 +1,162 @@
+// --device inverse3: the force that a service reports beside the one that was commanded.
+#include <fmt/format.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <memory>
+
+#include "inverse_sessions.hpp"
+#include "temp_folder.hpp"
+#include "tpm/haptics/inverse/force_comparison.hpp"
+#include "tpm/haptics/session/recording.hpp"
+#include "tpm/haptics/show/hil_report.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using Catch::Matchers::Contains;
+using namespace test::inverse_sessions;
+using test::StandInFaults;
+using test::StandInInverse;
+using How = StandInFaults::How;
+
+constexpr std::int64_t kPeriod_ns = 1'000'000;
+
+Eigen::Vector3d along_z(double newtons) {
+  return {0.0, 0.0, newtons};
+}
+
+/// What is found if `share` of a sine of 1 N and 1 Hz is reported, late by some milliseconds.
+std::string found_of(double share, int late_ms, int lasts_ms = 2000) {
+  ForceComparison forces;
+  forces.begin(0);
+  const auto commanded = [](int ms) { return along_z(std::sin(2e-3 * M_PI * ms)); };
+  for (int ms = 1; ms <= lasts_ms; ++ms) {
+    forces.command(commanded(ms), ms * kPeriod_ns);
+    forces.report(share * commanded(std::max(0, ms - late_ms)), ms * kPeriod_ns);
+  }
+  return forces.finding();
+}
+
+TEST_CASE("A reported force may be late and differ a little, and not be scaled or gated") {
+  CHECK(found_of(1.0, 0).empty());
+  CHECK(found_of(1.0, 5).empty());
+  CHECK(found_of(1.0, 49).empty());
+  CHECK(found_of(1.04, 0).empty());
+  CHECK_THAT(found_of(2.0, 0), Contains("the service reported ") && Contains(" was commanded"));
+  // A force that stays: half of it, and none at all.
+  for (const double share : {0.5, 0.0}) {
+    CAPTURE(share);
+    ForceComparison forces;
+    forces.begin(0);
+    for (int ms = 1; ms <= 1000; ++ms) {
+      forces.command(along_z(1.0), ms * kPeriod_ns);
+      forces.report(along_z(share), ms * kPeriod_ns);
+    }
+    CHECK_THAT(forces.finding(),
+               Contains(share > 0.0 ? "reported 0.5 N where 1 N" : "reported 0 N where 1 N"));
+  }
+}
+
+TEST_CASE("A difference of forces counts once it has lasted, and agreement ends it") {
+  ForceComparison forces;
+  forces.begin(0);
+  std::int64_t at_ns = 0;
+  const auto live = [&](double reported_N, int lasts_ms) {
+    for (int i = 0; i < lasts_ms; ++i) {
+      at_ns += kPeriod_ns;
+      forces.command(along_z(1.0), at_ns);
+      forces.report(along_z(reported_N), at_ns);
+    }
+  };
+  live(1.0, 200);
+  live(0.5, 190);
+  live(1.0, 10);
+  live(0.5, 190);
+  CHECK(forces.finding().empty());
+  live(1.0, 10);
+  live(0.5, 401);
+  CHECK_THAT(forces.finding(), Contains("for 0.4 s in all"));
+  live(1.0, 1000);
+  CHECK_THAT(forces.finding(), Contains("for 0.4 s in all"));
+  forces.begin(at_ns);
+  CHECK(forces.finding().empty());
+  forces.no_report();
+  CHECK_THAT(forces.finding(), Contains("the service reported no force"));
+}
+
+/// 500 periods of 1 N on such a service.
+std::vector<std::string> findings_on(const StandInFaults& faults) {
+  StandInInverse service(PlantSettings{}, {}, false, faults);
+  InverseDevice device({service.port(), service.events_port(), service.port(), ""},
+                       limits_of("inverse3"));
+  (void)device.open();
+  device.prepare({});
+  device.enable_forces();
+  Eigen::Vector3d at_m;
+  for (int i = 0; i < 500; ++i) {
+    CHECK(device.read(at_m) == DeviceAnswer::ok);
+    CHECK(device.write(along_z(1.0)) == DeviceAnswer::ok);
+  }
+  CHECK(device.status().forces_off == ForcesOff::none);  // nothing was ended
+  device.stop();
+  return device.findings();
+}
+
+TEST_CASE("A service that gates forces during a session is noticed if it reports what it renders") {
+  StandInFaults faults;
+  CHECK(findings_on(faults).empty());
+  faults.from = 100;
+  faults.how = How::gate;
+  for (const double rendered : {0.5, 0.0, 1.5}) {
+    CAPTURE(rendered);
+    faults.rendered = rendered;
+    const std::vector<std::string> found = findings_on(faults);
+    REQUIRE(found.size() == 1);
+    CHECK_THAT(found.front(),
+               Contains(fmt::format("reported {:.3g} N where 1 N was commanded", rendered)));
+  }
+  // One that reports the command is not noticed: this comparison cannot replace a look at filters.
+  faults.rendered = 0.5;
+  faults.how = How::gate_unseen;
+  CHECK(findings_on(faults).empty());
+  faults.how = How::no_report;
+  const std::vector<std::string> silent = findings_on(faults);
+  REQUIRE(silent.size() == 1);
+  CHECK_THAT(silent.front(), Contains("the service reported no force"));
+}
+
+TEST_CASE("What was noticed of forces is recorded and said, and the session goes on") {
+  const test::TempFolder folder;
+  Json json = inverse_session();
+  json.erase("creep");  // who keeps a force would push a device that gates too deep
+  const HilSession session = test::parsed(json);
+  StandInFaults faults;
+  faults.from = 1;
+  faults.how = How::gate;
+  StandInInverse service(plant_of(session, 0), session.operator_script(), false, faults);
+  const auto device =
+      std::make_shared<InverseDevice>(choice_of(service).inverse, limits_of("inverse3"));
+  DeviceLimits limits = limits_of("inverse3");
+  limits.simulated = true;  // its delay is not what is tried here
+  SessionRunOptions options;
+  options.recording = folder / "gated.tpmrec";
+  bool begun = false;
+  options.watcher = [&](const ServoRecord& row) {
+    if (row.phase >= 0 && !begun) service.begin();
+    begun = begun || row.phase >= 0;
+  };
+  const SessionRun run = run_session_on(session, device, limits, {}, options);
+  CAPTURE(word_of(run.outcome.cause), run.outcome.detail, run.largest_force_N);
+  CHECK(run.outcome.cause == StopCause::finished);
+  REQUIRE(run.findings.size() == 1);
+  CHECK_THAT(run.findings.front(),
+             Contains("the service reported ") && Contains(" N was commanded"));
+  CHECK_THAT(run_text(session, run), Contains("the device noticed: the service reported "));
+  CHECK(run_json(session, run).at("outcome").at("device_findings").size() == 1);
+  const HilRecording recording = read_recording(options.recording);
+  CHECK(recording.closing.at("device_findings").at(0) == run.findings.front());
+}
+
+}  // namespace
+}  // namespace tpm::haptics
