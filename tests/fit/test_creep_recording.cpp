@@ -1,4 +1,6 @@
 // A recording of stress and strain in which the stress was imposed is fitted as creep.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
