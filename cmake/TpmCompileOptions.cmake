@@ -40,8 +40,6 @@ function(tpm_common_headers target)
   endif()
 endfunction()
 
-# Files of one target are compiled together, a handful at a time: most of the compiler's time goes
-# into headers that they share. So names in unnamed namespaces are unique within a folder.
 # mold, lld or gold instead of ld, whichever is there: a link of a test takes half the time.
 option(TPM_FAST_LINKER "Link with the fastest linker that is installed" OFF)
 if(TPM_FAST_LINKER)
@@ -56,10 +54,12 @@ if(TPM_FAST_LINKER)
   endforeach()
 endif()
 
+# Files of one target are compiled together, some at a time: most of the compiler's time goes into headers
+# that they share. So names in unnamed namespaces are unique within a folder of src and of tests.
 option(TPM_TOGETHER "Compile the files of one folder together (unity build)" OFF)
-function(tpm_compile_together target)
+function(tpm_compile_together target at_a_time)
   if(TPM_TOGETHER)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE BATCH UNITY_BUILD_BATCH_SIZE 24)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE BATCH UNITY_BUILD_BATCH_SIZE ${at_a_time})
   endif()
 endfunction()
 

@@ -108,7 +108,7 @@ function(tpm_room_objects list room suffix flags)
     set(target tpm_objects_${name}${suffix})
     add_library(${target} OBJECT ${sources})
     tpm_room_options(${target} ${room} ${own_flags})
-    tpm_compile_together(${target})
+    tpm_compile_together(${target} 24)
     if(TPM_MPI AND folder STREQUAL sweep)  # only this folder speaks to other processes
       target_compile_definitions(${target} PRIVATE TPM_MPI OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
     endif()

@@ -877,12 +877,12 @@ std::string replace_all(std::string text, const std::string& from, const std::st
   return text;
 }
 
-struct Answer {
+struct ProgramAnswer {
   int exit_code = 0;
   std::string error;
 };
 
-Answer run(const std::string& arguments, const TempFolder& folder) {
+ProgramAnswer run(const std::string& arguments, const TempFolder& folder) {
   const std::string error_file = folder / "stderr";
   const std::string command = std::string("\"") + TPM_TEST_PROGRAM + "\" " +
                               replace_all(arguments, "{}", folder.path().string()) +
@@ -890,7 +890,7 @@ Answer run(const std::string& arguments, const TempFolder& folder) {
   const int status = std::system(command.c_str());
   REQUIRE(WIFEXITED(status));
   std::ifstream in(error_file, std::ios::binary);
-  Answer answer{WEXITSTATUS(status), std::string(std::istreambuf_iterator<char>(in), {})};
+  ProgramAnswer answer{WEXITSTATUS(status), std::string(std::istreambuf_iterator<char>(in), {})};
   std::filesystem::remove(error_file);
   return answer;
 }
@@ -903,7 +903,8 @@ std::size_t count_files(const TempFolder& folder) {
 }
 
 /// A row of the table, without anything that differs from machine to machine.
-std::string table_row(const ErrorCase& error_case, const Answer& answer, const TempFolder& folder) {
+std::string table_row(const ErrorCase& error_case, const ProgramAnswer& answer,
+                      const TempFolder& folder) {
   std::string message = answer.error.substr(0, answer.error.find('\n'));
   message = replace_all(message, folder.path().string() + "/", "");
   message = replace_all(message, folder.path().string(), "FOLDER");
@@ -949,7 +950,7 @@ TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md 
     const TempFolder folder;
     error_case.make(folder);
     const std::size_t files_before = count_files(folder);
-    const Answer answer = run(error_case.arguments, folder);
+    const ProgramAnswer answer = run(error_case.arguments, folder);
     CAPTURE(answer.error.substr(0, 500));
     CHECK(answer.exit_code != 0);
     CHECK(answer.error.starts_with("tpm: "));
@@ -975,7 +976,7 @@ TEST_CASE("tpm data check reports every failing file and answers no") {
   with_files(
       {{"c.json", kPointsJson}, {"c.csv", broken}, {"d.json", kPointsJson}, {"d.csv", broken}})(
       folder);
-  const Answer answer = run("data check {}/c.csv evren_static {}/d.csv", folder);
+  const ProgramAnswer answer = run("data check {}/c.csv evren_static {}/d.csv", folder);
   CHECK(answer.exit_code == 1);
   CHECK(std::count(answer.error.begin(), answer.error.end(), '\n') == 2);
   CHECK(run("data check {}/c.csv {}/missing.csv", folder).exit_code == 3);

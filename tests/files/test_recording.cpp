@@ -20,9 +20,9 @@ using test::TempFolder;
 namespace {
 
 /// Corners of a drive: time in s, depth in mm.
-using Path = std::vector<std::pair<double, double>>;
+using DrivePath = std::vector<std::pair<double, double>>;
 
-double along(const Path& path, double time) {
+double along(const DrivePath& path, double time) {
   for (std::size_t i = 1; i < path.size(); ++i) {
     if (time > path[i].first && i + 1 < path.size()) continue;
     const auto& [t0, u0] = path[i - 1];
@@ -43,7 +43,7 @@ struct Making {
 
 /// A relaxing contact, k (e + q) with e the depth in contact and q an overstress that fades within
 /// 2 s, never below 0 (nothing sticks).
-Recording made(const Path& path, const Making& making) {
+Recording made(const DrivePath& path, const Making& making) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0.0, 1.0);
   Recording recording;
@@ -99,7 +99,7 @@ RecordingPhases phases_of(const Recording& recording, const PhaseOptions& option
   return found;
 }
 
-const Path kRampHold = {{0, 0}, {1, 0}, {3, 4}, {13, 4}};
+const DrivePath kRampHold = {{0, 0}, {1, 0}, {3, 4}, {13, 4}};
 
 }  // namespace
 
@@ -163,7 +163,7 @@ TEST_CASE("ramps of 1 s and of 100 s, sampled unevenly") {
     making.uneven = true;
     making.force_noise_N = 1e-3;
     making.drive_noise_mm = 1e-3;
-    Path path = {{0, 0}, {0.1 * ramp_s, 0}, {1.1 * ramp_s, 5}, {3 * ramp_s, 5}};
+    DrivePath path = {{0, 0}, {0.1 * ramp_s, 0}, {1.1 * ramp_s, 5}, {3 * ramp_s, 5}};
     const Recording recording = made(path, making);
     const auto found = phases_of(recording);
     CHECK(kinds(found).ends_with("loading, hold"));
@@ -222,7 +222,7 @@ TEST_CASE("unloading leaves the force at its floor before the drive is back") {
   making.step_s = 0.02;
   making.force_noise_N = 1e-3;
   // After a hold, the overstress turns negative on the way back: the tissue lags behind.
-  const Path path = {{0, 0}, {1, 0}, {5, 4}, {15, 4}, {17, 0}, {20, 0}};
+  const DrivePath path = {{0, 0}, {1, 0}, {5, 4}, {15, 4}, {17, 0}, {20, 0}};
   const Recording recording = made(path, making);
   const auto found = phases_of(recording);
   CHECK_THAT(kinds(found), Catch::EndsWith("loading, hold, unloading, detached, recovery") ||
@@ -237,7 +237,8 @@ TEST_CASE("cycles with detachment in each of them") {
   Making making;
   making.step_s = 0.02;
   making.force_noise_N = 1e-3;
-  const Path path = {{0, 0}, {1, 0}, {3, 4}, {9, 4}, {11, 0}, {13, 0}, {15, 4}, {21, 4}, {23, 0}};
+  const DrivePath path = {{0, 0},  {1, 0},  {3, 4},  {9, 4}, {11, 0},
+                          {13, 0}, {15, 4}, {21, 4}, {23, 0}};
   const auto found = phases_of(made(path, making));
   CHECK_THAT(kinds(found), Catch::EndsWith("loading, hold, unloading, detached, loading, hold, "
                                            "unloading, detached"));

@@ -19,7 +19,7 @@ using namespace tpm::fit;
 
 namespace {
 
-constexpr double kStep_s = 0.1;
+constexpr double kReadingStep_s = 0.1;
 constexpr int kLoaded = 240;
 
 /// Force of a parallel branch k, tau under a ramp of 1 per second for 2 s and a hold.
@@ -51,18 +51,18 @@ struct Simulated {
   }
 };
 
-enum class Defect { none, slow_branch, drift, ringing };
+enum class ResidualDefect { none, slow_branch, drift, ringing };
 
 /// The defect's force where the recording is loaded; before, only drift is there.
-double defect_force(Defect defect, double t) {
+double defect_force(ResidualDefect defect, double t) {
   switch (defect) {
-    case Defect::none:
+    case ResidualDefect::none:
       return 0.0;
-    case Defect::slow_branch:
+    case ResidualDefect::slow_branch:
       return t < 0.0 ? 0.0 : branch_force(t, 12.0);
-    case Defect::drift:
+    case ResidualDefect::drift:
       return 0.1 * t;
-    case Defect::ringing:
+    case ResidualDefect::ringing:
       return t < 0.0 ? 0.0 : std::exp(-t / 3.0) * std::sin(9.0 * t);
   }
   return 0.0;
@@ -72,7 +72,7 @@ double defect_force(Defect defect, double t) {
 Eigen::MatrixXd law_columns() {
   Eigen::MatrixXd a(kLoaded, 3);
   for (int i = 0; i < kLoaded; ++i) {
-    const double t = kStep_s * i;
+    const double t = kReadingStep_s * i;
     a.row(i) << 1.0, std::min(t, 2.0), branch_force(t, 2.0);
   }
   return a;
@@ -87,12 +87,12 @@ Eigen::VectorXd left_by_law(const Eigen::VectorXd& y) {
 /// @param noises rms of the residual that the best fit leaves without noise, in standard
 ///        deviations of the noise
 /// @param quantum to which readings are rounded, in the same unit; 0 for none
-Simulated simulated(int at_rest, double rho, Defect defect, double noises, double quantum,
-                    std::uint64_t seed) {
+Simulated simulated_adequacy(int at_rest, double rho, ResidualDefect defect, double noises,
+                             double quantum, std::uint64_t seed) {
   double factor = 0.0;
-  if (defect != Defect::none) {
+  if (defect != ResidualDefect::none) {
     Eigen::VectorXd shape(kLoaded);
-    for (int i = 0; i < kLoaded; ++i) shape[i] = defect_force(defect, kStep_s * i);
+    for (int i = 0; i < kLoaded; ++i) shape[i] = defect_force(defect, kReadingStep_s * i);
     factor = noises / (left_by_law(shape).norm() / std::sqrt(1.0 * kLoaded));
   }
   UnitNoise noise(rho, seed);
@@ -102,12 +102,12 @@ Simulated simulated(int at_rest, double rho, Defect defect, double noises, doubl
   };
   Simulated s;
   for (int i = -at_rest; i < 0; ++i) {
-    s.rest_time_s.push_back(kStep_s * i);
-    s.rest.push_back(read(factor * defect_force(defect, kStep_s * i)));
+    s.rest_time_s.push_back(kReadingStep_s * i);
+    s.rest.push_back(read(factor * defect_force(defect, kReadingStep_s * i)));
   }
   Eigen::VectorXd y(kLoaded);
   for (int i = 0; i < kLoaded; ++i) {
-    const double t = kStep_s * i;
+    const double t = kReadingStep_s * i;
     const double law = 60.0 * std::min(t, 2.0) + 45.0 * branch_force(t, 2.0);
     s.time_s.push_back(t);
     y[i] = read(5.0 * law + factor * defect_force(defect, t));
@@ -118,7 +118,7 @@ Simulated simulated(int at_rest, double rho, Defect defect, double noises, doubl
   return s;
 }
 
-constexpr int kRests[] = {10, 14, 20, 30, 50, 80, 120, 200};
+constexpr int kRestCounts[] = {10, 14, 20, 30, 50, 80, 120, 200};
 
 }  // namespace
 
@@ -128,12 +128,12 @@ TEST_CASE("a law that is right is called wrong in no more than a test at 1 % all
   int judged = 0;
   Random pick(5);
   for (int i = 0; i < 1000; ++i) {
-    const int rest = kRests[i % 8];
+    const int rest = kRestCounts[i % 8];
     const int kind = i % 3;
     const double rho = kind == 1 ? 0.9 : 0.0;
     const double quantum =
         kind == 2 ? std::exp(std::log(0.3) + pick.uniform() * std::log(20.0)) : 0.0;
-    const Simulated s = simulated(rest, rho, Defect::none, 0.0, quantum, 1000 + i);
+    const Simulated s = simulated_adequacy(rest, rho, ResidualDefect::none, 0.0, quantum, 1000 + i);
     const Adequacy a = judge_adequacy(s.data());
     wrong += a.described == Described::not_described;
     judged += a.described != Described::not_judged;
@@ -146,14 +146,15 @@ TEST_CASE("a law that is right is called wrong in no more than a test at 1 % all
 TEST_CASE("a law that leaves three times the noise is found", "[adequacy]") {
   int found = 0;
   Random pick(6);
-  constexpr Defect kDefects[] = {Defect::slow_branch, Defect::drift, Defect::ringing};
+  constexpr ResidualDefect kDefects[] = {ResidualDefect::slow_branch, ResidualDefect::drift,
+                                         ResidualDefect::ringing};
   for (int i = 0; i < 1000; ++i) {
     // At least 20 effective samples: n (1 - rho) / (1 + rho).
     const double rho = i % 2 == 0 ? 0.0 : 0.6;
     const int rest =
         static_cast<int>(std::ceil((20.0 + 30.0 * pick.uniform()) * (1.0 + rho) / (1.0 - rho)));
     const double noises = 3.0 * std::exp(pick.uniform() * std::log(10.0));
-    const Simulated s = simulated(rest, rho, kDefects[i % 3], noises, 0.0, 5000 + i);
+    const Simulated s = simulated_adequacy(rest, rho, kDefects[i % 3], noises, 0.0, 5000 + i);
     const Adequacy a = judge_adequacy(s.data());
     found += a.described == Described::not_described;
   }
@@ -164,7 +165,8 @@ TEST_CASE("a clipped force cell is named", "[adequacy]") {
   int named = 0;
   Random pick(7);
   for (int i = 0; i < 500; ++i) {
-    Simulated s = simulated(20, 0.0, Defect::none, 0.0, i % 2 == 0 ? 0.0 : 1.0, 9000 + i);
+    Simulated s =
+        simulated_adequacy(20, 0.0, ResidualDefect::none, 0.0, i % 2 == 0 ? 0.0 : 1.0, 9000 + i);
     const double peak = *std::ranges::max_element(s.reading);
     const double limit = (0.6 + 0.35 * pick.uniform()) * peak;
     for (double& y : s.reading) y = std::min(y, limit);
@@ -175,7 +177,7 @@ TEST_CASE("a clipped force cell is named", "[adequacy]") {
   int healthy = 0;
   for (int i = 0; i < 500; ++i) {
     const double quantum = i % 2 == 0 ? 0.0 : 0.3 * (1.0 + i % 20);
-    const Simulated s = simulated(20, 0.0, Defect::none, 0.0, quantum, 20000 + i);
+    const Simulated s = simulated_adequacy(20, 0.0, ResidualDefect::none, 0.0, quantum, 20000 + i);
     healthy += clipped_run(s.reading, s.rest).has_value();
   }
   CHECK(healthy <= 5);
@@ -187,12 +189,13 @@ TEST_CASE("the causes of a misfit are told apart", "[adequacy]") {
     REQUIRE(a.described == Described::not_described);
     return a.causes.empty() ? std::string("none") : a.causes.front().substr(0, 5);
   };
-  CHECK(first_word(simulated(60, 0.0, Defect::drift, 10.0, 0.0, 3)) == "drift");
-  CHECK(first_word(simulated(60, 0.0, Defect::slow_branch, 10.0, 0.0, 3)) == "none");
-  Simulated early = simulated(60, 0.0, Defect::none, 0.0, 0.0, 4);
+  CHECK(first_word(simulated_adequacy(60, 0.0, ResidualDefect::drift, 10.0, 0.0, 3)) == "drift");
+  CHECK(first_word(simulated_adequacy(60, 0.0, ResidualDefect::slow_branch, 10.0, 0.0, 3)) ==
+        "none");
+  Simulated early = simulated_adequacy(60, 0.0, ResidualDefect::none, 0.0, 0.0, 4);
   for (int i = 0; i < 5; ++i) early.residual[i] += 60.0;
   CHECK(first_word(early) == "trans");
-  Simulated lost = simulated(60, 0.0, Defect::none, 0.0, 0.0, 5);
+  Simulated lost = simulated_adequacy(60, 0.0, ResidualDefect::none, 0.0, 0.0, 5);
   for (int i = 100; i < 110; ++i) {
     lost.residual[i] -= lost.reading[i];
     lost.reading[i] = 0.3 * (i % 3 - 1);
@@ -210,7 +213,7 @@ TEST_CASE("the causes of a misfit are told apart", "[adequacy]") {
 TEST_CASE("a signal that stands still at any level is named", "[adequacy]") {
   for (const int first : {30, 100, kLoaded - 20}) {
     CAPTURE(first);
-    Simulated frozen = simulated(60, 0.0, Defect::none, 0.0, 0.0, 6);
+    Simulated frozen = simulated_adequacy(60, 0.0, ResidualDefect::none, 0.0, 0.0, 6);
     for (int i = first + 1; i < first + 20; ++i) {
       const double law = frozen.reading[i] - frozen.residual[i];
       frozen.reading[i] = frozen.reading[first];
@@ -223,7 +226,7 @@ TEST_CASE("a signal that stands still at any level is named", "[adequacy]") {
     CHECK_THAT(a.causes.front(), Catch::StartsWith("frozen signal: 20 readings in a row from"));
   }
   // Coarsely rounded readings repeat, and nothing stands still.
-  Simulated coarse = simulated(60, 0.0, Defect::ringing, 20.0, 6.0, 7);
+  Simulated coarse = simulated_adequacy(60, 0.0, ResidualDefect::ringing, 20.0, 6.0, 7);
   for (const std::string& cause : judge_adequacy(coarse.data()).causes) {
     CHECK_THAT(cause, !Catch::StartsWith("frozen"));
   }
@@ -236,7 +239,8 @@ TEST_CASE("the bend of a zero that warms up is told from correlated noise", "[ad
       CAPTURE(rho, at_rest);
       int found = 0;
       for (int i = 0; i < kTrials; ++i) {
-        const Simulated s = simulated(at_rest, rho, Defect::none, 0.0, 0.0, 900U + i);
+        const Simulated s =
+            simulated_adequacy(at_rest, rho, ResidualDefect::none, 0.0, 0.0, 900U + i);
         const auto bend = rest_bend(s.rest_time_s, s.rest);
         REQUIRE(bend);
         found += bend->p_value < 1e-3;
@@ -244,7 +248,7 @@ TEST_CASE("the bend of a zero that warms up is told from correlated noise", "[ad
       CHECK(found <= 5);  // of 1000, at a level of 0.1 %
     }
   }
-  Simulated warm = simulated(100, 0.0, Defect::none, 0.0, 0.0, 8);
+  Simulated warm = simulated_adequacy(100, 0.0, ResidualDefect::none, 0.0, 0.0, 8);
   for (std::size_t i = 0; i < warm.rest.size(); ++i) {
     warm.rest[i] += 50.0 * (1.0 - std::exp(-(warm.rest_time_s[i] - warm.rest_time_s[0]) / 8.0));
   }
@@ -254,11 +258,11 @@ TEST_CASE("the bend of a zero that warms up is told from correlated noise", "[ad
 }
 
 TEST_CASE("too short a rest gives no verdict", "[adequacy]") {
-  const Simulated s = simulated(7, 0.0, Defect::slow_branch, 50.0, 0.0, 1);
+  const Simulated s = simulated_adequacy(7, 0.0, ResidualDefect::slow_branch, 50.0, 0.0, 1);
   CHECK(judge_adequacy(s.data()).described == Described::not_judged);
-  const Simulated none = simulated(0, 0.0, Defect::slow_branch, 50.0, 0.0, 1);
+  const Simulated none = simulated_adequacy(0, 0.0, ResidualDefect::slow_branch, 50.0, 0.0, 1);
   CHECK(judge_adequacy(none.data()).described == Described::not_judged);
-  Simulated short_by_one = simulated(20, 0.0, Defect::none, 0.0, 0.0, 1);
+  Simulated short_by_one = simulated_adequacy(20, 0.0, ResidualDefect::none, 0.0, 0.0, 1);
   short_by_one.rest.pop_back();
   CHECK_THROWS_AS(judge_adequacy(short_by_one.data()), Error);
 }

@@ -1,4 +1,6 @@
 // A recording of stress and strain in which the stress was imposed is fitted as creep.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -6,6 +8,7 @@
 #include <utility>
 
 #include "creep_recordings.hpp"
+#include "fitted_parameter.hpp"
 #include "placed_recordings.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
@@ -45,13 +48,6 @@ FitResult creep_fit(std::span<const PreparedRecording> recordings) {
                           data_sets(recordings));
   state_adequacy(fit, recordings);
   return fit;
-}
-
-double estimate_of(const FitResult& fit, const std::string& name) {
-  for (const ParameterResult& p : fit.parameters) {
-    if (p.parameter.name == name) return p.estimate;
-  }
-  throw std::runtime_error(name);
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ namespace {
 using Kind = PlannedExperiment::Kind;
 
 /// A spring alone: F = k u, with an offset of each recording.
-Json spring() {
+Json spring_design() {
   return parse_json(R"({
     "title": "spring", "law": {"name": "linear", "reference": "1 mm"},
     "parameters": {
@@ -36,7 +36,7 @@ Json spring() {
 }
 
 /// Amplitude and relaxation time, both unknown, everything relaxes: F = k1 u exp(-t / tau1).
-Json decay() {
+Json decay_design() {
   return parse_json(R"({
     "title": "decay", "law": {"name": "linear-1-fluid", "reference": "1 mm"},
     "parameters": {
@@ -72,7 +72,7 @@ std::string message(const Json& document) {
 
 TEST_CASE("a straight line through unknown zero has the standard error of the textbook") {
   // Depths 0, 1, 2, 3, 4 mm: sum (u - mean)^2 = 10 mm^2, se(k) = sigma / sqrt(10 mm^2).
-  const DesignResult result = fit::plan(parsed(spring()));
+  const DesignResult result = fit::plan(parsed(spring_design()));
   const DesignCandidate& best = result.ranked.front();
   CHECK(best.one.samples == 5.0);
   const double expected = 0.01 / std::sqrt(10e-6) / 100.0;
@@ -82,13 +82,13 @@ TEST_CASE("a straight line through unknown zero has the standard error of the te
   CHECK_THAT(*k.lower, WithinRel(100.0 * std::exp(-1.959963984540054 * expected), 1e-9));
   CHECK(k.identified);
   SECTION("without the offset the line goes through 0: sum u^2 = 30 mm^2") {
-    Json document = spring();
+    Json document = spring_design();
     document["parameters"].erase("offset");
     document.erase("nuisance");
     CHECK_THAT(fisher(document)(0, 0), WithinRel(30e-6 * 1e4 / 1e-4, 1e-9));
   }
   SECTION("relative noise adds to sigma") {
-    Json document = spring();
+    Json document = spring_design();
     document["parameters"].erase("offset");
     document.erase("nuisance");
     document["noise"]["force"]["relative"] = 0.1;
@@ -97,7 +97,7 @@ TEST_CASE("a straight line through unknown zero has the standard error of the te
     CHECK_THAT(fisher(document)(0, 0), WithinRel(sum, 1e-9));
   }
   SECTION("an estimated scale takes Student's t with the degrees of freedom that are left") {
-    Json document = spring();
+    Json document = spring_design();
     document["noise"]["scale"] = "estimated";
     const DesignResult wider = fit::plan(parsed(document));
     const double t3 = 3.182446305284263;  // 97.5 %, 5 - 2 degrees of freedom
@@ -107,7 +107,7 @@ TEST_CASE("a straight line through unknown zero has the standard error of the te
 }
 
 TEST_CASE("n repeats shrink the standard error by sqrt(n); previous ones count alike") {
-  Json document = decay();
+  Json document = decay_design();
   const auto error_of = [](const Json& j) {
     return fit::plan(parsed(j)).ranked.front().expected.parameters[1].relative_error;
   };
@@ -120,7 +120,7 @@ TEST_CASE("n repeats shrink the standard error by sqrt(n); previous ones count a
 }
 
 TEST_CASE("what is known beforehand adds to the information") {
-  Json document = spring();
+  Json document = spring_design();
   document["known"] = {{"k_inf", 0.02}};
   const double alone = 0.01 / std::sqrt(10e-6) / 100.0;
   const double both = 1.0 / std::sqrt(1.0 / (alone * alone) + 1.0 / (0.02 * 0.02));
@@ -131,7 +131,7 @@ TEST_CASE("what is known beforehand adds to the information") {
 TEST_CASE("a decay of unknown size and rate: D-optimal are readings at 0 and tau") {
   // Two readings, at 0 and at the hold h: det = (h/tau)^2 exp(-2 h/tau) (k u)^4, largest at h =
   // tau.
-  Json document = decay();
+  Json document = decay_design();
   document["criterion"] = "all";
   document["candidates"] = Json::array();
   for (const char* hold : {"1 s", "3 s", "8 s", "10 s", "12 s", "30 s", "90 s"}) {
@@ -157,7 +157,7 @@ TEST_CASE("a decay of unknown size and rate: D-optimal are readings at 0 and tau
 }
 
 TEST_CASE("a hold long compared with tau goes before one that is too short") {
-  Json document = decay();
+  Json document = decay_design();
   document["candidates"][0]["hold"] = {"1 s", "40 s"};
   for (const char* criterion : {"all", "worst", "tau1"}) {
     document["criterion"] = criterion;
@@ -169,7 +169,7 @@ TEST_CASE("a hold long compared with tau goes before one that is too short") {
 }
 
 TEST_CASE("a slow ramp hides a short relaxation, and the words say so") {
-  Json document = decay();
+  Json document = decay_design();
   document["parameters"]["k_inf"] = document["parameters"]["k1"];
   document["law"]["name"] = "linear-1";
   document["parameters"]["tau1"]["start"] = "0.3 s";
@@ -188,7 +188,7 @@ TEST_CASE("the expected standard errors are those of a fit to such data") {
   // Data without noise: the fit ends at the true values, and its covariance must be the predicted
   // one.
   for (const char* law : {"linear-1", "power-1", "linear-1-series"}) {
-    Json document = decay();
+    Json document = decay_design();
     document["law"]["name"] = law;
     const Json like_k = document["parameters"]["k1"];
     const Json like_tau = document["parameters"]["tau1"];
@@ -220,7 +220,7 @@ TEST_CASE("the expected standard errors are those of a fit to such data") {
 }
 
 TEST_CASE("the paper's element and creep are planned through the same interface") {
-  Json document = decay();
+  Json document = decay_design();
   document.erase("law");
   document["parameters"] = {
       {"E1", {{"start", "12 kPa"}, {"lower", "1 kPa"}, {"upper", "100 kPa"}}},
@@ -243,7 +243,7 @@ TEST_CASE("correlated noise thins the samples") {
   CHECK_THAT(inflation(0.01, 1.0, 1e6), WithinRel(200.0, 1e-4));
   CHECK(inflation(0.01, 1.0, 50.0) == 50.0);
   // Ten times as many samples of correlated noise promise hardly more.
-  Json document = decay();
+  Json document = decay_design();
   document["noise"]["correlation_time"] = "1 s";
   document["candidates"][0]["interval"] = {"0.1 s", "0.01 s"};
   const DesignResult result = fit::plan(parsed(document));
@@ -264,7 +264,7 @@ TEST_CASE("parameters that nothing tells apart stay unknown, the others do not s
 }
 
 TEST_CASE("the limits of the machine leave candidates out and say why") {
-  Json document = decay();
+  Json document = decay_design();
   document["limits"] = {{"rate", "20 mm/s"}, {"total_time", "100 s"}};
   document["candidates"][0]["rate"] = {"10 mm/s", "30 mm/s"};
   document["candidates"][0]["depth"] = {"4 mm", "13 mm"};
@@ -280,7 +280,7 @@ TEST_CASE("the limits of the machine leave candidates out and say why") {
 }
 
 TEST_CASE("the best pair is no worse than the best done twice") {
-  Json document = decay();
+  Json document = decay_design();
   document["candidates"][0]["hold"] = {"2 s", "20 s", "80 s"};
   const DesignResult result = fit::plan(parsed(document));
   CHECK(result.pair.expected.score <=
@@ -288,7 +288,7 @@ TEST_CASE("the best pair is no worse than the best done twice") {
 }
 
 TEST_CASE("the figures hold a curve per rate and a panel per parameter") {
-  Json document = decay();
+  Json document = decay_design();
   document["candidates"][0]["rate"] = {"1 mm/s", "10 mm/s", "100 mm/s"};
   document["candidates"][0]["hold"] = {"5 s", "40 s"};
   const std::vector<Figure> figures = design_figures(fit::plan(parsed(document)));
@@ -302,7 +302,7 @@ TEST_CASE("the figures hold a curve per rate and a panel per parameter") {
 
 TEST_CASE("bad designs are named") {
   const auto changed = [](const char* pointer, const Json& value) {
-    Json document = spring();
+    Json document = spring_design();
     document[Json::json_pointer(pointer)] = value;
     return message(document);
   };
@@ -321,10 +321,11 @@ TEST_CASE("bad designs are named") {
   CHECK_THAT(changed("/nuisance", Json::array()), Contains("/parameters/offset/start"));
   CHECK_THAT(changed("/known", Json{{"x", 0.1}}), Contains("no parameter is called 'x'"));
   CHECK_THAT(changed("/level", 2), Contains("/level"));
-  Json creep = spring();
+  Json creep = spring_design();
   creep["candidates"] = Json::array(
       {{{"kind", "creep"}, {"load", {"1 N"}}, {"hold", {"1 s"}}, {"interval", {"1 s"}}}});
   CHECK_THAT(message(creep), Contains("/noise: creep without the noise of a depth"));
-  CHECK_THROWS_WITH(check_design(parsed(spring()), parsed(spring()).candidates.front(), 3, 0),
-                    Contains("expected 10 or more"));
+  CHECK_THROWS_WITH(
+      check_design(parsed(spring_design()), parsed(spring_design()).candidates.front(), 3, 0),
+      Contains("expected 10 or more"));
 }

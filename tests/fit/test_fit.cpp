@@ -31,7 +31,7 @@ std::string config_path(const std::string& name) {
   return std::string(TPM_TEST_SOURCE_DIR) + "/configs/" + name;
 }
 
-FitConfig relaxation() {
+FitConfig liver_relaxation_config() {
   return read_fit_config(config_path("liver_relaxation.json"));
 }
 
@@ -68,7 +68,7 @@ class NaturalCost final : public ceres::CostFunction {
 
 /// Ceres' GradientChecker at random points of the box (away from its far ends, where the forces no
 /// longer depend on anything).
-void check_gradient(const FitConfig& config, std::uint64_t seed) {
+void check_gradient_by_ceres(const FitConfig& config, std::uint64_t seed) {
   const ExperimentResiduals function(config);
   Random random(seed);
   for (int point = 0; point < 4; ++point) {
@@ -106,40 +106,40 @@ TEST_CASE("derivatives of every cost function pass Ceres' gradient checker") {
   std::uint64_t seed = 1;
   for (const NoiseKind kind : {NoiseKind::relative_to_datum, NoiseKind::absolute,
                                NoiseKind::combined, NoiseKind::log, NoiseKind::relative_to_model}) {
-    FitConfig config = relaxation();
+    FitConfig config = liver_relaxation_config();
     config.data[0].noise = {kind, kind == NoiseKind::relative_to_datum ? 0.0 : 0.01, 0.1, true};
     CAPTURE(noise_kind_name(kind));
-    check_gradient(config, seed++);
+    check_gradient_by_ceres(config, seed++);
   }
   for (const Loss loss : {Loss::huber, Loss::cauchy}) {
-    FitConfig config = relaxation();
+    FitConfig config = liver_relaxation_config();
     config.loss = {loss, 1.0};
     CAPTURE(loss_name(loss));
-    check_gradient(config, seed++);
+    check_gradient_by_ceres(config, seed++);
   }
   // Bands; at random points the model lies outside most of them.
   for (const char* dataset : {"amy_creep", "evren_static"}) {
-    FitConfig config = relaxation();
+    FitConfig config = liver_relaxation_config();
     config.data[0].dataset = dataset;
     config.data[0].protocol = {};
     config.data[0].protocol.kind = std::string(dataset) == "amy_creep"
                                        ? ProtocolChoice::Kind::creep
                                        : ProtocolChoice::Kind::static_;
     CAPTURE(dataset);
-    check_gradient(config, seed++);
+    check_gradient_by_ceres(config, seed++);
   }
-  FitConfig frozen = relaxation();
+  FitConfig frozen = liver_relaxation_config();
   frozen.tension = TensionRule::frozen_at_peak();
-  check_gradient(frozen, seed++);
+  check_gradient_by_ceres(frozen, seed++);
   FitConfig separate = read_fit_config(config_path("liver_separate_moduli.json"));
-  check_gradient(separate, seed++);
+  check_gradient_by_ceres(separate, seed++);
 }
 
 TEST_CASE("derivatives through CVODES equal those through the closed form") {
   // Differences of an adaptive integrator are noise, so its sensitivities are compared with the
   // exact ones instead.
   for (const char* dataset : {"evren_relaxation", "amy_creep"}) {
-    FitConfig config = relaxation();
+    FitConfig config = liver_relaxation_config();
     if (std::string(dataset) == "amy_creep") {
       config.data[0].dataset = dataset;
       config.data[0].protocol = {};
@@ -164,7 +164,7 @@ TEST_CASE("derivatives through CVODES equal those through the closed form") {
 }
 
 TEST_CASE("liver relaxation: minima, agreement of the starts, verdicts") {
-  const FitResult fit = run_fit(relaxation());
+  const FitResult fit = run_fit(liver_relaxation_config());
   CHECK(fit.starts_run == 50);
   CHECK(fit.starts_failed == 0);
   CHECK(fit.starts_agreeing >= 20);
@@ -202,7 +202,7 @@ TEST_CASE("liver relaxation: minima, agreement of the starts, verdicts") {
 }
 
 TEST_CASE("the noise convention moves x, as docs/data say") {
-  FitConfig config = relaxation();
+  FitConfig config = liver_relaxation_config();
   config.profiles = false;
   config.hypotheses.clear();
   config.data[0].noise = {NoiseKind::log, 0.0, 0.1, true};
@@ -214,7 +214,7 @@ TEST_CASE("the noise convention moves x, as docs/data say") {
 }
 
 TEST_CASE("results do not depend on the order of runs and repeat for a seed; seed 0 is a seed") {
-  FitConfig config = relaxation();
+  FitConfig config = liver_relaxation_config();
   config.seed = 0;
   const std::string first = to_text(to_json(run_fit(config)));
   config.seed = 1;
@@ -225,7 +225,7 @@ TEST_CASE("results do not depend on the order of runs and repeat for a seed; see
 }
 
 TEST_CASE("a held-out depth is predicted, not fitted") {
-  FitConfig config = relaxation();
+  FitConfig config = liver_relaxation_config();
   Selector depth;
   depth.depth_m = 0.008;
   config.data[0].hold_out.push_back(depth);
@@ -239,13 +239,13 @@ TEST_CASE("a held-out depth is predicted, not fitted") {
   }
   CHECK(held_out == 2);
   // the same minimum as a fit that has never seen the depth
-  FitConfig without = relaxation();
+  FitConfig without = liver_relaxation_config();
   without.data[0].exclude.push_back(depth);
   CHECK_THAT(run_fit(without).best.deviance, WithinRel(fit.best.deviance, 1e-10));
 }
 
 TEST_CASE("CVODES and the closed form give the same fit") {
-  FitConfig config = relaxation();
+  FitConfig config = liver_relaxation_config();
   config.starts = 1;
   config.profiles = false;
   config.hypotheses.clear();
@@ -276,7 +276,7 @@ TEST_CASE("E1, E2 and E' apart: what the data cannot tell is said") {
 }
 
 TEST_CASE("a parameter that does nothing is flat") {
-  FitConfig config = relaxation();
+  FitConfig config = liver_relaxation_config();
   config.data[0].protocol = {};
   config.data[0].protocol.kind = ProtocolChoice::Kind::static_;
   config.data[0].dataset = "evren_static";
@@ -314,7 +314,7 @@ TEST_CASE("a measured recording is fitted along its own displacement") {
     "columns": {"time_s": {"quantity": "time", "unit": "s"},
                 "depth_mm": {"quantity": "indentation_depth", "unit": "mm"},
                 "force_N": {"quantity": "contact_force", "unit": "N"}}})");
-  FitConfig config = relaxation();
+  FitConfig config = liver_relaxation_config();
   config.folder = folder;
   config.hypotheses.clear();
   config.profiles = false;
@@ -362,7 +362,7 @@ TEST_CASE("a simulation that fails never looks like a perfect fit") {
 }
 
 TEST_CASE("robust losses hold an outlier down") {
-  FitConfig config = relaxation();
+  FitConfig config = liver_relaxation_config();
   config.profiles = false;
   config.hypotheses.clear();
   const double plain = find(run_fit(config), "E").estimate;
@@ -396,10 +396,10 @@ TEST_CASE("mistakes in a configuration are named") {
   refuse("\"A0\": \"12.56 mm^2\"", "\"E1\": \"12 kPa\"", "is set by 'E' and by 'fixed'");
   refuse("{\"eta1\": \"5 Pa s\"}", "{\"eta2\": \"5 Pa s\"}",
          "'eta2' is not an estimated parameter");
-  FitConfig config = relaxation();
+  FitConfig config = liver_relaxation_config();
   config.data[0].dataset = "no_such_curve";
   CHECK_THROWS_AS(run_fit(config), Error);
-  config = relaxation();
+  config = liver_relaxation_config();
   config.data[0].exclude.push_back(Selector{});
   CHECK_THROWS_WITH(run_fit(config), Catch::Contains("no datum is left"));
 }

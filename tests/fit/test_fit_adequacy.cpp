@@ -24,7 +24,7 @@ using test::Defect;
 
 namespace {
 
-Selection selected(const PreparedRecording& recording) {
+Selection selected_linear_1(const PreparedRecording& recording) {
   SelectionOptions options;
   options.laws = {parse_law_name("linear-1", "test")};
   options.only_listed = true;
@@ -38,7 +38,7 @@ const FitResult& best_of(const Selection& s) {
   return s.candidates[s.recommended].fit;
 }
 
-PreparedRecording prepared(const AdequacyTrial& trial) {
+PreparedRecording prepared_trial(const AdequacyTrial& trial) {
   Recording r = test::simulated(trial);
   r.header.sha256 = std::string(64, 'a');
   return prepare_recording("simulated", std::move(r));
@@ -52,8 +52,8 @@ TEST_CASE("a law that does not describe its recording says so first and everywhe
   trial.at_rest = 60;
   trial.defect = Defect::ringing;
   trial.defect_N = 0.1;
-  const PreparedRecording recording = prepared(trial);
-  const Selection s = selected(recording);
+  const PreparedRecording recording = prepared_trial(trial);
+  const Selection s = selected_linear_1(recording);
   CHECK_THAT(s.words.front(), StartsWith("no law tried describes this recording: residual "));
   CHECK_THAT(s.words.front(), Contains("times the noise"));
   CHECK_FALSE(s.candidates[s.recommended].identified);
@@ -81,7 +81,7 @@ TEST_CASE("where no law tried describes a recording, the laws that were not trie
   trial.at_rest = 60;
   trial.defect = Defect::ringing;
   trial.defect_N = 0.1;
-  const PreparedRecording recording = prepared(trial);
+  const PreparedRecording recording = prepared_trial(trial);
   SelectionOptions options;
   options.laws = {parse_law_name("linear-1", "test"), parse_law_name("linear", "test")};
   options.only_listed = true;
@@ -99,7 +99,7 @@ TEST_CASE("where no law tried describes a recording, the laws that were not trie
 TEST_CASE("a law that describes its recording says how near it comes", "[adequacy][wired]") {
   AdequacyTrial trial;
   trial.at_rest = 60;
-  const Selection s = selected(prepared(trial));
+  const Selection s = selected_linear_1(prepared_trial(trial));
   const LawAdequacy& adequacy = best_of(s).adequacy.value();
   CHECK(adequacy.is_adequate());
   CHECK(adequacy.residual_over_noise.value() == Approx(1.0).margin(0.25));
@@ -187,7 +187,7 @@ TEST_CASE("without a rest adequacy cannot be judged", "[adequacy][wired]") {
   trial.at_rest = 4;
   trial.defect = Defect::slow_branch;
   trial.defect_N = 0.1;
-  const Selection s = selected(prepared(trial));
+  const Selection s = selected_linear_1(prepared_trial(trial));
   const LawAdequacy& adequacy = best_of(s).adequacy.value();
   CHECK(adequacy.verdict == "not_judged");
   CHECK_FALSE(adequacy.residual_over_noise);
@@ -198,10 +198,10 @@ TEST_CASE("readings at the limit of a force cell are named and censored", "[adeq
   AdequacyTrial trial;
   trial.at_rest = 40;
   trial.clip = 0.75;
-  const PreparedRecording recording = prepared(trial);
+  const PreparedRecording recording = prepared_trial(trial);
   REQUIRE(recording.clipped_above);
   CHECK_THAT(recording.phases.words.front(), StartsWith("clipping: "));
-  const Selection s = selected(recording);
+  const Selection s = selected_linear_1(recording);
   const FitResult& fit = best_of(s);
   CHECK(fit.adequacy.value().is_adequate());
   for (const ParameterResult& p : fit.parameters) {
@@ -224,7 +224,7 @@ TEST_CASE("readings at the limit of a force cell are named and censored", "[adeq
 TEST_CASE("what looks like a limit of the force cell and is none", "[adequacy][clipping]") {
   AdequacyTrial exact;
   exact.noisy = false;
-  CHECK_FALSE(prepared(exact).clipped_above);
+  CHECK_FALSE(prepared_trial(exact).clipped_above);
   Recording elastic;
   Recording creep;  // 4 N kept from 1 s on, and the depth goes on
   for (Recording* r : {&elastic, &creep}) {
@@ -248,7 +248,7 @@ TEST_CASE("what looks like a limit of the force cell and is none", "[adequacy][c
 TEST_CASE("a stated size of the noise is what residuals are compared with", "[adequacy][wired]") {
   AdequacyTrial trial;
   trial.at_rest = 4;
-  const PreparedRecording one = prepared(trial);
+  const PreparedRecording one = prepared_trial(trial);
   const std::span<const PreparedRecording> recordings(&one, 1);
   SetupOptions setup;
   setup.starts = 4;

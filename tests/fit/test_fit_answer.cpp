@@ -22,7 +22,7 @@ using Catch::Matchers::Contains;
 namespace {
 
 /// A ramp and a hold of linear-1, depths and forces times `scale`; noise of 0.5 % of the peak.
-Recording pressed(double scale) {
+Recording scaled_press(double scale) {
   Recording r;
   for (int i = 0; i < 160; ++i) {
     const double t = 0.1 * i;
@@ -40,13 +40,13 @@ Recording pressed(double scale) {
   return r;
 }
 
-Selection selected(double scale) {
+Selection selected_at_scale(double scale) {
   SelectionOptions options;
   for (const char* name : {"linear", "linear-1", "power-1"}) {
     options.laws.push_back(parse_law_name(name, "test"));
   }
   options.only_listed = true;
-  const std::vector<PreparedRecording> one{prepare_recording("pressed.csv", pressed(scale))};
+  const std::vector<PreparedRecording> one{prepare_recording("pressed.csv", scaled_press(scale))};
   return select_law(one, options);
 }
 
@@ -65,7 +65,7 @@ std::string printed_answer(const Selection& s) {
 
 TEST_CASE("the short answer says the verdicts, adequacy and warnings of the JSON in 25 lines",
           "[fit][answer]") {
-  const Selection s = selected(1.0);
+  const Selection s = selected_at_scale(1.0);
   const std::string text = printed_answer(s);
   const Json json = to_json(s);
   INFO(text);
@@ -90,7 +90,7 @@ TEST_CASE("the short answer says the verdicts, adequacy and warnings of the JSON
 
 TEST_CASE("the short answer of a law with many parameters names the verdict of each",
           "[fit][answer]") {
-  Selection s = selected(1.0);
+  Selection s = selected_at_scale(1.0);
   FitResult& fit = s.candidates[s.recommended].fit;
   const ParameterResult one = fit.parameters.front();
   for (int i = 0; i < 30; ++i) {
@@ -108,7 +108,7 @@ TEST_CASE("the short answer of a law with many parameters names the verdict of e
 }
 
 TEST_CASE("an estimate near 0 is shown in the unit of its interval", "[fit][answer]") {
-  Selection s = selected(1.0);
+  Selection s = selected_at_scale(1.0);
   FitResult& fit = s.candidates[s.recommended].fit;
   for (ParameterResult& p : fit.parameters) {
     if (p.parameter.name != "contact") continue;
@@ -134,7 +134,7 @@ TEST_CASE("the short answer of a folder names the recordings that are not fitted
     row.reason = "too short";
     study.rows.push_back(std::move(row));
   }
-  const Selection s = selected(1.0);
+  const Selection s = selected_at_scale(1.0);
   SpecimenRow fitted;
   fitted.name = "fitted.csv";
   fitted.fit = s.candidates[s.recommended].fit;
@@ -152,7 +152,7 @@ TEST_CASE("the short answer of a folder names the recordings that are not fitted
 
 TEST_CASE("the short answer of depths and forces times 1e-6 has units of their size",
           "[fit][answer]") {
-  const Selection s = selected(1e-6);
+  const Selection s = selected_at_scale(1e-6);
   const std::string text = printed_answer(s);
   INFO(text);
   CHECK(lines_of(text) <= 25);

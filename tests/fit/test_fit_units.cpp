@@ -48,7 +48,8 @@ Recording in_contact(const std::string& law, const std::vector<double>& values,
   return r;
 }
 
-FitResult fit_of(const std::string& law, const std::vector<double>& values, const Powers& powers) {
+FitResult fit_in_units(const std::string& law, const std::vector<double>& values,
+                       const Powers& powers) {
   SelectionOptions options;
   options.laws = {parse_law_name(law, "test")};
   options.only_listed = true;
@@ -116,11 +117,11 @@ TEST_CASE("units change neither the parameters of a recording nor what is said o
   const auto [law, values] = GENERATE(table<std::string, std::vector<double>>(
       {{"linear-1", {60.0, 45.0, 2.0, 0.0, 0.0}}, {"power-1", {60.0, 45.0, 2.0, 1.6, 0.0, 0.0}}}));
   CAPTURE(law);
-  const FitResult expected = fit_of(law, values, {});
+  const FitResult expected = fit_in_units(law, values, {});
   for (const Powers& powers :
        {Powers{0, 0, -9}, Powers{0, -3, -6}, Powers{0, 0, -12}, Powers{0, 0, 12}, Powers{0, -12, 0},
         Powers{0, 12, 0}, Powers{-12, 0, 0}, Powers{12, 0, 0}, Powers{12, -12, 12},
         Powers{-12, 12, -12}, Powers{3, 12, -12}, Powers{-3, -12, 12}}) {
-    check_same(fit_of(law, values, powers), expected, powers);
+    check_same(fit_in_units(law, values, powers), expected, powers);
   }
 }

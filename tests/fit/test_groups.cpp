@@ -1,13 +1,12 @@
 // Two groups of specimens: the difference of their means, and the command that compares folders.
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <boost/math/distributions/students_t.hpp>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdlib>
 
 #include "group_studies.hpp"
+#include "run_in.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
@@ -28,20 +27,6 @@ std::vector<SpecimenEstimate> estimates(const std::vector<double>& values, doubl
   std::vector<SpecimenEstimate> all;
   for (const double v : values) all.push_back({"s", v, standard_error});
   return all;
-}
-
-struct Said {
-  int code;
-  std::string text;
-};
-
-Said run_in(const test::TempFolder& folder, const std::string& arguments) {
-  const std::string out = folder / "said.log";
-  const int status = std::system(fmt::format("cd '{}' && '" TPM_TEST_PROGRAM "' {} > '{}' 2>&1",
-                                             folder.path().string(), arguments, out)
-                                     .c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1,
-          std::filesystem::is_empty(out) ? std::string() : read_file(out)};
 }
 
 /// A rest of 2 s, a ramp and a hold: a stiffness of 60 N/m times a factor with a branch of 45 N/m
@@ -116,12 +101,12 @@ TEST_CASE("tpm fit A B --compare: the ratio of what differs, 1 for what does not
   const test::TempFolder folder;
   write_group(folder, "healthy", {0.9, 1.0, 1.1, 1.05}, 4.0, 1);
   write_group(folder, "fibrotic", {1.8, 2.0, 2.2, 2.1}, 4.0, 11);
-  const Said said =
-      run_in(folder,
-             "fit healthy fibrotic --compare --laws linear-1 --no-draw --punch-radius '2 mm' "
-             "--format json -o c.json");
-  INFO(said.text);
-  REQUIRE(said.code == 0);
+  const test::ProgramRun run =
+      test::run_in(folder,
+                   "fit healthy fibrotic --compare --laws linear-1 --no-draw --punch-radius '2 mm' "
+                   "--format json -o c.json");
+  INFO(run.said);
+  REQUIRE(run.code == 0);
   const Json j = read_json(folder / "c.json");
   for (const Json& p : j["parameters"]) {
     CAPTURE(p.dump());
@@ -136,15 +121,16 @@ TEST_CASE("tpm fit A B --compare: the ratio of what differs, 1 for what does not
   CHECK_THAT(j["young_moduli"][2]["ratio"].get<double>(), WithinRel(2.0, 0.02));
   CHECK_THAT(j["conclusion"].get<std::string>(),
              Contains("fibrotic against healthy: a difference in k_inf, k1"));
-  const Said text = run_in(folder, "fit healthy fibrotic --compare --laws linear-1 --folder out");
-  INFO(text.text);
+  const test::ProgramRun text =
+      test::run_in(folder, "fit healthy fibrotic --compare --laws linear-1 --folder out");
+  INFO(text.said);
   CHECK(text.code == 0);
-  CHECK_THAT(text.text, Contains("a difference in k_inf, k1 (Holm, 95 %); none is shown in tau1"));
-  CHECK(std::ranges::count(text.text, '\n') <= 25);
-  CHECK_THAT(text.text, !Contains("Hartung-Knapp") && Contains("next: tpm view out/figures.json"));
-  const Said all =
-      run_in(folder, "fit healthy fibrotic --compare --laws linear-1 --folder out --verbose");
-  CHECK_THAT(all.text, Contains("modified Hartung-Knapp") && !Contains("more: --verbose"));
+  CHECK_THAT(text.said, Contains("a difference in k_inf, k1 (Holm, 95 %); none is shown in tau1"));
+  CHECK(std::ranges::count(text.said, '\n') <= 25);
+  CHECK_THAT(text.said, !Contains("Hartung-Knapp") && Contains("next: tpm view out/figures.json"));
+  const test::ProgramRun all =
+      test::run_in(folder, "fit healthy fibrotic --compare --laws linear-1 --folder out --verbose");
+  CHECK_THAT(all.said, Contains("modified Hartung-Knapp") && !Contains("more: --verbose"));
   CHECK(std::filesystem::exists(folder.path() / "out" / "comparison.svg"));
   CHECK_THAT(read_file(folder.path() / "out" / "specimens.csv"), Contains("fibrotic/liver4.csv"));
 }
@@ -154,19 +140,20 @@ TEST_CASE("Groups that differ by their depths are refused, copies are no second 
   const test::TempFolder folder;
   write_group(folder, "a", {0.9, 1.0, 1.1}, 4.0, 1);
   write_group(folder, "b", {0.9, 1.0, 1.1}, 6.0, 11);
-  const Said depths = run_in(folder, "fit a b --compare --laws linear-1 --no-draw");
+  const test::ProgramRun depths =
+      test::run_in(folder, "fit a b --compare --laws linear-1 --no-draw");
   CHECK(depths.code == 3);
-  CHECK_THAT(depths.text, Contains("depth and group are confounded"));
+  CHECK_THAT(depths.said, Contains("depth and group are confounded"));
   std::filesystem::copy_file(folder.path() / "a" / "liver1.csv",
                              folder.path() / "a" / "liver9.csv");
   for (const char* command :
        {"fit a --laws linear-1 --no-draw", "fit a b --compare --laws linear-1 --no-draw"}) {
-    const Said twice = run_in(folder, command);
-    CAPTURE(command, twice.text);
+    const test::ProgramRun twice = test::run_in(folder, command);
+    CAPTURE(command, twice.said);
     CHECK(twice.code == 3);
   }
-  CHECK_THAT(run_in(folder, "fit a --laws linear-1 --no-draw").text,
+  CHECK_THAT(test::run_in(folder, "fit a --laws linear-1 --no-draw").said,
              Contains("the same bytes as 'a/liver1.csv'"));
-  CHECK_THAT(run_in(folder, "fit a b").text, Contains("--compare"));
-  CHECK_THAT(run_in(folder, "fit a --compare").text, Contains("two folders of recordings"));
+  CHECK_THAT(test::run_in(folder, "fit a b").said, Contains("--compare"));
+  CHECK_THAT(test::run_in(folder, "fit a --compare").said, Contains("two folders of recordings"));
 }

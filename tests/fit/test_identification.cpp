@@ -34,8 +34,8 @@ Eigen::MatrixXd dense_correlation(const std::vector<double>& time_s, double phi,
   return r;
 }
 
-PreparedRecording simulated(const char* name, double noise, double phi, std::uint64_t seed,
-                            double hold_s = 10.0) {
+PreparedRecording simulated_law(const char* name, double noise, double phi, std::uint64_t seed,
+                                double hold_s = 10.0) {
   LawSpec law = parse_law_name(name, "test");
   law.reference = 4e-3;
   Recording r = simulated_recording(law, visible_parameters(law), test::even_test(hold_s, 0.05));
@@ -97,7 +97,7 @@ TEST_CASE("REML is the minimum of the dense restricted deviance") {
 }
 
 TEST_CASE("after the last sample the sequential fit is the fit of all samples") {
-  const PreparedRecording recording = simulated("linear-1", 0.01, 0.0, 5);
+  const PreparedRecording recording = simulated_law("linear-1", 0.01, 0.0, 5);
   const Identification id = identify(recording, only("linear-1"));
   SetupOptions setup;
   setup.profiles = false;
@@ -196,7 +196,7 @@ TEST_CASE("a contact that stands on a sample is not gone through again at every 
 }
 
 TEST_CASE("nothing of the future is used") {
-  const PreparedRecording whole = simulated("linear-1", 0.01, 0.5, 8);
+  const PreparedRecording whole = simulated_law("linear-1", 0.01, 0.5, 8);
   const Identification all = identify(whole, only("linear-1"));
   Recording cut = whole.recording;
   const std::size_t kept = 150;
@@ -217,8 +217,8 @@ TEST_CASE("nothing of the future is used") {
 TEST_CASE("intervals narrow, correlated noise widens them, and a target stops") {
   IdentifyOptions options = only("linear-1");
   options.target = 0.1;
-  const Identification white = identify(simulated("linear-1", 0.01, 0.0, 11), options);
-  const Identification correlated = identify(simulated("linear-1", 0.01, 0.9, 11), options);
+  const Identification white = identify(simulated_law("linear-1", 0.01, 0.0, 11), options);
+  const Identification correlated = identify(simulated_law("linear-1", 0.01, 0.9, 11), options);
   REQUIRE(white.stopped);
   CHECK(white.result().estimate.widest_relative_half_width() <= 0.1);
   CHECK(white.history.back().estimate.phi < 0.3);
@@ -228,16 +228,17 @@ TEST_CASE("intervals narrow, correlated noise widens them, and a target stops") 
   CHECK_THAT(test::refusal_of([&] {
                IdentifyOptions bad = options;
                bad.patience = 0.5;
-               (void)identify(simulated("linear-1", 0.01, 0.0, 11), bad);
+               (void)identify(simulated_law("linear-1", 0.01, 0.0, 11), bad);
              }),
              Contains("patience 0.5"));
-  CHECK_THAT(test::refusal_of(
-                 [&] { (void)identify(simulated("linear-1", 0.01, 0.0, 11), only("hertz-1")); }),
+  CHECK_THAT(test::refusal_of([&] {
+               (void)identify(simulated_law("linear-1", 0.01, 0.0, 11), only("hertz-1"));
+             }),
              Contains("cannot be fitted sample by sample"));
 }
 
 TEST_CASE("the identified law carries its covariance to predictions") {
-  const PreparedRecording recording = simulated("linear-1", 0.01, 0.0, 11);
+  const PreparedRecording recording = simulated_law("linear-1", 0.01, 0.0, 11);
   const Identification id = identify(recording, only("linear-1"));
   const LawFile law = identified_law(id, recording);
   REQUIRE(law.uncertainty);
@@ -304,7 +305,7 @@ TEST_CASE("at rest every law may take the place of every other") {
 }
 
 TEST_CASE("laws that are identified are handed to the loop") {
-  const PreparedRecording recording = simulated("linear-1", 0.01, 0.0, 11);
+  const PreparedRecording recording = simulated_law("linear-1", 0.01, 0.0, 11);
   const Identification id = identify(recording, only("linear-1"));
   const IdentifiedLoop loop = replay_in_loop(id, recording, {});
   REQUIRE(loop.first_s);

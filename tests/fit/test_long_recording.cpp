@@ -18,7 +18,7 @@ using Catch::Matchers::WithinRel;
 namespace {
 
 // linear-1, SI: k_inf, k1, tau1 and offset are estimated, the contact lies at depth 0
-const std::vector<double> kTrueValues{80.0, 120.0, 3.0, 0.004};
+const std::vector<double> kTrueEstimates{80.0, 120.0, 3.0, 0.004};
 const std::vector<double> kLaw{80.0, 120.0, 3.0, 0.0, 0.004};
 constexpr std::size_t kKept = 12;  // one sample in so many stays in the thinned record
 
@@ -65,7 +65,7 @@ std::vector<PreparedRecording> thinned_record() {
   return {few};
 }
 
-FitResult fit_of(const std::vector<PreparedRecording>& record, const FitConfig& config) {
+FitResult fit_of_record(const std::vector<PreparedRecording>& record, const FitConfig& config) {
   return run_fit(config, data_sets(record));
 }
 
@@ -82,19 +82,19 @@ FitConfig config_for(const std::vector<PreparedRecording>& record) {
 void check_true_values(const FitResult& fit) {
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
     const ParameterResult& p = fit.parameters[i];
-    CAPTURE(p.parameter.name, p.estimate, kTrueValues[i]);
+    CAPTURE(p.parameter.name, p.estimate, kTrueEstimates[i]);
     REQUIRE(p.lower);
     REQUIRE(p.upper);
-    CHECK(*p.lower < kTrueValues[i]);
-    CHECK(kTrueValues[i] < *p.upper);
+    CHECK(*p.lower < kTrueEstimates[i]);
+    CHECK(kTrueEstimates[i] < *p.upper);
   }
 }
 
 }  // namespace
 
 TEST_CASE("24,000 samples give the true values, and what every twelfth of them gives") {
-  const FitResult fit = fit_of(whole_record(), config_for(whole_record()));
-  const FitResult few = fit_of(thinned_record(), config_for(thinned_record()));
+  const FitResult fit = fit_of_record(whole_record(), config_for(whole_record()));
+  const FitResult few = fit_of_record(thinned_record(), config_for(thinned_record()));
   REQUIRE(fit.value_count > 20'000);
   REQUIRE(few.value_count < 20'000);
   CHECK_THAT(all(fit.flags), Contains("come from the covariance"));
@@ -116,11 +116,11 @@ TEST_CASE("24,000 samples without noise give back the parameters that made them"
   test.ramp_interval_s = test.hold_interval_s = 21.1 / 24'000.0;
   record.front().recording.response =
       simulated_recording(parse_law_name("linear-1", "test"), kLaw, test).response;
-  const FitResult fit = fit_of(record, config_for(record));
+  const FitResult fit = fit_of_record(record, config_for(record));
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
     CAPTURE(fit.parameters[i].parameter.name);
-    CHECK(std::abs(fit.parameters[i].estimate - kTrueValues[i]) <
-          1e-6 * std::abs(kTrueValues[i]) + 1e-12);
+    CHECK(std::abs(fit.parameters[i].estimate - kTrueEstimates[i]) <
+          1e-6 * std::abs(kTrueEstimates[i]) + 1e-12);
   }
 }
 
@@ -141,13 +141,13 @@ TEST_CASE("a long recording with the size of its noise among the parameters") {
   Json document = config_json(config_for(whole_record()));
   document["data"][0]["noise"] = {{"kind", "absolute"}, {"absolute", "estimated"}};
   document["starts"]["count"] = 2;
-  const FitResult fit = fit_of(whole_record(), parse_fit_config(document, "test"));
-  REQUIRE(fit.parameters.size() == kTrueValues.size() + 1);
+  const FitResult fit = fit_of_record(whole_record(), parse_fit_config(document, "test"));
+  REQUIRE(fit.parameters.size() == kTrueEstimates.size() + 1);
   REQUIRE(fit.parameters.back().parameter.name == "sigma_a");
   CHECK_THAT(fit.parameters.back().estimate, WithinRel(fit.recordings.front().rms_residual, 1e-3));
-  for (std::size_t i = 0; i < kTrueValues.size(); ++i) {
+  for (std::size_t i = 0; i < kTrueEstimates.size(); ++i) {
     const ParameterResult& p = fit.parameters[i];
-    CAPTURE(p.parameter.name, p.estimate, kTrueValues[i]);
-    CHECK(std::abs(p.estimate - kTrueValues[i]) < 3.0 * *p.standard_error);
+    CAPTURE(p.parameter.name, p.estimate, kTrueEstimates[i]);
+    CHECK(std::abs(p.estimate - kTrueEstimates[i]) < 3.0 * *p.standard_error);
   }
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "fitted_parameter.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
@@ -33,7 +34,7 @@ std::vector<double> decades_of(double from, double to, int points) {
   return values;
 }
 
-MaterialFunction read(const std::string& path) {
+MaterialFunction read_function(const std::string& path) {
   auto function = find_material_function(path, {});
   REQUIRE(function);
   return *std::move(function);
@@ -45,26 +46,18 @@ SelectionOptions quick() {
   return options;
 }
 
-double estimate(const FitResult& fit, const std::string& name) {
-  for (const ParameterResult& p : fit.parameters) {
-    if (p.parameter.name == name) return p.estimate;
-  }
-  FAIL("no parameter " << name);
-  return 0.0;
-}
-
 const FitResult& chosen(const Selection& s) {
   return s.candidates[s.recommended].fit;
 }
 
 /// The two branches come in any order.
 void check_two_branches(const FitResult& fit) {
-  CHECK_THAT(estimate(fit, "k_inf"), WithinRel(kLasting, 1e-5));
-  const bool in_order = estimate(fit, "tau1") < estimate(fit, "tau2");
-  CHECK_THAT(estimate(fit, in_order ? "k1" : "k2"), WithinRel(kFirst, 1e-5));
-  CHECK_THAT(estimate(fit, in_order ? "k2" : "k1"), WithinRel(kSecond, 1e-5));
-  CHECK_THAT(estimate(fit, in_order ? "tau1" : "tau2"), WithinRel(kTau1, 1e-5));
-  CHECK_THAT(estimate(fit, in_order ? "tau2" : "tau1"), WithinRel(kTau2, 1e-5));
+  CHECK_THAT(estimate_of(fit, "k_inf"), WithinRel(kLasting, 1e-5));
+  const bool in_order = estimate_of(fit, "tau1") < estimate_of(fit, "tau2");
+  CHECK_THAT(estimate_of(fit, in_order ? "k1" : "k2"), WithinRel(kFirst, 1e-5));
+  CHECK_THAT(estimate_of(fit, in_order ? "k2" : "k1"), WithinRel(kSecond, 1e-5));
+  CHECK_THAT(estimate_of(fit, in_order ? "tau1" : "tau2"), WithinRel(kTau1, 1e-5));
+  CHECK_THAT(estimate_of(fit, in_order ? "tau2" : "tau1"), WithinRel(kTau2, 1e-5));
 }
 
 TEST_CASE("A relaxation modulus is fitted from its file alone") {
@@ -74,7 +67,7 @@ TEST_CASE("A relaxation modulus is fitted from its file alone") {
     text += fmt::format("{:.17g},{:.17g}\n", t, 1e-3 * modulus(t));
   }
   write_file(folder / "g.csv", text);
-  const MaterialFunction function = read(folder / "g.csv");
+  const MaterialFunction function = read_function(folder / "g.csv");
   CHECK(function.kind() == "relaxation modulus");
   const Selection s = select_law(function, quick());
   CHECK(law_name(chosen(s).config.law.value()) == "linear-2");
@@ -82,7 +75,7 @@ TEST_CASE("A relaxation modulus is fitted from its file alone") {
   // The written configuration says the same.
   const FitConfig again = parse_fit_config(config_json(chosen(s).config), "config.json");
   const FitResult rerun = run_fit(again);
-  CHECK_THAT(estimate(rerun, "k_inf"), WithinRel(kLasting, 1e-5));
+  CHECK_THAT(estimate_of(rerun, "k_inf"), WithinRel(kLasting, 1e-5));
 }
 
 TEST_CASE("A creep compliance is fitted from its file alone") {
@@ -95,16 +88,16 @@ TEST_CASE("A creep compliance is fitted from its file alone") {
     text += fmt::format("{:.17g},{:.17g}\n", t, 1.0 / k0 + (1.0 - std::exp(-t / T)) / k);
   }
   write_file(folder / "j.csv", text);
-  const MaterialFunction function = read(folder / "j.csv");
+  const MaterialFunction function = read_function(folder / "j.csv");
   CHECK(function.kind() == "creep compliance");
   SelectionOptions options = quick();
   options.laws = {parse_law_name("linear-1", "test")};
   options.only_listed = true;
   const FitResult fit = chosen(select_law(function, options));
   const double lasting = k0 * k / (k0 + k);
-  CHECK_THAT(estimate(fit, "k_inf"), WithinRel(lasting, 1e-5));
-  CHECK_THAT(estimate(fit, "k1"), WithinRel(k0 - lasting, 1e-5));
-  CHECK_THAT(estimate(fit, "tau1"), WithinRel(T * k / (k0 + k), 1e-5));
+  CHECK_THAT(estimate_of(fit, "k_inf"), WithinRel(lasting, 1e-5));
+  CHECK_THAT(estimate_of(fit, "k1"), WithinRel(k0 - lasting, 1e-5));
+  CHECK_THAT(estimate_of(fit, "tau1"), WithinRel(T * k / (k0 + k), 1e-5));
 }
 
 TEST_CASE("All laws are fitted to a creep compliance that begins at 0 s") {
@@ -118,12 +111,12 @@ TEST_CASE("All laws are fitted to a creep compliance that begins at 0 s") {
                         1.0 / k0 + (1.0 - std::exp(-t / Ta)) / ka + (1.0 - std::exp(-t / Tb)) / kb);
   }
   write_file(folder / "j.csv", text);
-  const Selection s = select_law(read(folder / "j.csv"), quick());
+  const Selection s = select_law(read_function(folder / "j.csv"), quick());
   const FitResult& fit = chosen(s);
   CHECK(law_name(fit.config.law.value()) == "linear-2");
-  const KelvinChain chain = to_series({estimate(fit, "k_inf"),
-                                       {estimate(fit, "k1"), estimate(fit, "k2")},
-                                       {estimate(fit, "tau1"), estimate(fit, "tau2")}});
+  const KelvinChain chain = to_series({estimate_of(fit, "k_inf"),
+                                       {estimate_of(fit, "k1"), estimate_of(fit, "k2")},
+                                       {estimate_of(fit, "tau1"), estimate_of(fit, "tau2")}});
   CHECK_THAT(chain.k0, WithinRel(k0, 1e-6));
   CHECK_THAT(chain.k.front(), WithinRel(ka, 1e-6));
   CHECK_THAT(chain.T_s.front(), WithinRel(Ta, 1e-6));
@@ -138,15 +131,15 @@ TEST_CASE("A relaxation modulus that falls by more decades than an instrument re
     text += fmt::format("{:.9g},{:.9g}\n", t, std::exp(-t));
   }
   write_file(folder / "g.csv", text);
-  const Selection s = select_law(read(folder / "g.csv"), quick());
+  const Selection s = select_law(read_function(folder / "g.csv"), quick());
   CHECK(law_name(chosen(s).config.law.value()) == "linear-1-fluid");
-  CHECK_THAT(estimate(chosen(s), "k1"), WithinRel(1.0, 1e-6));
-  CHECK_THAT(estimate(chosen(s), "tau1"), WithinRel(1.0, 1e-6));
+  CHECK_THAT(estimate_of(chosen(s), "k1"), WithinRel(1.0, 1e-6));
+  CHECK_THAT(estimate_of(chosen(s), "tau1"), WithinRel(1.0, 1e-6));
   REQUIRE_FALSE(s.warnings.empty());
   CHECK(s.warnings.front().find("43 decades") != std::string::npos);
   // The written configuration says the same.
   const FitConfig again = parse_fit_config(config_json(chosen(s).config), "config.json");
-  CHECK_THAT(estimate(run_fit(again), "tau1"), WithinRel(1.0, 1e-6));
+  CHECK_THAT(estimate_of(run_fit(again), "tau1"), WithinRel(1.0, 1e-6));
 }
 
 TEST_CASE("A relaxation modulus that falls by a power of time is fitted by a spring-pot") {
@@ -158,10 +151,10 @@ TEST_CASE("A relaxation modulus that falls by a power of time is fitted by a spr
                         kSize * std::pow(t, -kOrder) / std::tgamma(1.0 - kOrder));
   }
   write_file(folder / "g.csv", text);
-  const Selection s = select_law(read(folder / "g.csv"), quick());
+  const Selection s = select_law(read_function(folder / "g.csv"), quick());
   CHECK(law_name(chosen(s).config.law.value()) == "linear-fspringpot");
-  CHECK_THAT(estimate(chosen(s), "k1"), WithinRel(kSize, 1e-6));
-  CHECK_THAT(estimate(chosen(s), "alpha"), WithinRel(kOrder, 1e-6));
+  CHECK_THAT(estimate_of(chosen(s), "k1"), WithinRel(kSize, 1e-6));
+  CHECK_THAT(estimate_of(chosen(s), "alpha"), WithinRel(kOrder, 1e-6));
   for (const Candidate& c : s.candidates) {
     INFO(law_name(c.law) << ": " << c.reason);
     CHECK_FALSE(c.failed);
@@ -174,7 +167,7 @@ TEST_CASE("A spectrum of a few readings does not get as many parameters") {
   write_file(folder / "s.txt",
              "Frequency\tG'\tG\"\nHz\tPa\tPa\n0.1\t120\t15\n0.3\t130\t17\n1\t145\t22\n3\t160\t31\n"
              "10\t190\t45\n30\t220\t60\n");
-  const Selection s = select_law(read(folder / "s.txt"), quick());
+  const Selection s = select_law(read_function(folder / "s.txt"), quick());
   CHECK(s.samples == 12);
   CHECK(chosen(s).parameters.size() <= 5);
   CHECK(s.candidates[s.recommended].rms_over_peak < 0.01);
@@ -182,7 +175,7 @@ TEST_CASE("A spectrum of a few readings does not get as many parameters") {
   write_file(folder / "J.csv",
              "time [s],J [1/Pa]\n0.1,0.000506600\n1,0.000560423\n5,0.000710707\n20,0.000827228\n"
              "50,0.000833318\n");
-  CHECK(law_name(chosen(select_law(read(folder / "J.csv"), quick())).config.law.value()) ==
+  CHECK(law_name(chosen(select_law(read_function(folder / "J.csv"), quick())).config.law.value()) ==
         "linear-1");
 }
 
@@ -201,7 +194,7 @@ TEST_CASE("A spectrum is fitted from magnitude and phase over an angular frequen
                         std::atan2(loss, storage) * 180.0 / std::numbers::pi);
   }
   write_file(folder / "s.csv", text);
-  const MaterialFunction function = read(folder / "s.csv");
+  const MaterialFunction function = read_function(folder / "s.csv");
   CHECK(function.kind() == "spectrum");
   const Selection s = select_law(function, quick());
   CHECK(law_name(chosen(s).config.law.value()) == "linear-2");
@@ -216,14 +209,15 @@ TEST_CASE(
   write_file(folder / "r.csv", "time [s],depth [mm],force [N]\n0,0,0\n1,1,1\n2,1,0.5\n");
   CHECK_FALSE(find_material_function(folder / "r.csv", {}));
   write_file(folder / "g.csv", "time [s],G(t) [Pa]\n1,3\n2,2\n3,1\n");
-  const MaterialFunction function = read(folder / "g.csv");
+  const MaterialFunction function = read_function(folder / "g.csv");
   CHECK_THAT(test::refusal_of([&] {
                static_cast<void>(function_config(parse_law_name("hertz-1", "test"), function, {}));
              }),
              Contains("a law with a linear kernel"));
   write_file(folder / "before.csv", "time [s],G(t) [Pa]\n-1,3\n2,2\n3,1\n");
-  CHECK_THAT(test::refusal_of(
-                 [&] { static_cast<void>(select_law(read(folder / "before.csv"), quick())); }),
+  CHECK_THAT(test::refusal_of([&] {
+               static_cast<void>(select_law(read_function(folder / "before.csv"), quick()));
+             }),
              Contains("times before the step"));
 }
 

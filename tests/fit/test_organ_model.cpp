@@ -113,9 +113,9 @@ TEST_CASE("derivatives along tied changes are those of each, added") {
 namespace {
 
 /// A few observations of a decay with a bend, and what a surrogate takes them for.
-class Decay final : public ResidualFunction {
+class BentDecay final : public ResidualFunction {
  public:
-  Decay(double bend, const ResidualFunction* surrogate) : bend_(bend), surrogate_(surrogate) {}
+  BentDecay(double bend, const ResidualFunction* surrogate) : bend_(bend), surrogate_(surrogate) {}
   [[nodiscard]] Eigen::Index residual_count() const override { return 12; }
   [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                               RowMatrix* jacobian) const override {
@@ -148,9 +148,9 @@ class Decay final : public ResidualFunction {
 TEST_CASE("a search with a surrogate ends where one without does, and asks less") {
   const std::vector<FitParameter> parameters{{"a", {}, Scale::log, 1.0, 1e-3, 1e3},
                                              {"tau", {}, Scale::log, 1.0, 1e-3, 1e3}};
-  const Decay plain(0.5, nullptr);
-  const Decay cheap(0.0, nullptr);
-  const Decay costly(0.5, &cheap);
+  const BentDecay plain(0.5, nullptr);
+  const BentDecay cheap(0.0, nullptr);
+  const BentDecay costly(0.5, &cheap);
   for (const std::vector<double>& start :
        {std::vector<double>{1.0, 1.0}, std::vector<double>{20.0, 0.05}}) {
     const Minimum reference = minimise(plain, parameters, start);

@@ -63,13 +63,13 @@ Json star_with_branch() {
 }
 
 /// What a recording of that star is made of.
-struct Made {
+struct MadeReadings {
   double contact_m, offset_N, rate_m_per_s;
   std::uint64_t seed;
 };
 
 OrganReadings recorded(const OrganModel& model, const FittedBonds& bonds,
-                       std::span<const double> true_values, const Made& made) {
+                       std::span<const double> true_values, const MadeReadings& made) {
   constexpr double kDeepest = 3e-3, kStep_s = 0.05, kEnd_s = 6.0, kNoise = 5e-3;
   const double ramp_s = kDeepest / made.rate_m_per_s;
   const Protocol drive(Drive::displacement, {{0.0, 0.0}, {ramp_s, kDeepest}, {kEnd_s, kDeepest}});
@@ -143,9 +143,9 @@ TEST_CASE("bonds, contacts and offsets of two recordings are found from their re
   const FittedBonds bonds(organ.tissue->materials.materials.front(), false);
   REQUIRE(bonds.names() == std::vector<std::string>{"Einf", "g1"});
   const std::vector<double> true_values{8e3, 6e3};
-  const std::vector<Made> made{{0.5e-3, 0.02, 3e-3, 3}, {0.2e-3, -0.01, 1e-3, 4}};
+  const std::vector<MadeReadings> made{{0.5e-3, 0.02, 3e-3, 3}, {0.2e-3, -0.01, 1e-3, 4}};
   std::vector<OrganReadings> recordings;
-  for (const Made& each : made) {
+  for (const MadeReadings& each : made) {
     recordings.push_back(recorded(*organ.model, bonds, true_values, each));
   }
   const std::vector<FitParameter> parameters{searched("Einf", 1e4, Scale::log, 80.0, 8e5),

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "fitted_parameter.hpp"
 #include "placement_studies.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
@@ -26,20 +27,13 @@ using test::PlacedTest;
 
 namespace {
 
-const ParameterResult& parameter_of(const FitResult& fit, const std::string& name) {
-  for (const ParameterResult& p : fit.parameters) {
-    if (p.parameter.name == name) return p;
-  }
-  throw std::runtime_error(name);
-}
-
 bool is_fitted(const FitResult& fit, const std::string& name) {
   return std::ranges::any_of(fit.parameters,
                              [&](const auto& p) { return p.parameter.name == name; });
 }
 
-Selection selected(const PreparedRecording& recording, const std::string& law,
-                   SetupOptions setup = {}) {
+Selection selected_law(const PreparedRecording& recording, const std::string& law,
+                       SetupOptions setup = {}) {
   SelectionOptions options;
   options.laws = {parse_law_name(law, "test")};
   options.only_listed = true;
@@ -53,7 +47,7 @@ Selection selected(const PreparedRecording& recording, const std::string& law,
 FitResult quick_fit(const PreparedRecording& recording, const std::string& law,
                     SetupOptions setup = {}) {
   setup.profiles = false;
-  return selected(recording, law, setup).candidates.front().fit;
+  return selected_law(recording, law, setup).candidates.front().fit;
 }
 
 }  // namespace
@@ -152,14 +146,14 @@ TEST_CASE("a drift that the rest tells is in the fit, and k_inf knows it", "[pla
   test.rest_s = 10.0;
   test.hold_s = 48.0;
   test.drift_N_per_s = 1e-3;
-  const Selection s = selected(test::prepared(test, 3), "linear-1");
+  const Selection s = selected_law(test::prepared(test, 3), "linear-1");
   const FitResult& fit = s.candidates.front().fit;
-  CHECK_THAT(parameter_of(fit, "drift").estimate, WithinRel(1e-3, 0.01));
-  CHECK_THAT(parameter_of(fit, "k_inf").estimate, WithinRel(60.0, 0.003));
-  CHECK_THAT(parameter_of(fit, "k1").estimate, WithinRel(45.0, 0.005));
-  CHECK_THAT(parameter_of(fit, "tau1").estimate, WithinRel(2.0, 0.01));
+  CHECK_THAT(find(fit, "drift").estimate, WithinRel(1e-3, 0.01));
+  CHECK_THAT(find(fit, "k_inf").estimate, WithinRel(60.0, 0.003));
+  CHECK_THAT(find(fit, "k1").estimate, WithinRel(45.0, 0.005));
+  CHECK_THAT(find(fit, "tau1").estimate, WithinRel(2.0, 0.01));
   CHECK_FALSE(s.drift);
-  CHECK(verdict_text(parameter_of(fit, "k_inf")) == "identified");
+  CHECK(verdict_text(find(fit, "k_inf")) == "identified");
   CHECK_THAT(to_terminal_text(fit), Contains("mN/s"));
   // Without the term the interval of k_inf is narrower than it may be.
   SetupOptions without;
@@ -206,13 +200,13 @@ TEST_CASE("a placement that is remembered is the one that is measured", "[placem
 TEST_CASE("without a rest a drift and a slow branch are not separable", "[placement]") {
   PlacedTest test;
   test.rest_s = 0.0;
-  const Selection s = selected(test::prepared(test, 4), "linear-1");
+  const Selection s = selected_law(test::prepared(test, 4), "linear-1");
   const FitResult& fit = s.candidates.front().fit;
   CHECK_FALSE(is_fitted(fit, "drift"));
   REQUIRE(s.drift);
   REQUIRE(s.drift->drifting);
   CHECK_THAT(s.drift->k_inf, WithinRel(60.0, 0.01));
-  const ParameterResult& k_inf = parameter_of(fit, "k_inf");
+  const ParameterResult& k_inf = find(fit, "k_inf");
   CHECK(verdict_text(k_inf) == "not identified: drift or a slow branch: not separable");
   CHECK_THAT(to_terminal_text(fit), Contains("drift or a slow branch: not separable") &&
                                         Contains("without a drift of the zero"));
@@ -223,7 +217,7 @@ TEST_CASE("without a rest a drift and a slow branch are not separable", "[placem
   }
   // What a drift would move has an interval that holds both answers.
   for (const char* name : {"k1", "tau1"}) {
-    const ParameterResult& p = parameter_of(fit, name);
+    const ParameterResult& p = find(fit, name);
     if (!p.not_separable.empty()) continue;
     REQUIRE(p.with_drift);
     CHECK(*p.lower <= *p.with_drift->lower);
@@ -234,7 +228,7 @@ TEST_CASE("without a rest a drift and a slow branch are not separable", "[placem
   // The written configuration says the same when it is run.
   const FitResult again = run_fit(parse_fit_config(config_json(fit.config), "test"),
                                   {test::prepared(test, 4).recording});
-  CHECK(verdict_text(parameter_of(again, "k_inf")) == verdict_text(k_inf));
+  CHECK(verdict_text(find(again, "k_inf")) == verdict_text(k_inf));
 }
 
 TEST_CASE("pools, law files and written configurations hold both answers of a drift",
@@ -255,8 +249,8 @@ TEST_CASE("pools, law files and written configurations hold both answers of a dr
   REQUIRE(both->drifting);
   CHECK_THAT(*both->drifting, WithinRel(60.0, 0.02));
   // 0.5 mN/s over the recording moves k_inf by more than its standard error.
-  const double before = parameter_of(alone, "k_inf").standard_error.value();
-  const double after = parameter_of(fit, "k_inf").standard_error.value();
+  const double before = find(alone, "k_inf").standard_error.value();
+  const double after = find(fit, "k_inf").standard_error.value();
   CHECK(std::abs(both->k_inf - *both->drifting) > before);
   CHECK(1.96 * after > std::abs(both->k_inf - *both->drifting));
   const LawFile wide = fitted_law(fit);
@@ -274,10 +268,9 @@ TEST_CASE("pools, law files and written configurations hold both answers of a dr
   give_both_drift_answers(again, data_sets(span));
   for (const char* name : {"k_inf", "k1", "tau1"}) {
     CAPTURE(name);
-    CHECK_THAT(parameter_of(again, name).standard_error.value(),
-               WithinRel(parameter_of(fit, name).standard_error.value(), 1e-3));
-    CHECK(parameter_of(again, name).with_drift.has_value() ==
-          parameter_of(fit, name).with_drift.has_value());
+    CHECK_THAT(find(again, name).standard_error.value(),
+               WithinRel(find(fit, name).standard_error.value(), 1e-3));
+    CHECK(find(again, name).with_drift.has_value() == find(fit, name).with_drift.has_value());
   }
   CHECK_THAT(again.flags.back(), Contains("drift or a slow branch: not separable"));
 }
@@ -289,10 +282,10 @@ TEST_CASE("a drift that no rest tells does not move k1 and tau1 out of their int
     PlacedTest test;
     test.rest_s = 0.0;
     test.drift_N_per_s = drift_N_per_s;
-    const Selection s = selected(test::prepared(test, 4), "linear-1");
+    const Selection s = selected_law(test::prepared(test, 4), "linear-1");
     const FitResult& fit = s.candidates.front().fit;
     for (const auto& [name, truth] : {std::pair<const char*, double>{"k1", 45.0}, {"tau1", 2.0}}) {
-      const ParameterResult& p = parameter_of(fit, name);
+      const ParameterResult& p = find(fit, name);
       CAPTURE(name, p.words);
       if (p.verdict != Verdict::identified || !p.not_separable.empty()) continue;
       CHECK(*p.lower < truth);
@@ -320,7 +313,7 @@ TEST_CASE("priors and drift are kept by the written configuration", "[placement]
   const FitConfig read = parse_fit_config(config_json(fit.config), "test");
   const FitResult again = run_fit(read, {r.recording});
   for (const ParameterResult& p : fit.parameters) {
-    const ParameterResult& q = parameter_of(again, p.parameter.name);
+    const ParameterResult& q = find(again, p.parameter.name);
     CHECK_THAT(q.estimate, WithinAbs(p.estimate, 1e-3 * p.standard_error.value()));
     CHECK_THAT(q.standard_error.value(), WithinRel(p.standard_error.value(), 1e-4));
   }
@@ -384,7 +377,7 @@ TEST_CASE("a law that does not describe a recording leaves its contact where it 
   const PreparedRecording r = test::prepared(test, 8);
   const Onset onset = find_onset(r, read_rests(r), 1.0);
   const FitResult fit = quick_fit(r, "linear-1");
-  const ParameterResult& contact = parameter_of(fit, "contact");
+  const ParameterResult& contact = find(fit, "contact");
   CHECK_FALSE(contact.first_bounds);
   CHECK(std::abs(contact.estimate - onset.drive.value) < 4.0 * onset.drive.sd);
 }
@@ -416,7 +409,7 @@ TEST_CASE("recordings of one material at unequal depths, preloads and zeros pool
       double low = HUGE_VAL, high = 0.0;
       for (const SpecimenRow& row : study.rows) {
         REQUIRE(row.fit);
-        const double value = parameter_of(*row.fit, name).estimate;
+        const double value = find(*row.fit, name).estimate;
         low = std::min(low, value);
         high = std::max(high, value);
       }

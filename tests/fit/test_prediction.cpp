@@ -19,7 +19,7 @@ namespace {
 using Catch::Matchers::Contains;
 
 /// F = k u with k = 100 +- 2 N/m and readings that scatter by 3 mN.
-LawFile spring() {
+LawFile spring_law() {
   LawFile law;
   law.spec = parse_law_name("linear", "test");
   law.spec.reference = 4e-3;
@@ -48,7 +48,7 @@ PreparedRecording noisy_recording(double phi, std::uint64_t seed, const char* sh
   return prepare_recording("simulated", r);
 }
 
-LawFile fit_of(const PreparedRecording& recording) {
+LawFile fitted_linear_1(const PreparedRecording& recording) {
   SetupOptions setup;
   setup.profiles = false;
   setup.reference = 4e-3;
@@ -60,7 +60,7 @@ LawFile fit_of(const PreparedRecording& recording) {
 }  // namespace
 
 TEST_CASE("the band of a spring is that of a straight line through the origin") {
-  const LawFile law = spring();
+  const LawFile law = spring_law();
   const Protocol protocol = ramp_and_hold(4e-3, 1e-3, 6.0);
   const std::vector<double> times{0.0, 1.0, 2.0, 4.0, 10.0};
   const LawPrediction p = predict_law(law, protocol, times, {});
@@ -82,7 +82,7 @@ TEST_CASE("the band of a spring is that of a straight line through the origin") 
 }
 
 TEST_CASE("a t quantile is used where the size of the noise was estimated") {
-  LawFile law = spring();
+  LawFile law = spring_law();
   law.uncertainty->degrees_of_freedom = 5.0;
   const LawPrediction p = predict_law(law, ramp_and_hold(4e-3, 1e-3, 6.0), std::vector{4.0}, {});
   CHECK(p.quantile == Approx(2.5705818366).epsilon(1e-9));
@@ -93,7 +93,7 @@ TEST_CASE("a t quantile is used where the size of the noise was estimated") {
 }
 
 TEST_CASE("bands from drawn laws agree with bands from derivatives where the law is well known") {
-  const LawFile law = fit_of(noisy_recording(0.0, 4, "a"));
+  const LawFile law = fitted_linear_1(noisy_recording(0.0, 4, "a"));
   const Protocol protocol = ramp_and_hold(3e-3, 2e-3, 8.0);
   const std::vector<double> times = times_over(protocol, 30);
   const LawPrediction by_slopes = predict_law(law, protocol, times, {});
@@ -108,7 +108,7 @@ TEST_CASE("bands from drawn laws agree with bands from derivatives where the law
 }
 
 TEST_CASE("a law file keeps its uncertainty") {
-  const LawFile law = fit_of(noisy_recording(0.6, 1, "abc"));
+  const LawFile law = fitted_linear_1(noisy_recording(0.6, 1, "abc"));
   REQUIRE(law.uncertainty);
   CHECK(law.uncertainty->readings_per_independent > 1.5);
   const LawFile back = law_from_json(files::to_json(law), "test");
@@ -127,7 +127,7 @@ TEST_CASE("a law file keeps its uncertainty") {
 }
 
 TEST_CASE("a covariance that is none is refused") {
-  const Json good = files::to_json(spring());
+  const Json good = files::to_json(spring_law());
   const auto refused = [&](const std::function<void(Json&)>& change) {
     Json bad = good;
     change(bad["fit"]);
@@ -141,7 +141,7 @@ TEST_CASE("a covariance that is none is refused") {
              Contains("unknown parameter 'k9_N_per_m'"));
   CHECK_THAT(refused([](Json& fit) { fit["parameters"][1] = fit["parameters"][0]; }),
              Contains("twice"));
-  LawFile bare = spring();
+  LawFile bare = spring_law();
   bare.uncertainty.reset();
   CHECK_THAT(test::refusal_of([&] {
                (void)predict_law(bare, ramp_and_hold(1e-3, 1e-3, 1.0), std::vector{0.5}, {});
@@ -174,7 +174,7 @@ TEST_CASE("the paper's element becomes a law with the fit's own standard errors"
 TEST_CASE("a recording that was fitted keeps its contact and offset, another finds its own") {
   const PreparedRecording first = noisy_recording(0.0, 1, "first");
   PreparedRecording second = noisy_recording(0.0, 2, "second");
-  const LawFile law = fit_of(first);
+  const LawFile law = fitted_linear_1(first);
   const LawPrediction same = predict_recording(law, first, {});
   CHECK(same.placement == Placement::fitted);
   CHECK(same.recording->held_out.samples == 0);
@@ -191,7 +191,7 @@ TEST_CASE("a recording that was fitted keeps its contact and offset, another fin
 }
 
 TEST_CASE("what goes beyond the fitted data is said") {
-  const LawFile law = spring();
+  const LawFile law = spring_law();
   const LawPrediction deep =
       predict_law(law, ramp_and_hold(8e-3, 1e-3, 30.0), std::vector{0.0, 8.0, 38.0}, {});
   REQUIRE(deep.flags.size() == 2);

@@ -1,12 +1,12 @@
 // What a rheologist's file says: strains, lengths and kept steps, and what a fit of it prints.
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 
+#include "fitted_parameter.hpp"
+#include "run_in.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
@@ -66,26 +66,6 @@ std::string tension_csv(const std::string& header, double drive, double stress) 
                         stress * answer[static_cast<Eigen::Index>(i)]);
   }
   return text;
-}
-
-struct Run {
-  int code;
-  std::string said;
-};
-
-Run run_in(const test::TempFolder& folder, const std::string& arguments) {
-  const std::string out = folder / "said.log";
-  const int status = std::system(fmt::format("cd '{}' && '" TPM_TEST_PROGRAM "' {} > '{}' 2>&1",
-                                             folder.path().string(), arguments, out)
-                                     .c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out)};
-}
-
-double estimate_of(const FitResult& fit, const std::string& name) {
-  for (const ParameterResult& p : fit.parameters) {
-    if (p.parameter.name == name) return p.estimate;
-  }
-  throw std::runtime_error(name);
 }
 
 }  // namespace
@@ -193,7 +173,7 @@ TEST_CASE("A strain is fitted from its file alone, by linear and power kernels",
   const test::TempFolder folder;
   write_file(folder / "shear.csv",
              tension_csv("time [s],shear strain [%],shear stress [kPa]\n", 100.0, 1e-3));
-  const Run run = run_in(folder, "fit shear.csv --format json");
+  const test::ProgramRun run = test::run_in(folder, "fit shear.csv --format json");
   INFO(run.said);
   REQUIRE(run.code == 0);
   const Json json = parse_json(run.said, "said");
@@ -214,20 +194,21 @@ TEST_CASE("A strain is fitted from its file alone, by linear and power kernels",
   }
   CHECK_THAT(read_file(folder.path() / "shear_fit" / "parameters.csv"),
              Catch::StartsWith("parameter,SI_unit,estimate,standard_error,lower,upper,level,"));
-  CHECK(run_in(folder, "fit shear_fit/config.json").code == 0);
+  CHECK(test::run_in(folder, "fit shear_fit/config.json").code == 0);
 }
 
 TEST_CASE("A compression that is counted negative names the options that help", "[rheometer]") {
   const test::TempFolder folder;
   write_file(folder / "c.csv", tension_csv("time [s],strain [%],stress [kPa]\n", -100.0, -1e-3));
-  const Run refused = run_in(folder, "fit c.csv --no-draw");
+  const test::ProgramRun refused = test::run_in(folder, "fit c.csv --no-draw");
   CHECK(refused.code == 3);
   CHECK_THAT(refused.said, Contains("the drive falls") && Contains("--negate-drive"));
-  const Run run = run_in(folder, "fit c.csv --negate-drive --negate-response --format json");
+  const test::ProgramRun run =
+      test::run_in(folder, "fit c.csv --negate-drive --negate-response --format json");
   INFO(run.said);
   REQUIRE(run.code == 0);
   CHECK(parse_json(run.said, "said").at("recommended") == "linear-1");
-  CHECK(run_in(folder, "fit c_fit/config.json").code == 0);
+  CHECK(test::run_in(folder, "fit c_fit/config.json").code == 0);
 }
 
 TEST_CASE("Columns that only their units tell make a spectrum or a modulus", "[rheometer]") {

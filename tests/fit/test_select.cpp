@@ -25,7 +25,8 @@ using Catch::Matchers::WithinRel;
 namespace {
 
 /// Ramp and hold of a law with 0.5 % noise, a few samples before contact.
-Recording simulated(const std::string& law, const std::vector<double>& values, std::uint64_t seed) {
+Recording simulated_press(const std::string& law, const std::vector<double>& values,
+                          std::uint64_t seed) {
   Recording r;
   for (int i = 0; i < 240; ++i) {
     const double t = 0.1 * i;
@@ -54,7 +55,7 @@ SelectionOptions few_laws() {
 TEST_CASE("select returns the law behind a recording and says what the protocol hides",
           "[select]") {
   const std::vector<PreparedRecording> one{prepare_recording(
-      "one.csv", simulated("linear-2", {100.0, 120.0, 80.0, 0.4, 6.0, 0.0, 0.0}, 4))};
+      "one.csv", simulated_press("linear-2", {100.0, 120.0, 80.0, 0.4, 6.0, 0.0, 0.0}, 4))};
   const Selection s = select_law(one, few_laws());
   const Candidate& chosen = s.candidates[s.recommended];
   CHECK(law_name(chosen.law) == "linear-2");
@@ -71,7 +72,7 @@ TEST_CASE("select returns the law behind a recording and says what the protocol 
 
 TEST_CASE("one point of a profile tells whether the interval holds a value", "[select]") {
   const std::vector<PreparedRecording> one{
-      prepare_recording("one.csv", simulated("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 5))};
+      prepare_recording("one.csv", simulated_press("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 5))};
   ExperimentResiduals function(recording_config(parse_law_name("linear-1", "test"), one, {}),
                                data_sets(one));
   const FitResult fit = fit_experiments(function);
@@ -99,7 +100,7 @@ TEST_CASE("one point of a profile tells whether the interval holds a value", "[s
 
 TEST_CASE("the printed configuration gives the same fit again", "[select]") {
   const test::TempFolder folder;
-  Recording r = simulated("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 7);
+  Recording r = simulated_press("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 7);
   std::string csv = "time [s],depth [mm],force [N]\n";
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
     csv += fmt::format("{},{},{}\n", r.time_s[i], 1e3 * r.drive[i], r.response[i]);
@@ -122,8 +123,8 @@ TEST_CASE("one specimen's recording is told from the spread between specimens", 
   for (const double stiffness : {80.0, 100.0, 125.0, 110.0}) {
     specimens.push_back(
         prepare_recording(fmt::format("{}.csv", stiffness),
-                          simulated("linear-1", {stiffness, 1.2 * stiffness, 3.0, 0.0, 0.0},
-                                    static_cast<std::uint64_t>(stiffness))));
+                          simulated_press("linear-1", {stiffness, 1.2 * stiffness, 3.0, 0.0, 0.0},
+                                          static_cast<std::uint64_t>(stiffness))));
   }
   SetupOptions setup;
   setup.profiles = false;
@@ -142,9 +143,10 @@ TEST_CASE("one specimen's recording is told from the spread between specimens", 
 TEST_CASE("branches are pooled by their times, however a fit numbers them", "[select]") {
   std::vector<PreparedRecording> specimens;
   for (int i = 0; i < 4; ++i) {
-    specimens.push_back(prepare_recording(
-        fmt::format("{}.csv", i), simulated("linear-2", {100.0, 120.0, 80.0, 0.4, 6.0, 0.0, 0.0},
-                                            static_cast<std::uint64_t>(40 + i))));
+    specimens.push_back(
+        prepare_recording(fmt::format("{}.csv", i),
+                          simulated_press("linear-2", {100.0, 120.0, 80.0, 0.4, 6.0, 0.0, 0.0},
+                                          static_cast<std::uint64_t>(40 + i))));
   }
   SelectionOptions options;
   options.setup.profiles = false;
@@ -176,7 +178,7 @@ TEST_CASE("branches are pooled by their times, however a fit numbers them", "[se
 }
 
 TEST_CASE("a depth of metres is taken for a slip of the unit", "[select]") {
-  Recording r = simulated("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 6);
+  Recording r = simulated_press("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 6);
   for (double& depth : r.drive) depth *= 1000.0;
   SelectionOptions options;
   options.laws = {parse_law_name("linear-1", "test")};
@@ -207,7 +209,7 @@ Recording sampled(const std::string& law, const std::vector<double>& values, dou
   return r;
 }
 
-Selection selected(const Recording& r, std::initializer_list<const char*> laws) {
+Selection selected_among(const Recording& r, std::initializer_list<const char*> laws) {
   SelectionOptions options;
   for (const char* name : laws) options.laws.push_back(parse_law_name(name, "test"));
   options.only_listed = true;
@@ -228,9 +230,9 @@ const Candidate& candidate(const Selection& s, const std::string& law) {
 TEST_CASE("a law with a relaxation time that the sampling cannot support is not recommended",
           "[select]") {
   // 0.15 s between samples that are 0.1 s apart.
-  const Selection s =
-      selected(sampled("linear-2", {100.0, 300.0, 80.0, 0.15, 6.0, 0.0, 0.0}, 0.1, 30.0, 1e-4),
-               {"linear-1", "linear-2"});
+  const Selection s = selected_among(
+      sampled("linear-2", {100.0, 300.0, 80.0, 0.15, 6.0, 0.0, 0.0}, 0.1, 30.0, 1e-4),
+      {"linear-1", "linear-2"});
   const Candidate& two = candidate(s, "linear-2");
   REQUIRE(two.delta_bic == 0.0);
   CHECK_FALSE(two.identified);
@@ -326,22 +328,22 @@ TEST_CASE("the table of laws does not contradict the table of parameters", "[sel
 
 TEST_CASE("a hold of three relaxation times is needed to say that nothing remains", "[select]") {
   const std::vector<double> fluid{300.0, 6.0, 0.0, 0.0};
-  const Selection brief =
-      selected(sampled("linear-1-fluid", fluid, 0.1, 11.0, 2e-3), {"linear-1-fluid", "linear-1"});
+  const Selection brief = selected_among(sampled("linear-1-fluid", fluid, 0.1, 11.0, 2e-3),
+                                         {"linear-1-fluid", "linear-1"});
   CHECK_FALSE(candidate(brief, "linear-1-fluid").identified);
   CHECK(candidate(brief, "linear-1-fluid").reason ==
         "a hold of 9 s does not tell that nothing remains in the end");
   CHECK(law_name(brief.candidates[brief.recommended].law) == "linear-1");
-  const Selection late =
-      selected(sampled("linear-1-fluid", fluid, 0.1, 40.0, 2e-3), {"linear-1-fluid", "linear-1"});
+  const Selection late = selected_among(sampled("linear-1-fluid", fluid, 0.1, 40.0, 2e-3),
+                                        {"linear-1-fluid", "linear-1"});
   CHECK(candidate(late, "linear-1-fluid").identified);
   CHECK(law_name(late.candidates[late.recommended].law) == "linear-1-fluid");
 }
 
 TEST_CASE("few samples are no prediction", "[select]") {
   // Ramp of 1 s, and a hold of four samples.
-  const Selection s =
-      selected(sampled("linear-1", {100.0, 120.0, 1.0, 0.0, 0.0}, 0.1, 2.4, 1e-3), {"linear-1"});
+  const Selection s = selected_among(
+      sampled("linear-1", {100.0, 120.0, 1.0, 0.0, 0.0}, 0.1, 2.4, 1e-3), {"linear-1"});
   CHECK(s.candidates.front().held_out.empty());
   CHECK_THAT(s.warnings.front(), Catch::Contains("nothing was held out: the second half of the "
                                                  "hold has fewer than 5 samples"));

@@ -1,13 +1,12 @@
 // Folders of recordings: one reference depth for all coefficients, and repeats of a specimen.
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdlib>
 
 #include "expected_values.hpp"
+#include "run_in.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
@@ -37,7 +36,7 @@ LawSpec law_at(const char* name, double reference_m) {
 }
 
 /// Ramp and hold of a specimen whose power law has exponent 2 and k_inf = 100 N/m at 4 mm.
-Recording quadratic(double depth_m, double stiffness, std::uint64_t seed) {
+Recording quadratic_press(double depth_m, double stiffness, std::uint64_t seed) {
   Recording r;
   for (int i = 0; i < 160; ++i) {
     r.time_s.push_back(0.06 * i);
@@ -57,12 +56,12 @@ std::vector<PreparedRecording> one_material() {
   for (const double depth_mm : {2.0, 3.0, 4.5, 6.0, 8.0}) {
     recordings.push_back(prepare_recording(
         fmt::format("{} mm.csv", depth_mm),
-        quadratic(1e-3 * depth_mm, 1.0, static_cast<std::uint64_t>(10 * depth_mm))));
+        quadratic_press(1e-3 * depth_mm, 1.0, static_cast<std::uint64_t>(10 * depth_mm))));
   }
   return recordings;
 }
 
-SelectionOptions without_profiles() {
+SelectionOptions options_without_profiles() {
   SelectionOptions options;
   options.setup.profiles = false;
   return options;
@@ -85,27 +84,12 @@ std::string csv_of(const Recording& r, const std::string& specimen = {}) {
   return csv;
 }
 
-struct Run {
-  int code;
-  std::string said;
-};
-
-/// The program on a folder, from within it.
-Run run_on(const test::TempFolder& folder, const std::string& arguments) {
-  const std::string out = folder / "said.log";
-  const int status = std::system(fmt::format("cd '{}' && '" TPM_TEST_PROGRAM "' {} > '{}' 2>&1",
-                                             folder.path().string(), arguments, out)
-                                     .c_str());
-  const bool silent = std::filesystem::is_empty(out);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, silent ? std::string() : read_file(out)};
-}
-
 }  // namespace
 
 TEST_CASE("Recordings of one material to unequal depths show no spread", "[specimens]") {
   const auto recordings = one_material();
   const SpecimenStudy study =
-      study_specimens(recordings, parse_law_name("power-1", "test"), without_profiles());
+      study_specimens(recordings, parse_law_name("power-1", "test"), options_without_profiles());
   // What all of them reach: 2 mm, less what a quadratic force hides below the noise.
   CHECK_THAT(study.law.reference, test::expected("recordings_to_unequal_depths.reference_depth"));
   for (const SpecimenRow& row : study.rows) {
@@ -134,7 +118,7 @@ TEST_CASE("A folder's stiffnesses under a probe are Young's moduli", "[specimens
   cone.cone_half_angle_rad = std::atan(1.5);
   cone.poisson_ratio = 0.4;
   const double true_Pa = 100.0 / 4e-3 / (2.0 / 3.141592653589793 * 1.5 / (1.0 - 0.16));
-  SelectionOptions options = without_profiles();
+  SelectionOptions options = options_without_profiles();
   options.setup.exponent = probe_exponent(cone);
   const SpecimenStudy study = study_specimens(one_material(), law_at("power-1", 1.0), options);
   const YoungModuli moduli = pooled_moduli(study, cone, true);
@@ -165,7 +149,7 @@ void write_folder(const test::TempFolder& folder) {
   std::filesystem::create_directory(folder.path() / "pig");
   for (const double depth_mm : {3.0, 5.0}) {
     write_file(folder.path() / "pig" / fmt::format("{}mm.csv", depth_mm),
-               csv_of(quadratic(1e-3 * depth_mm, 1.0, static_cast<std::uint64_t>(depth_mm))));
+               csv_of(quadratic_press(1e-3 * depth_mm, 1.0, static_cast<std::uint64_t>(depth_mm))));
   }
 }
 
@@ -190,7 +174,8 @@ TEST_CASE("Beside an answer in JSON stands its table as CSV", "[specimens]") {
            {"predict law.json --frequencies '1 Hz : 100 Hz : 3'",
             "frequency_Hz,storage_N_per_m,"}}) {
     INFO(c.command);
-    const Run json = run_on(folder, std::string(c.command) + " --format json -o answer.json");
+    const test::ProgramRun json =
+        test::run_in(folder, std::string(c.command) + " --format json -o answer.json");
     INFO(json.said);
     REQUIRE((json.code == 0 || json.code == 1));
     const Json answer = parse_json(read_file(folder.path() / "answer.json"), "answer");
@@ -200,10 +185,11 @@ TEST_CASE("Beside an answer in JSON stands its table as CSV", "[specimens]") {
     CHECK(std::count(csv.begin(), csv.end(), '\n') > 1);
     std::filesystem::remove(folder.path() / "answer.csv");
     // Text has no table beside it.
-    CHECK(run_on(folder, std::string(c.command) + " -o answer.txt").code == json.code);
+    CHECK(test::run_in(folder, std::string(c.command) + " -o answer.txt").code == json.code);
     CHECK_FALSE(std::filesystem::exists(folder.path() / "answer.csv"));
   }
-  const Run over = run_on(folder, "fit pig/3mm.csv --no-draw --format json -o pig/3mm.json");
+  const test::ProgramRun over =
+      test::run_in(folder, "fit pig/3mm.csv --no-draw --format json -o pig/3mm.json");
   CHECK(over.code == 2);
   CHECK_THAT(over.said, Contains("pig/3mm.csv: this command reads it and would write over it"));
 }
@@ -212,7 +198,8 @@ TEST_CASE("The choice of a law is told by options of fit", "[specimens]") {
   const test::TempFolder folder;
   write_folder(folder);
   const auto answer = [&](const std::string& options) {
-    const Run run = run_on(folder, "fit pig/3mm.csv --no-draw --format json " + options);
+    const test::ProgramRun run =
+        test::run_in(folder, "fit pig/3mm.csv --no-draw --format json " + options);
     INFO(run.said);
     REQUIRE(run.code == 0);
     return parse_json(run.said, "answer");
@@ -228,11 +215,12 @@ TEST_CASE("The choice of a law is told by options of fit", "[specimens]") {
     CHECK_FALSE(parse_law_name(law.at("law").get<std::string>(), "answer").fractional ==
                 Fractional::none);
   }
-  const Run twice = run_on(folder, "fit pig/3mm.csv --laws linear-1,power-1 --times '1 s'");
+  const test::ProgramRun twice =
+      test::run_in(folder, "fit pig/3mm.csv --laws linear-1,power-1 --times '1 s'");
   CHECK(twice.code == 2);
   CHECK_THAT(twice.said, Contains("--times: with 2 laws"));
   for (const char* option : {"--laws power-1", "--family all", "--margin 3", "--no-profiles"}) {
-    const Run run = run_on(
+    const test::ProgramRun run = test::run_in(
         folder, std::string("fit " TPM_TEST_SOURCE_DIR "/configs/liver_relaxation.json ") + option);
     CHECK(run.code == 2);
     CHECK_THAT(run.said, Contains("with a configuration"));
@@ -243,7 +231,8 @@ TEST_CASE("Under a sphere the law of a folder is chosen among those of Hertz' ke
           "[specimens]") {
   const test::TempFolder folder;
   write_folder(folder);
-  const Run run = run_on(folder, "fit pig --radius '2 mm' --no-draw --format json");
+  const test::ProgramRun run =
+      test::run_in(folder, "fit pig --radius '2 mm' --no-draw --format json");
   INFO(run.said);
   REQUIRE(run.code == 0);
   const Json study = parse_json(run.said, "answer");
@@ -255,8 +244,8 @@ TEST_CASE("Under a sphere the law of a folder is chosen among those of Hertz' ke
 TEST_CASE("A folder under a probe answers in pascals", "[specimens]") {
   const test::TempFolder folder;
   write_folder(folder);
-  const Run text =
-      run_on(folder, "fit pig --laws power-1 --cone-angle '45 deg' --poisson 0.4 --folder out");
+  const test::ProgramRun text = test::run_in(
+      folder, "fit pig --laws power-1 --cone-angle '45 deg' --poisson 0.4 --folder out");
   INFO(text.said);
   REQUIRE(text.code == 0);
   CHECK_THAT(text.said, Contains("Young's moduli under") && Contains("typical of 2 specimens"));
@@ -269,7 +258,7 @@ TEST_CASE("A folder under a probe answers in pascals", "[specimens]") {
 
 TEST_CASE("A reference depth can be chosen, and the coefficients are those at it", "[specimens]") {
   const auto recordings = one_material();
-  SelectionOptions options = without_profiles();
+  SelectionOptions options = options_without_profiles();
   options.setup.reference = 4e-3;
   const SpecimenStudy study =
       study_specimens(recordings, parse_law_name("power-1", "test"), options);
@@ -300,10 +289,10 @@ TEST_CASE("Coefficients of different reference depths are never pooled", "[speci
 TEST_CASE("What was fitted to shallow recordings predicts a deep one", "[specimens]") {
   std::vector<PreparedRecording> recordings;
   for (const double depth_mm : {3.0, 4.0, 6.0}) {
-    recordings.push_back(
-        prepare_recording(fmt::format("{}.csv", depth_mm), quadratic(1e-3 * depth_mm, 1.0, 7)));
+    recordings.push_back(prepare_recording(fmt::format("{}.csv", depth_mm),
+                                           quadratic_press(1e-3 * depth_mm, 1.0, 7)));
   }
-  SelectionOptions options = without_profiles();
+  SelectionOptions options = options_without_profiles();
   options.laws = {parse_law_name("power-1", "test")};
   options.only_listed = true;
   const Selection s = select_law(recordings, options);
@@ -316,7 +305,7 @@ TEST_CASE("What was fitted to shallow recordings predicts a deep one", "[specime
 
 TEST_CASE("The law of a folder is one that most of its recordings identify", "[specimens]") {
   const auto recordings = one_material();
-  const SpecimenStudy study = study_specimens(recordings, std::nullopt, without_profiles());
+  const SpecimenStudy study = study_specimens(recordings, std::nullopt, options_without_profiles());
   CHECK(law_name(study.law) == "power-1");
   CHECK_THAT(study.why, Contains("among the laws that most of them identify; its parameters are "
                                  "identified in 5 of them"));
@@ -352,7 +341,8 @@ TEST_CASE("A folder's repeats are grouped by name, column or key", "[specimens]"
   int i = 0;
   for (const double stiffness : {1.0, 1.3}) {
     for (const double depth_mm : {3.0, 5.0}) {
-      const Recording r = quadratic(1e-3 * depth_mm, stiffness, static_cast<std::uint64_t>(++i));
+      const Recording r =
+          quadratic_press(1e-3 * depth_mm, stiffness, static_cast<std::uint64_t>(++i));
       const std::string animal = stiffness > 1.1 ? "pig2" : "pig1";
       const std::string name = fmt::format("{}_{}mm", animal, depth_mm);
       write_file(folder.path() / "by_name" / (name + ".csv"), csv_of(r, animal));
@@ -371,7 +361,7 @@ TEST_CASE("A folder's repeats are grouped by name, column or key", "[specimens]"
        std::vector<std::string>{"by_name " + fit + "'(pig[0-9])_'", "by_name " + fit + "animal",
                                 "by_key " + fit + "specimen"}) {
     INFO(arguments);
-    const Run run = run_on(folder, "fit " + arguments);
+    const test::ProgramRun run = test::run_in(folder, "fit " + arguments);
     INFO(run.said);
     REQUIRE(run.code == 0);
     const Json json = parse_json(run.said, "said");
@@ -381,20 +371,22 @@ TEST_CASE("A folder's repeats are grouped by name, column or key", "[specimens]"
     CHECK(json.at("pooled").at(0).at("repeat_degrees_of_freedom") == 2);
     CHECK(json.at("pooled").at(0).at("spread_p_value") < 0.05);  // they differ by 30 %
   }
-  const Run text = run_on(folder,
-                          "fit by_name --laws power-1 --no-draw --group-by animal "
-                          "--reference '3.5 mm' --verbose");
+  const test::ProgramRun text =
+      test::run_in(folder,
+                   "fit by_name --laws power-1 --no-draw --group-by animal "
+                   "--reference '3.5 mm' --verbose");
   CHECK_THAT(text.said, Contains("[pig2]") && Contains("secants at a depth of 3.5 mm"));
-  const Run unmatched = run_on(folder, "fit by_name --no-draw --group-by '(cow)'");
+  const test::ProgramRun unmatched =
+      test::run_in(folder, "fit by_name --no-draw --group-by '(cow)'");
   CHECK(unmatched.code == 2);
   CHECK_THAT(unmatched.said, Contains("tpm: --group-by: 'pig1_3mm.csv' is not matched by '(cow)'"));
-  CHECK(run_on(folder, "fit by_name --group-by '(a)(b)'").code == 2);
-  CHECK(run_on(folder, "fit by_name --group-by '(['").code == 2);
-  CHECK(run_on(folder, "fit by_name --group-by colour").code == 3);
-  CHECK(run_on(folder, "fit by_key --group-by colour").code == 3);
-  CHECK(run_on(folder, "fit by_name --group-by force").code == 3);
-  CHECK(run_on(folder, "fit by_name --reference '0 mm'").code == 2);
-  CHECK(run_on(folder, "fit by_name/pig1_3mm.csv --group-by animal").code == 2);
+  CHECK(test::run_in(folder, "fit by_name --group-by '(a)(b)'").code == 2);
+  CHECK(test::run_in(folder, "fit by_name --group-by '(['").code == 2);
+  CHECK(test::run_in(folder, "fit by_name --group-by colour").code == 3);
+  CHECK(test::run_in(folder, "fit by_key --group-by colour").code == 3);
+  CHECK(test::run_in(folder, "fit by_name --group-by force").code == 3);
+  CHECK(test::run_in(folder, "fit by_name --reference '0 mm'").code == 2);
+  CHECK(test::run_in(folder, "fit by_name/pig1_3mm.csv --group-by animal").code == 2);
   // A folder that would not be written is no silent wish.
-  CHECK(run_on(folder, "fit by_name/pig1_3mm.csv --no-draw --folder f").code == 2);
+  CHECK(test::run_in(folder, "fit by_name/pig1_3mm.csv --no-draw --folder f").code == 2);
 }

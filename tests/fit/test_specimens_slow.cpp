@@ -20,7 +20,7 @@ namespace {
 constexpr double kLevel = 0.95;
 constexpr double kTest = 1e-3;  // level of the exact binomial tests
 
-LawSpec quadratic() {
+LawSpec quadratic_law() {
   LawSpec spec = parse_law_name("power-1", "test");
   spec.reference = 4e-3;
   return spec;
@@ -37,7 +37,7 @@ Recording clean_recording(double depth_m, double rest_s) {
   const std::vector<double> values{100.0, 120.0, 2.0, 2.0, kAbove_m, 0.0};
   const Protocol history = measured_history(Drive::displacement, r.time_s, r.drive);
   const Eigen::VectorXd f =
-      LawModel(quadratic()).respond(history, r.time_s, values, Want::values).value;
+      LawModel(quadratic_law()).respond(history, r.time_s, values, Want::values).value;
   r.response.assign(f.begin(), f.end());
   return r;
 }
@@ -68,7 +68,7 @@ std::map<std::string, std::pair<int, int>> spread_rejections(double rest_s, int 
       recordings.push_back(
           prepare_recording(fmt::format("{}.csv", recordings.size()), with_noise(r, random)));
     }
-    const SpecimenStudy study = study_specimens(recordings, quadratic(), options);
+    const SpecimenStudy study = study_specimens(recordings, quadratic_law(), options);
     for (const PooledParameter& p : study.pooled) {
       if (p.effects.specimens != clean.size()) continue;
       auto& [rejected, tested] = counts[p.parameter.name];

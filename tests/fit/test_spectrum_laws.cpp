@@ -33,7 +33,7 @@ Selection select_for(const std::function<Complex(Complex)>& modulus) {
   return select_law(MaterialFunction{"made", std::move(spectrum), {}, {}}, options);
 }
 
-struct Made {
+struct MadeSpectrum {
   const char* law;
   int parameters;
   std::function<Complex(Complex)> modulus;
@@ -42,7 +42,7 @@ struct Made {
 }  // namespace
 
 TEST_CASE("a spectrum of 18 readings gets the law that made it", "[select][spectrum]") {
-  const std::vector<Made> all{
+  const std::vector<MadeSpectrum> all{
       {"linear-1", 3, [](Complex s) { return 500.0 + 1000.0 * s / (1.0 + s); }},
       {"linear-2", 5,
        [](Complex s) {
@@ -54,7 +54,7 @@ TEST_CASE("a spectrum of 18 readings gets the law that made it", "[select][spect
        [](Complex s) { return 300.0 * std::pow(s, 0.6) + 500.0 * std::pow(s, 0.15); }},
       {"linear-fmaxwell2", 4,
        [](Complex s) { return 1.0 / (std::pow(s, -0.7) / 300.0 + std::pow(s, -0.15) / 500.0); }}};
-  for (const Made& made : all) {
+  for (const MadeSpectrum& made : all) {
     INFO(made.law);
     const Selection s = select_for(made.modulus);
     const Candidate& chosen = s.candidates[s.recommended];
@@ -67,12 +67,12 @@ TEST_CASE("a spectrum of 18 readings gets the law that made it", "[select][spect
 
 TEST_CASE("a dashpot beside or behind a spring-pot is an order of 1 and no bound",
           "[select][spectrum]") {
-  const Made beside{"linear-fkelvin_voigt2", 4,
-                    [](Complex s) { return 300.0 * s + 500.0 * std::pow(s, 0.15); }};
-  const Made behind{"linear-fmaxwell2", 4, [](Complex s) {
-                      return 1.0 / (1.0 / (300.0 * s) + std::pow(s, -0.15) / 500.0);
-                    }};
-  for (const Made& made : {beside, behind}) {
+  const MadeSpectrum beside{"linear-fkelvin_voigt2", 4,
+                            [](Complex s) { return 300.0 * s + 500.0 * std::pow(s, 0.15); }};
+  const MadeSpectrum behind{"linear-fmaxwell2", 4, [](Complex s) {
+                              return 1.0 / (1.0 / (300.0 * s) + std::pow(s, -0.15) / 500.0);
+                            }};
+  for (const MadeSpectrum& made : {beside, behind}) {
     INFO(made.law);
     const Selection s = select_for(made.modulus);
     const Candidate& chosen = s.candidates[s.recommended];

@@ -4,16 +4,15 @@
 // parallel form, a ramped creep, strips with a slack length, units that change verdicts (issue 47),
 // and recordings of a stiffer material (issue 51).
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdlib>
 #include <functional>
 #include <regex>
 #include <string>
 
+#include "run_in.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
@@ -27,21 +26,6 @@ using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
 namespace {
-
-struct Answer {
-  int code;
-  std::string said;
-};
-
-/// @param before  a command whose output goes into the program, such as "cat FILE |"
-Answer answer_in(const test::TempFolder& folder, const std::string& arguments,
-                 const std::string& before = "") {
-  const std::string out = folder / "said.log";
-  const int status = std::system(fmt::format("cd '{}' && {} '" TPM_TEST_PROGRAM "' {} > '{}' 2>&1",
-                                             folder.path().string(), before, arguments, out)
-                                     .c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out)};
-}
 
 /// In SI, of a fit that was asked for JSON.
 double estimate_in(const std::string& said, const std::string& name) {
@@ -74,7 +58,8 @@ TEST_CASE("marks of thousands do not scale a fit", "[tables]") {
                 : fmt::format("{},{:03}\n", force / 1000, std::abs(force) % 1000);
   }
   write_file(folder / "t.txt", text);
-  const Answer answer = answer_in(folder, "fit t.txt --laws linear-1 --no-draw --format json");
+  const test::ProgramRun answer =
+      test::run_in(folder, "fit t.txt --laws linear-1 --no-draw --format json");
   INFO(answer.said);
   REQUIRE(answer.code == 0);
   CHECK_THAT(estimate_in(answer.said, "k_inf"), WithinRel(60.0, 0.01));
@@ -90,18 +75,18 @@ TEST_CASE("the time of a step is an option that the configuration keeps", "[tabl
     text += fmt::format("{:.1f}\t1.000\t{:.4f}\n", 185.0 + t, 20.0 + 30.0 * std::exp(-t / 5.0));
   }
   write_file(folder / "t.txt", text);
-  const Answer late = answer_in(folder, "fit t.txt --no-draw");
+  const test::ProgramRun late = test::run_in(folder, "fit t.txt --no-draw");
   CHECK(late.code == 3);
   CHECK_THAT(late.said,
              Contains("the first sample is 185.1 s after the step") && Contains("--step-time"));
-  const Answer told =
-      answer_in(folder, "fit t.txt --step-time '185 s' --laws linear-1 --format json");
+  const test::ProgramRun told =
+      test::run_in(folder, "fit t.txt --step-time '185 s' --laws linear-1 --format json");
   INFO(told.said);
   REQUIRE(told.code == 0);
   CHECK_THAT(estimate_in(told.said, "k_inf"), WithinRel(2000.0, 1e-3));
   CHECK_THAT(estimate_in(told.said, "k1"), WithinRel(3000.0, 1e-3));
   CHECK_THAT(estimate_in(told.said, "tau1"), WithinRel(5.0, 1e-3));
-  const Answer again = answer_in(folder, "fit t_fit/config.json");
+  const test::ProgramRun again = test::run_in(folder, "fit t_fit/config.json");
   INFO(again.said);
   CHECK(again.code == 0);
 }
@@ -116,7 +101,7 @@ TEST_CASE("a rest at a zero error before a ramp without a hold is fitted", "[tab
     text += fmt::format("{:.1f},{:.2f},{:.4f}\n", t, depth, 0.5 + 0.060 * depth + noise);
   }
   write_file(folder / "t.csv", text);
-  const Answer answer = answer_in(folder, "fit t.csv --no-draw --format json");
+  const test::ProgramRun answer = test::run_in(folder, "fit t.csv --no-draw --format json");
   INFO(answer.said);
   REQUIRE(answer.code == 0);
   CHECK_THAT(estimate_in(answer.said, "k_inf"), WithinRel(60.0, 0.03));
@@ -138,15 +123,15 @@ TEST_CASE("a pipe is read, and what cannot be fitted says what to type", "[table
   write_file(folder / "plain.csv", plain);
   write_file(folder / "negative.csv", negative);
   write_file(folder / "held.csv", held);
-  const Answer piped = answer_in(folder, "fit /dev/stdin --laws linear-1 --no-draw --format json",
-                                 "cat plain.csv |");
+  const test::ProgramRun piped = test::run_in(
+      folder, "fit /dev/stdin --laws linear-1 --no-draw --format json", "cat plain.csv |");
   INFO(piped.said);
   REQUIRE(piped.code == 0);
   CHECK_THAT(estimate_in(piped.said, "k_inf"), WithinRel(60.0, 0.01));
-  const Answer turned = answer_in(folder, "fit negative.csv --no-draw");
+  const test::ProgramRun turned = test::run_in(folder, "fit negative.csv --no-draw");
   CHECK(turned.code == 3);
   CHECK_THAT(turned.said, Contains("the response falls") && Contains("--negate-response"));
-  const Answer only = answer_in(folder, "fit held.csv --no-draw");
+  const test::ProgramRun only = test::run_in(folder, "fit held.csv --no-draw");
   CHECK(only.code == 3);
   CHECK_THAT(only.said, Contains("only a hold") && !Contains("--negate"));
 }
@@ -171,7 +156,7 @@ std::string recording_seen(const std::function<double(double t, double force)>& 
 std::string fit_of_seen(const std::function<double(double t, double force)>& seen) {
   const test::TempFolder folder;
   write_file(folder / "r.csv", recording_seen(seen));
-  const Answer answer = answer_in(folder, "fit r.csv --no-draw");
+  const test::ProgramRun answer = test::run_in(folder, "fit r.csv --no-draw");
   REQUIRE(answer.code == 0);
   return answer.said;
 }
@@ -211,7 +196,8 @@ TEST_CASE("a stress that was ramped and held is what was imposed", "[tables]") {
   }
   const test::TempFolder folder;
   write_file(folder / "r.csv", text);
-  const Answer answer = answer_in(folder, "fit r.csv --laws linear-1 --no-draw --format json");
+  const test::ProgramRun answer =
+      test::run_in(folder, "fit r.csv --laws linear-1 --no-draw --format json");
   REQUIRE(answer.code == 0);
   CHECK_THAT(estimate_in(answer.said, "k1"), WithinRel(3000.0, 0.04));
 }
@@ -233,7 +219,7 @@ TEST_CASE("strips that were fitted together keep their slack length", "[tables]"
     }
     write_file(folder / fmt::format("s{}.csv", speed), text);
   }
-  const Answer answer = answer_in(folder, "fit s1.csv s2.csv --laws linear-1");
+  const test::ProgramRun answer = test::run_in(folder, "fit s1.csv s2.csv --laws linear-1");
   REQUIRE(answer.code == 0);
   const Json law = parse_json(read_file(folder / "s1_fit/law.json"), "law.json");
   CHECK_THAT(law.at("parameters").at("contact").get<double>(), WithinAbs(1.0, 0.01));
@@ -246,8 +232,8 @@ TEST_CASE("a recording of a stiffer material is judged by its error and uncertai
   write_file(folder / "fitted.csv", recording_seen([](double, double force) { return force; }));
   write_file(folder / "stiffer.csv",
              recording_seen([](double, double force) { return 1.05 * force; }));
-  REQUIRE(answer_in(folder, "fit fitted.csv --laws linear-1").code == 0);
-  const Answer judged = answer_in(folder, "validate fitted_fit/law.json stiffer.csv");
+  REQUIRE(test::run_in(folder, "fit fitted.csv --laws linear-1").code == 0);
+  const test::ProgramRun judged = test::run_in(folder, "validate fitted_fit/law.json stiffer.csv");
   CHECK(judged.code <= 1);
   CHECK_THAT(judged.said, Contains("a model error of"));
 }

@@ -16,13 +16,13 @@ using Catch::Matchers::WithinRel;
 
 namespace {
 
-constexpr double kStep_s = 0.05;
+constexpr double kSampleStep_s = 0.05;
 
 /// A linear solid of 60 and 45 N/m, 2 s, driven along knots that lie between its samples.
 Recording driven(std::vector<Knot> knots, double end_s, std::uint64_t seed) {
   Recording r;
   r.header.id = "made";
-  for (int i = 0; i * kStep_s < end_s; ++i) r.time_s.push_back(i * kStep_s);
+  for (int i = 0; i * kSampleStep_s < end_s; ++i) r.time_s.push_back(i * kSampleStep_s);
   const Protocol path(Drive::displacement, std::move(knots));
   for (const double t : r.time_s) r.drive.push_back(value_at(path, t));
   LawSpec spec = parse_law_name("linear-1", "test");

@@ -28,7 +28,7 @@ PreparedRecording ramp_hold(const std::function<double(double)>& response) {
   return prepare_recording("made", r);
 }
 
-double read(const PreparedRecording& r, QuantityKind kind, double at = 0.0) {
+double read_quantity_of(const PreparedRecording& r, QuantityKind kind, double at = 0.0) {
   const Eigen::VectorXd curve = Eigen::VectorXd::Map(
       r.recording.response.data(), static_cast<Eigen::Index>(r.recording.response.size()));
   return read_quantity({kind, at}, parts_of(r), r.recording, 0.0, curve).value().value;
@@ -75,15 +75,16 @@ TEST_CASE("quantities of a ramp and hold have their closed forms", "[validate]")
   const auto linear = ramp_hold([](double t) { return t < 3.0 ? 5.0 : 5.0 - 0.1 * (t - 3.0); });
   const RecordingParts parts = parts_of(linear);
   CHECK_THAT(parts.corner_s, WithinAbs(3.0, 1e-9));
-  CHECK_THAT(read(linear, QuantityKind::peak), WithinRel(5.0, 1e-9));
-  CHECK_THAT(read(linear, QuantityKind::at_time, 10.0), WithinRel(5.0 - 0.7, 1e-9));
+  CHECK_THAT(read_quantity_of(linear, QuantityKind::peak), WithinRel(5.0, 1e-9));
+  CHECK_THAT(read_quantity_of(linear, QuantityKind::at_time, 10.0), WithinRel(5.0 - 0.7, 1e-9));
   // Mean over the last tenth, 30 s to 33 s.
-  CHECK_THAT(read(linear, QuantityKind::end_of_hold), WithinRel(5.0 - 0.1 * 28.5, 1e-9));
-  CHECK_THAT(read(linear, QuantityKind::relaxation_ratio), WithinRel(2.15 / 5.0, 1e-9));
+  CHECK_THAT(read_quantity_of(linear, QuantityKind::end_of_hold),
+             WithinRel(5.0 - 0.1 * 28.5, 1e-9));
+  CHECK_THAT(read_quantity_of(linear, QuantityKind::relaxation_ratio), WithinRel(2.15 / 5.0, 1e-9));
   // 2.85 / 2 below 5 N, on a straight line.
-  CHECK_THAT(read(linear, QuantityKind::half_time), WithinRel(14.25, 1e-6));
+  CHECK_THAT(read_quantity_of(linear, QuantityKind::half_time), WithinRel(14.25, 1e-6));
   const auto ramp = ramp_hold([](double t) { return 100.0 * std::clamp(t - 1.0, 0.0, 2.0); });
-  CHECK_THAT(read(ramp, QuantityKind::at_depth, 2e-3), WithinRel(100.0, 1e-9));
+  CHECK_THAT(read_quantity_of(ramp, QuantityKind::at_depth, 2e-3), WithinRel(100.0, 1e-9));
 }
 
 TEST_CASE("a quantity's weights are its derivatives by the samples", "[validate]") {
@@ -115,7 +116,8 @@ TEST_CASE("work of a loop is the area that the curve encloses", "[validate]") {
     r.response.push_back((i <= 100 ? 2e-2 : 1e-2) * up);
   }
   // Triangles of 2 N and 1 N over 1 mm; the corner's sample belongs to the ramp.
-  CHECK_THAT(read(prepare_recording("loop", r), QuantityKind::work), WithinRel(5e-4, 0.02));
+  CHECK_THAT(read_quantity_of(prepare_recording("loop", r), QuantityKind::work),
+             WithinRel(5e-4, 0.02));
 }
 
 TEST_CASE("the variance of a weighted sum of correlated readings is that of the dense matrix",

@@ -21,7 +21,7 @@ using test::CreepTrial;
 using test::quiet_law;
 using test::request_for;
 
-PreparedRecording prepared(const CreepTrial& trial, double stiffer = 1.0) {
+PreparedRecording stiffened_creep(const CreepTrial& trial, double stiffer = 1.0) {
   Recording r = test::creep_recording_of(trial);
   for (double& strain : r.drive) strain /= stiffer;
   r.header.sha256 = std::string(64, static_cast<char>('a' + trial.seed % 20));
@@ -30,7 +30,7 @@ PreparedRecording prepared(const CreepTrial& trial, double stiffer = 1.0) {
 
 /// Fitted to 100 Pa within 2 s.
 ValidationRequest request_with(PreparedRecording recording) {
-  const std::vector<PreparedRecording> calibration{prepared({.rest_s = 4.0})};
+  const std::vector<PreparedRecording> calibration{stiffened_creep({.rest_s = 4.0})};
   SetupOptions setup;
   setup.starts = 4;
   setup.profiles = false;
@@ -89,7 +89,7 @@ TEST_CASE("creep of the same material is as predicted, of a stiffer one it is no
 
 TEST_CASE("creep in a table of stress and strain is validated with a law of creep",
           "[validate][creep]") {
-  const PreparedRecording same = prepared(kFaster);
+  const PreparedRecording same = stiffened_creep(kFaster);
   REQUIRE(same.load_imposed);
   const Validation v = validate(request_with(same));
   const std::string text = to_terminal_text(v);
@@ -120,7 +120,7 @@ TEST_CASE("creep in a table of stress and strain is validated with a law of cree
 
 TEST_CASE("a stiffer material is seen in creep, and fitted creep gets no verdict",
           "[validate][creep]") {
-  ValidationRequest request = request_with(prepared(kFaster, 1.1));
+  ValidationRequest request = request_with(stiffened_creep(kFaster, 1.1));
   request.requirement = parse_requirement("5%", "test");
   const Validation stiffer = validate(request);
   INFO(to_terminal_text(stiffer));

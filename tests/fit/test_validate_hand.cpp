@@ -13,7 +13,7 @@ using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
-constexpr double kAskedHold_s = 5.0, kEnd_s = 25.0, kDepth_m = 4e-3;
+constexpr double kAskedHold_s = 5.0, kHandEnd_s = 25.0, kDepth_m = 4e-3;
 
 /// From 0 to 1 with no jerk at the ends (Flash and Hogan 1985).
 double reach(double t, double begin_s, double length_s) {
@@ -48,7 +48,7 @@ const HandMotion kWhole[] = {
 };
 
 /// The force of 60 + 45 exp(-t / 2 s) N/m and 0.1 mN of noise, every 20 ms.
-PreparedRecording pressed(double (*part)(double), double stiffer = 1.0) {
+PreparedRecording hand_press(double (*part)(double), double stiffer = 1.0) {
   Recording r;
   r.header.id = "press";
   for (int i = 0; i <= 1200; ++i) {
@@ -98,7 +98,7 @@ Validation compared(std::vector<PreparedRecording> recordings, bool asked = true
 TEST_CASE("all of a hand's press is compared, however the hand moved", "[validate][hand]") {
   for (const HandMotion& hand : kWhole) {
     CAPTURE(hand.name);
-    const PreparedRecording press = pressed(hand.part);
+    const PreparedRecording press = hand_press(hand.part);
     const double largest = *std::ranges::max_element(press.recording.response);
     const Validation v = compared({press});
     INFO(to_terminal_text(v));
@@ -115,7 +115,7 @@ TEST_CASE("all of a hand's press is compared, however the hand moved", "[validat
     // What the tremor does to the force is no scatter of it.
     CHECK_THAT(r.scatter.sigma, WithinRel(1e-4, 0.25));
     CHECK(v.verdict == ModelVerdict::adequate);
-    CHECK(compared({pressed(hand.part, 1.25)}).verdict == ModelVerdict::not_adequate);
+    CHECK(compared({hand_press(hand.part, 1.25)}).verdict == ModelVerdict::not_adequate);
     CHECK_THAT(to_terminal_text(v), Contains("the whole press"));
     CHECK(to_json(v)["recordings"][0]["compared"]["whole"] == true);
   }
@@ -123,7 +123,7 @@ TEST_CASE("all of a hand's press is compared, however the hand moved", "[validat
 
 TEST_CASE("a hand that leaves is compared as long as it held, which is said", "[validate][hand]") {
   const PreparedRecording press =
-      pressed([](double t) { return reach(t, 1.0, 4.0) - 0.6 * reach(t, 19.0, 1.0); });
+      hand_press([](double t) { return reach(t, 1.0, 4.0) - 0.6 * reach(t, 19.0, 1.0); });
   const Validation v = compared({press});
   const RecordingComparison& r = v.recordings.front();
   CHECK_FALSE(r.part.whole());
@@ -134,13 +134,13 @@ TEST_CASE("a hand that leaves is compared as long as it held, which is said", "[
 }
 
 TEST_CASE("a hand that was never there is refused", "[validate][hand]") {
-  CHECK_THROWS_WITH(compared({pressed([](double) { return 0.0; })}), Contains("never rises"));
+  CHECK_THROWS_WITH(compared({hand_press([](double) { return 0.0; })}), Contains("never rises"));
 }
 
 TEST_CASE("several presses are compared as wholes, each", "[validate][hand]") {
   std::vector<PreparedRecording> presses;
   for (const HandMotion& hand : kWhole) {
-    presses.push_back(pressed(hand.part));
+    presses.push_back(hand_press(hand.part));
     presses.back().name = hand.name;
   }
   const Validation v = compared(std::move(presses));
@@ -156,7 +156,7 @@ TEST_CASE("a recording by hand pauses on its way, and a machine's steps are step
   for (const HandMotion& hand : kWhole) {
     CAPTURE(hand.name);
     const std::string name = hand.name;
-    const Validation v = compared({pressed(hand.part)}, false);
+    const Validation v = compared({hand_press(hand.part)}, false);
     INFO(to_terminal_text(v));
     if (name == "pauses half-way" || name == "overshoots") {
       // 2.2 s between motions of 0.8 s are two steps, and to fall by 12 % is to unload.

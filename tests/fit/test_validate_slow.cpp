@@ -13,7 +13,7 @@
 namespace tpm::fit {
 namespace {
 
-int run_in(const test::TempFolder& folder, const std::string& arguments) {
+int exit_code_in(const test::TempFolder& folder, const std::string& arguments) {
   const int status = std::system(fmt::format("cd '{}' && '" TPM_TEST_PROGRAM "' {} > said 2>&1",
                                              folder.path().string(), arguments)
                                      .c_str());
@@ -38,9 +38,9 @@ TEST_CASE("the example of the help runs, and its page finds what changed", "[val
   write_table(folder / "recording.csv", test::study_recording({}, noise, random));
   const test::StudyTest protocol = test::study_validation(100, 0.0);
   write_table(folder / "other.csv", test::study_recording(protocol, noise, random));
-  REQUIRE(run_in(folder, "fit recording.csv --folder fitted") == 0);
+  REQUIRE(exit_code_in(folder, "fit recording.csv --folder fitted") == 0);
   const std::string validate = "validate fitted/law.json other.csv --require 10%";
-  CHECK(run_in(folder, validate + " --folder validated --credibility page.html") == 0);
+  CHECK(exit_code_in(folder, validate + " --folder validated --credibility page.html") == 0);
   CHECK_THAT(read_file(folder / "said"), Catch::Matchers::Contains("adequate for 10%"));
   for (const char* file :
        {"validation.csv", "validation.json", "validation_error.png", "validation_motion.png"}) {
@@ -54,7 +54,7 @@ TEST_CASE("the example of the help runs, and its page finds what changed", "[val
                            Catch::Matchers::Contains("overflow-wrap: anywhere"));
   // Recordings of one protocol are one line of the figure, with how many they are.
   write_table(folder / "again.csv", test::study_recording(protocol, noise, random));
-  CHECK(run_in(folder, "validate fitted/law.json other.csv again.csv --folder two") == 0);
+  CHECK(exit_code_in(folder, "validate fitted/law.json other.csv again.csv --folder two") == 0);
   std::vector<std::string> labels;
   const Json figures = read_json(folder / "two/figures.json");
   for (const Json& series : figures["figures"][1]["panels"][0]["series"]) {
@@ -63,18 +63,18 @@ TEST_CASE("the example of the help runs, and its page finds what changed", "[val
   CHECK(labels == std::vector<std::string>{"calibration", "other.csv and 1 of its protocol",
                                            "other.csv and 1 of its protocol",
                                            "deepest of the calibration"});
-  CHECK(run_in(folder, "validate --recheck page.html") == 0);
+  CHECK(exit_code_in(folder, "validate --recheck page.html") == 0);
   // Another recording under the same name.
   write_table(folder / "other.csv", test::study_recording(protocol, noise, random, 1.3));
-  CHECK(run_in(folder, "validate --recheck page.html") == 1);
+  CHECK(exit_code_in(folder, "validate --recheck page.html") == 1);
   const std::string page = read_file(folder / "page_rechecked.html");
   CHECK_THAT(page, Catch::Matchers::Contains("Changed since this page was written") &&
                        Catch::Matchers::Contains("class=\"bad\""));
-  CHECK(run_in(folder, validate) == 1);
+  CHECK(exit_code_in(folder, validate) == 1);
   // The law's own data validate nothing.
-  CHECK(run_in(folder, "validate fitted/law.json recording.csv --require 10%") == 1);
+  CHECK(exit_code_in(folder, "validate fitted/law.json recording.csv --require 10%") == 1);
   CHECK_THAT(read_file(folder / "said"), Catch::Matchers::Contains("calibration residual"));
-  CHECK(run_in(folder, "validate fitted/law.json other.csv --require much") == 2);
+  CHECK(exit_code_in(folder, "validate fitted/law.json other.csv --require much") == 2);
 }
 
 TEST_CASE("a credibility page names what was tampered with, is missing or changed", "[validate]") {
@@ -88,12 +88,12 @@ TEST_CASE("a credibility page names what was tampered with, is missing or change
   write_file(folder / "cell.json",
              R"({"instrument": {"id": "cell", "force": "0.5 % of reading"}})");
   write_file(folder / "checks.json", "{}");
-  REQUIRE(run_in(folder, "fit recording.csv --folder fitted") == 0);
-  REQUIRE(
-      run_in(folder,
-             "validate fitted/law.json other.csv --require 10% --placement onset --quantity peak "
-             "--quantity end --instrument cell.json --evidence 'code verification=checks.json' "
-             "--question 'Stiff?' --context training --risk low --credibility page.html") == 0);
+  REQUIRE(exit_code_in(folder, "fit recording.csv --folder fitted") == 0);
+  REQUIRE(exit_code_in(
+              folder,
+              "validate fitted/law.json other.csv --require 10% --placement onset --quantity peak "
+              "--quantity end --instrument cell.json --evidence 'code verification=checks.json' "
+              "--question 'Stiff?' --context training --risk low --credibility page.html") == 0);
   const std::string page = read_file(folder / "page.html");
   for (const char* shown : {"Stiff?", "training", "checks.json (SHA-256", "cell.json"}) {
     CHECK_THAT(page, Catch::Matchers::Contains(shown));
@@ -101,7 +101,7 @@ TEST_CASE("a credibility page names what was tampered with, is missing or change
   CHECK_THAT(page, !Catch::Matchers::Contains("relaxation ratio"));
   const auto recheck = [&](int code, const std::string& says) {
     CAPTURE(says);
-    CHECK(run_in(folder, "validate --recheck page.html") == code);
+    CHECK(exit_code_in(folder, "validate --recheck page.html") == code);
     const std::string said = read_file(folder / "said");
     CHECK_THAT(said, Catch::Matchers::Contains(says));
     CHECK(read_file(folder / "page.html").size() > 0);

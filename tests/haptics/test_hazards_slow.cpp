@@ -9,7 +9,7 @@ namespace tpm::haptics {
 namespace {
 
 /// With what a session of a few seconds ends on a machine that has no time for it.
-bool is_of_a_stall(StopCause cause) {
+bool is_stop_of_a_stall(StopCause cause) {
   return cause == StopCause::watchdog || cause == StopCause::overrun_storm ||
          cause == StopCause::cycle_timeout;
 }
@@ -19,7 +19,7 @@ TEST_CASE("On the clock, too, every hazard ends as it should, with forces within
   REQUIRE(study.rows.size() >= 18);
   for (const ClockHazardRow& row : study.rows) {
     CAPTURE(row.hazard, row.setting, word_of(row.cause), row.to_zero_s, row.tries);
-    CHECK((row.cause == row.expected || is_of_a_stall(row.cause)));
+    CHECK((row.cause == row.expected || is_stop_of_a_stall(row.cause)));
     CHECK(row.largest_force_N <= study.force_limit_N);
     if (row.cause == StopCause::finished) continue;
     CHECK(row.to_zero_s < 1e8);  // forces were switched off

@@ -32,9 +32,9 @@ bool names_a_stall(const std::vector<std::string>& lines) {
 TEST_CASE("By the command line, a delay is found or the stall named, and each session verified") {
   for (const int late_ms : {0, 2, 5}) {
     // Another try if the machine left nothing to look at; what is seen has to hold in each.
-    constexpr int kMostTries = 3;
+    constexpr int kMostRuns = 3;
     bool whole = false;
-    for (int tries = 0; tries < kMostTries && !whole; ++tries) {
+    for (int tries = 0; tries < kMostRuns && !whole; ++tries) {
       const test::LineRun run = test::run_on_the_line(TPM_TEST_PROGRAM, late_ms);
       CAPTURE(late_ms, tries);
       INFO(run.said);

@@ -17,7 +17,7 @@ using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
 /// Two presses on 60 + 45 exp(-t / 2 s) N/m, the second before the first is forgotten.
-Json law_session(const char* rate = "2 mm/s") {
+Json two_presses(const char* rate = "2 mm/s") {
   Json json = Json::parse(R"({
     "model": {"kind": "law", "law": {"law": "linear-1", "drive": "indentation_depth",
       "response": "contact_force", "reference_m": 0.004, "fitted_to_m": 0.004,
@@ -31,7 +31,7 @@ Json law_session(const char* rate = "2 mm/s") {
 HilRecording law_recording(const test::TempFolder& folder, const char* rate = "2 mm/s") {
   SessionRunOptions options;
   options.recording = folder / "r";
-  (void)run_session(test::parsed(law_session(rate)), {}, options);
+  (void)run_session(test::parsed(two_presses(rate)), {}, options);
   return read_recording(folder / "r");
 }
 

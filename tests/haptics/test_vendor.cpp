@@ -84,13 +84,13 @@ Ran ran(const HilSession& session, const DeviceChoice& device, const std::string
 }
 
 /// Cycles before the session begins, in which the tool is at rest.
-constexpr std::uint64_t kWaited = 250;
+constexpr std::uint64_t kWaitedCycles = 250;
 
 std::string operator_lines(const HilSession& session, const test::TempFolder& folder) {
   write_file(folder / "operator", to_lines(session.operator_script()));
   // In virtual time cycles come as fast as the machine goes, and may come late.
   return "watchdog_by_clock 0\noperator " + (folder / "operator") + "\nwait " +
-         std::to_string(kWaited) + "\n";
+         std::to_string(kWaitedCycles) + "\n";
 }
 
 TEST_CASE("A missing library is told with all that was tried") {
@@ -344,7 +344,7 @@ TEST_CASE("Each fault ends in a safe stop within 10 ms of session, with its caus
   const test::TempFolder folder;
   constexpr std::uint64_t kAt = 1777;
   const Script script(operator_lines(session, folder) + "fault " + fault.fault + " " +
-                      std::to_string(kAt + kWaited) + " 1\n");
+                      std::to_string(kAt + kWaitedCycles) + " 1\n");
   const Ran r = ran(session, stand_in(), folder / "r");
   CHECK(script.happened(fault.event));
   CHECK(r.run.outcome.cause == fault.cause);

@@ -59,7 +59,7 @@ std::vector<Number> numbers(const std::string& html, const Json& name) {
   return values;
 }
 
-std::string recorded(const TempFolder& folder) {
+std::string recorded_session(const TempFolder& folder) {
   const HilSession session = test::parsed(test::short_session());
   SessionRunOptions options;
   options.recording = folder / "s.tpmrec";
@@ -130,7 +130,7 @@ TEST_CASE("the page of a result on a smooth table says what slides in its plane"
 
 TEST_CASE("the page of a recording holds every sample, or the extremes of parts") {
   const TempFolder folder;
-  const std::string file = recorded(folder);
+  const std::string file = recorded_session(folder);
   const HilRecording recording = read_recording(file);
   std::vector<float> depth_mm;
   for (const ServoRecord& row : recording.rows) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "law_answers.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/law/relaxation/mittag_leffler.hpp"
 #include "tpmkit/law_model.hpp"
@@ -12,6 +13,7 @@ using namespace tpm::base;
 using namespace tpm::law;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
+using test::largest;
 
 namespace {
 
@@ -29,7 +31,7 @@ constexpr std::array<Element, 4> kElements{{{"linear-fspringpot", false, false},
                                             {"linear-fkelvin_voigt", true, false},
                                             {"linear-fzener", true, true}}};
 
-std::vector<double> values_of(const Element& element, double alpha) {
+std::vector<double> element_values(const Element& element, double alpha) {
   std::vector<double> values;
   if (element.solid) values.push_back(kInf);
   values.push_back(kOne);
@@ -63,10 +65,6 @@ double compliance(const Element& element, double alpha, double t) {
   return power / kOne;
 }
 
-double largest(const Eigen::VectorXd& values) {
-  return values.cwiseAbs().maxCoeff();
-}
-
 }  // namespace
 
 TEST_CASE("a ramp and hold is answered as by E_{alpha,2}", "[fractional]") {
@@ -78,7 +76,8 @@ TEST_CASE("a ramp and hold is answered as by E_{alpha,2}", "[fractional]") {
   for (const Element& element : kElements) {
     const LawModel law(parse_law_name(element.name, "test"));
     for (const double alpha : {0.05, 0.3, 0.6, 0.9, 0.99, 1.0}) {
-      const auto force = law.respond(ramp, times, values_of(element, alpha), Want::values).value;
+      const auto force =
+          law.respond(ramp, times, element_values(element, alpha), Want::values).value;
       double worst = 0.0;
       for (std::size_t i = 0; i < times.size(); ++i) {
         const double exact = rate * (stiffness_integral(element, alpha, times[i]) -
@@ -106,7 +105,7 @@ TEST_CASE("a random history is the sum of its ramps", "[fractional]") {
   for (const Element& element : kElements) {
     const LawModel law(parse_law_name(element.name, "test"));
     for (const double alpha : {0.2, 0.7, 0.97}) {
-      auto values = values_of(element, alpha);
+      auto values = element_values(element, alpha);
       values.back() = 10.0;  // far from detachment: then the forces would be cut off
       if (!element.solid) values[values.size() - 2] = 0.0;
       const auto force = law.respond(history, times, values, Want::values).value;
@@ -153,7 +152,7 @@ TEST_CASE("a jump of the depth: exact stiffness at once, or refused", "[fraction
   const std::vector<double> times{0.0, 0.01, 0.5, 20.0, std::numeric_limits<double>::infinity()};
   for (const Element& element : kElements) {
     const LawModel law(parse_law_name(element.name, "test"));
-    const auto values = values_of(element, 0.6);
+    const auto values = element_values(element, 0.6);
     if (!element.relaxes) {
       CHECK_THROWS_WITH(law.respond(step, times, values, Want::values),
                         Catch::Contains("jumps at 0 s") && Catch::Contains("expected a ramp"));
@@ -178,7 +177,7 @@ TEST_CASE("creep under a step of load is the exact compliance", "[fractional][he
     const LawModel law(spec);
     for (const double alpha : {0.2, 0.5, 0.8, 0.95, 1.0}) {
       const auto depth =
-          law.respond(creep(0.2, 40.0), times, values_of(element, alpha), Want::values).value;
+          law.respond(creep(0.2, 40.0), times, element_values(element, alpha), Want::values).value;
       double worst = 0.0;
       for (std::size_t i = 0; i < times.size(); ++i) {
         const double exact = 0.2 * compliance(element, alpha, times[i]);

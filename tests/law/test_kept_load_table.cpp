@@ -12,7 +12,7 @@ using namespace tpm::law;
 
 namespace {
 
-constexpr double kLoad = 0.03;  // N
+constexpr double kLoad_N = 0.03;  // N
 
 std::vector<double> values_of(const LawModel& law) {
   std::vector<double> values;
@@ -31,15 +31,16 @@ std::vector<double> values_of(const LawModel& law) {
 }
 
 const Protocol& kept() {
-  static const Protocol protocol(Drive::force, {{0.0, kLoad}}, "kept", true);
+  static const Protocol protocol(Drive::force, {{0.0, kLoad_N}}, "kept", true);
   return protocol;
 }
 
-constexpr const char* kLaws[] = {"linear-1",         "linear-2",       "linear-2-fluid",
-                                 "power-2",          "hertz-1",        "linear-fspringpot",
-                                 "linear-fmaxwell",  "linear-fzener",  "linear-fkelvin_voigt2",
-                                 "linear-fmaxwell2", "linear-fzener2", "power-fspringpot",
-                                 "linear-1-elastic"};
+constexpr const char* kKeptLoadLaws[] = {
+    "linear-1",         "linear-2",       "linear-2-fluid",
+    "power-2",          "hertz-1",        "linear-fspringpot",
+    "linear-fmaxwell",  "linear-fzener",  "linear-fkelvin_voigt2",
+    "linear-fmaxwell2", "linear-fzener2", "power-fspringpot",
+    "linear-1-elastic"};
 
 }  // namespace
 
@@ -48,7 +49,7 @@ TEST_CASE("Creep at many times is that at few", "[law]") {
   constexpr int kCount = 3000;
   for (int i = 0; i < kCount; ++i) times.push_back(1e-4 * std::pow(1e8, i / (kCount - 1.0)));
   REQUIRE(KeptLoadTable::covering(kept(), times));
-  for (const char* name : kLaws) {
+  for (const char* name : kKeptLoadLaws) {
     INFO(name);
     const LawModel law(parse_law_name(name, "test"));
     const std::vector<double> values = values_of(law);
@@ -85,7 +86,7 @@ TEST_CASE("A kept depth and a moved load are not tabulated", "[law]") {
   CHECK(KeptLoadTable::covering(kept(), times));
   const Protocol depth(Drive::displacement, {{0.0, 1e-3}}, "depth", true);
   CHECK_FALSE(KeptLoadTable::covering(depth, times));
-  const Protocol ramp(Drive::force, {{0.0, 0.0}, {1.0, kLoad}}, "ramp", true);
+  const Protocol ramp(Drive::force, {{0.0, 0.0}, {1.0, kLoad_N}}, "ramp", true);
   CHECK_FALSE(KeptLoadTable::covering(ramp, times));
   times.push_back(-1.0);
   CHECK_FALSE(KeptLoadTable::covering(kept(), times));
@@ -103,6 +104,6 @@ TEST_CASE("A spring-pot yields nothing at once, a spring in its series all that 
   CHECK(drive_at_once("linear-fkelvin_voigt") == 0.0);
   CHECK(drive_at_once("linear-fmaxwell2") == 0.0);
   CHECK(drive_at_once("power-fspringpot") == 0.0);
-  CHECK(drive_at_once("linear-fmaxwell") == Approx(kLoad / 40.0).epsilon(1e-15));
-  CHECK(drive_at_once("linear-fzener") == Approx(kLoad / 55.0).epsilon(1e-15));
+  CHECK(drive_at_once("linear-fmaxwell") == Approx(kLoad_N / 40.0).epsilon(1e-15));
+  CHECK(drive_at_once("linear-fzener") == Approx(kLoad_N / 55.0).epsilon(1e-15));
 }

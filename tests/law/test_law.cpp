@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "law_answers.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/law/element/closed_form.hpp"
 #include "tpm/law/imposed_depth.hpp"
@@ -17,6 +18,7 @@ using namespace tpm::base;
 using namespace tpm::law;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
+using test::evenly;
 
 namespace {
 
@@ -49,13 +51,6 @@ std::vector<double> random_parameters(const LawModel& law, Random& random) {
     }
   }
   return values;
-}
-
-std::vector<double> evenly(double from, double to, int count) {
-  std::vector<double> times;
-  times.reserve(static_cast<std::size_t>(count));
-  for (int i = 0; i < count; ++i) times.push_back(from + (to - from) * i / (count - 1));
-  return times;
 }
 
 double largest_difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {

@@ -22,7 +22,7 @@ using Catch::Matchers::WithinRel;
 
 namespace {
 
-const std::vector<std::string> kLaws{
+const std::vector<std::string> kSpectrumLaws{
     "linear",          "linear-2",     "linear-2-fluid",      "linear-2-series",
     "power-1-elastic", "hertz-1",      "linear-1-relaxing",   "linear-fspringpot",
     "linear-fmaxwell", "power-fzener", "linear-fkelvin_voigt"};
@@ -124,7 +124,7 @@ TEST_CASE("small cycles in time have the storage and loss of the spectrum", "[sp
 TEST_CASE("storage rises, loss is positive, derivatives agree with differences", "[spectrum]") {
   std::vector<double> frequency;
   for (double f = 1e-4; f < 1e4; f *= 3.0) frequency.push_back(f);
-  for (const std::string& name : kLaws) {
+  for (const std::string& name : kSpectrumLaws) {
     const LawSpec spec = parse_law_name(name, "test");
     const auto values = plausible(spec);
     const auto ask = [&](const std::vector<double>& v, Want want) {
@@ -185,7 +185,7 @@ TEST_CASE("the paper's element over frequency is linear-1", "[spectrum]") {
 
 TEST_CASE("law files go there and back, and faults are named", "[law file]") {
   const test::TempFolder folder;
-  for (const std::string& name : kLaws) {
+  for (const std::string& name : kSpectrumLaws) {
     LawFile law = some_law(name.c_str());
     law.note = "a note";
     write_law(folder / "law.json", law);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "expected_values.hpp"
+#include "law_answers.hpp"
 #include "refusal.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -20,17 +21,11 @@ using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
+using test::evenly;
 
 namespace {
 
 constexpr double kReference = 1e-3;
-
-std::vector<double> evenly(double from, double to, int count) {
-  std::vector<double> times;
-  times.reserve(static_cast<std::size_t>(count));
-  for (int i = 0; i < count; ++i) times.push_back(from + (to - from) * i / (count - 1));
-  return times;
-}
 
 /// Two branches, with the kernel's reference at 1 mm.
 struct TwoBranches {

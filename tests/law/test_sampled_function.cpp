@@ -4,19 +4,14 @@
 #include <vector>
 
 #include "expected_values.hpp"
+#include "law_answers.hpp"
 #include "tpm/law/relaxation/sampled_function.hpp"
 
 using namespace tpm;
 using namespace tpm::law;
+using test::evenly;
 
 namespace {
-
-std::vector<double> evenly(double from, double to, int count) {
-  std::vector<double> places;
-  places.reserve(static_cast<std::size_t>(count));
-  for (int i = 0; i < count; ++i) places.push_back(from + (to - from) * i / (count - 1));
-  return places;
-}
 
 /// A function of two parts that counts how often it is asked.
 struct Counted {

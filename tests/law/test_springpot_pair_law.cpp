@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "expected_values.hpp"
+#include "law_answers.hpp"
 #include "step_response.hpp"
 #include "tpm/files/blocks/law_export.hpp"
 #include "tpm/files/blocks/law_json.hpp"
@@ -26,6 +27,7 @@ using namespace tpm::law;
 using namespace tpm::files;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
+using test::largest;
 
 namespace {
 
@@ -46,7 +48,7 @@ LawSpec law_of(const char* name) {
   return parse_law_name(name, "test");
 }
 
-std::vector<double> values_of(const LawSpec& spec, double alpha, double beta) {
+std::vector<double> pair_values(const LawSpec& spec, double alpha, double beta) {
   std::vector<double> values;
   for (const LawParameter& p : law_parameters(spec)) {
     values.push_back(p.name == "k_inf"   ? kEnd
@@ -78,10 +80,6 @@ double integral_of(const LawSpec& spec, double alpha, double beta, double t) {
 
 constexpr std::array<std::array<double, 2>, 7> kPairs{
     {{0.3, 0.05}, {0.6, 0.3}, {0.9, 0.1}, {0.95, 0.9}, {1.0, 0.4}, {1.0, 0.01}, {0.5, 0.5}}};
-
-double largest(const Eigen::VectorXd& values) {
-  return values.cwiseAbs().maxCoeff();
-}
 
 /// Central differences of f by every parameter against its slopes, relative to the largest.
 template <class Function>
@@ -125,7 +123,7 @@ TEST_CASE("laws of two spring-pots have names, words and parameters", "[pair]") 
   CHECK_THROWS_WITH(law_of("linear-fzener2-fluid"), Catch::Contains("fractional law"));
   CHECK_THROWS_WITH(law_of("linear-fspringpot2"), Catch::Contains("unknown law"));
   const LawSpec zener = law_of("linear-fzener2");
-  CHECK_THROWS_WITH(LawModel(zener).require_in_range(values_of(zener, 0.5, 1.01)),
+  CHECK_THROWS_WITH(LawModel(zener).require_in_range(pair_values(zener, 0.5, 1.01)),
                     Catch::Contains("beta = 1.01; expected a value from 0 to 1"));
 }
 
@@ -139,7 +137,7 @@ TEST_CASE("a ramp and hold of two spring-pots is answered in closed form", "[pai
     const LawSpec spec = law_of(pair.name);
     for (const auto& [alpha, beta] : kPairs) {
       const auto force =
-          LawModel(spec).respond(ramp, times, values_of(spec, alpha, beta), Want::values).value;
+          LawModel(spec).respond(ramp, times, pair_values(spec, alpha, beta), Want::values).value;
       double worst = 0.0;
       for (std::size_t i = 0; i < times.size(); ++i) {
         if (alpha == 1.0 && times[i] == ramp_s) continue;  // a dashpot's force jumps here
@@ -160,7 +158,7 @@ TEST_CASE("a kept step is answered by G and J, with slopes by every parameter", 
         "linear-fmaxwell2", "linear-fkelvin_voigt2", "linear-fzener2"}) {
     const LawSpec spec = law_of(name);
     const LawModel model(spec);
-    auto values = values_of(spec, 0.6, 0.25);
+    auto values = pair_values(spec, 0.6, 0.25);
     values[values.size() - 2] = 2e-4;  // contact
     values.back() = 1e-3;              // offset
     const Protocol depth = step_and_hold(2e-3, 100.0);
@@ -199,9 +197,9 @@ TEST_CASE("with beta = 0 a law of two spring-pots is that of one", "[pair]") {
     for (const double alpha : {0.05, 0.5, 0.95, 1.0}) {
       const LawSpec two = law_of(pair.name);
       const LawSpec one = law_of(pair.one_springpot);
-      auto few = values_of(one, alpha, 0.0);
+      auto few = pair_values(one, alpha, 0.0);
       if (two.fractional == Fractional::kelvin_voigt_pair) few[0] = kOther;
-      const auto many = values_of(two, alpha, 0.0);
+      const auto many = pair_values(two, alpha, 0.0);
       INFO(pair.name << ", alpha " << alpha);
       const auto force = [&](const LawSpec& spec, const std::vector<double>& values) {
         return LawModel(spec).respond(push, times, values, Want::values).value;
@@ -209,7 +207,7 @@ TEST_CASE("with beta = 0 a law of two spring-pots is that of one", "[pair]") {
       const Eigen::VectorXd exact = force(one, few);
       CHECK(largest(force(two, many) - exact) < 1e-9 * largest(exact));
       // and continuously: a small beta changes little
-      const Eigen::VectorXd near = force(two, values_of(two, alpha, 1e-7));
+      const Eigen::VectorXd near = force(two, pair_values(two, alpha, 1e-7));
       CHECK(largest(near - exact) < 1e-5 * largest(exact));
       const auto r = respond_spectrum(two, many, frequency, std::nullopt, Want::values);
       const auto s = respond_spectrum(one, few, frequency, std::nullopt, Want::values);
@@ -265,7 +263,7 @@ TEST_CASE("in time the derivatives by all parameters of two spring-pots are exac
        {"linear-fmaxwell2", "linear-fkelvin_voigt2", "linear-fzener2", "power-fzener2"}) {
     const LawSpec spec = law_of(name);
     const LawModel law(spec);
-    auto values = values_of(spec, 0.7, 0.15);
+    auto values = pair_values(spec, 0.7, 0.15);
     if (spec.kernel == Kernel::power) values[law.index("exponent")] = 1.6;
     // At 0 the differences to both sides would not agree: one of them begins in contact.
     values[law.index("contact")] = 1e-4;
@@ -289,7 +287,7 @@ TEST_CASE("G(t) by the contour is the closed form, with exact derivatives", "[pa
         "linear-fmaxwell", "linear-fspringpot", "linear-fkelvin_voigt", "linear-2",
         "linear-2-series", "linear-2-fluid"}) {
     const LawSpec spec = law_of(name);
-    auto values = values_of(spec, 0.7, 0.15);
+    auto values = pair_values(spec, 0.7, 0.15);
     if (spec.branches == 2) values = {20.0, 30.0, 12.0, 0.4, 3.0, 0.0, 0.0};
     if (!spec.solid) values = {30.0, 12.0, 0.4, 3.0, 0.0, 0.0};
     for (const double t : {1e-4, 0.03, 1.0, 20.0}) {
@@ -306,7 +304,7 @@ TEST_CASE("G(t) by the contour is the closed form, with exact derivatives", "[pa
     }
   }
   const LawSpec spec = law_of("linear-fzener2");
-  CHECK_THROWS_WITH(law_creep(spec, values_of(spec, 0.7, 0.15), 0.0),
+  CHECK_THROWS_WITH(law_creep(spec, pair_values(spec, 0.7, 0.15), 0.0),
                     "law linear-fzener2: time 0 s; expected a finite time above 0 s");
   CHECK_THROWS_WITH(
       law_creep(spec, std::vector<double>{0, 0, 1, 0.5, 0.1, 0, 0}, 1.0),
@@ -323,12 +321,12 @@ TEST_CASE("the creep of two spring-pots in closed form", "[pair]") {
       const double springpots = (std::pow(x, alpha) / std::tgamma(1.0 + alpha) +
                                  std::pow(x, beta) / std::tgamma(1.0 + beta)) /
                                 kFirst;
-      CHECK_THAT(law_creep(series, values_of(series, alpha, beta), t).value,
+      CHECK_THAT(law_creep(series, pair_values(series, alpha, beta), t).value,
                  WithinRel(springpots, 1e-11));
       const double z = kOther / kFirst * std::pow(t, alpha - beta);
       const double retarded = std::pow(t, alpha) / kFirst *
                               mittag_leffler_with_slopes(alpha - beta, 1.0 + alpha, z).value;
-      CHECK_THAT(law_creep(beside, values_of(beside, alpha, beta), t).value,
+      CHECK_THAT(law_creep(beside, pair_values(beside, alpha, beta), t).value,
                  WithinRel(retarded, 1e-11));
     }
   }
@@ -339,7 +337,7 @@ TEST_CASE("the convolution of G and J is t", "[pair]") {
   for (const PairLaw& pair : kPairLaws) {
     const LawSpec spec = law_of(pair.name);
     for (const auto& [alpha, beta] : kPairs) {
-      const auto values = values_of(spec, alpha, beta);
+      const auto values = pair_values(spec, alpha, beta);
       for (const double t : {0.05, 1.0, 30.0}) {
         INFO(pair.name << ", alpha " << alpha << ", beta " << beta << ", t " << t);
         // G from its closed form; both ends may be singular, so each half starts from its end
@@ -368,7 +366,7 @@ TEST_CASE("storage and loss are the Fourier integrals of G(t)", "[pair]") {
     const LawSpec spec = law_of(pair.name);
     for (const auto& [alpha, beta] :
          {std::array{0.6, 0.3}, std::array{0.9, 0.1}, std::array{0.4, 0.2}}) {
-      const auto values = values_of(spec, alpha, beta);
+      const auto values = pair_values(spec, alpha, beta);
       const double end = spec.fractional == Fractional::zener_pair ? kEnd : 0.0;
       const auto relaxing = [&](double t) { return relaxation_stiffness(spec, values, t) - end; };
       for (const double frequency : {0.02, 0.3, 5.0}) {
@@ -392,12 +390,12 @@ TEST_CASE("a jump is refused by two spring-pots, and a load makes them creep", "
     LawSpec spec = law_of(pair.name);
     spec.reference = 0.01;
     const LawModel law(spec);
-    CHECK_THROWS_WITH(
-        law.respond(second_step, std::vector<double>{3.0}, values_of(spec, 0.6, 0.1), Want::values),
-        Catch::Contains("jumps at 2 s") && Catch::Contains("expected a ramp"));
+    CHECK_THROWS_WITH(law.respond(second_step, std::vector<double>{3.0},
+                                  pair_values(spec, 0.6, 0.1), Want::values),
+                      Catch::Contains("jumps at 2 s") && Catch::Contains("expected a ramp"));
     const std::vector<double> times{0.0, 0.05, 0.2, 1.0, 5.0, 40.0};
     for (const auto& [alpha, beta] : kPairs) {
-      const auto values = values_of(spec, alpha, beta);
+      const auto values = pair_values(spec, alpha, beta);
       const auto depth = law.respond(creep(0.2, 40.0), times, values, Want::values).value;
       INFO(pair.name << ", alpha " << alpha << ", beta " << beta);
       CHECK(depth[0] == 0.0);
@@ -429,7 +427,7 @@ TEST_CASE("laws of two spring-pots go through files and exports", "[pair]") {
   for (const PairLaw& pair : kPairLaws) {
     LawFile law;
     law.spec = law_of(pair.name);
-    law.values = values_of(law.spec, 0.6, 0.1);
+    law.values = pair_values(law.spec, 0.6, 0.1);
     const LawFile back = law_from_json(to_json(law), "test");
     CHECK(back.spec == law.spec);
     CHECK(back.values == law.values);

@@ -248,8 +248,8 @@ struct Slab {
   Constraints constraints;
 };
 
-QuasiStaticRun run_of(const DrivenNetwork& driven, const Protocol& protocol,
-                      std::span<const double> times, QuasiStaticOptions options) {
+QuasiStaticRun quasi_static_run(const DrivenNetwork& driven, const Protocol& protocol,
+                                std::span<const double> times, QuasiStaticOptions options) {
   return QuasiStatic(driven.bonds, driven.rest, driven.constraints, driven.probes,
                      std::move(options))
       .run(protocol, times);
@@ -275,7 +275,7 @@ TEST_CASE("a punch on a flat face is its spheres driven together") {
       QuasiStatic(slab.bonds, slab.network.organ.position, slab.constraints, Probes(patch), {})
           .run(protocol, times);
   const DrivenNetwork driven = slab.pressed({slab.punch(Slab::kMiddle, 0.021)});
-  const QuasiStaticRun pressed = run_of(driven, protocol, times, {});
+  const QuasiStaticRun pressed = quasi_static_run(driven, protocol, times, {});
   CHECK((pressed.response - bonded.response).cwiseAbs().maxCoeff() <
         5e-4 * bonded.response.maxCoeff());
   CHECK(tool_states(driven, pressed.position).front().touching == 5);

@@ -34,11 +34,11 @@ Inertial inertial_star(const Star& star, const InertialOptions& options) {
 }
 
 /// A block of two layers, its lower layer partly held, the contact in the middle of the upper one.
-struct Block {
-  explicit Block(const TpmParameters& p,
-                 const Eigen::Matrix3d& rotation = Eigen::Matrix3d::Identity(),
-                 const Eigen::Vector3d& shift = Eigen::Vector3d::Zero(),
-                 const std::vector<std::size_t>& order = {})
+struct HeldBlock {
+  explicit HeldBlock(const TpmParameters& p,
+                     const Eigen::Matrix3d& rotation = Eigen::Matrix3d::Identity(),
+                     const Eigen::Vector3d& shift = Eigen::Vector3d::Zero(),
+                     const std::vector<std::size_t>& order = {})
       : network(build_network(renumbered(moved(organ(), rotation, shift), order), {}, "block")),
         bonds(network, p),
         constraints(network.organ.size()),
@@ -171,7 +171,7 @@ TEST_CASE("released, the star rings down with the frequency and the ratio of its
 TEST_CASE("the lowest mode of a block agrees with the dense eigenvalue problem") {
   TpmParameters p;
   p.eta1_Pa_s = 1e9;  // nothing relaxes
-  const Block block(p);
+  const HeldBlock block(p);
   const Eigen::VectorXd mass = sphere_masses_kg(block.network.organ);
   const LowestMode mode =
       lowest_mode(block.bonds, block.network.organ.position, block.constraints, mass);
@@ -196,7 +196,7 @@ TEST_CASE("the lowest mode of a block agrees with the dense eigenvalue problem")
 }
 
 TEST_CASE("the Jacobian is the derivative of the equations of motion") {
-  const Block block(slow_tissue());
+  const HeldBlock block(slow_tissue());
   for (const Drive drive : {Drive::displacement, Drive::force}) {
     DrivenTissue tissue(block.bonds, block.network.organ.position, block.constraints, block.probe,
                         drive);
@@ -250,7 +250,7 @@ TEST_CASE("the Jacobian is the derivative of the equations of motion") {
 }
 
 TEST_CASE("KLU and the eliminated form integrate alike") {
-  const Block block(slow_tissue());
+  const HeldBlock block(slow_tissue());
   const auto times = even_times(0.8, 16);
   InertialOptions options;
   options.tolerance = 1e-8;
@@ -264,7 +264,7 @@ TEST_CASE("KLU and the eliminated form integrate alike") {
 }
 
 TEST_CASE("the work of the probe is stored, moves spheres or becomes heat") {
-  const Block block(slow_tissue());
+  const HeldBlock block(slow_tissue());
   const Protocol loads(Drive::force, {{0.0, 0.0}, {0.1, 0.3}, {0.3, 0.3}, {0.3, -0.1}, {0.5, 0.1}});
   for (const Protocol& protocol : {push_and_release(), loads}) {
     for (const double share : {0.0, 0.5}) {
@@ -288,7 +288,7 @@ TEST_CASE("the work of the probe is stored, moves spheres or becomes heat") {
 }
 
 TEST_CASE("a run with mass in two halves is one run") {
-  const Block block(slow_tissue());
+  const HeldBlock block(slow_tissue());
   const Protocol loads(Drive::force, {{0.0, 0.0}, {0.1, 0.3}, {0.3, 0.3}, {0.3, -0.1}, {0.5, 0.1}});
   InertialOptions options;
   options.tolerance = 1e-9;
@@ -321,7 +321,7 @@ TEST_CASE("a run with mass in two halves is one run") {
 }
 
 TEST_CASE("driven slowly, the inertial network is the quasi-static one", "[heavy]") {
-  const Block block(slow_tissue());
+  const HeldBlock block(slow_tissue());
   double last = 1.0;
   for (const double slowness : {1.0, 10.0, 100.0}) {
     const Protocol ramp = ramp_and_hold(4e-3, 4e-3 / slowness, 9.0 * slowness);
@@ -343,7 +343,7 @@ TEST_CASE("driven slowly, the inertial network is the quasi-static one", "[heavy
 }
 
 TEST_CASE("a preload starts in equilibrium and a release rings down to rest") {
-  const Block block(slow_tissue());
+  const HeldBlock block(slow_tissue());
   Protocol release(Drive::force, {{0.0, 0.2}, {0.1, 0.2}, {0.1, 0.0}, {20.0, 0.0}});
   release.set_equilibrium_at_start(true);
   InertialOptions options;
@@ -379,14 +379,15 @@ TEST_CASE("the motion depends neither on the numbering nor on a rigid motion of 
   InertialOptions options;
   options.tolerance = 1e-8;
   options.stiffness_share = 0.3;
-  const Eigen::VectorXd plain = Block(p).inertial(options).run(push_and_release(), times).response;
+  const Eigen::VectorXd plain =
+      HeldBlock(p).inertial(options).run(push_and_release(), times).response;
   const Eigen::Matrix3d rotation =
       Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
   std::vector<std::size_t> order(24);
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::reverse(order.begin(), order.begin() + 17);
   std::swap(order[3], order[20]);
-  const Eigen::VectorXd other = Block(p, rotation, {0.1, -0.2, 0.3}, order)
+  const Eigen::VectorXd other = HeldBlock(p, rotation, {0.1, -0.2, 0.3}, order)
                                     .inertial(options)
                                     .run(push_and_release(), times)
                                     .response;

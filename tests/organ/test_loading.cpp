@@ -28,7 +28,7 @@ Json block_scene() {
                     "scene");
 }
 
-ExperimentScene scene_of(const Json& json) {
+ExperimentScene parsed_scene(const Json& json) {
   return parse_experiment(json, "scene", {});
 }
 
@@ -50,9 +50,9 @@ Json pushed_sphere(std::size_t number) {
 
 const Json kRamp = parse_json(
     R"({"kind": "ramp_hold", "depth": "2 mm", "rate": "4 mm/s", "hold": "2 s"})", "ramp");
-const Json kLoad = parse_json(R"({"kind": "knots", "knots": [{"time": "0 s", "load": "0 N"},
+const Json kLoadProtocol = parse_json(R"({"kind": "knots", "knots": [{"time": "0 s", "load": "0 N"},
     {"time": "0.8 s", "load": "0.02 N"}, {"time": "2 s", "load": "0.005 N"}]})",
-                              "load");
+                                      "load");
 
 }  // namespace
 
@@ -64,7 +64,7 @@ TEST_CASE("contacts with equal protocols of their own answer as contacts that sh
   Json own = block_scene();
   own["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   for (Json& one : own["contacts"]) one["protocol"] = kRamp;
-  const ExperimentScene together = scene_of(shared), apart = scene_of(own);
+  const ExperimentScene together = parsed_scene(shared), apart = parsed_scene(own);
   CHECK_FALSE(together.has_own_protocols());
   CHECK(apart.has_own_protocols());
   const SimulationRun a = simulate(together, network_to_run(together));
@@ -86,9 +86,9 @@ TEST_CASE("the energy of a depth beside a load, under gravity, is accounted for"
   Json json = block_scene();
   json["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   json["contacts"][0]["protocol"] = kRamp;
-  json["contacts"][1]["protocol"] = kLoad;
+  json["contacts"][1]["protocol"] = kLoadProtocol;
   json["loads"] = {{{"kind", "gravity"}, {"direction", {0, 0, -1}}}};
-  const ExperimentScene scene = scene_of(json);
+  const ExperimentScene scene = parsed_scene(json);
   CHECK_THAT(scene.protocol.end_s(), WithinRel(2.5, 1e-12));
   const SimulationRun run = simulate(scene, network_to_run(scene));
   const QuasiStaticEnergy& end = run.record.curve.back().energy;
@@ -108,7 +108,7 @@ TEST_CASE("anchors bear the weight of a sagged block, and nothing has to relax a
       {"time": "3 s", "depth": "0 mm"}, {"time": "4 s", "depth": "1 mm"}]})",
                                 "protocol");
   json["loads"] = {{{"kind", "gravity"}, {"direction", {0, 0, -1}}, {"mass_kg", 0.05}}};
-  const ExperimentScene scene = scene_of(json);
+  const ExperimentScene scene = parsed_scene(json);
   const RunNetwork network = network_to_run(scene);
   const Loading& loading = network.driven.probes.loading();
   CHECK_THAT(loading.dead_N.row(2).sum(), WithinRel(-0.05 * 9.80665, 1e-12));
@@ -137,11 +137,11 @@ TEST_CASE("a sagged network can be given masses: light spheres move as without t
   Json json = block_scene();
   json["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   json["contacts"][0]["protocol"] = kRamp;
-  json["contacts"][1]["protocol"] = kLoad;
+  json["contacts"][1]["protocol"] = kLoadProtocol;
   json["loads"] = {{{"kind", "gravity"}, {"direction", {0, 0, -1}}}};
-  const ExperimentScene massless = scene_of(json);
+  const ExperimentScene massless = parsed_scene(json);
   json["formulation"] = {{"kind", "inertial"}, {"density_kg_per_m3", 0.01}, {"damping_ratio", 1.0}};
-  const ExperimentScene light = scene_of(json);
+  const ExperimentScene light = parsed_scene(json);
   const SimulationRun a = simulate(massless, network_to_run(massless));
   const SimulationRun b = simulate(light, network_to_run(light));
   const auto at = [](const SimulationRun& run, double time_s) -> const CurvePoint& {
@@ -170,9 +170,9 @@ TEST_CASE("a run with two protocols and gravity goes on from a checkpoint to the
   Json json = block_scene();
   json["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   json["contacts"][0]["protocol"] = kRamp;
-  json["contacts"][1]["protocol"] = kLoad;
+  json["contacts"][1]["protocol"] = kLoadProtocol;
   json["loads"] = {{{"kind", "gravity"}, {"direction", {0, 0, -1}}}};
-  const ExperimentScene scene = scene_of(json);
+  const ExperimentScene scene = parsed_scene(json);
   const RunNetwork network = network_to_run(scene);
   const SimulationRun whole = simulate(scene, network);
   SimulationControls controls;
@@ -305,19 +305,19 @@ TEST_CASE("scenes with several protocols that make no sense are refused") {
   Json json = block_scene();
   json["contacts"] = {pushed_sphere(first), pushed_sphere(second)};
   json["contacts"][0]["protocol"] = kRamp;
-  CHECK_THROWS_WITH(scene_of(json), Contains("/contacts/1/protocol") && Contains("is missing"));
+  CHECK_THROWS_WITH(parsed_scene(json), Contains("/contacts/1/protocol") && Contains("is missing"));
   json["protocol"] = kRamp;  // which nothing would follow
-  CHECK_THROWS_WITH(scene_of(json), Contains("key /protocol: is of no contact"));
+  CHECK_THROWS_WITH(parsed_scene(json), Contains("key /protocol: is of no contact"));
   json.erase("protocol");
   json["contacts"][1]["protocol"] = parse_json(
       R"({"kind": "knots", "knots": [{"time": "1 s", "depth": "0 mm"}, {"time": "2 s", "depth": "1 mm"}]})",
       "late");
-  CHECK_THROWS_WITH(scene_of(json), Contains("begins at 1 s"));
-  json["contacts"][1]["protocol"] = kLoad;
+  CHECK_THROWS_WITH(parsed_scene(json), Contains("begins at 1 s"));
+  json["contacts"][1]["protocol"] = kLoadProtocol;
   json["contacts"][1]["share"] = 0.5;
-  CHECK_THROWS_WITH(scene_of(json), Contains("is of no protocol"));
+  CHECK_THROWS_WITH(parsed_scene(json), Contains("is of no protocol"));
   json["contacts"][1].erase("share");
   json["formulation"] = {{"kind", "static"}};
-  const ExperimentScene scene = scene_of(json);
+  const ExperimentScene scene = parsed_scene(json);
   CHECK_THROWS_WITH(require_runnable(scene), Contains("protocols of their own"));
 }

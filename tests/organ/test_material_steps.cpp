@@ -18,9 +18,9 @@ using tpm::testing::OrganScene;
 namespace {
 
 constexpr double kDepth_m = 4e-3, kRamp_s = 1.0;
-const std::vector<double> kTimes{0.25, 0.5, 1.0, 1.5, 2.0};
+const std::vector<double> kRampTimes_s{0.25, 0.5, 1.0, 1.5, 2.0};
 
-const OrganScene& small_scene() {
+const OrganScene& liver_of_24() {
   static const OrganScene scene = [] {
     LiverRequest request;
     request.count = 24;
@@ -45,28 +45,28 @@ BondMaterial two_branches() {
 class Written {
  public:
   Written(const BondMaterial& material, std::vector<double> factors = {})
-      : bonds_(small_scene().network, field(material, factors)),
+      : bonds_(liver_of_24().network, field(material, factors)),
         driven_{bonds_,
-                small_scene().network.organ.position,
-                small_scene().constraints,
-                Probes(small_scene().probe),
+                liver_of_24().network.organ.position,
+                liver_of_24().constraints,
+                Probes(liver_of_24().probe),
                 {}} {
-    std::vector<WrittenBond> written = written_bonds(small_scene().network, material);
+    std::vector<WrittenBond> written = written_bonds(liver_of_24().network, material);
     // A bond between two factors is both at half strength.
     for (std::size_t i = 0; i < written.size() && !factors.empty(); ++i) {
       const double mean = 0.5 * (factors[written[i].a] + factors[written[i].b]);
       written[i].k *= mean;
       for (WrittenBond::Branch& branch : written[i].branches) branch.g *= mean;
     }
-    WrittenNetwork network(small_scene().network, std::move(written), small_scene().constraints,
-                           small_scene().probe);
-    const std::vector<double> forces = written_ramp(network, kDepth_m, kRamp_s, kTimes);
+    WrittenNetwork network(liver_of_24().network, std::move(written), liver_of_24().constraints,
+                           liver_of_24().probe);
+    const std::vector<double> forces = written_ramp(network, kDepth_m, kRamp_s, kRampTimes_s);
     expected_ = Eigen::VectorXd::Map(forces.data(), std::ssize(forces));
   }
 
   /// The largest difference in parts of the peak.
   [[nodiscard]] double error(const MethodSettings& settings) const {
-    const MethodRun run = network_problem(driven_, ramp())->run(settings, kTimes);
+    const MethodRun run = network_problem(driven_, ramp())->run(settings, kRampTimes_s);
     REQUIRE(run.end == MethodEnd::completed);
     return (run.response - expected_).cwiseAbs().maxCoeff() / expected_.maxCoeff();
   }
@@ -118,13 +118,13 @@ TEST_CASE("step rules take a stiffening potential, a kernel and factors of place
   BondMaterial m = two_branches();
   m.potential = elongation_function("cubic", {8e-3});
   m.kernel = elongation_function("cubic", {6e-3});
-  std::vector<double> factors(small_scene().network.organ.size(), 1.0);
-  factors[*small_scene().network.organ.contact] = 3.0;
+  std::vector<double> factors(liver_of_24().network.organ.size(), 1.0);
+  factors[*liver_of_24().network.organ.contact] = 3.0;
   check_rules(Written(m, factors));
 }
 
 TEST_CASE("a ball by CVODE takes several branches: one written as two is the same", "[method]") {
-  const OrganScene& scene = small_scene();
+  const OrganScene& scene = liver_of_24();
   BondMaterial one = two_branches();
   one.branches = {{10e3, 0.4}};
   BondMaterial two = one;

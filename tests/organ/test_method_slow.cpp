@@ -24,8 +24,8 @@ std::vector<double> eighths(double end) {
   return times;
 }
 
-void check_orders(const ReferenceProblem& checked, const std::map<int, double>& step_s,
-                  double least_error) {
+void check_organ_orders(const ReferenceProblem& checked, const std::map<int, double>& step_s,
+                        double least_error) {
   for (const StepRuleEntry& entry : kStepRules) {
     if (entry.meaning == StepRule::xpbd) continue;  // below
     INFO(checked.name << ", " << entry.text);
@@ -49,17 +49,18 @@ void check_orders(const ReferenceProblem& checked, const std::map<int, double>& 
 TEST_CASE("method on an organ: orders without masses") {
   const SmallOrgan organ(TpmParameters{}.with_relaxation_time(0.1));
   const std::map<int, double> steps{{1, 0.003125}, {2, 0.0125}, {4, 0.0125}};
-  check_orders(organ.massless("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4)), steps, 0.0);
+  check_organ_orders(organ.massless("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4)), steps,
+                     0.0);
   const Protocol load(Drive::force, {{0.0, 0.0}, {0.2, 0.1}, {0.5, 0.1}});
-  check_orders(organ.massless("load", load, eighths(0.5)), steps, 0.0);
+  check_organ_orders(organ.massless("load", load, eighths(0.5)), steps, 0.0);
 }
 
 TEST_CASE("method on an organ: orders with masses") {
   const SmallOrgan organ(TpmParameters{}.with_relaxation_time(0.1));
   const std::map<int, double> steps{{1, 1.25e-4}, {2, 5e-4}, {4, 5e-4}};
   // The reference itself is good to some 1e-9.
-  check_orders(organ.with_mass("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4), 0.5), steps,
-               1e-8);
+  check_organ_orders(organ.with_mass("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4), 0.5),
+                     steps, 1e-8);
 }
 
 TEST_CASE("method on an organ: XPBD lags without masses, and less the more it sweeps") {

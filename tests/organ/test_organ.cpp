@@ -7,6 +7,7 @@
 #include "expected_values.hpp"
 #include "organ_meshes.hpp"
 #include "refusal.hpp"
+#include "solid_fillings.hpp"
 #include "tpm/organ/body/filling.hpp"
 #include "tpm/organ/body/landing_site.hpp"
 #include "tpm/organ/body/liver.hpp"
@@ -33,18 +34,12 @@ ShellRequest shell_of(std::size_t count, int layers) {
   return request;
 }
 
-double least_distance(const Organ& organ) {
-  double least = 1e300;
-  for (const NearestDistances& layer : nearest_distances(organ)) least = std::min(least, layer.min);
-  return least;
-}
-
 bool same(const Organ& a, const Organ& b) {
   return a.position == b.position && a.normal == b.normal && a.layer == b.layer &&
          a.spacing == b.spacing && a.contact == b.contact;
 }
 
-std::string refusal(const Organ& organ) {
+std::string organ_refusal(const Organ& organ) {
   return refusal_of([&] { require_valid(organ, "organ"); });
 }
 
@@ -337,24 +332,24 @@ TEST_CASE("an organ that is not one is refused with the first fault") {
   const Organ good = star(0.03, 0.02);
   Organ organ = good;
   organ.position(1, 2) = std::nan("");
-  CHECK_THAT(refusal(organ), Contains("sphere 3 has a coordinate that is not finite"));
+  CHECK_THAT(organ_refusal(organ), Contains("sphere 3 has a coordinate that is not finite"));
   organ = good;
   organ.normal(2, 0) = 0.5;
-  CHECK_THAT(refusal(organ), Contains("the normal of sphere 1 has length 0.5"));
+  CHECK_THAT(organ_refusal(organ), Contains("the normal of sphere 1 has length 0.5"));
   organ = good;
   organ.position.col(3) = organ.position.col(0);
-  CHECK_THAT(refusal(organ), Contains("sphere 1 lies where another sphere lies"));
+  CHECK_THAT(organ_refusal(organ), Contains("sphere 1 lies where another sphere lies"));
   organ = good;
   organ.layer = {0, 0, 0, 2};
-  CHECK_THAT(refusal(organ), Contains("layer 1 has no spheres"));
+  CHECK_THAT(organ_refusal(organ), Contains("layer 1 has no spheres"));
   organ = good;
   organ.layer.pop_back();
-  CHECK_THAT(refusal(organ), Contains("4 positions, 4 normals and 3 layers"));
+  CHECK_THAT(organ_refusal(organ), Contains("4 positions, 4 normals and 3 layers"));
   organ = good;
   organ.radius = 0.0;
-  CHECK_THAT(refusal(organ), Contains("the radius of the spheres is 0 m"));
+  CHECK_THAT(organ_refusal(organ), Contains("the radius of the spheres is 0 m"));
   organ = good;
   organ.contact = 4;
-  CHECK_THAT(refusal(organ), Contains("the contact is sphere 5; expected one of 1 to 4"));
-  CHECK_THAT(refusal(Organ{}), Contains("has no spheres"));
+  CHECK_THAT(organ_refusal(organ), Contains("the contact is sphere 5; expected one of 1 to 4"));
+  CHECK_THAT(organ_refusal(Organ{}), Contains("has no spheres"));
 }

@@ -1,22 +1,12 @@
 // Large organs: 150,000 spheres, as a solid and as a shell.
-#include <algorithm>
 #include <catch2/catch.hpp>
 
-#include "tpm/organ/body/filling.hpp"
+#include "solid_fillings.hpp"
 #include "tpm/organ/body/liver.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;
-
-namespace {
-
-double least_distance(const Organ& organ) {
-  double least = 1e300;
-  for (const NearestDistances& layer : nearest_distances(organ)) least = std::min(least, layer.min);
-  return least;
-}
-
-}  // namespace
+using test::least_distance;
 
 TEST_CASE("a solid liver of 150,000 spheres") {
   const MeshSurface surface = liver_surface({});

@@ -16,9 +16,9 @@ namespace {
 
 constexpr double kCoarseSpacing = 0.02;
 
-struct Block {
-  Block(Lattice lattice, int cells, double spacing, const NetworkOptions& options,
-        const TpmParameters& material = {})
+struct PatchBlock {
+  PatchBlock(Lattice lattice, int cells, double spacing, const NetworkOptions& options,
+             const TpmParameters& material = {})
       : network(build_network(block(cells, cells, cells, spacing, lattice), options, "block")),
         bonds(network, material),
         margin(2.0 * options.support * spacing),
@@ -61,8 +61,8 @@ TEST_CASE("lattices have the elasticity of their first and second neighbours") {
   const double unit =
       material.E2_Pa * material.modulus_to_stiffness_m() / kCoarseSpacing;  // k/x, all bonds alike
   for (const Cubic& expected : kCubic) {
-    const Block b(expected.lattice, cells_for(expected.lattice), kCoarseSpacing,
-                  options_of(StiffnessRule::per_bond));
+    const PatchBlock b(expected.lattice, cells_for(expected.lattice), kCoarseSpacing,
+                       options_of(StiffnessRule::per_bond));
     const PatchTest patch = b.test(0.0);
     CAPTURE(static_cast<int>(expected.lattice), patch.interior);
     Elasticity c = Elasticity::Zero();
@@ -82,7 +82,7 @@ TEST_CASE("lattices have the elasticity of their first and second neighbours") {
 }
 
 TEST_CASE("a cubic lattice with its diagonals is isotropic with a Poisson ratio of 1/4") {
-  const Block b(Lattice::cubic, 8, kCoarseSpacing, options_of(StiffnessRule::per_bond));
+  const PatchBlock b(Lattice::cubic, 8, kCoarseSpacing, options_of(StiffnessRule::per_bond));
   const Moduli m = moduli_of(b.test(0.0).elasticity);
   CHECK_THAT(m.anisotropy, WithinRel(1.0, 1e-12));
   CHECK_THAT(m.poisson(0, 1), WithinRel(0.25, 1e-12));
@@ -92,8 +92,8 @@ TEST_CASE("a cubic lattice with its diagonals is isotropic with a Poisson ratio 
 TEST_CASE(
     "the patch test agrees with the sum over bonds, and central forces have Cauchy symmetry") {
   for (const Cubic& entry : kCubic) {
-    const Block b(entry.lattice, cells_for(entry.lattice), kCoarseSpacing,
-                  options_of(StiffnessRule::normalised));
+    const PatchBlock b(entry.lattice, cells_for(entry.lattice), kCoarseSpacing,
+                       options_of(StiffnessRule::normalised));
     const auto interior = interior_spheres(b.network.organ, b.margin);
     for (const double relaxation_factor : {0.0, 0.3, 1.0}) {
       const Elasticity solved = b.test(relaxation_factor).elasticity;
@@ -109,7 +109,7 @@ TEST_CASE(
 }
 
 TEST_CASE("what relaxes halves with equal springs, and lateral bonds keep their stiffness") {
-  const Block b(Lattice::cubic, 8, kCoarseSpacing, options_of(StiffnessRule::normalised));
+  const PatchBlock b(Lattice::cubic, 8, kCoarseSpacing, options_of(StiffnessRule::normalised));
   const Elasticity instantaneous = b.test(0.0).elasticity;
   const Elasticity relaxed = b.test(1.0).elasticity;
   // Across z only inter-layer bonds carry; along xy both kinds.
@@ -123,8 +123,8 @@ TEST_CASE("the continuum law keeps the modulus of a block, the paper's law does 
   for (const Cubic& entry : kCubic) {
     for (const StiffnessRule rule : {StiffnessRule::normalised, StiffnessRule::per_bond}) {
       const auto modulus = [&](SpacingLaw law, double spacing, int more_cells) {
-        const Block b(entry.lattice, cells_for(entry.lattice) + more_cells, spacing,
-                      options_of(rule, law));
+        const PatchBlock b(entry.lattice, cells_for(entry.lattice) + more_cells, spacing,
+                           options_of(rule, law));
         return moduli_of(b.test(0.0).elasticity).young_Pa[2];
       };
       const double coarse = modulus(SpacingLaw::continuum, kCoarseSpacing, 0);
@@ -138,12 +138,12 @@ TEST_CASE("the continuum law keeps the modulus of a block, the paper's law does 
 
 TEST_CASE("a block between smooth plates comes nearer to the bulk with more cells", "[heavy]") {
   const auto block_of = [](int cells) {
-    return Block(Lattice::cubic, cells, kCoarseSpacing, options_of(StiffnessRule::per_bond));
+    return PatchBlock(Lattice::cubic, cells, kCoarseSpacing, options_of(StiffnessRule::per_bond));
   };
   const Moduli bulk = moduli_of(block_of(8).test(0.0).elasticity);
   std::vector<double> off;
   for (const int cells : {4, 8, 16}) {
-    const Block b = block_of(cells);
+    const PatchBlock b = block_of(cells);
     const PlateTest plates = plate_test(b.network, b.bonds, 0.0);
     CHECK_THAT(plates.poisson[0], WithinAbs(plates.poisson[1], 1e-9));
     CHECK_THAT(plates.volume_change, WithinAbs(1.0 - 2.0 * plates.poisson[0], 1e-9));
@@ -156,7 +156,7 @@ TEST_CASE("a block between smooth plates comes nearer to the bulk with more cell
 }
 
 TEST_CASE("patch tests refuse what they cannot answer") {
-  const Block small(Lattice::cubic, 4, kCoarseSpacing, options_of(StiffnessRule::per_bond));
+  const PatchBlock small(Lattice::cubic, 4, kCoarseSpacing, options_of(StiffnessRule::per_bond));
   CHECK_THROWS_WITH(small.test(0.0), Catch::Contains("no sphere of cubic block"));
   NetworkOptions narrow = options_of(StiffnessRule::per_bond);
   narrow.support = 1.1;  // without diagonals a cubic lattice is a mechanism

@@ -52,7 +52,7 @@ Protocol walk(Drive drive) {
           true};
 }
 
-const std::vector<double> kTimes{0.0, 0.3, 1.0, 1.37, 2.0, 2.01, 2.5, 3.0, 4.4};
+const std::vector<double> kSeenTimes_s{0.0, 0.3, 1.0, 1.37, 2.0, 2.01, 2.5, 3.0, 4.4};
 
 }  // namespace
 
@@ -77,7 +77,7 @@ TEST_CASE("the states shown are those of the responses, in the order of time") {
 TEST_CASE("the forces of a state balance, and its response is that of its positions") {
   const Scene scene;
   for (const Drive drive : {Drive::displacement, Drive::force}) {
-    const SeenRun seen = scene.see(walk(drive), kTimes);
+    const SeenRun seen = scene.see(walk(drive), kSeenTimes_s);
     const auto probe = static_cast<Eigen::Index>(scene.organ.probe.sphere);
     const Eigen::Vector3d& axis = scene.organ.probe.direction;
     for (const QuasiStaticState& state : seen.states) {
@@ -100,7 +100,7 @@ TEST_CASE("the forces of a state balance, and its response is that of its positi
 TEST_CASE("the account of the energy closes at every state") {
   const Scene scene;
   for (const Drive drive : {Drive::displacement, Drive::force}) {
-    const SeenRun seen = scene.see(walk(drive), kTimes);
+    const SeenRun seen = scene.see(walk(drive), kSeenTimes_s);
     const double scale = seen.states.back().energy->dissipated_J;
     CHECK(scale > 0.0);
     double before = 0.0;
@@ -119,13 +119,13 @@ TEST_CASE("the account of the energy closes at every state") {
 TEST_CASE("a run in two halves is one run") {
   const Scene scene;
   for (const Drive drive : {Drive::displacement, Drive::force}) {
-    const SeenRun whole = scene.see(walk(drive), kTimes);
+    const SeenRun whole = scene.see(walk(drive), kSeenTimes_s);
     const double peak = whole.run.response.cwiseAbs().maxCoeff();
-    for (std::size_t cut = 0; cut < kTimes.size(); ++cut) {
+    for (std::size_t cut = 0; cut < kSeenTimes_s.size(); ++cut) {
       const auto at = static_cast<std::ptrdiff_t>(cut);
-      const SeenRun rest =
-          scene.see(walk(drive), {kTimes.begin() + at, kTimes.end()}, &whole.states[cut]);
-      CAPTURE(cut, kTimes[cut], drive == Drive::force);
+      const SeenRun rest = scene.see(walk(drive), {kSeenTimes_s.begin() + at, kSeenTimes_s.end()},
+                                     &whole.states[cut]);
+      CAPTURE(cut, kSeenTimes_s[cut], drive == Drive::force);
       CHECK((rest.run.response - whole.run.response.tail(rest.run.response.size()))
                 .cwiseAbs()
                 .maxCoeff() < 3 * Scene::kTolerance * peak);

@@ -28,7 +28,8 @@ using test::TempFolder;
 
 namespace {
 
-const std::string kPush = R"("protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s",
+const std::string kShallowPush =
+    R"("protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s",
   "hold": "2 s"}, "outputs": {"count": 4})";
 
 void write_scene(const std::string& path, const std::string& text) {
@@ -75,7 +76,7 @@ std::set<std::string> keys_of(const Json& json) {
 
 TEST_CASE("the file of a run holds its scene, version, tolerance, and what was found", "[heavy]") {
   const TempFolder folder;
-  const ExperimentScene scene = small_scene(kPush + R"(, "title": "a push")");
+  const ExperimentScene scene = small_scene(kShallowPush + R"(, "title": "a push")");
   const RunNetwork network = network_to_run(scene);
   const SimulationRun run = simulate(scene, network);
   const auto xdmf = write_simulation(scene, network, run, folder / "a.h5");
@@ -156,7 +157,7 @@ TEST_CASE("a run that is stopped, by whatever signal, ends as one that was not",
 
 TEST_CASE("nothing is said on standard error where that is no terminal") {
   const TempFolder folder;
-  write_scene(folder / "s.json", test::small_scene_text(kPush));
+  write_scene(folder / "s.json", test::small_scene_text(kShallowPush));
   REQUIRE(exit_code(command_for(
               folder / "s.json", folder / "a.h5",
               fmt::format("--format json >\"{}\" 2>\"{}\"", folder / "out", folder / "err"))) == 0);
@@ -170,7 +171,7 @@ TEST_CASE("nothing is said on standard error where that is no terminal") {
 TEST_CASE("tissue and mass-spring model are run and drawn beside each other, twice the same",
           "[heavy]") {
   const TempFolder folder;
-  write_scene(folder / "s.json", test::small_scene_text(kPush));
+  write_scene(folder / "s.json", test::small_scene_text(kShallowPush));
   for (const std::string name : {"a", "b"}) {
     REQUIRE(exit_code(command_for(
                 folder / "s.json", folder / (name + ".h5"),

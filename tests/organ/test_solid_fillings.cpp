@@ -4,8 +4,8 @@
 
 #include "organ_meshes.hpp"
 #include "refusal.hpp"
+#include "solid_fillings.hpp"
 #include "tpm/base/random.hpp"
-#include "tpm/organ/body/filling.hpp"
 #include "tpm/organ/body/known_margins.hpp"
 #include "tpm/organ/body/landing_site.hpp"
 #include "tpm/organ/body/mesh_surface.hpp"
@@ -31,23 +31,10 @@ TriangleMesh box(const Vector3d& corner) {
   return mesh;
 }
 
-Organ solid_of(const Surface& surface, std::size_t count, Lattice lattice) {
-  SolidRequest request;
-  request.count = count;
-  request.lattice = lattice;
-  return fill_solid(surface, request);
-}
-
 double least_outer_support(const Organ& organ) {
   const std::vector<double> support =
       outer_support(build_network(organ, NetworkOptions{}, "solid"));
   return *std::min_element(support.begin(), support.end());
-}
-
-double least_distance(const Organ& organ) {
-  double least = 1e300;
-  for (const NearestDistances& layer : nearest_distances(organ)) least = std::min(least, layer.min);
-  return least;
 }
 
 }  // namespace

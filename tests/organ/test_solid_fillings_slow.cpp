@@ -11,8 +11,8 @@
 #include <numbers>
 
 #include "organ_meshes.hpp"
+#include "solid_fillings.hpp"
 #include "tpm/organ/balance/equilibrium.hpp"
-#include "tpm/organ/body/filling.hpp"
 #include "tpm/organ/body/liver_surface.hpp"
 #include "tpm/organ/bonds/outer_support.hpp"
 #include "tpmkit/tpm_element.hpp"
@@ -22,17 +22,11 @@ using namespace tpm::base;
 using namespace tpm::organ;
 using Eigen::Index;
 using Eigen::Vector3d;
+using test::solid_of;
 
 namespace {
 
 constexpr std::array kLattices{Lattice::cubic, Lattice::bcc, Lattice::fcc};
-
-Organ solid_of(const Surface& surface, std::size_t count, Lattice lattice) {
-  SolidRequest request;
-  request.count = count;
-  request.lattice = lattice;
-  return fill_solid(surface, request);
-}
 
 /// None of the outer spheres is below the least support, and each has a bond that the measure
 /// counts.

@@ -24,7 +24,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-std::string refusal(const TriangleMesh& mesh) {
+std::string mesh_refusal(const TriangleMesh& mesh) {
   return refusal_of([&] { (void)closed_mesh(mesh, "m.stl"); });
 }
 
@@ -117,22 +117,22 @@ TEST_CASE("points are spread in proportion to area") {
 
 TEST_CASE("faults of a mesh are refused with their place") {
   CHECK_THAT(
-      refusal(without_triangle(unit_cube(), 4)),
+      mesh_refusal(without_triangle(unit_cube(), 4)),
       Contains("m.stl: the surface is open: the edge from (") && Contains("belongs only to"));
   TriangleMesh twisted = unit_cube();
   std::swap(twisted.triangles(0, 3), twisted.triangles(1, 3));
-  CHECK_THAT(refusal(twisted), Contains("wind differently") && Contains("triangle 4"));
-  CHECK_THAT(refusal(self_cutting_tube()), Contains("the surface cuts itself: triangle"));
+  CHECK_THAT(mesh_refusal(twisted), Contains("wind differently") && Contains("triangle 4"));
+  CHECK_THAT(mesh_refusal(self_cutting_tube()), Contains("the surface cuts itself: triangle"));
   const TriangleMesh apart = both(unit_cube(), cuboid({2, 0, 0}, {3, 1, 1}));
-  CHECK_THAT(refusal(apart), Contains("triangle 13 at (") && Contains("is not connected"));
+  CHECK_THAT(mesh_refusal(apart), Contains("triangle 13 at (") && Contains("is not connected"));
   const TriangleMesh by_edge = both(unit_cube(), cuboid({1, 1, 0}, {2, 2, 1}));
-  CHECK_THAT(refusal(by_edge), Contains("belongs to 4 triangles"));
+  CHECK_THAT(mesh_refusal(by_edge), Contains("belongs to 4 triangles"));
   TriangleMesh flat = cuboid({0, 0, 0}, {1, 1, 1e-12});
-  CHECK_THAT(refusal(flat), Contains("m.stl: "));
+  CHECK_THAT(mesh_refusal(flat), Contains("m.stl: "));
   TriangleMesh bad = unit_cube();
   bad.vertices(0, 2) = std::nan("");
-  CHECK_THAT(refusal(bad), Contains("vertex 3 is not finite"));
-  CHECK_THAT(refusal(TriangleMesh{}), Contains("holds no triangles"));
+  CHECK_THAT(mesh_refusal(bad), Contains("vertex 3 is not finite"));
+  CHECK_THAT(mesh_refusal(TriangleMesh{}), Contains("holds no triangles"));
 }
 
 TEST_CASE("two crossing cubes cut each other") {

@@ -17,7 +17,7 @@ namespace {
 
 const fs::path kSource = TPM_TEST_SOURCE_DIR;
 
-OrganStudyConfig shipped() {
+OrganStudyConfig shipped_study() {
   return read_organ_study(kSource / "configs" / "organ_experiments.json");
 }
 
@@ -36,7 +36,7 @@ double deviance_at(const ExperimentResiduals& function, std::span<const double> 
 }  // namespace
 
 TEST_CASE("the committed fits have the chi-square that they state, and none nearby is lower") {
-  const OrganStudyConfig config = shipped();
+  const OrganStudyConfig config = shipped_study();
   const Json report = read_json(kSource / "reports" / "organ" / "experiments.json");
   std::size_t checked = 0;
   for (std::size_t f = 0; f < config.fits.size(); ++f) {
@@ -72,7 +72,7 @@ constexpr const char* kScene = R"({"organ": {"kind": "liver", "count": 40, "spac
 
 /// One of the study's fits with an organ of a few spheres.
 FitConfig small_fit(const std::string& name) {
-  const OrganStudyConfig study = shipped();
+  const OrganStudyConfig study = shipped_study();
   for (const StudyFit& fit : study.fits) {
     if (fit.name != name) continue;
     FitConfig config = fit.configs.back();

@@ -29,7 +29,7 @@ const std::vector<PrintedTable>& paper_tables() {
   return tables;
 }
 
-TablesResult printed_paper(const TableRequest& request = {}) {
+TablesResult printed_tables(const TableRequest& request = {}) {
   return make_tables(request, paper_tables());
 }
 
@@ -88,7 +88,7 @@ TEST_CASE("negative, zero and scientific printed numbers use the same windows") 
 }
 
 TEST_CASE("the window of a cell with few digits is wide, and says so") {
-  const TablesResult result = printed_paper();
+  const TablesResult result = printed_tables();
   const TableRow& row = row_at(result, 0.004, 0.035);  // printed 0.61 -> 0.3
   CHECK_THAT(row.end_force.printed->from_computed_lambda1.window_width(), WithinRel(0.15, 1e-12));
   CHECK_THAT(*row.end_force.printed->from_computed_lambda1.window_percent(),
@@ -96,7 +96,7 @@ TEST_CASE("the window of a cell with few digits is wide, and says so") {
 }
 
 TEST_CASE("Tables 1-4: 16 of 16 lambda1 and 30 of 32 forces follow") {
-  const TableSummary s = printed_paper().summary;
+  const TableSummary s = printed_tables().summary;
   CHECK(s.lambda1.cells == 16);
   CHECK(s.lambda1.explained() == 16);
   CHECK(s.lambda1.by_rounding == 14);
@@ -111,11 +111,11 @@ TEST_CASE("Tables 1-4: 16 of 16 lambda1 and 30 of 32 forces follow") {
 TEST_CASE("with the true circle area 28 of 32 forces follow") {
   TableRequest request;
   request.parameters.A0_m2 = std::numbers::pi * 4e-6;
-  CHECK(printed_paper(request).summary.force_from_printed_lambda1.explained() == 28);
+  CHECK(printed_tables(request).summary.force_from_printed_lambda1.explained() == 28);
 }
 
 TEST_CASE("the cells are Eqs. 2, 15 and 16 computed by hand") {
-  const TablesResult result = printed_paper();
+  const TablesResult result = printed_tables();
   const TableRow& row = row_at(result, 0.004, 0.030);
   const double lambda1 = 24e3 * (1.0 - std::cos(std::atan(4.0 / 30.0)));
   CHECK_THAT(row.lambda1.value, WithinRel(lambda1, 1e-12));
@@ -128,7 +128,7 @@ TEST_CASE("the cells are Eqs. 2, 15 and 16 computed by hand") {
 }
 
 TEST_CASE("Table 5 is the relaxed force at 30 mm and lies in its bands") {
-  const TablesResult result = printed_paper();
+  const TablesResult result = printed_tables();
   REQUIRE(result.bands.size() == 4);
   for (const BandRow& band : result.bands) {
     CHECK(band.inside);
@@ -140,20 +140,20 @@ TEST_CASE("Table 5 is the relaxed force at 30 mm and lies in its bands") {
 TEST_CASE("consistent mode with the stated eta1 has no peak, with a large one it has") {
   TableRequest request;
   request.mode = TableMode::consistent;
-  const TableRow fast = row_at(printed_paper(request), 0.004, 0.030);
+  const TableRow fast = row_at(printed_tables(request), 0.004, 0.030);
   CHECK_THAT(fast.peak_force.value, WithinRel(fast.end_force.value, 1e-3));
   CHECK_THAT(*fast.peak_force.printed->from_computed_lambda1.difference_percent,
              test::expected("paper_tables.peak_misfit_with_stated_viscosity"));
   request.parameters.eta1_Pa_s = 2.4e9;  // so slow that nothing relaxes
-  const TableRow slow = row_at(printed_paper(request), 0.004, 0.030);
-  const TableRow step = row_at(printed_paper(), 0.004, 0.030);
+  const TableRow slow = row_at(printed_tables(request), 0.004, 0.030);
+  const TableRow step = row_at(printed_tables(), 0.004, 0.030);
   CHECK_THAT(slow.end_force.value, WithinRel(step.peak_force.value, 1e-3));
 }
 
 TEST_CASE("rows the paper does not print have no verdict") {
   TableRequest request;
   request.depths_m = {0.003};
-  const TablesResult result = printed_paper(request);
+  const TablesResult result = printed_tables(request);
   CHECK(result.summary.lambda1.cells == 0);
   CHECK(result.bands.empty());
   CHECK_FALSE(result.rows.front().lambda1.printed);
@@ -163,21 +163,22 @@ TEST_CASE("rows the paper does not print have no verdict") {
 TEST_CASE("bad requests give one clear line") {
   TableRequest request;
   request.depths_m = {0.002, 0.002};
-  CHECK_THROWS_WITH(printed_paper(request), "depths: 2 mm stands twice; expected each length once");
+  CHECK_THROWS_WITH(printed_tables(request),
+                    "depths: 2 mm stands twice; expected each length once");
   request.depths_m = {-0.002};
-  CHECK_THROWS_WITH(printed_paper(request), "depths: -2 mm; expected a length above 0");
+  CHECK_THROWS_WITH(printed_tables(request), "depths: -2 mm; expected a length above 0");
   request.depths_m = {};
-  CHECK_THROWS_AS(printed_paper(request), Error);
+  CHECK_THROWS_AS(printed_tables(request), Error);
   request.depths_m = {0.002};
   request.rate_m_per_s = 0.0;
-  CHECK_THROWS_AS(printed_paper(request), Error);
+  CHECK_THROWS_AS(printed_tables(request), Error);
   request.rate_m_per_s = 1.0;
   request.parameters.E1_Pa = std::nan("");
-  CHECK_THROWS_AS(printed_paper(request), Error);
+  CHECK_THROWS_AS(printed_tables(request), Error);
 }
 
 TEST_CASE("JSON has all 48 cells, and every format is the same each time") {
-  const TablesResult result = printed_paper();
+  const TablesResult result = printed_tables();
   const Json json = to_json(result);
   int cells = 0;
   for (const Json& row : json.at("rows")) {
@@ -188,7 +189,7 @@ TEST_CASE("JSON has all 48 cells, and every format is the same each time") {
   }
   CHECK(cells == 48);
   CHECK(json.at("summary").at("force_from_printed_lambda1").at("explained") == 30);
-  CHECK(to_text(json) == to_text(to_json(printed_paper())));
+  CHECK(to_text(json) == to_text(to_json(printed_tables())));
   for (const TableStyle style : {TableStyle::text, TableStyle::markdown, TableStyle::latex}) {
     const std::string text = render(tables_document(result), style);
     CHECK(text.find("0.613") != std::string::npos);
@@ -206,7 +207,7 @@ TEST_CASE("CSV cells with commas and quotes are quoted") {
 TEST_CASE(
     "The short answer of the tables has a row per depth and spacing, and marks what does not "
     "follow") {
-  const TablesResult result = printed_paper();
+  const TablesResult result = printed_tables();
   const ShortAnswer answer = short_answer(result);
   REQUIRE(answer.rows.size() == result.rows.size());
   const std::string text = to_text(answer);
@@ -230,7 +231,7 @@ TEST_CASE("A short answer of many rows says how many are left out, and keeps the
   TableRequest request;
   request.spacings_m.clear();
   for (int i = 0; i < 30; ++i) request.spacings_m.push_back(0.020 + 0.0005 * i);
-  const ShortAnswer answer = short_answer(printed_paper(request));
+  const ShortAnswer answer = short_answer(printed_tables(request));
   const std::string text = to_text(answer);
   CHECK(std::ranges::count(text, '\n') <= static_cast<std::ptrdiff_t>(kAnswerLines));
   CHECK_THAT(text, Catch::Contains("more rows") && Catch::Contains("lambda1: "));

@@ -20,7 +20,7 @@ using test::refusal_of;
 
 namespace {
 
-const std::string kRamp = R"("protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s",
+const std::string kPress = R"("protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s",
   "hold": "1 s"})";
 
 }  // namespace
@@ -93,19 +93,19 @@ TEST_CASE("a scene that a formulation cannot run names those that can") {
                    R"(, "formulation": {"kind": ")" + kind + R"("}})");
     return refusal_of([&] { require_runnable(scene); });
   };
-  CHECK_THAT(refused("closed_form", kRamp),
+  CHECK_THAT(refused("closed_form", kPress),
              Contains("key /formulation") &&
                  Contains("'closed_form' is no formulation that runs on "
                           "any network, not only on the star; expected one of linear, "));
-  CHECK_THAT(refused("rk4", kRamp + R"(, "contacts": [{"kind": "ball", "radius": "10 mm"}])"),
+  CHECK_THAT(refused("rk4", kPress + R"(, "contacts": [{"kind": "ball", "radius": "10 mm"}])"),
              Contains("lets tools touch and leave; expected one of static, network_step, "
                       "quasi_static, inertial"));
   CHECK_THAT(
       refused("condensed", R"("protocol": {"kind": "creep", "load": "0.1 N", "duration": "1 s"})"),
       Contains("is driven by a load"));
-  CHECK_THAT(refused("surface", kRamp), Contains("unknown formulation of scenes 'surface'"));
+  CHECK_THAT(refused("surface", kPress), Contains("unknown formulation of scenes 'surface'"));
   CHECK_THAT(refusal_of([] {
-               (void)experiment(R"({"organ": {"kind": "liver", "count": 40}, )" + kRamp +
+               (void)experiment(R"({"organ": {"kind": "liver", "count": 40}, )" + kPress +
                                 R"(, "formulation": {"kind": "magic"}})");
              }),
              Contains("key /formulation/kind") && Contains("unknown formulation 'magic'") &&
@@ -114,7 +114,7 @@ TEST_CASE("a scene that a formulation cannot run names those that can") {
 
 TEST_CASE("settings of a formulation reach it, those of others are refused") {
   const auto parsed = [](const std::string& keys) {
-    return experiment(R"({"organ": {"kind": "star"}, )" + kRamp + R"(, "formulation": {)" + keys +
+    return experiment(R"({"organ": {"kind": "star"}, )" + kPress + R"(, "formulation": {)" + keys +
                       "}}")
         .formulation;
   };

@@ -19,7 +19,8 @@ namespace {
 
 const std::string kLiver =
     R"({"organ": {"kind": "liver", "count": 50}, "material": {"eta1": "16800 Pa s"}, )";
-const std::string kRamp = R"("protocol": {"kind": "ramp_hold", "depth": "2 mm", "rate": "2 mm/s",
+const std::string kShallowRamp =
+    R"("protocol": {"kind": "ramp_hold", "depth": "2 mm", "rate": "2 mm/s",
     "hold": "2 s"})";
 const std::string kSine =
     R"("protocol": {"kind": "sine", "depth": "3 mm", "frequency": "0.5 Hz", "cycles": 2})";
@@ -28,7 +29,7 @@ const std::string kGravity =
 
 /// The organ's own contact and the free outer sphere farthest from it.
 std::string two(const std::string& first, const std::string& second) {
-  const Tissue tissue = experiment(kLiver + kRamp + "}").tissue;
+  const Tissue tissue = experiment(kLiver + kShallowRamp + "}").tissue;
   const Organ& organ = tissue.network.organ;
   const Constraints constraints = tissue.constraints();
   const std::size_t contact = organ.contact.value();
@@ -48,7 +49,7 @@ std::string two(const std::string& first, const std::string& second) {
          std::to_string(other + 1) + ", " + second + "}]";
 }
 
-PlanRequest request(double tolerance) {
+PlanRequest loading_request(double tolerance) {
   PlanRequest request;
   request.tolerance = tolerance;
   request.relevance = request.changes = false;
@@ -67,8 +68,8 @@ double true_error(const Plan& plan, const ExperimentScene& scene) {
 }  // namespace
 
 TEST_CASE("a plan of contacts with protocols of their own picks what answers as simulate does") {
-  const ExperimentScene scene = experiment(kLiver + two(kRamp, kSine) + "}");
-  PlanRequest wanted = request(1e-3);
+  const ExperimentScene scene = experiment(kLiver + two(kShallowRamp, kSine) + "}");
+  PlanRequest wanted = loading_request(1e-3);
   wanted.relevance = wanted.changes = true;
   const Plan plan = make_plan(scene, wanted);
   REQUIRE(plan.choice);
@@ -81,7 +82,7 @@ TEST_CASE("a plan of contacts with protocols of their own picks what answers as 
 }
 
 TEST_CASE("what one contact does counts in the answer and in the times of another's plan") {
-  const ExperimentScene scene = experiment(kLiver + two(kRamp, kSine) + "}");
+  const ExperimentScene scene = experiment(kLiver + two(kShallowRamp, kSine) + "}");
   const PlanScene planned(scene);
   CHECK(planned.corners().knots().size() > scene.protocol.knots().size() + 100);
   CHECK(planned.corners().knots().back().time_s == planned.protocol().knots().back().time_s);
@@ -112,13 +113,13 @@ TEST_CASE("what masses do where two contacts move is that of a run with masses",
 }
 
 TEST_CASE("a plan under gravity starts from the sagged tissue", "[heavy]") {
-  const ExperimentScene scene = experiment(kLiver + kGravity + kRamp + "}");
-  const ExperimentScene without = experiment(kLiver + kRamp + "}");
+  const ExperimentScene scene = experiment(kLiver + kGravity + kShallowRamp + "}");
+  const ExperimentScene without = experiment(kLiver + kShallowRamp + "}");
   const std::vector<double> end{3.0};
   // The load matters, so a model that leaves it out could not pass.
   const double with_N = run_scene(scene, end, false).response[0];
   CHECK(std::abs(run_scene(without, end, false).response[0] - with_N) > 0.005 * with_N);
-  PlanRequest wanted = request(1e-3);
+  PlanRequest wanted = loading_request(1e-3);
   wanted.relevance = wanted.changes = true;
   wanted.budget.rate_Hz = 1000.0;
   const Plan plan = make_plan(scene, wanted);
@@ -127,7 +128,7 @@ TEST_CASE("a plan under gravity starts from the sagged tissue", "[heavy]") {
 }
 
 TEST_CASE("tissue that is all relaxed sags as far as tissue that relaxes") {
-  const PlanScene scene(experiment(kLiver + kGravity + kRamp + "}"));
+  const PlanScene scene(experiment(kLiver + kGravity + kShallowRamp + "}"));
   const auto sag = [](const PlanScene& s) { return s.driven().rest; };
   const double far = (sag(scene) - scene.network().organ.position).cwiseAbs().maxCoeff();
   CHECK(far > 1e-4);
@@ -142,7 +143,7 @@ TEST_CASE("what masses change is known without the mass of a tool whose depth is
   const auto planned = [&](const std::string& mass, const std::string& protocol) {
     return make_plan(experiment(kLiver + R"("contacts": [{"kind": "ball", "radius": "10 mm")" +
                                 mass + "}], " + protocol + "}"),
-                     request(0.01));
+                     loading_request(0.01));
   };
   const Plan without = planned("", quick);
   REQUIRE(without.masses_left_out);
@@ -169,7 +170,7 @@ TEST_CASE("a plan with masses takes less than twice its reference") {
       kLiver + R"("formulation": {"kind": "inertial"}, "protocol": {"kind": "knots", "knots": [
     {"time": "0 s", "depth": "0 mm"}, {"time": "0.35 s", "depth": "4 mm"}, {"time": "0.7 s", "depth": "0 mm"},
     {"time": "1.05 s", "depth": "4 mm"}, {"time": "1.4 s", "depth": "0 mm"}]}})");
-  PlanRequest wanted = request(0.01);
+  PlanRequest wanted = loading_request(0.01);
   wanted.relevance = wanted.changes = true;
   const Plan plan = make_plan(scene, wanted);
   REQUIRE(plan.choice);

@@ -16,5 +16,8 @@ inline const ParameterResult& find(const FitResult& fit, const std::string& name
   FAIL("no parameter " << name);
   return fit.parameters.front();
 }
+inline double estimate_of(const FitResult& fit, const std::string& name) {
+  return find(fit, name).estimate;
+}
 
 }  // namespace tpm::fit

@@ -47,7 +47,7 @@ std::vector<int> counted(std::span<const std::size_t> spheres, std::size_t size)
   return is_in;
 }
 
-ViscousState at_rest(const BondSystem& bonds, double relaxation_factor) {
+ViscousState state_at_rest(const BondSystem& bonds, double relaxation_factor) {
   return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), relaxation_factor};
 }
 
@@ -57,7 +57,7 @@ class LinearBlock {
   LinearBlock(const Network& network, const BondSystem& bonds, double relaxation_factor,
               Constraints constraints)
       : rest_(network.organ.position),
-        viscous_state_(at_rest(bonds, relaxation_factor)),
+        viscous_state_(state_at_rest(bonds, relaxation_factor)),
         bonds_(bonds),
         constraints_(std::move(constraints)),
         equilibrium_(bonds_, constraints_) {

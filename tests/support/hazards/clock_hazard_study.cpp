@@ -233,8 +233,8 @@ ClockRun run_once(const ClockHazard& hazard, HilSession session) {
   return run;
 }
 
-ClockHazardRow row_of(const ClockHazard& hazard, const HilSession& session, bool in_time,
-                      std::string& scheduling) {
+ClockHazardRow clock_row_of(const ClockHazard& hazard, const HilSession& session, bool in_time,
+                            std::string& scheduling) {
   ClockHazardRow row;
   row.hazard = hazard.name;
   row.setting = hazard.setting;
@@ -279,7 +279,7 @@ ClockHazardStudy study_hazards_on_the_clock(bool in_time) {
   study.most_tries = kMostTries;
   study.force_limit_N = session.servo.force_limit_N;
   for (const ClockHazard& hazard : clock_hazards()) {
-    study.rows.push_back(row_of(hazard, session, in_time, study.scheduling));
+    study.rows.push_back(clock_row_of(hazard, session, in_time, study.scheduling));
   }
   return study;
 }

@@ -10,16 +10,16 @@
 namespace tpm::haptics {
 namespace {
 
-bool ran(const HazardRow& row) {
+bool was_run(const HazardRow& row) {
   return row.refused.empty();
 }
 
 bool stopped(const HazardRow& row) {
-  return ran(row) && row.cause != StopCause::finished;
+  return was_run(row) && row.cause != StopCause::finished;
 }
 
 std::string outcome_of(const HazardRow& row) {
-  if (!ran(row)) return "refused: " + row.refused;
+  if (!was_run(row)) return "refused: " + row.refused;
   return std::string(word_of(row.cause));
 }
 
@@ -37,12 +37,13 @@ std::string hazard_text(const HazardStudy& study) {
       "the hand, mJ | to zero force, ms | travel, mm | within bounds |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
   for (const HazardRow& row : study.rows) {
-    text += fmt::format("| {} | {}{} | {} | {} | {} | {} | {} | {} | {} |\n", row.hazard,
-                        row.setting, row.accepted ? ", accepted as unstable" : "", outcome_of(row),
-                        in(row.largest_force_N, 1.0, ran(row)),
-                        in(row.largest_rise_N, 1.0, ran(row)) + (row.damped ? " (damped)" : ""),
-                        in(row.delivered_J, 1e3, ran(row)), in(row.to_zero_s, 1e3, stopped(row)),
-                        in(row.travel_m, 1e3, stopped(row)), row.within ? "yes" : "NO");
+    text +=
+        fmt::format("| {} | {}{} | {} | {} | {} | {} | {} | {} | {} |\n", row.hazard, row.setting,
+                    row.accepted ? ", accepted as unstable" : "", outcome_of(row),
+                    in(row.largest_force_N, 1.0, was_run(row)),
+                    in(row.largest_rise_N, 1.0, was_run(row)) + (row.damped ? " (damped)" : ""),
+                    in(row.delivered_J, 1e3, was_run(row)), in(row.to_zero_s, 1e3, stopped(row)),
+                    in(row.travel_m, 1e3, stopped(row)), row.within ? "yes" : "NO");
   }
   const auto within = std::ranges::count_if(study.rows, &HazardRow::within);
   text += fmt::format(

@@ -6,12 +6,15 @@
 #include <cmath>
 #include <limits>
 
+#include "hil_scenes.hpp"
 #include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 namespace {
+
+using test::with;
 
 enum class FaultKind {
   none,
@@ -153,11 +156,6 @@ Json star_session() {
       "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e4 Pa s"}}},
     "indentations": {"depths": ["4 mm"], "rates": ["4 mm/s"], "hold": "1 s", "rest": "0.5 s"},
     "start": {"limit": "2 s"}})");
-}
-
-Json with(Json json, const char* pointer, Json value) {
-  json[Json::json_pointer(pointer)] = std::move(value);
-  return json;
 }
 
 /// A period in which the tool of star_session() is held in the tissue.
