@@ -101,7 +101,8 @@ Announced announced(const HilSession& session, const DeviceLimits& limits) {
   return a;
 }
 
-TEST_CASE("A loop looks for a delay that grows exactly where its rendering is announced passive") {
+TEST_CASE("A loop looks for a delay that grows exactly where its rendering is announced passive",
+          "[heavy]") {
   // The shipped sessions whose models are made within a second, all passive by their friction.
   for (const char* name : {"law", "liver", "network", "omega7", "surface"}) {
     const std::string file = fmt::format(TPM_TEST_SOURCE_DIR "/configs/hil_{}.json", name);

@@ -169,7 +169,8 @@ TEST_CASE("The damping of a hand that holds the handle is no friction of the dev
 
 TEST_CASE(
     "Of devices at most 5 % have less viscous friction than the limit, or Coulomb's outside its "
-    "interval") {
+    "interval",
+    "[heavy]") {
   int above = 0, outside = 0, tries = 0;
   double far = 0.0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {

@@ -12,7 +12,7 @@
 namespace tpm::haptics {
 namespace {
 
-TEST_CASE("No hazard leaves its bounds, and nothing that is passive is refused") {
+TEST_CASE("No hazard leaves its bounds, and nothing that is passive is refused", "[heavy]") {
   const HazardStudy study = study_hazards();
   CHECK(study.rows.size() >= 40);
   CHECK(study.safe());
@@ -35,7 +35,8 @@ TEST_CASE("No hazard leaves its bounds, and nothing that is passive is refused")
   CHECK(hazard_text(study) == hazard_text(study_hazards()));
 }
 
-TEST_CASE("Up to what a session is allowed, impacts come to rest whatever limits the rise") {
+TEST_CASE("Up to what a session is allowed, impacts come to rest whatever limits the rise",
+          "[heavy]") {
   const BoundaryStudy study = study_boundaries({});
   REQUIRE_FALSE(study.impacts.empty());
   std::size_t restless = 0;

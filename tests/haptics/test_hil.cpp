@@ -108,7 +108,8 @@ TEST_CASE("A patch is pushed by models that move several spheres, and verified",
   CHECK(by_patch > 1.5 * make_loop_model(parsed(one)).stiffness_N_per_m);
 }
 
-TEST_CASE("A patch is refused by models of one sphere, and a contact where there is none") {
+TEST_CASE("A patch is refused by models of one sphere, and a contact where there is none",
+          "[heavy]") {
   for (const char* const kind : {"condensed", "network"}) {
     CHECK_THROWS_WITH(make_loop_model(parsed(patch_session(kind))),
                       Contains("/model/contact") && Contains("pushed at one sphere"));

@@ -221,7 +221,8 @@ TEST_CASE("A device that keeps the clock has no virtual time") {
   CHECK_THAT(error_of([&] { device.prepare({}); }), Contains("expected --clock real"));
 }
 
-TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any other") {
+TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any other",
+          "[heavy]") {
   const test::TempFolder folder;
   for (const int late_ms : {0, 2, 5}) {
     const HilSession session = test::parsed(inverse_session());
