@@ -15,7 +15,7 @@
 namespace tpm::haptics {
 namespace {
 
-constexpr double kVelocityWindow_s = 0.064, kLongestDelay_s = 0.050;
+constexpr double kVelocityWindow_s = 0.064, kSearchedDelay_s = 0.050;
 constexpr double kEdge_N = 0.2, kCentring_N_per_m = 15.0;
 constexpr double kShortestBit_s = 0.040, kLongestBit_s = 0.120;
 constexpr int kUnknowns = 5;  // m, b, c, k, f
@@ -248,7 +248,7 @@ DelayFit fit_delay(const Timeline& line, const Windows& windows, std::size_t hal
       }
     }
   };
-  search(0.0, kLongestDelay_s, period_s);
+  search(0.0, kSearchedDelay_s, period_s);
   const double coarse_s = fit.delay_s;
   search(std::max(0.0, coarse_s - period_s), coarse_s + period_s, 0.05 * period_s);
   const Eigen::VectorXd force = forces(line, windows, half, fit.delay_s);
@@ -281,7 +281,7 @@ struct Lengths {
 };
 Lengths lengths_of(double period_s) {
   const auto half = static_cast<std::size_t>(std::lround(0.5 * kVelocityWindow_s / period_s));
-  const auto longest = static_cast<std::size_t>(std::lround(kLongestDelay_s / period_s));
+  const auto longest = static_cast<std::size_t>(std::lround(kSearchedDelay_s / period_s));
   return {half, half + longest + 16};
 }
 
