@@ -6,8 +6,8 @@
 #include <memory>
 #include <thread>
 
+#include "inverse_clients.hpp"
 #include "tpm/files/json.hpp"
-#include "tpm/haptics/serve/inverse_server.hpp"
 #include "tpm/haptics/serve/simulated_hand.hpp"
 
 namespace tpm::haptics {
@@ -16,8 +16,6 @@ namespace {
 using Catch::Matchers::WithinAbs;
 using namespace std::chrono_literals;
 using files::Json;
-
-constexpr double kSoon_s = 60.0;  // on a machine that is busy, too
 
 /// A simulated hand without a loop: the test moves its time.
 struct ServedGrip {
@@ -32,10 +30,9 @@ struct ServedGrip {
     server = std::make_unique<InverseServer>(hand, std::move(settings));
   }
   [[nodiscard]] std::unique_ptr<WebSocketClient> client(Json* first = nullptr) const {
-    auto one = std::make_unique<WebSocketClient>(server->port(), "/", kSoon_s, kMostInventoryBytes);
-    const auto text = one->receive(kSoon_s);
-    REQUIRE(text);
-    if (first != nullptr) *first = Json::parse(*text);
+    std::string text;
+    auto one = test::client_of(*server, &text);
+    if (first != nullptr) *first = Json::parse(text);
     return one;
   }
 
@@ -43,15 +40,8 @@ struct ServedGrip {
   std::unique_ptr<InverseServer> server;  ///< ends first
 };
 
-std::string answer(WebSocketClient& client, const std::string& message) {
-  REQUIRE(client.send(message));
-  const auto text = client.receive(kSoon_s);
-  REQUIRE(text);
-  return *text;
-}
-
-InverseState state_after(WebSocketClient& client, const std::string& message) {
-  return parse_state(answer(client, message), "SIMULATED");
+InverseState grip_after(WebSocketClient& client, const std::string& message) {
+  return parse_state(test::answer_to(client, message), "SIMULATED");
 }
 
 TEST_CASE("The first message has a device that is ready and a grip, both of them simulated") {
@@ -71,8 +61,8 @@ TEST_CASE("The first message has a device that is ready and a grip, both of them
   CHECK(grip.at("state").at("orientation").size() == 4);
   CHECK(grip.at("state").at("buttons") == Json::parse(R"({"a": false, "b": false, "c": false})"));
   // Each later message has them, too.
-  const Json later =
-      Json::parse(answer(*client, force_message(InverseFormat::values, "SIMULATED", {1, 0, 0})));
+  const Json later = Json::parse(
+      test::answer_to(*client, force_message(InverseFormat::values, "SIMULATED", {1, 0, 0})));
   CHECK(later.at("wireless_verse_grip").at(0).at("state").contains("orientation"));
   CHECK(later.at("inverse3").at(0).at("status").at("in_use") == true);
 }
@@ -81,13 +71,13 @@ TEST_CASE("Buttons of the simulated grip are those that a client presses, until 
   const ServedGrip served;
   const auto reader = served.client();
   auto presser = served.client();
-  CHECK(state_after(*presser, press_message(0b101U)).buttons == 0b101U);
-  CHECK(state_after(*reader, "{}").buttons == 0b101U);
-  CHECK(state_after(*presser, press_message(0b010U)).buttons == 0b010U);
+  CHECK(grip_after(*presser, press_message(0b101U)).buttons == 0b101U);
+  CHECK(grip_after(*reader, "{}").buttons == 0b101U);
+  CHECK(grip_after(*presser, press_message(0b010U)).buttons == 0b010U);
   presser.reset();
   std::uint32_t buttons = 0b010U;
   for (int i = 0; i < 6000 && buttons != 0; ++i) {
-    buttons = state_after(*reader, "{}").buttons;
+    buttons = grip_after(*reader, "{}").buttons;
     std::this_thread::sleep_for(10ms);
   }
   CHECK(buttons == 0);
@@ -96,11 +86,11 @@ TEST_CASE("Buttons of the simulated grip are those that a client presses, until 
 TEST_CASE("The simulated grip leans with the hand") {
   ServedGrip served;
   const auto client = served.client();
-  CHECK(state_after(*client, neutral_message("SIMULATED", "test")).grip.w() == 1.0);
-  (void)state_after(*client, R"({"inverse3":[{"device_id":"SIMULATED","commands":{)"
-                             R"("set_cursor_position":{"position":{"x":0.02,"y":0,"z":0}}}}]})");
+  CHECK(grip_after(*client, neutral_message("SIMULATED", "test")).grip.w() == 1.0);
+  (void)grip_after(*client, R"({"inverse3":[{"device_id":"SIMULATED","commands":{)"
+                            R"("set_cursor_position":{"position":{"x":0.02,"y":0,"z":0}}}}]})");
   for (int ms = 0; ms < 2000; ++ms) served.hand.advance(1e-3);
-  const InverseState state = state_after(*client, "{}");
+  const InverseState state = grip_after(*client, "{}");
   CHECK_THAT(state.position_m.x(), WithinAbs(0.02, 1e-3));
   const Eigen::Quaterniond leaning(Eigen::AngleAxisd(
       SimulatedHand::kLean_rad_per_m * state.position_m.x(), Eigen::Vector3d::UnitY()));

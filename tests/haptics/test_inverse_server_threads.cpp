@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "hil_scenes.hpp"
+#include "inverse_clients.hpp"
 #include "raw_client.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
@@ -32,7 +33,7 @@ using Catch::Matchers::WithinAbs;
 using namespace std::chrono_literals;
 using files::Json;
 
-constexpr double kSoon_s = 60.0;  // on a machine that is busy, too
+using test::kSoon_s;
 
 /// A server with a hand that notes what it is asked, and no tissue.
 class NotingHand final : public ServedHand {
@@ -75,11 +76,7 @@ class Served {
     server = std::make_unique<InverseServer>(hand, std::move(settings));
   }
   [[nodiscard]] std::unique_ptr<WebSocketClient> client(std::string* inventory = nullptr) const {
-    auto one = std::make_unique<WebSocketClient>(server->port(), "/", kSoon_s, kMostInventoryBytes);
-    const auto first = one->receive(kSoon_s);
-    REQUIRE(first);
-    if (inventory != nullptr) *inventory = *first;
-    return one;
+    return test::client_of(*server, inventory);
   }
   [[nodiscard]] std::vector<std::string> lines() {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -97,10 +94,7 @@ class Served {
 };
 
 InverseState state_after(WebSocketClient& client, const std::string& message) {
-  REQUIRE(client.send(message));
-  const auto text = client.receive(kSoon_s);
-  REQUIRE(text);
-  return parse_state(*text, "049D");
+  return parse_state(test::answer_to(client, message), "049D");
 }
 
 std::string push_of(double newtons, InverseFormat format = InverseFormat::vector) {
