@@ -76,7 +76,9 @@ def events_of(log):
 
 
 def ended(command, environment, log, send, switched_on):
-    """Exit code, events after the end began, last words of tpm. `switched_on`: how often forces go on until then."""
+    """Exit code, events after the end began, last words of tpm. `switched_on`: how often forces go on until then.
+
+    None where the program ended before: on a machine that stalls, the check of a second refuses the session."""
     log.unlink(missing_ok=True)
     # Signals that stop a process do so in a group that somebody looks after: its parent, from another one.
     process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
@@ -86,6 +88,9 @@ def ended(command, environment, log, send, switched_on):
     while (events_of(log).count("thread_of_forces_on") < switched_on and process.poll() is None
            and time.monotonic() < until):
         time.sleep(0.01)
+    if events_of(log).count("thread_of_forces_on") < switched_on:
+        process.communicate(timeout=60)
+        return None
     before = len(events_of(log))
     if send is not None:
         time.sleep(0.3)
@@ -139,7 +144,12 @@ def main():
         for device, command, name_of_signal, by in tries:
             own = {**environment, **({"TPM_ENDS_BY": by} if by else {})}
             send = getattr(signal, name_of_signal) if name_of_signal else None
-            code, events, said = ended(command, own, log, send, 2 if device == "stand-in" else 1)
+            seen = None
+            for _ in range(10):
+                seen = seen or ended(command, own, log, send, 2 if device == "stand-in" else 1)
+            if seen is None:
+                sys.exit(f"{device}, {name_of_signal or words[by]}: no session of ten began; the machine is too busy")
+            code, events, said = seen
             ok = code is None or name_of_signal == "SIGKILL" or any(e in OFF for e in events)
             failed |= not ok
             print(f"| {device} | {name_of_signal or words[by]} | {'-' if code is None else code} | "
