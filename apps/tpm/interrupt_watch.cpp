@@ -60,4 +60,8 @@ int InterruptWatch::signal() {
   return stop_signal;
 }
 
+int InterruptWatch::exit_code() {
+  return 128 + (stop_signal != 0 ? int{stop_signal} : haptics::ForcesOffGuard::last_signal());
+}
+
 }  // namespace tpm::app

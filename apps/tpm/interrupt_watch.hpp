@@ -17,8 +17,9 @@ class InterruptWatch {
   [[nodiscard]] static bool seen();
   /// Its number; 0 if none was seen.
   [[nodiscard]] static int signal();
-  /// That of a program that was stopped by it, as shells expect it.
-  [[nodiscard]] static int exit_code() { return 128 + signal(); }
+  /// That of a program that was stopped by it, or by one that the guard of forces saw, as shells
+  /// expect it.
+  [[nodiscard]] static int exit_code();
 
  private:
   struct Watched {

@@ -151,7 +151,7 @@ def main():
                 sys.exit(f"{device}, {name_of_signal or words[by]}: no session of ten began; the machine is too busy")
             code, events, said = seen
             ok = code is None or name_of_signal == "SIGKILL" or any(e in OFF for e in events)
-            failed |= not ok
+            failed |= not ok or code == 128  # 128 and no signal
             print(f"| {device} | {name_of_signal or words[by]} | {'-' if code is None else code} | "
                   f"{' '.join(events) or ('-' if code is None else 'nothing')} | "
                   f"{said.replace(str(folder) + '/', '').replace('|', '/')[:110]} |{'' if ok else ' FORCES STAY ON'}", flush=True)

@@ -23,7 +23,7 @@ constexpr std::size_t kSignals = 65;
 
 // What a signal handler reads.
 std::array<std::atomic<HapticDevice*>, 32> guarded;
-std::atomic<int> end_signal{0};
+std::atomic<int> end_signal{0}, last_signal_seen{0};
 std::array<struct sigaction, kSignals> before;
 std::array<std::atomic<bool>, kSignals> taken;
 static_assert(std::atomic<HapticDevice*>::is_always_lock_free);
@@ -53,6 +53,7 @@ extern "C" void tpm_cut_forces_and_end(int signal) {
 
 extern "C" void tpm_remember_end(int signal) {
   end_signal = signal;
+  last_signal_seen = signal;
 }
 
 /// Whether a call that it interrupts goes on. A terminal sends SIGTTIN and SIGTTOU again for each
@@ -147,6 +148,10 @@ ForcesOffGuard::~ForcesOffGuard() {
 
 bool ForcesOffGuard::ended_by_signal() noexcept {
   return end_signal != 0;
+}
+
+int ForcesOffGuard::last_signal() noexcept {
+  return last_signal_seen;
 }
 
 }  // namespace tpm::haptics

@@ -37,6 +37,8 @@ class ForcesOffGuard {
 
   /// A signal that ends the process came while a guard lived.
   [[nodiscard]] static bool ended_by_signal() noexcept;
+  /// The last one that came while a guard lived; 0 if none did.
+  [[nodiscard]] static int last_signal() noexcept;
 
  private:
   std::atomic<HapticDevice*>* slot_ = nullptr;
