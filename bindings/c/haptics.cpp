@@ -149,6 +149,12 @@ int not_given(char* message, std::size_t room) noexcept {
   return TPM_HAPTICS_USAGE;
 }
 
+/// What a caller does not ask rightly is no force either, where there is a place for one.
+int no_force(double* force_N) noexcept {
+  if (force_N != nullptr) std::fill_n(force_N, 3, 0.0);
+  return TPM_HAPTICS_USAGE;
+}
+
 }  // namespace
 
 extern "C" {
@@ -172,7 +178,7 @@ int tpm_haptics_step(tpm_haptics_contact* contact, const double position_m[3], d
 
 int tpm_haptics_step_after(tpm_haptics_contact* contact, uint32_t missed,
                            const double position_m[3], double force_N[3]) {
-  if (contact == nullptr || position_m == nullptr || force_N == nullptr) return TPM_HAPTICS_USAGE;
+  if (contact == nullptr || position_m == nullptr || force_N == nullptr) return no_force(force_N);
   constexpr std::uint32_t kMost = 1U << 20U;  // far above what stops a contact
   Eigen::Vector3d force;
   const StopCause cause = contact->contact.step(Eigen::Map<const Eigen::Vector3d>(position_m),
@@ -183,7 +189,7 @@ int tpm_haptics_step_after(tpm_haptics_contact* contact, uint32_t missed,
 
 int tpm_haptics_step_at(tpm_haptics_contact* contact, double t_s, const double position_m[3],
                         double force_N[3]) {
-  if (contact == nullptr || position_m == nullptr || force_N == nullptr) return TPM_HAPTICS_USAGE;
+  if (contact == nullptr || position_m == nullptr || force_N == nullptr) return no_force(force_N);
   Eigen::Vector3d force;
   const StopCause cause =
       contact->contact.step_at(t_s, Eigen::Map<const Eigen::Vector3d>(position_m), force);

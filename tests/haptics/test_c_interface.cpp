@@ -189,6 +189,21 @@ TEST_CASE("What is wrong with a file is a code and one line in C") {
   CHECK(tpm_haptics_open(nullptr, nullptr, &contact, nullptr, 0) == TPM_HAPTICS_USAGE);
 }
 
+TEST_CASE("In C there is no force without a contact or a position") {
+  const Opened contact(test::short_session());
+  const double air_m[3] = {0.0, 0.0, 0.0};
+  for (const int way : {0, 1, 2, 3}) {
+    CAPTURE(way);
+    double force_N[3] = {7.0, 7.0, 7.0};
+    const int answer = way == 0   ? tpm_haptics_step(nullptr, air_m, force_N)
+                       : way == 1 ? tpm_haptics_step(contact, nullptr, force_N)
+                       : way == 2 ? tpm_haptics_step_at(nullptr, 0.0, air_m, force_N)
+                                  : tpm_haptics_step_at(contact, 0.0, nullptr, force_N);
+    CHECK(answer == TPM_HAPTICS_USAGE);
+    CHECK(std::count(force_N, force_N + 3, 0.0) == 3);
+  }
+}
+
 TEST_CASE("Structs of C keep to the size that the caller has") {
   const Opened contact(test::short_session());
   tpm_haptics_state state = TPM_HAPTICS_STATE_INIT;
@@ -376,6 +391,14 @@ TEST_CASE("Hardware in C that nobody has measured counts as 20 ms late and free 
                        "delay": {"provenance": "measured", "largest_s": 0.0}})");
   CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_REFUSED, options),
              Contains("not measured on this device"));
+  // Nor does a file make a device one without motors.
+  write_file(file,
+             R"({"device": "virtual", "delay": {"provenance": "measured", "largest_s": 0.0}})");
+  CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_BAD_INPUT, options),
+             Contains("is 'virtual', without motors") && Contains("--device KIND"));
+  std::strcpy(options.device, "virtual");
+  const Opened named(test::short_session(), options);
+  CHECK(named.info().delay_s < 0.020);
 }
 
 TEST_CASE("A device that only its file knows, and one of a plugin, are opened in C") {

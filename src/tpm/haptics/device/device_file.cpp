@@ -126,6 +126,18 @@ DeviceLimits limits_from(const DeviceFile& file, std::string_view kind) {
   return limits_by_file(limits_of(said), file);
 }
 
+DeviceLimits limits_of_motors(const DeviceFile& file, std::string_view kind) {
+  const DeviceLimits limits = limits_from(file, kind);
+  if (kind.empty() && !limits.hardware()) {
+    throw bad_input(
+        file.where + ": key /device", fmt::format("is '{}', without motors", file.kind),
+        fmt::format("the file of a device with motors (tpm hil identify --device KIND), "
+                    "or the device '{}' named where nothing has any",
+                    file.kind));
+  }
+  return limits;
+}
+
 DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file) {
   if (file.kind != limits.kind) {
     throw bad_input(file.where + ": key /device",

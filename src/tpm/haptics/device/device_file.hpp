@@ -51,6 +51,10 @@ struct DeviceFile {
 /// that is not the file's.
 [[nodiscard]] DeviceLimits limits_from(const DeviceFile& file, std::string_view kind = {});
 
+/// limits_from() for a device that may have motors: a file of the simulated device, or of a replay,
+/// counts only where the kind says so. Throws Error(bad_input) as limits_from(), and otherwise.
+[[nodiscard]] DeviceLimits limits_of_motors(const DeviceFile& file, std::string_view kind = {});
+
 /// Limits of a kind of device as far as a file says others. Throws Error(bad_input) if the file is
 /// of another kind, or a limit is above that of the kind.
 [[nodiscard]] DeviceLimits limits_by_file(DeviceLimits limits, const DeviceFile& file);

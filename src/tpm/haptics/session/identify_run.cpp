@@ -60,7 +60,8 @@ ServoSettings identifying_settings(const HilSession& like, const DeviceLimits& l
   servo.period_s = like.servo.period_s;
   servo.push = like.servo.push;
   servo.phase_ends = {static_cast<std::uint64_t>(std::llround(duration_s / servo.period_s))};
-  servo.force_limit_N = kMostIdentifyingForce_N;
+  // Nor more than the session may send.
+  servo.force_limit_N = std::min(kMostIdentifyingForce_N, like.servo.force_limit_N);
   servo.slew_limit_N_per_s = limits.slew_N_per_s;
   servo.ramp_in_s = 0.0;
   servo.most_damping_N_s_per_m = 0.0;

@@ -80,7 +80,7 @@ DeviceLimits limits_that_apply(const LoopContactOptions& options) {
     return limits_of(options.device.empty() ? "omega7" : std::string_view(options.device));
   }
   const DeviceFile file = read_device_file(options.device_file);
-  DeviceLimits limits = limits_from(file, options.device);
+  DeviceLimits limits = limits_of_motors(file, options.device);
   if (file.simulated && limits.hardware()) limits.measured_delay_s.reset();
   return limits;
 }

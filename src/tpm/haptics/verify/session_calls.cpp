@@ -42,10 +42,10 @@ SessionSummary Session::run(const std::shared_ptr<HapticDevice>& device,
   options.watcher = request.watcher;
   const bool simulated = dynamic_cast<const VirtualOmega7*>(device.get()) != nullptr;
   const std::string usual = simulated ? "virtual" : "omega7";
-  const DeviceLimits limits =
-      request.device_file.empty()
-          ? limits_of(request.limits.empty() ? usual : request.limits)
-          : limits_from(read_device_file(request.device_file), request.limits);
+  const auto of_file = simulated ? limits_from : limits_of_motors;
+  const DeviceLimits limits = request.device_file.empty()
+                                  ? limits_of(request.limits.empty() ? usual : request.limits)
+                                  : of_file(read_device_file(request.device_file), request.limits);
   const SessionRun run =
       run_session_on(*session_, device, limits, {.may_move = request.may_move}, options);
   return {.device = run.device,
