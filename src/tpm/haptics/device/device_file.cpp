@@ -127,7 +127,7 @@ DeviceLimits limits_from(const DeviceFile& file, std::string_view kind) {
 }
 
 DeviceLimits limits_of_motors(const DeviceFile& file, std::string_view kind) {
-  const DeviceLimits limits = limits_from(file, kind);
+  DeviceLimits limits = limits_from(file, kind);
   if (kind.empty() && !limits.hardware()) {
     throw bad_input(
         file.where + ": key /device", fmt::format("is '{}', without motors", file.kind),

@@ -57,6 +57,7 @@ struct MovingMassKeys {
   std::optional<std::vector<double>> interval_kg;
 };
 
+// NOLINTNEXTLINE(bugprone-exception-escape): moving a Json does not throw, unseen
 struct DeviceKeys {
   std::string device;
   std::optional<std::string> name, description, serial;
