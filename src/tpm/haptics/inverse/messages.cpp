@@ -43,7 +43,7 @@ class Part {
   }
   [[nodiscard]] std::string text(std::size_t most = kMostCharacters) const {
     require(json_->is_string(), "is no text");
-    const auto text = json_->get<std::string>();
+    auto text = json_->get<std::string>();
     require(text.size() <= most && printable(text, most) == text, "is too long or not printable");
     return text;
   }

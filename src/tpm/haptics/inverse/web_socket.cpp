@@ -234,7 +234,7 @@ std::optional<WebSocketMessage> WebSocketReader::control(FrameKind kind, std::st
   return std::nullopt;
 }
 
-std::optional<WebSocketMessage> WebSocketReader::data(const Header& h, std::string payload) {
+std::optional<WebSocketMessage> WebSocketReader::data(const Header& h, std::string_view payload) {
   if (h.kind != FrameKind::continuation) open_ = h.kind;
   message_.append(payload);
   if (!h.final_frame) return std::nullopt;
@@ -255,7 +255,7 @@ std::optional<WebSocketMessage> WebSocketReader::next() {
     begin_ += h->header_bytes + h->size;
     if (masked_) apply_mask(payload, h->mask);
     std::optional<WebSocketMessage> message =
-        is_control(h->kind) ? control(h->kind, std::move(payload)) : data(*h, std::move(payload));
+        is_control(h->kind) ? control(h->kind, std::move(payload)) : data(*h, payload);
     if (message) return message;
   }
   buffer_.erase(0, begin_);

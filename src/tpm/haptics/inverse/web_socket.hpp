@@ -75,7 +75,8 @@ class WebSocketReader {
   [[nodiscard]] std::optional<Header> header();
   [[nodiscard]] bool allowed(const Header& header, std::uint8_t first, bool masked);
   [[nodiscard]] std::optional<WebSocketMessage> control(FrameKind kind, std::string payload);
-  [[nodiscard]] std::optional<WebSocketMessage> data(const Header& header, std::string payload);
+  [[nodiscard]] std::optional<WebSocketMessage> data(const Header& header,
+                                                     std::string_view payload);
   void fail(std::uint16_t code, const char* words) noexcept;
 
   bool masked_;

@@ -241,10 +241,12 @@ DelayFit fit_delay(const Timeline& line, const Windows& windows, std::size_t hal
   };
   double best = std::numeric_limits<double>::infinity();
   const auto search = [&](double from_s, double to_s, double by_s) {
-    for (double d = from_s; d <= to_s + 1e-12; d += by_s) {
-      if (const double rms = misfit(d); rms < best) {
+    const auto steps = static_cast<int>(std::floor((to_s - from_s) / by_s + 1e-9));
+    for (int i = 0; i <= steps; ++i) {
+      const double delay_s = from_s + i * by_s;
+      if (const double rms = misfit(delay_s); rms < best) {
         best = rms;
-        fit.delay_s = d;
+        fit.delay_s = delay_s;
       }
     }
   };

@@ -261,7 +261,7 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
 }  // namespace
 
 DeviceLimits limits_of(const DeviceChoice& choice) {
-  const DeviceLimits limits =
+  DeviceLimits limits =
       choice.kind == "plugin" ? plugin_of(choice)->limits() : limits_of(choice.kind);
   if (choice.file.empty() || limits.plant) return limits;
   return limits_by_file(limits, read_device_file(choice.file));
