@@ -35,7 +35,7 @@ struct ZeroDrift {
   [[nodiscard]] double u(const Eigen::VectorXd& weight, const std::vector<double>& time_s) const;
 };
 
-/// The drift that the readings before contact tell (read_rests), where it is more than three of its
+/// The drift that the readings before contact tell (read_rests), where it is more than four of its
 /// standard uncertainties; takes it out of the readings. Less than that stays in them.
 [[nodiscard]] std::optional<ZeroDrift> take_out_drift(PreparedRecording& recording);
 
