@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 PATHS = {
-    "A recording": ["tpm example", "tpm example recording", "tpm fit recording.csv", "tpm view recording_fit/law.json -o fit.html",
+    "A recording": ["tpm example", "tpm example recording", "tpm fit recording.csv", "tpm view recording_fit",
                     'tpm predict recording_fit/law.json --depth "4 mm" --rate "1 mm/s" --hold "30 s"', "tpm fit evren_relaxation"],
     "An organ": ["tpm simulate configs/liver_poke.json -o poke.h5", "tpm view poke.h5", "tpm plan configs/plan/servo.json"],
     "A device": ['tpm hil check --device virtual --loop-rate "1 kHz" --duration "5 s"', "tpm hil run configs/hil_liver.json -o session.tpmrec",

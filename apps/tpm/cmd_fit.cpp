@@ -76,10 +76,15 @@ bool is_configuration(const std::vector<std::string>& files) {
   return !document.contains("kind");
 }
 
-/// The page of the law in a folder; without one its figures.
+/// The page of what the run has written: a selection of laws, with intervals and verdicts, the law,
+/// or its figures.
 std::string next_of_law(const std::string& folder, const std::vector<std::string>& files) {
+  const auto wrote = [&files](const char* name) {
+    return std::ranges::find(files, name) != files.end();
+  };
   if (files.empty()) return {};
-  if (std::ranges::find(files, "law.json") == files.end()) return next_of_figures(folder);
+  if (wrote("selection.json")) return fmt::format("tpm view {}", shell_word(folder));
+  if (!wrote("law.json")) return next_of_figures(folder);
   return fmt::format("tpm view {}",
                      shell_word((std::filesystem::path(folder) / "law.json").string()));
 }

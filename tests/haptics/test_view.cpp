@@ -185,7 +185,8 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
     "parameters": [{"name": "k1", "estimate_SI": 45.0, "interval_SI": [44.0, null], "SI_unit": "N/m",
                     "verdict": "no upper limit", "profile_SI_and_deviance": [[44, 4], [45, 0]]},
                    {"name": "drift", "estimate_SI": -9.87e-7, "interval_SI": [-6.93e-6, 4.96e-6],
-                    "SI_unit": "N/s", "verdict": "identified"}],
+                    "SI_unit": "N/s", "verdict": "identified",
+                    "profile_SI_and_deviance": [[-7e-6, 7], [-9.87e-7, 3], [5e-6, null], [6e-6, 9]]}],
     "adequacy": {"verdict": "not_described", "words": "no law tried describes this recording"},
     "flags": []})");
   fit["title"] = title;
@@ -203,8 +204,22 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
         Json({"k1", "45", "44 .. open", "N/m", "no upper limit"}));
   CHECK(page.description.at("table").at("rows")[1] ==
         Json({"drift", "-987", "-6930 .. 4960", "nN/s", "identified"}));
-  CHECK(page.description.at("plots").size() == 2);  // the figure, and the profile
+  REQUIRE(page.description.at("plots").size() == 3);  // the figure, and the profiles
   const std::string html = page.html();
+  // In the unit of the table, as a rise, with the interval: no upper end of k1, both of the drift.
+  const Json& profile = page.description["plots"][2];
+  CHECK(profile.at("x").at("unit") == "nN/s");
+  CHECK(profile.at("y").at("quantity") == "rise of the deviance");
+  const auto of = [&](const Json& name) { return numbers<double>(html, name); };
+  CHECK_THAT(of(profile.at("series")[0].at("x")),
+             Catch::Matchers::Approx(std::vector<double>{-7000, -987, 6000}));
+  CHECK(of(profile.at("series")[0].at("y")) == std::vector<double>{4, 0, 6});
+  CHECK_THAT(of(profile.at("series")[1].at("x")),
+             Catch::Matchers::Approx(std::vector<double>{-987}));
+  CHECK(profile.at("series")[2].at("label") == "95 % interval");
+  CHECK_THAT(of(profile.at("series")[2].at("x")),
+             Catch::Matchers::Approx(std::vector<double>{-6930, 4960}));
+  CHECK(of(page.description["plots"][1].at("series")[2].at("x")) == std::vector<double>{44});
   CHECK(html.find("<script>alert") == std::string::npos);
   CHECK(html.find("<b>") == std::string::npos);
 
@@ -213,7 +228,7 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   std::ofstream(folder / "figures.json") << figures.dump();
   const ViewPage seen = view_file(shown_file(folder.path()));
   CHECK(seen.description.at("lead") == lead);
-  CHECK(seen.description.at("plots").size() == 2);
+  CHECK(seen.description.at("plots").size() == 3);
   const TempFolder empty;
   CHECK_THROWS_WITH((void)shown_file(empty.path()), Contains("a folder without a result"));
 }

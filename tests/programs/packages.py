@@ -8,7 +8,7 @@
 - packaging/debian: copyright in the form of DEP-5 with the text of LICENSE and the parts of docs/licences.md, control,
   tests, of which the one for the README's commands is run with TPM;
 - packaging/conda/recipe.yaml and packaging/spack: read as YAML and as Python; every dependency of
-  cmake/TpmDependencies.cmake is named by both, and a check sum stands where there is an address, and only there;
+  cmake/TpmDependencies.cmake is named by both, from the same version, and a check sum stands where there is an address, and only there;
 - Dockerfile: stages, a user, an entry point; every path that it copies or runs exists;
 - what scripts, recipes and the Dockerfile build is made by CMake.
 """
@@ -182,7 +182,29 @@ def dependencies(root):
     return names - NOT_NAMED
 
 
+def least_versions(root):
+    """The least version of what cmake/TpmDependencies.cmake looks for: {name: version}."""
+    text = re.sub(r"#.*", "", text_of(root, "cmake/TpmDependencies.cmake"))
+    return {name: version for name, version in re.findall(r"(?:tpm_find|find_package)\((\w+) ([0-9.]+)", text) if name not in NOT_NAMED}
+
+
+def faults_of_least_versions(root):
+    """Both recipes ask for the least version that the build asks for."""
+    host = yaml.safe_load(text_of(root, "packaging/conda/recipe.yaml"))["requirements"]["host"]
+    conda = {str(r).split()[0]: found(r">=([0-9.]+)", str(r)) for r in host}
+    _, calls = spack_class(root, "tpmkit")
+    spack = {re.split(r"[@ ~+]", words[0])[0]: found(r"@([0-9.]+)", words[0]) for words, _ in calls["depends_on"]}
+    least = least_versions(root)
+    for name, version in least.items():
+        for recipe, there in (("conda", conda.get(NAMES[name][0])), ("spack", spack.get(NAMES[name][1]))):
+            if there != version:
+                yield f"{recipe}: {name} from {there}; cmake/TpmDependencies.cmake asks for {version}"
+    if len(least) < 10:
+        yield f"this test found {len(least)} least versions; expected 10 or more"
+
+
 def faults_of_recipes(root):
+    yield from faults_of_least_versions(root)
     for name in sorted(dependencies(root) ^ NAMES.keys()):
         yield f"{name}: is in cmake/TpmDependencies.cmake or in this test, not in both"
     recipe = yaml.safe_load(text_of(root, "packaging/conda/recipe.yaml"))

@@ -312,6 +312,8 @@ def look_at_lines(chromium, tpm, folder):
     (folder / "figures.json").write_text(json.dumps(figures))
     subprocess.run([tpm, "view", folder / "figures.json", "-o", folder / "late.html"], check=True, capture_output=True)
     page = Page(chromium, folder / "late.html")
+    said = page.js("[sized(2.02e-4, 'N', 5), sized(-3.5e-8, 'm', 5), sized(0.25, 'N', 5), sized(1e-4, '%', 5), sized(2, '', 5)]")
+    assert said == ["202 uN", "\u221235 nm", "0.25 N", "1.0000e\u22124 %", "2"], said
     for width in (400, 1400):
         chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
         page.frame()

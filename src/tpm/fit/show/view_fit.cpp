@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
@@ -145,43 +146,58 @@ std::string interval_text(const Json& interval, const Unit& unit) {
              : std::string("-");
 }
 
-/// How the deviance rises along each parameter: what an interval is read from.
-void add_profile(ViewPage& page, const Json& parameter) {
-  Json x = Json::array(), y = Json::array();
+/// How far the deviance rises above its least value along a parameter, with the interval that is
+/// read from it.
+void add_profile(ViewPage& page, const Json& parameter, const Unit& unit,
+                 const std::string& interval_name) {
+  std::vector<double> x, y, ends;
   for (const Json& pair : parameter.value("profile_SI_and_deviance", Json::array())) {
-    x.push_back(pair.at(0));
-    y.push_back(pair.at(1));
+    if (!pair.at(0).is_number() || !pair.at(1).is_number()) continue;  // the model failed there
+    x.push_back(pair.at(0).get<double>() / unit.to_si);
+    y.push_back(pair.at(1).get<double>());
   }
   if (x.size() < 2) return;
+  const double least = *std::ranges::min_element(y);
+  for (double& deviance : y) deviance -= least;
+  for (const Json& end : parameter.value("interval_SI", Json())) {
+    if (end.is_number()) ends.push_back(end.get<double>() / unit.to_si);
+  }
+  const std::vector<double> best{parameter.at("estimate_SI").get<double>() / unit.to_si};
   const std::string name = parameter.at("name").get<std::string>();
-  page.description["plots"].push_back(
-      {{"title", "profile of " + name},
-       {"x", {{"quantity", name}, {"unit", parameter.at("SI_unit")}}},
-       {"y", {{"quantity", "deviance"}, {"unit", ""}}},
-       {"series",
-        {{{"kind", "line"},
-          {"label", "deviance, all other parameters fitted"},
-          {"x", put_numbers(page, x)},
-          {"y", put_numbers(page, y)}}}}});
+  Json series = {{{"kind", "line"},
+                  {"label", "deviance, all other parameters fitted"},
+                  {"x", page.put(x)},
+                  {"y", page.put(y)}},
+                 {{"kind", "points"},
+                  {"label", "best fit"},
+                  {"x", page.put(best)},
+                  {"y", page.put(std::vector<double>{0.0})}}};
+  if (!ends.empty()) {
+    series.push_back({{"kind", "upright"}, {"label", interval_name}, {"x", page.put(ends)}});
+  }
+  page.description["plots"].push_back({{"title", "profile of " + name},
+                                       {"x", {{"quantity", name}, {"unit", unit.symbol}}},
+                                       {"y", {{"quantity", "rise of the deviance"}, {"unit", ""}}},
+                                       {"series", std::move(series)}});
 }
 
 void add_answer(ViewPage& page, const Json& fit) {
   page.description["title"] = fit.at("title");
   page.fact("model", fit.at("model").get<std::string>());
   Json rows = Json::array();
+  const std::string interval_name =
+      significant(100.0 * fit.value("confidence_level", 0.0), 3) + " % interval";
   for (const Json& p : fit.at("parameters")) {
     const double estimate = p.at("estimate_SI").get<double>();
     const Unit unit = read_unit(p.at("SI_unit").get<std::string>(), estimate);
     rows.push_back({p.at("name"), significant(estimate / unit.to_si, kShownDigits),
                     interval_text(p.value("interval_SI", Json()), unit), unit.symbol,
                     p.value("verdict", "")});
-    add_profile(page, p);
+    add_profile(page, p, unit, interval_name);
   }
-  const double level = fit.value("confidence_level", 0.0);
   page.description["table"] = {
       {"title", "Parameters"},
-      {"head",
-       {"parameter", "estimate", significant(100.0 * level, 3) + " % interval", "unit", "verdict"}},
+      {"head", {"parameter", "estimate", interval_name, "unit", "verdict"}},
       {"rows", std::move(rows)}};
   for (const Json& data : fit.value("data", Json::array())) {
     page.fact("reading",
