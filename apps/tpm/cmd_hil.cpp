@@ -288,6 +288,13 @@ int run_hil(const RunChoice& choice, const Session& session) {
     if (page) page->see(row);
   };
   options.planning = [&guide](const std::string&) { guide->plan(); };
+  options.checking = [](double most_N) {
+    tell_user(
+        "tpm: hold the tool still in the middle of its workspace, or let go of it: once it is at "
+        "rest it is pushed for a second with at most {} N, which measures its delay\n",
+        most_N);
+  };
+  options.noticed = [](const std::string& line) { tell_user("tpm: warning: {}\n", line); };
   std::optional<OutOfMemoryIsThrown> while_the_device_is_open;
   options.opened = [&, opened = options.opened](const DeviceIdentity& identity,
                                                 const LoopModel& model) {
