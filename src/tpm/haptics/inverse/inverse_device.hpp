@@ -44,8 +44,8 @@ struct InverseAddress {
 /// has not renewed for the watchdog's time is replaced by zero, for good. A state is as old as the
 /// message that it answers: older than a period it is no fresh position, older than the watchdog's
 /// time a failed read. A connection that stalls or ends is a failed status with what happened, and
-/// no word of the device: only an event of the service says that it is unplugged. In virtual time each write is one message and its state, which only
-/// a simulated device allows.
+/// no word of the device: only an event of the service says that it is unplugged. In virtual time
+/// each write is one message and its state, which only a simulated device allows.
 ///
 /// open() makes force gate and damping of the service 0, lets it carry the device's weight, and
 /// reads all back; a service in which one of them stays or is not told, or in another scale, is

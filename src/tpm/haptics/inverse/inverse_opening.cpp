@@ -24,9 +24,9 @@ std::string devices_there(const InverseInventory& inventory) {
   const std::size_t count = inventory.devices.size();
   std::vector<std::string> ids;
   for (const InverseDeviceEntry& entry : inventory.devices) ids.push_back(printable(entry.id));
-  return count == 0 ? "no device"
-                    : fmt::format("{} device{}: {}", count, count == 1 ? "" : "s",
-                                  fmt::join(ids, ", "));
+  return count == 0
+             ? "no device"
+             : fmt::format("{} device{}: {}", count, count == 1 ? "" : "s", fmt::join(ids, ", "));
 }
 
 /// Empty: none is told there.

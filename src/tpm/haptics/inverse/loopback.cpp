@@ -216,8 +216,8 @@ bool WebSocketClient::send_frame(FrameKind kind, std::string_view payload,
                                  double timeout_s) noexcept {
   try {
     if (!over_.empty()) return false;
-    switch (send_all(socket_.handle(), frame_bytes(kind, payload, fresh_mask()),
-                     after_s(timeout_s))) {
+    switch (
+        send_all(socket_.handle(), frame_bytes(kind, payload, fresh_mask()), after_s(timeout_s))) {
       case Sent::all:
         return true;
       case Sent::late:

@@ -75,8 +75,8 @@ struct InverseState {
 
 struct InverseDeviceEntry {
   std::string id, type, firmware;
-  /// It says so itself: `simulated_device`, true or SIMULATED DEVICE, in its config, status or state,
-  /// and nowhere otherwise.
+  /// It says so itself: `simulated_device`, true or SIMULATED DEVICE, in its config, status or
+  /// state, and nowhere otherwise.
   bool simulated = false;
   bool in_use = false;  ///< its status says so; which use that is is documented for tpm hil serve
   std::string control_mode;  ///< "idle": nobody commands it; empty: not named

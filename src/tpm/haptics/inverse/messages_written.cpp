@@ -27,8 +27,8 @@ std::string state_text(const InverseState& state) {
   return fmt::format(
       R"({{"cursor_position":{},"cursor_velocity":{},"current_cursor_force":{},"control_domain":)"
       R"("cartesian","{}":"{}"}})",
-      vector_text(state.position_m), vector_text(state.velocity_m_per_s), vector_text(state.force_N),
-      key::mode, state.driven ? "force" : "idle");
+      vector_text(state.position_m), vector_text(state.velocity_m_per_s),
+      vector_text(state.force_N), key::mode, state.driven ? "force" : "idle");
 }
 
 std::string pressed_text(std::uint32_t buttons) {
