@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <sys/socket.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <functional>
@@ -78,6 +79,8 @@ struct ServedBeside {
     settings.device.settings.handedness = "right";
     settings.device.settings.preset = "defaults";
     settings.device.settings.filters_named = settings.device.settings.damping_named = true;
+    settings.device.settings.gravity_named = settings.device.settings.gravity_compensation = true;
+    settings.device.settings.gravity_scaling = 1.0;
     server = std::make_unique<InverseServer>(hand, std::move(settings));
   }
   [[nodiscard]] InverseAddress address() const {
@@ -178,7 +181,6 @@ TEST_CASE("A connection that ends is no unplugged device, and says how it ended"
 /// Words of a client whose service breaks the connection in this way.
 std::string ending_after(bool reads, bool says_goodbye, bool resets) {
   const Socket listening = listen_on_loopback(0);
-  std::atomic<bool> over{false};
   std::thread service([&] {
     Socket socket;
     while (!socket.open()) socket = accepted(listening);
@@ -198,7 +200,6 @@ std::string ending_after(bool reads, bool says_goodbye, bool resets) {
       (void)::setsockopt(socket.handle(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
     }
     socket.close();
-    over = true;
   });
   std::string words;
   try {

@@ -21,10 +21,10 @@ namespace tpm::haptics {
 /// of its devices is meant.
 struct InverseAddress {
   int port = 10001;
-  int events_port = 10020;       ///< of versions from 3.5 on
-  int old_http_port = 10000;     ///< of versions before 3.5
-  std::string device_id;         ///< in capitals or small letters; empty: by `index`
-  std::optional<int> index;      ///< in the inventory, from 0; empty: the only one
+  int events_port = 10020;                  ///< of versions from 3.5 on
+  int old_http_port = 10000;                ///< of versions before 3.5
+  std::string device_id;                    ///< in capitals or small letters; empty: by `index`
+  std::optional<int> index = std::nullopt;  ///< in the inventory, from 0; empty: the only one
   double gravity_carried = 1.0;  ///< share of the device's weight that the service is to carry
   bool poll = false;             ///< the thread of the messages looks again and again, for latency
 };
