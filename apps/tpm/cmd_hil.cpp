@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <ctime>
 #include <filesystem>
 #include <functional>
@@ -19,9 +18,6 @@
 #include "interrupt_watch.hpp"
 #include "option_kinds.hpp"
 #include "out_of_memory.hpp"
-#include "tpm/base/nearest_word.hpp"
-#include "tpm/files/require_exists.hpp"
-#include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/device/plugin_device.hpp"
 #include "tpm/haptics/session/enter_key.hpp"
@@ -69,13 +65,6 @@ std::string seen_text(const SeenDevice& device) {
                      limits_of(device.kind).tried ? "" : " (never tried with this device)");
 }
 
-/// Of what the system's loader would word in its own way, or look for elsewhere.
-void require_libraries(const DeviceOptions& options) {
-  for (const std::string& file : {options.plugin, options.library}) {
-    if (!file.empty()) require_exists(file);
-  }
-}
-
 /// What a plugin says of its devices; nothing is opened.
 int list_plugin(const DeviceOptions& options, const Session& session) {
   const DevicePlugin plugin(options.plugin);
@@ -120,21 +109,31 @@ int list_plugin(const DeviceOptions& options, const Session& session) {
 /// The devices of a service that is compatible with the Inverse service, or why there are none.
 std::pair<Json, std::string> listed_inverse(const InverseAddress& address) {
   Json list = Json::array();
-  std::string text, reason;
+  std::string text, reason, unheard;
   try {
     for (const InverseDeviceEntry& device : inverse_inventory(address).devices) {
-      list.push_back(
-          {{"id", device.id}, {"type", device.type}, {"simulated_device", device.simulated}});
-      text += fmt::format("inverse3 {} at port {}{}: --device inverse3 --inverse-id {}\n",
-                          printable(device.type.empty() ? "device" : device.type), address.port,
-                          device.simulated ? ", SIMULATED DEVICE" : "", printable(device.id));
+      list.push_back({{"id", device.id},
+                      {"type", device.type},
+                      {"simulated_device", device.simulated},
+                      {"in_use", device.in_use}});
+      text += fmt::format("{:<8} {} at port {}{}{}: --device inverse3 --serial {}\n",
+                          list.size() - 1, printable(device.type.empty() ? "device" : device.type),
+                          address.port, device.simulated ? ", SIMULATED DEVICE" : "",
+                          device.in_use ? ", in use" : "", printable(device.id));
     }
     if (list.empty()) reason = fmt::format("the service at port {} sees no device", address.port);
+    unheard = inverse_events_fault(address);
+    if (!unheard.empty()) text += fmt::format("         no session begins: events: {}\n", unheard);
   } catch (const Error& error) {
     reason = error.what();
   }
   if (!reason.empty()) text = fmt::format("none     of Haply: {}\n", reason);
-  return {Json{{"port", address.port}, {"devices", list}, {"reason", reason}}, text};
+  return {Json{{"port", address.port},
+               {"devices", list},
+               {"reason", reason},
+               {"events_port", address.events_port},
+               {"events_reason", unheard}},
+          text};
 }
 
 int list_devices(const DeviceOptions& options, const Session& session) {
@@ -288,6 +287,13 @@ int run_hil(const RunChoice& choice, const Session& session) {
     if (page) page->see(row);
   };
   options.planning = [&guide](const std::string&) { guide->plan(); };
+  options.checking = [](double most_N) {
+    tell_user(
+        "tpm: hold the tool still in the middle of its workspace, or let go of it: once it is at "
+        "rest it is pushed for a second with at most {} N, which measures its delay\n",
+        most_N);
+  };
+  options.noticed = [](const std::string& line) { tell_user("tpm: warning: {}\n", line); };
   std::optional<OutOfMemoryIsThrown> while_the_device_is_open;
   options.opened = [&, opened = options.opened](const DeviceIdentity& identity,
                                                 const LoopModel& model) {
@@ -319,105 +325,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   return exit_code_of(run.outcome);
 }
 
-void add_dhd_library(CLI::App& command, DeviceOptions& options) {
-  command.add_option("--dhd-library", options.library,
-                     "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
-}
-
-void add_inverse_port(CLI::App& command, DeviceOptions& options, const char* of = "") {
-  command
-      .add_option("--inverse-port", options.choice.inverse.port,
-                  fmt::format("Port of the Inverse service: its simulation channel{}", of))
-      ->check(CLI::Range(1, 65535))
-      ->capture_default_str();
-}
-
-/// Throws Error(usage) for a file that only another kind of device would read.
-void require_kind(const DeviceChoice& choice, const std::filesystem::path& file, const char* option,
-                  const char* kind) {
-  if (file.empty() || choice.kind == kind) return;
-  throw Error(ExitCode::usage, option, fmt::format("with --device {}", choice.kind),
-              fmt::format("--device {}", kind));
-}
-
 }  // namespace
-
-void add_device_options(CLI::App& command, DeviceOptions& options) {
-  command
-      .add_option("--device", options.choice.kind,
-                  "virtual, replay, plugin, omega7, inverse3 or another device with a file in "
-                  "configs/devices")
-      ->check([](const std::string& kind) {
-        if (kind == "plugin") return std::string();
-        std::vector<std::string> kinds = device_kinds();
-        if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return std::string();
-        kinds.emplace_back("plugin");
-        return fmt::format("unknown device '{}'{}; expected one of {}", printable(kind),
-                           did_you_mean(kind, kinds), fmt::join(kinds, ", "));
-      })
-      ->capture_default_str();
-  command
-      .add_option("--serial", options.serial,
-                  "Serial number of the device, where there are several")
-      ->check(CLI::Range(0, 65535));
-  command.add_option("--index", options.index, "Its place in the list of tpm hil devices")
-      ->check(CLI::Range(0, 127));
-  add_dhd_library(command, options);
-  command.add_option(
-      "--plugin", options.plugin,
-      "Library of a device plugin, after tpmkit/haptic_device.h: of --device plugin");
-  command.add_option(
-      "--device-file", options.file,
-      "What was measured of the device (tpm hil identify; schemas/device.schema.json); "
-      "without it hardware counts as 20 ms late and free of friction");
-  add_inverse_port(command, options, ", of --device inverse3");
-  command
-      .add_option("--inverse-events-port", options.choice.inverse.events_port,
-                  "Port of its events, of versions from 3.5 on")
-      ->check(CLI::Range(1, 65535))
-      ->capture_default_str();
-  command
-      .add_option("--inverse-http-port", options.choice.inverse.old_http_port,
-                  "Port of its HTTP, of versions before 3.5")
-      ->check(CLI::Range(1, 65535))
-      ->capture_default_str();
-  command.add_option("--inverse-id", options.choice.inverse.device_id,
-                     "Which device of the service, where there are several");
-  command
-      .add_option("--inverse-gravity", options.choice.inverse.gravity_carried,
-                  "Share of the device's weight that the service is to carry")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  command.add_option("--device-recording", options.replay, "What --device replay plays");
-  command.add_flag("--may-move", options.choice.may_move,
-                   "The device may move by itself to initialise");
-  command.add_flag("--take-as-ready", options.choice.take_as_ready,
-                   "The device is initialised, where the library cannot tell");
-  command
-      .add_option("--real-time", options.real_time,
-                  "Real-time scheduling that is refused is an error, or said and ignored")
-      ->check(one_of_words({"enforce", "ignore"}))
-      ->capture_default_str();
-}
-
-DeviceChoice chosen_device(const DeviceOptions& options) {
-  DeviceChoice choice = options.choice;
-  choice.library = options.library;
-  if (options.serial >= 0) choice.which.serial = options.serial;
-  if (options.index >= 0) choice.which.index = options.index;
-  choice.replay = options.replay;
-  choice.plugin = options.plugin;
-  choice.file = options.file;
-  require_kind(choice, choice.replay, "--device-recording", "replay");
-  require_kind(choice, choice.plugin, "--plugin", "plugin");
-  require_libraries(options);
-  if (!choice.file.empty()) (void)read_device_file(choice.file);  // also where nothing asks for it
-  return choice;
-}
-
-RealTimeWish chosen_wish(const DeviceOptions& options) {
-  return options.real_time == "enforce" ? RealTimeWish::enforce : RealTimeWish::ignore;
-}
 
 void add_hil_command(CLI::App& app, Session& session) {
   CLI::App* hil = app.add_subcommand("hil", "A tissue rendered on a haptic device");
@@ -431,7 +339,7 @@ void add_hil_command(CLI::App& app, Session& session) {
   add_dhd_library(*devices, *listed);
   devices->add_option("--plugin", listed->plugin,
                       "Library of a device plugin: list its devices (docs/library.md)");
-  add_inverse_port(*devices, *listed);
+  add_inverse_ports(*devices, *listed);
   add_format_option(*devices, session);
   devices->footer("Examples:\n  tpm hil devices\n  tpm hil devices --plugin ./my_device.so");
   set_run(*devices, session, [listed, &session] { return list_devices(*listed, session); });

@@ -24,13 +24,6 @@ struct ServeChoice {
   bool poll = false;
 };
 
-int serve_port(const std::string& text, const char* option) {
-  constexpr std::uint64_t kLeast = 1024, kMost = 65535;
-  const std::uint64_t port = parse_whole_number(text, option, 0);
-  if (port == 0 || (port >= kLeast && port <= kMost)) return static_cast<int>(port);
-  throw Error(ExitCode::usage, option, text, "0 for a port that is free, or 1024 to 65535");
-}
-
 double serve_duration_s(const std::string& text) {
   constexpr double kMost_s = 86400.0;
   if (text.empty()) return 0.0;
@@ -41,8 +34,8 @@ double serve_duration_s(const std::string& text) {
 
 int serve_hil(const ServeChoice& choice, const Session& session) {
   ServeOptions options;
-  options.port = serve_port(choice.port, "--port");
-  options.events_port = serve_port(choice.events_port, "--events-port");
+  options.port = listening_port(choice.port, "--port");
+  options.events_port = listening_port(choice.events_port, "--events-port");
   if (options.port != 0 && options.events_port == options.port) {
     throw Error(ExitCode::usage, "--events-port", choice.events_port, "another port than --port");
   }
@@ -51,7 +44,7 @@ int serve_hil(const ServeChoice& choice, const Session& session) {
   const HilSession hil = read_session(choice.session);
   LiveView view(hil, true);
   std::optional<PageServer> page;
-  if (!choice.page.empty()) page.emplace(view, serve_port(choice.page, "--page"));
+  if (!choice.page.empty()) page.emplace(view, listening_port(choice.page, "--page"));
   const InterruptWatch interrupts;
   options.interrupted = InterruptWatch::seen;
   options.log = [](const std::string& line) { tell_user("tpm: {}\n", line); };
@@ -67,9 +60,9 @@ int serve_hil(const ServeChoice& choice, const Session& session) {
   const ServeRun run = serve_session(hil, options);
   view.ended(run.outcome);
   say("{}", session.json() ? answer_text(session, serve_json(hil, run)) : serve_text(hil, run));
-  // Ctrl-C is how a server without --duration ends.
-  const bool ended = run.outcome.cause == StopCause::finished ||
-                     (run.outcome.cause == StopCause::signal && options.duration_s == 0.0);
+  // Ctrl-C is how a server ends; one that has a duration may end before it.
+  const bool ended =
+      run.outcome.cause == StopCause::finished || run.outcome.cause == StopCause::signal;
   return ended ? 0 : static_cast<int>(ExitCode::environment);
 }
 
@@ -87,7 +80,7 @@ void add_hil_serve_command(CLI::App& hil, Session& session) {
       ->add_option("--events-port", choice->events_port,
                    "Port of the events, 0 for one that is free")
       ->capture_default_str();
-  command->add_option("--duration", choice->duration, "Duration (default: until Ctrl-C)");
+  command->add_option("--duration", choice->duration, "Longest duration (default: until Ctrl-C)");
   command->add_option(
       "--page", choice->page,
       "Port of a page that a browser on this machine shows: the tissue; 0 for one that is free");

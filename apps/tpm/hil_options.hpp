@@ -9,13 +9,28 @@ namespace tpm::app {
 struct DeviceOptions {
   DeviceChoice choice;
   std::string library, replay, plugin, file;
-  int serial = -1, index = -1;  ///< -1: not given
+  std::string serial;  ///< empty: not given
+  int index = -1;      ///< -1: not given
   std::string real_time = "ignore";
 };
 
 /// Adds --device, --serial, --index, --dhd-library, --device-recording, --may-move and
 /// --take-as-ready.
 void add_device_options(CLI::App& command, DeviceOptions& options);
+
+/// --dhd-library alone.
+void add_dhd_library(CLI::App& command, DeviceOptions& options);
+/// --inverse-port, --inverse-events-port and --inverse-http-port alone. @param of ends the words of
+/// the first
+void add_inverse_ports(CLI::App& command, DeviceOptions& options, const char* of = "");
+
+/// Throws Error(usage) for a library or plugin that is not there: the system's loader would word it
+/// in its own way, or look for it elsewhere.
+void require_libraries(const DeviceOptions& options);
+
+/// Port that a command listens on: 0 for one that is free, or 1024 to 65535. Throws Error(usage)
+/// naming the option.
+[[nodiscard]] int listening_port(const std::string& text, const char* option);
 
 /// What was chosen; call when the command runs.
 [[nodiscard]] DeviceChoice chosen_device(const DeviceOptions& options);

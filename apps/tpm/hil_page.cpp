@@ -1,11 +1,14 @@
 // The page of tpm hil run: when it begins, and when it ends.
 #include "hil_page.hpp"
 
+#include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <system_error>
 #include <thread>
 
 #include "command.hpp"
+#include "hil_options.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -19,13 +22,6 @@ double page_time_s(const std::string& text, const char* option) {
   throw Error(ExitCode::usage, option, text, "0 to 3600 s");
 }
 
-int page_port(const std::string& text) {
-  constexpr std::uint64_t kLeast = 1024, kMost = 65535;
-  const std::uint64_t port = parse_whole_number(text, "--page", 0);
-  if (port == 0 || (port >= kLeast && port <= kMost)) return static_cast<int>(port);
-  throw Error(ExitCode::usage, "--page", text, "0 for a port that is free, or 1024 to 65535");
-}
-
 /// Until done() or the time is over.
 void linger(double seconds, const std::function<bool()>& done) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
@@ -36,11 +32,22 @@ void linger(double seconds, const std::function<bool()>& done) {
 
 }  // namespace
 
+int listening_port(const std::string& text, const char* option) {
+  constexpr const char* kExpected = "0 for a port that is free, or 1024 to 65535";
+  constexpr int kLeast = 1024, kMost = 65535;
+  int port = -1;
+  const char* end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, port);
+  const bool whole = read.ec == std::errc{} && read.ptr == end;
+  if (whole && (port == 0 || (port >= kLeast && port <= kMost))) return port;
+  throw Error(ExitCode::usage, option, printable(text), kExpected);
+}
+
 HilPage::HilPage(const HilSession& session, bool real_time, const PageOptions& options)
     : view_(session, real_time),
       wait_s_(page_time_s(options.wait, "--page-wait")),
       keep_s_(page_time_s(options.keep, "--page-keep")),
-      server_(view_, page_port(options.port)) {
+      server_(view_, listening_port(options.port, "--page")) {
   tell_user("page: {}\n", server_.address());
 }
 

@@ -47,7 +47,7 @@ constexpr OptionKind kKinds[] = {
     {"NUMBERS", " --margins "},
     {"COUNT",
      " --bootstrap --starts --repetitions --draws --spheres --most-spheres --layers --top --points "
-     "--workers --block --header-rows --contact-samples --terms --index --serial "},
+     "--workers --block --header-rows --contact-samples --terms --index "},
     {"SEED", " --seed "},
     {"SHARE", " --level --target --sphere-tolerance --flaw "},
     {"TOLERANCE", " --tolerance --require "},
@@ -64,7 +64,8 @@ constexpr OptionKind kKinds[] = {
     {"COLUMN", " --time --drive --response --sd --frequency --storage --loss "},
     {"COLUMN=UNIT", " --unit "},
     {"QUANTITY:UNIT", " --x-quantity --y-quantity "},
-    {"NAME", " --drive-quantity --response-quantity --quantity --dataset --inverse-id --only "},
+    {"NAME",
+     " --drive-quantity --response-quantity --quantity --dataset --inverse-id --serial --only "},
     {"AXIS", " --axis --over --x --y "},
     {"AXIS=VALUE", " --at "},
     {"VARIABLE", " --variable --objective "},

@@ -788,6 +788,11 @@ std::vector<ErrorCase> device_file_cases() {
        "hil run {}/h.json --device inverse3 -o {}/out", with_files({{"h.json", kSession}})},
       {"Inverse service", "a port of the system", "hil serve {}/h.json --port 80",
        with_files({{"h.json", kSession}})},
+      {"Inverse service", "no number of a port", "hil serve {}/h.json --port abc",
+       with_files({{"h.json", kSession}})},
+      {"Inverse service", "serial number of a simulated device",
+       "hil run {}/h.json --device virtual --serial 4711 -o {}/out",
+       with_files({{"h.json", kSession}})},
       {"Inverse service", "no time to serve", "hil serve {}/h.json --duration '0 s'",
        with_files({{"h.json", kSession}})},
   };

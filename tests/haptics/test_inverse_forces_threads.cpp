@@ -1,5 +1,6 @@
 // --device inverse3: the force that a service reports beside the one that was commanded.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -26,6 +27,10 @@ Eigen::Vector3d along_z(double newtons) {
   return {0.0, 0.0, newtons};
 }
 
+std::string lines_of(const ForceComparison& forces) {
+  return fmt::format("{}", fmt::join(forces.findings(), "\n"));
+}
+
 /// What is found if `share` of a sine of 1 N and 1 Hz is reported, late by some milliseconds.
 std::string found_of(double share, int late_ms, int lasts_ms = 2000) {
   ForceComparison forces;
@@ -35,7 +40,7 @@ std::string found_of(double share, int late_ms, int lasts_ms = 2000) {
     forces.command(commanded(ms), ms * kPeriod_ns);
     forces.report(share * commanded(std::max(0, ms - late_ms)), ms * kPeriod_ns);
   }
-  return forces.finding();
+  return lines_of(forces);
 }
 
 TEST_CASE("A reported force may be late and differ a little, and not be scaled or gated") {
@@ -53,7 +58,7 @@ TEST_CASE("A reported force may be late and differ a little, and not be scaled o
       forces.command(along_z(1.0), ms * kPeriod_ns);
       forces.report(along_z(share), ms * kPeriod_ns);
     }
-    CHECK_THAT(forces.finding(),
+    CHECK_THAT(lines_of(forces),
                Contains(share > 0.0 ? "reported 0.5 N where 1 N" : "reported 0 N where 1 N"));
   }
 }
@@ -73,16 +78,42 @@ TEST_CASE("A difference of forces counts once it has lasted, and agreement ends 
   live(0.5, 190);
   live(1.0, 10);
   live(0.5, 190);
-  CHECK(forces.finding().empty());
+  CHECK(lines_of(forces).empty());
   live(1.0, 10);
   live(0.5, 401);
-  CHECK_THAT(forces.finding(), Contains("for 0.4 s in all"));
+  CHECK_THAT(lines_of(forces), Contains("for 0.4 s in all"));
   live(1.0, 1000);
-  CHECK_THAT(forces.finding(), Contains("for 0.4 s in all"));
+  CHECK_THAT(lines_of(forces), Contains("for 0.4 s in all"));
   forces.begin(at_ns);
-  CHECK(forces.finding().empty());
+  CHECK(lines_of(forces).empty());
   forces.no_report();
-  CHECK_THAT(forces.finding(), Contains("the service reported no force"));
+  CHECK_THAT(lines_of(forces), Contains("the service reported no force"));
+}
+
+TEST_CASE("A force that is reported where none was commanded is somebody else's") {
+  ForceComparison forces;
+  forces.begin(0);
+  std::int64_t at_ns = 0;
+  const auto live = [&](double commanded_N, double reported_N, int lasts_ms) {
+    for (int i = 0; i < lasts_ms; ++i) {
+      at_ns += kPeriod_ns;
+      forces.command(along_z(commanded_N), at_ns);
+      forces.report(along_z(reported_N), at_ns);
+    }
+  };
+  live(0.0, 0.0, 1000);
+  CHECK(forces.findings().empty());
+  live(0.0, 0.7, 501);
+  REQUIRE(forces.findings().size() == 1);
+  CHECK_THAT(lines_of(forces), Contains("up to 0.7 N where nothing was commanded, for 0.5 s") &&
+                                   Contains("another client pushes (end it)"));
+  live(1.0, 1.0, 300);
+  CHECK(forces.findings().size() == 1);
+  // And where a force is commanded: another client may have the seat of the driver.
+  live(1.0, 0.2, 500);
+  REQUIRE(forces.findings().size() == 2);
+  CHECK_THAT(forces.findings().back(), Contains("reported 0.2 N where 1 N was commanded") &&
+                                           Contains("another client may drive the device"));
 }
 
 /// 500 periods of 1 N on such a service.
@@ -146,7 +177,10 @@ TEST_CASE("What was noticed of forces is recorded and said, and the session goes
     if (row.phase >= 0 && !begun) service.begin();
     begun = begun || row.phase >= 0;
   };
+  std::vector<std::string> told;
+  options.noticed = [&told](const std::string& line) { told.push_back(line); };
   const SessionRun run = run_session_on(session, device, limits, {}, options);
+  CHECK(told == run.findings);
   CAPTURE(word_of(run.outcome.cause), run.outcome.detail, run.largest_force_N);
   CHECK(run.outcome.cause == StopCause::finished);
   REQUIRE(run.findings.size() == 1);

@@ -468,10 +468,11 @@ TEST_CASE("The example client in Python is served in both formats, and names a s
   options.duration_s = 600.0;
   options.interrupted = [&done] { return done.load(); };
   options.opened = [&](const InverseServer& server, const DeviceIdentity&, const LoopModel&) {
-    worker = std::thread([&, port = server.port()] {
-      listing = std::system(
-          fmt::format("'" TPM_TEST_PROGRAM "' hil devices --inverse-port {} >{}", port, listed)
-              .c_str());
+    worker = std::thread([&, port = server.port(), server_events = server.events_port()] {
+      listing = std::system(fmt::format("'" TPM_TEST_PROGRAM "' hil devices --inverse-port {} "
+                                        "--inverse-events-port {} >{}",
+                                        port, server_events, listed)
+                                .c_str());
       status = std::system(fmt::format("python3 {}/examples/inverse_client.py --port {} "
                                        "--messages 300 --format {} >{} 2>&1",
                                        TPM_TEST_SOURCE_DIR, port, format, output)
@@ -488,7 +489,8 @@ TEST_CASE("The example client in Python is served in both formats, and names a s
   CHECK(run.counts.states == 300);
   CHECK(listing == 0);
   CHECK_THAT(files::read_file(listed), Contains("inverse3") && Contains("SIMULATED DEVICE") &&
-                                           Contains("--device inverse3 --inverse-id"));
+                                           Contains("--device inverse3 --serial SIMULATED\n"));
+  CHECK_FALSE(Contains("no session begins").match(files::read_file(listed)));
 }
 
 TEST_CASE("The simulated hand moves as the oscillator that it is, as late as the session says") {

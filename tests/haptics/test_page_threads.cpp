@@ -204,7 +204,7 @@ TEST_CASE("Hostile requests get a short error") {
   const std::vector<Request> requests{
       {"GET / HTTP/1.1\r\n\r\n", "403"},
       {"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n", "403"},
-      {"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n", "403"},
+      {"GET / HTTP/1.1\r\nHost: 127.0.0.1:1\r\n\r\n", "403"},
       {"GET / HTTP/1.1\r\n" + host + "Host: evil.example\r\n\r\n", "403"},
       {"POST /state.json HTTP/1.1\r\n" + host + "Content-Length: 200000\r\n\r\n" + big, "405"},
       {"DELETE / HTTP/1.1\r\n" + host + "\r\n", "405"},

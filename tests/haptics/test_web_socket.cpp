@@ -193,6 +193,16 @@ TEST_CASE("An upgrade is refused to other hosts, foreign pages, and what is no h
   CHECK(status_of(request("host", "127.0.0.1:4711")) == "101");
   CHECK(status_of(request("host", "evil.example:4711")) == "403");
   CHECK(status_of(request("host", "localhost:80")) == "403");
+  // Names have no case, and a browser sends one without a port to port 80 only.
+  for (const char* own : {"LocalHost:4711", "localhost", "127.0.0.1"}) {
+    CAPTURE(own);
+    CHECK(status_of(request("host", own)) == "101");
+  }
+  for (const char* other : {"localhost:", "localhost:47110", "localhost:4711:4711", "local",
+                            "evil.example", "localhost.evil.example", ""}) {
+    CAPTURE(other);
+    CHECK(status_of(request("host", other)) == "403");
+  }
   CHECK(status_of(request("host", std::nullopt)) == "403");
   CHECK(status_of(request("origin", "http://localhost:8080")) == "101");
   CHECK(status_of(request("origin", "http://127.0.0.1:4711")) == "101");

@@ -129,6 +129,30 @@ def z_of(seen):
     return float(seen["texts"]["at"].split(",")[2])
 
 
+def pressed(chromium, wanted):
+    """The buttons of the grip as the server tells them, once they are as wanted."""
+    asks = "fetch('/devices').then(a => a.json()).then(d => JSON.stringify(d.wireless_verse_grip[0].state.buttons))"
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        answer = chromium.call("Runtime.evaluate", expression=asks, awaitPromise=True)
+        seen = json.loads(answer["result"]["value"])
+        if seen == wanted:
+            return
+        time.sleep(0.1)
+    raise AssertionError((seen, wanted))
+
+
+def press(chromium):
+    """The mouse holds button b of the grip down, and lets it go."""
+    box, = [b for k, b in look(chromium)["boxes"].items() if k.endswith(" BUTTON b")]
+    mouse = {"x": (box[0] + box[2]) / 2, "y": (box[1] + box[3]) / 2, "button": "left", "clickCount": 1}
+    up = {"a": False, "b": False, "c": False}
+    chromium.call("Input.dispatchMouseEvent", type="mousePressed", buttons=1, **mouse)
+    pressed(chromium, {**up, "b": True})
+    chromium.call("Input.dispatchMouseEvent", type="mouseReleased", buttons=0, **mouse)
+    pressed(chromium, up)
+
+
 def check_hand(chromium, address, folder):
     def at_rest(s):  # connected a moment before the first state is shown
         texts = s["texts"]
@@ -136,6 +160,7 @@ def check_hand(chromium, address, folder):
 
     chromium.open(address)
     until(chromium, at_rest, "the hand at rest")
+    press(chromium)
     drag(chromium, -6.0)
     fits(chromium, "hand", folder, lambda s: z_of(s) < -4.0)
 

@@ -118,7 +118,8 @@ class Closed(Exception):
 
 class Server:
     def __init__(self, tpm, session):
-        self.process = subprocess.Popen([tpm, "hil", "serve", session, "--port", "0", "--events-port", "0"],
+        self.process = subprocess.Popen([tpm, "hil", "serve", session, "--port", "0", "--events-port", "0",
+                                         "--duration", "3600 s"],
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         first = self.process.stderr.readline()
         self.port = int(first.split("ws://localhost:")[1].split(",")[0])
@@ -138,7 +139,7 @@ class Server:
     def end(self):
         self.process.send_signal(2)
         said = self.process.stdout.read()
-        self.process.wait()
+        assert self.process.wait() == 0, "a signal is how a server ends, with a duration, too"
         self.reader.join()
         return said
 
@@ -279,6 +280,10 @@ def place(x):
                             % (c.device, "position" if form == "vector" else "values", x))
 
 
+def setting(what):
+    return lambda c, form: json.dumps({"inverse3": [{"device_id": c.device, "configure": what}]})
+
+
 def two(client, form):
     one = {"set_cursor_force": {form: {"x": 1, "y": 0, "z": 0}}}
     return json.dumps({"inverse3": [{"device_id": client.device, "commands": one},
@@ -305,6 +310,7 @@ ROWS = [
     ("upgrade with a foreign Host", http(lambda p: upgrade(p, host="evil.example")), "HTTP/1.1 403", "Host"),
     ("upgrade with a foreign Origin", http(lambda p: upgrade(p, more="Origin: http://evil.example\r\n")), "HTTP/1.1 403", "Origin"),
     ("upgrade with the Origin null", http(lambda p: upgrade(p, more="Origin: null\r\n")), "HTTP/1.1 403", "Origin"),
+    ("upgrade with the Host localhost, no port", http(lambda p: upgrade(p, host="localhost")), "HTTP/1.1 101", ""),
     ("upgrade without a key", http(lambda p: upgrade(p, key="")), "HTTP/1.1 400", "Key"),
     ("a body in chunks", http(lambda p: (f"POST /devices HTTP/1.1\r\nHost: localhost:{p}\r\nTransfer-Encoding: chunked"
                                          "\r\n\r\n2\r\n{}\r\n0\r\n\r\n").encode()), "HTTP/1.1 501", "chunks"),
@@ -315,6 +321,12 @@ ROWS = [
     ("a place at infinity: 1e400", texts(place("1e400")), "one state", "number"),
     ("a place at infinity: Infinity", texts(place("Infinity")), "one state", "message: "),
     ("a place 2 m away", texts(place("2")), "one state", "asks for a place 2 m away"),
+    ("a preset that nobody has", texts(setting({"preset": {"preset": "upside_down"}})), "one state", "asks for the preset upside_down; it stays"),
+    ("a basis", texts(setting({"basis": {"permutation": "YXZ"}})), "one state", "asks for the basis YXZ; it stays XYZ"),
+    ("a force gate", texts(setting({"force_gate": {"gain": 0.3}})), "one state", "asks for a force gate of 0.3; it stays 0"),
+    ("a damping", texts(setting({"damping": {"scalar": 2}})), "one state", "asks for a damping of 2"),
+    ("a mount", texts(setting({"mount": {"scale": {"x": 2, "y": 2, "z": 2}}})), "one state", "asks for mount, which is not here"),
+    ("torques", texts(lambda c, f: commands(c.device, {"set_angular_torques": {}})), "one state", "asks for set_angular_torques, which is not here"),
     ("a force in words", texts(lambda c, f: force(c, f, {"x": "1", "y": "0", "z": "0"})), "one state", "is no number"),
     ("a force that is a list", texts(lambda c, f: force(c, f, [1, 2, 3])), "one state", "is no object"),
     ("a force that is null in z", texts(lambda c, f: force(c, f, {"x": 1, "y": 0, "z": None})), "one state", "has no z"),

@@ -93,8 +93,11 @@ inline InverseHazardRow ended(const char* hazard, const char* expected, double b
       const bool hung = loop_hangs && fault_ns != 0;
       if (!hung) (void)device.read(at_m);
       if (!hung) (void)device.write({0.0, 0.0, kAsked_N});
-      if (const ForcesOff cause = device.status().forces_off; cause != ForcesOff::none) {
-        row.ended = fmt::format("{}: {}", word_of(cause), device.status().error_text);
+      const DeviceStatus status = device.status();
+      if (status.failed || status.forces_off != ForcesOff::none) {
+        row.ended =
+            fmt::format("{}: {}", status.failed ? "communication" : word_of(status.forces_off),
+                        status.error_text);
         break;
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -212,10 +215,10 @@ inline std::vector<InverseHazardRow> inverse_hazard_rows(double watchdog_s, doub
   };
   // A state is at most a period old when the fault comes.
   const double silent_s = watchdog_s + scheduling_s;
-  rows.push_back(ended("the service falls silent", "unplugged", silent_s, watchdog_s,
+  rows.push_back(ended("the service falls silent", "communication", silent_s, watchdog_s,
                        failing(How::silence), {}, false));
-  rows.push_back(ended("the service closes", "unplugged", silent_s, watchdog_s, failing(How::close),
-                       {}, false));
+  rows.push_back(ended("the service closes", "communication", silent_s, watchdog_s,
+                       failing(How::close), {}, false));
   rows.push_back(ended("the service sends garbage", "no state", silent_s, watchdog_s,
                        failing(How::garbage), {}, false));
   rows.push_back(ended("the service answers for another device", "no state", silent_s, watchdog_s,

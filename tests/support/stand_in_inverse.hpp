@@ -27,6 +27,9 @@ using namespace haptics;
 struct StandInFaults {
   std::string version = "3.5.0.0";
   bool simulated = true;      ///< it says so
+  bool in_use = false;        ///< its status and control mode say so
+  int close_code = 0;         ///< of How::close; 0: no close frame
+  std::string close_reason;   ///< the same
   bool no_inventory = false;  ///< it accepts and is silent
   bool no_events = false;     ///< nobody listens there
   bool names_no_filters = false, names_no_damping = false;
@@ -94,6 +97,7 @@ class StandInInverse {
   /// The texts that answer; nothing: this connection is over.
   [[nodiscard]] std::optional<std::vector<std::string>> answer(const std::string& text);
   [[nodiscard]] InverseInventory inventory();
+  [[nodiscard]] std::string inventory_text();
   [[nodiscard]] bool keeps(std::string_view name) const;
   void live();
 
@@ -260,12 +264,21 @@ inline InverseInventory StandInInverse::inventory() {
     entry.id = id;
     entry.type = "inverse3";
     entry.simulated = faults_.simulated;
+    entry.state.driven = faults_.in_use;
     entry.settings = set_;
     entry.state.position_m = plant_.measured_m();
     if (set_.preset != kCentredPreset) entry.state.position_m += stand_in::kCentre_m;
     all.devices.push_back(entry);
   }
   return all;
+}
+
+/// Hardware has a status, too.
+inline std::string StandInInverse::inventory_text() {
+  std::string text = inventory_message(inventory());
+  const std::string bare = R"("status":{})";
+  const std::size_t at = faults_.in_use ? text.find(bare) : text.npos;
+  return at == text.npos ? text : text.replace(at, bare.size(), R"("status":{"in_use":true})");
 }
 
 inline void StandInInverse::post(const std::string& target, const std::string& body) {
@@ -312,7 +325,7 @@ inline std::string StandInInverse::http(const HttpHead& head, const std::string&
                        fmt::format(R"({{"project_version":"{}"}})", faults_.version));
   }
   if (path == (old ? "/3.0/devices" : "/devices")) {
-    std::string text = inventory_message(inventory());
+    std::string text = inventory_text();
     if (faults_.names_no_filters) {
       const std::size_t at = text.find("\"filters\"");
       text.replace(at, 9, "\"unnamed\"");
@@ -430,7 +443,7 @@ inline void StandInInverse::talk(Socket socket, bool events) {
         const std::lock_guard<std::mutex> lock(mutex_);
         listeners_.push_back(socket.handle());
       } else if (!faults_.no_inventory) {
-        stand_in::send_text(socket.handle(), inventory_message(inventory()));
+        stand_in::send_text(socket.handle(), inventory_text());
         InverseState elsewhere;
         elsewhere.position_m = stand_in::kElsewhere_m;
         for (int i = 0; i < faults_.unasked_states; ++i) {
@@ -447,6 +460,13 @@ inline void StandInInverse::talk(Socket socket, bool events) {
       if (message->kind == FrameKind::text && !events) {
         const auto texts = answer(message->payload);
         goes_on = texts.has_value();
+        if (!goes_on && faults_.close_code != 0) {
+          stand_in::send_bytes(
+              socket.handle(),
+              frame_bytes(FrameKind::close,
+                          close_payload(static_cast<std::uint16_t>(faults_.close_code),
+                                        faults_.close_reason)));
+        }
         for (const std::string& text : texts.value_or(std::vector<std::string>())) {
           if (faults_.late_s > 0.0) {
             irregular += irregular < 0.381966 ? 0.618034 : -0.381966;  // golden section, in [0, 1)

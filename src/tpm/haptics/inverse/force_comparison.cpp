@@ -31,8 +31,8 @@ void ForceComparison::begin(std::int64_t at_ns) noexcept {
   since_ns_ = at_ns;
   apart_ = false;
   named_ = unnamed_ = 0;
-  apart_ns_ = 0;
-  farthest_N_ = commanded_N_ = reported_N_ = 0.0;
+  apart_ns_ = unasked_ns_ = 0;
+  unasked_N_ = farthest_N_ = commanded_N_ = reported_N_ = 0.0;
 }
 
 void ForceComparison::command(const Eigen::Vector3d& force_N, std::int64_t at_ns) noexcept {
@@ -61,24 +61,41 @@ void ForceComparison::report(const Eigen::Vector3d& force_N, std::int64_t at_ns)
     apart_since_ns_ = counted_until_ns_ = at_ns;
   }
   if (at_ns - apart_since_ns_ < ns(kLasts_s)) return;
-  apart_ns_ += at_ns - counted_until_ns_;
+  const std::int64_t lasted_ns = at_ns - counted_until_ns_;
   counted_until_ns_ = at_ns;
+  if (largest_N == 0.0) {
+    unasked_N_ = std::max(unasked_N_.load(), force_N.norm());
+    unasked_ns_ += lasted_ns;
+    return;
+  }
+  apart_ns_ += lasted_ns;
   if (apart_N <= farthest_N_) return;
   farthest_N_ = apart_N;
   commanded_N_ = last_N_.norm();
   reported_N_ = force_N.norm();
 }
 
-std::string ForceComparison::finding() const {
+std::vector<std::string> ForceComparison::findings() const {
   if (named_ == 0 && unnamed_ > 0) {
-    return "the service reported no force: whether it renders those commanded is not known";
+    return {"the service reported no force: whether it renders those commanded is not known"};
   }
-  if (apart_ns_ == 0) return {};
-  return fmt::format(
-      "the service reported {:.3g} N where {:.3g} N was commanded, apart by up to {:.3g} N, for "
-      "{:.3g} s in all: something may gate, scale or add forces",
-      reported_N_.load(), commanded_N_.load(), farthest_N_.load(),
-      static_cast<double>(apart_ns_) * 1e-9);
+  const auto in_all = [](std::int64_t ns) {
+    return fmt::format("for {:.3g} s in all", static_cast<double>(ns) * 1e-9);
+  };
+  std::vector<std::string> lines;
+  if (unasked_ns_ > 0) {
+    lines.push_back(fmt::format(
+        "the service reported up to {:.3g} N where nothing was commanded, {}: another client "
+        "pushes (end it), or a tissue of the service",
+        unasked_N_.load(), in_all(unasked_ns_)));
+  }
+  if (apart_ns_ > 0) {
+    lines.push_back(fmt::format(
+        "the service reported {:.3g} N where {:.3g} N was commanded, apart by up to {:.3g} N, {}: "
+        "another client may drive the device, or something may gate, scale or add forces",
+        reported_N_.load(), commanded_N_.load(), farthest_N_.load(), in_all(apart_ns_)));
+  }
+  return lines;
 }
 
 }  // namespace tpm::haptics

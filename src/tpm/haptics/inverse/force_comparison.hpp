@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "tpm/base/namespaces.hpp"
 
@@ -20,7 +21,8 @@ namespace tpm::haptics {
 ///
 /// It is not documented whether the report is the force that is rendered or the last command.
 /// Agreement therefore proves nothing, and a difference ends no session: tpm hil serve reports the
-/// force of its own tissue, too.
+/// force of its own tissue, too. A force that is reported where none was commanded is counted by
+/// itself: somebody else pushes.
 class ForceComparison {
  public:
   static constexpr double kTolerance_N = 0.02, kTolerance = 0.05;
@@ -32,8 +34,8 @@ class ForceComparison {
   void report(const Eigen::Vector3d& force_N, std::int64_t at_ns) noexcept;
   /// A state came that names no force.
   void no_report() noexcept { ++unnamed_; }
-  /// What was found, in a line; empty: nothing. From any thread.
-  [[nodiscard]] std::string finding() const;
+  /// What was found, a line each. From any thread.
+  [[nodiscard]] std::vector<std::string> findings() const;
 
  private:
   struct Commands {
@@ -49,9 +51,10 @@ class ForceComparison {
   Eigen::Vector3d last_N_ = Eigen::Vector3d::Zero();
   bool apart_ = false;
   std::int64_t apart_since_ns_ = 0, counted_until_ns_ = 0;
-  // For finding().
+  // For findings().
   std::atomic<std::uint64_t> named_{0}, unnamed_{0};
-  std::atomic<std::int64_t> apart_ns_{0};
+  std::atomic<std::int64_t> apart_ns_{0}, unasked_ns_{0};  ///< unasked: nothing was commanded
+  std::atomic<double> unasked_N_{0.0};
   std::atomic<double> farthest_N_{0.0}, commanded_N_{0.0}, reported_N_{0.0};
 };
 

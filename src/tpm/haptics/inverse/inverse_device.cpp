@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <chrono>
 #include <cstring>
 
@@ -25,21 +24,6 @@ constexpr double kMoved_m = 1e-6;
 
 double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
   return static_cast<double>(to_ns - from_ns) * 1e-9;
-}
-
-/// Whether an event means that forces no longer reach the hand.
-std::optional<ForcesOff> end_of(const InverseEvent& event) {
-  if (event.name == "device-disconnected") return ForcesOff::unplugged;
-  if (event.name == "device-busy") return ForcesOff::software;
-  if (event.name != "device-safety-triggered") return std::nullopt;
-  const bool harmless = event.safety_type == "ebrake_released" || event.level == "info";
-  return harmless ? std::nullopt : std::optional(ForcesOff::software);
-}
-
-/// Identifiers are told in capitals or small letters.
-bool same_id(std::string_view a, std::string_view b) {
-  return std::ranges::equal(
-      a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
 Eigen::Vector3d limited(const Eigen::Vector3d& force_N, double most_N) noexcept {
@@ -62,6 +46,15 @@ InverseDevice::InverseDevice(InverseAddress address, const DeviceLimits& limits)
 InverseDevice::~InverseDevice() {
   stop();
   if (messages_.joinable()) messages_.join();
+}
+
+/// Whether an event means that forces no longer reach the hand.
+std::optional<InverseDevice::Fault> InverseDevice::end_of(const InverseEvent& event) {
+  if (event.name == "device-disconnected") return Fault::unplugged;
+  if (event.name == "device-busy") return Fault::software;
+  if (event.name != "device-safety-triggered") return std::nullopt;
+  const bool harmless = event.safety_type == "ebrake_released" || event.level == "info";
+  return harmless ? std::nullopt : std::optional(Fault::software);
 }
 
 void InverseDevice::prepare(const DevicePreparation& preparation) {
@@ -103,21 +96,21 @@ void InverseDevice::enable_forces() {
   forces_on_ = true;
 }
 
-void InverseDevice::fail(ForcesOff cause, std::string_view words) noexcept {
+void InverseDevice::fail(Fault fault, std::string_view words) noexcept {
   if (failing_.exchange(true)) return;  // the first one counts, of whichever thread
   const std::size_t size = std::min(words.size(), fault_words_.size() - 1);
   std::memcpy(fault_words_.data(), words.data(), size);
   fault_words_[size] = '\0';
-  fault_.store(cause, std::memory_order_release);
+  fault_.store(fault, std::memory_order_release);
 }
 
 Eigen::Vector3d InverseDevice::force_to_send() noexcept {
   (void)order_.refresh();
   const Order& order = order_.latest();
-  if (!forces_on_ || cut_ || ending_ || fault_ != ForcesOff::none) return Eigen::Vector3d::Zero();
+  if (!forces_on_ || cut_ || ending_ || fault_ != Fault::none) return Eigen::Vector3d::Zero();
   // In virtual time nobody counts the time between two commands.
   if (preparation_.real_time && seconds_between(order.at_ns, now_ns()) > preparation_.watchdog_s) {
-    fail(ForcesOff::watchdog, "no command in the watchdog's time");
+    fail(Fault::watchdog, "no command in the watchdog's time");
     return Eigen::Vector3d::Zero();
   }
   return limited(order.force_N, preparation_.max_force_N);
@@ -132,13 +125,13 @@ bool InverseDevice::exchange(const std::string& message, double timeout_s) {
   }
   waiting_.sent(asked_ns);
   if (!service_->send(message)) {
-    fail(ForcesOff::unplugged, service_->over());
+    fail(Fault::connection, service_->over());
     return false;
   }
   std::optional<std::string> text = service_->receive(timeout_s, address_.poll);
   if (!text) {
     ++unanswered_;
-    if (!service_->over().empty()) fail(ForcesOff::unplugged, service_->over());
+    if (!service_->over().empty()) fail(Fault::connection, service_->over());
     return false;
   }
   for (; text; text = service_->receive(0.0)) take_state(*text);
@@ -154,14 +147,14 @@ void InverseDevice::take_state(const std::string& text) {
     if (!is_scaled_as_device(state) || !is_turned_as_device(state) ||
         !((state.workspace_position_m - *workspace_m_).norm() < kMoved_m)) {
       // Another program may set the workspace of this session: the surface would be elsewhere.
-      fail(ForcesOff::software, "the service has moved, turned or scaled the workspace");
+      fail(Fault::software, "the service has moved, turned or scaled the workspace");
       return;
     }
     if (asked_ns) answer_.write({state, *asked_ns});  // else it came after all patience
   } catch (const Error&) {
     ++unreadable_;
     if (++unreadable_in_a_row_ >= kMostUnreadable) {
-      fail(ForcesOff::unknown, "the service sends what is no state");
+      fail(Fault::unknown, "the service sends what is no state");
     }
   }
 }
@@ -173,13 +166,13 @@ void InverseDevice::look_for_events() {
     try {
       const InverseEvent event = parse_event(*text);
       const bool ours = event.device_id.empty() || same_id(event.device_id, device_.id);
-      const std::optional<ForcesOff> end = end_of(event);
+      const std::optional<Fault> end = end_of(event);
       if (ours && end) fail(*end, words_of(event));
     } catch (const Error&) {
       ++unreadable_;  // an event of a kind that nobody knows ends nothing
     }
   }
-  if (!events_->over().empty()) fail(ForcesOff::unplugged, "events: " + events_->over());
+  if (!events_->over().empty()) fail(Fault::connection, "events: " + events_->over());
 }
 
 /// Until the loop has written another force, or a fraction of a period is over.
@@ -214,9 +207,9 @@ void InverseDevice::exchange_in_turn() noexcept {
       wait_for_order();
     }
   } catch (const std::exception& error) {
-    fail(ForcesOff::unknown, error.what());
+    fail(Fault::unknown, error.what());
   } catch (...) {
-    fail(ForcesOff::unknown, "something that is no error was thrown");
+    fail(Fault::unknown, "something that is no error was thrown");
   }
   say_goodbye();
   over_ = true;
@@ -246,7 +239,7 @@ DeviceAnswer InverseDevice::read(Eigen::Vector3d& position_m) noexcept {
   }
   const double age_s = seconds_between(seen_.asked_ns, now_ns());
   if (preparation_.real_time && age_s > preparation_.watchdog_s) {
-    fail(ForcesOff::unplugged, "the service sends no state");
+    fail(Fault::connection, "no state of the service in the watchdog's time");
     return DeviceAnswer::failed;
   }
   position_m = seen_.state.position_m;
@@ -257,7 +250,7 @@ DeviceAnswer InverseDevice::read(Eigen::Vector3d& position_m) noexcept {
 }
 
 DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
-  if (cut_ || fault_ != ForcesOff::none) return DeviceAnswer::failed;
+  if (cut_ || fault_ != Fault::none) return DeviceAnswer::failed;
   const bool clipped = force_N.norm() > preparation_.max_force_N;
   if (clipped) ++status_.saturations;
   ++written_;
@@ -269,12 +262,12 @@ DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
   } else {
     try {
       if (!exchange(force_message(format_, device_.id, force_to_send()), kPatience_s)) {
-        fail(ForcesOff::unplugged, "the service is silent");
+        fail(Fault::connection, "the service is silent");
         return DeviceAnswer::failed;
       }
       look_for_events();
     } catch (...) {
-      fail(ForcesOff::unknown, "no memory for a message");
+      fail(Fault::unknown, "no memory for a message");
       return DeviceAnswer::failed;
     }
   }
@@ -282,13 +275,32 @@ DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
 }
 
 DeviceStatus InverseDevice::status() noexcept {
-  const ForcesOff fault = fault_.load(std::memory_order_acquire);
-  status_.forces_off = fault == ForcesOff::none && cut_ ? ForcesOff::software : fault;
-  if (fault != ForcesOff::none) {
+  const Fault fault = fault_.load(std::memory_order_acquire);
+  status_.failed = fault == Fault::connection;
+  status_.forces_off = forces_off(fault);
+  if (fault == Fault::none && cut_) status_.forces_off = ForcesOff::software;
+  if (fault != Fault::none) {
     status_.error = 1;
     std::memcpy(status_.error_text, fault_words_.data(), sizeof status_.error_text);
   }
   return status_;
+}
+
+ForcesOff InverseDevice::forces_off(Fault fault) noexcept {
+  switch (fault) {
+    case Fault::none:
+    case Fault::connection:
+      return ForcesOff::none;
+    case Fault::unplugged:
+      return ForcesOff::unplugged;
+    case Fault::software:
+      return ForcesOff::software;
+    case Fault::watchdog:
+      return ForcesOff::watchdog;
+    case Fault::unknown:
+      break;
+  }
+  return ForcesOff::unknown;
 }
 
 /// Time for the comparison of forces. In virtual time the clock says nothing.
@@ -298,8 +310,9 @@ std::int64_t InverseDevice::session_ns() const noexcept {
 }
 
 std::vector<std::string> InverseDevice::findings() const {
-  const std::string found = forces_.finding();
-  return found.empty() ? std::vector<std::string>() : std::vector<std::string>{found};
+  std::vector<std::string> found = noticed_;
+  for (std::string& line : forces_.findings()) found.push_back(std::move(line));
+  return found;
 }
 
 HandState InverseDevice::hand() noexcept {

@@ -21,9 +21,10 @@ namespace tpm::haptics {
 /// of its devices is meant.
 struct InverseAddress {
   int port = 10001;
-  int events_port = 10020;       ///< of versions from 3.5 on
-  int old_http_port = 10000;     ///< of versions before 3.5
-  std::string device_id;         ///< empty: the only one
+  int events_port = 10020;                  ///< of versions from 3.5 on
+  int old_http_port = 10000;                ///< of versions before 3.5
+  std::string device_id;                    ///< in capitals or small letters; empty: by `index`
+  std::optional<int> index = std::nullopt;  ///< in the inventory, from 0; empty: the only one
   double gravity_carried = 1.0;  ///< share of the device's weight that the service is to carry
   bool poll = false;             ///< the thread of the messages looks again and again, for latency
 };
@@ -31,6 +32,9 @@ struct InverseAddress {
 /// Devices that the service lists; nothing is commanded. Throws Error(environment) where
 /// nobody listens or answers, Error(bad_input) for what is no inventory.
 [[nodiscard]] InverseInventory inverse_inventory(const InverseAddress& address);
+/// Why no events of the service are heard, without which no session on it begins; empty: they are,
+/// or its version has none. Throws Error(environment) where no version is told.
+[[nodiscard]] std::string inverse_events_fault(const InverseAddress& address);
 
 /// An Inverse3 through a service that is compatible with the Inverse service: messages over
 /// loopback, no vendor library.
@@ -39,13 +43,16 @@ struct InverseAddress {
 /// with the newest force. The loop meets it in two mailboxes and never waits. A force that the loop
 /// has not renewed for the watchdog's time is replaced by zero, for good. A state is as old as the
 /// message that it answers: older than a period it is no fresh position, older than the watchdog's
-/// time a failed read. In virtual time each write is one message and its state, which only
-/// a simulated device allows.
+/// time a failed read. A connection that stalls or ends is a failed status with what happened, and
+/// no word of the device: only an event of the service says that it is unplugged. In virtual time
+/// each write is one message and its state, which only a simulated device allows.
 ///
 /// open() makes force gate and damping of the service 0, lets it carry the device's weight, and
 /// reads all back; a service in which one of them stays or is not told, or in another scale, is
-/// refused. A workspace that is moved, turned or scaled later ends the session. A reported force
-/// that is not the commanded one is a finding (ForceComparison).
+/// refused. So is a simulated device that another client drives; of hardware that seems to be in
+/// use a finding says so, because no service documents what that means. A workspace that is moved,
+/// turned or scaled later ends the session. A reported force that is not the commanded one is a
+/// finding (ForceComparison).
 class InverseDevice final : public HapticDevice {
  public:
   /// @param limits named in the identity with what they are known by
@@ -59,7 +66,7 @@ class InverseDevice final : public HapticDevice {
   DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
   DeviceStatus status() noexcept override;
   HandState hand() noexcept override;
-  std::vector<std::string> findings() const override;
+  std::vector<std::string> findings() const override;  // from any thread
   void stop() noexcept override;
   void cut_forces() noexcept override;
 
@@ -79,6 +86,7 @@ class InverseDevice final : public HapticDevice {
     std::int64_t asked_ns = 0;  ///< when the message was sent that it answers
   };
   void choose(const InverseInventory& inventory);
+  void look_for_other_clients();
   void make_neutral();
   void require_neutral() const;
   void learn_settings();
@@ -92,7 +100,11 @@ class InverseDevice final : public HapticDevice {
   [[nodiscard]] Eigen::Vector3d force_to_send() noexcept;
   void wait_for_order() noexcept;
   void look_for_events();
-  void fail(ForcesOff cause, std::string_view words) noexcept;
+  /// Why forces no longer reach the hand. `connection`: nothing is known of the device.
+  enum class Fault { none, connection, unplugged, software, watchdog, unknown };
+  [[nodiscard]] static std::optional<Fault> end_of(const InverseEvent& event);
+  [[nodiscard]] static ForcesOff forces_off(Fault fault) noexcept;
+  void fail(Fault fault, std::string_view words) noexcept;
   void say_goodbye() noexcept;
   void wake() noexcept;
   [[nodiscard]] std::int64_t session_ns() const noexcept;
@@ -104,6 +116,7 @@ class InverseDevice final : public HapticDevice {
   std::unique_ptr<WebSocketClient> service_, events_;
   std::int64_t session_ = 0;
   InverseDeviceEntry device_;
+  std::vector<std::string> noticed_;  ///< at the opening
   DeviceIdentity identity_;
   DevicePreparation preparation_;
   bool prepared_ = false;
@@ -119,7 +132,7 @@ class InverseDevice final : public HapticDevice {
   std::atomic<bool> forces_on_{false}, cut_{false}, zero_sent_{false}, ending_{false}, over_{false};
   std::atomic<bool> begun_{false};  ///< the thread of the messages has asked once
   std::atomic<bool> failing_{false};
-  std::atomic<ForcesOff> fault_{ForcesOff::none};
+  std::atomic<Fault> fault_{Fault::none};
   std::array<char, sizeof DeviceStatus::error_text> fault_words_{};  ///< before fault_ is set
   Socket wake_;                                                      ///< an eventfd
   // Of the thread of the messages.

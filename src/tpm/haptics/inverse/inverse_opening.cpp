@@ -5,17 +5,61 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <ctime>
 
 #include "tpm/haptics/inverse/inverse_device.hpp"
 #include "tpm/haptics/inverse/service_terms.hpp"
+#include "tpm/haptics/loop/real_time.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 namespace {
 
 constexpr std::string_view kProfile = "org.tpmkit:tpm-hil";
+/// A client that has ended is gone within this time, and one that is silent drives no more.
+constexpr double kUntilFree_s = 2.5;
+
+/// "3 devices: 049D, 0A14, 1B20".
+std::string devices_there(const InverseInventory& inventory) {
+  const std::size_t count = inventory.devices.size();
+  std::vector<std::string> ids;
+  for (const InverseDeviceEntry& entry : inventory.devices) ids.push_back(printable(entry.id));
+  return count == 0
+             ? "no device"
+             : fmt::format("{} device{}: {}", count, count == 1 ? "" : "s", fmt::join(ids, ", "));
+}
+
+/// Empty: none is told there.
+std::string version_at(int port, const char* target) {
+  try {
+    return parse_version(http_exchange(port, target, "", kPatience_s));
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+/// Throws Error(environment) if none is told.
+std::string told_version(const InverseAddress& address) {
+  std::string version = version_at(address.port, "/version");
+  if (version.empty()) version = version_at(address.port, "/3.0/version");
+  if (version.empty()) version = version_at(address.old_http_port, "/3.0/version");
+  if (!version.empty()) return version;
+  throw service_fault(
+      fmt::format("no version is told on ports {} and {}", address.port, address.old_http_port),
+      "GET /version or /3.0/version");
+}
 
 }  // namespace
+
+std::string inverse_events_fault(const InverseAddress& address) {
+  if (format_of_version(told_version(address)) != InverseFormat::vector) return {};
+  try {
+    const WebSocketClient events(address.events_port, "/", kPatience_s, kMostMessageBytes);
+    return {};
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
 
 InverseInventory inverse_inventory(const InverseAddress& address) {
   WebSocketClient service(address.port, "/", kPatience_s, kMostInventoryBytes);
@@ -36,22 +80,56 @@ std::string InverseDevice::take_text(double timeout_s) {
 
 /// The device that is meant, of those in the inventory.
 void InverseDevice::choose(const InverseInventory& inventory) {
-  std::vector<std::string> ids;
-  const InverseDeviceEntry* meant = nullptr;
-  for (const InverseDeviceEntry& entry : inventory.devices) {
-    ids.push_back(entry.id);
-    if (address_.device_id.empty() ? inventory.devices.size() == 1
-                                   : entry.id == address_.device_id) {
-      meant = &entry;
+  const std::vector<InverseDeviceEntry>& all = inventory.devices;
+  const std::string there = fmt::format("the service has {}", devices_there(inventory));
+  auto meant = all.end();
+  if (all.empty()) throw service_fault(there, "one that is plugged in");
+  if (!address_.device_id.empty()) {
+    meant = std::ranges::find_if(
+        all, [this](const auto& entry) { return same_id(entry.id, address_.device_id); });
+    if (meant == all.end()) {
+      throw service_fault(
+          fmt::format("'{}' is not there: {}", printable(address_.device_id), there),
+          "--serial with one of these");
     }
-  }
-  if (meant == nullptr) {
-    throw service_fault(fmt::format("the service has {} such devices{}", ids.size(),
-                                    ids.empty() ? "" : fmt::format(": {}", fmt::join(ids, ", "))),
-                        "one device, or --inverse-id with one of them");
+  } else if (address_.index) {
+    const int count = static_cast<int>(all.size());
+    if (*address_.index < 0 || *address_.index >= count) {
+      throw service_fault(fmt::format("there is no device {}: {}", *address_.index, there),
+                          fmt::format("--index from 0 to {}", count - 1));
+    }
+    meant = all.begin() + *address_.index;
+  } else if (all.size() > 1) {
+    throw service_fault(there, "--serial with one of these, or --index with its place from 0 on");
+  } else {
+    meant = all.begin();
   }
   session_ = inventory.session;
   device_ = *meant;
+}
+
+/// Of a simulated device it is documented what `in_use` says: a second client would only read. A
+/// client that has just ended gets the time to be gone.
+void InverseDevice::look_for_other_clients() {
+  const std::int64_t until_ns = now_ns() + static_cast<std::int64_t>(kUntilFree_s * 1e9);
+  while (device_.simulated && device_.in_use) {
+    if (now_ns() > until_ns) {
+      throw service_fault(
+          fmt::format("another client drives the device {} (status in_use)", printable(device_.id)),
+          "a device that nobody drives: end that client");
+    }
+    constexpr timespec kLook{0, 20'000'000};
+    (void)::nanosleep(&kLook, nullptr);
+    const InverseInventory now = read_back();
+    const auto found = std::ranges::find(now.devices, device_.id, &InverseDeviceEntry::id);
+    device_.in_use = found != now.devices.end() && found->in_use;
+  }
+  const bool commanded = !device_.control_mode.empty() && device_.control_mode != "idle";
+  if (device_.simulated || !(device_.in_use || commanded)) return;
+  noticed_.push_back(fmt::format(
+      "another client may use the device {} (status in_use {}, control mode '{}'): end it, or its "
+      "forces add to those of this session",
+      printable(device_.id), device_.in_use, printable(device_.control_mode)));
 }
 
 /// What the service says of its devices now, as this session sees them.
@@ -157,26 +235,14 @@ void InverseDevice::identify() {
 }
 
 const DeviceIdentity& InverseDevice::open() {
-  const auto version_at = [](int port, const char* target) -> std::string {
-    try {
-      return parse_version(http_exchange(port, target, "", kPatience_s));
-    } catch (const Error&) {
-      return {};
-    }
-  };
   // The WebSocket first: where nobody listens at all, its message says so.
   service_ =
       std::make_unique<WebSocketClient>(address_.port, "/", kPatience_s, kMostInventoryBytes);
-  version_ = version_at(address_.port, "/version");
-  if (version_.empty()) version_ = version_at(address_.port, "/3.0/version");
-  if (version_.empty()) version_ = version_at(address_.old_http_port, "/3.0/version");
-  if (version_.empty()) {
-    throw service_fault(
-        fmt::format("no version is told on ports {} and {}", address_.port, address_.old_http_port),
-        "GET /version or /3.0/version");
-  }
+  version_ = told_version(address_);
   format_ = format_of_version(version_);
+  noticed_.clear();
   choose(parse_inventory(take_text(kPatience_s)));
+  look_for_other_clients();
   if (format_ == InverseFormat::vector) {
     events_ = std::make_unique<WebSocketClient>(address_.events_port, "/", kPatience_s,
                                                 kMostMessageBytes);

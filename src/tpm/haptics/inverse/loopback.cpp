@@ -22,6 +22,7 @@ namespace {
 using LoopbackClock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostAnswerBytes = 1'048'576;
+constexpr const char* kReset = "the connection to the service was reset";
 
 LoopbackClock::time_point after_s(double seconds) {
   return LoopbackClock::now() + std::chrono::duration_cast<LoopbackClock::duration>(
@@ -56,24 +57,33 @@ bool would_wait() {
   return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
 }
 
-bool send_all(int handle, std::string_view bytes, LoopbackClock::time_point until) {
+enum class Sent { all, late, broken };
+
+Sent send_all(int handle, std::string_view bytes, LoopbackClock::time_point until) {
   while (!bytes.empty()) {
     const ssize_t count = ::send(handle, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (count > 0) {
       bytes.remove_prefix(static_cast<std::size_t>(count));
-    } else if (!would_wait() || !ready(handle, POLLOUT, until)) {
-      return false;
+    } else if (!would_wait()) {
+      return Sent::broken;
+    } else if (!ready(handle, POLLOUT, until)) {
+      return Sent::late;
     }
   }
-  return true;
+  return Sent::all;
 }
 
-/// Appends what is there; -1: nothing for now, 0: the other side is done, or the socket broke.
+constexpr ssize_t kNothingYet = -1, kBroken = -2;
+
+/// Appends what is there and returns its size, or one of the two above; 0: the other side is done.
 ssize_t append_received(int handle, std::string& bytes) {
   std::array<char, 16'384> block;
   const ssize_t count = ::recv(handle, block.data(), block.size(), 0);
-  if (count > 0) bytes.append(block.data(), static_cast<std::size_t>(count));
-  return count < 0 && !would_wait() ? 0 : count;
+  if (count >= 0) {
+    bytes.append(block.data(), static_cast<std::size_t>(count));
+    return count;
+  }
+  return would_wait() ? kNothingYet : kBroken;
 }
 
 Error port_fault(int port, std::string_view what) {
@@ -86,8 +96,9 @@ std::string received(int handle, std::string_view end, LoopbackClock::time_point
   std::string bytes;
   while (bytes.size() < kMostAnswerBytes) {
     const ssize_t count = append_received(handle, bytes);
-    if (count == 0 || (!end.empty() && bytes.find(end) != bytes.npos)) break;
-    if (count < 0 && !ready(handle, POLLIN, until)) break;
+    if (count == 0 || count == kBroken) break;
+    if (!end.empty() && bytes.find(end) != bytes.npos) break;
+    if (count == kNothingYet && !ready(handle, POLLIN, until)) break;
   }
   return bytes;
 }
@@ -171,7 +182,9 @@ std::string http_exchange(int port, std::string_view target, std::string_view bo
                 "POST {} HTTP/1.1\r\nHost: localhost:{}\r\nConnection: close\r\n"
                 "Content-Type: application/json\r\nContent-Length: {}\r\n\r\n{}",
                 target, port, body.size(), body);
-  if (!send_all(socket.handle(), request, until)) throw port_fault(port, "does not read");
+  if (send_all(socket.handle(), request, until) != Sent::all) {
+    throw port_fault(port, "does not read");
+  }
   const std::string answer = received(socket.handle(), "", until);
   const std::optional<HttpHead> head = parse_http_head(answer);
   if (!head || head->start[1] != "200") {
@@ -189,7 +202,7 @@ WebSocketClient::WebSocketClient(int port, std::string_view target, double timeo
     : socket_(connect_to_loopback(port, timeout_s)), reader_(WebSocketSide::client, most_bytes) {
   const auto until = after_s(timeout_s);
   const std::string key = fresh_web_socket_key();
-  if (!send_all(socket_.handle(), upgrade_request(port, target, key), until)) {
+  if (send_all(socket_.handle(), upgrade_request(port, target, key), until) != Sent::all) {
     throw port_fault(port, "does not read");
   }
   const std::string answer = received(socket_.handle(), "\r\n\r\n", until);
@@ -203,14 +216,42 @@ bool WebSocketClient::send_frame(FrameKind kind, std::string_view payload,
                                  double timeout_s) noexcept {
   try {
     if (!over_.empty()) return false;
-    if (send_all(socket_.handle(), frame_bytes(kind, payload, fresh_mask()), after_s(timeout_s))) {
-      return true;
+    switch (
+        send_all(socket_.handle(), frame_bytes(kind, payload, fresh_mask()), after_s(timeout_s))) {
+      case Sent::all:
+        return true;
+      case Sent::late:
+        over_ = "the service does not read";
+        break;
+      case Sent::broken:
+        learn_end();
+        break;
     }
-    over_ = "the service does not read";
   } catch (const std::exception& error) {
     over_ = error.what();
   }
   return false;
+}
+
+/// Of a connection that takes nothing more: a close frame may have come before it broke.
+void WebSocketClient::learn_end() {
+  std::string bytes;
+  while (append_received(socket_.handle(), bytes) > 0) {
+  }
+  reader_.feed(bytes);
+  while (const std::optional<WebSocketMessage> message = reader_.next()) {
+    if (message->kind == FrameKind::close) take_close(*message);
+  }
+  if (over_.empty()) over_ = kReset;
+}
+
+void WebSocketClient::take_close(const WebSocketMessage& message) {
+  constexpr std::size_t kMostReason = 24;  // the words of a fault have 63 characters
+  close_code_ = message.close_code;
+  const std::string reason = message.payload.empty()
+                                 ? std::string(words_of_close(message.close_code))
+                                 : printable(message.payload, kMostReason);
+  over_ = fmt::format("the service closed with {} ({})", message.close_code, reason);
 }
 
 bool WebSocketClient::send(std::string_view text, double timeout_s) noexcept {
@@ -227,9 +268,8 @@ std::optional<std::string> WebSocketClient::next_text() {
         (void)send_frame(FrameKind::pong, message->payload, kControl_s);
         break;
       case FrameKind::close:
-        close_code_ = message->close_code;
         (void)send_frame(FrameKind::close, close_payload(kCloseNormal, ""), kControl_s);
-        over_ = fmt::format("the service closed the connection with {}", message->close_code);
+        take_close(*message);  // whether or not it took the answer
         return std::nullopt;
       default:
         break;
@@ -254,7 +294,9 @@ std::optional<std::string> WebSocketClient::receive(double timeout_s, bool poll)
     if (count > 0) {
       reader_.feed(bytes);
     } else if (count == 0) {
-      over_ = "the service is gone";
+      over_ = "the service is gone, without a close frame";
+    } else if (count == kBroken) {
+      over_ = kReset;
     } else if (poll ? LoopbackClock::now() >= until : !ready(socket_.handle(), POLLIN, until)) {
       break;
     }

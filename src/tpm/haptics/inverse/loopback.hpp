@@ -65,6 +65,8 @@ class WebSocketClient {
   bool send_frame(FrameKind kind, std::string_view payload, double timeout_s) noexcept;
   /// Takes a text from what has been read; handles control frames.
   [[nodiscard]] std::optional<std::string> next_text();
+  void learn_end();
+  void take_close(const WebSocketMessage& message);
 
   Socket socket_;
   WebSocketReader reader_;

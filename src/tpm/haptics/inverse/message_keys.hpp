@@ -20,7 +20,9 @@ inline constexpr const char *device = "inverse3", *id = "device_id", *config = "
                             *permutation = "permutation", *mount = "mount", *rotation = "rotation",
                             *scale = "scale", *gravity = "gravity_compensation",
                             *enabled = "enabled", *factor = "scaling_factor",
-                            *torque = "torque_scaling", *set_buttons = "set_buttons";
+                            *torque = "torque_scaling", *set_buttons = "set_buttons",
+                            *status = "status", *in_use = "in_use", *mode = "control_mode",
+                            *probe = "probe_position";
 inline constexpr const char* grips[] = {"wireless_verse_grip", "verse_grip", "custom_verse_grip"};
 inline constexpr const char* button_names[][2] = {
     {"a", "button_0"}, {"b", "button_1"}, {"c", "button_2"}};

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <functional>
+#include <initializer_list>
 
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/inverse/message_keys.hpp"
@@ -17,6 +19,7 @@ namespace key = inverse_key;
 
 constexpr std::size_t kMostCharacters = 64;  // of an identifier
 constexpr double kMostNumber = 1e6;          // metres, newtons and the like
+constexpr std::size_t kMostUnread = 16;      // names in a message
 
 /// A value with the place where it stands, for messages.
 class Part {
@@ -49,6 +52,16 @@ class Part {
   }
   [[nodiscard]] bool is(std::string_view words) const {
     return json_->is_string() && json_->get<std::string>() == words;
+  }
+  [[nodiscard]] bool is_true() const { return json_->is_boolean() && json_->get<bool>(); }
+  /// Adds names of an object that are not in a list, shortened.
+  void add_others(std::vector<std::string>& others,
+                  std::initializer_list<std::string_view> known) const {
+    if (!json_->is_object()) return;
+    for (const auto& [name, value] : json_->items()) {
+      if (others.size() == kMostUnread) return;
+      if (std::ranges::find(known, name) == known.end()) others.push_back(printable(name, 40));
+    }
   }
   /// What can be shown of a text; empty for anything else.
   [[nodiscard]] std::string words(std::size_t most = kMostCharacters) const {
@@ -166,6 +179,19 @@ InverseSettings settings_of(const Part& config) {
   return s;
 }
 
+/// Whether a device says that it is simulated. Any other word than these is none of a simulation:
+/// hardware keeps its guards.
+bool says_simulated(const Part& part) {
+  bool said = false;
+  for (const char* place : {key::config, key::status, key::state}) {
+    if (!part.has(place) || !part.at(place).has(key::simulated)) continue;
+    const Part word = part.at(place).at(key::simulated);
+    if (!word.is_true() && !word.is(key::simulated_words)) return false;
+    said = true;
+  }
+  return said;
+}
+
 InverseDeviceEntry entry_of(const Part& part) {
   InverseDeviceEntry entry;
   entry.id = part.at(key::id).text();
@@ -179,11 +205,15 @@ InverseDeviceEntry entry_of(const Part& part) {
                                    info.at("minor_version").number());
     }
   }
-  // Anything else than these words is no word of a simulation: hardware keeps its guards.
-  entry.simulated =
-      config.has(key::simulated) && config.at(key::simulated).is(key::simulated_words);
+  entry.simulated = says_simulated(part);
+  if (part.has(key::status) && part.at(key::status).has(key::in_use)) {
+    entry.in_use = part.at(key::status).at(key::in_use).is_true();
+  }
   entry.settings = settings_of(config);
   entry.state = state_of(part.at(key::state));
+  if (part.at(key::state).has(key::mode)) {
+    entry.control_mode = part.at(key::state).at(key::mode).words();
+  }
   return entry;
 }
 
@@ -312,14 +342,19 @@ InverseCommand parse_command(std::string_view text, std::string_view device_id) 
                                                     : key::values;
         command.position_m = place.at(form).vector();
       }
+      said.add_others(command.unread, {key::force, key::place, key::probe});
     }
     if (!part.has(key::configure)) return;
     const Part set = part.at(key::configure);
+    set.add_others(command.unread, {key::gate, key::damping, key::preset, key::basis});
     if (set.has(key::gate)) command.force_gate_gain = set.at(key::gate).at(key::gain).number();
-    if (set.has(key::damping) && set.at(key::damping).has(key::scalar)) {
-      command.damping = set.at(key::damping).at(key::scalar).number();
+    if (set.has(key::damping)) {
+      const Part damping = set.at(key::damping);
+      if (damping.has(key::scalar)) command.damping = damping.at(key::scalar).number();
+      command.directional_damping = vector_or_zero(damping, key::vector);
     }
     if (set.has(key::preset)) command.preset = set.at(key::preset).at(key::preset).text();
+    if (set.has(key::basis)) command.basis = set.at(key::basis).at(key::permutation).text();
   });
   return command;
 }

@@ -75,7 +75,11 @@ struct InverseState {
 
 struct InverseDeviceEntry {
   std::string id, type, firmware;
-  bool simulated = false;  ///< it says so itself: SIMULATED DEVICE
+  /// It says so itself: `simulated_device`, true or SIMULATED DEVICE, in its config, status or
+  /// state, and nowhere otherwise.
+  bool simulated = false;
+  bool in_use = false;  ///< its status says so; which use that is is documented for tpm hil serve
+  std::string control_mode;  ///< "idle": nobody commands it; empty: not named
   InverseSettings settings;
   InverseState state;
 };
@@ -96,7 +100,11 @@ struct InverseCommand {
   std::optional<Eigen::Vector3d> force_N, position_m;
   std::string profile;  ///< of a program that registers itself; else empty
   std::string preset;   ///< of the coordinates; empty: not asked for
+  std::string basis;    ///< the same of the axes
   std::optional<double> force_gate_gain, damping;
+  Eigen::Vector3d directional_damping = Eigen::Vector3d::Zero();
+  /// Settings and commands that are not read, by their names as far as they can be shown.
+  std::vector<std::string> unread;
   /// Of the simulated grip: a, b, c. An addition of tpm hil serve to the protocol.
   std::optional<std::uint32_t> buttons;
   bool of_another_device = false;  ///< some of the message

@@ -26,9 +26,9 @@ std::string json_text(std::string_view text) {
 std::string state_text(const InverseState& state) {
   return fmt::format(
       R"({{"cursor_position":{},"cursor_velocity":{},"current_cursor_force":{},"control_domain":)"
-      R"("cartesian","control_mode":"force"}})",
+      R"("cartesian","{}":"{}"}})",
       vector_text(state.position_m), vector_text(state.velocity_m_per_s),
-      vector_text(state.force_N));
+      vector_text(state.force_N), key::mode, state.driven ? "force" : "idle");
 }
 
 std::string pressed_text(std::uint32_t buttons) {
@@ -44,8 +44,8 @@ std::string pressed_text(std::uint32_t buttons) {
 std::string status_text(bool simulated, bool driven) {
   if (!simulated) return "{}";
   return fmt::format(
-      R"({{"{}":"{}","calibrated":true,"in_use":{},"power_supply":true,"ready":true,"started":true}})",
-      key::simulated, key::simulated_words, driven);
+      R"({{"{}":"{}","calibrated":true,"{}":{},"power_supply":true,"ready":true,"started":true}})",
+      key::simulated, key::simulated_words, key::in_use, driven);
 }
 
 std::string grips_text(const InverseState& state, bool simulated) {

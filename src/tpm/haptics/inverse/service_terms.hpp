@@ -1,4 +1,6 @@
 #pragma once
+#include <algorithm>
+#include <cctype>
 #include <string_view>
 
 #include "tpm/haptics/inverse/messages.hpp"
@@ -12,6 +14,12 @@ inline constexpr double kPatience_s = 2.0;
 /// A service with which no session can begin.
 inline Error service_fault(std::string_view what, std::string_view expected) {
   return {ExitCode::environment, "inverse3", what, expected};
+}
+
+/// Identifiers are told in capitals or small letters.
+inline bool same_id(std::string_view a, std::string_view b) {
+  return std::ranges::equal(
+      a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
 /// Rotations and scales within these are none.

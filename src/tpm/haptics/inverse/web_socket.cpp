@@ -125,6 +125,31 @@ std::string close_payload(std::uint16_t code, std::string_view reason) {
   return payload.append(reason.substr(0, kMostControlBytes - 2));
 }
 
+std::string_view words_of_close(std::uint16_t code) noexcept {
+  switch (code) {
+    case kCloseNormal:
+      return "normal";
+    case kCloseGoingAway:
+      return "going away";
+    case kCloseProtocolError:
+      return "protocol error";
+    case 1003:
+      return "unsupported data";
+    case kCloseBadText:
+      return "text that is not UTF-8";
+    case kClosePolicy:
+      return "policy";
+    case kCloseTooBig:
+      return "message too big";
+    case 1010:
+      return "an extension is missing";
+    case 1011:
+      return "internal error";
+    default:
+      return "no reason";
+  }
+}
+
 FrameMask fresh_mask() {
   FrameMask mask{};
   fill_random(mask.data(), mask.size());
@@ -386,10 +411,15 @@ bool is_origin_of(std::string_view origin, int port) {
          origin == fmt::format("http://localhost:{}", port);
 }
 
+bool names_this_host(std::string_view host, int port) {
+  const std::size_t colon = host.find(':');
+  const std::string name = lower(host.substr(0, colon));
+  return (name == "127.0.0.1" || name == "localhost") &&
+         (colon == host.npos || host.substr(colon + 1) == std::to_string(port));
+}
+
 bool names_this_host(const HttpHead& request, int port) {
-  const std::string host = request.value("host");
-  return request.count("host") == 1 &&
-         (host == fmt::format("127.0.0.1:{}", port) || host == fmt::format("localhost:{}", port));
+  return request.count("host") == 1 && names_this_host(request.value("host"), port);
 }
 
 UpgradeAnswer answer_upgrade(const HttpHead& request, int port,

@@ -27,6 +27,9 @@ inline constexpr std::uint16_t kCloseNormal = 1000, kCloseGoingAway = 1001,
                                kCloseProtocolError = 1002, kCloseBadText = 1007,
                                kClosePolicy = 1008, kCloseTooBig = 1009;
 
+/// What a status code means; for one that RFC 6455 does not list, "no reason".
+[[nodiscard]] std::string_view words_of_close(std::uint16_t code) noexcept;
+
 using FrameMask = std::array<std::uint8_t, 4>;
 
 /// The bytes of one frame. A client masks each frame, a server none.
@@ -130,7 +133,12 @@ struct UpgradeAnswer {
                                            const std::vector<int>& page_ports);
 /// A page of this machine at this port.
 [[nodiscard]] bool is_origin_of(std::string_view origin, int port);
-/// True if Host is there once and names this machine and port.
+/// True if a Host is a name of this machine: 127.0.0.1 or localhost, in any case, with this port or
+/// none. One without a port stands for port 80 (RFC 9110, 7.2) and is accepted all the same: the
+/// check is there for names that were made to point here, and a browser sends such a Host to port
+/// 80 only.
+[[nodiscard]] bool names_this_host(std::string_view host, int port);
+/// The same of the field of a request, which has to be there once.
 [[nodiscard]] bool names_this_host(const HttpHead& request, int port);
 /// A whole answer that closes the connection.
 [[nodiscard]] std::string http_answer(std::string_view status, std::string_view type,

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <set>
 
 #include "tpm/haptics/loop/real_time.hpp"
 #include "tpmkit/error.hpp"
@@ -39,18 +40,15 @@ struct InverseServer::Connection {
   bool events = false, centred = false, shut = false;
   bool turned_away = false;    ///< beyond the number that is served: told so, and nothing more
   std::int64_t pushed_ns = 0;  ///< its last force as the driver
-  unsigned told = 0;           ///< bits of Once
   std::string head, out;
   WebSocketReader reader{WebSocketSide::server, kMostMessageBytes};
   std::size_t discarded = 0;
   int lines = 0;
+  std::set<std::string> told;  ///< said to the log once, however often the client does it
 
-  /// What is said to the log once of a client, however often it does it.
-  enum class Once : unsigned { reads = 1, moves_not = 2, far = 4, another_device = 8 };
-  [[nodiscard]] bool first(Once what) {
-    const bool is_first = (told & static_cast<unsigned>(what)) == 0;
-    told |= static_cast<unsigned>(what);
-    return is_first;
+  [[nodiscard]] bool first(const std::string& what) {
+    const bool room = told.size() < static_cast<std::size_t>(kMostLines);  // it may name anything
+    return room && told.insert(what).second;
   }
   void enter(Stage next) {
     stage = next;
@@ -356,13 +354,9 @@ void InverseServer::take_text(Connection& c, const std::string& text) {
 }
 
 void InverseServer::obey(Connection& c, const InverseCommand& command) {
-  using Once = Connection::Once;
   if (!command.profile.empty()) say(c, "registers as " + command.profile);
-  if (command.force_gate_gain && *command.force_gate_gain == 0.0) {
-    settings_.device.settings.force_gate_gain = 0.0;  // there is no gate to switch on
-  }
-  if (!command.preset.empty()) c.centred = command.preset == kCentredPreset;
-  if (command.of_another_device && c.first(Once::another_device)) {
+  set(c, command);
+  if (command.of_another_device && c.first("another device")) {
     say(c, "speaks to a device that is not here");
   }
   if (command.position_m) move(c, *command.position_m);
@@ -384,13 +378,46 @@ void InverseServer::obey(Connection& c, const InverseCommand& command) {
     return hand_.push(*command.force_N);
   }
   if (driver_ == 0) return;  // zero, and the hand feels none
-  if (c.first(Once::reads)) say(c, fmt::format("reads only, client {} drives", driver_));
+  if (c.first("reads")) say(c, fmt::format("reads only, client {} drives", driver_));
+}
+
+/// What a client configures. There is neither a gate nor a damping to switch on, and one basis.
+void InverseServer::set(Connection& c, const InverseCommand& command) {
+  InverseSettings& device = settings_.device.settings;
+  const auto stays = [&](const std::string& kind, const std::string& asked, std::string_view kept) {
+    if (!c.first(kind)) return;
+    say(c, fmt::format("asks for {} {}; it stays {}", kind, printable(asked), kept));
+  };
+  const std::string& preset = command.preset;
+  if (!preset.empty() && (preset == kCentredPreset || preset == device.preset)) {
+    c.centred = preset == kCentredPreset;
+  } else if (!preset.empty()) {
+    stays("the preset", preset, c.centred ? kCentredPreset : std::string_view(device.preset));
+  }
+  if (!command.basis.empty() && command.basis != device.basis) {
+    stays("the basis", command.basis, device.basis);
+  }
+  if (command.force_gate_gain.value_or(0.0) != 0.0) {
+    stays("a force gate of", fmt::format("{}", *command.force_gate_gain),
+          fmt::format("{}", device.force_gate_gain));
+  } else if (command.force_gate_gain) {
+    device.force_gate_gain = 0.0;
+  }
+  const Eigen::Vector3d& by_direction = command.directional_damping;
+  if (command.damping.value_or(0.0) != 0.0 || !by_direction.isZero()) {
+    stays("a damping of",
+          fmt::format("{}, by direction {} {} {}", command.damping.value_or(0.0), by_direction.x(),
+                      by_direction.y(), by_direction.z()),
+          fmt::format("{}", device.damping));
+  }
+  for (const std::string& name : command.unread) {
+    if (c.first(name)) say(c, fmt::format("asks for {}, which is not here", name));
+  }
 }
 
 void InverseServer::move(Connection& c, const Eigen::Vector3d& position_m) {
-  using Once = Connection::Once;
   if (position_m.norm() > kFarthest_m) {
-    if (c.first(Once::far)) {
+    if (c.first("far")) {
       say(c, fmt::format("asks for a place {:.3g} m away; expected at most {} m", position_m.norm(),
                          kFarthest_m));
     }
@@ -398,7 +425,7 @@ void InverseServer::move(Connection& c, const Eigen::Vector3d& position_m) {
   }
   if (mover_ == 0) mover_ = c.session;
   if (mover_ != c.session) {
-    if (c.first(Once::moves_not)) {
+    if (c.first("moves not")) {
       say(c, fmt::format("does not move the hand, client {} does", mover_));
     }
     return;

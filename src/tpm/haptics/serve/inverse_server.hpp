@@ -46,8 +46,9 @@ struct InverseServerSettings {
 
 /// A server that is compatible with the Inverse service, on 127.0.0.1: an inventory first, then
 /// exactly one state for each message. The first client that asks for a force drives until it
-/// leaves, or asks for nothing in two seconds; others read. What strangers can take is bounded:
-/// connections, bytes, lines of the log.
+/// leaves, or asks for nothing in two seconds; others read. A setting that this device does not
+/// have stays, and the log says so. What strangers can take is bounded: connections, bytes, lines
+/// of the log.
 class InverseServer {
  public:
   /// @param hand must live as long as this. Throws Error(environment) if the port is taken.
@@ -81,6 +82,7 @@ class InverseServer {
   void take_messages(Connection& c);
   void take_text(Connection& c, const std::string& text);
   void obey(Connection& c, const InverseCommand& command);
+  void set(Connection& c, const InverseCommand& command);
   void move(Connection& c, const Eigen::Vector3d& position_m);
   void fault(Connection& c, std::uint16_t code, const std::string& why);
   void release(Connection& c);

@@ -170,6 +170,9 @@ DelayCheck check_delay(const std::shared_ptr<HapticDevice>& device, const Device
   move_handle(run, samples, device, choice, like, second);
   DelayCheck check;
   check.cause = run.outcome.cause;
+  check.detail = run.outcome.detail;
+  const std::string_view said = run.outcome.device.error_text;
+  if (!said.empty()) check.detail.append(check.detail.empty() ? "" : "; ").append(said);
   if (check.cause == StopCause::finished) {
     check.delay_s = checked_delay_s(samples, like.servo.period_s);
   }

@@ -51,6 +51,7 @@ using MakesDevice = std::function<std::shared_ptr<HapticDevice>()>;
 struct DelayCheck {
   std::optional<double> delay_s;  ///< both paths together, see checked_delay_s(); empty: not found
   StopCause cause = StopCause::none;
+  std::string detail;  ///< of the cause, in words of loop and device; may be empty
 };
 /// Measures the delay of a device for a second with the forces of the identification, once the
 /// handle is in place and at rest; a hand may hold it, but not move it. The device is closed

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "tpm/files/file.hpp"
+#include "tpm/haptics/inverse/web_socket.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
@@ -195,10 +196,8 @@ class PageServer::Service {
             return Handling::Handled;
           }
           // A page of somebody else whose name was made to point here says another name.
-          const std::string host = request.get_header_value("Host");
           if (request.get_header_value_count("Host") == 1 &&
-              (host == fmt::format("127.0.0.1:{}", port_) ||
-               host == fmt::format("localhost:{}", port_))) {
+              names_this_host(request.get_header_value("Host"), port_)) {
             return Handling::Unhandled;
           }
           response.status = 403;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 
 #include "tpm/files/row_log.hpp"
 #include "tpm/haptics/device/device_file.hpp"
@@ -69,11 +70,30 @@ class Markers {
   Json list_ = Json::array();
 };
 
+/// Tells each finding of a device once, though its numbers grow.
+class Notices {
+ public:
+  Notices(const HapticDevice& device, std::function<void(const std::string&)> tell)
+      : device_(device), tell_(std::move(tell)) {}
+  void look() {
+    if (!tell_) return;
+    for (const std::string& line : device_.findings()) {
+      if (told_.insert(line.substr(0, line.find_first_of("0123456789"))).second) tell_(line);
+    }
+  }
+
+ private:
+  const HapticDevice& device_;
+  std::function<void(const std::string&)> tell_;
+  std::set<std::string> told_;  ///< up to their first number
+};
+
 /// @param prepare prepares the device and lets the recording appear
 ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
                       const std::shared_ptr<ContactModel>& stepped, const ServoSettings& servo,
                       const SessionRunOptions& options, RowLogWriter& log, Markers& markers,
-                      double& largest_force_N, const std::function<void()>& prepare) {
+                      double& largest_force_N, Notices& notices,
+                      const std::function<void()>& prepare) {
   const RecordSink sink = [&](const ServoRecord& written) {
     ServoRecord row = written;
     const bool waits = row.phase < 0 && row.stop == StopCause::none;
@@ -97,9 +117,10 @@ ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDev
   real.interrupted = options.interrupted;
   real.prepare = prepare;
   std::int64_t passed_on_ns = now_ns();
-  real.idle = [&log, &passed_on_ns] {
+  real.idle = [&log, &notices, &passed_on_ns] {
     if (now_ns() - passed_on_ns < kPassOnEvery_ns) return;
     log.flush();
+    notices.look();
     passed_on_ns = now_ns();
   };
   return run_in_real_time(device, stepped, servo, sink, real);
@@ -175,6 +196,25 @@ DeviceLimits checked_limits(const DeviceLimits& limits, const DelayCheck& check)
   return now;
 }
 
+/// Why the check before a session ended early, and what would help.
+Error ended_check(const DelayCheck& check) {
+  constexpr const char* kWhere = "delay of the device";
+  if (check.cause == StopCause::signal) {
+    return {ExitCode::environment, kWhere,
+            "the check of a second before the session was interrupted", ""};
+  }
+  const char* expected = check.cause == StopCause::not_in_place
+                             ? "a handle at rest in the middle of its workspace"
+                         : check.cause == StopCause::unplugged
+                             ? "a device that stays connected"
+                             : "a device that answers in time; tpm hil check looks for stalls";
+  return {ExitCode::environment, kWhere,
+          fmt::format("the check of a second before the session ended early: {}{}{}",
+                      word_of(check.cause), check.detail.empty() ? "" : ": ",
+                      printable(check.detail, 200)),
+          expected};
+}
+
 /// Measures the delay for a second, and the rendering once more with what was found. Throws as
 /// run_session().
 template <class MakeDevice>
@@ -186,13 +226,11 @@ void check_at_start(SessionRun& run, const HilSession& session, const DeviceChoi
   second.wish = options.wish;
   second.interrupted = options.interrupted;
   second.opened = [&choice](const DeviceIdentity& device) { require_same_device(choice, device); };
-  const DelayCheck check = check_delay(make(), choice, session, second);
-  if (check.cause != StopCause::finished) {
-    throw Error(ExitCode::environment, "delay of the device",
-                "the check of a second before the session ended early: " +
-                    std::string(word_of(check.cause)),
-                "a handle at rest in the middle of its workspace");
+  if (options.checking) {
+    options.checking(std::min(kMostIdentifyingForce_N, session.servo.force_limit_N));
   }
+  const DelayCheck check = check_delay(make(), choice, session, second);
+  if (check.cause != StopCause::finished) throw ended_check(check);
   run.rendering = check_rendering(session, model, run.model, checked_limits(limits, check));
   run.rendering.delay_at_start_s = check.delay_s;
   if (!check.delay_s) {
@@ -234,6 +272,8 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
     require_same_device(choice, run.device);
     require_clock(choice, run.device, options.real_time);
     if (options.opened) options.opened(run.device, run.model);
+    Notices notices(*device, options.noticed);
+    notices.look();
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time,
                                               options.notes, to_json(run.rendering))),
@@ -241,12 +281,13 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
     const ServoSettings servo =
         loop_settings(session, run.model, run.rendering, choice.kind != "replay");
     Markers markers(options.markers);
-    run.outcome =
-        run_loop(session, device, stepped, servo, options, log, markers, run.largest_force_N, [&] {
-          device->prepare(preparation);
-          log.appear();
-        });
+    run.outcome = run_loop(session, device, stepped, servo, options, log, markers,
+                           run.largest_force_N, notices, [&] {
+                             device->prepare(preparation);
+                             log.appear();
+                           });
     run.findings = device->findings();
+    notices.look();
     Json closing = recording_closing(run.outcome);
     if (!run.findings.empty()) closing["device_findings"] = run.findings;
     if (!markers.list().empty()) closing["markers"] = markers.list();

@@ -43,6 +43,9 @@ struct SessionRunOptions {
   /// session (check_delay() in identify_run.hpp). The larger delay counts; without an answer the
   /// device counts as not measured. A device of the caller (run_session_on) is not checked.
   bool check_delay = true;
+  /// Called right before that check, with the device still closed: the handle will be pushed.
+  /// @param most_N the largest force
+  std::function<void(double most_N)> checking;
   SessionNotes notes;
   std::function<bool()> interrupted;
   /// Number of markers that the operator has set by key so far; may be null.
@@ -51,6 +54,9 @@ struct SessionRunOptions {
   std::function<void(const ServoRecord&)> watcher;
   /// Called when the device is open and its forces are still off.
   std::function<void(const DeviceIdentity&, const LoopModel&)> opened;
+  /// Told once for each finding of the device (HapticDevice::findings), in real time when it is
+  /// noticed; from the thread that writes records.
+  std::function<void(const std::string&)> noticed;
   PlanningTold planning;  ///< see make_loop_model()
 };
 
