@@ -469,6 +469,18 @@ std::optional<Functional> read_quantity(const QuantityOfInterest& quantity,
   return f;
 }
 
+double weighted_sum(const Eigen::VectorXd& weight, const Eigen::VectorXd& values) {
+  return (weight.array() != 0.0).select(weight.array() * values.array(), 0.0).sum();
+}
+
+Eigen::RowVectorXd weighted_sum(const Eigen::VectorXd& weight, const Eigen::MatrixXd& values) {
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(values.cols());
+  for (Eigen::Index i = 0; i < weight.size(); ++i) {
+    if (weight[i] != 0.0) sum += weight[i] * values.row(i);
+  }
+  return sum;
+}
+
 Eigen::VectorXd line_weights(std::span<const double> x, double at) {
   const auto n = static_cast<Eigen::Index>(x.size());
   const auto places = Eigen::VectorXd::Map(x.data(), n);

@@ -9,7 +9,6 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/files/file.hpp"
 #include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/select/loading_sense.hpp"
 #include "tpm/fit/validate/calibration_covariance.hpp"
@@ -19,23 +18,6 @@
 
 namespace tpm::fit {
 namespace {
-
-namespace fs = std::filesystem;
-
-std::optional<fs::path> found_file(const std::string& name, const std::string& sha256,
-                                   const fs::path& law_file) {
-  const fs::path folder = law_file.parent_path();
-  for (const fs::path& place :
-       {fs::path(name), folder / name, folder / ".." / name, folder / fs::path(name).filename(),
-        folder / ".." / fs::path(name).filename()}) {
-    for (fs::path file : {place, fs::path(place).replace_extension(".csv")}) {
-      std::error_code none;
-      if (!fs::is_regular_file(file, none)) continue;
-      if (sha256_hex(read_file(file)) == sha256) return file.lexically_normal();
-    }
-  }
-  return std::nullopt;
-}
 
 Applicability motion_of(const PreparedRecording& recording, const RecordingParts& parts,
                         double contact) {
@@ -308,46 +290,6 @@ std::vector<RenderingError> rendering_errors(const Validation& presses) {
     }
   }
   return all;
-}
-
-CalibrationData find_calibration(const LawFile& law, const fs::path& law_file,
-                                 const std::vector<std::string>& digests,
-                                 const std::function<PreparedRecording(const std::string&)>& read) {
-  CalibrationData data;
-  if (!law.uncertainty) return data;
-  bool one = true;
-  for (const FittedFile& fitted : law.uncertainty->data) {
-    CalibrationData::File file{fitted.name, fitted.sha256, std::nullopt};
-    if (data.files.size() < digests.size()) file.samples_sha256 = digests[data.files.size()];
-    const auto path =
-        fitted.sha256.empty() ? std::nullopt : found_file(fitted.name, fitted.sha256, law_file);
-    if (!path) {
-      data.remarks.push_back(
-          fmt::format("the calibration's {} was not found with its SHA-256", fitted.name));
-      one = false;
-    } else {
-      try {
-        file.recording = read(path->string());
-      } catch (const Error& error) {
-        if (error.code() != ExitCode::bad_input) throw;
-        file.recording.reset();
-        data.remarks.push_back(
-            fmt::format("the calibration's file was not read: {}", error.what()));
-      }
-      const auto block = instrument_beside(*path);
-      std::optional<Instrument> instrument;
-      if (block) {
-        instrument = read_instrument(*block, quantity_dimension(law.spec.response),
-                                     quantity_dimension(law.spec.drive),
-                                     fmt::format("{}: instrument", path->string()));
-      }
-      if (!instrument || (data.instrument && data.instrument->id != instrument->id)) one = false;
-      if (instrument && !data.instrument) data.instrument = instrument;
-    }
-    data.files.push_back(std::move(file));
-  }
-  if (!one) data.instrument.reset();
-  return data;
 }
 
 Validation validate(const ValidationRequest& request) {
