@@ -113,13 +113,14 @@ TEST_CASE("stiffer tissue with the same scatter is no copy", "[validate]") {
 
 TEST_CASE("the calibration's files are read as they were fitted", "[validate]") {
   // The new recordings may need options that the old ones were not fitted with.
-  const PreparedRecording fitted =
-      prepare_recording("fitted.csv", quiet_recording(1.0).recording);
+  const PreparedRecording fitted = prepare_recording("fitted.csv", quiet_recording(1.0).recording);
   const test::TempFolder folder;
   const std::string bytes = "stands for its file", path = (folder.path() / "fitted.csv").string();
   write_file(path, bytes);
   LawFile law = test::study_fit({fitted});
-  law.uncertainty.value().data = {FittedFile{path, sha256_hex(bytes)}};
+  FittedFile& file = law.uncertainty.value().data.at(0);
+  file.name = path;
+  file.sha256 = sha256_hex(bytes);
   const std::vector<std::string> digests{samples_sha256(fitted.recording)};
   const auto whole = [&](const std::string&) { return fitted; };
   const auto cut = [&](const std::string&) {

@@ -161,6 +161,36 @@ TEST_CASE("a calibration residual does not ask for less uncertainty", "[validate
   for (const QuantityComparison& q : v.recordings.front().quantities) CHECK(q.remark.empty());
 }
 
+TEST_CASE("creep and relaxation are not pooled", "[validate]") {
+  // 10 % stiffer: less force is simulated than measured, and more depth.
+  const LawFile law = quiet_law();
+  ValidationRequest request = request_for(law, test::quiet_recording(1.1));
+  for (const std::uint64_t seed : {11U, 12U}) {
+    request.recordings.push_back(test::creep_recording(law, 1.1, seed));
+  }
+  request.recordings.push_back(test::quiet_recording(1.1, 6));
+  request.requirement = parse_requirement("5%", "test");
+  const Validation v = validate(request);
+  CAPTURE(to_terminal_text(v));
+  int forces = 0, depths = 0;
+  for (const PooledQuantity& p : v.pooled) {
+    CAPTURE(p.name);
+    CHECK(p.recordings == 2);
+    if (p.name == "force at end of hold") {
+      ++forces;
+      CHECK_THAT(p.e.error, WithinAbs(-0.1, 0.01));
+    }
+    if (p.name == "depth at end of hold") {
+      ++depths;
+      CHECK_THAT(p.e.error, WithinAbs(0.1 / 1.1, 0.01));
+    }
+  }
+  CHECK(forces == 1);
+  CHECK(depths == 1);
+  CHECK(std::ranges::count(v.pooled, std::string("half time"), &PooledQuantity::name) == 1);
+  CHECK(std::ranges::count(v.pooled, std::string("creep half time"), &PooledQuantity::name) == 1);
+}
+
 TEST_CASE("what is beyond the requirement before Holm's correction only is named", "[validate]") {
   RecordingComparison r;
   r.name = "made";
@@ -182,6 +212,19 @@ TEST_CASE("what is beyond the requirement before Holm's correction only is named
   v.verdict = r.verdict;
   v.recordings = {r};
   CHECK_THAT(conclusion_words(v), Contains("before Holm's correction only: quantity 1"));
+  // Without a requirement: 1.0 is beyond 0.98 by itself, p = 0.046.
+  for (QuantityComparison& q : r.quantities) {
+    q.e.error = 0.0;
+    q.limit.reset();
+  }
+  r.quantities.front().e.error = 1.0;
+  judge_quantities(r, std::nullopt, Dimension::force, 10.0);
+  CHECK(r.quantities.front().verdict == ModelVerdict::seen);
+  CHECK(r.verdict == ModelVerdict::not_seen);
+  v.requirement.clear();
+  v.verdict = r.verdict;
+  v.recordings = {r};
+  CHECK_THAT(conclusion_words(v), Contains("no model error is seen above the uncertainty; beyond"));
 }
 
 }  // namespace tpm::fit

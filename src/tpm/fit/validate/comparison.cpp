@@ -63,7 +63,7 @@ class Comparer {
     const std::optional<double>& asked_s = options_.motion.hold_asked_s;
     result_.parts = asked_s ? parts_of_press(prepared_, *asked_s) : parts_of(prepared_);
     result_.part = compared_part(r_, result_.parts, asked_s);
-    result_.scatter = scatter_of(prepared_, result_.parts);
+    result_.scatter = scatter_of(prepared_, result_.parts, clipped_);
     result_.placement = place_for_validation(along_, prepared_, result_.parts, result_.scatter,
                                              options_.placement, known_placement());
     result_.placement.drift = drift;

@@ -295,7 +295,7 @@ std::string quantity_words(const QuantityOfInterest& quantity, Quantity drive, Q
     case QuantityKind::relaxation_ratio:
       return is_creep(response) ? "creep ratio" : "relaxation ratio";
     case QuantityKind::half_time:
-      return "half time";
+      return is_creep(response) ? "creep half time" : "half time";
     case QuantityKind::work:
       return "work of the loop";
     case QuantityKind::rate:

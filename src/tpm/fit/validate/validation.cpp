@@ -217,8 +217,7 @@ ModelVerdict judge_together(Validation& v, const std::vector<RecordingComparison
   for (const RecordingComparison& r : unseen) {
     for (QuantityComparison q : r.quantities) {
       const auto has = [&](const RecordingComparison& other) {
-        return std::ranges::find(other.quantities, q.quantity, &QuantityComparison::quantity) !=
-               other.quantities.end();
+        return same_quantity(other, q) != nullptr;
       };
       if (std::ranges::count_if(unseen, has) > 1) continue;
       q.name = fmt::format("{}: {}", r.name, q.name);
@@ -406,9 +405,7 @@ Validation validate(const ValidationRequest& request) {
     v.verdict = ModelVerdict::residual;
     return v;
   }
-  const bool creep = unseen.front().creep;
-  PooledOptions pooling{request.requirement, request.at,
-                        quantity_dimension(creep ? law.spec.drive : law.spec.response)};
+  const PooledOptions pooling{request.requirement, request.at};
   v.pooled = pool_recordings(
       unseen, unseen_motions,
       law.uncertainty->degrees_of_freedom.value_or(std::numeric_limits<double>::infinity()),

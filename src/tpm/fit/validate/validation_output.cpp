@@ -369,23 +369,35 @@ std::string applicability_text(const Validation& v, const std::vector<std::strin
   return text + fmt::format(" (not known of all: {})", fmt::join(each_once(unknown, itself), ", "));
 }
 
-void add_each_recording(BriefText& text, const Validation& v) {
-  const std::vector<std::string> names = names_of(v).names;
+/// A row each, of those of relaxation or of creep: these have no quantity in common.
+void add_rows_of(BriefText& text, const Validation& v, const std::vector<std::string>& names,
+                 bool creep) {
+  std::vector<RecordingComparison> recordings;
   TableSection section;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (v.recordings[i].creep != creep) continue;
+    recordings.push_back(v.recordings[i]);
+    section.rows.push_back({names[i]});
+  }
+  if (recordings.empty()) return;
   section.columns = {"recording"};
-  const std::vector<QuantityComparison> quantities = each_quantity(v.recordings);
+  const std::vector<QuantityComparison> quantities = each_quantity(recordings);
   for (const QuantityComparison& q : quantities) section.columns.push_back(q.name);
   section.columns.push_back("verdict");
-  for (const RecordingComparison& r : v.recordings) {
-    std::vector<std::string> row{names[section.rows.size()]};
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    std::vector<std::string>& row = section.rows[i];
     for (const QuantityComparison& q : quantities) {
-      const auto own = std::ranges::find(r.quantities, q.quantity, &QuantityComparison::quantity);
-      row.push_back(own == r.quantities.end() ? "-" : error_text(own->e, unit_of(*own)));
+      const QuantityComparison* own = same_quantity(recordings[i], q);
+      row.push_back(own == nullptr ? "-" : error_text(own->e, unit_of(*own)));
     }
-    row.push_back(cell_words(r.verdict));
-    section.rows.push_back(std::move(row));
+    row.push_back(cell_words(recordings[i].verdict));
   }
   add_table(text, std::move(section), Rank::recording, "recordings");
+}
+
+void add_each_recording(BriefText& text, const Validation& v) {
+  const std::vector<std::string> names = names_of(v).names;
+  for (const bool creep : {false, true}) add_rows_of(text, v, names, creep);
   for (const QuantityComparison& q : v.alone) {
     text.add_line(
         "in one only",
@@ -420,7 +432,8 @@ std::string conclusion_words(const Validation& v) {
                        bool rejected, ModelVerdict verdict) {
     const bool wanted =
         v.verdict == ModelVerdict::undetermined ? verdict == ModelVerdict::undetermined : rejected;
-    if (verdict == ModelVerdict::not_adequate && !rejected) alone.push_back(name);
+    const bool beyond = verdict == ModelVerdict::not_adequate || verdict == ModelVerdict::seen;
+    if (beyond && !rejected) alone.push_back(name);
     if (wanted) named.push_back(fmt::format("{} {}", name, error_text(e, unit)));
   };
   for (const PooledQuantity& p : v.pooled) add(p.name, p.e, unit_of(p), p.rejected, p.verdict);
@@ -434,6 +447,10 @@ std::string conclusion_words(const Validation& v) {
     }
   }
   const std::string list = fmt::format("{}", fmt::join(named, ", "));
+  const std::string before_holm =
+      alone.empty()
+          ? ""
+          : fmt::format("; beyond it before Holm's correction only: {}", fmt::join(alone, ", "));
   switch (v.verdict) {
     case ModelVerdict::adequate:
       return fmt::format("adequate for {}", v.requirement);
@@ -445,10 +462,7 @@ std::string conclusion_words(const Validation& v) {
                                v.requirement)
                  : fmt::format("undetermined{}: {}{}",
                                v.requirement.empty() ? "" : " for " + v.requirement, list,
-                               alone.empty() ? ""
-                                             : fmt::format("; beyond it before Holm's correction "
-                                                           "only: {}",
-                                                           fmt::join(alone, ", ")));
+                               before_holm);
     case ModelVerdict::seen:
       return fmt::format("a model error of E +- U: {}", list);
     case ModelVerdict::no_requirement:
@@ -456,7 +470,7 @@ std::string conclusion_words(const Validation& v) {
     default:
       break;
   }
-  return std::string(verdict_words(ModelVerdict::not_seen));
+  return std::string(verdict_words(ModelVerdict::not_seen)) + before_holm;
 }
 
 std::string to_terminal_text(const Validation& v) {
