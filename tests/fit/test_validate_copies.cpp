@@ -100,6 +100,15 @@ TEST_CASE("parts of fitted data get no verdict, whatever was done to them", "[va
   });
 }
 
+TEST_CASE("the same readings under two names are refused", "[validate]") {
+  const PreparedRecording one = quiet_recording(1.0);
+  ValidationRequest request = request_for(test::quiet_law(), one);
+  request.recordings.push_back(one);
+  request.recordings.back().name = "copy";
+  CHECK_THROWS_WITH(validate(request),
+                    Contains("recording 'copy'") && Contains("each recording once"));
+}
+
 TEST_CASE("stiffer tissue with the same scatter is no copy", "[validate]") {
   // As of a simulation with one seed: held, both differ by a constant.
   const test::StudyNoise noise;

@@ -265,6 +265,21 @@ void require_fitting_unit(const Validation& v, const std::optional<Requirement>&
                           fmt::join(each, " or ")));
 }
 
+/// The same readings twice would count as two that agree.
+void require_each_once(const std::vector<PreparedRecording>& recordings) {
+  std::vector<std::string> seen;
+  for (const PreparedRecording& r : recordings) {
+    std::string numbers = samples_sha256(r.recording);
+    if (const auto same = std::ranges::find(seen, numbers); same != seen.end()) {
+      throw bad_input(fmt::format("recording '{}'", r.name),
+                      fmt::format("has the readings of '{}'",
+                                  recordings[static_cast<std::size_t>(same - seen.begin())].name),
+                      "each recording once");
+    }
+    seen.push_back(std::move(numbers));
+  }
+}
+
 }  // namespace
 
 std::vector<RenderingError> rendering_errors(const Validation& presses) {
@@ -301,6 +316,7 @@ Validation validate(const ValidationRequest& request) {
     throw Error(ExitCode::usage, "--at-recording", fmt::format("'{}'", printable(*request.at)),
                 "the name of one of the recordings");
   }
+  if (request.presses.empty()) require_each_once(request.recordings);
   Validation v;
   const std::optional<LawFile> again =
       with_calibration_covariance(request.law, found_recordings(request.calibration));
