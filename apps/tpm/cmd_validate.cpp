@@ -199,11 +199,16 @@ ValidationRequest validation_request(const ValidateOptions& options) {
   request.contact_by_threshold = !options.recordings.contact_response.empty();
   if (!options.at.empty()) request.at = options.at;
   set_recordings(request, options);
-  request.calibration =
-      find_calibration(request.law, options.law, digests, [&](const std::string& file) {
-        return prepared(file, read_recording_file(file, import_options(options.recordings)),
-                        options.recordings);
-      });
+  // The files of the calibration may have other columns, or were fitted over another stretch.
+  RecordingOptions without = options.recordings;
+  without.reading = {};
+  const auto with = [](const RecordingOptions& reading) {
+    return [&reading](const std::string& file) {
+      return prepared(file, read_recording_file(file, import_options(reading)), reading);
+    };
+  };
+  request.calibration = find_calibration(request.law, options.law, digests,
+                                         {with(options.recordings), with(without)});
   if (!options.calibration_instrument.empty()) {
     request.calibration.instrument = instrument_of(instrument_block(options.calibration_instrument),
                                                    spec, options.calibration_instrument);
@@ -389,10 +394,12 @@ void add_validate_command(CLI::App& app, Session& session) {
   command->add_option("--session", options->session,
                       "A session (.tpmrec) whose rendering is part of S: what a hand felt, against "
                       "recordings of the material");
-  command->add_option(
-      "--require", options->requirement,
-      "Largest model error that is acceptable: a share of the measured value such as 10%, an "
-      "amount such as \"20 mN\", or jnd (what a hand can tell, as in tpm plan)");
+  command
+      ->add_option(
+          "--require", options->requirement,
+          "Largest model error that is acceptable: a share of the measured value such as 10%, an "
+          "amount such as \"20 mN\", or jnd (what a hand can tell, as in tpm plan)")
+      ->each(reads_word(parse_requirement, "--require"));
   command
       ->add_option(
           "--quantity", options->quantities,

@@ -225,8 +225,6 @@ TEST_CASE("strips that were fitted together keep their slack length", "[tables]"
   CHECK_THAT(law.at("parameters").at("contact").get<double>(), WithinAbs(1.0, 0.01));
 }
 
-// "Validated, in the words of the standards": there is no command yet that judges a recording of
-// another specimen.
 TEST_CASE("a recording of a stiffer material is judged by its error and uncertainty", "[tables]") {
   const test::TempFolder folder;
   write_file(folder / "fitted.csv", recording_seen([](double, double force) { return force; }));

@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "quiet_recordings.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
 #include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/validate/fitted_copy.hpp"
 
@@ -29,7 +31,7 @@ TEST_CASE("a renamed and resaved copy of fitted data gets no verdict", "[validat
   CHECK(samples_sha256(copy.recording) == digests.front());
   ValidationRequest request = request_for(fitted_law(fit), copy);
   request.calibration = find_calibration(request.law, "nowhere/law.json", digests,
-                                         [](const std::string&) { return PreparedRecording(); });
+                                         {[](const std::string&) { return PreparedRecording(); }});
   CHECK(validate(request).verdict == ModelVerdict::residual);
   request.recordings.front().recording.response[100] += 1e-6;
   CHECK(validate(request).verdict != ModelVerdict::residual);
@@ -86,10 +88,72 @@ TEST_CASE("parts of fitted data get no verdict, whatever was done to them", "[va
     f = 1e-5 * std::round(1e5 * f);
     return true;
   });
+  refused("zeroed anew, from its ramp on", [](std::size_t i, double& t, double& d, double& f) {
+    t -= 3.9;
+    d += 1e-3;
+    f -= 4e-3;
+    return i >= 30;
+  });
   refused("half of it replaced", [&](std::size_t i, double&, double&, double& f) {
     if (i % 5 < 2) f = other.recording.response[i];
     return true;
   });
+}
+
+TEST_CASE("the same readings under two names are refused", "[validate]") {
+  const PreparedRecording one = quiet_recording(1.0);
+  ValidationRequest request = request_for(test::quiet_law(), one);
+  request.recordings.push_back(one);
+  request.recordings.back().name = "copy";
+  CHECK_THROWS_WITH(validate(request),
+                    Contains("recording 'copy'") && Contains("each recording once"));
+}
+
+TEST_CASE("stiffer tissue with the same scatter is no copy", "[validate]") {
+  // As of a simulation with one seed: held, both differ by a constant.
+  const test::StudyNoise noise;
+  test::StudyTest long_hold;
+  long_hold.hold_s = 200.0;
+  Random one(4), same(4);
+  const Recording fitted = test::study_recording(long_hold, noise, one);
+  const Recording stiffer = test::study_recording(long_hold, noise, same, 1.05);
+  CHECK(share_of_readings(stiffer, fitted, noise.sigma_N) < 0.5);
+}
+
+TEST_CASE("the calibration's files are read as they were fitted", "[validate]") {
+  // The new recordings may need options that the old ones were not fitted with.
+  const PreparedRecording fitted = prepare_recording("fitted.csv", quiet_recording(1.0).recording);
+  const test::TempFolder folder;
+  const std::string bytes = "stands for its file", path = (folder.path() / "fitted.csv").string();
+  write_file(path, bytes);
+  LawFile law = test::study_fit({fitted});
+  FittedFile& file = law.uncertainty.value().data.at(0);
+  file.name = path;
+  file.sha256 = sha256_hex(bytes);
+  const std::vector<std::string> digests{samples_sha256(fitted.recording)};
+  const auto whole = [&](const std::string&) { return fitted; };
+  const auto cut = [&](const std::string&) {
+    PreparedRecording part = fitted;
+    part.recording.time_s.pop_back();
+    part.recording.drive.pop_back();
+    part.recording.response.pop_back();
+    return part;
+  };
+  const auto fails = [](const std::string&) -> PreparedRecording {
+    throw bad_input("fitted.csv", "no column 't'", "column 1 'time'");
+  };
+  for (const auto& first : {std::function<PreparedRecording(const std::string&)>(cut),
+                            std::function<PreparedRecording(const std::string&)>(fails)}) {
+    const CalibrationData found = find_calibration(law, "law.json", digests, {first, whole});
+    CHECK(found.remarks.empty());
+    REQUIRE(found.files.front().recording);
+    CHECK(found.files.front().recording->recording.time_s == fitted.recording.time_s);
+    const CalibrationData lost = find_calibration(law, "law.json", digests, {first});
+    CHECK_FALSE(lost.files.front().recording);
+    REQUIRE(lost.remarks.size() == 1);
+  }
+  CHECK_THAT(find_calibration(law, "law.json", digests, {cut}).remarks.front(),
+             Contains("other options"));
 }
 
 }  // namespace tpm::fit

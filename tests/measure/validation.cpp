@@ -319,6 +319,40 @@ void parts(int experiments, int calibrations, double phi, double slow_branch) {
              correlation);
 }
 
+/// A jump to 3 mm anywhere between two samples, of the study's material; 0.3 mN of noise.
+PreparedRecording jumped(Random& random, const char* name) {
+  constexpr double kEvery_s = 0.1, kDepth = 3e-3, kNoise = 3e-4;
+  constexpr int kRest = 40, kCount = 240;
+  const double jump_s = kEvery_s * (kRest + random.uniform());
+  Recording r;
+  r.header.id = name;
+  for (int i = 0; i < kCount; ++i) {
+    const double t = kEvery_s * i;
+    const bool pressed = i > kRest;
+    r.time_s.push_back(t);
+    r.drive.push_back(pressed ? kDepth : 0.0);
+    const double force = pressed ? kDepth * (60.0 + 45.0 * std::exp(-(t - jump_s) / 2.0)) : 0.0;
+    r.response.push_back(force + kNoise * random.normal());
+  }
+  return prepare_recording(name, std::move(r));
+}
+
+void jumps(int experiments) {
+  Random random(57);
+  StudyCounts by_ramps, by_jumps;
+  ComparisonOptions options;
+  options.quantities = {{QuantityKind::peak}, {QuantityKind::end_of_hold}};
+  for (int i = 0; i < experiments; ++i) {
+    const PreparedRecording r = jumped(random, "validation");
+    const LawFile of_ramps = study_calibration(5, {}, random);
+    by_ramps.add(compare_with_recording(of_ramps, r, options), 0.0, 0.0);
+    const LawFile of_jump = study_fit({jumped(random, "calibration")});
+    by_jumps.add(compare_with_recording(of_jump, r, options), 0.0, 0.0);
+  }
+  say("no model error, a jump between two samples, law of 5 ramps", by_ramps);
+  say("no model error, a jump between two samples, law of another such jump", by_jumps);
+}
+
 }  // namespace
 }  // namespace tpm::test
 
@@ -338,6 +372,7 @@ int main(int argc, char** argv) {
         if (wanted("stiffer")) known_error(n);
         if (wanted("branch")) branch_left_out(n, words.size() > 2 ? std::stoull(words[2]) : 53);
         if (wanted("instruments")) instruments(n);
+        if (wanted("jumps")) jumps(n);
         if (wanted("several")) several(n);
         if (wanted("specimens")) {
           new_specimens(n, 5);

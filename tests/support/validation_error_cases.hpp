@@ -89,6 +89,7 @@ inline std::vector<ErrorCase> validation_error_cases() {
       {type, "missing recording", command, with_files({{"l.json", law("")}})},
       {type, "law without uncertainty", command, files(validated_recording())},
       {type, "requirement that is none", command + " --require much", files(validated_recording())},
+      {type, "requirement of nothing", command + " --require ''", files(validated_recording())},
       {type, "requirement of 0", command + " --require 0%", files(validated_recording())},
       {type, "requirement of less than 0", command + " --require=-5%",
        files(validated_recording())},

@@ -108,4 +108,11 @@ bool is_clipped(const PreparedRecording& recording, double reading) {
          (recording.clipped_below && reading <= *recording.clipped_below);
 }
 
+Eigen::Array<bool, Eigen::Dynamic, 1> clipped_readings(const PreparedRecording& recording) {
+  const std::vector<double>& readings = recording.recording.response;
+  return Eigen::ArrayXd::Map(readings.data(), std::ssize(readings)).unaryExpr([&](double reading) {
+    return is_clipped(recording, reading);
+  });
+}
+
 }  // namespace tpm::fit

@@ -1,4 +1,6 @@
 #pragma once
+#include <Eigen/Core>
+
 #include "tpm/fit/select/recording_setup.hpp"
 
 namespace tpm::fit {
@@ -11,5 +13,8 @@ void find_clipping(PreparedRecording& recording);
 
 /// True if a reading stands at a limit that was found.
 [[nodiscard]] bool is_clipped(const PreparedRecording& recording, double reading);
+/// Of each sample.
+[[nodiscard]] Eigen::Array<bool, Eigen::Dynamic, 1> clipped_readings(
+    const PreparedRecording& recording);
 
 }  // namespace tpm::fit

@@ -38,6 +38,10 @@ class Motions {
 
 }  // namespace
 
+double UnseenRise::u_s() const {
+  return (latest_s - earliest_s) / std::sqrt(12.0);
+}
+
 std::vector<UnseenRise> unseen_rises(const PreparedRecording& r) {
   constexpr std::size_t kCorners = 5;                // intervals of a rise
   constexpr std::size_t kMost = 16;                  // rises of one recording
@@ -90,10 +94,10 @@ void add_rise_delays(FitConfig& config, const PreparedRecording& r, std::size_t 
     p.fit = {fmt::format("rise_delay{}{}", rises.size() > 1 ? std::to_string(k + 1) : "", suffix),
              shown_unit(Dimension::time),
              Scale::linear,
-             0.5 * (rise.earliest_s + rise.latest_s),
+             rise.expected().delay_s,
              -0.5 * lasts_s,
              0.5 * lasts_s};
-    p.prior = Prior{p.fit.start, (rise.latest_s - rise.earliest_s) / std::sqrt(12.0),
+    p.prior = Prior{p.fit.start, rise.u_s(),
                     fmt::format("anywhere between the samples at {} and {} s",
                                 significant(rise.begin_s, 6), significant(rise.end_s, 6))};
     p.rise = RiseTerm{i, rise.begin_s, rise.end_s};

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "tpm/fit/select/recording_setup.hpp"
+#include "tpmkit/law_uncertainty.hpp"
 
 namespace tpm::fit {
 
@@ -11,6 +12,11 @@ namespace tpm::fit {
 struct UnseenRise {
   double begin_s = 0.0, end_s = 0.0;
   double earliest_s = 0.0, latest_s = 0.0;  ///< delay, s
+  /// Mean and standard deviation of that distribution.
+  [[nodiscard]] DelayedRise expected() const {
+    return {begin_s, end_s, 0.5 * (earliest_s + latest_s)};
+  }
+  [[nodiscard]] double u_s() const;
 };
 
 /// Rises of up to the end of the window that the samples do not resolve. A rise within one

@@ -7,6 +7,7 @@
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/select/unseen_rises.hpp"
 #include "tpm/fit/validate/measured_placement_weights.hpp"
 
 namespace tpm::fit {
@@ -17,7 +18,8 @@ struct FittedSlopes {
   /// Of all samples: what each adds to the scores of law and placement, the derivatives of the
   /// fitted ones and, of a placement that was measured, its weight in what the fit took for it.
   Eigen::MatrixXd scores;
-  /// J'J of the fitted samples; placement: zero, contact, drift, where they were fitted.
+  /// J'J of the fitted samples; placement: zero, contact, drift, delays of rises, where they were
+  /// fitted.
   Eigen::MatrixXd gram;
   /// Of each column of the placement, times the variance of an independent reading: 1/sd^2 that the
   /// fit weighed its prior by (0: no prior), and the variance of what was measured by readings that
@@ -74,14 +76,15 @@ FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
                        const FittedFile& file, bool only_one, const RecordingParts& parts,
                        const ReadingScatter& scatter, double of_independent) {
   const Recording& r = recording.recording;
-  const LawAlong along(law, recording);
+  const LawAlong along(law, recording, nullptr, {}, file.rises);
   const PlacementInFit in = placement_in(law, along, file, only_one, recording, parts, scatter);
   const bool by_threshold = is_at_threshold(recording, in.contact);
   const LawAlong::At at = along.at(in.contact);
   std::vector<Eigen::Index> rows;
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (file.holds(r.time_s[i]) && std::isfinite(at.value[k])) rows.push_back(k);
+    const bool fitted = file.holds(r.time_s[i]) && !file.clips(r.response[i]);
+    if (fitted && std::isfinite(at.value[k])) rows.push_back(k);
   }
   MeasuredPlacement measured;
   const bool indents =
@@ -113,6 +116,12 @@ FittedSlopes slopes_of(const LawFile& law, const PreparedRecording& recording,
     const auto time = Eigen::VectorXd::Map(r.time_s.data(), std::ssize(r.time_s));
     columns.push_back(
         {time(rows).array() - origin_s, precision_of(measured.rests.drift), std::nullopt});
+  }
+  const std::vector<UnseenRise> unseen = unseen_rises(recording);
+  for (std::size_t k = 0; k < file.rises.size(); ++k) {
+    const auto known = std::ranges::find(unseen, file.rises[k].begin_s, &UnseenRise::begin_s);
+    columns.push_back({along.by_delay(k, in.contact)(rows),
+                       known == unseen.end() ? 0.0 : std::pow(known->u_s(), -2), std::nullopt});
   }
   const Eigen::Index p = at.by_law.cols(), width = std::ssize(columns);
   FittedSlopes slopes;

@@ -77,6 +77,34 @@ std::optional<double> limit_of(const Requirement& requirement, const QuantityCom
   return requirement.value * (is_of_response(quantity.quantity.kind) ? std::max(peak, size) : size);
 }
 
+void judge_quantities(RecordingComparison& r, const std::optional<Requirement>& requirement,
+                      Dimension response, double peak) {
+  for (const QuantityComparison& q : r.quantities) {
+    if (is_of_response(q.quantity.kind)) peak = std::max(peak, std::abs(q.measured));
+  }
+  std::vector<double> p_values;
+  for (QuantityComparison& q : r.quantities) {
+    if (requirement) q.limit = limit_of(*requirement, q, response, peak);
+    q.verdict = judge_error(q.e, q.limit);
+    q.p_value = error_p_value(q.e, q.limit);
+    if (requirement && !q.limit) q.verdict = ModelVerdict::no_requirement;
+    if (q.unknown) {
+      q.verdict = ModelVerdict::undetermined;
+      q.p_value = 1.0;
+      r.joint.unknown.push_back(q.name);
+    } else if (q.verdict == ModelVerdict::undetermined && !r.calibration) {
+      q.remark =
+          what_must_shrink(q.e, *q.limit, q.parts,
+                           scaled_unit(q.unit, std::max(std::abs(q.measured), q.e.expanded())));
+    }
+    if (r.calibration) q.verdict = ModelVerdict::residual;
+    p_values.push_back(q.verdict == ModelVerdict::no_requirement ? 1.0 : q.p_value);
+  }
+  const std::vector<bool> rejected = holm_rejects(p_values);
+  for (std::size_t i = 0; i < rejected.size(); ++i) r.quantities[i].rejected = rejected[i];
+  r.verdict = verdict_of_all(r.quantities);
+}
+
 ModelVerdict verdict_of_all(const std::vector<QuantityComparison>& quantities) {
   bool required = false, all_adequate = true, rejected = false, unknown = false, any = false;
   for (const QuantityComparison& q : quantities) {

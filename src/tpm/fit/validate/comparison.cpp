@@ -14,6 +14,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/predict/organ_readings.hpp"
+#include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/validate/grid_convergence.hpp"
 #include "tpm/fit/validate/instrument_effects.hpp"
 #include "tpm/fit/validate/joint_test.hpp"
@@ -27,6 +28,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNumericalError = 1e-9;
 constexpr const char* kFilling = "the place of the spheres";
 
+RecordingComparison begun(const PreparedRecording& recording, const ComparisonOptions& options) {
+  RecordingComparison begun;
+  begun.name = recording.name;
+  if (options.motion.knots.empty()) begun.rises = unseen_rises(recording);
+  return begun;
+}
+
 /// What all quantities of a recording are computed from.
 class Comparer {
  public:
@@ -34,11 +42,12 @@ class Comparer {
       : options_(options),
         prepared_(recording),
         r_(prepared_.recording),
-        along_(law, prepared_, options.organ, options.motion.knots),
+        result_(begun(prepared_, options)),
+        along_(law, prepared_, options.organ, options.motion.knots,
+               mapped<DelayedRise>(result_.rises, &UnseenRise::expected)),
         degrees_of_law_(law.uncertainty->degrees_of_freedom.value_or(kInfinity)) {}
 
   RecordingComparison compare() {
-    result_.name = prepared_.name;
     result_.sha256 = r_.header.sha256;
     result_.calibration = options_.calibration_data;
     result_.instrument = options_.instrument;
@@ -48,16 +57,18 @@ class Comparer {
     result_.creep = along_.load_imposed();
     result_.probe = probe_words(ours, theirs);
     probe_ = probe_effect(ours, theirs);
+    clipped_ = clipped_readings(prepared_);
     const bool own_zero = options_.known != KnownPlacement::surface && !result_.creep;
     const auto drift = own_zero ? take_out_drift(prepared_) : std::nullopt;
     const std::optional<double>& asked_s = options_.motion.hold_asked_s;
     result_.parts = asked_s ? parts_of_press(prepared_, *asked_s) : parts_of(prepared_);
     result_.part = compared_part(r_, result_.parts, asked_s);
-    result_.scatter = scatter_of(prepared_, result_.parts);
+    result_.scatter = scatter_of(prepared_, result_.parts, clipped_);
     result_.placement = place_for_validation(along_, prepared_, result_.parts, result_.scatter,
                                              options_.placement, known_placement());
     result_.placement.drift = drift;
     at_ = along_.at(result_.placement.contact);
+    follow_rises();
     refine();
     const auto n = static_cast<Eigen::Index>(r_.response.size());
     measured_ = Eigen::VectorXd::Map(r_.response.data(), n).array() - result_.placement.zero;
@@ -115,12 +126,13 @@ class Comparer {
     for (const LawAlong::Refinement& refinement : refinements_) {
       std::vector<double> values;
       for (const Eigen::VectorXd& curve : refinement.values)
-        values.push_back(times(s.weight, curve));
+        values.push_back(weighted_sum(s.weight, curve));
       add(refinement.name, grid_convergence(values, refinement.ratio).u);
     }
     if (!by_filling_.empty()) {
-      q.of_filling = root_of(mapped<double>(
-          by_filling_, [&](const Eigen::VectorXd& curve) { return times(s.weight, curve); }));
+      q.of_filling = root_of(mapped<double>(by_filling_, [&](const Eigen::VectorXd& curve) {
+        return weighted_sum(s.weight, curve);
+      }));
       add(kFilling, q.of_filling.norm());
     }
     if (claimed_limit_ > 0.0) {
@@ -137,6 +149,12 @@ class Comparer {
     q.u_num = sum.u();
   }
 
+  void follow_rises() {
+    for (std::size_t k = 0; k < result_.rises.size(); ++k) {
+      by_rise_.push_back(result_.rises[k].u_s() * along_.by_delay(k, result_.placement.contact));
+    }
+  }
+
   void follow_instrument() {
     const double contact = result_.placement.contact;
     depth_scale_ = along_.by_depth_scale(contact);
@@ -144,28 +162,15 @@ class Comparer {
     time_shift_ = along_.by_time_shift(contact);
   }
 
-  [[nodiscard]] static double times(const Eigen::VectorXd& weight, const Eigen::VectorXd& slope) {
-    // Samples that the law does not predict have no weight.
-    return (weight.array() != 0.0).select(weight.array() * slope.array(), 0.0).sum();
-  }
-  [[nodiscard]] static Eigen::RowVectorXd times(const Eigen::VectorXd& weight,
-                                                const Eigen::MatrixXd& slope) {
-    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(slope.cols());
-    for (Eigen::Index i = 0; i < weight.size(); ++i) {
-      if (weight[i] != 0.0) sum += weight[i] * slope.row(i);
-    }
-    return sum;
-  }
-
   [[nodiscard]] const char* zero_name() const {
     return result_.creep ? "the reading without a load" : "the zero of the force";
   }
 
   [[nodiscard]] ChannelSlopes slopes_of(const Functional& s, const Functional& d) const {
-    return {times(s.weight, depth_scale_), times(s.weight, time_scale_),
-            times(s.weight, time_shift_),  -times(s.weight, at_.by_contact),
-            times(s.weight, at_.value),    s.weight.sum(),
-            times(d.weight, measured_),    d.weight.sum()};
+    return {weighted_sum(s.weight, depth_scale_), weighted_sum(s.weight, time_scale_),
+            weighted_sum(s.weight, time_shift_),  -weighted_sum(s.weight, at_.by_contact),
+            weighted_sum(s.weight, at_.value),    s.weight.sum(),
+            weighted_sum(d.weight, measured_),    d.weight.sum()};
   }
   [[nodiscard]] ChannelSlopes slopes_of(Eigen::Index k) const {
     return {depth_scale_[k], time_scale_[k],
@@ -206,6 +211,10 @@ class Comparer {
                       significant(q.u_D, 2)));
       return;
     }
+    if ((d->weight.array() != 0.0 && clipped_.array()).any()) {
+      q.remark = "read from readings that stand at a limit of the force cell";
+      q.unknown = true;
+    }
     result_.quantities.push_back(std::move(q));
   }
 
@@ -216,7 +225,7 @@ class Comparer {
         result_.scatter.of(r_.time_s, s.weight) > result_.scatter.of(r_.time_s, d.weight)) {
       d.weight = s.weight;
     }
-    const double by_contact = times(s.weight, at_.by_contact);
+    const double by_contact = weighted_sum(s.weight, at_.by_contact);
     const double by_zero = d.weight.sum();
     const Eigen::VectorXd from_contact = by_contact * p.contact_by_reading;
     const Eigen::VectorXd from_zero = by_zero * p.zero_by_reading;
@@ -230,8 +239,8 @@ class Comparer {
     q.parts.push_back({"the contact point", std::hypot(u_of(from_contact), q.of_contact)});
     const double by_drift = p.drift ? p.drift->u(weight, r_.time_s) : 0.0;
     q.parts.push_back({"the drift of the zero", by_drift});
-    const Eigen::RowVectorXd by_law =
-        times(s.weight, at_.by_law) + by_contact * p.contact_by_law + by_zero * p.zero_by_law;
+    const Eigen::RowVectorXd by_law = weighted_sum(s.weight, at_.by_law) +
+                                      by_contact * p.contact_by_law + by_zero * p.zero_by_law;
     q.shared = by_law * along_.root();
     q.u_input = q.shared.norm();
     q.parts.push_back({"the law's parameters", q.u_input});
@@ -251,7 +260,10 @@ class Comparer {
     add_probe(q, s);
     if (options_.specimens != nullptr) add_specimen(q, s);
     const double own_instrument = q.of_instrument.norm();
-    const double stated = std::hypot(stated_zero, q.of_contact, by_drift);
+    for (const Eigen::VectorXd& slope : by_rise_) extend(q.of_rises, weighted_sum(s.weight, slope));
+    const double by_rises = q.of_rises.norm();
+    q.parts.push_back({"the time of a change between two samples", by_rises});
+    const double stated = std::hypot(std::hypot(stated_zero, q.of_contact), by_drift, by_rises);
     q.u_D = std::hypot(u_readings, own_instrument, stated);
     const double by_filling = q.of_filling.norm();
     const double of_numbers = std::sqrt(std::max(q.u_num * q.u_num - by_filling * by_filling, 0.0));
@@ -309,8 +321,8 @@ class Comparer {
   /// The law holds the calibration's probe, and S would grow with that of the recording.
   void add_probe(QuantityComparison& q, const Functional& s) const {
     if (!probe_.stated || probe_.same) return;
-    const double slope =
-        slope_by_radius(times(s.weight, at_.value), times(s.weight, depth_scale_), result_.creep);
+    const double slope = slope_by_radius(weighted_sum(s.weight, at_.value),
+                                         weighted_sum(s.weight, depth_scale_), result_.creep);
     q.of_probe = -slope * probe_.u_validation;
     const double theirs = slope * probe_.u_calibration;
     q.parts.push_back({"the radius of the probe", std::abs(q.of_probe)});
@@ -343,57 +355,37 @@ class Comparer {
   }
 
   void judge() {
-    double peak = 0.0;
-    for (const QuantityComparison& q : result_.quantities) {
-      if (is_of_response(q.quantity.kind)) peak = std::max(peak, std::abs(q.measured));
-    }
-    if (const auto f = read_quantity({QuantityKind::peak}, result_.parts, r_,
-                                     result_.placement.contact, measured_)) {
-      peak = std::max(peak, std::abs(f->value));
-    }
-    std::vector<double> p_values;
-    for (QuantityComparison& q : result_.quantities) {
-      if (options_.requirement) {
-        q.limit =
-            limit_of(*options_.requirement, q, quantity_dimension(r_.response_quantity), peak);
-      }
-      q.verdict = judge_error(q.e, q.limit);
-      q.p_value = error_p_value(q.e, q.limit);
-      if (options_.requirement && !q.limit) q.verdict = ModelVerdict::no_requirement;
-      if (q.unknown) {
-        q.verdict = ModelVerdict::undetermined;
-        q.p_value = 1.0;
-      } else if (q.verdict == ModelVerdict::undetermined) {
-        q.remark =
-            what_must_shrink(q.e, *q.limit, q.parts,
-                             scaled_unit(q.unit, std::max(std::abs(q.measured), q.e.expanded())));
-      }
-      if (result_.calibration) q.verdict = ModelVerdict::residual;
-      p_values.push_back(q.verdict == ModelVerdict::no_requirement ? 1.0 : q.p_value);
-    }
-    const std::vector<bool> rejected = holm_rejects(p_values);
-    for (std::size_t i = 0; i < rejected.size(); ++i) result_.quantities[i].rejected = rejected[i];
-    result_.verdict = verdict_of_all(result_.quantities);
+    const auto peak = read_quantity({QuantityKind::peak}, result_.parts, r_,
+                                    result_.placement.contact, measured_);
+    judge_quantities(result_, options_.requirement, quantity_dimension(r_.response_quantity),
+                     peak ? std::abs(peak->value) : 0.0);
   }
 
   void set_joint() {
-    const auto count = static_cast<Eigen::Index>(result_.quantities.size());
+    std::vector<std::size_t> known;  // what hangs on something unknown says nothing of the model
+    for (std::size_t i = 0; i < result_.quantities.size(); ++i) {
+      if (!result_.quantities[i].unknown) known.push_back(i);
+    }
+    const auto count = static_cast<Eigen::Index>(known.size());
+    const auto quantity = [&](Eigen::Index i) -> const QuantityComparison& {
+      return result_.quantities[known[static_cast<std::size_t>(i)]];
+    };
     Eigen::MatrixXd weights(static_cast<Eigen::Index>(r_.response.size()), count);
     Eigen::VectorXd error(count);
     for (Eigen::Index i = 0; i < count; ++i) {
-      weights.col(i) = weights_[static_cast<std::size_t>(i)];
-      error[i] = result_.quantities[static_cast<std::size_t>(i)].e.error;
+      weights.col(i) = weights_[known[static_cast<std::size_t>(i)]];
+      error[i] = quantity(i).e.error;
     }
     Eigen::MatrixXd covariance = result_.scatter.covariance(r_.time_s, weights);
     double degrees = kInfinity;
     for (Eigen::Index i = 0; i < count; ++i) {
-      const QuantityComparison& a = result_.quantities[static_cast<std::size_t>(i)];
+      const QuantityComparison& a = quantity(i);
       degrees = std::min(degrees, a.e.degrees);
       for (Eigen::Index j = 0; j < count; ++j) {
-        const QuantityComparison& b = result_.quantities[static_cast<std::size_t>(j)];
+        const QuantityComparison& b = quantity(j);
         covariance(i, j) += a.shared.dot(b.shared) + a.of_instrument.dot(b.of_instrument) +
                             a.of_filling.dot(b.of_filling) + a.of_contact * b.of_contact +
-                            a.of_probe * b.of_probe;
+                            a.of_rises.dot(b.of_rises) + a.of_probe * b.of_probe;
         if (a.of_specimen.size() == b.of_specimen.size()) {
           covariance(i, j) += (1.0 + a.of_mean * b.of_mean) * a.of_specimen.dot(b.of_specimen);
         }
@@ -403,18 +395,20 @@ class Comparer {
       if (own > 0.0) covariance(i, i) += own;
     }
     const auto has = [&](QuantityKind kind) {
-      return std::ranges::any_of(result_.quantities,
-                                 [kind](const auto& q) { return q.quantity.kind == kind; });
+      return std::ranges::any_of(result_.quantities, [kind](const auto& q) {
+        return q.quantity.kind == kind && !q.unknown;
+      });
     };
     const bool ratio_follows = has(QuantityKind::peak) && has(QuantityKind::end_of_hold);
     std::vector<bool> follows;
-    for (const QuantityComparison& q : result_.quantities) {
-      follows.push_back(q.quantity.kind == QuantityKind::relaxation_ratio && ratio_follows);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      follows.push_back(quantity(i).quantity.kind == QuantityKind::relaxation_ratio &&
+                        ratio_follows);
     }
     const std::vector<std::size_t> left_out =
         test_together(result_.joint, error, covariance, follows, degrees);
     for (const std::size_t i : left_out) {
-      result_.joint.dependent.push_back(result_.quantities[i].name);
+      result_.joint.dependent.push_back(quantity(static_cast<Eigen::Index>(i)).name);
     }
   }
 
@@ -429,6 +423,7 @@ class Comparer {
       if (values.size() < 2) continue;
       square += std::pow(grid_convergence(values, refinement.ratio).u, 2);
     }
+    for (const Eigen::VectorXd& by_rise : by_rise_) square += by_rise[k] * by_rise[k];
     const auto at_sample = [k](const Eigen::VectorXd& curve) { return curve[k]; };
     square += root_of(mapped<double>(by_filling_, at_sample)).squaredNorm();
     if (!options_.instrument && !options_.calibration_instrument) return square;
@@ -453,7 +448,7 @@ class Comparer {
     const double sigma = result_.scatter.sigma;
     for (std::size_t i = parts.ramp_first; i <= last; ++i) {
       const auto k = static_cast<Eigen::Index>(i);
-      if (!std::isfinite(at_.value[k])) continue;
+      if (!std::isfinite(at_.value[k]) || clipped_[k]) continue;
       const double e = at_.value[k] - measured_[k];
       const double contact = at_.by_contact[k] * p.contact_u;
       times.push_back(r_.time_s[i]);
@@ -477,16 +472,18 @@ class Comparer {
   const ComparisonOptions& options_;
   PreparedRecording prepared_;
   const Recording& r_;
+  RecordingComparison result_;
   LawAlong along_;
   double degrees_of_law_;
   LawAlong::At at_;
   Eigen::VectorXd measured_, depth_scale_, time_scale_, time_shift_;
-  std::vector<Eigen::VectorXd> weights_;
+  std::vector<Eigen::VectorXd> weights_, by_rise_;
+  Eigen::Array<bool, Eigen::Dynamic, 1>
+      clipped_;  ///< whether a reading stands at a limit of the force cell
   std::vector<LawAlong::Refinement> refinements_;
   std::vector<Eigen::VectorXd> by_filling_;  ///< of the organ, then of other fillings
   double claimed_limit_ = 0.0;
   ProbeEffect probe_;
-  RecordingComparison result_;
 };
 
 }  // namespace

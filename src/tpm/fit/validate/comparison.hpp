@@ -7,6 +7,7 @@
 
 #include "tpm/files/instrument.hpp"
 #include "tpm/fit/predict/other_fillings.hpp"
+#include "tpm/fit/select/unseen_rises.hpp"
 #include "tpm/fit/validate/joint_test.hpp"
 #include "tpm/fit/validate/placement_of_recording.hpp"
 #include "tpm/fit/validate/requirement.hpp"
@@ -46,7 +47,8 @@ struct QuantityComparison {
   double specimen_with_own = 0.0;  ///< with the recordings' own u: its square has specimen_degrees
   int specimen_degrees = 0;        ///< 0: no new specimen
   double of_contact = 0.0;         ///< effect of contact between two samples (contact_u_sampled)
-  double u_own = 0.0;              ///< the rest of u_val, with of_specimen
+  Eigen::RowVectorXd of_rises;     ///< effects of changes of the drive between two samples
+  double u_own = 0.0;              ///< the rest of u_val, with of_specimen and of_rises
 };
 
 /// The difference of the whole curve, which gets no verdict.
@@ -73,11 +75,12 @@ struct RecordingComparison {
   ReadingScatter scatter;
   ValidationPlacement placement;
   std::optional<Instrument> instrument;
-  bool same_instrument = false;  ///< as the calibration's
-  std::string probe;             ///< what is known of the two probes; empty: nothing is stated
-  bool creep = false;            ///< the load was imposed
-  std::string fillings;          ///< what u_num holds of the place of an organ's spheres
-  std::string pick;              ///< name of the reduced model that answered; empty: none
+  bool same_instrument = false;   ///< as the calibration's
+  std::string probe;              ///< what is known of the two probes; empty: nothing is stated
+  bool creep = false;             ///< the load was imposed
+  std::string fillings;           ///< what u_num holds of the place of an organ's spheres
+  std::string pick;               ///< name of the reduced model that answered; empty: none
+  std::vector<UnseenRise> rises;  ///< changes of the drive that the samples do not show
   std::vector<QuantityComparison> quantities;
   std::vector<std::string> without;  ///< quantities that were asked for and cannot be read, and why
   JointTest joint;
@@ -154,6 +157,14 @@ struct ComparisonOptions {
 [[nodiscard]] std::optional<double> limit_of(const Requirement& requirement,
                                              const QuantityComparison& quantity, Dimension response,
                                              double peak);
+
+/// Sets limit, verdict, p-value and Holm's rejection of each quantity, what must shrink, and the
+/// verdict of all.
+/// @param response dimension of the recording's response
+/// @param peak of the readings, SI: what a share of a quantity that is hardly known counts of, or
+///             the largest that was compared
+void judge_quantities(RecordingComparison& recording, const std::optional<Requirement>& requirement,
+                      Dimension response, double peak);
 
 /// That of several: adequate only if all are, not adequate (or seen) if Holm's procedure rejects
 /// one.

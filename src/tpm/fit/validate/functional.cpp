@@ -295,7 +295,7 @@ std::string quantity_words(const QuantityOfInterest& quantity, Quantity drive, Q
     case QuantityKind::relaxation_ratio:
       return is_creep(response) ? "creep ratio" : "relaxation ratio";
     case QuantityKind::half_time:
-      return "half time";
+      return is_creep(response) ? "creep half time" : "half time";
     case QuantityKind::work:
       return "work of the loop";
     case QuantityKind::rate:
@@ -467,6 +467,18 @@ std::optional<Functional> read_quantity(const QuantityOfInterest& quantity,
   }
   if (f && !(std::isfinite(f->value) && f->weight.allFinite())) return std::nullopt;
   return f;
+}
+
+double weighted_sum(const Eigen::VectorXd& weight, const Eigen::VectorXd& values) {
+  return (weight.array() != 0.0).select(weight.array() * values.array(), 0.0).sum();
+}
+
+Eigen::RowVectorXd weighted_sum(const Eigen::VectorXd& weight, const Eigen::MatrixXd& values) {
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(values.cols());
+  for (Eigen::Index i = 0; i < weight.size(); ++i) {
+    if (weight[i] != 0.0) sum += weight[i] * values.row(i);
+  }
+  return sum;
 }
 
 Eigen::VectorXd line_weights(std::span<const double> x, double at) {

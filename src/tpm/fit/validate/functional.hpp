@@ -107,6 +107,12 @@ struct Functional {
                                                       const Recording& recording, double contact,
                                                       const Eigen::VectorXd& curve);
 
+/// Sum of weights times values (of each column); samples that the law does not predict, which are
+/// not finite, have no weight.
+[[nodiscard]] double weighted_sum(const Eigen::VectorXd& weight, const Eigen::VectorXd& values);
+[[nodiscard]] Eigen::RowVectorXd weighted_sum(const Eigen::VectorXd& weight,
+                                              const Eigen::MatrixXd& values);
+
 /// Derivatives by the samples of a straight line of least squares through them, read at a place.
 /// Fewer than two different places give the mean.
 /// @param x places of the samples

@@ -11,6 +11,7 @@ struct JointTest {
   double t_squared = 0.0, f = 0.0, p_value = 1.0;
   double degrees = 0.0;                ///< of the denominator
   std::vector<std::string> dependent;  ///< quantities that follow from the others
+  std::vector<std::string> unknown;    ///< left out: a part of their uncertainty is not known
 };
 
 /// Fills T^2 and F from the errors of quantities and their covariance. A quantity is independent

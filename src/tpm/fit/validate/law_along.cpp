@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tpm/data/straight_pieces.hpp"
+#include "tpm/fit/likelihood/delayed_rise.hpp"
 #include "tpm/fit/validate/functional.hpp"
 #include "tpm/work/give_up.hpp"
 #include "tpmkit/error.hpp"
@@ -39,11 +40,6 @@ Protocol changed(const Protocol& history, const Change& change) {
   return result;
 }
 
-/// The samples up to the end of the ramp and hold.
-Protocol until_hold_ends(const Protocol& whole, const PreparedRecording& recording) {
-  return history_until(whole, std::min(recording.to_s, whole.end_s()));
-}
-
 /// Times later by an amount, of a sample within a motion within it still.
 std::vector<double> within(const Protocol& motion, std::vector<double> times_s, double later_s) {
   for (double& t : times_s) {
@@ -71,7 +67,7 @@ PreparedRecording as_load_imposed(const PreparedRecording& recording) {
 }
 
 LawAlong::LawAlong(const LawFile& law, const PreparedRecording& recording, const OrganOfLaw* organ,
-                   std::vector<Knot> motion)
+                   std::vector<Knot> motion, std::vector<DelayedRise> rises)
     : law_(law),
       recording_(recording.recording),
       own_model_(organ != nullptr ? nullptr : std::make_shared<LawModel>(law.spec)),
@@ -79,8 +75,11 @@ LawAlong::LawAlong(const LawFile& law, const PreparedRecording& recording, const
       model_(organ != nullptr ? static_cast<const Model*>(organ) : own_model_.get()),
       coordinates_(fitted_coordinates(law, Placement::own)),
       load_imposed_(is_load(recording_.drive_quantity)),
-      whole_(history_of(load_imposed_ ? Drive::force : Drive::displacement, recording_,
-                        std::move(motion))),
+      rises_(std::move(rises)),
+      to_s_(recording.to_s),
+      straight_(history_of(load_imposed_ ? Drive::force : Drive::displacement, recording_,
+                           std::move(motion))),
+      whole_(with_delays(straight_, rises_)),
       motion_(whole_) {
   if (!load_imposed_) {
     require_quantities_of(law, recording);
@@ -95,7 +94,7 @@ LawAlong::LawAlong(const LawFile& law, const PreparedRecording& recording, const
                       "creep, which an organ is not compared with",
                       "an imposed depth; or the law.json that was put on the organ");
     }
-    motion_ = followed_by_organ(until_hold_ends(whole_, recording));
+    motion_ = driven(rises_);
   }
   const std::vector<LawParameter> parameters = law_parameters(law.spec);
   const LawParameter& contact = parameters[parameters.size() - 2];
@@ -104,6 +103,12 @@ LawAlong::LawAlong(const LawFile& law, const PreparedRecording& recording, const
       std::ranges::find(coordinates_.place, parameters.size() - 2) != coordinates_.place.end();
   contact_of_law_ =
       !load_imposed_ && !belongs_to_recording(law.spec, contact) && (known || value != 0.0);
+}
+
+Protocol LawAlong::driven(std::vector<DelayedRise> rises) const {
+  Protocol motion = with_delays(straight_, rises);
+  if (organ_ == nullptr) return motion;
+  return followed_by_organ(history_until(motion, std::min(to_s_, motion.end_s())));
 }
 
 Response LawAlong::respond(const Protocol& motion, const std::vector<double>& times_s,
@@ -194,6 +199,20 @@ Eigen::VectorXd LawAlong::by_time_shift(double contact) const {
   const double step = part * median_step(recording_.time_s);
   // The motion comes later; the samples stay.
   return (along(motion_, contact, -step) - along(motion_, contact, step)) / (2.0 * step);
+}
+
+Eigen::VectorXd LawAlong::by_delay(std::size_t rise, double contact) const {
+  constexpr double kPart = 0.1;  // of the time between the samples
+  const DelayedRise& own = rises_.at(rise);
+  const double lasts_s = own.end_s - own.begin_s;
+  const auto delayed = [&](double by_s) {
+    std::vector<DelayedRise> rises = rises_;
+    rises[rise].delay_s = by_s;
+    return along(driven(std::move(rises)), contact);
+  };
+  const double early_s = std::max(own.delay_s - kPart * lasts_s, -0.5 * lasts_s);
+  const double late_s = std::min(own.delay_s + kPart * lasts_s, 0.5 * lasts_s);
+  return (delayed(late_s) - delayed(early_s)) / (late_s - early_s);
 }
 
 std::vector<LawAlong::Refinement> LawAlong::refinements(double contact) const {

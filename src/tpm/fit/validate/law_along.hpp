@@ -8,6 +8,7 @@
 #include "tpm/fit/predict/other_fillings.hpp"
 #include "tpm/fit/predict/prediction_parts.hpp"
 #include "tpmkit/law_file.hpp"
+#include "tpmkit/law_uncertainty.hpp"
 #include "tpmkit/model.hpp"
 
 namespace tpm::fit {
@@ -22,9 +23,11 @@ class LawAlong {
   /// @param organ answers in place of the law, on the ramp and hold alone; outlives this
   /// @param motion that the tissue has seen, up to the end of the recording; empty: that of its
   ///               samples
+  /// @param rises of that motion, which its samples do not show
   /// Throws Error(bad_input) for a law without uncertainty or a recording of other quantities.
   LawAlong(const LawFile& law, const PreparedRecording& recording,
-           const OrganOfLaw* organ = nullptr, std::vector<Knot> motion = {});
+           const OrganOfLaw* organ = nullptr, std::vector<Knot> motion = {},
+           std::vector<DelayedRise> rises = {});
 
   /// Values and derivatives at one contact point.
   struct At {
@@ -38,6 +41,8 @@ class LawAlong {
   /// d value / d ln(time), and d value / d(time), with which the motion comes later.
   [[nodiscard]] Eigen::VectorXd by_time_scale(double contact) const;
   [[nodiscard]] Eigen::VectorXd by_time_shift(double contact) const;
+  /// d value / d(delay) of one of the rises, 1/s.
+  [[nodiscard]] Eigen::VectorXd by_delay(std::size_t rise, double contact) const;
 
   /// One way in which the computation could be coarser.
   struct Refinement {
@@ -67,6 +72,8 @@ class LawAlong {
   [[nodiscard]] Protocol motion() const { return motion_; }
 
  private:
+  /// Imposed motion with these delays, as the model is driven.
+  [[nodiscard]] Protocol driven(std::vector<DelayedRise> rises) const;
   void follow_times(At& at, std::vector<double> values) const;
   [[nodiscard]] Eigen::VectorXd along(const Protocol& motion, double contact,
                                       double later_s = 0.0) const;
@@ -80,8 +87,11 @@ class LawAlong {
   const Model* model_;
   UncertainCoordinates coordinates_;
   bool load_imposed_ = false;
-  Protocol whole_;   ///< of every sample
-  Protocol motion_;  ///< of an organ, in straight pieces to the end of the hold
+  std::vector<DelayedRise> rises_;
+  double to_s_;        ///< end of the ramp and hold
+  Protocol straight_;  ///< of every sample, straight between them
+  Protocol whole_;     ///< with the rises
+  Protocol motion_;    ///< of an organ, in straight pieces to the end of the hold
   bool contact_of_law_ = false;
 };
 

@@ -176,7 +176,8 @@ void judge_pooled(PooledQuantity& pooled, const std::vector<Member>& members,
   if (options.requirement) {
     if (pooled.relative) {
       const Member& largest = *std::ranges::max_element(members, {}, &Member::scale);
-      const auto limit = limit_of(*options.requirement, *largest.quantity, options.response, 0.0);
+      const auto limit =
+          limit_of(*options.requirement, *largest.quantity, largest.quantity->unit.dimension, 0.0);
       if (limit && options.requirement->share) {
         pooled.limit = options.requirement->value;
       } else if (limit) {
@@ -187,7 +188,7 @@ void judge_pooled(PooledQuantity& pooled, const std::vector<Member>& members,
       QuantityComparison mean = *members.front().quantity;
       mean.measured = pooled.measured;
       mean.u_D = pooled.e.u_val;
-      pooled.limit = limit_of(*options.requirement, mean, options.response, 0.0);
+      pooled.limit = limit_of(*options.requirement, mean, mean.unit.dimension, 0.0);
     }
   }
   pooled.verdict = judge_error(pooled.e, pooled.limit);
@@ -227,13 +228,22 @@ bool equal_protocols(std::span<const Applicability> motions) {
          agree(&Applicability::duration_s);
 }
 
+const QuantityComparison* same_quantity(const RecordingComparison& recording,
+                                        const QuantityComparison& quantity) {
+  for (const QuantityComparison& q : recording.quantities) {
+    if (q.quantity == quantity.quantity && q.name == quantity.name) return &q;
+  }
+  return nullptr;
+}
+
 std::vector<QuantityComparison> each_quantity(std::span<const RecordingComparison> recordings) {
   std::vector<QuantityComparison> all;
   for (const RecordingComparison& r : recordings) {
     for (const QuantityComparison& q : r.quantities) {
-      if (std::ranges::find(all, q.quantity, &QuantityComparison::quantity) == all.end()) {
-        all.push_back(q);
-      }
+      const bool known = std::ranges::any_of(all, [&](const QuantityComparison& other) {
+        return other.quantity == q.quantity && other.name == q.name;
+      });
+      if (!known) all.push_back(q);
     }
   }
   return all;
@@ -248,10 +258,9 @@ std::vector<PooledQuantity> pool_recordings(std::span<const RecordingComparison>
   for (const QuantityComparison& one : each_quantity(recordings)) {
     std::vector<Member> members;
     for (const RecordingComparison& r : recordings) {
-      const auto found =
-          std::ranges::find(r.quantities, one.quantity, &QuantityComparison::quantity);
-      if (found == r.quantities.end()) continue;
-      members.push_back({&r, &*found, equal ? 1.0 : std::abs(found->simulated)});
+      const QuantityComparison* found = same_quantity(r, one);
+      if (found == nullptr) continue;
+      members.push_back({&r, found, equal ? 1.0 : std::abs(found->simulated)});
     }
     if (members.size() < 2) continue;
     PooledQuantity pooled;

@@ -38,11 +38,15 @@ struct PooledQuantity {
 struct PooledOptions {
   std::optional<Requirement> requirement;
   std::optional<std::string> at;  ///< recording whose protocol pooled areas are carried to
-  Dimension response = Dimension::force;
 };
 
 /// True if depth, rate and duration of the recordings agree to 2 %.
 [[nodiscard]] bool equal_protocols(std::span<const Applicability> motions);
+
+/// A quantity of a recording that is the same as one of another: creep and relaxation have none in
+/// common. Null: it has none.
+[[nodiscard]] const QuantityComparison* same_quantity(const RecordingComparison& recording,
+                                                      const QuantityComparison& quantity);
 
 /// Every quantity of the recordings once, as the first that has it has it.
 [[nodiscard]] std::vector<QuantityComparison> each_quantity(

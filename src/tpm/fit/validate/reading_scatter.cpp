@@ -10,6 +10,7 @@
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
+#include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/validate/law_along.hpp"
 #include "tpmkit/error.hpp"
 
@@ -157,13 +158,26 @@ Eigen::MatrixXd ReadingScatter::covariance(std::span<const double> time_s,
 }
 
 ReadingScatter scatter_of(const PreparedRecording& recording, const RecordingParts& parts) {
+  return scatter_of(recording, parts, clipped_readings(recording));
+}
+
+ReadingScatter scatter_of(const PreparedRecording& recording, const RecordingParts& parts,
+                          const Eigen::Array<bool, Eigen::Dynamic, 1>& clipped) {
   const Recording& r = recording.recording;
   ReadingScatter scatter;
   std::size_t first = parts.ramp_first, last = parts.ramp_last;
   const std::size_t before = parts.ramp_first + 1;
   bool hold = false;
-  if (parts.has_hold() && *parts.hold_last - *parts.hold_first + 1 >= kFewestReadings) {
-    first = *parts.hold_first;
+  const auto at_limit = [&](std::size_t i) { return clipped[static_cast<Eigen::Index>(i)]; };
+  std::size_t held = parts.has_hold() ? *parts.hold_first : 0;  // after the last clipped reading
+  for (std::size_t i = held; parts.has_hold() && i <= *parts.hold_last; ++i) {
+    if (at_limit(i)) held = i + 1;
+  }
+  for (std::size_t i = last; i > first; --i) {
+    if (at_limit(i)) last = i - 1;
+  }
+  if (parts.has_hold() && *parts.hold_last + 1 >= held + kFewestReadings) {
+    first = held;
     last = *parts.hold_last;
     scatter.told_by = "the hold";
     hold = true;

@@ -34,5 +34,10 @@ struct ReadingScatter {
 /// / sqrt(12) at least. Throws Error(bad_input) if fewer than 10 readings could tell it.
 [[nodiscard]] ReadingScatter scatter_of(const PreparedRecording& recording,
                                         const RecordingParts& parts);
+/// @param clipped whether a reading, before anything was taken out of it, stands at a limit of the
+///                force cell: such readings do not scatter
+[[nodiscard]] ReadingScatter scatter_of(const PreparedRecording& recording,
+                                        const RecordingParts& parts,
+                                        const Eigen::Array<bool, Eigen::Dynamic, 1>& clipped);
 
 }  // namespace tpm::fit

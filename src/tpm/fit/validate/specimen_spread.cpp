@@ -75,7 +75,10 @@ std::vector<SpecimenSpread> specimen_spreads(std::span<const RecordingComparison
   for (const bool creep : {false, true}) {
     for (const QuantityComparison& one : each_quantity(calibration)) {
       const std::vector<CalibrationShare> members = shares_in(calibration, one.quantity, creep);
-      if (members.size() < 2) continue;
+      const bool known = std::ranges::any_of(all, [&](const SpecimenSpread& own) {
+        return own.quantity == one.quantity && own.creep == creep;
+      });
+      if (members.size() < 2 || known) continue;
       SpecimenSpread spread = spread_of(members, calibration.size(), readings);
       spread.quantity = one.quantity;
       spread.creep = creep;

@@ -9,7 +9,6 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/files/file.hpp"
 #include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/select/loading_sense.hpp"
 #include "tpm/fit/validate/calibration_covariance.hpp"
@@ -19,23 +18,6 @@
 
 namespace tpm::fit {
 namespace {
-
-namespace fs = std::filesystem;
-
-std::optional<fs::path> found_file(const std::string& name, const std::string& sha256,
-                                   const fs::path& law_file) {
-  const fs::path folder = law_file.parent_path();
-  for (const fs::path& place :
-       {fs::path(name), folder / name, folder / ".." / name, folder / fs::path(name).filename(),
-        folder / ".." / fs::path(name).filename()}) {
-    for (fs::path file : {place, fs::path(place).replace_extension(".csv")}) {
-      std::error_code none;
-      if (!fs::is_regular_file(file, none)) continue;
-      if (sha256_hex(read_file(file)) == sha256) return file.lexically_normal();
-    }
-  }
-  return std::nullopt;
-}
 
 Applicability motion_of(const PreparedRecording& recording, const RecordingParts& parts,
                         double contact) {
@@ -235,8 +217,7 @@ ModelVerdict judge_together(Validation& v, const std::vector<RecordingComparison
   for (const RecordingComparison& r : unseen) {
     for (QuantityComparison q : r.quantities) {
       const auto has = [&](const RecordingComparison& other) {
-        return std::ranges::find(other.quantities, q.quantity, &QuantityComparison::quantity) !=
-               other.quantities.end();
+        return same_quantity(other, q) != nullptr;
       };
       if (std::ranges::count_if(unseen, has) > 1) continue;
       q.name = fmt::format("{}: {}", r.name, q.name);
@@ -284,6 +265,21 @@ void require_fitting_unit(const Validation& v, const std::optional<Requirement>&
                           fmt::join(each, " or ")));
 }
 
+/// The same readings twice would count as two that agree.
+void require_each_once(const std::vector<PreparedRecording>& recordings) {
+  std::vector<std::string> seen;
+  for (const PreparedRecording& r : recordings) {
+    std::string numbers = samples_sha256(r.recording);
+    if (const auto same = std::ranges::find(seen, numbers); same != seen.end()) {
+      throw bad_input(fmt::format("recording '{}'", r.name),
+                      fmt::format("has the readings of '{}'",
+                                  recordings[static_cast<std::size_t>(same - seen.begin())].name),
+                      "each recording once");
+    }
+    seen.push_back(std::move(numbers));
+  }
+}
+
 }  // namespace
 
 std::vector<RenderingError> rendering_errors(const Validation& presses) {
@@ -310,46 +306,6 @@ std::vector<RenderingError> rendering_errors(const Validation& presses) {
   return all;
 }
 
-CalibrationData find_calibration(const LawFile& law, const fs::path& law_file,
-                                 const std::vector<std::string>& digests,
-                                 const std::function<PreparedRecording(const std::string&)>& read) {
-  CalibrationData data;
-  if (!law.uncertainty) return data;
-  bool one = true;
-  for (const FittedFile& fitted : law.uncertainty->data) {
-    CalibrationData::File file{fitted.name, fitted.sha256, std::nullopt};
-    if (data.files.size() < digests.size()) file.samples_sha256 = digests[data.files.size()];
-    const auto path =
-        fitted.sha256.empty() ? std::nullopt : found_file(fitted.name, fitted.sha256, law_file);
-    if (!path) {
-      data.remarks.push_back(
-          fmt::format("the calibration's {} was not found with its SHA-256", fitted.name));
-      one = false;
-    } else {
-      try {
-        file.recording = read(path->string());
-      } catch (const Error& error) {
-        if (error.code() != ExitCode::bad_input) throw;
-        file.recording.reset();
-        data.remarks.push_back(
-            fmt::format("the calibration's file was not read: {}", error.what()));
-      }
-      const auto block = instrument_beside(*path);
-      std::optional<Instrument> instrument;
-      if (block) {
-        instrument = read_instrument(*block, quantity_dimension(law.spec.response),
-                                     quantity_dimension(law.spec.drive),
-                                     fmt::format("{}: instrument", path->string()));
-      }
-      if (!instrument || (data.instrument && data.instrument->id != instrument->id)) one = false;
-      if (instrument && !data.instrument) data.instrument = instrument;
-    }
-    data.files.push_back(std::move(file));
-  }
-  if (!one) data.instrument.reset();
-  return data;
-}
-
 Validation validate(const ValidationRequest& request) {
   if (!request.law.uncertainty) {
     throw bad_input(request.law_file, "carries no uncertainty of a fit",
@@ -360,6 +316,7 @@ Validation validate(const ValidationRequest& request) {
     throw Error(ExitCode::usage, "--at-recording", fmt::format("'{}'", printable(*request.at)),
                 "the name of one of the recordings");
   }
+  if (request.presses.empty()) require_each_once(request.recordings);
   Validation v;
   const std::optional<LawFile> again =
       with_calibration_covariance(request.law, found_recordings(request.calibration));
@@ -464,9 +421,7 @@ Validation validate(const ValidationRequest& request) {
     v.verdict = ModelVerdict::residual;
     return v;
   }
-  const bool creep = unseen.front().creep;
-  PooledOptions pooling{request.requirement, request.at,
-                        quantity_dimension(creep ? law.spec.drive : law.spec.response)};
+  const PooledOptions pooling{request.requirement, request.at};
   v.pooled = pool_recordings(
       unseen, unseen_motions,
       law.uncertainty->degrees_of_freedom.value_or(std::numeric_limits<double>::infinity()),

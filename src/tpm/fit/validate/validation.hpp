@@ -27,11 +27,13 @@ struct CalibrationData {
 /// its SHA-256 is the one in the law.
 /// @param law_file path of the law, or of the organ that it was put on
 /// @param digests sample_digests() of the law
-/// @param read reads and prepares a file as a recording; its errors are told in remarks
+/// @param ways each reads and prepares a file as a recording, such as with the options of the new
+///             recordings and without; the first counts that gives the numbers that were fitted.
+///             Errors of the first are told in remarks
 [[nodiscard]] CalibrationData find_calibration(
     const LawFile& law, const std::filesystem::path& law_file,
     const std::vector<std::string>& digests,
-    const std::function<PreparedRecording(const std::string&)>& read);
+    const std::vector<std::function<PreparedRecording(const std::string&)>>& ways);
 
 /// Request of a validation: see docs/validate.md.
 struct ValidationRequest {

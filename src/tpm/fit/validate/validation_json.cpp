@@ -90,6 +90,7 @@ Json recording_json(const RecordingComparison& r, const Applicability& a, const 
     if (std::isfinite(r.joint.degrees)) joint["degrees_of_freedom"] = stored(r.joint.degrees);
   }
   joint["dependent"] = r.joint.dependent;
+  if (!r.joint.unknown.empty()) joint["without"] = r.joint.unknown;
   j["together"] = joint;
   j["curve"] = {{"samples", r.curve.samples},
                 {"mean_square_E", stored(r.curve.mean_square_error)},
@@ -112,6 +113,14 @@ Json recording_json(const RecordingComparison& r, const Applicability& a, const 
                   {"phi", stored(r.scatter.phi)},
                   {"degrees_of_freedom", stored(r.scatter.degrees)},
                   {"from", r.scatter.told_by}};
+  if (!r.rises.empty()) {
+    j["unseen_rises"] = array_json(r.rises, [](const UnseenRise& rise) {
+      return Json{{"begin_s", stored(rise.begin_s)},
+                  {"end_s", stored(rise.end_s)},
+                  {"delay_s", stored(rise.expected().delay_s)},
+                  {"u_s", stored(rise.u_s())}};
+    });
+  }
   if (r.instrument) j["instrument"] = r.instrument->stated;
   j["same_instrument"] = r.same_instrument;
   if (!r.probe.empty()) j["probe"] = r.probe;

@@ -73,13 +73,19 @@ void add_table(BriefText& text, TableSection section, Rank rank, std::string_vie
 }
 
 std::string joint_text(const JointTest& joint) {
-  if (joint.rank == 0) return "not possible: too few degrees of freedom";
+  if (joint.rank == 0) {
+    return joint.unknown.empty() ? "not possible: too few degrees of freedom"
+                                 : "not possible: of no quantity is the whole uncertainty known";
+  }
   std::string text = fmt::format(
       "T^2 = {}, rank {}, p = {} (F with {} and {} degrees of freedom)",
       significant(joint.t_squared, 3), joint.rank, significant(joint.p_value, 2), joint.rank,
       std::isfinite(joint.degrees) ? significant(joint.degrees, 3) : "infinitely many");
   if (!joint.dependent.empty()) {
     text += fmt::format("; {} follows from these", fmt::join(joint.dependent, ", "));
+  }
+  if (!joint.unknown.empty()) {
+    text += fmt::format("; without {}", fmt::join(joint.unknown, ", "));
   }
   return text;
 }
@@ -148,6 +154,15 @@ std::string rendering_text(const Validation& v) {
                         e.presses == 1 ? "press" : "presses");
   }
   return text;
+}
+
+std::string rises_text(const RecordingComparison& r) {
+  const UnseenRise& first = r.rises.front();
+  const std::size_t more = r.rises.size() - 1;
+  return fmt::format(
+      "when the {} changed between the samples at {} and {} s{} is not known: in u_D",
+      r.creep ? "load" : "drive", significant(first.begin_s, 6), significant(first.end_s, 6),
+      more > 0 ? fmt::format(" and in {} more such intervals", more) : "");
 }
 
 std::string instrument_text(const RecordingComparison& r) {
@@ -277,6 +292,7 @@ void add_recording(BriefText& text, const Validation& v, std::size_t index) {
       placement_text(r, unit, quantity_dimension(r.creep ? v.spec.response : v.spec.drive)),
       Rank::context);
   text.add_line("scatter", scatter_text(r.scatter, unit), Rank::detail);
+  if (!r.rises.empty()) text.add_line("motion", rises_text(r), Rank::detail);
   text.add_line("instrument", instrument_and_probe_text(r), Rank::detail);
   text.add_line("applicability", applicability_text(v.applicability[index]), Rank::context);
 }
@@ -353,23 +369,35 @@ std::string applicability_text(const Validation& v, const std::vector<std::strin
   return text + fmt::format(" (not known of all: {})", fmt::join(each_once(unknown, itself), ", "));
 }
 
-void add_each_recording(BriefText& text, const Validation& v) {
-  const std::vector<std::string> names = names_of(v).names;
+/// A row each, of those of relaxation or of creep: these have no quantity in common.
+void add_rows_of(BriefText& text, const Validation& v, const std::vector<std::string>& names,
+                 bool creep) {
+  std::vector<RecordingComparison> recordings;
   TableSection section;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (v.recordings[i].creep != creep) continue;
+    recordings.push_back(v.recordings[i]);
+    section.rows.push_back({names[i]});
+  }
+  if (recordings.empty()) return;
   section.columns = {"recording"};
-  const std::vector<QuantityComparison> quantities = each_quantity(v.recordings);
+  const std::vector<QuantityComparison> quantities = each_quantity(recordings);
   for (const QuantityComparison& q : quantities) section.columns.push_back(q.name);
   section.columns.push_back("verdict");
-  for (const RecordingComparison& r : v.recordings) {
-    std::vector<std::string> row{names[section.rows.size()]};
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    std::vector<std::string>& row = section.rows[i];
     for (const QuantityComparison& q : quantities) {
-      const auto own = std::ranges::find(r.quantities, q.quantity, &QuantityComparison::quantity);
-      row.push_back(own == r.quantities.end() ? "-" : error_text(own->e, unit_of(*own)));
+      const QuantityComparison* own = same_quantity(recordings[i], q);
+      row.push_back(own == nullptr ? "-" : error_text(own->e, unit_of(*own)));
     }
-    row.push_back(cell_words(r.verdict));
-    section.rows.push_back(std::move(row));
+    row.push_back(cell_words(recordings[i].verdict));
   }
   add_table(text, std::move(section), Rank::recording, "recordings");
+}
+
+void add_each_recording(BriefText& text, const Validation& v) {
+  const std::vector<std::string> names = names_of(v).names;
+  for (const bool creep : {false, true}) add_rows_of(text, v, names, creep);
   for (const QuantityComparison& q : v.alone) {
     text.add_line(
         "in one only",
@@ -395,39 +423,17 @@ void add_each_recording(BriefText& text, const Validation& v) {
 
 }  // namespace
 
-std::string part_words(const RecordingComparison& r, const LawSpec& law) {
-  const ComparedPart& part = r.part;
-  const Unit unit = shown_unit(quantity_dimension(r.creep ? law.response : law.drive));
-  const auto driven = [&](double si) { return significant(si / unit.to_si, 3); };
-  const auto seconds = [](double s) { return significant(s, 4); };
-  std::string text =
-      fmt::format("ramp from {} s to {} s, {}, ", seconds(part.from_s), seconds(part.corner_s),
-                  r.creep || unit.dimension != Dimension::length
-                      ? "to " + with_unit(driven(part.depth), unit)
-                      : with_unit(driven(part.depth), unit) + " deep");
-  text += part.hold_s > 0.0 ? fmt::format("and hold to {} s", seconds(part.to_s)) : "no hold";
-  if (part.whole()) return text + (part.hold_asked_s ? ": the whole press" : ": the whole loading");
-  text += ": only a part";
-  if (part.depth < part.depth_of_all) {
-    text += fmt::format(", of {}", with_unit(driven(part.depth_of_all), unit));
-  }
-  if (part.left_out_s > 0.0) {
-    text += fmt::format(", without {} s of the {} s {}", seconds(part.left_out_s),
-                        seconds(part.loaded_s),
-                        part.hold_asked_s ? "that the hold was asked for" : "under load");
-  }
-  return text;
-}
-
 std::string conclusion_words(const Validation& v) {
   if (v.verdict == ModelVerdict::residual) {
     return "calibration residual: the law was fitted to these data, so this validates nothing";
   }
-  std::vector<std::string> named;
+  std::vector<std::string> named, alone;
   const auto add = [&](const std::string& name, const ErrorWithUncertainty& e, const Unit& unit,
                        bool rejected, ModelVerdict verdict) {
     const bool wanted =
         v.verdict == ModelVerdict::undetermined ? verdict == ModelVerdict::undetermined : rejected;
+    const bool beyond = verdict == ModelVerdict::not_adequate || verdict == ModelVerdict::seen;
+    if (beyond && !rejected) alone.push_back(name);
     if (wanted) named.push_back(fmt::format("{} {}", name, error_text(e, unit)));
   };
   for (const PooledQuantity& p : v.pooled) add(p.name, p.e, unit_of(p), p.rejected, p.verdict);
@@ -441,6 +447,10 @@ std::string conclusion_words(const Validation& v) {
     }
   }
   const std::string list = fmt::format("{}", fmt::join(named, ", "));
+  const std::string before_holm =
+      alone.empty()
+          ? ""
+          : fmt::format("; beyond it before Holm's correction only: {}", fmt::join(alone, ", "));
   switch (v.verdict) {
     case ModelVerdict::adequate:
       return fmt::format("adequate for {}", v.requirement);
@@ -450,8 +460,9 @@ std::string conclusion_words(const Validation& v) {
       return list.empty()
                  ? fmt::format("undetermined for {}: beyond it before Holm's correction only",
                                v.requirement)
-                 : fmt::format("undetermined{}: {}",
-                               v.requirement.empty() ? "" : " for " + v.requirement, list);
+                 : fmt::format("undetermined{}: {}{}",
+                               v.requirement.empty() ? "" : " for " + v.requirement, list,
+                               before_holm);
     case ModelVerdict::seen:
       return fmt::format("a model error of E +- U: {}", list);
     case ModelVerdict::no_requirement:
@@ -459,7 +470,7 @@ std::string conclusion_words(const Validation& v) {
     default:
       break;
   }
-  return std::string(verdict_words(ModelVerdict::not_seen));
+  return std::string(verdict_words(ModelVerdict::not_seen)) + before_holm;
 }
 
 std::string to_terminal_text(const Validation& v) {
