@@ -95,13 +95,10 @@ std::string fault_of(const JitterCheck& check) {
 
 /// What was kept, for how long, and what that time can say.
 std::string kept_words(const JitterCheck& check) {
-  constexpr double kHour_s = 3600.0;
   std::string words = fmt::format("kept {} Hz for {} s", significant(check.rate_Hz, 4),
                                   significant(observed_s(check), 4));
-  if (const auto most = most_stalls_per_s(check)) {
-    words +=
-        fmt::format("; stalls beyond the watchdog: fewer than {} an hour with 95 % (3/T of {} s)",
-                    significant(kHour_s * *most, 3), significant(observed_s(check), 3));
+  if (const std::string bound = stall_bound(check); !bound.empty()) {
+    words += "; stalls beyond the watchdog: " + bound;
   }
   if (const auto hour_s = once_an_hour_s(check)) {
     return words + fmt::format("; extrapolated, not measured: {} once an hour", ms(*hour_s));
@@ -167,6 +164,17 @@ std::optional<double> most_stalls_per_s(const JitterCheck& check) {
   const double most =
       stalls == 0.0 ? kOfNone : 0.5 * chi_squared_quantile(kShare, 2.0 * (stalls + 1.0));
   return most / observed_s(check);
+}
+
+std::string stall_bound(const JitterCheck& check) {
+  constexpr double kHour_s = 3600.0, kDigits3 = 100.0;
+  const auto most = most_stalls_per_s(check);
+  if (!most) return {};
+  const double hourly = kHour_s * *most;
+  return fmt::format("fewer than {} an hour with 95 % ({} {} s)",
+                     hourly < kDigits3 ? significant(hourly, 3) : fmt::format("{:.0f}", hourly),
+                     stalls_beyond_watchdog(check) == 0 ? "3/T of" : "Poisson, in",
+                     significant(observed_s(check), 3));
 }
 
 std::optional<double> once_an_hour_s(const JitterCheck& check) {

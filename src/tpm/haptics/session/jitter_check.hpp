@@ -37,6 +37,9 @@ inline constexpr double kSessionRates_Hz[] = {4000.0, 2000.0, 1000.0, 500.0};
 /// the time T. Empty if no wake-up was counted.
 [[nodiscard]] std::optional<double> most_stalls_per_s(const JitterCheck& check);
 
+/// That limit in words, with how it was found; empty without one.
+[[nodiscard]] std::string stall_bound(const JitterCheck& check);
+
 /// Time that was observed, s.
 [[nodiscard]] double observed_s(const JitterCheck& check);
 

@@ -76,16 +76,6 @@ std::string extrapolation_of(const JitterCheck& check) {
   return fmt::format("too short: {} cycles, {} needed", late.count(), kFewestToExtrapolate);
 }
 
-/// The upper limit of the stalls in words; empty if there is none.
-std::string bound_of(const JitterCheck& check) {
-  constexpr double kHour_s = 3600.0;
-  const auto most = most_stalls_per_s(check);
-  if (!most) return {};
-  return fmt::format("fewer than {} an hour with 95 % ({} {} s)", significant(kHour_s * *most, 3),
-                     stalls_beyond_watchdog(check) == 0 ? "3/T of" : "Poisson, in",
-                     significant(observed_s(check), 3));
-}
-
 Json stalls_json(const JitterCheck& check) {
   const auto or_null = [](const std::optional<double>& value) {
     return value ? Json(rounded(*value, kHilDigits)) : Json();
@@ -98,14 +88,14 @@ Json stalls_json(const JitterCheck& check) {
           {"once_an_hour_extrapolated_s", or_null(once_an_hour_s(check))},
           {"extrapolation", extrapolation_of(check)},
           {"upper_95_per_s", or_null(most_stalls_per_s(check))},
-          {"upper_95", bound_of(check)}};
+          {"upper_95", stall_bound(check)}};
 }
 
 std::string stalls_text(const JitterCheck& check) {
   const TimeHistogram& late = check.outcome.woke_late;
   std::string text = "stalls beyond the watchdog: not counted\n";
   if (late.count() > 0) {
-    const std::string bound = bound_of(check);
+    const std::string bound = stall_bound(check);
     text = fmt::format(
         "p99.99 of the wake-ups {} us, the watchdog waits for {} us; stalls beyond it: {}{}{}\n",
         us(late.quantile_s(0.9999)), us(check.watchdog_s), stalls_beyond_watchdog(check),
