@@ -73,7 +73,8 @@ std::string extrapolation_of(const JitterCheck& check) {
                            ? "if the tail beyond 99.9 % falls as an exponential"
                            : "the largest seen, for an exponential tail beyond 99.9 % ends below");
   }
-  return fmt::format("too short: {} cycles, {} needed", late.count(), kFewestToExtrapolate);
+  return fmt::format("too short: {} cycles, {},000 needed", late.count(),
+                     kFewestToExtrapolate / 1000);
 }
 
 Json stalls_json(const JitterCheck& check) {
