@@ -105,6 +105,7 @@ TEST_CASE("Of a loop that hung nothing is counted, and nothing is said of its st
   check.outcome.cycles = 30'000;
   assess(check);
   CHECK(check.timing == "not kept: the test ended early: cycle timeout");
+  CHECK_THAT(check.advice, Contains("nothing is known of what this machine can do"));
   const std::string text = check_text(check);
   CHECK_THAT(text, Contains("stalls beyond the watchdog: not counted\n"));
   CHECK_THAT(text, Contains("woke after the deadline: not counted\n"));

@@ -117,6 +117,9 @@ double best_rate_Hz(const JitterCheck& check) {
 
 std::string advice_of(const JitterCheck& check) {
   constexpr double kLongestWatchdog_s = 0.016;
+  if (check.outcome.woke_late.count() == 0) {
+    return "no wake-up was counted, so nothing is known of what this machine can do";
+  }
   const double stall_s = longest_stall_s(check);
   const double rate = best_rate_Hz(check);
   std::string can =
