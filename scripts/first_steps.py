@@ -26,7 +26,7 @@ def main():
     out = [f"# The four paths typed, {datetime.date.today().isoformat()}", "",
            "Each command as a new user types it, in an empty folder, with its exit code, wall time and last ten lines. The",
            "machine was shared with other work, so times are upper bounds, and `tpm hil check`, which measures the machine, may",
-           "say `not fit`. Written by", "",
+           "say `not kept`. Written by", "",
            f"    python3 scripts/first_steps.py build/release/tpm reports/first_steps/{page.name}"]
     with tempfile.TemporaryDirectory() as folder:
         for name, commands in PATHS.items():

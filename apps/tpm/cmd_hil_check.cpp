@@ -1,7 +1,11 @@
-// tpm hil check: communication and jitter test before a session.
+// tpm hil check: timing of machine and device before a session, and the gate of that session.
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "answer.hpp"
 #include "command.hpp"
@@ -10,6 +14,7 @@
 #include "out_of_memory.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
+#include "tpm/work/progress.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -29,8 +34,48 @@ double within(const std::string& text, Dimension dimension, const char* option, 
               fmt::format("{} to {} {}", shortest(least), shortest(most), si_symbol(dimension)));
 }
 
+/// Throws Error(usage) for what would not be used: each is refused, not ignored.
+void require_used(const CheckChoice& choice, const DeviceChoice& device) {
+  if (!choice.session.empty() && !choice.rate.empty()) {
+    throw Error(ExitCode::usage, "--loop-rate", "beside a session, which has a rate of its own",
+                "\"rate\" in the session, or --loop-rate without one");
+  }
+  if (choice.session.empty() && device.kind == "virtual" && !device.file.empty()) {
+    throw Error(ExitCode::usage, "--device-file", "of a device that no session is asked for",
+                "a SESSION, or the --device that the file is of");
+  }
+}
+
+/// What `tpm hil run` would say to the session, as far as it says it before the first force of the
+/// tissue.
+SessionVerdict asked_gate(const HilSession& hil, const DeviceChoice& device, RealTimeWish wish) {
+  const DeviceLimits limits = limits_of(device);
+  if (limits.hardware() && limits.measured_delay_s) {
+    tell_user(
+        "tpm: let go of the handle in the middle of its workspace: as before a session it is moved "
+        "for a second with less than 0.3 N\n");
+  }
+  std::optional<Progress> progress;
+  return ask_session_gate(hil, device, wish, InterruptWatch::seen, [&](const std::string&) {
+    if (!progress) progress.emplace("planning the model of the loop", kPlanningSteps);
+    progress->advance();
+  });
+}
+
+JitterCheck checked_hil(const HilSession& hil, const CheckChoice& choice,
+                        const DeviceChoice& device, double duration_s) {
+  const RealTimeWish wish = chosen_wish(choice.device);
+  std::optional<SessionVerdict> verdict;
+  if (!choice.session.empty()) verdict = asked_gate(hil, device, wish);
+  JitterCheck check = check_jitter(device, hil, duration_s, wish, InterruptWatch::seen);
+  check.session = std::move(verdict);
+  return check;
+}
+
 int check_hil(const CheckChoice& choice, const Session& session) {
   constexpr double kLeast_Hz = 100.0, kMost_Hz = 4000.0, kLeast_s = 0.1, kMost_s = 86400.0;
+  const DeviceChoice device = chosen_device(choice.device);
+  require_used(choice, device);
   HilSession hil;
   if (!choice.session.empty()) hil = read_session(choice.session);
   if (!choice.rate.empty()) {
@@ -40,25 +85,34 @@ int check_hil(const CheckChoice& choice, const Session& session) {
   const double duration = within(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);
   const InterruptWatch interrupts(InterruptWatch::Of::motors);
   const OutOfMemoryIsThrown while_the_device_is_open;
-  const JitterCheck check = check_jitter(chosen_device(choice.device), hil, duration,
-                                         chosen_wish(choice.device), InterruptWatch::seen);
-  say("{}", session.json() ? answer_text(session, check_json(check), {{"rate_kept", check.fit}})
-                           : check_text(check));
-  return exit_code(check.fit);
+  JitterCheck check;
+  try {
+    check = checked_hil(hil, choice, device, duration);
+  } catch (const Error& error) {
+    if (!InterruptWatch::seen()) throw;
+    tell_user("tpm: {}\n", error.what());
+    return InterruptWatch::exit_code();
+  }
+  std::vector<Verdict> verdicts{{"rate_kept", check.timing_kept}};
+  if (check.session) verdicts.push_back({"session_accepted", check.session->accepted});
+  say("{}", session.json() ? answer_text(session, check_json(check), verdicts) : check_text(check));
+  if (check.outcome.cause == StopCause::signal) return InterruptWatch::exit_code();
+  return exit_code(check.timing_kept && (!check.session || check.session->accepted));
 }
 
 }  // namespace
 
 void add_hil_check_command(CLI::App& hil, Session& session) {
   CLI::App* command = hil.add_subcommand(
-      "check", "Is this machine, with this device, up to a session? Jitter, verdict");
+      "check",
+      "Does this machine keep the time with this device, and would a session begin on it?");
   auto choice = std::make_shared<CheckChoice>();
   command->add_option("SESSION", choice->session,
-                      "With the rate and the limits of this session (default: those of one that "
-                      "says nothing)");
+                      "With the rate and the limits of this session, whose start gate is asked too "
+                      "(default: timing alone, with the limits of one that says nothing)");
   add_device_options(*command, choice->device);
   command->add_option("--loop-rate", choice->rate,
-                      "Rate of the servo loop, 100 Hz to 4 kHz (default: the session's, 1 kHz)");
+                      "Rate of the servo loop without a session, 100 Hz to 4 kHz (default: 1 kHz)");
   command->add_option("--duration", choice->duration, "Duration, of the test")
       ->capture_default_str();
   add_format_option(*command, session);

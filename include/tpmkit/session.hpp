@@ -27,7 +27,9 @@ struct SessionRequest {
   /// every other device.
   std::string limits;
   /// Measurements of the device (schemas/device.schema.json, `tpm hil identify`). Without it
-  /// hardware counts as 20 ms late and free of friction, and stiff tissues are refused.
+  /// hardware counts as 20 ms late and free of friction, and stiff tissues are refused. A device
+  /// with another serial number or name than the file is refused before a force; a simulated one
+  /// stands for that of the file.
   std::filesystem::path device_file;
   bool may_move = false;              ///< the device may move by itself to initialise
   std::function<bool()> interrupted;  ///< true ends the session with the cause `signal`

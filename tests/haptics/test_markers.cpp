@@ -227,6 +227,34 @@ TEST_CASE("A check tells p99.99 beside the watchdog, the bound 3/T, and names wh
   CHECK_THAT(check_json(stalled).dump(), Contains("\"upper_95_per_s\":0.10493"));
 }
 
+TEST_CASE("An extrapolation is never below what was seen, and keeps no rate beyond the watchdog") {
+  // Five stalls of 3 ms: p99.9 and p99.99 are 20 us, and so would be what falls beyond them.
+  const JitterCheck seen = check_with(0, 0, 5, 3'000'000);
+  REQUIRE(once_an_hour_s(seen));
+  CHECK(*once_an_hour_s(seen) == Approx(0.003));
+  CHECK_THAT(check_text(seen), Contains("extrapolated, not measured: 3000 us once an hour, the "
+                                        "largest seen"));
+  CHECK(seen.timing_kept);
+  CHECK_THAT(seen.timing,
+             Contains("kept 1000 Hz for 60 s") && Contains("fewer than 180 an hour with 95 % (3/T "
+                                                           "of 60 s)"));
+  // p99.9 is 100 us and p99.99 2.5 ms: 2.5 + 2.4 / ln 10 * ln 360 = 8.64 ms.
+  const JitterCheck beyond = check_with(100, 99'500, 10, 2'499'500);
+  CHECK(*once_an_hour_s(beyond) == Approx(0.00864).epsilon(1e-2));
+  CHECK_FALSE(beyond.timing_kept);
+  CHECK_THAT(beyond.timing, Contains("extrapolated, not measured"));
+  CHECK(check_json(beyond).at("timing_kept") == false);
+}
+
+TEST_CASE("A stall counts with the period before it: so long the device has no command") {
+  // 7.5 ms late at 1 kHz are 8.5 ms without a command.
+  const JitterCheck check = check_with(0, 0, 1, 7'500'000);
+  CHECK(stalls_beyond_watchdog(check) == 1);
+  CHECK_FALSE(check.timing_kept);
+  CHECK_THAT(check.timing, Contains("a stall of 7.5 ms leaves 8.5 ms without a command"));
+  CHECK(stalls_beyond_watchdog(check_with(0, 0, 1, 6'900'000)) == 0);
+}
+
 TEST_CASE("A check that is too short to extrapolate says so, in text and in JSON") {
   JitterCheck check;
   check.rate_Hz = 1000.0;

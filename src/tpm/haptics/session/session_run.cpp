@@ -111,10 +111,7 @@ ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDev
     prepare();
     return run_in_virtual_time(*device, *stepped, servo, sink, options.interrupted);
   }
-  RealTimeOptions real;
-  real.wish = options.wish;
-  real.cycle_timeout_s = session.cycle_timeout_s;
-  real.interrupted = options.interrupted;
+  RealTimeOptions real = real_time_options(session, options.wish, options.interrupted);
   real.prepare = prepare;
   std::int64_t passed_on_ns = now_ns();
   real.idle = [&log, &notices, &passed_on_ns] {
@@ -146,35 +143,6 @@ std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
   return std::make_shared<PluginDevice>(choice.plugin, choice.which);
 }
 
-/// A file that was measured on another device says nothing of this one. One that measured nothing,
-/// as those that are shipped, is for any device of its kind.
-void require_same_device(const DeviceChoice& choice, const DeviceIdentity& device) {
-  if (choice.file.empty() || choice.kind == "virtual") return;
-  const DeviceFile file = read_device_file(choice.file);
-  if (file.simulated && device.hardware) {
-    throw Error(ExitCode::environment, file.where + ": key /measurement/simulated_device",
-                "was measured on a simulated device, and this one has motors",
-                "the file of this device (tpm hil identify)");
-  }
-  const auto other = [&file](const char* key, const std::string& theirs, const std::string& ours) {
-    return Error(ExitCode::environment, fmt::format("{}: key /{}", file.where, key),
-                 theirs.empty()
-                     ? fmt::format("is missing: what was measured may be of another device than "
-                                   "this, '{}'",
-                                   printable(ours))
-                     : fmt::format("was measured on the device '{}', and this is '{}'",
-                                   printable(theirs), printable(ours)),
-                 "the file of this device (tpm hil identify)");
-  };
-  const bool must_say = file.measured && device.hardware;
-  if (file.serial != device.serial && (!file.serial.empty() || must_say)) {
-    throw other("serial", file.serial, device.serial);
-  }
-  if (file.measured && !file.name.empty() && !device.name.empty() && file.name != device.name) {
-    throw other("name", file.name, device.name);
-  }
-}
-
 constexpr const char* kCallersOwn = "the caller's own";
 
 /// Of a device of the caller's; those of this library refuse in prepare().
@@ -196,77 +164,63 @@ DeviceLimits checked_limits(const DeviceLimits& limits, const DelayCheck& check)
   return now;
 }
 
-/// Why the check before a session ended early, and what would help.
-Error ended_check(const DelayCheck& check) {
-  constexpr const char* kWhere = "delay of the device";
-  if (check.cause == StopCause::signal) {
-    return {ExitCode::environment, kWhere,
-            "the check of a second before the session was interrupted", ""};
-  }
-  const char* expected = check.cause == StopCause::not_in_place
-                             ? "a handle at rest in the middle of its workspace"
-                         : check.cause == StopCause::unplugged
-                             ? "a device that stays connected"
-                             : "a device that answers in time; tpm hil check looks for stalls";
-  return {ExitCode::environment, kWhere,
-          fmt::format("the check of a second before the session ended early: {}{}{}",
-                      word_of(check.cause), check.detail.empty() ? "" : ": ",
-                      printable(check.detail, 200)),
-          expected};
-}
-
 /// Measures the delay for a second, and the rendering once more with what was found. Throws as
 /// run_session().
-template <class MakeDevice>
-void check_at_start(SessionRun& run, const HilSession& session, const DeviceChoice& choice,
-                    const DeviceLimits& limits, const SessionRunOptions& options,
-                    ContactModel& model, const MakeDevice& make) {
+void check_at_start(AdmittedSession& admitted, const HilSession& session,
+                    const DeviceChoice& choice, const DeviceLimits& limits,
+                    const SessionRunOptions& options) {
   DeviceIdentifyOptions second;
   second.real_time = options.real_time;
   second.wish = options.wish;
   second.interrupted = options.interrupted;
   second.opened = [&choice](const DeviceIdentity& device) { require_same_device(choice, device); };
+  second.watcher = [&options](const ServoRecord& row) {
+    if (row.phase < 0 && options.watcher) options.watcher(row);  // what the check waits for
+  };
   if (options.checking) {
     options.checking(std::min(kMostIdentifyingForce_N, session.servo.force_limit_N));
   }
-  const DelayCheck check = check_delay(make(), choice, session, second);
-  if (check.cause != StopCause::finished) throw ended_check(check);
-  run.rendering = check_rendering(session, model, run.model, checked_limits(limits, check));
-  run.rendering.delay_at_start_s = check.delay_s;
+  const DelayCheck check = check_delay(make_device(choice, session), choice, session, second);
+  admitted.rendering =
+      check_rendering(session, *admitted.stepped, admitted.model, checked_limits(limits, check));
+  admitted.rendering.delay_at_start_s = check.delay_s;
   if (!check.delay_s) {
-    run.rendering.delay_note =
+    admitted.rendering.delay_note =
         "the handle did not follow the forces of the check before the session; let go of it";
   }
-  require_acceptable(run.rendering, choice, limits, options);
+  require_acceptable(admitted.rendering, choice, limits, options);
 }
 
-/// A session from its model to the end of its recording.
-/// @param checks the delay before the session
-/// @param make gives the device, once the rendering is known to be acceptable
-template <class MakeDevice>
-SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const DeviceLimits& limits,
-                  const SessionRunOptions& options, bool checks, const MakeDevice& make) {
+/// The gate as far as it needs no device.
+AdmittedSession admit_to(const HilSession& session, const DeviceChoice& choice,
+                         const DeviceLimits& limits, const SessionRunOptions& options) {
   require_within(session, limits);
-  SessionRun run;
-  run.model = make_loop_model(session, options.planning);
-  const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
-  run.rendering = check_rendering(session, *stepped, run.model, limits);
+  AdmittedSession admitted;
+  admitted.model = make_loop_model(session, options.planning);
+  admitted.stepped = std::move(admitted.model.model);
+  admitted.rendering = check_rendering(session, *admitted.stepped, admitted.model, limits);
   if (choice.kind == "virtual") {
     const DeviceLimits real =
         choice.file.empty() ? limits_of("omega7") : limits_from(read_device_file(choice.file));
-    run.on_hardware = check_rendering(session, *stepped, run.model, real);
-    run.hardware_kind = real.kind;
+    admitted.on_hardware = check_rendering(session, *admitted.stepped, admitted.model, real);
+    admitted.hardware_kind = real.kind;
   }
-  require_acceptable(run.rendering, choice, limits, options);
-  if (checks) check_at_start(run, session, choice, limits, options, *stepped, make);
-  const std::shared_ptr<HapticDevice> device = make();
+  require_acceptable(admitted.rendering, choice, limits, options);
+  return admitted;
+}
+
+/// A session that was admitted, to the end of its recording.
+SessionRun run_admitted(AdmittedSession admitted, const HilSession& session,
+                        const DeviceChoice& choice, const SessionRunOptions& options,
+                        const std::shared_ptr<HapticDevice>& device) {
+  SessionRun run;
+  run.model = std::move(admitted.model);
+  run.rendering = std::move(admitted.rendering);
+  run.on_hardware = std::move(admitted.on_hardware);
+  run.hardware_kind = std::move(admitted.hardware_kind);
   const ForcesOffGuard guard(*device);
-  DevicePreparation preparation = session.preparation;
-  preparation.period_s = session.servo.period_s;
-  preparation.may_move = choice.may_move;
-  preparation.take_as_ready = choice.take_as_ready;
-  preparation.real_time = options.real_time;
-  preparation.interrupted = options.interrupted;
+  const DevicePreparation preparation =
+      preparation_for(session, choice, options.real_time, options.interrupted);
   try {
     run.device = device->open();
     require_same_device(choice, run.device);
@@ -281,7 +235,7 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
     const ServoSettings servo =
         loop_settings(session, run.model, run.rendering, choice.kind != "replay");
     Markers markers(options.markers);
-    run.outcome = run_loop(session, device, stepped, servo, options, log, markers,
+    run.outcome = run_loop(session, device, admitted.stepped, servo, options, log, markers,
                            run.largest_force_N, notices, [&] {
                              device->prepare(preparation);
                              log.appear();
@@ -334,6 +288,54 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
 void forgive_stalls(HilSession& session) {
   constexpr double kOfRehearsals_s = 1.0;
   session.plant.least_watchdog_s = std::max(session.plant.least_watchdog_s, kOfRehearsals_s);
+  session.cycle_timeout_s = std::max(session.cycle_timeout_s, kOfRehearsals_s);
+}
+
+DevicePreparation preparation_for(const HilSession& session, const DeviceChoice& choice,
+                                  bool real_time, const std::function<bool()>& interrupted) {
+  DevicePreparation preparation = session.preparation;
+  preparation.period_s = session.servo.period_s;
+  preparation.may_move = choice.may_move;
+  preparation.take_as_ready = choice.take_as_ready;
+  preparation.real_time = real_time;
+  preparation.interrupted = interrupted;
+  return preparation;
+}
+
+RealTimeOptions real_time_options(const HilSession& session, RealTimeWish wish,
+                                  const std::function<bool()>& interrupted) {
+  RealTimeOptions options;
+  options.wish = wish;
+  options.cycle_timeout_s = session.cycle_timeout_s;
+  options.interrupted = interrupted;
+  return options;
+}
+
+void require_same_device(const DeviceChoice& choice, const DeviceIdentity& device) {
+  if (choice.file.empty() || choice.kind == "virtual") return;
+  const DeviceFile file = read_device_file(choice.file);
+  if (file.simulated && device.hardware) {
+    throw Error(ExitCode::environment, file.where + ": key /measurement/simulated_device",
+                "was measured on a simulated device, and this one has motors",
+                "the file of this device (tpm hil identify)");
+  }
+  const auto other = [&file](const char* key, const std::string& theirs, const std::string& ours) {
+    return Error(ExitCode::environment, fmt::format("{}: key /{}", file.where, key),
+                 theirs.empty()
+                     ? fmt::format("is missing: what was measured may be of another device than "
+                                   "this, '{}'",
+                                   printable(ours))
+                     : fmt::format("was measured on the device '{}', and this is '{}'",
+                                   printable(theirs), printable(ours)),
+                 "the file of this device (tpm hil identify)");
+  };
+  const bool must_say = file.measured && device.hardware;
+  if (file.serial != device.serial && (!file.serial.empty() || must_say)) {
+    throw other("serial", file.serial, device.serial);
+  }
+  if (file.measured && !file.name.empty() && !device.name.empty() && file.name != device.name) {
+    throw other("name", file.name, device.name);
+  }
 }
 
 ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
@@ -353,13 +355,20 @@ ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
   return servo;
 }
 
-SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
-                       const SessionRunOptions& options) {
+AdmittedSession admit_session(const HilSession& session, const DeviceChoice& choice,
+                              const SessionRunOptions& options) {
   const DeviceLimits limits = limits_of(choice);
+  AdmittedSession admitted = admit_to(session, choice, limits, options);
   const bool checks = options.check_delay && options.real_time && limits.hardware() &&
                       limits.measured_delay_s.has_value();
-  return run_on(session, choice, limits, options, checks,
-                [&] { return make_device(choice, session); });
+  if (checks) check_at_start(admitted, session, choice, limits, options);
+  return admitted;
+}
+
+SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
+                       const SessionRunOptions& options) {
+  AdmittedSession admitted = admit_session(session, choice, options);
+  return run_admitted(std::move(admitted), session, choice, options, make_device(choice, session));
 }
 
 SessionRun run_session_on(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
@@ -367,9 +376,10 @@ SessionRun run_session_on(const HilSession& session, const std::shared_ptr<Hapti
                           const SessionRunOptions& options) {
   DeviceChoice choice;
   choice.kind = kCallersOwn;
+  choice.file = permissions.file;
   choice.may_move = permissions.may_move;
   choice.take_as_ready = permissions.take_as_ready;
-  return run_on(session, choice, limits, options, false, [&] { return device; });
+  return run_admitted(admit_to(session, choice, limits, options), session, choice, options, device);
 }
 
 }  // namespace tpm::haptics

@@ -77,8 +77,23 @@ struct SessionRun {
 inline constexpr double kLeastFeltForce_N = 0.01;
 
 /// In real time a machine that stalls ends no rehearsal, check or identification on the simulated
-/// Omega.7: its watchdog waits for a second at least.
+/// Omega.7: its watchdog, and that of a cycle (cycle_timeout_s), wait for a second at least.
 void forgive_stalls(HilSession& session);
+
+/// Settings of the device for a loop of this session, of a session as of what comes before it.
+[[nodiscard]] DevicePreparation preparation_for(const HilSession& session,
+                                                const DeviceChoice& choice, bool real_time,
+                                                const std::function<bool()>& interrupted);
+
+/// Settings of the loop on the clock, of a session as of what comes before it: the forces are cut
+/// when a cycle takes longer than the session's cycle_timeout_s.
+[[nodiscard]] RealTimeOptions real_time_options(const HilSession& session, RealTimeWish wish,
+                                                const std::function<bool()>& interrupted);
+
+/// Throws Error(environment) if the device file of the choice was measured on another device than
+/// this, or on a simulated one and this has motors. A file that measured nothing, as those that are
+/// shipped, is for any device of its kind; that of the kind "virtual" is of another device.
+void require_same_device(const DeviceChoice& choice, const DeviceIdentity& device);
 
 /// Settings of the loop of a session: those that the session states, with what is known of its
 /// model and device.
@@ -87,10 +102,30 @@ void forgive_stalls(HilSession& session);
 [[nodiscard]] ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
                                           const RenderingCheck& rendering, bool guided);
 
-/// Abilities of a device beside rendering forces.
+/// A session that the gate has let pass.
+struct AdmittedSession {
+  LoopModel model;                        ///< its `model` is `stepped`
+  std::shared_ptr<ContactModel> stepped;  ///< at rest
+  RenderingCheck rendering;
+  std::optional<RenderingCheck> on_hardware = std::nullopt;  ///< as in SessionRun
+  std::string hardware_kind;                                 ///< as in SessionRun
+};
+
+/// The gate of run_session(), before its device is opened for the session: limits of the device,
+/// stability, six hands. Of hardware whose delay a device file states, in real time, it opens the
+/// device for a second and moves the handle with less than 0.3 N (SessionRunOptions::check_delay).
+/// Throws as run_session() before its loop begins: Error(answer_is_no) for a session that is
+/// refused.
+[[nodiscard]] AdmittedSession admit_session(const HilSession& session, const DeviceChoice& device,
+                                            const SessionRunOptions& options);
+
+/// What the caller says of a device of its own.
 struct DevicePermissions {
   bool may_move = false;       ///< to initialise itself
   bool take_as_ready = false;  ///< it is initialised, where nobody can tell
+  /// The device file that its limits are from, compared as require_same_device() says; may be
+  /// empty.
+  std::filesystem::path file = {};
 };
 
 /// run_session() on a device that the caller has made; a hand holds it.

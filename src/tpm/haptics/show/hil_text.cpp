@@ -7,7 +7,6 @@
 #include <optional>
 #include <string_view>
 
-#include "tpm/base/distributions.hpp"
 #include "tpm/base/printed_number.hpp"
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
@@ -35,12 +34,15 @@ std::string device_words(const DeviceIdentity& device) {
 }
 
 std::string times_text(const char* what, const TimeHistogram& times) {
+  if (times.count() == 0) return fmt::format("{}: not counted\n", what);
   return fmt::format("{}: p50 {} us, p99 {} us, p99.9 {} us, max {} us\n", what,
                      us(times.quantile_s(0.5)), us(times.quantile_s(0.99)),
                      us(times.quantile_s(0.999)), us(times.max_s()));
 }
 
+/// Null if nothing was counted: the thread of a loop that hung was left behind.
 Json times_json(const TimeHistogram& times) {
+  if (times.count() == 0) return {};
   return {{"p50_s", rounded(times.quantile_s(0.5), kHilDigits)},
           {"p99_s", rounded(times.quantile_s(0.99), kHilDigits)},
           {"p999_s", rounded(times.quantile_s(0.999), kHilDigits)},
@@ -62,75 +64,72 @@ std::vector<std::pair<double, std::uint64_t>> octaves(const TimeHistogram& times
   return result;
 }
 
-/// Lateness that is exceeded once an hour if the tail beyond 99.9 % falls as an exponential does;
-/// empty if there were too few cycles to say.
-std::optional<double> once_an_hour_s(const JitterCheck& check) {
-  constexpr double kHour_s = 3600.0, kShare = 1e-3, kFurther = 1e-4;
-  constexpr std::uint64_t kFewest = 20'000;
-  const TimeHistogram& late = check.outcome.woke_late;
-  if (late.count() < kFewest) return std::nullopt;
-  const double at_s = late.quantile_s(1.0 - kShare), further_s = late.quantile_s(1.0 - kFurther);
-  const double slope_s = (further_s - at_s) / std::log(kShare / kFurther);
-  return further_s + slope_s * std::max(0.0, std::log(kFurther * kHour_s * check.rate_Hz));
-}
-
-/// Seen stalls that the watchdog would have ended a session for.
-std::uint64_t stalls_of(const JitterCheck& check) {
-  const TimeHistogram& late = check.outcome.woke_late;
-  const auto edge = static_cast<std::size_t>(std::ceil(1e6 * check.watchdog_s));
-  std::uint64_t below = 0;
-  for (std::size_t i = 0; i < std::min(edge, late.bins().size()); ++i) below += late.bins()[i];
-  return late.count() - below;
-}
-
-double watched_s(const JitterCheck& check) {
-  return static_cast<double>(check.outcome.cycles) / check.rate_Hz;
-}
-
-/// Upper limit of the stalls a second at 95 %: of a Poisson count, 3/T where there was none. Empty
-/// without cycles.
-std::optional<double> most_stalls_per_s(const JitterCheck& check) {
-  constexpr double kShare = 0.95, kOfNone = 3.0;
-  if (check.outcome.cycles == 0) return std::nullopt;
-  const auto stalls = static_cast<double>(stalls_of(check));
-  const double most =
-      stalls == 0.0 ? kOfNone : 0.5 * chi_squared_quantile(kShare, 2.0 * (stalls + 1.0));
-  return most / watched_s(check);
-}
-
 /// The extrapolation in words.
 std::string extrapolation_of(const JitterCheck& check) {
+  const TimeHistogram& late = check.outcome.woke_late;
   if (const auto hour_s = once_an_hour_s(check)) {
-    return fmt::format("{} us once an hour, if the tail beyond 99.9 % falls as an exponential",
-                       us(*hour_s));
+    return fmt::format("{} us once an hour, {}", us(*hour_s),
+                       *hour_s > late.max_s()
+                           ? "if the tail beyond 99.9 % falls as an exponential"
+                           : "the largest seen, for an exponential tail beyond 99.9 % ends below");
   }
-  return fmt::format("too short: {} cycles, 20,000 needed", check.outcome.woke_late.count());
+  return fmt::format("too short: {} cycles, {},000 needed", late.count(),
+                     kFewestToExtrapolate / 1000);
 }
 
 Json stalls_json(const JitterCheck& check) {
   const auto or_null = [](const std::optional<double>& value) {
     return value ? Json(rounded(*value, kHilDigits)) : Json();
   };
-  return {{"beyond_watchdog", stalls_of(check)},
-          {"p9999_s", rounded(check.outcome.woke_late.quantile_s(0.9999), kHilDigits)},
+  const TimeHistogram& late = check.outcome.woke_late;
+  const bool counted = late.count() > 0;
+  return {{"beyond_watchdog", counted ? Json(stalls_beyond_watchdog(check)) : Json()},
+          {"p9999_s", counted ? Json(rounded(late.quantile_s(0.9999), kHilDigits)) : Json()},
           {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
           {"once_an_hour_extrapolated_s", or_null(once_an_hour_s(check))},
           {"extrapolation", extrapolation_of(check)},
-          {"upper_95_per_s", or_null(most_stalls_per_s(check))}};
+          {"upper_95_per_s", or_null(most_stalls_per_s(check))},
+          {"upper_95", stall_bound(check)}};
 }
 
 std::string stalls_text(const JitterCheck& check) {
-  const std::uint64_t stalls = stalls_of(check);
-  std::string text = fmt::format(
-      "p99.99 of the wake-ups {} us, the watchdog waits for {} us; stalls beyond it: {}",
-      us(check.outcome.woke_late.quantile_s(0.9999)), us(check.watchdog_s), stalls);
-  if (const auto most = most_stalls_per_s(check)) {
-    constexpr double kHour_s = 3600.0;
-    text +=
-        fmt::format(": fewer than {} an hour with 95 % ({} {} s)", significant(kHour_s * *most, 3),
-                    stalls == 0 ? "3/T of" : "Poisson, in", significant(watched_s(check), 3));
+  const TimeHistogram& late = check.outcome.woke_late;
+  std::string text = "stalls beyond the watchdog: not counted\n";
+  if (late.count() > 0) {
+    const std::string bound = stall_bound(check);
+    text = fmt::format(
+        "p99.99 of the wake-ups {} us, the watchdog waits for {} us; stalls beyond it: {}{}{}\n",
+        us(late.quantile_s(0.9999)), us(check.watchdog_s), stalls_beyond_watchdog(check),
+        bound.empty() ? "" : ": ", bound);
   }
-  return text + fmt::format("\nextrapolated, not measured: {}\n", extrapolation_of(check));
+  return text + fmt::format("extrapolated, not measured: {}\n", extrapolation_of(check));
+}
+
+/// The device that a rehearsal stands for; empty if it stands for none.
+std::string on_hardware_text(const std::optional<RenderingCheck>& rendering,
+                             const std::string& kind) {
+  if (!rendering) return {};
+  return fmt::format("on the device '{}' it would be {}: {}\n", kind,
+                     rendering->acceptable() ? "accepted" : "refused", rendering->verdict());
+}
+
+Json on_hardware_json(const std::optional<RenderingCheck>& rendering) {
+  return rendering ? to_json(*rendering) : Json();
+}
+
+Json session_verdict_json(const SessionVerdict& session) {
+  return {{"title", session.title},
+          {"accepted", session.accepted},
+          {"verdict", session.words},
+          {"rendering", session.rendering ? to_json(*session.rendering) : Json()},
+          {"stands_for", session.on_hardware ? Json(session.hardware_kind) : Json()},
+          {"rendering_on_hardware", on_hardware_json(session.on_hardware)}};
+}
+
+std::string session_verdict_text(const SessionVerdict& session) {
+  return fmt::format("session: {}: {}: {}\n", session.title,
+                     session.accepted ? "accepted" : "refused", session.words) +
+         on_hardware_text(session.on_hardware, session.hardware_kind);
 }
 
 Json fidelity_json(const ForceFidelity& f) {
@@ -196,9 +195,10 @@ Json check_json(const JitterCheck& check) {
           {"most_late_of_1000", o.counts.most_late},
           {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
           {"cycle_timeout_s", rounded(check.cycle_timeout_s, kHilDigits)},
-          {"fit", check.fit},
-          {"verdict", check.verdict},
-          {"advice", check.advice}};
+          {"timing_kept", check.timing_kept},
+          {"timing", check.timing},
+          {"advice", check.advice},
+          {"session", check.session ? session_verdict_json(*check.session) : Json()}};
 }
 
 std::string check_text(const JitterCheck& check) {
@@ -209,16 +209,21 @@ std::string check_text(const JitterCheck& check) {
       significant(check.duration_s, 4), o.cycles, o.counts.late, o.counts.missed);
   text += times_text("woke after the deadline", o.woke_late);
   text += times_text("work of a cycle", o.busy);
-  text += fmt::format("time guards {}, saturations {}\nwoke after the deadline, up to\n",
-                      o.counts.time_guards, o.counts.saturations);
+  text +=
+      fmt::format("time guards {}, saturations {}\n", o.counts.time_guards, o.counts.saturations);
+  if (o.woke_late.count() > 0) text += "woke after the deadline, up to\n";
   for (const auto& [edge, count] : octaves(o.woke_late)) {
     text += fmt::format("  {:>8} us {:>10}\n", us(edge), count);
   }
   text += stalls_text(check);
   text += fmt::format(
-      "at most {} consecutive periods missed, {} of 1000 cycles late; watchdog {} ms\n",
-      o.counts.most_consecutive_missed, o.counts.most_late, significant(1e3 * check.watchdog_s, 3));
-  return text + "verdict: " + check.verdict + "\n" + check.advice + "\n";
+      "at most {} consecutive periods missed, {} of 1000 cycles late; watchdog {} ms, a cycle may "
+      "take {} ms; end: {}\n",
+      o.counts.most_consecutive_missed, o.counts.most_late, significant(1e3 * check.watchdog_s, 3),
+      significant(1e3 * check.cycle_timeout_s, 3), word_of(o.cause));
+  text += "timing: " + check.timing + "\n" + check.advice + "\n";
+  return text + (check.session ? session_verdict_text(*check.session)
+                               : "session: none was named, so none was asked for its tissue\n");
 }
 
 Json run_json(const HilSession& session, const SessionRun& run) {
@@ -235,7 +240,7 @@ Json run_json(const HilSession& session, const SessionRun& run) {
             {"plan", run.model.plan}}},
           {"rendering", to_json(run.rendering)},
           {"stands_for", run.on_hardware ? Json(run.hardware_kind) : Json()},
-          {"rendering_on_hardware", run.on_hardware ? to_json(*run.on_hardware) : Json()},
+          {"rendering_on_hardware", on_hardware_json(run.on_hardware)},
           {"rate_Hz", rounded(1.0 / session.servo.period_s, kHilDigits)},
           {"duration_s", rounded(session.duration_s(), kHilDigits)},
           {"phases", session.phases.size()},
@@ -254,11 +259,7 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
       run.model.error_bound, significant(lived_s, 6), significant(session.duration_s(), 6),
       significant(1.0 / session.servo.period_s, 4), o.real_time ? "real" : "virtual",
       session.phases.size());
-  if (run.on_hardware) {
-    text += fmt::format("on the device '{}' it would be {}: {}\n", run.hardware_kind,
-                        run.on_hardware->acceptable() ? "accepted" : "refused",
-                        run.on_hardware->verdict());
-  }
+  text += on_hardware_text(run.on_hardware, run.hardware_kind);
   if (o.real_time) {
     text += o.scheduling + "\n" + times_text("woke after the deadline", o.woke_late) +
             times_text("work of a cycle", o.busy);

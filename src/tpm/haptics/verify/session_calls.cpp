@@ -46,8 +46,9 @@ SessionSummary Session::run(const std::shared_ptr<HapticDevice>& device,
   const DeviceLimits limits = request.device_file.empty()
                                   ? limits_of(request.limits.empty() ? usual : request.limits)
                                   : of_file(read_device_file(request.device_file), request.limits);
-  const SessionRun run =
-      run_session_on(*session_, device, limits, {.may_move = request.may_move}, options);
+  DevicePermissions permissions{.may_move = request.may_move};
+  if (!simulated) permissions.file = request.device_file;  // else of the device it stands for
+  const SessionRun run = run_session_on(*session_, device, limits, permissions, options);
   return {.device = run.device,
           .model = run.model.name,
           .rendering = run.rendering.verdict(),

@@ -1,0 +1,240 @@
+// tpm hil check: the time that machine and device keep, and the gate of the session that is named.
+#include <sys/wait.h>
+
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+
+#include "hil_scenes.hpp"
+#include "refusal.hpp"
+#include "temp_folder.hpp"
+#include "tpm/files/file.hpp"
+#include "tpm/haptics/device/force_dimension.hpp"
+#include "tpm/haptics/session/jitter_check.hpp"
+#include "tpm/haptics/show/hil_report.hpp"
+#include "tpmkit/session.hpp"
+
+namespace tpm::haptics {
+namespace {
+
+using Catch::Matchers::Contains;
+
+/// The stand-in library with a script, for as long as this lives.
+class CheckedStandIn {
+ public:
+  explicit CheckedStandIn(const std::string& lines) {
+    write_file(folder_ / "script",
+               "watchdog_by_clock 0\nevents " + (folder_ / "events") + "\n" + lines);
+    (void)setenv("TPM_STAND_IN_SCRIPT", (folder_ / "script").c_str(), 1);
+  }
+  ~CheckedStandIn() { (void)unsetenv("TPM_STAND_IN_SCRIPT"); }
+  CheckedStandIn(const CheckedStandIn&) = delete;
+  CheckedStandIn& operator=(const CheckedStandIn&) = delete;
+
+  [[nodiscard]] bool happened(const std::string& event) const {
+    return ("\n" + read_file(folder_ / "events")).find("\n" + event + " ") != std::string::npos;
+  }
+  /// Its device, with a file in which one key is another.
+  [[nodiscard]] DeviceChoice with_file(const char* key, const Json& value) const {
+    DeviceChoice device;
+    device.kind = "omega7";
+    device.library = TPM_STAND_IN_DHD;
+    device.file = folder_ / "device.json";
+    Json file = read_json(TPM_TEST_SOURCE_DIR "/tests/fixtures/stand_in_device.json");
+    file[key] = value;
+    write_file(device.file, to_text(file));
+    return device;
+  }
+  [[nodiscard]] std::string file(const char* name) const { return folder_ / name; }
+
+ private:
+  test::TempFolder folder_;
+};
+
+DeviceChoice device_without_a_file() {
+  DeviceChoice device;
+  device.kind = "omega7";
+  device.library = TPM_STAND_IN_DHD;
+  return device;
+}
+
+/// Exit code of `tpm hil check`, its answer and its message.
+struct CheckAnswer {
+  int exit_code = -1;
+  std::string text, error;
+};
+
+CheckAnswer answer_of_check(const std::string& arguments) {
+  const test::TempFolder folder;
+  const std::string said = folder / "said", error = folder / "error";
+  const int status = std::system(
+      ("'" TPM_TEST_PROGRAM "' hil check " + arguments + " > '" + said + "' 2> '" + error + "'")
+          .c_str());
+  REQUIRE(WIFEXITED(status));
+  const auto content = [](const std::string& file) {  // which may be empty
+    std::ifstream lines(file);
+    return std::string(std::istreambuf_iterator<char>(lines), {});
+  };
+  return {WEXITSTATUS(status), content(said), content(error)};
+}
+
+TEST_CASE("A check gives a cycle as long as its session does") {
+  HilSession session;
+  session.cycle_timeout_s = 5.0;
+  CHECK(real_time_options(session, RealTimeWish::ignore, {}).cycle_timeout_s == 5.0);
+  session.servo.most_late = 1001;
+  session.servo.most_missed = 1'000'000;
+  const CheckedStandIn stand_in("fault hang 100 2000\n");
+  const JitterCheck check =
+      check_jitter(device_without_a_file(), session, 0.5, RealTimeWish::ignore);
+  CHECK(stand_in.happened("hang_over"));
+  CHECK(check.outcome.cause == StopCause::finished);
+  CHECK(check.outcome.busy.max_s() >= 2.0);
+  CHECK(check.cycle_timeout_s == 5.0);
+  CHECK_THAT(check.timing, Contains("not kept: a stall of 2"));
+}
+
+TEST_CASE("Of a loop that hung nothing is counted, and nothing is said of its stalls") {
+  JitterCheck check;
+  check.rate_Hz = 1000.0;
+  check.watchdog_s = check.cycle_timeout_s = 0.008;
+  check.outcome.cause = StopCause::cycle_timeout;
+  check.outcome.cycles = 30'000;
+  assess(check);
+  CHECK(check.timing == "not kept: the test ended early: cycle timeout");
+  CHECK_THAT(check.advice, Contains("nothing is known of what this machine can do"));
+  const std::string text = check_text(check);
+  CHECK_THAT(text, Contains("stalls beyond the watchdog: not counted\n"));
+  CHECK_THAT(text, Contains("woke after the deadline: not counted\n"));
+  const Json json = check_json(check);
+  CHECK(json.at("stalls").at("beyond_watchdog").is_null());
+  CHECK(json.at("stalls").at("upper_95_per_s").is_null());
+  CHECK(json.at("woke_late").is_null());
+}
+
+TEST_CASE("A check refuses the file of another device before a force") {
+  const CheckedStandIn stand_in("");
+  const auto refusal = [](const DeviceChoice& device) {
+    return test::refusal_of(
+        [&] { (void)check_jitter(device, HilSession{}, 0.1, RealTimeWish::ignore); });
+  };
+  CHECK_THAT(refusal(stand_in.with_file("serial", "1")),
+             Contains("was measured on the device '1', and this is '4711'"));
+  CHECK(stand_in.happened("open"));
+  CHECK(stand_in.happened("close"));
+  CHECK_FALSE(stand_in.happened("thread_of_forces_on"));
+  CHECK_THAT(refusal(stand_in.with_file("device", "falcon")),
+             Contains("key /device: is of 'falcon', not of 'omega7'"));
+}
+
+TEST_CASE("A check says to a session what its run says") {
+  const CheckedStandIn stand_in("");
+  const auto asked = [](const HilSession& session, const DeviceChoice& device) {
+    return ask_session_gate(session, device, RealTimeWish::ignore);
+  };
+  const HilSession session = test::parsed(test::short_session());
+  SessionRunOptions options;
+  options.real_time = true;
+  options.recording = stand_in.file("r");
+
+  // What nobody measured counts as 20 ms late; a workspace may be too small.
+  for (const DeviceChoice& device :
+       {device_without_a_file(), stand_in.with_file("limits", {{"reach_m", 0.01}})}) {
+    const SessionVerdict verdict = asked(session, device);
+    CHECK_FALSE(verdict.accepted);
+    CHECK_FALSE(verdict.words.empty());
+    CHECK(verdict.words == test::refusal_of([&] { (void)run_session(session, device, options); }));
+  }
+  CHECK_THAT(asked(session, device_without_a_file()).words,
+             Contains("stability: a weakly damped hand would receive energy"));
+
+  // The check of a second is part of it, and compares the serial number.
+  CHECK_THAT(test::refusal_of([&] { (void)asked(session, stand_in.with_file("serial", "1")); }),
+             Contains("was measured on the device '1', and this is '4711'"));
+
+  options.real_time = false;
+  const SessionVerdict rehearsed = asked(session, DeviceChoice{});
+  const SessionRun run = run_session(session, DeviceChoice{}, options);
+  CHECK(rehearsed.accepted);
+  CHECK(rehearsed.words == run.rendering.verdict());
+  REQUIRE(rehearsed.on_hardware);
+  CHECK(rehearsed.on_hardware->verdict() == run.on_hardware->verdict());
+  CHECK(rehearsed.hardware_kind == "omega7");
+}
+
+TEST_CASE("Text and JSON of a check say the same of time and session") {
+  JitterCheck check;
+  check.rate_Hz = 1000.0;
+  check.watchdog_s = check.cycle_timeout_s = 0.008;
+  check.late_limit = 100;
+  check.missed_limit = 50;
+  check.outcome.cause = StopCause::finished;
+  check.outcome.cycles = 60'000;
+  for (int i = 0; i < 60'000; ++i) check.outcome.woke_late.note(19'500);
+  assess(check);
+  CHECK_THAT(check_text(check), Contains("session: none was named"));
+  CHECK(check_json(check).at("session").is_null());
+
+  check.session = ask_session_gate(test::parsed(test::short_session()), device_without_a_file(),
+                                   RealTimeWish::ignore);
+  const std::string text = check_text(check);
+  const Json json = check_json(check);
+  CHECK(json.at("timing_kept") == true);
+  CHECK_THAT(text, Contains("timing: " + json.at("timing").get<std::string>() + "\n"));
+  const Json& session = json.at("session");
+  CHECK(session.at("accepted") == false);
+  CHECK_THAT(text, Contains("session: short: refused: " + session.at("verdict").get<std::string>() +
+                            "\n"));
+}
+
+TEST_CASE("tpm hil check ends as tpm hil run does where that refuses") {
+  const CheckedStandIn stand_in("");
+  write_file(stand_in.file("s.json"), to_text(test::short_session()));
+  const std::string session = "'" + stand_in.file("s.json") + "' --duration '0.1 s' ";
+  const std::string device = "--device omega7 --dhd-library '" TPM_STAND_IN_DHD "' ";
+  const CheckAnswer refused = answer_of_check(session + device);
+  CHECK(refused.exit_code == 1);
+  CHECK_THAT(refused.text, Contains("\nsession: short: refused: stability: a weakly damped hand"));
+  const CheckAnswer json = answer_of_check(session + device + "--format json");
+  CHECK(json.exit_code == 1);
+  CHECK(Json::parse(json.text).at("session").at("accepted") == false);
+
+  const std::string other = stand_in.with_file("serial", "1").file.string();
+  const CheckAnswer of_another =
+      answer_of_check("--duration '0.1 s' " + device + "--device-file '" + other + "'");
+  CHECK(of_another.exit_code == 5);
+  CHECK_THAT(of_another.error, Contains("was measured on the device '1', and this is '4711'"));
+
+  // What would not be used is refused.
+  CHECK(answer_of_check("--duration '0.1 s' --device-file '" + other + "'").exit_code == 2);
+  CHECK(answer_of_check(session + "--loop-rate '2 kHz'").exit_code == 2);
+}
+
+TEST_CASE("A session of a C++ program compares the file with the device that it is given") {
+  const CheckedStandIn stand_in("clock 1\n");
+  write_file(stand_in.file("s.json"), to_text(test::short_session()));
+  const Session session(stand_in.file("s.json"));
+  const auto refusal = [&](const char* serial) {
+    SessionRequest request;
+    request.recording = stand_in.file("r");
+    request.device_file = stand_in.with_file("serial", serial).file;
+    const auto device =
+        std::make_shared<ForceDimension>(TPM_STAND_IN_DHD, "omega7", DeviceSelection{});
+    return test::refusal_of([&] { (void)session.run(device, request); });
+  };
+  CHECK_THAT(refusal("1"), Contains("was measured on the device '1', and this is '4711'"));
+  CHECK_FALSE(stand_in.happened("thread_of_forces_on"));
+  CHECK_THAT(refusal("4711"), Contains("a device with motors keeps the clock"));
+  // A simulated device stands for that of the file.
+  SessionRequest request;
+  request.recording = stand_in.file("r");
+  request.limits = "omega7";
+  request.device_file = stand_in.with_file("serial", "1").file;
+  CHECK(session.run(session.simulated_device(), request).outcome.cause == StopCause::finished);
+}
+
+}  // namespace
+}  // namespace tpm::haptics
