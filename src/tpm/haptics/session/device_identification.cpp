@@ -37,13 +37,15 @@ enum class Handle { free, held, not_known };
 /// otherwise.
 Handle handle_of(DeviceIdentification& found, const HandleSolution& s) {
   constexpr double kLeastHeld_N_per_m = 3.0, kSurely = 3.0, kMostCoulomb_N = 0.5 * kEdge_N;
+  constexpr double kMostMargin_N = 0.025;
   found.held_N_per_m = s.value[3];
-  const double rubs_N = s.value[2] + coulomb_margin_N(s);
-  if (std::isfinite(rubs_N) && rubs_N > kMostCoulomb_N) {
+  const double margin_N = coulomb_margin_N(s), rubs_N = s.value[2] + margin_N;
+  const bool told = margin_N <= kMostMargin_N;  // not if the sign of the motion was never known
+  if (told && rubs_N > kMostCoulomb_N) {
     found.not_identified.push_back(
         fmt::format("delay, friction, mass: Coulomb friction of up to {} N; at most {} N let the "
                     "handle follow edges of {} N",
-                    significant(rubs_N, 2), kMostCoulomb_N, kEdge_N));
+                    significant(rubs_N, 3), kMostCoulomb_N, kEdge_N));
     return Handle::not_known;
   }
   // The centring spring is a part of the forces: what is left of stiffness is a hand's.
@@ -55,6 +57,12 @@ Handle handle_of(DeviceIdentification& found, const HandleSolution& s) {
         fmt::format("delay, friction: something holds the handle with {} N/m; let go of it",
                     significant(found.held_N_per_m, 3)));
     return Handle::held;
+  }
+  if (!told) {
+    found.not_identified.emplace_back(
+        "delay, friction, mass: the motion does not tell Coulomb friction; the encoder is too "
+        "coarse, or friction stops the handle");
+    return Handle::not_known;
   }
   if (!free || s.value[1] + kSurely * error_of(s, 1) < 0.0) {
     found.not_identified.emplace_back(
@@ -81,16 +89,11 @@ void find_delay(DeviceIdentification& found, const std::vector<double>& delays) 
 /// of least squares, and simulated devices need this for 95 %
 /// (tests/haptics/test_device_identification.cpp).
 void find_friction(DeviceIdentification& found, const HandleSolution& s) {
-  constexpr double kOneSided = 2.33, kMostMargin_N = 0.025;
+  constexpr double kOneSided = 2.33;
   found.viscous_N_s_per_m = s.value[1];
   found.viscous_lower_95_N_s_per_m = std::clamp(kSums * s.value[1] - kOneSided * error_of(s, 1),
                                                 0.0, kMostHandleFriction_N_s_per_m);
   const double coulomb_N = s.value[2], margin_N = coulomb_margin_N(s);
-  if (!(margin_N <= kMostMargin_N)) {  // nor if the sign of the motion was never known
-    found.not_identified.emplace_back(
-        "Coulomb friction: the encoder is too coarse, or the handle too slow, to tell it");
-    return;
-  }
   found.coulomb_low_N = std::max(0.0, coulomb_N - margin_N);
   found.coulomb_high_N = std::max(0.0, coulomb_N) + margin_N;
 }
