@@ -273,6 +273,7 @@ TEST_CASE("A start that cannot be is refused at once, with what would work") {
   CHECK_THAT(refused("force_N", 0.1),
              Contains("key /limits/force_N: 0.1 N; expected at least 0.2 N"));
   HilSession far = late_and_free();
+  far.plant.origin_m.setZero();
   far.plant.arm_set_point_m = 0.09;
   CHECK_THAT(test::refusal_of([&] { (void)run_identification({}, far, {}); }),
              Contains("start of the simulated handle: 90 mm from the middle of the workspace; "
@@ -286,6 +287,7 @@ TEST_CASE("A start that cannot be is refused at once, with what would work") {
 TEST_CASE("A wait that is given up says what was missing, and the watcher sees it from the start") {
   HilSession far = late_and_free();
   far.plant.origin_m = {0.0, 0.0, 0.09};
+  far.plant.arm_set_point_m = 0.0;
   DeviceIdentifyOptions options;
   std::uint32_t first = 0;
   options.watcher = [&](const ServoRecord& row) {
