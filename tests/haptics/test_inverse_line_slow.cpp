@@ -82,6 +82,7 @@ TEST_CASE("An identification whose service is killed fails, and says why") {
   REQUIRE(test::until(
       [&] { return test::text_of(folder / "err").find("tpm: measuring") != std::string::npos; },
       120.0));
+  std::this_thread::sleep_for(std::chrono::seconds(1));
   service.reset();
   CHECK(identify.wait_for() == 5);
   CHECK(test::text_of(folder / "err").find("tpm: identification ended after ") !=
