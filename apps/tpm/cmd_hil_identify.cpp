@@ -53,14 +53,11 @@ std::string identified_text(const IdentifyRun& run) {
         significant(1e3 * *f.delay_mean_s, 3), significant(1e3 * *f.delay_largest_s, 3),
         significant(1e3 * *f.delay_jitter_s, 2), significant(1e3 * f.resolution_s, 2), f.edges);
   }
-  if (f.coulomb_low_N) {
-    text += fmt::format("friction    {}Coulomb {} to {} N\n",
-                        f.viscous_lower_95_N_s_per_m
-                            ? fmt::format("viscous above {} N s/m with 95 % (estimate {}), ",
-                                          significant(*f.viscous_lower_95_N_s_per_m, 3),
-                                          significant(*f.viscous_N_s_per_m, 3))
-                            : std::string(),
-                        significant(*f.coulomb_low_N, 2), significant(*f.coulomb_high_N, 2));
+  if (f.viscous_lower_95_N_s_per_m && f.coulomb_low_N) {
+    text += fmt::format(
+        "friction    viscous above {} N s/m with 95 % (estimate {}), Coulomb {} to {} N\n",
+        significant(*f.viscous_lower_95_N_s_per_m, 3), significant(*f.viscous_N_s_per_m, 3),
+        significant(*f.coulomb_low_N, 2), significant(*f.coulomb_high_N, 2));
   }
   if (f.mass_kg) {
     text += f.mass_certain
@@ -82,11 +79,39 @@ std::string identified_text(const IdentifyRun& run) {
                                          : fmt::format("; begun again {} {}", run.begun_again,
                                                        run.begun_again == 1 ? "time" : "times"));
   }
+  for (const std::string& line : run.findings) text += "the device noticed: " + line + "\n";
   for (const std::string& line : f.not_identified) {
     text += fmt::format("not identified: {}\n", line);
   }
   return text;
 }
+
+/// Says what the measurement waits for, once for each thing, and when it begins.
+class StartWords {
+ public:
+  StartWords(const DeviceLimits& limits, bool real_time) : limits_(limits), real_time_(real_time) {}
+  void see(const ServoRecord& row) {
+    if (row.stop != StopCause::none) return;
+    const std::uint32_t missing = row.phase < 0 ? row.flags & (kOutOfReach | kMoving) : 0U;
+    if (missing == missing_) return;
+    missing_ = missing;
+    if ((missing & kOutOfReach) != 0) {
+      const Eigen::Map<const Eigen::Vector3d> at_m(row.position_m);
+      tell_user(
+          "tpm: waiting: the handle is {} mm from the middle of its workspace; bring it to within "
+          "{} mm and let go\n",
+          significant(1e3 * at_m.norm(), 3), significant(1e3 * identifying_reach_m(limits_), 3));
+    } else if (real_time_) {
+      tell_user("tpm: {}\n",
+                missing != 0 ? "waiting for the handle to be at rest; let go of it" : "measuring");
+    }
+  }
+
+ private:
+  DeviceLimits limits_;
+  bool real_time_;
+  std::uint32_t missing_ = 0;
+};
 
 int identify_hil(const IdentifyChoice& choice, const Session& session) {
   constexpr double kSlowest_Hz = 500.0, kFastest_Hz = 4000.0, kLeast_s = 5.0, kMost_s = 600.0;
@@ -97,13 +122,16 @@ int identify_hil(const IdentifyChoice& choice, const Session& session) {
         1.0 / between(choice.rate, Dimension::frequency, "--loop-rate", kSlowest_Hz, kFastest_Hz);
   }
   const DeviceChoice device = chosen_device(choice.device);
-  const bool hardware = limits_of(device).hardware();
+  const DeviceLimits limits = limits_of(device);
+  const bool hardware = limits.hardware();
   DeviceIdentifyOptions options;
   options.duration_s = between(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);
   options.real_time = choice.time.empty() ? hardware : choice.time == "real";
   options.wish = chosen_wish(choice.device);
   const InterruptWatch interrupts(InterruptWatch::Of::motors);
   options.interrupted = InterruptWatch::seen;
+  StartWords words(limits, options.real_time);
+  options.watcher = [&words](const ServoRecord& row) { words.see(row); };
   if (hardware) {
     tell_user(
         "tpm: let go of the handle in the middle of its workspace, with 3 cm of free space around "
@@ -117,19 +145,23 @@ int identify_hil(const IdentifyChoice& choice, const Session& session) {
   } catch (const Error&) {
     if (!InterruptWatch::seen()) throw;
   }
-  if (!measured || (measured->outcome.cause == StopCause::signal && InterruptWatch::seen())) {
+  if (!measured || measured->outcome.cause == StopCause::signal) {
     tell_user("tpm: interrupted; nothing was written\n");
     return InterruptWatch::exit_code();
   }
   const IdentifyRun& run = *measured;
   const Json json = device_file_json(run, hardware ? date_now() : std::string());
-  write_file(choice.output, to_text(json));
+  if (run.counts) write_file(choice.output, to_text(json));
   if (session.json()) {
     say("{}", answer_text(session, json, {{"delay_found", run.found.delay_mean_s.has_value()}}));
   } else {
-    say("{}wrote {}\n", identified_text(run), choice.output);
+    say("{}{}", identified_text(run), run.counts ? fmt::format("wrote {}\n", choice.output) : "");
   }
-  return exit_code(run.found.delay_mean_s.has_value());
+  if (run.ended_by.empty()) return exit_code(run.found.delay_mean_s.has_value());
+  tell_user("tpm: identification ended after {} s of {} s: {}{}\n", significant(run.measured_s, 3),
+            significant(run.duration_s, 3), run.ended_by,
+            run.counts ? "" : "; nothing was written");
+  return static_cast<int>(ExitCode::environment);
 }
 
 }  // namespace

@@ -34,15 +34,17 @@ InterruptWatch::InterruptWatch(Of of) {
   patience_s = of == Of::motors ? kPatience_s : 0;
   struct sigaction action {};
   action.sa_handler = note_signal;
-  std::vector<int> signals{SIGINT, SIGTERM};
-  if (of == Of::motors) signals.insert(signals.end(), {SIGHUP, SIGQUIT});
+  const std::vector<int> signals =
+      of == Of::motors ? haptics::ending_signals() : std::vector<int>{SIGINT, SIGTERM};
   watched_.reserve(signals.size());
   for (const int signal : signals) {
     Watched watched;
     watched.signal = signal;
-    // What the caller ignores stays ignored: nohup tpm hil run ...
     if (sigaction(signal, nullptr, &watched.before) != 0) continue;
-    if (signal == SIGHUP && watched.before.sa_handler == SIG_IGN) continue;
+    // What the caller ignores stays ignored: nohup tpm hil run ... Shells let what runs in the
+    // background ignore SIGINT and SIGQUIT.
+    const bool always = signal == SIGINT || signal == SIGTERM || signal == SIGQUIT;
+    if (!always && watched.before.sa_handler != SIG_DFL) continue;
     sigaction(signal, &action, nullptr);
     watched_.push_back(watched);
   }

@@ -5,8 +5,9 @@
 namespace tpm::app {
 
 /// While this lives, the first SIGINT or SIGTERM is remembered and a second one kills. With
-/// `motors`, SIGHUP and SIGQUIT too, and only one kills that comes two seconds after the first:
-/// until then the program is stopping them, and must not be killed in the middle of it.
+/// `motors`, every signal that ends a process (haptics::ending_signals()), and only one kills that
+/// comes two seconds after the first: until then the program is stopping them, and must not be
+/// killed in the middle of it.
 class InterruptWatch {
  public:
   enum class Of { work, motors };

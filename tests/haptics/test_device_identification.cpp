@@ -1,16 +1,13 @@
 // tpm hil identify finds what was put into a device, without being told.
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <memory>
 #include <vector>
 
 #include "hil_scenes.hpp"
 #include "identified_handle.hpp"
 #include "tpm/haptics/device/device_file.hpp"
-#include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/session/identify_run.hpp"
 #include "tpm/haptics/session/six_hands.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 namespace {
@@ -84,7 +81,7 @@ TEST_CASE("The check before a session finds the delay of the simulated device") 
     const DeviceIdentifyOptions options;
     const DelayCheck check =
         check_delay(make_device(DeviceChoice{}, session), DeviceChoice{}, session, options);
-    CAPTURE(periods, word_of(check.cause));
+    CAPTURE(periods);
     REQUIRE(check.delay_s);
     CHECK(std::abs(*check.delay_s - periods * session.servo.period_s) <=
           0.5 * session.servo.period_s + 1e-9);
@@ -144,7 +141,7 @@ TEST_CASE("A handle that is held has an interval of mass and no number") {
   const DeviceIdentification found = identify_device(moved(h), h.period_s);
   REQUIRE(found.mass_kg);
   CHECK_FALSE(found.mass_certain);
-  CHECK(*found.mass_low_kg < 0.85);
+  CHECK(*found.mass_low_kg < 0.3);  // of the device alone
   CHECK(*found.mass_high_kg > 0.85);
 }
 
@@ -160,9 +157,11 @@ TEST_CASE("The damping of a hand that holds the handle is no friction of the dev
               found.viscous_lower_95_N_s_per_m.value_or(-1));
       CHECK_FALSE(found.viscous_lower_95_N_s_per_m);
       CHECK_FALSE(found.viscous_N_s_per_m);
+      CHECK_FALSE(found.delay_mean_s);
+      CHECK_FALSE(found.coulomb_low_N);
       REQUIRE(found.not_identified.size() == 1);
       CHECK_THAT(found.not_identified[0],
-                 StartsWith("viscous friction: something holds the handle with "));
+                 StartsWith("delay, friction: something holds the handle with "));
     }
   }
 }
@@ -268,80 +267,6 @@ TEST_CASE("The simulated device is identified, and its file is one that a sessio
   CHECK(file.kind == "virtual");
   REQUIRE(file.measured_delay_s);
   CHECK_THAT(*file.measured_delay_s, WithinAbs(4e-3, 1e-3));
-}
-
-/// The simulated device, which is unplugged after so many positions.
-class Unplugged final : public HapticDevice {
- public:
-  Unplugged(const HilSession& session, int after)
-      : device_(session.plant, session.operator_script()), left_(after) {}
-  const DeviceIdentity& open() override {
-    if (left_ > 0) return device_.open();
-    throw Error(ExitCode::environment, "inverse3", "the service is silent",
-                "a service that answers each message");
-  }
-  void prepare(const DevicePreparation& preparation) override { device_.prepare(preparation); }
-  void enable_forces() override { device_.enable_forces(); }
-  DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
-    return --left_ > 0 ? device_.read(position_m) : DeviceAnswer::failed;
-  }
-  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override {
-    return device_.write(force_N);
-  }
-  DeviceStatus status() noexcept override {
-    DeviceStatus status = device_.status();
-    if (left_ <= 0) status.forces_off = ForcesOff::unplugged;
-    return status;
-  }
-  void await() noexcept override { device_.await(); }
-  void begin() noexcept override { device_.begin(); }
-  void advance(double seconds) noexcept override { device_.advance(seconds); }
-  void stop() noexcept override { device_.stop(); }
-  void cut_forces() noexcept override { device_.cut_forces(); }
-
- private:
-  VirtualOmega7 device_;
-  int left_;
-};
-
-/// An identification of 8 s on devices that end after so many positions; the last opens no more.
-IdentifyRun identified_until(const std::vector<int>& ends) {
-  HilSession like = test::parsed(test::short_session());
-  like.plant.delay_periods = 4;
-  like.plant.arm = {1e-9, 0.0, 0.0, 0.0};
-  DeviceIdentifyOptions options;
-  options.duration_s = 8.0;
-  std::size_t begun = 0;
-  return run_identification_on([&] { return std::make_shared<Unplugged>(like, ends.at(begun++)); },
-                               {}, like, options);
-}
-
-TEST_CASE("What was measured before a device that never answers again is kept, the rest named") {
-  const IdentifyRun run = identified_until({5000, 0});
-  CHECK(run.begun_again == 1);
-  REQUIRE(run.found.delay_mean_s);
-  CHECK_THAT(*run.found.delay_mean_s, WithinAbs(4e-3, 0.5e-3));
-  CHECK(run.measured_s > 4.0);
-  CHECK(run.measured_s < 5.0);
-  REQUIRE(run.found.not_identified.size() == 1);
-  CHECK_THAT(run.found.not_identified.front(),
-             Catch::Matchers::StartsWith("everything after 4.") &&
-                 Catch::Matchers::Contains(" s of 8 s: unplugged") &&
-                 Catch::Matchers::Contains("does not open again: inverse3: the service is silent"));
-  CHECK(run.found.stalls == 0);  // nothing stands for the part that was not begun
-  const Json file = device_file_json(run, "");
-  CHECK_THAT(file.at("measurement").at("measured_s").get<double>(),
-             WithinRel(run.measured_s, 1e-3));
-  CHECK_THAT(file.at("measurement").at("ended_by").get<std::string>(),
-             Catch::Matchers::Contains("does not open again"));
-  (void)parse_device_file(file, "device.json");
-  // A whole measurement in two parts lacks nothing.
-  const IdentifyRun whole = identified_until({5000, 100000});
-  CHECK(whole.ended_by.empty());
-  CHECK(whole.found.not_identified.empty());
-  CHECK_THAT(whole.measured_s, WithinAbs(8.0, 0.01));
-  // Where nothing was measured yet there is nothing to keep.
-  CHECK_THROWS_WITH(identified_until({0}), Catch::Matchers::Contains("the service is silent"));
 }
 
 }  // namespace

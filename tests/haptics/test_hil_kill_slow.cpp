@@ -78,4 +78,37 @@ TEST_CASE("kill -9 at random moments: every recording opens and verifies up to t
   CHECK(written_late <= test::allowed_cost("session.kills_with_a_second_unwritten"));
 }
 
+TEST_CASE("Every signal that ends a process lets a session say how it ended, as SIGTERM does") {
+  const test::TempFolder folder;
+  Json session = test::short_session();
+  session["virtual_device"] = {{"least_watchdog", "10 s"}};
+  session["limits"] = {{"cycle_timeout", "1 s"}, {"late_cycles", 1000}};
+  write_file(folder / "session.json", session.dump());
+  for (const int signal : {SIGTERM, SIGUSR1, SIGALRM, SIGIO, SIGPWR, SIGRTMIN}) {
+    const std::string name = std::to_string(signal), file = folder / ("r" + name);
+    const std::string said = folder / ("said" + name);
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      (void)!freopen(said.c_str(), "w", stdout);
+      (void)!freopen("/dev/null", "w", stderr);
+      execl(TPM_TEST_PROGRAM, "tpm", "hil", "run", (folder / "session.json").c_str(), "--clock",
+            "real", "-o", file.c_str(), static_cast<char*>(nullptr));
+      _exit(127);
+    }
+    for (int wait = 0; wait < 4000 && !std::filesystem::exists(file); ++wait) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    (void)kill(child, signal);
+    int status = 0;
+    (void)waitpid(child, &status, 0);
+    CAPTURE(signal, status);
+    REQUIRE(WIFEXITED(status));
+    CHECK(WEXITSTATUS(status) == 128 + signal);
+    const std::string words = read_file(said);
+    CHECK(words.find("end: signal") != std::string::npos);
+    CHECK(words.find("wrote ") != std::string::npos);
+  }
+}
+
 }  // namespace tpm::haptics

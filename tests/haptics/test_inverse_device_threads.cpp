@@ -295,6 +295,7 @@ TEST_CASE("A measurement goes on after a lost connection, and says so") {
   CHECK(file.at("measurement").at("stalled_s").get<double>() > 0.4);
   // Of one that never answers again, what was measured until then is used, and the rest is named.
   faults.how = How::silence;
+  faults.from = 6500;
   StandInInverse silent(free, {}, false, faults);
   const IdentifyRun part = run_identification(choice_of(silent), session, options);
   CHECK(part.measured_s > 0.0);

@@ -38,6 +38,10 @@ TEST_CASE("By the command line, a delay is found or the stall named, and each se
       const test::LineRun run = test::run_on_the_line(TPM_TEST_PROGRAM, late_ms);
       CAPTURE(late_ms, tries);
       INFO(run.said);
+      if (run.identified == 5) {  // a stall ended it for good
+        CHECK(run.said.find("tpm: identification ended after ") != std::string::npos);
+        continue;
+      }
       REQUIRE(run.identified <= 1);
       REQUIRE(run.identified >= 0);
       if (run.identified == 1) {
@@ -63,6 +67,26 @@ TEST_CASE("By the command line, a delay is found or the stall named, and each se
     }
     if (!whole) WARN("no session was whole: the machine stalled in each");
   }
+}
+
+TEST_CASE("An identification whose service is killed fails, and says why") {
+  const test::TempFolder folder;
+  files::write_file(folder / "session.json", test::rendered().dump());
+  const std::string file = folder / "inverse.json";
+  auto service =
+      std::make_unique<test::ServeBeside>(TPM_TEST_PROGRAM, folder, test::served(2, false));
+  std::vector<std::string> words{TPM_TEST_PROGRAM, "hil",  "identify", folder / "session.json",
+                                 "--duration",     "60 s", "-o",       file};
+  service->add_address(words);
+  test::Beside identify(words, folder / "out", folder / "err");
+  REQUIRE(test::until(
+      [&] { return test::text_of(folder / "err").find("tpm: measuring") != std::string::npos; },
+      120.0));
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  service.reset();
+  CHECK(identify.wait_for() == 5);
+  CHECK(test::text_of(folder / "err").find("tpm: identification ended after ") !=
+        std::string::npos);
 }
 
 }  // namespace

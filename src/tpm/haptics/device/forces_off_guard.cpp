@@ -83,22 +83,23 @@ void take_all() {
   (void)std::at_quick_exit(cut_all_forces);
   end_signal = 0;
   for (const int signal : kCrashes) take(signal, tpm_cut_forces_and_end, true);
-  for (const int signal : kEnds) take(signal, tpm_remember_end, false);
+  for (const int signal : ending_signals()) take(signal, tpm_remember_end, false);
   for (const int signal : kStops) take(signal, tpm_remember_end, false);
-  // The C library keeps the first of them for itself: their numbers are known at run time only.
-  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) take(signal, tpm_remember_end, false);
   for (const int signal : kFailedWrites) take(signal, SIG_IGN, false);
 }
 
 void give_all_back() noexcept {
-  for (const int signal : kCrashes) give_back(signal);
-  for (const int signal : kEnds) give_back(signal);
-  for (const int signal : kStops) give_back(signal);
-  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) give_back(signal);
-  for (const int signal : kFailedWrites) give_back(signal);
+  for (int signal = 1; signal <= SIGRTMAX; ++signal) give_back(signal);
 }
 
 }  // namespace
+
+std::vector<int> ending_signals() {
+  std::vector<int> signals(kEnds.begin(), kEnds.end());
+  // The C library keeps the first of them for itself: their numbers are known at run time only.
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) signals.push_back(signal);
+  return signals;
+}
 
 void cut_all_forces() noexcept {
   for (std::atomic<HapticDevice*>& slot : guarded) {

@@ -58,6 +58,10 @@ class SignalStack {
   stack_t before_{};
 };
 
+/// Signals that end a process and at which the loop of a guarded device stops in order. A program
+/// that takes them itself lives on to say how the session ended.
+[[nodiscard]] std::vector<int> ending_signals();
+
 /// cut_forces() of every guarded device. For whoever ends the process without exit handlers.
 void cut_all_forces() noexcept;
 

@@ -16,6 +16,8 @@ struct ArmSettings {
   double damping_N_s_per_m = 6.45;
   double stiffness_N_per_m = 135.0;
   double correction_per_s = 3.0;  ///< rate at which a wrong depth is corrected
+
+  [[nodiscard]] bool operator==(const ArmSettings&) const = default;
 };
 
 /// A simulated Omega.7 and the arm that holds it.

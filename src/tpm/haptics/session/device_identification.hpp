@@ -10,11 +10,12 @@ namespace tpm::haptics {
 
 /// Command to a device and its place, in one period.
 struct IdentificationSample {
-  double at_m = 0.0;     ///< along the direction of the forces, as the device reads it
-  double force_N = 0.0;  ///< sent in this period, held until the next one
-  int missed = 0;        ///< periods without a cycle before this one
-  double late_s = 0.0;   ///< after the beginning of the period in which it was read and sent
-  bool stale = false;    ///< the position is that of an earlier call
+  double at_m = 0.0;       ///< along the direction of the forces, as the device reads it
+  double force_N = 0.0;    ///< sent in this period, held until the next one
+  int missed = 0;          ///< periods without a cycle before this one
+  double late_s = 0.0;     ///< after the beginning of the period in which it was read and sent
+  bool stale = false;      ///< the position is that of an earlier call
+  bool saturated = false;  ///< the motors gave less than this force
 };
 
 /// Identified properties of a device. Values that could not be identified are empty.
@@ -26,10 +27,10 @@ struct DeviceIdentification {
   int edges = 0;              ///< of the force, each a measurement of the delay
   std::optional<double> encoder_step_m;
   double noise_m = 0.0;  ///< of positions, the step's rounding included
-  /// Device and whatever holds it. `mass_certain`: to 10 %; else only the interval is known.
+  /// Of the device, with whatever holds it. `mass_certain`: to 10 %; else only the interval is
+  /// known, which begins at 0 if something holds the handle.
   std::optional<double> mass_kg, mass_low_kg, mass_high_kg;
   bool mass_certain = false;
-  /// Of the device: empty if something holds the handle, whose damping cannot be told apart.
   std::optional<double> viscous_N_s_per_m, viscous_lower_95_N_s_per_m;
   std::optional<double> coulomb_low_N, coulomb_high_N;
   double held_N_per_m = 0.0;  ///< stiffness of whatever holds the handle
@@ -52,6 +53,11 @@ struct DeviceIdentification {
 /// w is (1 - s^2)^4. Windows of 64 ms give one equation each; for every delay d they are solved by
 /// least squares, and the delay with the smallest residual is taken. Each edge of the force is then
 /// a measurement of its own delay. Coulomb friction is an unknown of its own and never a part of b.
+///
+/// Delay and friction are those of a free handle. A hand is no spring: it reacts, and its grip
+/// yields, which shifts the delay by milliseconds while the fit still looks good. So k decides:
+/// from 3 N/m on something holds the handle, and neither delay nor friction is identified. Nor are
+/// they where Coulomb friction is above half the edges of the force, or the motors were saturated.
 ///
 /// Samples need not come on time: a command counts from when it was sent until the next one, and
 /// positions are taken linearly between readings that are at most kLongestBridge_s apart, in which
