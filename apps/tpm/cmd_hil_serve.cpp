@@ -24,13 +24,6 @@ struct ServeChoice {
   bool poll = false;
 };
 
-int serve_port(const std::string& text, const char* option) {
-  constexpr std::uint64_t kLeast = 1024, kMost = 65535;
-  const std::uint64_t port = parse_whole_number(text, option, 0);
-  if (port == 0 || (port >= kLeast && port <= kMost)) return static_cast<int>(port);
-  throw Error(ExitCode::usage, option, text, "0 for a port that is free, or 1024 to 65535");
-}
-
 double serve_duration_s(const std::string& text) {
   constexpr double kMost_s = 86400.0;
   if (text.empty()) return 0.0;
@@ -41,8 +34,8 @@ double serve_duration_s(const std::string& text) {
 
 int serve_hil(const ServeChoice& choice, const Session& session) {
   ServeOptions options;
-  options.port = serve_port(choice.port, "--port");
-  options.events_port = serve_port(choice.events_port, "--events-port");
+  options.port = port_of_option(choice.port, "--port");
+  options.events_port = port_of_option(choice.events_port, "--events-port");
   if (options.port != 0 && options.events_port == options.port) {
     throw Error(ExitCode::usage, "--events-port", choice.events_port, "another port than --port");
   }
@@ -51,7 +44,7 @@ int serve_hil(const ServeChoice& choice, const Session& session) {
   const HilSession hil = read_session(choice.session);
   LiveView view(hil, true);
   std::optional<PageServer> page;
-  if (!choice.page.empty()) page.emplace(view, serve_port(choice.page, "--page"));
+  if (!choice.page.empty()) page.emplace(view, port_of_option(choice.page, "--page"));
   const InterruptWatch interrupts;
   options.interrupted = InterruptWatch::seen;
   options.log = [](const std::string& line) { tell_user("tpm: {}\n", line); };

@@ -39,7 +39,7 @@ int verify_hil(const VerifyChoice& choice, const Session& session) {
   const Verification v = verify(recording, options_of(choice));
   if (session.json()) {
     say("{}", answer_text(session, verification_json(recording, v),
-                          {{"recording_whole", recording.damaged == 0}}));
+                          {{"recording_whole", recording.whole()}}));
   } else if (choice.verbose) {
     say("{}", verification_text(recording, v));
   } else {
@@ -48,8 +48,9 @@ int verify_hil(const VerifyChoice& choice, const Session& session) {
                fmt::format("tpm hil report {} --folder hil_report", shell_word(choice.recording)));
     say("{}", to_text(answer));
   }
-  // What is left of a damaged recording is verified; the answer is no all the same.
-  return exit_code(recording.damaged == 0);
+  // What is left of a recording that is damaged or cut off is verified; the answer is no all the
+  // same. A session that ended early is recorded as a whole.
+  return exit_code(recording.whole());
 }
 
 int report_hil(const VerifyChoice& choice, const Session& session) {
@@ -61,7 +62,7 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
   write_hil_report(recording, v, choice.output, python);
   if (session.json()) {
     say("{}", answer_text(session, verification_json(recording, v),
-                          {{"recording_whole", recording.damaged == 0}}));
+                          {{"recording_whole", recording.whole()}}));
   } else {
     ShortAnswer answer = short_answer(recording, v);
     end_answer(answer, choice.output, {"report.html", "report.md", "report.json"},
@@ -71,7 +72,7 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
                                                choice.output)
                              : to_text(answer));
   }
-  return exit_code(recording.damaged == 0);
+  return exit_code(recording.whole());
 }
 
 std::shared_ptr<VerifyChoice> add_choice(CLI::App& command, Session& session) {

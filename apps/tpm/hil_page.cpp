@@ -1,8 +1,12 @@
 // The page of tpm hil run: when it begins, and when it ends.
 #include "hil_page.hpp"
 
+#include <fmt/format.h>
+
+#include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <system_error>
 #include <thread>
 
 #include "command.hpp"
@@ -19,13 +23,6 @@ double page_time_s(const std::string& text, const char* option) {
   throw Error(ExitCode::usage, option, text, "0 to 3600 s");
 }
 
-int page_port(const std::string& text) {
-  constexpr std::uint64_t kLeast = 1024, kMost = 65535;
-  const std::uint64_t port = parse_whole_number(text, "--page", 0);
-  if (port == 0 || (port >= kLeast && port <= kMost)) return static_cast<int>(port);
-  throw Error(ExitCode::usage, "--page", text, "0 for a port that is free, or 1024 to 65535");
-}
-
 /// Until done() or the time is over.
 void linger(double seconds, const std::function<bool()>& done) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
@@ -36,11 +33,21 @@ void linger(double seconds, const std::function<bool()>& done) {
 
 }  // namespace
 
+int port_of_option(const std::string& text, const char* option) {
+  constexpr int kLeast = 1024, kMost = 65535;
+  int port = -1;
+  const auto [stop, status] = std::from_chars(text.data(), text.data() + text.size(), port);
+  const bool whole = status == std::errc{} && stop == text.data() + text.size();
+  if (whole && (port == 0 || (port >= kLeast && port <= kMost))) return port;
+  throw Error(ExitCode::usage, option, whole ? text : fmt::format("'{}'", printable(text)),
+              "0 for a port that is free, or 1024 to 65535");
+}
+
 HilPage::HilPage(const HilSession& session, bool real_time, const PageOptions& options)
     : view_(session, real_time),
       wait_s_(page_time_s(options.wait, "--page-wait")),
       keep_s_(page_time_s(options.keep, "--page-keep")),
-      server_(view_, page_port(options.port)) {
+      server_(view_, port_of_option(options.port, "--page")) {
   tell_user("page: {}\n", server_.address());
 }
 

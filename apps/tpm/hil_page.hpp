@@ -9,6 +9,10 @@
 
 namespace tpm::app {
 
+/// A port to listen on: 0 for one that is free, or 1024 to 65535. Throws Error(usage) naming the
+/// option.
+[[nodiscard]] int port_of_option(const std::string& text, const char* option);
+
 /// Options of a session with a page.
 struct PageOptions {
   std::string port;  ///< empty: no page
