@@ -27,11 +27,16 @@ VerifyOptions options_of(const VerifyChoice& choice) {
       option_quantity(choice.motion_tolerance, Dimension::length, "--motion-tolerance");
   options.spacing_s = option_quantity(choice.spacing, Dimension::time, "--compare-every");
   options.window_s = option_quantity(choice.window, Dimension::time, "--window");
-  if (options.motion_tolerance_m > 0.0 && options.spacing_s > 0.0 && options.window_s >= 0.0) {
-    return options;
-  }
-  throw Error(ExitCode::usage, "tpm hil", "an option is out of range",
-              "a tolerance and a spacing above 0, a window of 0 or more");
+  const auto require = [](bool holds, const char* option, const std::string& text,
+                          const char* expected) {
+    if (!holds) throw Error(ExitCode::usage, option, text, expected);
+  };
+  require(options.motion_tolerance_m > 0.0, "--motion-tolerance", choice.motion_tolerance,
+          "a length above 0, such as 5 um");
+  require(options.spacing_s > 0.0, "--compare-every", choice.spacing,
+          "a time above 0, such as 10 ms");
+  require(options.window_s >= 0.0, "--window", choice.window, "a time of 0 or more");
+  return options;
 }
 
 int verify_hil(const VerifyChoice& choice, const Session& session) {
