@@ -21,17 +21,21 @@ int export_hil(const ExportChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   export_recording(recording, sha256_hex(read_file(choice.recording)), choice.output);
   if (session.json()) {
-    say("{}", answer_text(session, Json{{"file", choice.output},
-                                        {"rows", recording.rows.size()},
-                                        {"whole", recording.closed && recording.damaged == 0},
-                                        {"damaged_rows", recording.damaged},
-                                        {"simulated_device", recording.simulated()}}));
+    say("{}", answer_text(session,
+                          Json{{"file", choice.output},
+                               {"rows", recording.rows.size()},
+                               {"whole", recording.whole()},
+                               {"damaged_rows", recording.damaged},
+                               {"end", recording.cause()},
+                               {"notes", recording_remarks(recording)},
+                               {"simulated_device", recording.simulated()}},
+                          {{"recording_whole", recording.whole()}}));
   } else {
-    const std::string damage = damage_line(recording);
-    say("{}\n{}{}wrote {}: {} rows\n", device_line(recording), damage, damage.empty() ? "" : "\n",
-        choice.output, recording.rows.size());
+    std::string text = device_line(recording) + "\n";
+    for (const std::string& line : recording_remarks(recording)) text += line + "\n";
+    say("{}wrote {}: {} rows\n", text, choice.output, recording.rows.size());
   }
-  return exit_code(recording.damaged == 0);
+  return exit_code(recording.whole());
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "command.hpp"
 #include "common_options.hpp"
 #include "hil_options.hpp"
+#include "hil_page.hpp"
 #include "interrupt_watch.hpp"
 #include "tpm/haptics/serve/serve.hpp"
 #include "tpm/haptics/session/live_view.hpp"

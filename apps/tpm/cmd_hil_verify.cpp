@@ -27,11 +27,16 @@ VerifyOptions options_of(const VerifyChoice& choice) {
       option_quantity(choice.motion_tolerance, Dimension::length, "--motion-tolerance");
   options.spacing_s = option_quantity(choice.spacing, Dimension::time, "--compare-every");
   options.window_s = option_quantity(choice.window, Dimension::time, "--window");
-  if (options.motion_tolerance_m > 0.0 && options.spacing_s > 0.0 && options.window_s >= 0.0) {
-    return options;
-  }
-  throw Error(ExitCode::usage, "tpm hil", "an option is out of range",
-              "a tolerance and a spacing above 0, a window of 0 or more");
+  const auto require = [](bool holds, const char* option, const std::string& text,
+                          const char* expected) {
+    if (!holds) throw Error(ExitCode::usage, option, text, expected);
+  };
+  require(options.motion_tolerance_m > 0.0, "--motion-tolerance", choice.motion_tolerance,
+          "a length above 0, such as 5 um");
+  require(options.spacing_s > 0.0, "--compare-every", choice.spacing,
+          "a time above 0, such as 10 ms");
+  require(options.window_s >= 0.0, "--window", choice.window, "a time of 0 or more");
+  return options;
 }
 
 int verify_hil(const VerifyChoice& choice, const Session& session) {
@@ -39,7 +44,7 @@ int verify_hil(const VerifyChoice& choice, const Session& session) {
   const Verification v = verify(recording, options_of(choice));
   if (session.json()) {
     say("{}", answer_text(session, verification_json(recording, v),
-                          {{"recording_whole", recording.damaged == 0}}));
+                          {{"recording_whole", recording.whole()}}));
   } else if (choice.verbose) {
     say("{}", verification_text(recording, v));
   } else {
@@ -48,8 +53,9 @@ int verify_hil(const VerifyChoice& choice, const Session& session) {
                fmt::format("tpm hil report {} --folder hil_report", shell_word(choice.recording)));
     say("{}", to_text(answer));
   }
-  // What is left of a damaged recording is verified; the answer is no all the same.
-  return exit_code(recording.damaged == 0);
+  // What is left of a recording that is damaged or cut off is verified; the answer is no all the
+  // same. A session that ended early is recorded as a whole.
+  return exit_code(recording.whole());
 }
 
 int report_hil(const VerifyChoice& choice, const Session& session) {
@@ -61,7 +67,7 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
   write_hil_report(recording, v, choice.output, python);
   if (session.json()) {
     say("{}", answer_text(session, verification_json(recording, v),
-                          {{"recording_whole", recording.damaged == 0}}));
+                          {{"recording_whole", recording.whole()}}));
   } else {
     ShortAnswer answer = short_answer(recording, v);
     end_answer(answer, choice.output, {"report.html", "report.md", "report.json"},
@@ -71,7 +77,7 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
                                                choice.output)
                              : to_text(answer));
   }
-  return exit_code(recording.damaged == 0);
+  return exit_code(recording.whole());
 }
 
 std::shared_ptr<VerifyChoice> add_choice(CLI::App& command, Session& session) {

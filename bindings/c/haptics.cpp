@@ -10,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "tpm/base/text.hpp"
 #include "tpm/haptics/session/loop_contact.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
@@ -133,7 +134,7 @@ int guarded(char* message, std::size_t room, Work&& work) noexcept {
     work();
     return TPM_HAPTICS_OK;
   } catch (const tpm::Error& error) {
-    say(message, room, error.what());
+    say(message, room, tpm::base::with_arguments_for_options(error.what()));
     return static_cast<int>(error.code());
   } catch (const std::bad_alloc&) {
     say(message, room, "no memory");

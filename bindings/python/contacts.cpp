@@ -37,6 +37,16 @@ Eigen::Vector3d step_once(LoopContact& contact, const Eigen::Vector3d& position_
   return force_N;
 }
 
+/// One call at a time of the caller's clock; none for a time that cannot be the next one.
+std::optional<Eigen::Vector3d> step_once_at(LoopContact& contact, double time_s,
+                                            const Eigen::Vector3d& position_m) {
+  Eigen::Vector3d force_N;
+  const StopCause cause = contact.step_at(time_s, position_m, force_N);
+  if (cause == LoopContact::kBadTime) return std::nullopt;
+  if (cause != StopCause::none) throw stopped(cause);
+  return force_N;
+}
+
 /// Many periods; where the contact stops, the forces end.
 py::array_t<double> step_through(LoopContact& contact, const Numbers& positions_m) {
   if (positions_m.ndim() != 2 || positions_m.shape(1) != 3) {
@@ -119,11 +129,7 @@ py::dict session_of(const std::filesystem::path& file) {
   column("observed_J", [](const ServoRecord& r) { return r.observed_J; });
   column("busy_s", [](const ServoRecord& r) { return r.busy_s; });
   column("flags", [](const ServoRecord& r) { return r.flags; });
-  std::vector<std::string> warnings;
-  if (recording.damaged > 0 || !recording.closed) warnings.push_back(damage_line(recording));
-  if (recording.closed && recording.closing.at("cause") != "finished") {
-    warnings.push_back("ended: " + recording.closing.at("cause").get<std::string>());
-  }
+  std::vector<std::string> warnings = recording_remarks(recording);
   const Json rendering = recording.header.value("rendering", Json());
   if (rendering.is_object()) {
     for (const Json& words : rendering.at("warnings")) warnings.push_back(words);
@@ -143,13 +149,14 @@ py::dict session_of(const std::filesystem::path& file) {
 
 /// A session on the simulated device, as fast as it goes.
 std::string run_virtual(const std::filesystem::path& session, const std::filesystem::path& output,
-                        const std::string& law, py::object progress) {
+                        const std::string& law, bool accept_unstable, py::object progress) {
   SessionChanges changes;
   changes.law = law;
   const HilSession read = read_session(session, changes);
   const LongCall call(std::move(progress));
   SessionRunOptions options;
   options.recording = output;
+  options.accept_unstable = accept_unstable;
   options.interrupted = call.interrupted();
   const auto total = static_cast<std::uint64_t>(read.phases.size());
   std::int32_t phase = -1;
@@ -171,6 +178,7 @@ void bind_contacts(py::module_& module) {
            py::arg("longest_s"), py::arg("accept_unstable"), py::arg("device"),
            py::arg("device_file"))
       .def("step", &step_once, py::arg("position_m"), py::arg("missed") = 0)
+      .def("step_at", &step_once_at, py::arg("t_s"), py::arg("position_m"))
       .def("steps", &step_through, py::arg("positions_m"))
       .def("reset", &LoopContact::reset)
       .def_property_readonly("state", &state_of)

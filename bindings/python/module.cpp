@@ -13,25 +13,32 @@
 namespace tpm::python {
 namespace {
 
-/// tpmkit.Error: str() is the one line, `code` the exit code that the program would end with.
+/// tpmkit.Error: str() is the one line, `code` the exit code that the program would end with. Of an
+/// argument it is tpmkit.ArgumentError, which is a ValueError too.
 void bind_errors(py::module_& module) {
   static PyObject* const kind = PyErr_NewExceptionWithDoc(
       "tpmkit.Error",
       "What tpmkit cannot do, in one line: \"WHERE: WHAT; expected ...\".\n\n"
       "`code` is the exit code of the program `tpm`: 1 the answer is no, "
       "2 usage, 3 bad input,\n4 numerical, 5 environment.",
-      PyExc_RuntimeError, nullptr);
+      PyExc_RuntimeError, py::dict(py::arg("code") = static_cast<int>(ExitCode::bad_input)).ptr());
   module.add_object("Error", py::reinterpret_borrow<py::object>(kind));
+  static PyObject* const of_argument = PyErr_NewExceptionWithDoc(
+      "tpmkit.ArgumentError", "An argument that a call does not take. It is a ValueError too.",
+      py::make_tuple(py::handle(kind), py::handle(PyExc_ValueError)).ptr(),
+      py::dict(py::arg("code") = static_cast<int>(ExitCode::usage)).ptr());
+  module.add_object("ArgumentError", py::reinterpret_borrow<py::object>(of_argument));
   py::register_exception_translator([](std::exception_ptr thrown) {
-    const auto raise = [](const std::string& words, int code) {
-      const py::object error = py::reinterpret_borrow<py::object>(kind)(words);
-      error.attr("code") = code;
-      PyErr_SetObject(kind, error.ptr());
+    const auto raise = [](const std::string& words, ExitCode code) {
+      const py::handle raised = code == ExitCode::usage ? of_argument : kind;
+      const py::object error = raised(words);
+      error.attr("code") = static_cast<int>(code);
+      PyErr_SetObject(raised.ptr(), error.ptr());
     };
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const Error& error) {
-      raise(error.what(), static_cast<int>(error.code()));
+      raise(with_arguments_for_options(error.what()), error.code());
     } catch (const Interrupted& stop) {
       PyErr_SetString(PyExc_KeyboardInterrupt, stop.what());
     }
@@ -78,6 +85,8 @@ PYBIND11_MODULE(_core, module) {
                              "frequency");
       },
       py::arg("text"), py::arg("dimension"));
+  module.def("with_arguments_for_options", &tpm::base::with_arguments_for_options,
+             py::arg("message"));
   module.def("share_dir", [] { return tpm::files::share_dir(); });
   bind_laws(module);
   bind_fits(module);

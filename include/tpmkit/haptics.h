@@ -70,7 +70,7 @@ enum tpm_haptics_cause {
   TPM_HAPTICS_POSITION_NOT_FINITE = 2,
   TPM_HAPTICS_POSITION_JUMPED = 3,      /**< faster than 5 m/s */
   TPM_HAPTICS_FORCE_NOT_FINITE = 4,
-  TPM_HAPTICS_LATE = 5,                 /**< too many periods missed */
+  TPM_HAPTICS_LATE = 5,                 /**< the loop missed periods in too many calls */
   TPM_HAPTICS_NOT_IN_PLACE = 6,         /**< the tool was never in free air and at rest */
   TPM_HAPTICS_OUTSIDE_VALIDITY = 7,     /**< forces were outside the validity of the model for too long */
   TPM_HAPTICS_ENERGY = 8,               /**< the rendering delivered energy to the hand */
@@ -103,8 +103,9 @@ typedef struct tpm_haptics_options {
   double longest_s;          /**< of a law file: spring-pots keep their history so long; default 600 */
   uint32_t no_start_gate;    /**< 1: forces do not wait until the tool is in free air and at rest */
   uint32_t accept_unstable;  /**< 1: open what would be unstable; not for a device with motors */
-  char device[32];           /**< whose limits apply, as `tpm hil run --device`; "": that of device_file, else
-                                  omega7; "virtual": nothing has motors, as in a test of your loop */
+  char device[32];           /**< whose limits apply, as `tpm hil run --device` but for "replay"; "": that of
+                                  device_file, else omega7; "virtual": nothing has motors, as in a test of your
+                                  loop */
   const char *device_file;   /**< limits, delay and friction measured on your device (`tpm hil identify`,
                                   schemas/device.schema.json). NULL, or a file without a measured delay: a device
                                   with motors counts as 20 ms late and free of friction, and a tissue above
@@ -182,18 +183,21 @@ TPM_HAPTICS_API int tpm_haptics_open(const char *file, const tpm_haptics_options
 TPM_HAPTICS_API int tpm_haptics_step(tpm_haptics_contact *contact, const double position_m[3],
                                      double force_N[3]);
 
-/** The same after `missed` periods without a step; the tissue is advanced through them too. */
+/** The same after `missed` periods without a step; the tissue is advanced through them too. A loop that
+ * misses some in more calls than the session allows (limits/late_cycles: 100 of 1000), also while the contact
+ * waits to begin, or more than the tissue can make up for (8 periods a call) is stopped: TPM_HAPTICS_LATE. */
 TPM_HAPTICS_API int tpm_haptics_step_after(tpm_haptics_contact *contact, uint32_t missed,
                                            const double position_m[3], double force_N[3]);
 
 /** One call of your loop at the time `t_s` of your clock. The number of periods since the last call follows
  * from the time: a loop that runs at another rate than the contact, or that is late, lives through the same
  * time as the tissue. A faster loop receives the force of the last period in between; a slower one misses
- * periods, and is stopped with TPM_HAPTICS_LATE if they are too many. Use either this or the two above.
+ * periods: up to the limits of tpm_haptics_step_after the force is that of its time, above them it is stopped
+ * with TPM_HAPTICS_LATE. Use either this or the two above.
  * @param t_s seconds of a clock that does not jump (CLOCK_MONOTONIC), rising from call to call; its origin
- *        does not matter
- * @returns as tpm_haptics_step; TPM_HAPTICS_USAGE with a zero force for a time that is not finite or lies
- *          before that of the last call
+ *        does not matter, its size is 1e10 at most: above that a double does not tell a hundredth of a period
+ * @returns as tpm_haptics_step; TPM_HAPTICS_USAGE with a zero force for a time that is not finite, is larger,
+ *          lies before that of the last call, or is the same in more than 100 calls in a row
  */
 TPM_HAPTICS_API int tpm_haptics_step_at(tpm_haptics_contact *contact, double t_s,
                                         const double position_m[3], double force_N[3]);

@@ -52,6 +52,9 @@ struct SessionCheck {
   double rms_N = 0.0, max_N = 0.0;  ///< commanded less reference
   double peak_N = 0.0;              ///< largest force of the reference
   double reference_error_N = 0.0;   ///< error estimate of the reference
+  bool whole = true;                ///< neither the end of the recording nor a row is missing
+  /// What was not compared, how a session ended that ended early, what the device noticed.
+  std::vector<std::string> notes;
 };
 
 /// A session with a haptic device: tissue, loop and phases (schemas/hil.schema.json,

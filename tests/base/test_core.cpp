@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/error.hpp"
@@ -11,6 +12,22 @@ using namespace tpm;
 using namespace tpm::base;
 using namespace tpm::files;
 using Catch::Matchers::WithinRel;
+
+TEST_CASE("a message for one who calls the library names arguments in place of options") {
+  const auto said = with_arguments_for_options;
+  CHECK(said("--device: 'gloves'; expected --device-file") ==
+        "device: 'gloves'; expected device_file");
+  CHECK(said("m.csv: no column; expected --separator and --decimal (comma or point)") ==
+        "m.csv: no column; expected separator and decimal (comma or point)");
+  // Whole commands stay, and what is no option.
+  for (const char* const same :
+       {"d.json: is no file; expected one of tpm hil identify --device KIND", "a -- b --", "a--b",
+        "not measured (tpm plan --calibrate measures)", "k = -1e-3", ""}) {
+    CHECK(said(same) == same);
+  }
+  CHECK(said("a page (tpm validate --credibility), or --require 5%") ==
+        "a page (tpm validate --credibility), or require 5%");
+}
 
 TEST_CASE("a quantity is a number and a unit of the right dimension") {
   CHECK_THAT(parse_quantity("12 kPa", Dimension::stress, "here"), WithinRel(12000.0, 1e-15));

@@ -51,6 +51,68 @@ class Contacts(unittest.TestCase):
         self.assertGreater(forces[:, 2].max(), 0.1)
         self.assertTrue(many.state["valid"])
 
+    def test_a_loop_by_the_clock_has_the_forces_of_its_time(self):
+        by_periods, by_clock = (tpmkit.Contact(self.file, start_gate=False, device="virtual") for _ in range(2))
+        depths = np.concatenate([np.zeros(600), 4e-6 * np.arange(500)])
+        right = by_periods.push(depths)
+        forces = [by_clock.step_at(100.0 + i / 4000, [0.0, 0.0, -depths[i // 4]])[2] for i in range(4 * len(depths))]
+        # A force is that of the call nearest to the end of a period.
+        np.testing.assert_allclose(forces[-1], right[-1], rtol=5e-3)
+        self.assertAlmostEqual(by_clock.state["time_s"], len(depths) * 1e-3, delta=2e-3)
+        slow = tpmkit.Contact(self.file, device="virtual")
+        with self.assertRaisesRegex(tpmkit.Error, "overrun storm"):
+            for i in range(1000):
+                slow.step_at(i / 100, [0.0, 0.0, 2e-3])
+        self.assertLess(i, 150)
+
+    def test_arguments_are_refused_in_a_sentence(self):
+        contact = tpmkit.Contact(self.file, start_gate=False, device="virtual")
+        here = [0.0, 0.0, 1e-3]
+        contact.step_at(1.0, here)
+        refused = [
+            (lambda: contact.step(here, missed=-1), "missed is -1"),
+            (lambda: contact.step(here, missed=1.5), "missed is 1.5"),
+            (lambda: contact.step(here, missed=True), "missed is True"),
+            (lambda: contact.step([0.0, 0.0]), "three numbers"),
+            (lambda: contact.step("here"), "three numbers"),
+            (lambda: contact.step(None), "three numbers"),
+            (lambda: contact.step([[0.0, 0.0, 0.0]]), "three numbers"),
+            (lambda: contact.step_at("now", here), "t_s is 'now'"),
+            (lambda: contact.step_at(10**400, here), "t_s is 1000"),
+            (lambda: contact.step_at(2.0, [0.0]), "three numbers"),
+            (lambda: contact.steps([1.0, 2.0]), "three columns"),
+            (lambda: contact.push([[1.0], [2.0]]), "a list of numbers"),
+            (lambda: tpmkit.Contact(self.file, rate_Hz=100.0, device="virtual"), "rate_Hz: 100; expected 500 to 4000 Hz"),
+            (lambda: tpmkit.Contact(self.file, rate_Hz="fast", device="virtual"), "rate_Hz is 'fast'"),
+            (lambda: tpmkit.Contact(self.file, longest_s=-1.0, device="virtual"), "longest_s: -1"),
+            (lambda: tpmkit.Contact(self.file, device="gloves"), "^device: 'gloves'"),
+            (lambda: tpmkit.Contact(self.file, device="replay"), "^device: 'replay'"),
+            (lambda: tpmkit.Contact(self.file, start_gate="no"), "wrong kind"),
+        ]
+        refused += [(lambda t=t: contact.step_at(t, here), "rise with the calls")
+                    for t in (0.5, float("nan"), float("inf"), -float("inf"), 1e15)]
+        for call, words in refused:
+            with self.subTest(words):
+                with self.assertRaisesRegex(ValueError, words) as caught:
+                    call()
+                self.assertIsInstance(caught.exception, tpmkit.Error)
+                self.assertEqual(caught.exception.code, 2)
+                self.assertNotIn("\n", str(caught.exception))
+                self.assertNotIn("--", str(caught.exception))
+        # None of them was a step.
+        self.assertEqual(contact.state["time_s"], 1e-3)
+        self.assertEqual(contact.step_at(1.001, here).tolist(), [0.0, 0.0, 0.0])
+
+    def test_what_is_unstable_is_refused_by_its_argument(self):
+        stiff = json.loads(self.file.read_text())
+        stiff["model"]["scene"]["material"]["E2"] = "12 MPa"
+        self.file.write_text(json.dumps(stiff))
+        output = Path(self.folder.name) / "s.tpmrec"
+        with self.assertRaisesRegex(tpmkit.Error, "unstable.* accept_unstable$"):
+            tpmkit.run_session(self.file, output)
+        tpmkit.run_session(self.file, output, accept_unstable=True)
+        self.assertTrue(output.exists())
+
     def test_it_waits_for_the_tool_and_stops_at_a_jump(self):
         contact = tpmkit.Contact(self.file, device="virtual")
         contact.step([0.0, 0.0, 5e-3])
@@ -87,7 +149,7 @@ class Contacts(unittest.TestCase):
         self.assertEqual(data.attrs["warnings"], rendering["warnings"])
         cut = Path(self.folder.name) / "cut.tpmrec"
         cut.write_bytes(output.read_bytes()[:-3000])
-        self.assertIn("closing record", " ".join(tpmkit.open(cut).attrs["warnings"]))
+        self.assertRegex(" ".join(tpmkit.open(cut).attrs["warnings"]), "cut off at .* s of 6.5 s: no closing record")
         self.assertGreater(float(data.commanded_N.max()), 0.3)
         deepest = float(data.tool_depth_m.max())
         self.assertAlmostEqual(deepest, 4e-3, delta=2e-4)

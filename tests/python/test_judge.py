@@ -52,7 +52,7 @@ class Judgements(unittest.TestCase):
             self.assertIn(warning, repr(judged))
         seen = tpmkit.validate(saved / "law.json", self.folder / "liver_1.csv", require="5%")
         self.assertEqual(seen.verdict, "calibration_residual")
-        with self.assertRaisesRegex(tpmkit.Error, "--new-specimen: the law was fitted to 1 recording"):
+        with self.assertRaisesRegex(tpmkit.Error, "new_specimen: the law was fitted to 1 recording"):
             tpmkit.validate(saved / "law.json", self.folder / "liver_2.csv", new_specimen=True)
         for law in (fit, fit.law):
             same = tpmkit.validate(law, self.folder / "liver_2.csv", require="5%")

@@ -10,10 +10,33 @@ import numpy as np
 from . import _core, _kinds
 from ._run import shown
 
+MOST_MISSED = 2**20  # far above what stops a contact
+
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     Array = npt.NDArray[np.float64]
+
+
+def _numbers(where: str, name: str, values: Any, shape: tuple[int | None, ...], expected: str) -> Array:
+    """An argument as an array of this shape; None is a length of any size."""
+    try:
+        array = np.ascontiguousarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise _core.ArgumentError(f"{where}: {name} is {values!r:.60}; expected {expected}") from None
+    if len(array.shape) != len(shape) or any(n not in (None, m) for n, m in zip(shape, array.shape)):
+        raise _core.ArgumentError(f"{where}: {name} has the shape {array.shape}; expected {expected}")
+    return array
+
+
+def _number(where: str, name: str, value: Any) -> float:
+    """An argument that is a real number, of Python or of numpy; its name ends in its unit."""
+    try:
+        if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+            return float(value)
+    except OverflowError:
+        pass
+    raise _core.ArgumentError(f"{where}: {name} is {value!r:.60}; expected a number, in {name.rpartition('_')[2]}")
 
 
 class Contact:
@@ -35,8 +58,8 @@ class Contact:
     accept_unstable
         Open what would be unstable on the device.
     device
-        Whose limits apply, as `tpm hil run --device` takes it. Default: the device of `device_file`, else omega7.
-        "virtual" where nothing has motors: forces are computed, and nobody feels them.
+        Whose limits apply, as `tpm hil run --device` takes it, but for "replay". Default: the device of
+        `device_file`, else omega7. "virtual" where nothing has motors: forces are computed, and nobody feels them.
     device_file
         What is known of your device: limits, and the delay and friction that `tpm hil identify` measured
         (schemas/device.schema.json). Without a measured delay a device with motors counts as 20 ms late and free of
@@ -60,27 +83,45 @@ class Contact:
         device: str = "",
         device_file: str | os.PathLike[str] = "",
     ) -> None:
-        for name, value in (("rate_Hz", rate_Hz), ("longest_s", longest_s)):
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.integer)):
-                raise _core.Error(f"contact: {name} is {value!r}; expected a number, in {name.rpartition('_')[2]}")
+        rate, longest = _number("contact", "rate_Hz", rate_Hz), _number("contact", "longest_s", longest_s)
         self._core = _core.Contact(
-            os.fspath(file), rate_Hz, start_gate, longest_s, accept_unstable, device, os.fspath(device_file)
+            os.fspath(file), rate, start_gate, longest, accept_unstable, device, os.fspath(device_file)
         )
 
     def step(self, position_m: npt.ArrayLike, *, missed: int = 0) -> Array:
         """One period: position of the tool (m) to force on the hand (N), both in device coordinates.
 
-        `missed` periods without a step are lived through. Raises tpmkit.Error once the contact has stopped.
+        `missed` periods without a step, 0 or more, are lived through. Raises tpmkit.Error once the contact has stopped,
+        tpmkit.ArgumentError (a ValueError) for an argument of another kind or range.
         """
-        return self._core.step(np.asarray(position_m, dtype=float), missed)
+        if not isinstance(missed, (int, np.integer)) or isinstance(missed, bool) or missed < 0:
+            raise _core.ArgumentError(f"step: missed is {missed!r:.60}; expected a whole number of periods, 0 or more")
+        place = _numbers("step", "position_m", position_m, (3,), "three numbers, m")
+        return self._core.step(place, min(int(missed), MOST_MISSED))
+
+    def step_at(self, t_s: float, position_m: npt.ArrayLike) -> Array:
+        """The same at the time `t_s` of your clock, from which the number of periods since the last call follows.
+
+        A loop that runs at another rate than the contact lives through the same time as the tissue. A faster one receives
+        the force of the last period in between; one that misses periods in too many calls is stopped.
+
+        `t_s` are seconds of a clock that does not jump, such as time.monotonic(), rising from call to call, at most 1e10.
+        Raises tpmkit.Error once the contact has stopped, tpmkit.ArgumentError (a ValueError) for a time that is not finite,
+        is larger, lies before that of the last call, or is the same in more than 100 calls in a row.
+        """
+        place = _numbers("step_at", "position_m", position_m, (3,), "three numbers, m")
+        force = self._core.step_at(_number("step_at", "t_s", t_s), place)
+        if force is None:
+            raise _core.ArgumentError(f"step_at: t_s is {t_s!r:.60}; expected seconds that rise with the calls, at most 1e10")
+        return force
 
     def steps(self, positions_m: npt.ArrayLike) -> Array:
         """Many periods: positions of shape (n, 3) to forces of shape (n, 3)."""
-        return self._core.steps(np.ascontiguousarray(positions_m, dtype=float))
+        return self._core.steps(_numbers("steps", "positions_m", positions_m, (None, 3), "a table of three columns, m"))
 
     def push(self, depths_m: npt.ArrayLike) -> Array:
         """Many periods along the push: depths below the surface at rest to forces against the push, N."""
-        depths = np.asarray(depths_m, dtype=float)
+        depths = _numbers("push", "depths_m", depths_m, (None,), "a list of numbers, m")
         push, surface = self.info["push"], self.info["surface_m"]
         return -self.steps(surface + depths[:, None] * push) @ push
 
@@ -133,14 +174,15 @@ def run_session(
     output: str | os.PathLike[str],
     *,
     law: str | os.PathLike[str] = "",
+    accept_unstable: bool = False,
     progress: bool | Callable[[int, int], None] = False,
 ) -> str:
     """Runs a session on the simulated device, as fast as it goes, and records it (`tpm hil run --device
     virtual`).
 
-    `law` replaces the session's tissue. `progress` is True for a line on standard error, or is called with
-    (phases done, phases). Returns the cause of the end, "finished" if all went well; `tpmkit.open(output)`
+    `law` replaces the session's tissue. `accept_unstable` runs what would be unstable. `progress` is True for a line on
+    standard error, or is called with (phases done, phases). Returns the cause of the end, "finished" if all went well; `tpmkit.open(output)`
     opens the recording.
     """
     with shown(progress, "session") as told:
-        return _core.run_session(os.fspath(session), os.fspath(output), os.fspath(law), told)
+        return _core.run_session(os.fspath(session), os.fspath(output), os.fspath(law), accept_unstable, told)

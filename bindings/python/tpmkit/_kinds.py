@@ -19,7 +19,7 @@ def shown(value: Any) -> str:
 
 def told(function: Function) -> Function:
     """The function, whose arguments of a kind that the compiled part does not take, or that are no paths, raise
-    tpmkit.Error in a sentence without its types of C++."""
+    tpmkit.ArgumentError in a sentence without its types of C++."""
 
     @functools.wraps(function)
     def call(*arguments: Any, **named: Any) -> Any:
@@ -33,8 +33,7 @@ def told(function: Function) -> Function:
         if owner and arguments and owner in (type(arguments[0]).__qualname__, getattr(arguments[0], "__qualname__", "")):
             arguments = arguments[1:]  # without self, or the class
         given = ", ".join([shown(a) for a in arguments] + [f"{k}={shown(v)}" for k, v in named.items()])
-        refused = _core.Error(f"{name}({given}): an argument is of a wrong kind; expected what help(tpmkit.{name}) says")
-        refused.code = 2
-        raise refused
+        words = f"{name}({given}): an argument is of a wrong kind; expected what help(tpmkit.{name}) says"
+        raise _core.ArgumentError(words)
 
     return call  # type: ignore[return-value]

@@ -45,7 +45,9 @@ def run(words: Sequence[str], answers: Sequence[int] = (0,)) -> str:
     if made.returncode in answers:
         return made.stdout
     said = [line for line in made.stderr.splitlines() if line]
-    raise _error(said[-1].removeprefix("tpm: ") if said else f"tpm {words[0]}: ended with {made.returncode}", made.returncode)
+    if not said:
+        raise _error(f"tpm {words[0]}: ended with {made.returncode}", made.returncode)
+    raise _error(_core.with_arguments_for_options(said[-1].removeprefix("tpm: ")), made.returncode)
 
 
 def answer(words: Sequence[str], answers: Sequence[int] = (0,)) -> dict[str, Any]:

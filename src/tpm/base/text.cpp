@@ -58,4 +58,33 @@ std::string for_terminal(std::string_view text, LineEnds line_ends) {
   return safe;
 }
 
+std::string with_arguments_for_options(std::string_view message) {
+  const auto is_letter = [](char c) { return c >= 'a' && c <= 'z'; };
+  const auto begins_word = [&](std::size_t at) {
+    constexpr std::string_view kBefore = " (\"'";
+    return at == 0 || kBefore.find(message[at - 1]) != std::string_view::npos;
+  };
+  std::string text;
+  bool in_command = false;
+  for (std::size_t at = 0; at < message.size();) {
+    constexpr std::string_view kCommand = "tpm ", kOption = "--", kEnds = ";,)";
+    const std::string_view rest = message.substr(at);
+    if (kEnds.find(rest.front()) != std::string_view::npos) in_command = false;
+    if (rest.starts_with(kCommand) && begins_word(at)) in_command = true;
+    const bool option = rest.starts_with(kOption) && begins_word(at) && rest.size() > 2 &&
+                        is_letter(rest[2]) && !in_command;
+    if (!option) {
+      text += message[at++];
+      continue;
+    }
+    for (at += kOption.size(); at < message.size(); ++at) {
+      const char c = message[at];
+      const bool joins = c == '-' && at + 1 < message.size() && is_letter(message[at + 1]);
+      if (!is_letter(c) && !joins) break;
+      text += joins ? '_' : c;
+    }
+  }
+  return text;
+}
+
 }  // namespace tpm::base

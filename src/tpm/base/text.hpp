@@ -26,4 +26,9 @@ enum class LineEnds { kept, escaped };
 /// are not UTF-8 become '?'. Tabs stay.
 [[nodiscard]] std::string for_terminal(std::string_view text, LineEnds line_ends);
 
+/// A message of this library for one who calls it: options of the command line are arguments there,
+/// so that "--device-file" becomes "device_file". Commands that it names as a whole stay ("tpm hil
+/// identify --device omega7").
+[[nodiscard]] std::string with_arguments_for_options(std::string_view message);
+
 }  // namespace tpm::base

@@ -131,9 +131,8 @@ DeviceLimits limits_of_motors(const DeviceFile& file, std::string_view kind) {
   if (kind.empty() && !limits.hardware()) {
     throw bad_input(
         file.where + ": key /device", fmt::format("is '{}', without motors", file.kind),
-        fmt::format("the file of a device with motors (tpm hil identify --device KIND), "
-                    "or the device '{}' named where nothing has any",
-                    file.kind));
+        fmt::format("the file of a device with motors (tpm hil identify --device KIND){}",
+                    limits.plant ? ", or the device 'virtual' named where nothing has any" : ""));
   }
   return limits;
 }

@@ -33,7 +33,7 @@ DeviceLimits limits_of(std::string_view kind) {
     if (limits.kind == kind) return limits;
   }
   if (const auto file = shipped_device_file(kind)) return limits_in(*file);
-  throw Error(ExitCode::usage, "--device", "'" + printable(kind) + "'",
+  throw Error(ExitCode::usage, "device", "'" + printable(kind) + "'",
               fmt::format("one of {}", fmt::join(device_kinds(), ", ")));
 }
 

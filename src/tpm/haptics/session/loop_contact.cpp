@@ -1,6 +1,7 @@
 #include "tpm/haptics/session/loop_contact.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include "tpm/haptics/device/device_file.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
 #include "tpm/haptics/loop/triple_buffer.hpp"
+#include "tpm/haptics/session/session_keys.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/session/surface_scene.hpp"
 #include "tpmkit/error.hpp"
@@ -45,12 +47,12 @@ class CallersDevice final : public HapticDevice {
 
 namespace {
 
+/// A kind of device that replays a recording: nothing for a loop that reads its own.
+constexpr const char* kReplayed = "replay";
+
 /// A session around a law: as deep as the law was fitted to.
 Json session_around(const Json& law, const LoopContactOptions& options, const std::string& where) {
   const LawFile file = law_from_json(law, where);
-  if (!(options.longest_s > 0.0) || !std::isfinite(options.longest_s)) {
-    throw Error(ExitCode::usage, "longest_s", shortest(options.longest_s), "seconds above 0");
-  }
   const double deepest_m = file.fitted_to.value_or(file.spec.reference);
   constexpr double kRate_m_per_s = 4e-3;
   return {{"title", where},
@@ -61,7 +63,20 @@ Json session_around(const Json& law, const LoopContactOptions& options, const st
             {"hold", fmt::format("{} s", options.longest_s)}}}};
 }
 
+/// Of the caller, not of the file: they are named so. 0 is the rate of the file.
+void require_options(const LoopContactOptions& options) {
+  const double rate_Hz = options.rate_Hz;
+  if (rate_Hz != 0.0 && !(rate_Hz >= kLeastRate_Hz && rate_Hz <= kMostRate_Hz)) {
+    throw Error(ExitCode::usage, "rate_Hz", shortest(rate_Hz),
+                fmt::format("{} to {} Hz, or 0 for that of the file", kLeastRate_Hz, kMostRate_Hz));
+  }
+  if (!(options.longest_s > 0.0) || !std::isfinite(options.longest_s)) {
+    throw Error(ExitCode::usage, "longest_s", shortest(options.longest_s), "seconds above 0");
+  }
+}
+
 HilSession session_of(const std::filesystem::path& file, const LoopContactOptions& options) {
+  require_options(options);
   Json json = read_json(file);
   if (!json.is_object() || (!json.contains("model") && !json.contains("law"))) {
     throw bad_input(file.string(), "is neither a session nor a law",
@@ -74,8 +89,22 @@ HilSession session_of(const std::filesystem::path& file, const LoopContactOption
   return session;
 }
 
+/// Throws Error(usage) for a device that cannot be that of a loop of the caller's own, or that only
+/// a file could describe.
+void require_device(const LoopContactOptions& options) {
+  std::vector<std::string> kinds = device_kinds();
+  std::erase(kinds, kReplayed);
+  const bool known = std::ranges::find(kinds, options.device) != kinds.end();
+  if (options.device.empty() || known) return;
+  if (options.device != kReplayed && !options.device_file.empty()) return;
+  throw Error(
+      ExitCode::usage, "device", "'" + printable(options.device) + "'",
+      fmt::format("one of {}, or another with its limits in device_file", fmt::join(kinds, ", ")));
+}
+
 /// Limits of the caller's device. What was measured on a simulated one says nothing of motors.
 DeviceLimits limits_that_apply(const LoopContactOptions& options) {
+  require_device(options);
   if (options.device_file.empty()) {
     return limits_of(options.device.empty() ? "omega7" : std::string_view(options.device));
   }
@@ -109,6 +138,21 @@ struct LoopContact::Stepped {
   // Of step_at(): periods of the contact, counted by the caller's clock.
   bool timed = false;
   double begun_s = 0.0, last_s = 0.0, periods = 0.0;
+  int still = 0;  ///< calls in a row whose time is that of the call before
+  // Of both: what ServoStep does not judge of a loop that is too slow.
+  double late = 0.0;    ///< of the last thousand calls, while the contact waits to begin
+  double behind = 0.0;  ///< periods by which the tissue is behind, ServoStep::kMostSteps a call
+
+  /// Whether a loop whose call came after `missed` periods is too slow to go on.
+  bool is_too_slow(int missed, int most_late) noexcept {
+    constexpr double kCalls = 1000.0, kMostBehind = 1000.0;
+    if (!begun) {
+      late += (missed > 0 ? 1.0 : 0.0) - late / kCalls;
+      return late > most_late;
+    }
+    behind = std::max(0.0, behind + 1.0 + missed - ServoStep::kMostSteps);
+    return behind > kMostBehind;
+  }
 };
 
 LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOptions& options)
@@ -144,8 +188,14 @@ StopCause LoopContact::step(const Eigen::Vector3d& position_m, Eigen::Vector3d& 
   force_N.setZero();
   if (s.cause != StopCause::none) return s.cause;
   s.device.move_to(position_m);
+  missed = std::max(0, missed);
   LoopContactState state;
-  s.cause = s.step.cycle(std::max(0, missed), state.row);
+  s.cause = s.step.cycle(missed, state.row);
+  if (s.cause == StopCause::none && s.is_too_slow(missed, settings_.most_late)) {
+    s.cause = state.row.stop = StopCause::overrun_storm;
+    std::fill_n(state.row.commanded_N, 3, 0.0);
+    s.step.stop(s.cause);
+  }
   if (s.cause == StopCause::none) force_N = s.device.force_N();
   if (!s.begun && state.row.phase >= 0) {
     s.begun = true;
@@ -164,7 +214,12 @@ StopCause LoopContact::step_at(double time_s, const Eigen::Vector3d& position_m,
                                Eigen::Vector3d& force_N) noexcept {
   Stepped& s = *stepped_;
   force_N.setZero();
-  if (!std::isfinite(time_s) || (s.timed && time_s < s.last_s)) return kBadTime;
+  if (!(std::abs(time_s) <= kMostTime_s) || (s.timed && time_s < s.last_s)) return kBadTime;
+  s.still = s.timed && time_s == s.last_s ? s.still + 1 : 0;
+  if (s.still > kMostStill) {
+    s.still = kMostStill;
+    return kBadTime;
+  }
   const double since = (time_s - s.last_s) / settings_.period_s;
   s.last_s = time_s;
   if (!s.timed) {

@@ -43,8 +43,9 @@ class LoopContact {
  public:
   /// Reads a session (schemas/hil.schema.json) or a law (schemas/law.schema.json); which of the two
   /// it is, the key `model` or `law` says.
-  /// Throws Error(bad_input) as read_session(), read_law() and make_loop_model() do,
-  /// Error(answer_is_no) if the rendering would be unstable or beyond the device's limits.
+  /// Throws Error(usage) for an option out of its range, Error(bad_input) as read_session(),
+  /// read_law() and make_loop_model() do, Error(answer_is_no) if the rendering would be unstable or
+  /// beyond the device's limits.
   explicit LoopContact(const std::filesystem::path& file, const LoopContactOptions& options = {});
   ~LoopContact();
   LoopContact(const LoopContact&) = delete;
@@ -55,18 +56,24 @@ class LoopContact {
   /// @param force_N on the hand, device coordinates; zero once the contact has stopped
   /// @param missed periods since the last step in which the caller did not step, >= 0: the tissue
   ///        lives through them with the motion taken as linear
+  ///        A loop that misses some in more calls than the session allows, also while the contact
+  ///        waits to begin, or more than the tissue can make up for, is stopped: overrun_storm
   /// @returns none, or why the contact has stopped; it then stays so until reset()
   StopCause step(const Eigen::Vector3d& position_m, Eigen::Vector3d& force_N,
                  int missed = 0) noexcept;
   /// The same by the caller's clock: the number of periods since the last step follows from the
   /// time, so that a loop at another rate lives through the same time as the contact. Between two
   /// periods of the contact the force of the last one is held.
-  /// @param time_s of any clock that does not jump; rising from call to call
+  /// @param time_s of any clock that does not jump; rising from call to call, at most kMostTime_s
+  ///               in size: a hundredth of any period must still tell
   /// @returns as step(); kBadTime, with a zero force and without a step, for a time that is not
-  ///          finite or lies before that of the last call
+  ///          finite, larger, before that of the last call, or the same in more than kMostStill
+  ///          calls in a row
   StopCause step_at(double time_s, const Eigen::Vector3d& position_m,
                     Eigen::Vector3d& force_N) noexcept;
   static constexpr StopCause kBadTime = StopCause::exception;
+  static constexpr double kMostTime_s = 1e10;
+  static constexpr int kMostStill = 100;
   /// Back to rest. Allocates: not for the loop.
   void reset();
 

@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/document_place.hpp"
 #include "tpm/files/row_log.hpp"
@@ -63,6 +64,12 @@ void require_written_out(const Json& session, const DocumentPlace& place) {
   if (motion.is_object() && motion.contains("recording")) {
     throw refuse(place.key("motion").key("recording"));
   }
+}
+
+/// "1.66 s of 6.5 s"
+std::string end_words(const HilRecording& recording) {
+  return fmt::format("{} s of {} s", significant(recording.end_s(), 6),
+                     significant(recording.session.duration_s(), 6));
 }
 
 }  // namespace
@@ -155,6 +162,14 @@ bool HilRecording::simulated() const {
   return header.value("simulated_device", true);
 }
 
+std::string HilRecording::cause() const {
+  return closed ? closing.at("cause").get<std::string>() : "cut off";
+}
+
+double HilRecording::end_s() const {
+  return rows.empty() ? 0.0 : time_s(rows.back());
+}
+
 double HilRecording::time_s(const ServoRecord& row) const {
   return static_cast<double>(row.cycle) * session.servo.period_s;
 }
@@ -215,7 +230,41 @@ std::string damage_line(const HilRecording& recording) {
         recording.damaged, recording.rows.size() + recording.damaged,
         recording.closed ? "" : "; it has no closing record");
   }
-  return recording.closed ? "" : "the recording is cut off: no closing record";
+  if (recording.closed) return "";
+  return fmt::format("the recording is cut off at {}: no closing record says how the session ended",
+                     end_words(recording));
+}
+
+std::string early_end_line(const HilRecording& recording) {
+  if (!recording.closed || recording.cause() == word_of(StopCause::finished)) return "";
+  const Json& closing = recording.closing;
+  const std::string detail = closing.value("detail", "");
+  const int error = closing.at("device_error").get<int>();
+  return fmt::format("the session ended early, at {}: {}{}{}", end_words(recording),
+                     recording.cause() == word_of(StopCause::signal)
+                         ? "stopped by a signal, such as Ctrl-C"
+                         : recording.cause(),
+                     detail.empty() ? "" : ": " + detail,
+                     error == 0 ? ""
+                                : fmt::format(" (the device said: error {}, {})", error,
+                                              closing.at("device_error_text").get<std::string>()));
+}
+
+std::vector<std::string> recording_remarks(const HilRecording& recording) {
+  std::vector<std::string> remarks;
+  for (std::string line : {damage_line(recording), early_end_line(recording)}) {
+    if (!line.empty()) remarks.push_back(std::move(line));
+  }
+  if (!recording.closed) return remarks;
+  const auto dropped = recording.closing.at("dropped_records").get<std::uint64_t>();
+  if (dropped > 0) {
+    remarks.push_back(
+        fmt::format("{} rows found no room while the session ran, and are missing", dropped));
+  }
+  for (const Json& finding : recording.closing.value("device_findings", Json::array())) {
+    remarks.push_back("the device noticed: " + finding.get<std::string>());
+  }
+  return remarks;
 }
 
 std::string device_line(const HilRecording& recording) {

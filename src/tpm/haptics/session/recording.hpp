@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
@@ -37,6 +38,12 @@ struct HilRecording {
   Json closing;             ///< null unless closed
   std::size_t damaged = 0;  ///< rows that were written and are not whole; left out
 
+  /// Nothing is missing: neither the end nor a row.
+  [[nodiscard]] bool whole() const { return closed && damaged == 0; }
+  /// Why the session ended, as word_of(StopCause); "cut off" without a closing record.
+  [[nodiscard]] std::string cause() const;
+  /// Of the end: of the last row.
+  [[nodiscard]] double end_s() const;
   /// The device was simulated, replayed, or may be: no motor is known to have moved.
   [[nodiscard]] bool simulated() const;
   [[nodiscard]] double time_s(const ServoRecord& row) const;
@@ -51,6 +58,14 @@ struct HilRecording {
 
 /// Missing part of a recording, one line for a person; empty if nothing is.
 [[nodiscard]] std::string damage_line(const HilRecording& recording);
+
+/// How a session ended that did not come to its last phase, one line for a person; empty if it
+/// did, or if the recording does not say (damage_line()).
+[[nodiscard]] std::string early_end_line(const HilRecording& recording);
+
+/// What whoever uses the numbers of a recording has to know first, one line each: what is missing,
+/// an early end, rows that found no room, what the device noticed.
+[[nodiscard]] std::vector<std::string> recording_remarks(const HilRecording& recording);
 
 /// "SIMULATED DEVICE" in words that suit the recording, or what the hardware is.
 [[nodiscard]] std::string device_line(const HilRecording& recording);

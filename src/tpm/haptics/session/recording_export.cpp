@@ -180,16 +180,19 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
     attribute(key, notes.value(key, ""));
   }
   attribute("model", recording.header.at("model").value("name", ""));
-  attribute("whole", yes_or_no(recording.closed && recording.damaged == 0));
+  attribute("whole", yes_or_no(recording.whole()));
   attribute("damaged_rows", std::to_string(recording.damaged));
-  attribute("cause", recording.closed ? recording.closing.value("cause", "") : "cut off");
+  attribute("cause", recording.cause());
   write_rows(writer, recording);
   write_phases(writer, recording.session);
   std::vector<std::string> causes;
-  for (auto i = 0; i <= static_cast<std::int32_t>(StopCause::position_jump); ++i) {
+  for (auto i = 0; i <= static_cast<std::int32_t>(StopCause::damping); ++i) {
     causes.emplace_back(word_of(static_cast<StopCause>(i)));
   }
   writer.texts("/causes", causes);
+  if (const auto remarks = recording_remarks(recording); !remarks.empty()) {
+    writer.texts("/remarks", remarks);
+  }
   // Texts of any length: an attribute holds 64 KB at most.
   writer.texts("/header_json", {to_text(recording.header)});
   if (recording.closed) writer.texts("/closing_json", {to_text(recording.closing)});

@@ -312,7 +312,8 @@ const Block<SessionKeys>& session_block() {
       {key("title", &K::title, text(), "what the session is"),
        key("description", &K::description, text(), "what else is to be said of it"),
        required(key("model", &K::model, model_block().type(), "what is stepped in the loop")),
-       key("rate", &K::rate_Hz, quantity(Dimension::frequency, from_to(500.0, 4000.0)),
+       key("rate", &K::rate_Hz,
+           quantity(Dimension::frequency, from_to(kLeastRate_Hz, kMostRate_Hz)),
            "of the servo loop"),
        with_default(
            key("push", &K::push, direction(), "into the tissue, in the coordinates of the device"),

@@ -13,6 +13,9 @@
 
 namespace tpm::haptics {
 
+/// Rates of a servo loop.
+inline constexpr double kLeastRate_Hz = 500.0, kMostRate_Hz = 4000.0;
+
 /// Block `model`.
 struct SessionModelKeys {
   std::string kind = std::string(kPlannedModel);

@@ -131,8 +131,10 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
   }
   if (rendering.acceptable() || options.accept_unstable || choice.kind == "replay") return;
   throw Error(ExitCode::answer_is_no, "stability", rendering.verdict(),
-              "a softer tissue, a higher rate, a shorter delay or a faster rise; "
-              "--device-file with a measured delay; --accept-unstable with --device virtual");
+              fmt::format("a softer tissue, a higher rate, a shorter delay or a faster rise; {}",
+                          limits.plant ? "--accept-unstable"
+                                       : "a device file with a measured delay (tpm hil identify); "
+                                         "the device 'virtual', where nothing has motors"));
 }
 
 std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {

@@ -140,8 +140,11 @@ std::string experiment_line(const Verification& v) {
 void add_glance(Document& d, const HilRecording& r, const Verification& v,
                 const RecordingSummary& s) {
   d.heading(2, "Safe, faithful, like the experiment?");
-  std::vector<Cell> lines{{fmt::format("the session ended: {}", s.cause),
-                           s.cause == "finished" ? Tone::good : Tone::bad}};
+  std::vector<Cell> lines;
+  for (std::string& line : recording_remarks(r)) lines.push_back({std::move(line), Tone::bad});
+  if (s.cause == word_of(StopCause::finished)) {
+    lines.push_back({"the session came to its end", Tone::good});
+  }
   const Json rendering = r.header.value("rendering", Json());
   if (rendering.is_object()) {
     lines.push_back({rendering.at("verdict").get<std::string>(),
@@ -292,12 +295,8 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
   std::vector<Cell> lines;
   lines.push_back(
       {fmt::format("end: {}", s.cause), s.cause == "finished" ? Tone::good : Tone::bad});
-  if (r.damaged > 0) lines.push_back({damage_line(r), Tone::bad});
   if (!r.closed) {
-    lines.push_back(
-        {"the recording has no closing record: the process was killed; all rows up to "
-         "then are whole",
-         Tone::bad});
+    lines.push_back({"nothing is said of timing without the closing record", Tone::bad});
   } else if (r.closing.contains("scheduling")) {
     lines.push_back({r.closing.at("host").get<std::string>()});
     lines.push_back({r.closing.at("scheduling").get<std::string>()});
@@ -313,17 +312,6 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
         {fmt::format("records dropped: {}", r.closing.at("dropped_records").get<std::uint64_t>())});
   } else {
     lines.push_back({"virtual time: deadlines are met by definition, nothing is said of timing"});
-  }
-  if (r.closed && r.closing.at("device_error").get<int>() != 0) {
-    lines.push_back(
-        {fmt::format("the device said: error {} ({})", r.closing.at("device_error").get<int>(),
-                     r.closing.at("device_error_text").get<std::string>()),
-         Tone::bad});
-  }
-  if (r.closed && r.closing.contains("device_findings")) {
-    for (const Json& line : r.closing.at("device_findings")) {
-      lines.push_back({"the device noticed: " + line.get<std::string>(), Tone::fair});
-    }
   }
   lines.push_back({fmt::format(
       "{} cycles; missed periods {}; time guards {}; saturations {}; limited by force {}, "
@@ -356,7 +344,7 @@ void add_energy(Document& d, const RecordingSummary& s) {
 
 RecordingSummary summary_of(const HilRecording& recording) {
   RecordingSummary s;
-  s.cause = recording.closed ? recording.closing.at("cause").get<std::string>() : "cut off";
+  s.cause = recording.cause();
   for (const ServoRecord& row : recording.rows) {
     const auto has = [&](ServoFlag flag) -> std::uint64_t {
       return (row.flags & flag) != 0 ? 1 : 0;
@@ -396,7 +384,6 @@ void write_hil_report(const HilRecording& recording, const Verification& v,
   typeset(d);
   write_document(folder, d, {session_figure(recording, v), energy_figure(recording)}, python);
   Json json = verification_json(recording, v);
-  json["end"] = summary.cause;
   json["rendering"] = recording.header.value("rendering", Json());
   json["closing"] = recording.closing;
   json["observed_end_J"] = rounded(summary.observed_end_J, 6);

@@ -163,6 +163,14 @@ std::map<std::string, PhaseKindErrors> errors_by_kind(const Verification& v) {
   return kinds;
 }
 
+/// Time that was verified: of a session that ended early, of how much.
+std::string verified_words(const HilRecording& recording, const Verification& v) {
+  const bool finished = recording.cause() == word_of(StopCause::finished);
+  return significant(v.end_s, 6) + " s" +
+         (finished ? std::string()
+                   : " of " + significant(recording.session.duration_s(), 6) + " s");
+}
+
 std::string newtons(double force_N, int digits = 3) {
   return sized_text(Dimension::force, force_N, digits);
 }
@@ -312,6 +320,9 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
          {"reached_m", rounded(e.reached_m, kHilDigits)},
          {"cause", cause_of_difference(e, v.material)}});
   }
+  const Json closing = recording.closed ? recording.closing : Json::object();
+  std::vector<std::string> notes = recording_remarks(recording);
+  notes.insert(notes.end(), v.notes.begin(), v.notes.end());
   return {
       {"simulated_device", recording.simulated()},
       {"recording", recording.name},
@@ -320,9 +331,13 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
       {"reference", v.reference},
       {"whole", v.whole},
       {"damaged_rows", recording.damaged},
+      {"end", recording.cause()},
+      {"end_detail", closing.value("detail", "")},
+      {"device_findings", closing.value("device_findings", Json::array())},
       {"without_equilibrium", v.without_equilibrium},
-      {"notes", v.notes},
+      {"notes", notes},
       {"end_s", rounded(v.end_s, kHilDigits)},
+      {"asked_s", rounded(recording.session.duration_s(), kHilDigits)},
       {"knots", v.knots},
       {"motion_tolerance_m", v.motion_tolerance_m},
       {"motion_error_N", v.motion_error_N ? Json(rounded(*v.motion_error_N, kHilDigits)) : Json()},
@@ -341,11 +356,10 @@ std::string motion_cost(const Verification& v, double per_newton, std::string_vi
 
 std::string verification_text(const HilRecording& recording, const Verification& v) {
   std::string text = fmt::format(
-      "{}\n{}\nverified {} s{} against: {}\nmotion through {} knots within {} um, {}; the "
+      "{}\n{}\nverified {} against: {}\nmotion through {} knots within {} um, {}; the "
       "reference's own error estimate {} N\n",
-      recording.session.title, device_line(recording), significant(v.end_s, 6),
-      v.whole ? "" : " (" + damage_line(recording) + ")", v.reference, v.knots,
-      significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1.0, "N"),
+      recording.session.title, device_line(recording), verified_words(recording, v), v.reference,
+      v.knots, significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1.0, "N"),
       significant(v.reference_error_N, 3));
   text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", "phase", "count", "rms mN", "max mN",
                       "max/peak");
@@ -358,6 +372,7 @@ std::string verification_text(const HilRecording& recording, const Verification&
   text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}   peak {} N\n", "all", v.phases.size(),
                       significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
                       share(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4));
+  for (const std::string& line : recording_remarks(recording)) text += "note: " + line + "\n";
   for (const std::string& note : v.notes) text += "note: " + note + "\n";
   for (const CrossCheck& o : v.others) {
     text += fmt::format("beside: {}, {} to {} s: rms {} mN, max {} mN; {} mN from the reference\n",
@@ -384,7 +399,7 @@ ShortAnswer short_answer(const HilRecording& recording, const Verification& v) {
                   recording.session.title, newtons(v.all.max_N), share(v.all.max_N, v.all.peak_N),
                   newtons(v.all.peak_N, 4), newtons(v.all.rms_N)),
       device_line(recording),
-      fmt::format("reference: {}; {} s, {} instants", v.reference, significant(v.end_s, 6),
+      fmt::format("reference: {}; {}, {} instants", v.reference, verified_words(recording, v),
                   v.all.instants)};
   const auto row = [](const std::string& phase, const std::string& count, const std::string& rms,
                       const std::string& most, const std::string& of_peak) {
@@ -424,8 +439,7 @@ ShortAnswer short_answer(const HilRecording& recording, const Verification& v) {
                     percent_text(100.0 * (worst.commanded_N / worst.measured_N - 1.0), 1)));
     answer.limits.push_back("because " + cause_of_difference(worst, v.material));
   }
-  if (!v.whole) answer.warnings.push_back(damage_line(recording));
-  if (recording.damaged > 0) answer.warnings.push_back(damage_line(recording));
+  answer.warnings = recording_remarks(recording);
   answer.warnings.insert(answer.warnings.end(), v.notes.begin(), v.notes.end());
   return answer;
 }

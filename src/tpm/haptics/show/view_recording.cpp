@@ -203,8 +203,8 @@ void add_session_facts(const HilRecording& recording, ViewPage& page) {
   page.fact("date", notes.value("date", ""));
   page.fact("operator", notes.value("operator_code", ""));
   page.fact("subject", notes.value("subject_code", ""));
-  page.fact("end", recording.closed ? recording.closing.value("cause", "") : "cut off");
-  page.fact("damage", damage_line(recording));
+  page.fact("end", recording.cause());
+  for (const std::string& line : recording_remarks(recording)) page.fact("note", line);
   const std::size_t waiting = recording.rows.size() - shown_rows(recording).size();
   if (waiting > 0) page.fact("before the session", fmt::format("{} cycles, not shown", waiting));
 }

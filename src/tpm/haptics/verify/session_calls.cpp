@@ -56,13 +56,18 @@ SessionSummary Session::run(const std::shared_ptr<HapticDevice>& device,
 }
 
 SessionCheck verify_session(const std::filesystem::path& recording) {
-  const Verification check = verify(read_recording(recording));
+  const HilRecording read = read_recording(recording);
+  const Verification check = verify(read);
+  std::vector<std::string> notes = recording_remarks(read);
+  notes.insert(notes.end(), check.notes.begin(), check.notes.end());
   return {.reference = check.reference,
           .instants = check.all.instants,
           .rms_N = check.all.rms_N,
           .max_N = check.all.max_N,
           .peak_N = check.all.peak_N,
-          .reference_error_N = check.reference_error_N};
+          .reference_error_N = check.reference_error_N,
+          .whole = check.whole,
+          .notes = std::move(notes)};
 }
 
 }  // namespace tpm::haptics

@@ -36,7 +36,9 @@ RowList moved_rows(const HilRecording& recording) {
     if (row.stop == StopCause::none) rows.push_back(&row);
   }
   if (rows.size() < 2) {
-    throw bad_input(recording.name, "holds no motion", "a session of at least two cycles");
+    std::string what = "holds no motion";
+    for (const std::string& line : recording_remarks(recording)) what += "; " + line;
+    throw bad_input(recording.name, what, "a session of at least two cycles");
   }
   return rows;
 }
@@ -53,7 +55,7 @@ std::vector<std::size_t> compared_rows(const HilRecording& recording, std::size_
 Verification begun(const HilRecording& recording, const RowList& rows,
                    const std::vector<std::size_t>& compared) {
   Verification v;
-  v.whole = recording.closed && recording.damaged == 0;
+  v.whole = recording.whole();
   v.end_s = recording.time_s(*rows.back());
   for (const std::size_t i : compared) {
     v.time_s.push_back(recording.time_s(*rows[i]));
@@ -142,9 +144,14 @@ void leave_out_what_has_no_reference(Verification& v) {
 }
 
 Verification verify(const HilRecording& recording, const VerifyOptions& options) {
-  if (recording.session.model == "law") return verify_law(recording, options);
-  if (recording.session.model == "surface") return verify_in_space(recording, options);
-  return verify_along_push(recording, options);
+  Verification v = recording.session.model == "law"       ? verify_law(recording, options)
+                   : recording.session.model == "surface" ? verify_in_space(recording, options)
+                                                          : verify_along_push(recording, options);
+  const auto touches = [](const ServoRecord& row) { return (row.flags & kTouching) != 0; };
+  if (std::ranges::none_of(recording.rows, touches)) {
+    v.notes.emplace_back("no contact: the tool never touched the tissue, nothing to compare");
+  }
+  return v;
 }
 
 }  // namespace tpm::haptics

@@ -103,6 +103,8 @@ struct Verification {
 /// One contact that answers by a law is compared with the law itself, asked along every sample of
 /// the motion (LawModel), and with another quadrature of it (law_forces_by_gauss).
 ///
+/// A session that never touched the tissue is verified, and a note says that nothing was compared.
+///
 /// Where the reference has no equilibrium the instant is left out, and it goes on with the next one
 /// that it has one for, on a straight line. Throws Error(bad_input) for an empty recording, or
 /// fewer than four instants to compare in space, Error(numerical) if less than half of the instants

@@ -120,7 +120,7 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
   constexpr std::size_t kFewest = 4;  // the reference's error is told from every second of them
   if (compared.size() < kFewest) {
     throw bad_input(recording.name, fmt::format("{} instants to compare", compared.size()),
-                    "a --compare-every that leaves four or more");
+                    "instants closer together: four or more");
   }
   const SurfaceScene surface(recording.session);
   Verification v = begun(recording, rows, compared);
