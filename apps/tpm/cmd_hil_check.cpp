@@ -111,8 +111,9 @@ void add_hil_check_command(CLI::App& hil, Session& session) {
                       "With the rate and the limits of this session, whose start gate is asked too "
                       "(default: timing alone, with the limits of one that says nothing)");
   add_device_options(*command, choice->device);
-  command->add_option("--loop-rate", choice->rate,
-                      "Rate of the servo loop without a session, 100 Hz to 4 kHz (default: 1 kHz)");
+  command->add_option(
+      "--loop-rate", choice->rate,
+      "Rate of the servo loop, without a session: 100 Hz to 4 kHz (default: 1 kHz)");
   command->add_option("--duration", choice->duration, "Duration, of the test")
       ->capture_default_str();
   add_format_option(*command, session);

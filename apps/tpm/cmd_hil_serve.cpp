@@ -81,7 +81,7 @@ void add_hil_serve_command(CLI::App& hil, Session& session) {
       ->add_option("--events-port", choice->events_port,
                    "Port of the events, 0 for one that is free")
       ->capture_default_str();
-  command->add_option("--duration", choice->duration, "Longest duration (default: until Ctrl-C)");
+  command->add_option("--duration", choice->duration, "Duration, at most (default: until Ctrl-C)");
   command->add_option(
       "--page", choice->page,
       "Port of a page that a browser on this machine shows: the tissue; 0 for one that is free");

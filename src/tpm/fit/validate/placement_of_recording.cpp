@@ -141,8 +141,9 @@ double ZeroDrift::u(const Eigen::VectorXd& weight, const std::vector<double>& ti
 }
 
 std::optional<ZeroDrift> take_out_drift(PreparedRecording& recording) {
-  // A short rest with correlated noise knows the uncertainty of its trend badly: at 3 some drifts that are none are taken
-  // out, and U holds the error of the peak less often (reports/validation, AR(1) 0.9).
+  // A short rest with correlated noise knows the uncertainty of its trend badly: at 3 some drifts
+  // that are none are taken out, and U holds the error of the peak less often (reports/validation,
+  // AR(1) 0.9).
   constexpr double kSeen = 4.0;
   const RestReadings rests = read_rests(recording);
   if (!rests.zero || !rests.drift) return std::nullopt;
