@@ -134,7 +134,7 @@ double KernelShape::inverse(double v) const {
   };
   if (share_ == 0.0) return of_kernel(v);
   // V is convex and the start is at least as deep as the root: Newton falls monotonically
-  // onto it. V >= (1 - share) W gives such a start, unless nearly everything is tension.
+  // onto it. V >= (1 - share) V0 gives such a start, unless nearly everything is tension.
   double u = reference_;
   if (share_ < 0.999) {
     u = of_kernel(v / (1.0 - share_));

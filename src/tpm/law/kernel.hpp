@@ -25,8 +25,8 @@ struct TensionShape {
   [[nodiscard]] Tangent tangent(double u) const;
 };
 
-/// V(u) = (1 - share) W(u) + share T(u) for u >= 0: what the relaxation acts on. V(0) = 0, V rises
-/// strictly, and V(u_ref) = u_ref.
+/// V(u) = (1 - share) V0(u) + share T(u) for u >= 0, V0 the Kernel: what the relaxation acts on.
+/// V(0) = 0, V rises strictly, and V(u_ref) = u_ref.
 class KernelShape {
  public:
   /// @param exponent used by Kernel::power
