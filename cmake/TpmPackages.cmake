@@ -36,8 +36,9 @@ function(tpm_package component name section summary description)
   set(CPACK_COMPONENT_${upper}_DESCRIPTION "${summary}\n${description}" PARENT_SCOPE)
 endfunction()
 tpm_package(program tpmkit science "soft-tissue models: fitting, simulation, haptic loop"
-  "The program tpm: laws from recordings with intervals and verdicts, organs
-of spheres, sweeps, sessions with a haptic device."
+  "The program tpm fits laws to recordings, with intervals and verdicts,
+simulates organs of spheres, runs sweeps, and renders tissue on a haptic
+device."
   python3)
 tpm_package(library libtpmkit-haptics1 libs "soft tissue for haptic loops, C interface"
   "The library that steps a contact of tpmkit within a servo loop, without
@@ -52,11 +53,11 @@ for haptic loops."
   libsundials-dev libhdf5-dev libcsv-dev libmuparser-dev libcpp-httplib-dev libssl-dev libtbb-dev
   libdeflate-dev libmetis-dev libminizip-dev zlib1g-dev)
 tpm_package(python python3-tpmkit python "soft-tissue models from Python"
-  "The package tpmkit: fits as DataFrames, laws and protocols, contacts stepped,
-scenes and sweeps as xarray."
+  "The package tpmkit fits laws, runs scenes and sweeps, and steps contacts.
+Results are DataFrames and xarray Datasets."
   "tpmkit (= ${PROJECT_VERSION})" "python3 (>= 3.11)" "python3 (<< 3.12)" python3-numpy python3-pandas python3-xarray)
 
-# cpack packs what was built and builds nothing: the tests are none of its business.
+# CPack packs the finished build and builds nothing: it does not need the tests.
 set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME tpmkit)

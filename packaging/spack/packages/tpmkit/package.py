@@ -1,4 +1,4 @@
-# State: read by a test, never built, for there was no Spack on the machines of this project. Names of variants were compared
+# Status: a test parses this recipe; it was never built, because Spack was not available. Names of variants were compared
 # with a recipe of Spack of 2022 (sundials), versions were not: Spack may lack nanoflann 1.4 or Ceres 2.1, which Debian 12 has.
 import os
 
@@ -8,10 +8,10 @@ from spack.package import *
 class Tpmkit(CMakePackage):
     """Validation, parameter fitting and haptic replay of viscoelastic soft-tissue models."""
 
-    # There is no published archive yet, so the source is the local one of scripts/source_tarball.sh, and the version has
-    # no checksum:
+    # No archive has been published, so the source is the local one of scripts/source_tarball.sh, and the version has no
+    # checksum:
     #     scripts/source_tarball.sh && spack install --no-checksum tpmkit
-    # Whoever publishes the archive puts its address and sha256 here.
+    # When you publish the archive, insert its address and sha256.
     url = "file://" + os.path.normpath(os.path.join(os.path.dirname(__file__), "../../../../dist/tpmkit-0.1.0.tar.gz"))
 
     maintainers()  # to be filled in
