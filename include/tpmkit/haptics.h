@@ -102,7 +102,7 @@ typedef struct tpm_haptics_options {
   double rate_Hz;            /**< of your loop, 500 to 4000; 0: that of the file, or 1000 */
   double longest_s;          /**< of a law file: spring-pots keep their history so long; default 600 */
   uint32_t no_start_gate;    /**< 1: forces do not wait until the tool is in free air and at rest */
-  uint32_t accept_unstable;  /**< 1: open what would be unstable; not for a device with motors */
+  uint32_t accept_unstable;  /**< 1: open what would be unstable; refused but for "virtual" */
   char device[32];           /**< whose limits apply, as `tpm hil run --device` but for "replay"; "": that of
                                   device_file, else omega7; "virtual": nothing has motors, as in a test of your
                                   loop */

@@ -77,10 +77,21 @@ TEST_CASE("A measured friction does not count on hardware of which nobody measur
     write_file(folder / "s.json", test::short_session().dump());
     LoopContactOptions options;
     options.device_file = folder / "d.json";
+    const auto refused = [&] {
+      return test::refusal_of([&] { (void)LoopContact(folder / "s.json", options); });
+    };
+    CHECK_THAT(refused(), Contains("(not measured on this device: 20 ms and no friction count), "
+                                   "friction 0 N s/m"));
     options.accept_unstable = true;
-    const LoopContact contact(folder / "s.json", options);
-    CHECK(contact.rendering().delay_s == 0.020);
-    CHECK(contact.rendering().friction_N_s_per_m == 0.0);
+    CHECK_THAT(refused(), Contains("accept_unstable: is not for the device 'omega7'"));
+    options.device_file.clear();
+    for (const char* kind : {"", "omega7", "inverse3"}) {
+      CAPTURE(kind);
+      options.device = kind;
+      CHECK_THAT(refused(), Contains("accept_unstable: is not for the device"));
+    }
+    options.device = "virtual";
+    CHECK_NOTHROW(LoopContact(folder / "s.json", options));
   }
 }
 

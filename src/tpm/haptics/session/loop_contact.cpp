@@ -158,6 +158,10 @@ struct LoopContact::Stepped {
 LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOptions& options)
     : session_(session_of(file, options)), loop_(make_loop_model(session_)) {
   const DeviceLimits limits = limits_that_apply(options);
+  if (options.accept_unstable && limits.hardware()) {
+    throw Error(ExitCode::usage, "accept_unstable", "is not for the device '" + limits.kind + "'",
+                "the device 'virtual', where nothing has motors");
+  }
   require_within(session_, limits);
   rendering_ = check_rendering(session_, *loop_.model, loop_, limits);
   if (!rendering_.acceptable() && !options.accept_unstable) {

@@ -22,7 +22,9 @@ struct LoopContactOptions {
   std::filesystem::path device_file;
   bool start_gate = true;    ///< forces wait until the tool is in free air and at rest
   double longest_s = 600.0;  ///< of a law file: for how long spring-pots keep their history, > 0
-  bool accept_unstable = false;  ///< do not refuse a rendering that check_rendering() refuses
+  /// Do not refuse what check_rendering() refuses. Only of a device without motors ("virtual"):
+  /// else Error(usage).
+  bool accept_unstable = false;
 };
 
 /// The state of a contact after a step, as a drawing thread gets it. Device coordinates.
