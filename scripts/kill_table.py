@@ -74,7 +74,8 @@ def rows_in(tpm: Path, content: bytes) -> int:
         folder.mkdir()
         (folder / "r.tpmrec").write_bytes(content)
         done = tpm_in(folder, tpm, ["hil", "export", "r.tpmrec", "-o", "r.h5", "--format", "json"])
-        return json.loads(done.stdout)["rows"] if done.returncode == 0 else -1
+        cut_off = 1  # its rows are exported all the same
+        return json.loads(done.stdout)["rows"] if done.returncode in (0, cut_off) else -1
 
 
 def end_of_row(tpm: Path, recording: bytes, row: int) -> int:
