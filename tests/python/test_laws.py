@@ -68,7 +68,7 @@ class Laws(unittest.TestCase):
                      lambda: tpmkit.sweep(3, "s.h5"), lambda: tpmkit.open(3), lambda: tpmkit.read_recording(3), lambda: tpmkit.view(3, "v.html"),
                      lambda: tpmkit.design(3), lambda: tpmkit.validate("law.json", 3), lambda: tpmkit.validate("law.json", "a.csv", require=0.1),
                      lambda: tpmkit.Contact(3), lambda: tpmkit.run_session(3, "s.tpmrec"), lambda: tpmkit.example(3)):
-            with self.assertRaisesRegex(tpmkit.Error, r"an argument is of a wrong kind; expected what help\(tpmkit\.") as raised:
+            with self.assertRaisesRegex(tpmkit.Error, r"an argument is missing or of a wrong kind; expected what help\(tpmkit\.") as raised:
                 call()
             self.assertNotIn("std::", str(raised.exception))
         with self.assertRaisesRegex(tpmkit.Error, r"^simulate\(a Law\): an argument"):
