@@ -113,7 +113,7 @@ Json law_row(const LawFile& law, const LawParameter& parameter, std::size_t plac
     error = shown(std::abs(coordinate_slope(coordinate, value)) * sd, kErrorDigits);
     interval = fmt::format("{} .. {}", shown(low, kIntervalDigits), shown(high, kIntervalDigits));
   }
-  return Json{parameter.name, shown(value, kShownDigits), error, interval, unit.symbol};
+  return Json{parameter.name, shown(value, kShownDigits), unit.symbol, error, interval};
 }
 
 void add_law(ViewPage& page, const std::filesystem::path& file) {
@@ -128,7 +128,7 @@ void add_law(ViewPage& page, const std::filesystem::path& file) {
   }
   std::string interval = "interval";
   if (const auto& u = law.uncertainty) {
-    interval = significant(100.0 * u->level, 3) + " % interval (linearised)";
+    interval = significant(100.0 * u->level, 3) + " % interval";
     for (const FittedFile& data : u->data) {
       page.fact("fitted to",
                 fmt::format("{}: {} readings, SHA-256 {}", data.name, data.readings, data.sha256));
@@ -144,8 +144,8 @@ void add_law(ViewPage& page, const std::filesystem::path& file) {
     rows.push_back(law_row(law, parameters[i], i));
   }
   page.description["table"] = {
-      {"title", "Parameters"},
-      {"head", {"parameter", "value", "standard error (linearised)", interval, "unit"}},
+      {"title", law.uncertainty ? "Parameters, errors and intervals linearised" : "Parameters"},
+      {"head", {"parameter", "value", "unit", "std. error", interval}},
       {"rows", std::move(rows)}};
 }
 
