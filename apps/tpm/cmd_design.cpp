@@ -3,13 +3,13 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
 #include "design_options.hpp"
 #include "recording_options.hpp"
-#include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/design/design.hpp"
 #include "tpm/fit/show/design_figures.hpp"
@@ -19,12 +19,6 @@
 
 namespace tpm::app {
 namespace {
-
-void draw(const DesignResult& result, const std::filesystem::path& folder) {
-  const std::string python = find_drawing_python();
-  write_file(folder / "figures.json", to_text(to_json(design_figures(result))));
-  draw_figures(python, folder / "figures.json", folder);
-}
 
 int rank_candidates(const DesignOptions& options, const Session& session) {
   const auto sets = static_cast<int>(parse_whole_number(
@@ -40,10 +34,14 @@ int rank_candidates(const DesignOptions& options, const Session& session) {
     check = check_design(result.problem, result.ranked.front().experiment, sets, seed);
   }
   const DesignCheck* checked = check ? &*check : nullptr;
-  if (!options.folder.empty()) draw(result, options.folder);
+  std::string drawn;
+  if (!options.folder.empty()) {
+    drawn = written(session, options.folder, write_figures(options.folder, design_figures(result)));
+  }
   const Json json = to_json(result, checked, top);
-  deliver(session.json() ? answer_text(session, json) : to_terminal_text(result, checked, top),
-          options.output);
+  deliver(
+      session.json() ? answer_text(session, json) : to_terminal_text(result, checked, top) + drawn,
+      options.output);
   deliver_csv(json_table_csv(json.at("ranked"), "/expected/parameters"), csv);
   return 0;
 }

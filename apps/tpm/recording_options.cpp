@@ -11,6 +11,7 @@
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/instrument_of_recording.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
+#include "tpm/fit/select/rows_left_out.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpmkit/error.hpp"
 
@@ -123,6 +124,7 @@ PreparedRecording prepared(const std::string& name, RecordingFile file,
   PreparedRecording recording = prepare_recording(name, std::move(file.recording), phases);
   recording.import = import_options(options);
   recording.read_as = std::move(read_as);
+  warn_of_rows_left_out(recording, file.findings);
   take_instrument(recording, name);
   return recording;
 }

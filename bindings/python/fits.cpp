@@ -14,6 +14,7 @@
 #include "tpm/fit/select/instrument_of_recording.hpp"
 #include "tpm/fit/select/material_function.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
+#include "tpm/fit/select/rows_left_out.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
@@ -225,9 +226,10 @@ Fit fit_files(const FitRequest& request) {
   phases.contact_response = request.contact_force_N;
   std::vector<PreparedRecording> recordings;
   for (const std::string& file : request.files) {
-    recordings.push_back(
-        prepare_recording(file, read_recording_file(file, request.import).recording, phases));
+    RecordingFile read = read_recording_file(file, request.import);
+    recordings.push_back(prepare_recording(file, std::move(read.recording), phases));
     recordings.back().import = request.import;
+    warn_of_rows_left_out(recordings.back(), read.findings);
     take_instrument(recordings.back(), file);
   }
   if (request.contact) require_contact_within(*request.contact, recordings, "contact");

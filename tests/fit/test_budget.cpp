@@ -2,6 +2,7 @@
 // prediction, and what a file that is no budget says.
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -10,6 +11,7 @@
 #include "tpm/fit/predict/budget_parts.hpp"
 #include "tpm/fit/predict/error_budget.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
+#include "tpm/fit/show/budget_report.hpp"
 #include "tpm/organ/scene/protocol_file.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -138,6 +140,17 @@ TEST_CASE("the lines of a linear contact are those of its closed form") {
   CHECK(line_named(budget, "quantisation").largest <= 0.51 * 7e-6 * 150.0 / peak);
   CHECK(line_named(budget, "quantisation").largest > 0.1 * 7e-6 * 150.0 / peak);
   CHECK(budget.not_closed < 1e-13);
+
+  // The figure draws no point at another value than the line has.
+  const show::Figure figure = budget_figure(budget);
+  const std::vector<std::string>& names = figure.panels.at(1).x.names;
+  const auto at = std::find(names.begin(), names.end(), "integration (< 0.001 %)");
+  REQUIRE(at != names.end());
+  const show::Series& own = figure.panels.at(1).series.at(0);
+  CHECK(own.label == "largest of the line");
+  CHECK(own.x.size() == names.size() - 1);
+  const double place = static_cast<double>(at - names.begin()) + 1.0;
+  CHECK(std::find(own.x.begin(), own.x.end(), place) == own.x.end());
 }
 
 TEST_CASE("a stiffening kernel is linear within a period only to second order") {

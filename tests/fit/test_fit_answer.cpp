@@ -9,7 +9,9 @@
 
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
+#include "tpm/fit/show/recording_report.hpp"
 #include "tpm/fit/verdict.hpp"
+#include "tpm/fit/waterfall.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
@@ -178,6 +180,16 @@ TEST_CASE("a unit fits the size of its value, and one that takes no prefix stays
   CHECK(sized_text(Dimension::time, 5e6, 4) == "5e+06 s");
   CHECK(sized_text({"Pa s^alpha", Dimension::viscosity, 1.0}, 1e7, 4) == "1e+07 Pa s^alpha");
   CHECK(sized_text({"mN/s", Dimension::force, 1e-3}, 1e-9, 4) == "1 nN/s");
+}
+
+TEST_CASE("ends of starts that agree are drawn on the axis on which they count as one") {
+  FitResult fit;
+  fit.waterfall = waterfall(std::vector<double>{3.0, 3.0 + 1e-12, 3.0 + 2e-12});
+  const show::Axis agreeing = waterfall_figure(fit).panels.at(0).y;
+  CHECK(agreeing.lower == 0.0);
+  CHECK(agreeing.upper == fit.waterfall.margin);
+  fit.waterfall = waterfall(std::vector<double>{3.0, 8.0});
+  CHECK_FALSE(waterfall_figure(fit).panels.at(0).y.upper.has_value());
 }
 
 TEST_CASE("an answer that is too long sums up rows and lets warnings share a line",

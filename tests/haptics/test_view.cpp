@@ -174,8 +174,35 @@ TEST_CASE("a law is viewed without its figures, and says so") {
                    "offset_N": 0}})";
   const ViewPage page = view_file(folder / "law.json");
   CHECK(page.description.at("table").at("rows").size() == 5);
-  CHECK(page.description.at("table").at("rows").at(2) == Json({"tau1_s", "2", "fixed"}));
+  CHECK(page.description.at("table").at("rows").at(2) == Json({"tau1", "2", "s", "fixed", "-"}));
   CHECK_THAT(page.description.dump(), Contains("there is no figures.json beside the law"));
+}
+
+TEST_CASE("a law with its covariance is viewed with intervals in units of their size") {
+  const TempFolder folder;
+  // Known noise: normal quantiles. The interval of a logarithm is a factor about its estimate.
+  std::ofstream(folder / "law.json") << R"({"law": "linear-1", "drive": "indentation_depth",
+    "response": "contact_force", "reference_m": 0.004, "provenance": "derived",
+    "adequacy": {"verdict": "not_described", "words": "residual 9 times the noise"},
+    "parameters": {"k_inf_N_per_m": 60, "k1_N_per_m": 45, "tau1_s": 2, "contact_m": 0,
+                   "offset_N": -2e-5},
+    "fit": {"parameters": ["k_inf_N_per_m", "tau1_s", "offset_N"],
+            "coordinates": ["linear", "log", "linear"],
+            "covariance": [[0.25, 0, 0], [0, 0.0001, 0], [0, 0, 1e-12]], "level": 0.95,
+            "readings_per_independent_reading": 1.0, "duration_s": 20,
+            "noise": {"kind": "absolute", "absolute_N": 2e-4, "relative": 0, "column_factor": 1,
+                      "lag_1_correlation": 0},
+            "data": [{"file": "a.csv", "readings": 100, "sha256": ""}]}})";
+  const Json page = view_file(folder / "law.json").description;
+  CHECK(page.at("lead") ==
+        Json::array({{{"text", "residual 9 times the noise"}, {"doubt", true}}}));
+  const Json& table = page.at("table");
+  CHECK(table.at("head").at(4) == "95 % interval");
+  // 1.96 standard errors; 2 exp(-+0.0196)
+  CHECK(table.at("rows").at(0) == Json({"k_inf", "60", "N/m", "0.5", "59.02 .. 60.98"}));
+  CHECK(table.at("rows").at(1) == Json({"k1", "45", "N/m", "fixed", "-"}));
+  CHECK(table.at("rows").at(2) == Json({"tau1", "2", "s", "0.02", "1.961 .. 2.04"}));
+  CHECK(table.at("rows").at(4) == Json({"offset", "-20", "uN", "1", "-21.96 .. -18.04"}));
 }
 
 TEST_CASE("the page of a fit says first whether the law describes the data, and runs no name") {

@@ -296,7 +296,8 @@ def look_at_fit(chromium, tpm, folder):
             for words in (*answer["words"], *answer["warnings"], *answer["fit"]["flags"]):
                 assert lead.count(words) == 1, (words, lead)
         if name == "law":
-            assert f"{law['tau1_s']:.6g}" in page.text("table"), page.text("table")
+            for words in (f"{law['tau1_s']:.6g}", "std. error", "95 % interval", "N/m"):
+                assert words in page.text("table"), page.text("table")
         page.check_whole()
 
 

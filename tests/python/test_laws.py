@@ -62,13 +62,13 @@ class Laws(unittest.TestCase):
 
     def test_arguments_of_a_wrong_kind_are_told_in_a_sentence(self):
         law = tpmkit.Law("linear-1", LAW)
-        for call in (lambda: law.respond(3, [1.0]), lambda: tpmkit.fit("a.csv", law=3), lambda: tpmkit.Law.describe(3),
+        for call in (lambda: law.respond(3, [1.0]), lambda: tpmkit.Law.describe(3),
                      lambda: tpmkit.Element().respond("step", [1.0]), lambda: law.write(3), lambda: tpmkit.Law.read(3),
                      lambda: tpmkit.fit(3), lambda: tpmkit.fit([3]), lambda: tpmkit.simulate(3), lambda: tpmkit.plan(3),
                      lambda: tpmkit.sweep(3, "s.h5"), lambda: tpmkit.open(3), lambda: tpmkit.read_recording(3), lambda: tpmkit.view(3, "v.html"),
-                     lambda: tpmkit.design(3), lambda: tpmkit.validate("law.json", 3), lambda: tpmkit.validate("law.json", "a.csv", require=0.1),
+                     lambda: tpmkit.design(3), lambda: tpmkit.validate("law.json", 3), lambda: tpmkit.validate("law.json", "a.csv", instrument=3),
                      lambda: tpmkit.Contact(3), lambda: tpmkit.run_session(3, "s.tpmrec"), lambda: tpmkit.example(3)):
-            with self.assertRaisesRegex(tpmkit.Error, r"an argument is of a wrong kind; expected what help\(tpmkit\.") as raised:
+            with self.assertRaisesRegex(tpmkit.Error, r"an argument is missing or of a wrong kind; expected what help\(tpmkit\.") as raised:
                 call()
             self.assertNotIn("std::", str(raised.exception))
         with self.assertRaisesRegex(tpmkit.Error, r"^simulate\(a Law\): an argument"):

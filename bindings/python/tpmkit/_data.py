@@ -162,5 +162,14 @@ def open(path: str | os.PathLike[str]) -> xarray.Dataset:  # noqa: A001: tpmkit.
 
     if not Path(path).is_file():
         raise _core.Error(f"{os.fspath(path)}: there is no such file; expected a result of tpm simulate or tpm sweep")
-    with h5py.File(os.fspath(path), "r") as file:
-        return open_simulation(path) if "steps" in file else open_sweep(path)
+    wanted = "expected a result of tpm simulate or tpm sweep"
+    try:
+        with h5py.File(os.fspath(path), "r") as file:
+            keys = set(file)
+    except OSError as error:
+        raise _core.Error(f"{os.fspath(path)}: is no HDF5 file that can be read ({error}); {wanted}") from None
+    if {"steps", "curve"} <= keys:
+        return open_simulation(path)
+    if "status" in keys:
+        return open_sweep(path)
+    raise _core.Error(f"{os.fspath(path)}: is an HDF5 file of another kind; {wanted}")

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping, Sequence, Union
+from typing import TYPE_CHECKING, Any, Sequence, Union
 
 import numpy as np
 
 from . import _core, _program
 from ._core import Protocol
-from ._kinds import told
+from ._kinds import shown, told
 from ._law import Law, times_of
+from ._specimens import Specimens
+from ._tables import TABLE, by_file, csv_of, frame_of, is_table, options_of, reading_of, renamed
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
+    import xarray
     from matplotlib.axes import Axes
 
 PathLike = Union[str, "os.PathLike[str]"]
@@ -36,15 +38,7 @@ class _Inputs:
     def fitted(self) -> Any:
         if self.table is None:
             return _core.fit(list(self.files), *self.options)
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "table.csv"
-            file.write_text(self.table, encoding="utf-8", newline="")
-            try:
-                return _core.fit([str(file)], *self.options)
-            except _core.Error as error:
-                told = _core.Error(str(error).replace(str(file), "table"))
-                told.code = error.code
-                raise told from None
+        return _OfTable(*by_file(self.table, lambda file: _core.fit([file], *self.options)))
 
 
 _VALUES = ("parameters", "recordings", "has_law", "adequacy_json", "flags", "words", "warnings", "correlation")
@@ -60,6 +54,19 @@ def _answers_of(core: Any) -> dict[str, Any]:
     except _core.Error as error:
         answers["no_law"] = str(error)
     return answers
+
+
+class _OfTable:
+    """Stands for the `_core.Fit` of a table, whose answers name a file that is gone."""
+
+    def __init__(self, core: Any, names: dict[str, str]) -> None:
+        self._core, self._names = core, names
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._core, name)
+        if name in _TEXTS:
+            return lambda: renamed(value(), self._names)
+        return renamed(value, self._names)
 
 
 class _Unpickled:
@@ -92,6 +99,12 @@ class _Unpickled:
 
 def _unpickled(answers: dict[str, Any], inputs: _Inputs) -> Fit:
     return Fit(_Unpickled(answers, inputs), inputs)
+
+
+def _whole(where: str, name: str, value: Any, least: int, most: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value <= most:
+        raise _core.ArgumentError(f"{where}: {name} is {value!r:.60}; expected a whole number from {least} to {most}")
+    return int(value)
 
 
 class Fit:
@@ -267,7 +280,7 @@ class Fit:
         import pandas as pd
 
         times = times_of(times_s)
-        value, error = self._core.predict(protocol, times, dataset)
+        value, error = self._core.predict(protocol, times, _whole("predict", "dataset", dataset, 0, 2**31))
         return pd.DataFrame({"value": value, "standard_error": error}, index=pd.Index(times, name="time_s"))
 
     @told
@@ -305,7 +318,7 @@ class Fit:
         frames = self.data
         if not frames:
             raise _core.Error("plot: the fit has no recording; expected a fit of recordings")
-        frame = frames[recording]
+        frame = frames[_whole("plot", "recording", recording, 0, len(frames) - 1)]
         key = frame.attrs["response_key"]
         if ax is None:
             ax = plt.subplots(figsize=(7.0, 4.0))[1]
@@ -391,143 +404,15 @@ class Fit:
         return self.parameters.to_html(float_format=lambda v: f"{v:.4g}")
 
 
-class Specimens:
-    """Fits of the recordings of a folder, pooled. Made by `tpmkit.fit(folder)`."""
-
-    def __init__(self, document: dict[str, Any]) -> None:
-        self._document = document
-
-    @property
-    def law(self) -> str:
-        """The name of the law that all recordings were fitted with; `why` says how it was chosen."""
-        return self._document["law"]
-
-    @property
-    def why(self) -> str:
-        """How the law was chosen."""
-        return self._document["why"]
-
-    @property
-    def pooled(self) -> pd.DataFrame:
-        """One row per material parameter, by name, SI: typical, lower, upper, unit, specimens, left_out, identified,
-        i_squared, words."""
-        import pandas as pd
-
-        rows = []
-        for p in self._document["pooled"]:
-            lower, upper = p.get("interval_SI") or (None, None)
-            rows.append({"name": p["name"], "typical": p.get("typical_SI"), "lower": lower, "upper": upper,
-                         **{k: p.get(k) for k in ("unit", "specimens", "left_out", "identified", "i_squared", "words")}})
-        table = pd.DataFrame(rows).set_index("name")
-        for column in ("typical", "lower", "upper"):
-            table[column] = table[column].astype(float)
-        return table
-
-    @property
-    def adequacy(self) -> dict[str, Any]:
-        """Whether the law describes the recordings: `verdict` (not_described if one recording says so, else not_judged
-        if one cannot be judged, else adequate), `words`, and the names of the recordings by verdict."""
-        names: dict[str, list[str]] = {}
-        for r in self.recordings:
-            said = (r.get("fit") or {}).get("adequacy")
-            if "fit" in r:
-                names.setdefault(said["verdict"] if said else "not_judged", []).append(r["recording"])
-        verdict = next((v for v in ("not_described", "not_judged", "adequate") if v in names), "not_judged")
-        words = "; ".join(f"{len(rows)} of {len(self.recordings)} recordings {v.replace('_', ' ')}" for v, rows in names.items())
-        return {"verdict": verdict, "words": words or "no recording is fitted", **names}
-
-    @property
-    def warnings(self) -> list[str]:
-        """What a reader must know: recordings that are not fitted, or that the law does not describe."""
-        found = []
-        for r in self.recordings:
-            fit = r.get("fit")
-            if not fit:
-                found.append(f"{r['recording']} is not fitted: {r.get('reason', 'no reason is stored')}")
-                continue
-            adequacy = fit.get("adequacy")
-            if adequacy and adequacy["verdict"] != "adequate":
-                found.append(f"{r['recording']}: {adequacy['words']}")
-            found += [f"{r['recording']}: {flag}" for flag in fit.get("flags", [])]
-        return found
-
-    @property
-    def recordings(self) -> list[dict[str, Any]]:
-        """Of each recording: `recording`, `specimen`, and its `fit` (keys in docs/fit_files.md), or why it has none."""
-        return self._document["recordings"]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything, as `tpm fit FOLDER --format json` writes it."""
-        return self._document
-
-    def __repr__(self) -> str:
-        lines = [f"<tpmkit.Specimens {self.law}, {len(self.recordings)} recordings"]
-        lines += [f"  {name}: {row['words']}" for name, row in self.pooled.iterrows()]
-        lines.append(f"  adequacy: {self.adequacy['words']}")
-        lines += [f"  warning: {w}" for w in self.warnings]
-        return "\n".join(lines) + ">"
-
-
-def _options(columns: Mapping[str, Any] | None) -> list[str]:
-    """What `columns` says as options of the program."""
-    words: list[str] = []
-    for key, value in (columns or {}).items():
-        option = "--" + key.replace("_", "-")
-        if key == "units":
-            for column, unit in value.items():
-                words += ["--unit", f"{column}={unit}"]
-        elif isinstance(value, bool):
-            words += [option] if value else []
-        elif key == "segments":
-            words += [option, ",".join(value)]
-        else:
-            words += [option, str(value)]
-    return words
-
-
-def _table_of(time: Any, depth: Any, force: Any, units: Mapping[str, str] | None) -> pd.DataFrame:
-    """Arrays with units as a table that reads like a file."""
-    import pandas as pd
-
-    given = {"time": time, "depth": depth, "force": force}
-    missing = [name for name, values in given.items() if values is None]
-    if missing:
-        raise _core.Error(f"fit: {' and '.join(missing)} missing; expected time, depth and force together")
-    if set(units or {}) != set(given):
-        raise _core.Error('fit: units are not guessed; expected units={"time": "s", "depth": "mm", "force": "mN"}, one for each')
-    columns = {}
-    for name, values in given.items():
-        array = np.asarray(values)
-        if array.ndim != 1:
-            raise _core.Error(f"fit: {name} has the shape {array.shape}; expected a list of numbers")
-        if array.size != np.size(time):
-            raise _core.Error(f"fit: {name} has {array.size} values and time {np.size(time)}; expected as many of each")
-        try:
-            array = array.astype(float)
-        except (TypeError, ValueError):
-            raise _core.Error(f"fit: {name} holds {array.dtype}; expected numbers") from None
-        bad = np.flatnonzero(~np.isfinite(array))
-        if bad.size:
-            raise _core.Error(f"fit: {name} is {array[bad[0]]} at place {bad[0]}; expected finite numbers")
-        columns[f"{name} ({units[name]})"] = array  # type: ignore[index]
-    return pd.DataFrame(columns)
-
-
-def _fit_table(table: pd.DataFrame, options: tuple[Any, ...]) -> Fit:
+def _fit_table(table: Any, options: tuple[Any, ...]) -> Fit:
     """Fits a table as the file that it would be: one reader, one answer."""
-    import pandas as pd
-
-    if not isinstance(table.index, pd.RangeIndex):
-        if table.index.name is None:
-            raise _core.Error("fit: the table's index has no name; expected frame.reset_index(), or a name with a unit")
-        table = table.reset_index()
-    inputs = _Inputs(("table",), options, table.to_csv(index=False))
+    inputs = _Inputs((TABLE,), options, csv_of("fit", table))
     return Fit(inputs.fitted(), inputs)
 
 
 @told
 def fit(
-    files: PathLike | Sequence[PathLike] | pd.DataFrame | None = None,
+    files: PathLike | Sequence[PathLike] | pd.DataFrame | xarray.Dataset | None = None,
     *,
     time: npt.ArrayLike | None = None,
     depth: npt.ArrayLike | None = None,
@@ -551,14 +436,16 @@ def fit(
         to be fitted together, a spectrum, a relaxation modulus, a creep compliance, or a configuration
         (schemas/fit.schema.json). A folder: each recording in it is fitted by one law and the parameters are pooled
         (in another process, by the program `tpm`). A DataFrame: it is read as the file that it would be, so its columns
-        name their units ("time (s)", "depth (mm)", "force (mN)").
-    time, depth, force, units
-        A recording as three arrays of one length in place of `files`; `units` names the unit of each:
-        ``{"time": "s", "depth": "mm", "force": "mN"}``.
+        name their units ("time (s)", "depth (mm)", "force (mN)"), or `units` does; rows with a NaN are left out, and
+        `Fit.warnings` says so. A Dataset of `tpmkit.read_recording`.
+    time, depth, force
+        A recording as three arrays of one length in place of `files`; none may hold NaN.
+    units
+        The unit of each array or column: ``{"time": "s", "depth": "mm", "force": "mN"}``.
     law
-        Fit this one ("power-2") instead of the simplest law that the recordings support.
+        The name of one ("power-2"), fitted instead of the simplest law that the recordings support.
     starts, seed
-        Number of starts and seed of the search; equal seeds give equal answers.
+        Number of starts (1 to 1e9) and seed of the search; equal seeds give equal answers.
     reference
         Depth (m) at which coefficients are secants. Default: the largest.
     contact, contact_force, zero
@@ -582,31 +469,42 @@ def fit(
     >>> fit = tpmkit.fit("recording.csv")
     >>> fit.parameters.loc["tau1", ["estimate", "lower", "upper", "verdict"]]
     """
-    arrays = time is not None or depth is not None or force is not None or units is not None
+    arrays = time is not None or depth is not None or force is not None
     if arrays == (files is not None):
-        raise _core.Error("fit: expected files, a table, or time, depth and force, one of them")
-    for name, value in (("starts", starts), ("seed", seed)):
-        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0):
-            raise _core.Error(f"fit: {name} is {value!r}; expected a whole number")
+        raise _core.ArgumentError("fit: expected files, a table, or time, depth and force, one of them")
+    if law is not None and not isinstance(law, str):
+        raise _core.ArgumentError(f'fit: law is {shown(law)}; expected its name, such as "power-2"')
+    if starts is not None:
+        starts = _whole("fit", "starts", starts, 1, 10**9)
+    if seed is not None:
+        seed = _whole("fit", "seed", seed, 0, 2**64 - 1)
     placement = {"reference": reference, "contact": contact, "contact_force": contact_force, "zero": zero}
     units_of = {"reference": "m", "contact": "m", "contact_force": "N", "zero": "N"}
     for name, value in placement.items():
-        if value is not None and not isinstance(value, (int, float, np.floating, np.integer)):
-            raise _core.Error(f"fit: {name} is {value!r}; expected a number, in {units_of[name]}")
+        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer))):
+            raise _core.ArgumentError(f"fit: {name} is {value!r:.60}; expected a number, in {units_of[name]}")
 
-    options = (law, starts, seed, *placement.values(), dict(columns or {}))
+    reading = reading_of("fit", columns, None if arrays else units)
+    options = (law, starts, seed, *placement.values(), reading)
     if arrays:
-        return _fit_table(_table_of(time, depth, force, units), options)
-    if hasattr(files, "to_csv"):
+        return _fit_table(frame_of("fit", {"time": time, "depth": depth, "force": force}, units), options)
+    if is_table(files):
+        if hasattr(files, "attrs") and "provenance" in files.attrs:
+            reading.setdefault("provenance", files.attrs["provenance"])
         return _fit_table(files, options)
+    if isinstance(files, (Mapping, np.ndarray)):
+        raise _core.ArgumentError(f"fit: files is a {type(files).__name__}; expected files, a DataFrame, or time, depth and force with units")
     if isinstance(files, (str, os.PathLike)) or not isinstance(files, Iterable):
-        if os.path.isdir(os.fspath(files)):
-            words = ["fit", os.fspath(files), "--no-draw", *_options(columns)]
+        if os.path.isdir(os.fspath(files)):  # type: ignore[arg-type]
+            words = ["fit", os.fspath(files), "--no-draw", *options_of(reading)]  # type: ignore[arg-type, list-item]
             said = {"laws": law, "starts": starts, "seed": seed, **placement}
             for key, value in said.items():
                 unit = " " + units_of[key] if key in units_of else ""
                 words += [] if value is None else ["--" + key.replace("_", "-"), f"{value}{unit}"]
             return Specimens(_program.answer(words))
-        files = [files]
-    names = [os.fspath(f) for f in files]  # type: ignore[union-attr]
+        files = [files]  # type: ignore[list-item]
+    several = list(files)  # type: ignore[arg-type]
+    if any(is_table(f) for f in several):
+        raise _core.ArgumentError("fit: files holds tables; expected one table, or files")
+    names = [os.fspath(f) for f in several]
     return Fit(_core.fit(names, *options), _Inputs(tuple(os.path.abspath(n) for n in names), options))

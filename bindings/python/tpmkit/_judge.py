@@ -5,17 +5,18 @@ These are done by the program `tpm` in another process.
 
 from __future__ import annotations
 
-import json
+import numbers
 import os
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import _program
-from ._fit import Fit, PathLike, _options
-from ._kinds import told
+from . import _core, _program
+from ._fit import Fit, PathLike
+from ._kinds import json_text, told
 from ._law import Law
+from ._tables import TABLE, csv_of, is_table, options_of, reading_of, renamed, same_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,9 +70,9 @@ class Validation:
 @told
 def validate(
     law: PathLike | Law | Fit,
-    recordings: PathLike | Sequence[PathLike],
+    recordings: PathLike | Sequence[PathLike] | pd.DataFrame,
     *,
-    require: str | None = None,
+    require: str | float | None = None,
     placement: str | None = None,
     instrument: PathLike | None = None,
     new_specimen: bool = False,
@@ -84,9 +85,9 @@ def validate(
     law
         A Fit or a Law; law.json as `tpm fit` or `Fit.save` writes it; the scene or material.json of `tpm material`.
     recordings
-        One or several files. Of one that the law was fitted to the verdict is "calibration_residual".
+        One or several files, or a DataFrame as for `tpmkit.fit`. Of one that the law was fitted to the verdict is "calibration_residual".
     require
-        How large the error of the model may be: "10%" of the measured value, "20 mN", or "jnd". None: no verdict.
+        How large the error of the model may be: "10%" or 0.1 of the measured value, "20 mN", or "jnd". None: no verdict.
     new_specimen
         The recordings are of new specimens: the spread between the recordings that the law was fitted to, each of
         another specimen, adds to the uncertainty. Needs a law of two recordings or more, and these beside it.
@@ -98,20 +99,37 @@ def validate(
     tpmkit.Error
         What the program refuses, in its words.
     """
-    several = isinstance(recordings, Iterable) and not isinstance(recordings, (str, os.PathLike))
-    files: list[PathLike] = list(recordings) if several else [recordings]  # type: ignore[arg-type, list-item]
-    words = [*(os.fspath(f) for f in files), *_options(columns)]
+    if isinstance(require, numbers.Real) and not isinstance(require, numbers.Integral):
+        require = f"{100.0 * float(require):.12g}%"
+    if require is not None and not isinstance(require, str):
+        raise _core.ArgumentError(f'validate: require is {require!r:.60}; expected "10%", 0.1, "20 mN" or "jnd"')
+    options = options_of(reading_of("validate", columns))
     for option, value in (("--require", require), ("--placement", placement), ("--instrument", instrument)):
-        words += [] if value is None else [option, os.fspath(value)]
-    words += ["--new-specimen"] if new_specimen else []
+        options += [] if value is None else [option, os.fspath(value)]
+    options += ["--new-specimen"] if new_specimen else []
     with tempfile.TemporaryDirectory() as folder:
+        names = {}
         if isinstance(law, Fit):
             law = law.law
         if isinstance(law, Law):
             file = Path(folder) / "law.json"
             law.write(file)
+            names[str(file)] = "law"
             law = file
-        return Validation(_program.answer(["validate", os.fspath(law), *words], answers=(0, 1)))
+        if is_table(recordings):
+            file = Path(folder) / "table.csv"
+            file.write_text(csv_of("validate", recordings), encoding="utf-8", newline="")
+            names[str(file)] = TABLE
+            recordings = file
+        alone = isinstance(recordings, (str, os.PathLike)) or not isinstance(recordings, Iterable)
+        files = [os.fspath(f) for f in ([recordings] if alone else recordings)]  # type: ignore[union-attr, list-item]
+        if not files:
+            raise _core.ArgumentError("validate: recordings holds no file; expected one or more")
+        try:
+            document = _program.answer(["validate", os.fspath(law), *files, *options], answers=(0, 1))
+        except _core.Error as error:
+            raise same_error(error, names) from None
+        return Validation(renamed(document, names))
 
 
 class Design:
@@ -174,16 +192,24 @@ def design(problem: PathLike | Mapping[str, Any], *, repetitions: int = 100, see
     with tempfile.TemporaryDirectory() as folder:
         if isinstance(problem, Mapping):
             file = Path(folder) / "design.json"
-            file.write_text(json.dumps(dict(problem)), encoding="utf-8")
+            file.write_text(json_text(problem, "design"), encoding="utf-8")
             problem = file
         return Design(_program.answer(["design", os.fspath(problem), "--repetitions", str(repetitions), "--seed", str(seed)]))
 
 
 @told
-def view(file: PathLike, output: PathLike) -> Path:
-    """Writes a result, a session or a fit as one interactive page, which needs nothing else (`tpm view`).
+def view(file: PathLike | Fit | Law, output: PathLike) -> Path:
+    """Writes a Fit, a Law, or a file or folder of results, as one interactive page, which needs nothing else (`tpm view`).
 
     Returns the page. Raises tpmkit.Error, also where `output` is there already and not such a page.
     """
-    _program.run(["view", os.fspath(file), "-o", os.fspath(output)])
+    with tempfile.TemporaryDirectory() as folder:
+        if isinstance(file, Fit):
+            file.save(folder)
+            file = folder
+        elif isinstance(file, Law):
+            path = Path(folder) / "law.json"
+            file.write(path)
+            file = path
+        _program.run(["view", os.fspath(file), "-o", os.fspath(output)])
     return Path(output)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, Callable, TypeVar
+import json
+import os
+from typing import Any, Callable, Mapping, TypeVar
 
 from . import _core
 
@@ -17,9 +19,29 @@ def shown(value: Any) -> str:
     return f"a {type(value).__name__}" if hasattr(value, "_core") else repr(value)[:40]
 
 
-def told(function: Function) -> Function:
+def json_text(document: Mapping[str, Any], where: str) -> str:
+    """A dict as JSON. Numbers and arrays of numpy, and paths, may stand in it; NaN may not."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, os.PathLike):
+            return os.fspath(value)
+        if hasattr(value, "tolist"):
+            return value.tolist()
+        raise TypeError(f"a {type(value).__name__}")
+
+    try:
+        return json.dumps(dict(document), default=plain, allow_nan=False)
+    except ValueError:
+        words = "holds NaN, an infinite number or itself; expected finite numbers, texts, lists and dicts"
+    except TypeError as error:
+        words = f"holds {error}; expected numbers, texts, lists and dicts"
+    raise _core.ArgumentError(f"{where}: {words}")
+
+
+def told(function: Function, name: str | None = None) -> Function:
     """The function, whose arguments of a kind that the compiled part does not take, or that are no paths, raise
-    tpmkit.ArgumentError in a sentence without its types of C++."""
+    tpmkit.ArgumentError in a sentence without its types of C++. `name` is what messages call it."""
+    known = name or function.__qualname__.removesuffix(".__init__")
 
     @functools.wraps(function)
     def call(*arguments: Any, **named: Any) -> Any:
@@ -28,12 +50,11 @@ def told(function: Function) -> Function:
         except TypeError as error:
             if not any(said in str(error) for said in KINDS):
                 raise
-        name = function.__qualname__.removesuffix(".__init__")
         owner = function.__qualname__.rpartition(".")[0]
         if owner and arguments and owner in (type(arguments[0]).__qualname__, getattr(arguments[0], "__qualname__", "")):
             arguments = arguments[1:]  # without self, or the class
         given = ", ".join([shown(a) for a in arguments] + [f"{k}={shown(v)}" for k, v in named.items()])
-        words = f"{name}({given}): an argument is of a wrong kind; expected what help(tpmkit.{name}) says"
+        words = f"{known}({given}): an argument is missing or of a wrong kind; expected what help(tpmkit.{known}) says"
         raise _core.ArgumentError(words)
 
     return call  # type: ignore[return-value]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import math
+import numbers
 import os
 from typing import TYPE_CHECKING, Any, Mapping, overload
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from . import _core
 from ._core import Protocol
-from ._kinds import told
+from ._kinds import json_text, told
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -19,17 +20,43 @@ if TYPE_CHECKING:
 
 
 def times_of(times: npt.ArrayLike, name: str = "times_s") -> Array:
-    """A list of numbers, none of them NaN; raises tpmkit.Error in one sentence."""
+    """A list of numbers, none of them NaN; raises tpmkit.ArgumentError in one sentence."""
     try:
         array = np.ascontiguousarray(times, dtype=float)
     except (TypeError, ValueError):
-        raise _core.Error(f"{name}: {times!r:.60}; expected a list of numbers") from None
+        raise _core.ArgumentError(f"{name}: {times!r:.60}; expected a list of numbers") from None
     if array.ndim != 1:
-        raise _core.Error(f"{name}: has the shape {array.shape}; expected a list of numbers")
+        raise _core.ArgumentError(f"{name}: has the shape {array.shape}; expected a list of numbers")
     bad = np.flatnonzero(np.isnan(array))
     if bad.size:
-        raise _core.Error(f"{name}: is NaN at place {bad[0]}; expected numbers")
+        raise _core.ArgumentError(f"{name}: is NaN at place {bad[0]}; expected numbers")
     return array
+
+
+def number_of(where: str, name: str, value: Any) -> float:
+    """A finite number of Python or of numpy; raises tpmkit.ArgumentError in one sentence."""
+    if not isinstance(value, numbers.Real) or isinstance(value, bool) or not math.isfinite(value):
+        raise _core.ArgumentError(f"{where}: {name} is {value!r:.60}; expected a finite number, SI")
+    return float(value)
+
+
+def _told_protocols() -> None:
+    """Gives the ways to make a Protocol, which are compiled, messages without types of C++, and histories one dimension."""
+    for name in ("step_and_hold", "ramp_and_hold", "creep"):
+        setattr(Protocol, name, staticmethod(told(getattr(Protocol, name), f"Protocol.{name}")))
+    compiled = Protocol.history
+
+    def history(
+        times_s: npt.ArrayLike, values: npt.ArrayLike, drive: str = "displacement", equilibrium_at_start: bool = False
+    ) -> Protocol:
+        """A measured history of depths (m; drive "displacement") or loads (N; drive "force"); times increase.
+        equilibrium_at_start: the first value had been kept for ever before."""
+        return compiled(times_of(times_s), times_of(values, "values"), drive, equilibrium_at_start)
+
+    Protocol.history = staticmethod(told(history, "Protocol.history"))  # type: ignore[method-assign]
+
+
+_told_protocols()
 
 
 def _with_units(law: str, parameters: Mapping[str, float]) -> dict[str, float]:
@@ -44,8 +71,10 @@ def _with_units(law: str, parameters: Mapping[str, float]) -> dict[str, float]:
         meant = [key for key in known if key.startswith(f"{name}_")]
         key = meant[0] if name not in known and len(meant) == 1 else name
         if key in named:
-            raise _core.Error(f"law: {key} stands twice; expected each parameter once")
-        named[key] = value
+            raise _core.ArgumentError(f"law: {key} stands twice; expected each parameter once")
+        if name == "drift":
+            raise _core.ArgumentError("law: drift belongs to a recording, not to a law; expected the parameters without it, or fit.law")
+        named[key] = number_of("law", name, value)
     return named
 
 
@@ -61,7 +90,7 @@ class Law:
         parameters.
     parameters
         By name with SI unit: ``{"k_inf_N_per_m": 60, "k1_N_per_m": 40, "tau1_s": 0.5}``, or by the names of a fit,
-        in SI: ``{"k_inf": 60, "k1": 40, "tau1": 0.5}``, ``fit.parameters["estimate"]``. Parameters with a preset may
+        in SI: ``{"k_inf": 60, "k1": 40, "tau1": 0.5}``; the law of a fit is ``fit.law``. Parameters with a preset may
         be left out.
     reference
         Depth (m) or change of relative length at which coefficients are secants, above 0. It has no
@@ -79,6 +108,7 @@ class Law:
 
     _core: _core.Law
 
+    @told
     def __init__(
         self,
         name: str,
@@ -94,11 +124,11 @@ class Law:
             "law": name,
             "drive": drive,
             "response": response,
-            key: reference,
+            key: number_of("law", "reference", reference),
             "parameters": _with_units(name, parameters),
             "provenance": provenance,
         }
-        self._core = _core.Law.from_json(json.dumps(document))
+        self._core = _core.Law.from_json(json_text(document, "law"))
 
     @classmethod
     def _of(cls, core: _core.Law) -> Law:
@@ -203,6 +233,11 @@ class Element:
         As in docs/notation.md; all above 0 (E1 and E' may be 0).
     formulation
         "closed_form" (exact), or "cvodes", the differential equation, integrated.
+
+    Raises
+    ------
+    tpmkit.ArgumentError
+        A parameter out of range, an unknown formulation.
     """
 
     def __init__(
@@ -226,6 +261,14 @@ class Element:
             "A0_m2": A0_m2,
             "l0_m": l0_m,
         }
+        for name, value in self.parameters.items():
+            number = number_of("element", name, value)
+            may_be_0 = name in ("E1_Pa", "Eprime_Pa")
+            if number < 0.0 or (number == 0.0 and not may_be_0):
+                raise _core.ArgumentError(f"element: {name} is {number:g}; expected a number {'of at least' if may_be_0 else 'above'} 0")
+            self.parameters[name] = number
+        if formulation not in ("closed_form", "cvodes"):
+            raise _core.ArgumentError(f'element: formulation is {formulation!r:.60}; expected "closed_form" or "cvodes"')
         self.formulation = formulation
 
     @property

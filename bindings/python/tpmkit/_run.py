@@ -54,7 +54,7 @@ def shown(progress: bool | Progress, what: str) -> Iterator[Progress | None]:
 def scene_text(scene: str | os.PathLike[str] | Mapping[str, Any]) -> tuple[str, str, str]:
     """A scene as the library takes it: text, place for messages, folder of what it names."""
     if isinstance(scene, Mapping):
-        return json.dumps(scene), "scene", ""
+        return _kinds.json_text(scene, "scene"), "scene", ""
     path = Path(scene)
     return _core.read_text(os.fspath(path)), os.fspath(path), os.fspath(path.parent)
 
@@ -142,7 +142,7 @@ def sweep(
     from ._data import open_sweep
 
     if isinstance(workers, bool) or not isinstance(workers, numbers.Integral) or workers < 0:
-        raise _core.Error(f"sweep: workers is {workers!r}; expected a whole number, 0 for all processors")
+        raise _core.ArgumentError(f"sweep: workers is {workers!r}; expected a whole number, 0 for all processors")
     with shown(progress, "blocks of the sweep") as told:
         _core.sweep(os.fspath(file), os.fspath(output), workers, told)
     return open_sweep(output)
@@ -228,14 +228,14 @@ def plan(
     costs
         "nominal", the same on every machine, or a file of `tpm plan --calibrate`.
     """
-    if isinstance(tolerance, float):
+    if isinstance(tolerance, numbers.Real) and not isinstance(tolerance, numbers.Integral):
         tolerance = repr(float(tolerance))
     for name, value, wanted in (("tolerance", tolerance, '"1%", 0.01 or "jnd"'), ("outputs", outputs, '"force" or "field"'),
                                 ("wall", wall, 'a text such as "0.1 s per s"')):
         if not isinstance(value, str):
-            raise _core.Error(f"plan: {name} is {value!r}; expected {wanted}")
+            raise _core.ArgumentError(f"plan: {name} is {value!r}; expected {wanted}")
     if rate_Hz is not None and (isinstance(rate_Hz, bool) or not isinstance(rate_Hz, numbers.Real)):
-        raise _core.Error(f"plan: rate_Hz is {rate_Hz!r}; expected a number, in Hz")
+        raise _core.ArgumentError(f"plan: rate_Hz is {rate_Hz!r}; expected a number, in Hz")
     text, where, folder = scene_text(scene)
     with shown(progress, "planning") as told:
         return Plan(*_core.plan(text, where, folder, tolerance, outputs, rate_Hz, wall, os.fspath(costs), told))

@@ -5,6 +5,7 @@
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/instrument_of_recording.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
+#include "tpm/fit/select/rows_left_out.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/fit.hpp"
@@ -69,9 +70,10 @@ std::vector<PreparedRecording> prepared_recordings(const std::vector<std::filesy
   phases.contact_response = request.contact_force_N;
   std::vector<PreparedRecording> recordings;
   for (const std::filesystem::path& file : files) {
-    recordings.push_back(
-        prepare_recording(file.string(), read_recording_file(file, import).recording, phases));
+    RecordingFile read = read_recording_file(file, import);
+    recordings.push_back(prepare_recording(file.string(), std::move(read.recording), phases));
     recordings.back().import = import;
+    warn_of_rows_left_out(recordings.back(), read.findings);
     take_instrument(recordings.back(), file);
   }
   if (request.contact) require_contact_within(*request.contact, recordings, "contact");

@@ -60,22 +60,25 @@ Panel largest_panel(const ErrorBudget& b) {
               .y = {"of the peak", "%", true}};
   Series own{.kind = Series::Kind::points, .label = "largest of the line", .provenance = "derived"};
   const auto add = [&](const std::string& name, double part) {
-    panel.x.names.push_back(name);
-    own.add(static_cast<double>(panel.x.names.size()), 100.0 * std::max(part, kLeastDrawn));
+    const bool drawn = part >= kLeastDrawn;
+    panel.x.names.push_back(
+        drawn ? name : fmt::format("{} (< {} %)", name, significant(100.0 * kLeastDrawn, 1)));
+    if (drawn) own.add(static_cast<double>(panel.x.names.size()), 100.0 * part);
   };
   for (const BudgetLine& l : b.lines) add(l.name, l.largest);
   if (b.random) add("parameters", b.random->largest);
   add("all", b.combined);
   const double until = 0.5 + static_cast<double>(panel.x.names.size());
   panel.x.upper = until;
-  panel.series = {
-      std::move(own), threshold("a hand: force, 7 %", kForceJnd, until),
-      threshold("a hand: stiffness through a tool, 45 %", kStiffnessThroughTool, until)};
+  add_if_any(panel, std::move(own));
+  panel.series.push_back(threshold("a hand: force, 7 %", kForceJnd, until));
+  panel.series.push_back(
+      threshold("a hand: stiffness through a tool, 45 %", kStiffnessThroughTool, until));
   return panel;
 }
 
-/// The waterfall: how the lines add up at the instant of the largest sum, and beside it each line's
-/// own largest with the thresholds of a hand.
+}  // namespace
+
 Figure budget_figure(const ErrorBudget& budget) {
   return {"budget",
           fmt::format("Error budget: {}", budget.title),
@@ -86,8 +89,6 @@ Figure budget_figure(const ErrorBudget& budget) {
                       budget.sentences.empty() ? "" : budget.sentences.front()),
           {waterfall_panel(budget), largest_panel(budget)}};
 }
-
-}  // namespace
 
 std::vector<std::string> write_budget_report(const std::filesystem::path& folder,
                                              const ErrorBudget& budget) {

@@ -189,6 +189,12 @@ Figure waterfall_figure(const FitResult& fit) {
     ends.add(static_cast<double>(i + 1),
              fit.waterfall.deviances[i] - fit.waterfall.deviances.front());
   }
+  // Ends that agree are drawn as such: what rounding leaves between them does not fill the axis.
+  const Waterfall& w = fit.waterfall;
+  if (!w.deviances.empty() && w.deviances.back() - w.deviances.front() <= w.margin) {
+    panel.y.lower = 0.0;
+    panel.y.upper = w.margin;
+  }
   add_if_any(panel, std::move(ends));
   figure.panels = {std::move(panel)};
   return figure;

@@ -13,6 +13,7 @@
 #include "tpm/show/view_parts.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
+#include "tpmkit/law_uncertainty.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::fit {
@@ -75,55 +76,6 @@ void add_figures(ViewPage& page, const Json& figures, const std::string& where) 
   }
 }
 
-/// Linearised standard errors from the covariance of a law file, in the parameters' own units.
-std::vector<std::string> standard_errors(const Json& fit, const Json& parameters) {
-  std::vector<std::string> errors;
-  const Json& names = fit.at("parameters");
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const double sd = std::sqrt(fit.at("covariance").at(i).at(i).get<double>());
-    const double value = parameters.at(names.at(i).get<std::string>()).get<double>();
-    const std::string coordinate = fit.at("coordinates").at(i).get<std::string>();
-    if (coordinate == "linear") {
-      errors.push_back(significant(sd, 3));
-    } else if (coordinate == "log") {
-      errors.push_back(significant(std::abs(value) * sd, 3));
-    } else {
-      errors.push_back(fmt::format("{} of its {}", significant(sd, 3), coordinate));
-    }
-  }
-  return errors;
-}
-
-void add_law(ViewPage& page, const Json& law, const std::filesystem::path& file) {
-  (void)read_law(file);  // refuses what is no law
-  page.description["title"] = law.value("note", law.at("law").get<std::string>());
-  page.fact("law", law.at("law").get<std::string>());
-  page.fact("provenance of the parameters", law.value("provenance", ""));
-  Json rows = Json::array();
-  std::vector<std::string> errors;
-  Json fitted = Json::array();
-  if (law.contains("fit")) {
-    errors = standard_errors(law.at("fit"), law.at("parameters"));
-    fitted = law.at("fit").at("parameters");
-    for (const Json& data : law.at("fit").at("data")) {
-      page.fact("fitted to",
-                fmt::format("{}: {} readings, SHA-256 {}", data.at("file").get<std::string>(),
-                            data.at("readings").get<std::size_t>(),
-                            data.at("sha256").get<std::string>()));
-    }
-  }
-  for (const auto& [name, value] : law.at("parameters").items()) {
-    std::string error = "fixed";
-    for (std::size_t i = 0; i < fitted.size(); ++i) {
-      if (fitted[i] == name) error = errors[i];
-    }
-    rows.push_back({name, significant(value.get<double>(), kShownDigits), error});
-  }
-  page.description["table"] = {{"title", "Parameters"},
-                               {"head", {"parameter, SI", "value", "standard error (linearised)"}},
-                               {"rows", std::move(rows)}};
-}
-
 /// The unit in which a parameter is read, from that of SI. A drift ("N/s") is sized as what drifts.
 Unit read_unit(const std::string& si_unit, double si) {
   constexpr std::string_view kPerSecond = "/s";
@@ -135,6 +87,66 @@ Unit read_unit(const std::string& si_unit, double si) {
   }
   if (!is_unit(si_unit)) return {si_unit, Dimension::dimensionless, 1.0};
   return sized_unit(shown_unit(parse_unit(si_unit, {}).dimension), si);
+}
+
+/// A parameter of a law in the unit of its size; with an uncertainty its linearised standard error,
+/// and the interval that is symmetric in the coordinate of the uncertainty.
+Json law_row(const LawFile& law, const LawParameter& parameter, std::size_t place) {
+  const double value = law.values[place];
+  const Unit unit = read_unit(std::string(si_symbol(parameter.dimension)), value);
+  const auto shown = [&unit](double si, int digits) {
+    return significant(si / unit.to_si, digits);
+  };
+  constexpr int kErrorDigits = 3, kIntervalDigits = 4;
+  std::string error = "fixed", interval = "-";
+  const std::optional<LawUncertainty>& u = law.uncertainty;
+  const auto at =
+      u ? std::ranges::find(u->place, place) : std::vector<std::size_t>::const_iterator();
+  if (u && at != u->place.end()) {
+    const auto k = at - u->place.begin();
+    const Coordinate coordinate = u->coordinate[static_cast<std::size_t>(k)];
+    const double sd = std::sqrt(u->covariance(k, k)), theta = to_coordinate(coordinate, value);
+    const auto end = [&](double sign) {
+      return from_coordinate(coordinate, theta + sign * u->quantile() * sd);
+    };
+    const auto [low, high] = std::minmax({end(-1.0), end(1.0)});
+    error = shown(std::abs(coordinate_slope(coordinate, value)) * sd, kErrorDigits);
+    interval = fmt::format("{} .. {}", shown(low, kIntervalDigits), shown(high, kIntervalDigits));
+  }
+  return Json{parameter.name, shown(value, kShownDigits), unit.symbol, error, interval};
+}
+
+void add_law(ViewPage& page, const std::filesystem::path& file) {
+  const LawFile law = read_law(file);
+  const std::string name = law_name(law.spec);
+  page.description["title"] = law.note.empty() ? name : law.note;
+  page.fact("law", name);
+  page.fact("provenance of the parameters", std::string(provenance_name(law.provenance)));
+  if (law.adequacy) {
+    page.description["lead"] =
+        Json::array({{{"text", law.adequacy->words}, {"doubt", !law.adequacy->is_adequate()}}});
+  }
+  std::string interval = "interval";
+  if (const auto& u = law.uncertainty) {
+    interval = significant(100.0 * u->level, 3) + " % interval";
+    for (const FittedFile& data : u->data) {
+      page.fact("fitted to",
+                fmt::format("{}: {} readings, SHA-256 {}", data.name, data.readings, data.sha256));
+    }
+    for (const std::string& parameter : u->at_bound) page.fact("fixed on a bound", parameter);
+    for (const std::string& parameter : u->not_separable) {
+      page.fact("not separable from a drift", parameter);
+    }
+  }
+  Json rows = Json::array();
+  const std::vector<LawParameter> parameters = law_parameters(law.spec);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    rows.push_back(law_row(law, parameters[i], i));
+  }
+  page.description["table"] = {
+      {"title", law.uncertainty ? "Parameters, errors and intervals linearised" : "Parameters"},
+      {"head", {"parameter", "value", "unit", "std. error", interval}},
+      {"rows", std::move(rows)}};
 }
 
 std::string interval_text(const Json& interval, const Unit& unit) {
@@ -239,8 +251,8 @@ bool is_answer(const Json& json) {
 }
 
 /// A law, with the figures beside it if there are any.
-void add_law_and_figures(ViewPage& page, const Json& law, const std::filesystem::path& file) {
-  add_law(page, law, file);
+void add_law_and_figures(ViewPage& page, const std::filesystem::path& file) {
+  add_law(page, file);
   const std::filesystem::path figures = file.parent_path() / "figures.json";
   if (!std::filesystem::exists(figures)) {
     page.fact("curves", "none: there is no figures.json beside the law");
@@ -257,7 +269,7 @@ bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file
     if (json.contains("figures")) {
       add_figures(page, json, file.string());
     } else if (is_law(json)) {
-      add_law_and_figures(page, json, file);
+      add_law_and_figures(page, file);
     } else if (is_answer(fit)) {
       add_conclusion(page, json, fit);
       const std::filesystem::path figures = file.parent_path() / "figures.json";

@@ -1,0 +1,140 @@
+"""Recordings in memory, as the files that they would be, and what is said about reading them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from . import _core
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLE = "table"  # what messages and answers call a recording in memory
+Answer = TypeVar("Answer")
+
+
+def options_of(columns: Mapping[str, Any]) -> list[str]:
+    """What `columns` says as options of the program."""
+    words: list[str] = []
+    for key, value in columns.items():
+        option = "--" + key.replace("_", "-")
+        if key == "units":
+            for column, unit in value.items():
+                words += ["--unit", f"{column}={unit}"]
+        elif isinstance(value, bool):
+            words += [option] if value else []
+        elif key == "segments":
+            words += [option, ",".join(value)]
+        else:
+            words += [option, str(value)]
+    return words
+
+
+def reading_of(where: str, columns: Mapping[str, Any] | None, units: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """`columns` of a call as a dict, with the units of columns by name among them."""
+    for name, value in (("columns", columns), ("units", units)):
+        if value is not None and not isinstance(value, Mapping):
+            raise _core.ArgumentError(f"{where}: {name} is {value!r:.60}; expected a dict")
+    reading = dict(columns or {})
+    if units:
+        reading["units"] = {**reading.get("units", {}), **units}
+    return reading
+
+
+def is_table(value: Any) -> bool:
+    """Is it a DataFrame, or a Dataset of xarray."""
+    return hasattr(value, "to_csv") or hasattr(value, "to_dataframe")
+
+
+def csv_of(where: str, table: Any) -> str:
+    """A DataFrame, or a Dataset over one dimension, as a file of comma-separated values. An index without a name that
+    counts rows is left out, as filtering leaves it behind."""
+    import pandas as pd
+
+    if hasattr(table, "to_dataframe"):
+        if len(table.dims) != 1:
+            raise _core.ArgumentError(f"{where}: a Dataset over {', '.join(map(str, table.dims)) or 'nothing'}; expected one over "
+                                      "time_s, as tpmkit.read_recording returns it")
+        table = table.to_dataframe()
+        if table.index.name == "sample":
+            table.index.name = None
+    if not isinstance(table, pd.DataFrame):
+        raise _core.ArgumentError(f"{where}: a {type(table).__name__}; expected a DataFrame with columns of times, depths and forces")
+    index = table.index
+    if any(name is not None for name in index.names):
+        table = table.reset_index()
+    elif index.nlevels > 1 or not pd.api.types.is_integer_dtype(index.dtype):
+        raise _core.ArgumentError(f"{where}: the table's index has no name; expected frame.reset_index(drop=True), or a name with a unit")
+    return table.to_csv(index=False)
+
+
+def frame_of(where: str, arrays: Mapping[str, Any], units: Mapping[str, str] | None) -> pd.DataFrame:
+    """Arrays by name, with units, as a table that reads like a file."""
+    import pandas as pd
+
+    missing = [name for name, values in arrays.items() if values is None]
+    if missing:
+        raise _core.ArgumentError(f"{where}: {' and '.join(missing)} missing; expected {', '.join(arrays)} together")
+    if set(units or {}) != set(arrays):
+        raise _core.ArgumentError(f"{where}: units are not guessed; expected units="
+                                  '{"time": "s", "depth": "mm", "force": "mN"}, one for each')
+    columns: dict[str, Any] = {}
+    for name, values in arrays.items():
+        array = np.asarray(values)
+        if array.ndim != 1:
+            raise _core.ArgumentError(f"{where}: {name} has the shape {array.shape}; expected a list of numbers")
+        if columns and array.size != len(next(iter(columns.values()))):
+            first = next(iter(arrays))
+            raise _core.ArgumentError(f"{where}: {name} has {array.size} values and {first} "
+                                      f"{len(next(iter(columns.values())))}; expected as many of each")
+        if array.dtype.kind in "mM":
+            raise _core.ArgumentError(f"{where}: {name} holds {array.dtype}; expected numbers, such as "
+                                      '(t - t[0]) / numpy.timedelta64(1, "s")')
+        if array.dtype.kind not in "iufO":
+            raise _core.ArgumentError(f"{where}: {name} holds {array.dtype}; expected numbers")
+        try:
+            array = array.astype(float)
+        except (TypeError, ValueError):
+            raise _core.ArgumentError(f"{where}: {name} holds {array.dtype}; expected numbers") from None
+        bad = np.flatnonzero(~np.isfinite(array))
+        if bad.size:
+            raise _core.ArgumentError(f"{where}: {name} is {array[bad[0]]} at place {bad[0]}; expected finite numbers")
+        columns[f"{name} ({units[name]})"] = array  # type: ignore[index]
+    return pd.DataFrame(columns)
+
+
+def renamed(value: Any, names: Mapping[str, str]) -> Any:
+    """The same with the names of files that are gone replaced in every text."""
+    if isinstance(value, str):
+        for old, new in names.items():
+            value = value.replace(old, new)
+        return value
+    if isinstance(value, list):
+        return [renamed(v, names) for v in value]
+    if isinstance(value, dict):
+        return {renamed(k, names): renamed(v, names) for k, v in value.items()}
+    return value
+
+
+def same_error(error: _core.Error, names: Mapping[str, str]) -> _core.Error:
+    """The same error with these names in its text."""
+    told = type(error)(renamed(str(error), names))
+    told.code = error.code
+    return told
+
+
+def by_file(csv: str, work: Callable[[str], Answer]) -> tuple[Answer, dict[str, str]]:
+    """What `work` makes of a table as a file, and TABLE by the name of that file, which is gone."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "table.csv"
+        file.write_text(csv, encoding="utf-8", newline="")
+        names = {str(file): TABLE}
+        try:
+            return work(str(file)), names
+        except _core.Error as error:
+            raise same_error(error, names) from None
