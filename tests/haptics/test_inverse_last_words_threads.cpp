@@ -164,7 +164,7 @@ TEST_CASE("A check that the device ended quotes it, and does not blame the machi
                        Contains("communication error: positions older than 20 ms"));
   CHECK_THAT(text, !Contains("would help"));
   const Json json = check_json(check);
-  CHECK(json.at("device_error_text") == kSaid);
+  CHECK(json.at("device_error_text").get<std::string>() == kSaid);
   CHECK(json.at("device_findings").size() == 1);
   check.outcome.cause = StopCause::overrun_storm;
   assess(check);
