@@ -140,6 +140,9 @@ class HapticDevice {
   virtual void advance(double /*seconds*/) noexcept {}
   /// Sets zero force, switches forces off and closes. May be called more than once.
   virtual void stop() noexcept = 0;
+  /// Called by whoever ran the loop, after it and after stop(): waits a bounded time for what the
+  /// device still learns about the end of its connection. True if status() may be asked once more.
+  virtual bool learn_end() noexcept { return false; }
   /// Switches forces off as far as possible while another thread is stuck in a call.
   virtual void cut_forces() noexcept = 0;
 };

@@ -37,7 +37,10 @@ struct StandInFaults {
   std::string preset = "defaults", basis = "XYZ";
   double gate = 0.3, damping = 0.0, damping_along_z = 0.0, gravity = 0.0;
   double mount_turned_rad = 0.0, scale = 1.0;  ///< about x; of the mount
-  std::vector<std::string> keeps;              ///< names of those that it does not change
+  double mounted_m = 0.0;                      ///< along x
+  bool torque_scaling = false, names_no_gravity = false, no_inventory_json = false;
+  std::string last_event;          ///< name of one that is sent just before `how` acts
+  std::vector<std::string> keeps;  ///< names of those that it does not change
   std::vector<std::string> devices = {"049D"};
   std::string wrong_accept;       ///< in place of Sec-WebSocket-Accept
   bool settings_by_http = false;  ///< what a message configures is not heard
@@ -51,6 +54,7 @@ struct StandInFaults {
     silence,
     garbage,
     other_device,
+    no_device,  ///< its states list none
     close,
     drop_every_third,
     workspace,
@@ -79,15 +83,27 @@ class StandInInverse {
   /// The script of the hand begins.
   void begin();
   void tell(const InverseEvent& event);
-  void press(std::uint32_t buttons);
+  void press(std::uint32_t buttons) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    buttons_ = buttons;
+  }
   [[nodiscard]] int forces() const { return forces_; }
   [[nodiscard]] double largest_N();
   [[nodiscard]] Eigen::Vector3d last_N();
-  [[nodiscard]] std::string last_profile();
-  [[nodiscard]] InverseFormat last_format();
+  [[nodiscard]] std::string last_profile() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return last_profile_;
+  }
+  [[nodiscard]] InverseFormat last_format() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return last_format_;
+  }
   /// Targets of what was posted.
   [[nodiscard]] std::vector<std::string> posts();
-  [[nodiscard]] InverseSettings settings();
+  [[nodiscard]] InverseSettings settings() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return set_;
+  }
 
  private:
   void accept_all();
@@ -118,7 +134,7 @@ class StandInInverse {
   std::vector<std::string> posts_;
   std::vector<int> listeners_;
   std::atomic<int> forces_{0};
-  std::atomic<bool> ending_{false};
+  std::atomic<bool> ending_{false}, told_{false};
   std::vector<std::thread> talks_;
   std::thread accepting_;
 };
@@ -167,6 +183,8 @@ inline StandInInverse::StandInInverse(const PlantSettings& plant, OperatorScript
   set_.basis = faults_.basis;
   set_.mount_rotation = Eigen::AngleAxisd(faults_.mount_turned_rad, Eigen::Vector3d::UnitX());
   set_.mount_scale *= faults_.scale;
+  set_.mount_position_m.x() = faults_.mounted_m;
+  set_.torque_scaling = faults_.torque_scaling;
   set_.filters_named = true;
   set_.force_gate_gain = faults_.gate;
   set_.damping = faults_.damping;
@@ -191,11 +209,6 @@ inline void StandInInverse::tell(const InverseEvent& event) {
   for (const int listener : listeners_) stand_in::send_text(listener, event_message(event));
 }
 
-inline void StandInInverse::press(std::uint32_t buttons) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  buttons_ = buttons;
-}
-
 inline double StandInInverse::largest_N() {
   const std::lock_guard<std::mutex> lock(mutex_);
   return largest_N_;
@@ -204,21 +217,6 @@ inline double StandInInverse::largest_N() {
 inline Eigen::Vector3d StandInInverse::last_N() {
   const std::lock_guard<std::mutex> lock(mutex_);
   return last_N_;
-}
-
-inline std::string StandInInverse::last_profile() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return last_profile_;
-}
-
-inline InverseFormat StandInInverse::last_format() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return last_format_;
-}
-
-inline InverseSettings StandInInverse::settings() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return set_;
 }
 
 inline bool StandInInverse::keeps(std::string_view name) const {
@@ -275,7 +273,9 @@ inline InverseInventory StandInInverse::inventory() {
 
 /// Hardware has a status, too.
 inline std::string StandInInverse::inventory_text() {
+  if (faults_.no_inventory_json) return R"({"inverse3":[{"device_id":)";
   std::string text = inventory_message(inventory());
+  if (faults_.names_no_gravity) text.replace(text.find("\"gravity_comp"), 13, "\"unnamed_");
   const std::string bare = R"("status":{})";
   const std::size_t at = faults_.in_use ? text.find(bare) : text.npos;
   return at == text.npos ? text : text.replace(at, bare.size(), R"("status":{"in_use":true})");
@@ -293,6 +293,7 @@ inline void StandInInverse::post(const std::string& target, const std::string& b
     set_.gravity_compensation = set.at(old ? "enable" : "enabled").get<bool>();
     set_.gravity_scaling = set.at(old ? "gravity_scaling_factor" : "scaling_factor").get<double>();
   }
+  if (sets("torque_scaling")) set_.torque_scaling = set.at("enabled").get<bool>();
   if (sets("preset")) set_.preset = set.at("preset").get<std::string>();
   if (sets("basis")) set_.basis = set.at("permutation").get<std::string>();
   if (sets("force_gate")) set_.force_gate_gain = set.at("gain").get<double>();
@@ -307,6 +308,7 @@ inline void StandInInverse::post(const std::string& target, const std::string& b
   if (sets("mount")) {
     const auto rotation = set.at("transform").at("rotation"),
                scale = set.at("transform").at("scale");
+    set_.mount_position_m.x() = part(set.at("transform").at("position"), "x");
     set_.mount_rotation = {part(rotation, "w"), part(rotation, "x"), part(rotation, "y"),
                            part(rotation, "z")};
     set_.mount_scale = {part(scale, "x"), part(scale, "y"), part(scale, "z")};
@@ -377,6 +379,12 @@ inline std::optional<std::vector<std::string>> StandInInverse::answer(const std:
   }
   std::string id = faults_.devices.at(0);
   if (faults_.from > 0 && forces_ >= faults_.from) {
+    if (!faults_.last_event.empty() && !told_.exchange(true)) {
+      tell({faults_.last_event, "error", id, "", "last words"});
+    }
+    if (faults_.how == How::no_device) {
+      return std::vector<std::string>{R"({"session_id":7,"inverse3":[]})"};
+    }
     if (faults_.how == How::silence) return none;
     if (faults_.how == How::close && command.force_N && forces_ == faults_.from) {
       return std::nullopt;

@@ -21,6 +21,9 @@ constexpr double kMostUnanswered_s = 0.004;  // after which another message is s
 constexpr int kMostUnreadable = 20;          // in a row
 constexpr std::int64_t kLookForEvents_ns = 2'000'000;
 constexpr double kMoved_m = 1e-6;
+/// For events that were sent just before a connection ended.
+constexpr double kLastEvents_s = 0.05;
+constexpr int kMostLastEvents = 1000;
 
 double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
   return static_cast<double>(to_ns - from_ns) * 1e-9;
@@ -74,7 +77,10 @@ void InverseDevice::prepare(const DevicePreparation& preparation) {
     ask_for_first_state();
   }
   if (!answer_.refresh()) {
-    throw service_fault(service_->over().empty() ? "the service sends no state" : service_->over(),
+    stop();
+    (void)learn_end();
+    const std::string why = status().error_text;
+    throw service_fault(why.empty() ? "the service sends no state" : why,
                         "a service that answers each message");
   }
   seen_ = answer_.latest();
@@ -88,7 +94,9 @@ void InverseDevice::ask_for_first_state() {
   }
   waiting_ = {};
   workspace_m_.reset();
-  (void)exchange(probe_message(device_.id), kPatience_s);
+  if (!exchange(probe_message(device_.id), kPatience_s)) {
+    lose_connection("the service sends no state");
+  }
 }
 
 void InverseDevice::enable_forces() {
@@ -96,12 +104,28 @@ void InverseDevice::enable_forces() {
   forces_on_ = true;
 }
 
-void InverseDevice::fail(Fault fault, std::string_view words) noexcept {
-  if (failing_.exchange(true)) return;  // the first one counts, of whichever thread
-  const std::size_t size = std::min(words.size(), fault_words_.size() - 1);
-  std::memcpy(fault_words_.data(), words.data(), size);
-  fault_words_[size] = '\0';
+void InverseDevice::copy_words(FaultWords& to, std::string_view words) noexcept {
+  const std::size_t size = std::min(words.size(), to.size() - 1);
+  std::memcpy(to.data(), words.data(), size);
+  to[size] = '\0';
+}
+
+/// False if something else had failed before.
+bool InverseDevice::fail(Fault fault, std::string_view words) noexcept {
+  if (failing_.exchange(true)) return false;  // the first one counts, of whichever thread
+  copy_words(fault_words_, words);
   fault_.store(fault, std::memory_order_release);
+  return true;
+}
+
+/// An event that has come already is the cause; one that comes a little later completes it.
+void InverseDevice::lose_connection(std::string_view words) {
+  if (events_ != nullptr) {
+    while (const std::optional<std::string> text = events_->receive(0.0)) {
+      if (take_event(*text)) break;
+    }
+  }
+  (void)fail(Fault::connection, words);
 }
 
 Eigen::Vector3d InverseDevice::force_to_send() noexcept {
@@ -125,13 +149,13 @@ bool InverseDevice::exchange(const std::string& message, double timeout_s) {
   }
   waiting_.sent(asked_ns);
   if (!service_->send(message)) {
-    fail(Fault::connection, service_->over());
+    lose_connection(service_->over());
     return false;
   }
   std::optional<std::string> text = service_->receive(timeout_s, address_.poll);
   if (!text) {
     ++unanswered_;
-    if (!service_->over().empty()) fail(Fault::connection, service_->over());
+    if (!service_->over().empty()) lose_connection(service_->over());
     return false;
   }
   for (; text; text = service_->receive(0.0)) take_state(*text);
@@ -154,7 +178,9 @@ void InverseDevice::take_state(const std::string& text) {
   } catch (const Error&) {
     ++unreadable_;
     if (++unreadable_in_a_row_ >= kMostUnreadable) {
-      fail(Fault::unknown, "the service sends what is no state");
+      fail(Fault::unknown, lists_device(text, device_.id)
+                               ? "the service sends what is no state"
+                               : "the service sends what is no state: device is listed no more");
     }
   }
 }
@@ -162,17 +188,38 @@ void InverseDevice::take_state(const std::string& text) {
 void InverseDevice::look_for_events() {
   if (events_ == nullptr || now_ns() < next_look_ns_) return;
   next_look_ns_ = now_ns() + kLookForEvents_ns;
-  while (const std::optional<std::string> text = events_->receive(0.0)) {
-    try {
-      const InverseEvent event = parse_event(*text);
-      const bool ours = event.device_id.empty() || same_id(event.device_id, device_.id);
-      const std::optional<Fault> end = end_of(event);
-      if (ours && end) fail(*end, words_of(event));
-    } catch (const Error&) {
-      ++unreadable_;  // an event of a kind that nobody knows ends nothing
-    }
-  }
+  while (const std::optional<std::string> text = events_->receive(0.0)) (void)take_event(*text);
   if (!events_->over().empty()) fail(Fault::connection, "events: " + events_->over());
+}
+
+/// True if it ends the session.
+bool InverseDevice::take_event(const std::string& text) {
+  try {
+    const InverseEvent event = parse_event(text);
+    const bool ours = event.device_id.empty() || same_id(event.device_id, device_.id);
+    const std::optional<Fault> end = end_of(event);
+    if (!ours || !end) return false;
+    const std::string words = words_of(event);
+    if (!fail(*end, words) && told_fault_ == Fault::none) {
+      copy_words(told_words_, words);
+      told_fault_.store(*end, std::memory_order_release);
+    }
+    return true;
+  } catch (const Error&) {
+    ++unreadable_;  // an event of a kind that nobody knows ends nothing
+    return false;
+  }
+}
+
+/// A service may say why it closes or falls silent, on a channel of its own: waits for it a little.
+void InverseDevice::hear_last_events() {
+  if (events_ == nullptr) return;
+  const std::int64_t until_ns = now_ns() + static_cast<std::int64_t>(kLastEvents_s * 1e9);
+  for (int i = 0; i < kMostLastEvents; ++i) {
+    const double left_s = std::max(0.0, seconds_between(now_ns(), until_ns));
+    const std::optional<std::string> text = events_->receive(left_s);
+    if (!text || take_event(*text)) return;
+  }
 }
 
 /// Until the loop has written another force, or a fraction of a period is over.
@@ -215,7 +262,8 @@ void InverseDevice::exchange_in_turn() noexcept {
   over_ = true;
 }
 
-/// A zero force, and the end of both connections; waits for nobody.
+/// A zero force, and the end of both connections. Of a connection that was lost the last events are
+/// heard, which takes kLastEvents_s at most.
 void InverseDevice::say_goodbye() noexcept {
   try {
     if (prepared_ && service_->over().empty()) {
@@ -224,6 +272,10 @@ void InverseDevice::say_goodbye() noexcept {
   } catch (...) {  // no memory: the connection closes below
   }
   if (service_->over().empty()) service_->close();
+  try {
+    if (fault_ == Fault::connection) hear_last_events();
+  } catch (...) {  // no memory: the cause stays that of the connection
+  }
   if (events_ != nullptr) events_->close();
 }
 
@@ -262,7 +314,7 @@ DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
   } else {
     try {
       if (!exchange(force_message(format_, device_.id, force_to_send()), kPatience_s)) {
-        fail(Fault::connection, "the service is silent");
+        lose_connection("the service is silent");
         return DeviceAnswer::failed;
       }
       look_for_events();
@@ -275,13 +327,19 @@ DeviceAnswer InverseDevice::write(const Eigen::Vector3d& force_N) noexcept {
 }
 
 DeviceStatus InverseDevice::status() noexcept {
-  const Fault fault = fault_.load(std::memory_order_acquire);
+  Fault fault = fault_.load(std::memory_order_acquire);
+  const FaultWords* words = &fault_words_;
+  if (const Fault told = told_fault_.load(std::memory_order_acquire);
+      fault == Fault::connection && told != Fault::none) {
+    fault = told;
+    words = &told_words_;
+  }
   status_.failed = fault == Fault::connection;
   status_.forces_off = forces_off(fault);
   if (fault == Fault::none && cut_) status_.forces_off = ForcesOff::software;
   if (fault != Fault::none) {
     status_.error = 1;
-    std::memcpy(status_.error_text, fault_words_.data(), sizeof status_.error_text);
+    std::memcpy(status_.error_text, words->data(), sizeof status_.error_text);
   }
   return status_;
 }
@@ -345,6 +403,16 @@ void InverseDevice::stop() noexcept {
   constexpr timespec kLook{0, 100'000};
   constexpr int kLooks = 30;
   for (int i = 0; i < kLooks && !over_; ++i) (void)::nanosleep(&kLook, nullptr);
+}
+
+/// Until the thread of the messages has heard the last events and is over.
+bool InverseDevice::learn_end() noexcept {
+  constexpr timespec kLook{0, 1'000'000};
+  constexpr int kLooks = 2000;
+  for (int i = 0; i < kLooks && messages_.joinable() && !over_; ++i) {
+    (void)::nanosleep(&kLook, nullptr);
+  }
+  return true;
 }
 
 void InverseDevice::cut_forces() noexcept {

@@ -14,6 +14,7 @@
 #include "tpm/haptics/inverse/unanswered_messages.hpp"
 #include "tpm/haptics/loop/triple_buffer.hpp"
 #include "tpmkit/device.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 
@@ -68,6 +69,7 @@ class InverseDevice final : public HapticDevice {
   HandState hand() noexcept override;
   std::vector<std::string> findings() const override;  // from any thread
   void stop() noexcept override;
+  bool learn_end() noexcept override;
   void cut_forces() noexcept override;
 
   /// Round trips of messages since prepare().
@@ -90,6 +92,7 @@ class InverseDevice final : public HapticDevice {
   void make_neutral();
   void require_neutral() const;
   void learn_settings();
+  void notice_settings();
   void identify();
   [[nodiscard]] InverseInventory read_back();
   [[nodiscard]] std::string take_text(double timeout_s);
@@ -100,11 +103,17 @@ class InverseDevice final : public HapticDevice {
   [[nodiscard]] Eigen::Vector3d force_to_send() noexcept;
   void wait_for_order() noexcept;
   void look_for_events();
+  bool take_event(const std::string& text);
+  void hear_last_events();
+  void lose_connection(std::string_view words);
+  [[nodiscard]] Error silence();
   /// Why forces no longer reach the hand. `connection`: nothing is known of the device.
   enum class Fault { none, connection, unplugged, software, watchdog, unknown };
   [[nodiscard]] static std::optional<Fault> end_of(const InverseEvent& event);
   [[nodiscard]] static ForcesOff forces_off(Fault fault) noexcept;
-  void fail(Fault fault, std::string_view words) noexcept;
+  using FaultWords = std::array<char, sizeof DeviceStatus::error_text>;
+  bool fail(Fault fault, std::string_view words) noexcept;
+  static void copy_words(FaultWords& to, std::string_view words) noexcept;
   void say_goodbye() noexcept;
   void wake() noexcept;
   [[nodiscard]] std::int64_t session_ns() const noexcept;
@@ -133,8 +142,11 @@ class InverseDevice final : public HapticDevice {
   std::atomic<bool> begun_{false};  ///< the thread of the messages has asked once
   std::atomic<bool> failing_{false};
   std::atomic<Fault> fault_{Fault::none};
-  std::array<char, sizeof DeviceStatus::error_text> fault_words_{};  ///< before fault_ is set
-  Socket wake_;                                                      ///< an eventfd
+  FaultWords fault_words_{};  ///< before fault_ is set
+  /// Of an event that was read after the connection had been lost: it is the cause.
+  std::atomic<Fault> told_fault_{Fault::none};
+  FaultWords told_words_{};  ///< before told_fault_ is set
+  Socket wake_;              ///< an eventfd
   // Of the thread of the messages.
   std::thread messages_;
   UnansweredMessages waiting_;

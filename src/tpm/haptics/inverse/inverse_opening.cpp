@@ -18,6 +18,7 @@ namespace {
 constexpr std::string_view kProfile = "org.tpmkit:tpm-hil";
 /// A client that has ended is gone within this time, and one that is silent drives no more.
 constexpr double kUntilFree_s = 2.5;
+constexpr double kMounted_m = 1e-6;
 
 /// "3 devices: 049D, 0A14, 1B20".
 std::string devices_there(const InverseInventory& inventory) {
@@ -27,6 +28,33 @@ std::string devices_there(const InverseInventory& inventory) {
   return count == 0
              ? "no device"
              : fmt::format("{} device{}: {}", count, count == 1 ? "" : "s", fmt::join(ids, ", "));
+}
+
+/// Without what was expected.
+std::string reason_of(const Error& error) {
+  const std::string_view all = error.what();
+  return std::string(all.substr(0, all.find("; expected")));
+}
+
+/// Throws Error(environment) with the port.
+InverseInventory inventory_from(const std::string& text, int port) {
+  try {
+    return parse_inventory(text);
+  } catch (const Error& error) {
+    throw service_fault(
+        fmt::format("127.0.0.1:{}: the inventory cannot be read: {}", port, reason_of(error)),
+        "a service that is compatible with the Inverse service");
+  }
+}
+
+std::unique_ptr<WebSocketClient> events_of(const InverseAddress& address) {
+  try {
+    return std::make_unique<WebSocketClient>(address.events_port, "/", kPatience_s,
+                                             kMostMessageBytes);
+  } catch (const Error& error) {
+    throw service_fault(fmt::format("no events are heard: {}", reason_of(error)),
+                        "the events port of the service: --inverse-events-port");
+  }
 }
 
 /// Empty: none is told there.
@@ -54,7 +82,7 @@ std::string told_version(const InverseAddress& address) {
 std::string inverse_events_fault(const InverseAddress& address) {
   if (format_of_version(told_version(address)) != InverseFormat::vector) return {};
   try {
-    const WebSocketClient events(address.events_port, "/", kPatience_s, kMostMessageBytes);
+    (void)events_of(address);
     return {};
   } catch (const Error& error) {
     return error.what();
@@ -68,14 +96,25 @@ InverseInventory inverse_inventory(const InverseAddress& address) {
     throw service_fault(service.over().empty() ? "the service is silent" : service.over(),
                         "a service that begins with its inventory");
   }
-  return parse_inventory(*text);
+  return inventory_from(*text, address.port);
 }
 
 std::string InverseDevice::take_text(double timeout_s) {
   std::optional<std::string> text = service_->receive(timeout_s);
   if (text) return std::move(*text);
-  throw service_fault(service_->over().empty() ? "the service is silent" : service_->over(),
-                      "a service that answers each message");
+  throw silence();
+}
+
+/// Of a service that answers nothing more before a session, with what its events say.
+Error InverseDevice::silence() {
+  hear_last_events();
+  const DeviceStatus said = status();
+  if (said.forces_off != ForcesOff::none) {
+    return service_fault(fmt::format("the service says {}", said.error_text),
+                         "a device that is plugged in and free");
+  }
+  return service_fault(service_->over().empty() ? "the service is silent" : service_->over(),
+                       "a service that answers each message");
 }
 
 /// The device that is meant, of those in the inventory.
@@ -135,10 +174,13 @@ void InverseDevice::look_for_other_clients() {
 /// What the service says of its devices now, as this session sees them.
 InverseInventory InverseDevice::read_back() {
   if (format_ == InverseFormat::vector) {
-    return parse_inventory(http_exchange(
-        address_.port, fmt::format("/devices?session=%23{}", session_), "", kPatience_s));
+    return inventory_from(
+        http_exchange(address_.port, fmt::format("/devices?session=%23{}", session_), "",
+                      kPatience_s),
+        address_.port);
   }
-  return parse_inventory(http_exchange(address_.old_http_port, "/3.0/devices", "", kPatience_s));
+  return inventory_from(http_exchange(address_.old_http_port, "/3.0/devices", "", kPatience_s),
+                        address_.old_http_port);
 }
 
 void InverseDevice::make_neutral() {
@@ -188,6 +230,15 @@ void InverseDevice::require_neutral() const {
     throw service_fault(fmt::format("the service turns coordinates: a mount by {} rad", turned_rad),
                         "a mount that is not turned");
   }
+  if (s.preset.empty() && !(s.mount_position_m.norm() < kMounted_m)) {
+    throw service_fault(
+        fmt::format("the service moves coordinates: a mount by {} m", s.mount_position_m.norm()),
+        "a mount at 0 0 0");
+  }
+  if (s.torque_scaling.value_or(false)) {
+    throw service_fault("the torque scaling of the service stays on",
+                        "a service whose torque scaling can be switched off");
+  }
   if (!s.filters_named || !s.damping_named) {
     throw service_fault(
         fmt::format("the service of version {} does not say what its {} does to a force", version_,
@@ -208,6 +259,21 @@ void InverseDevice::require_neutral() const {
     throw service_fault(fmt::format("the damping of the service stays at {}, by direction {}",
                                     s.damping, fmt::join(s.directional_damping, " ")),
                         "a service whose damping can be set to 0");
+  }
+}
+
+/// What stays unknown of the settings, or is not this session's to change.
+void InverseDevice::notice_settings() {
+  const InverseSettings& s = device_.settings;
+  if (!s.gravity_named) {
+    noticed_.push_back(
+        "the service does not name gravity compensation: it is unknown how much of the device's "
+        "weight the hand carries");
+  }
+  if (!s.preset.empty() && !(s.mount_position_m.norm() < kMounted_m)) {
+    noticed_.push_back(fmt::format(
+        "the service names a mount at {} m beside the preset '{}': taken as that of the preset",
+        fmt::join(s.mount_position_m, " "), printable(s.preset)));
   }
 }
 
@@ -241,11 +307,10 @@ const DeviceIdentity& InverseDevice::open() {
   version_ = told_version(address_);
   format_ = format_of_version(version_);
   noticed_.clear();
-  choose(parse_inventory(take_text(kPatience_s)));
+  choose(inventory_from(take_text(kPatience_s), address_.port));
   look_for_other_clients();
   if (format_ == InverseFormat::vector) {
-    events_ = std::make_unique<WebSocketClient>(address_.events_port, "/", kPatience_s,
-                                                kMostMessageBytes);
+    events_ = events_of(address_);
   }
   make_neutral();
   if (!device_.settings.true_to_scale() || !is_scaled_as_device(device_.state)) {
@@ -256,6 +321,7 @@ const DeviceIdentity& InverseDevice::open() {
                                     angle_rad(device_.state.workspace_rotation)),
                         "a workspace that is not turned");
   }
+  notice_settings();
   identify();
   return identity_;
 }

@@ -302,6 +302,21 @@ InverseState parse_state(std::string_view text, std::string_view device_id) {
   return *state;
 }
 
+bool lists_device(std::string_view text, std::string_view device_id) {
+  try {
+    const Json json = message_json(text, kMostInventoryBytes);
+    const Part message(json, "state");
+    bool listed = !message.has(key::device);
+    if (listed) return true;
+    message.at(key::device).each([&](const Part& part) {
+      listed = listed || part.at(key::id).is(device_id);
+    });
+    return listed;
+  } catch (const Error&) {
+    return true;  // it is no such message
+  }
+}
+
 InverseCommand parse_command(std::string_view text, std::string_view device_id) {
   const Json json = message_json(text, kMostMessageBytes);
   const Part message(json, "command");

@@ -95,6 +95,9 @@ struct InverseInventory {
 /// Later messages. Throws Error(bad_input) with the key, also if the device is not there.
 [[nodiscard]] InverseState parse_state(std::string_view text, std::string_view device_id);
 
+/// False if it is a message whose list of devices lacks this one.
+[[nodiscard]] bool lists_device(std::string_view text, std::string_view device_id);
+
 /// Request of a client to a device. Forces of several sources add up.
 struct InverseCommand {
   std::optional<Eigen::Vector3d> force_N, position_m;

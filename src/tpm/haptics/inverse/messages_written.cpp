@@ -126,6 +126,10 @@ std::vector<InverseRequest> neutral_requests(InverseFormat format, std::string_v
     }
   }
   if (format == InverseFormat::values) return all;
+  if (s.torque_scaling.value_or(false)) {  // the device's, too: no message sets it
+    all.push_back(
+        {fmt::format("/inverse3/{}/config/{}", device_id, key::torque), R"({"enabled":false})"});
+  }
   const auto of_session = [&](const char* name, std::string body) {
     all.push_back({fmt::format("/inverse3/{}/config/{}?session=%23{}", device_id, name, session),
                    std::move(body)});
@@ -136,10 +140,10 @@ std::vector<InverseRequest> neutral_requests(InverseFormat format, std::string_v
   if (s.basis != "XYZ") of_session(key::basis, R"({"permutation":"XYZ"})");
   const bool turned = s.mount_rotation.angularDistance(Eigen::Quaterniond::Identity()) != 0.0;
   // A mount beside a preset is ambiguous to the service.
-  if (s.preset.empty() && (turned || !s.true_to_scale())) {
+  if (s.preset.empty() && (turned || !s.true_to_scale() || !s.mount_position_m.isZero(0.0))) {
     of_session(key::mount,
                fmt::format(R"({{"transform":{{"position":{},"rotation":{},"scale":{}}}}})",
-                           vector_text(s.mount_position_m),
+                           vector_text(Eigen::Vector3d::Zero()),
                            quaternion_text(Eigen::Quaterniond::Identity()),
                            vector_text(Eigen::Vector3d::Ones())));
   }

@@ -228,7 +228,9 @@ bool watch(const std::shared_ptr<Shared>& s, const RealTimeOptions& options,
   return false;
 }
 
-void fill(ServoOutcome& outcome, const Shared& s) {
+void fill(ServoOutcome& outcome, Shared& s) {
+  s.step.complete_cause();
+  if (outcome.detail.empty()) outcome.detail = s.step.detail();
   outcome.cause = s.step.cause();
   outcome.cycles = s.step.cycles();
   outcome.counts = s.step.counts();

@@ -135,6 +135,7 @@ StopCause ServoStep::read(int missed, ServoRecord& row) noexcept {
   if (answer != DeviceAnswer::time_guard) {
     stale_ = 0;
   } else if (since_s > kMostStale_s) {
+    detail_ = "positions older than 20 ms: the answers of the device were late or missing";
     return StopCause::communication;
   }
   return StopCause::none;

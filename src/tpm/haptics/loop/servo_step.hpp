@@ -48,6 +48,14 @@ class ServoStep {
   StopCause cycle(int missed, ServoRecord& row) noexcept;
   /// Zero force, forces off. Bounded. Remembers the first cause.
   void stop(StopCause cause) noexcept;
+  /// After the loop: completes the cause of a lost connection with what the device has learned.
+  void complete_cause() noexcept {
+    if (cause_ != StopCause::communication || !device_.learn_end()) return;
+    const StopCause known = look_at_status();
+    if (known != StopCause::none) cause_ = known;
+  }
+  /// The cause in words where it alone does not say enough; else empty.
+  [[nodiscard]] const char* detail() const noexcept { return detail_; }
 
   [[nodiscard]] const ServoCounts& counts() const noexcept { return counts_; }
   [[nodiscard]] const DeviceStatus& device_status() const noexcept { return status_; }
@@ -139,6 +147,7 @@ class ServoStep {
   int late_now_ = 0;
   bool begun_ = false, awaited_ = false;
   StopCause cause_ = StopCause::none;
+  const char* detail_ = "";
 };
 
 }  // namespace tpm::haptics

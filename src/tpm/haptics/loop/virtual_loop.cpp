@@ -45,6 +45,8 @@ ServoOutcome run_in_virtual_time(HapticDevice& device, ContactModel& model,
     step.stop(StopCause::exception);
     outcome.detail = "something that is no error was thrown by whoever records";
   }
+  step.complete_cause();
+  if (outcome.detail.empty()) outcome.detail = step.detail();
   outcome.cause = step.cause();
   outcome.cycles = step.cycles();
   outcome.counts = step.counts();

@@ -54,7 +54,8 @@ std::string fault_of(const JitterCheck& check) {
   const ServoOutcome& o = check.outcome;
   const double late_s = o.woke_late.quantile_s(0.99);
   if (o.cause != StopCause::finished) {
-    return fmt::format("the test ended early: {}", word_of(o.cause));
+    return fmt::format("the test ended early: {}{}{}", word_of(o.cause),
+                       o.detail.empty() ? "" : ": ", o.detail);
   }
   const double stall_s = longest_stall_s(check);
   if (const double silent_s = silence_s(check, stall_s); silent_s >= check.watchdog_s) {
@@ -115,6 +116,17 @@ double best_rate_Hz(const JitterCheck& check) {
   return 0.0;
 }
 
+/// The device ended the test, whatever the machine can do.
+bool device_ended(StopCause cause) {
+  static constexpr StopCause kOfDevice[] = {
+      StopCause::communication, StopCause::unplugged,
+      StopCause::velocity,      StopCause::button,
+      StopCause::software,      StopCause::dead_man,
+      StopCause::forces_off,    StopCause::position_not_finite,
+      StopCause::position_jump};
+  return std::ranges::find(kOfDevice, cause) != std::end(kOfDevice);
+}
+
 std::string advice_of(const JitterCheck& check) {
   constexpr double kLongestWatchdog_s = 0.016;
   if (check.outcome.woke_late.count() == 0) {
@@ -127,6 +139,7 @@ std::string advice_of(const JitterCheck& check) {
                  : std::string(
                        "by its wake-ups this machine can do no rate above "
                        "500 Hz");
+  if (device_ended(check.outcome.cause)) return can + "; the device ended the test, not the time";
   if (silence_s(check, stall_s) >= kLongestWatchdog_s) {
     return fmt::format(
         "{}; stalls of {} are longer than any watchdog of the device: give the loop a core of its "
@@ -221,6 +234,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
     check.outcome = run_in_real_time(
         device, std::make_shared<EmptySpace>(session.servo.period_s), ServoSettings{session.servo},
         [](const ServoRecord&) {}, options);
+    check.findings = device->findings();
   } catch (...) {
     device->stop();
     throw;

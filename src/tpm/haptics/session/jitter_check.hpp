@@ -20,6 +20,7 @@ struct JitterCheck {
   double watchdog_s = 0.0, cycle_timeout_s = 0.0;  ///< of the sessions that it speaks for
   int late_limit = 0, missed_limit = 0;            ///< as ServoSettings::most_late, most_missed
   ServoOutcome outcome;
+  std::vector<std::string> findings;  ///< of the device, a line each
   bool timing_kept = false;
   std::string timing;  ///< whether the rate was kept, and for how long; or why not: one line
   std::string advice;  ///< what this machine can do and what to change, one sentence

@@ -175,6 +175,15 @@ std::string newtons(double force_N, int digits = 3) {
   return sized_text(Dimension::force, force_N, digits);
 }
 
+std::string said_by_device(const ServoOutcome& o, const std::vector<std::string>& findings) {
+  std::string text;
+  if (o.device.error != 0) {
+    text += fmt::format("the device said: error {} ({})\n", o.device.error, o.device.error_text);
+  }
+  for (const std::string& line : findings) text += "the device noticed: " + line + "\n";
+  return text;
+}
+
 }  // namespace
 
 Json check_json(const JitterCheck& check) {
@@ -199,6 +208,10 @@ Json check_json(const JitterCheck& check) {
           {"woke_late_histogram", bins},
           {"stalls", stalls_json(check)},
           {"cause", word_of(o.cause)},
+          {"detail", o.detail},
+          {"device_error", o.device.error},
+          {"device_error_text", std::string(o.device.error_text)},
+          {"device_findings", check.findings},
           {"most_consecutive_missed", o.counts.most_consecutive_missed},
           {"most_late_of_1000", o.counts.most_late},
           {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
@@ -229,6 +242,7 @@ std::string check_text(const JitterCheck& check) {
       "take {} ms; end: {}\n",
       o.counts.most_consecutive_missed, o.counts.most_late, significant(1e3 * check.watchdog_s, 3),
       significant(1e3 * check.cycle_timeout_s, 3), word_of(o.cause));
+  text += said_by_device(o, check.findings);
   text += "timing: " + check.timing + "\n" + check.advice + "\n";
   return text + (check.session ? session_verdict_text(*check.session)
                                : "session: none was named, so none was asked for its tissue\n");
@@ -284,11 +298,7 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
           ? std::string()
           : fmt::format(": no hand feels it (less than {} N, assumed)", kLeastFeltForce_N));
   text += fmt::format("end: {}{}{}\n", word_of(o.cause), o.detail.empty() ? "" : ": ", o.detail);
-  if (o.device.error != 0) {
-    text += fmt::format("the device said: error {} ({})\n", o.device.error, o.device.error_text);
-  }
-  for (const std::string& line : run.findings) text += "the device noticed: " + line + "\n";
-  return text;
+  return text + said_by_device(o, run.findings);
 }
 
 Json verification_json(const HilRecording& recording, const Verification& v) {
