@@ -169,7 +169,8 @@ inline void push_until(WebSocketClient& client, double asked_N, double rendered_
   }
 }
 
-/// Time until the hand renders nothing; the client only probes.
+/// Time until the hand renders nothing; the client only probes, which takes back a force of its
+/// own.
 inline double to_zero_s(WebSocketClient& client) {
   const std::int64_t from_ns = now_ns();
   while (answered_N(client, probe_message("SIMULATED")) > 0.0 && since_s(from_ns) < 5.0) {
@@ -236,9 +237,12 @@ inline std::vector<InverseHazardRow> inverse_hazard_rows(double watchdog_s, doub
   rows.push_back(ended("the loop hangs", "no command in the watchdog's time", silent_s, watchdog_s,
                        {}, {}, true));
   rows.push_back(served("client: falls silent", "zero", kDriverSilence_s + scheduling_s, kLimit_N,
-                        [](WebSocketClient& client, int /*port*/, double& after_s) {
+                        [](WebSocketClient& client, int port, double& after_s) {
+                          // Who pushes says nothing more; another client looks.
+                          WebSocketClient reader(port, "/", 5.0, kMostInventoryBytes);
+                          (void)reader.receive(5.0);
                           push_until(client, 2.0, 2.0);
-                          after_s = to_zero_s(client);
+                          after_s = to_zero_s(reader);
                           return std::string("zero");
                         }));
   rows.push_back(served("client: asks for 1000 N", "limited", 5.0, kLimit_N,
