@@ -21,8 +21,8 @@ TEST_CASE("On the clock, too, every hazard ends as it should, with forces within
     CAPTURE(row.hazard, row.setting, word_of(row.cause), row.to_zero_s, row.tries);
     CHECK((row.cause == row.expected || is_stop_of_a_stall(row.cause)));
     CHECK(row.largest_force_N <= study.force_limit_N);
-    if (row.cause == StopCause::finished) continue;
-    CHECK(row.to_zero_s < 1e8);  // forces were switched off
+    CHECK(row.forces_off);  // of each try, also of one that a stall ended before its fault
+    if (row.cause == StopCause::finished || !row.by_fault) continue;
     // Nobody waits for a call that takes long enough to tell.
     if (row.cause == StopCause::cycle_timeout && row.expected == row.cause && row.lasts_s > 0.1) {
       CHECK(row.to_zero_s < row.lasts_s);
@@ -32,7 +32,7 @@ TEST_CASE("On the clock, too, every hazard ends as it should, with forces within
                                    [](const auto& row) { return row.cause == row.expected; });
   if (ended < static_cast<std::ptrdiff_t>(study.rows.size())) {
     WARN("the machine stalled: " << study.rows.size() - static_cast<std::size_t>(ended)
-                                 << " rows ended by that, 10 times each");
+                                 << " rows ended by that, " << study.most_tries << " times each");
   }
   const std::string text = clock_hazard_text(study);
   CHECK(std::count(text.begin(), text.end(), '\n') ==

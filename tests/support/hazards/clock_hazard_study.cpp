@@ -20,6 +20,7 @@ namespace tpm::haptics {
 namespace {
 
 constexpr int kMostTries = 10;
+constexpr int kMostTriesUntimed = 3;  // where no time counts: a stall of the machine may end all
 constexpr double kStopBound_s = 0.010;
 constexpr std::uint64_t kHeldAt = 1800;  // a period in which the tool is held in the tissue
 
@@ -41,12 +42,14 @@ struct ClockHazard {
 struct Moments {
   std::atomic<std::int64_t> fault_ns{0}, off_ns{0};
   std::atomic<int> under_way{0};  ///< calls that hang
+  std::atomic<bool> off{false};   ///< forces were switched off, with or without a fault
 
   void begin_fault() noexcept {
     std::int64_t none = 0;
     fault_ns.compare_exchange_strong(none, now_ns());
   }
   void forces_off() noexcept {
+    off = true;
     std::int64_t none = 0;
     if (fault_ns != 0) off_ns.compare_exchange_strong(none, now_ns());
   }
@@ -188,7 +191,8 @@ std::vector<ClockHazard> clock_hazards() {
 struct ClockRun {
   ServoOutcome outcome;
   double largest_N = 0.0;
-  std::optional<double> to_zero_s;
+  bool forces_off = false;
+  std::optional<double> to_zero_s;  ///< nothing of one that ended before its fault
 };
 
 ClockRun run_once(const ClockHazard& hazard, HilSession session) {
@@ -224,6 +228,7 @@ ClockRun run_once(const ClockHazard& hazard, HilSession session) {
     return true;
   };
   run.outcome = run_in_real_time(device, model, servo, sink, options);
+  run.forces_off = moments->off;
   if (moments->fault_ns != 0 && moments->off_ns != 0) {
     run.to_zero_s = 1e-9 * static_cast<double>(moments->off_ns - moments->fault_ns);
   }
@@ -234,17 +239,16 @@ ClockRun run_once(const ClockHazard& hazard, HilSession session) {
 }
 
 ClockHazardRow clock_row_of(const ClockHazard& hazard, const HilSession& session, bool in_time,
-                            std::string& scheduling) {
+                            int most_tries, std::string& scheduling) {
   ClockHazardRow row;
   row.hazard = hazard.name;
   row.setting = hazard.setting;
   row.expected = hazard.expected;
   row.bound_s = hazard.bound_s;
   row.lasts_s = hazard.lasts_s;
-  bool by_fault = false;  // and not by a stall of the machine before it
   const auto done = [&] {
-    return row.tries == kMostTries ||
-           (in_time ? row.within : row.tries > 0 && row.cause == row.expected && by_fault);
+    return row.tries == most_tries ||
+           (in_time ? row.within : row.tries > 0 && row.cause == row.expected && row.by_fault);
   };
   while (!done()) {
     ++row.tries;
@@ -256,7 +260,8 @@ ClockHazardRow clock_row_of(const ClockHazard& hazard, const HilSession& session
     row.largest_force_N = in_time ? run.largest_N : std::max(row.largest_force_N, run.largest_N);
     const bool finished = row.expected == StopCause::finished;
     row.to_zero_s = finished ? 0.0 : run.to_zero_s.value_or(1e9);
-    by_fault = finished || run.to_zero_s.has_value();
+    row.by_fault = finished || run.to_zero_s.has_value();
+    row.forces_off = row.forces_off && run.forces_off;
     const bool counted =
         !finished || row.consecutive_missed + 2 >= std::lround(1e3 * hazard.lasts_s);
     const bool felt = hazard.at == 0 || row.largest_force_N > 0.0;  // it came in the tissue
@@ -276,10 +281,11 @@ bool ClockHazardStudy::safe() const {
 ClockHazardStudy study_hazards_on_the_clock(bool in_time) {
   const HilSession session = parse_session(short_star_session(), "session", {});
   ClockHazardStudy study;
-  study.most_tries = kMostTries;
+  study.most_tries = in_time ? kMostTries : kMostTriesUntimed;
   study.force_limit_N = session.servo.force_limit_N;
   for (const ClockHazard& hazard : clock_hazards()) {
-    study.rows.push_back(clock_row_of(hazard, session, in_time, study.scheduling));
+    study.rows.push_back(
+        clock_row_of(hazard, session, in_time, study.most_tries, study.scheduling));
   }
   return study;
 }

@@ -17,6 +17,8 @@ struct ClockHazardRow {
   double bound_s = 0.0;          ///< for that
   double lasts_s = 0.0;          ///< the call that hangs
   int tries = 0;                 ///< until one was within bounds, or ended as it should
+  bool by_fault = false;         ///< the last try came to its fault; to_zero_s is known
+  bool forces_off = true;        ///< at the end of each try
   bool within = false;           ///< the expected end, in time, forces within the limit
 };
 
