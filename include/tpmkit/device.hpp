@@ -22,7 +22,7 @@ enum class ForcesOff : std::int32_t {
   unknown = 7,  ///< a value that is not listed
 };
 
-[[nodiscard]] std::string_view word_of(ForcesOff cause);
+[[nodiscard]] std::string_view to_string(ForcesOff cause);
 
 /// Result of a call to a device.
 enum class DeviceAnswer {
@@ -43,7 +43,7 @@ enum class DeviceLink {
   unknown,
 };
 
-[[nodiscard]] std::string_view word_of(DeviceLink link);
+[[nodiscard]] std::string_view to_string(DeviceLink link);
 
 /// Identity of a device, as it reports it.
 struct DeviceIdentity {

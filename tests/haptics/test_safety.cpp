@@ -255,7 +255,7 @@ TEST_CASE("What is unstable and accepted ends with a cause of its own, not as fi
   for (const char* modulus : {"1e6 kPa", "3 MPa"}) {
     CAPTURE(modulus);
     const StopCause cause = accepted(stiff_session(modulus)).outcome.cause;
-    CAPTURE(word_of(cause));
+    CAPTURE(to_string(cause));
     CHECK((cause == StopCause::oscillation || cause == StopCause::energy));
   }
   Json delayed = stiff_session("36 kPa", 50);

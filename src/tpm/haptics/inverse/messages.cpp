@@ -219,7 +219,7 @@ InverseDeviceEntry entry_of(const Part& part) {
 
 }  // namespace
 
-std::string_view word_of(InverseFormat format) {
+std::string_view to_string(InverseFormat format) {
   return format == InverseFormat::vector ? key::vector : key::values;
 }
 

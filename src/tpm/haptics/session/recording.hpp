@@ -40,7 +40,7 @@ struct HilRecording {
 
   /// Nothing is missing: neither the end nor a row.
   [[nodiscard]] bool whole() const { return closed && damaged == 0; }
-  /// Why the session ended, as word_of(StopCause); "cut off" without a closing record.
+  /// Why the session ended, as to_string(StopCause); "cut off" without a closing record.
   [[nodiscard]] std::string cause() const;
   /// Of the end: of the last row.
   [[nodiscard]] double end_s() const;

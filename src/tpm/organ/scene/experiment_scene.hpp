@@ -66,7 +66,7 @@ struct SceneContact {
 };
 
 /// The word for it in scenes and results.
-[[nodiscard]] std::string_view word_of(ContactKind kind);
+[[nodiscard]] std::string_view to_string(ContactKind kind);
 
 /// The spheres that a contact of the kinds `sphere` and `patch` drives, rising.
 [[nodiscard]] std::vector<std::size_t> spheres_of(const SceneContact& contact, const Organ& organ);
