@@ -414,7 +414,7 @@ TEST_CASE("the effective number of an autoregression is n (1 - phi) / (1 + phi)"
   CHECK_THAT(alternating.integrated_time, WithinRel(1.0 / 3.0, 0.1));
   CHECK(alternating.effective_count == 10000.0);
   CHECK(alternating.inflation() == 1.0);
-  CHECK_THAT(alternating.words, Contains("alternate"));
+  CHECK_THAT(alternating.summary, Contains("alternate"));
 }
 
 TEST_CASE("independent residuals keep their number") {
@@ -445,7 +445,7 @@ TEST_CASE("odd residuals: constant, zero, three, none, several recordings") {
   const Correlation three = residual_correlation(std::vector<double>{1.0, 1.0, 1.0});
   CHECK(three.effective_count == 3.0);
   CHECK(three.ljung_box_lags == 0);
-  CHECK_THAT(three.words, Contains("too few"));
+  CHECK_THAT(three.summary, Contains("too few"));
   CHECK(residual_correlation(std::vector<double>{}).inflation() == 1.0);
   CHECK_THROWS_WITH(residual_correlation(std::vector<double>{1.0, std::nan("")}),
                     Contains("finite"));
@@ -652,7 +652,7 @@ TEST_CASE("whole recordings carry the spread between specimens") {
   // The intercept is nearly the mean of the offsets.
   CHECK_THAT(b.parameters[0].standard_error, WithinRel(std::sqrt(square / 10.0), 0.15));
   CHECK(b.parameters[1].standard_error < 0.05);
-  CHECK_THAT(b.words, Contains("whole recordings"));
+  CHECK_THAT(b.summary, Contains("whole recordings"));
 
   const CurveRefit single(straight_line, data, 1);
   CHECK_THROWS_WITH(bootstrap(single, line_parameters(), m, options), Contains("at least 2"));
@@ -704,7 +704,7 @@ TEST_CASE("failed refits are counted and said") {
   const BootstrapResult b = bootstrap(Fragile(refit, 1.0), line_parameters(), m, options);
   CHECK(b.failed > 0);
   CHECK(b.parameters[0].replicates.size() + static_cast<std::size_t>(b.failed) == 200);
-  CHECK_THAT(b.words, Contains("of them failed and are left out"));
+  CHECK_THAT(b.summary, Contains("of them failed and are left out"));
   CHECK_THROWS_WITH(bootstrap(Fragile(refit, -0.5), line_parameters(), m, options),
                     Contains("refits failed"));
 }
@@ -955,7 +955,7 @@ TEST_CASE("equal standard errors have REML in closed form, and its boundary") {
   CHECK(homogeneous.tau_at_zero);
   CHECK(*homogeneous.i_squared == 0.0);
   CHECK_THAT(homogeneous.standard_error, WithinRel(1.0, 1e-12));  // 2 / sqrt(4), not less
-  CHECK_THAT(homogeneous.words, Contains("no spread"));
+  CHECK_THAT(homogeneous.summary, Contains("no spread"));
 }
 
 TEST_CASE("one and two specimens are answered, none and bad ones refused") {
@@ -987,8 +987,8 @@ TEST_CASE("the waterfall sorts, clusters and counts the ends of the starts") {
   const Waterfall w = waterfall(ends);
   CHECK(w.deviances == std::vector<double>{10.0, 10.000001, 10.05, 12.0, 12.0, 300.0});
   CHECK(w.clusters == std::vector<int>{0, 0, 1, 2, 2, 3});
-  CHECK(w.words == "3 of 7 starts within 0.1 of the best; 4 distinct minima, 1 failed");
-  CHECK(waterfall(std::vector<double>{nan}).words == "none of 1 starts ended in a usable point");
+  CHECK(w.summary == "3 of 7 starts within 0.1 of the best; 4 distinct minima, 1 failed");
+  CHECK(waterfall(std::vector<double>{nan}).summary == "none of 1 starts ended in a usable point");
   CHECK(waterfall({}).near_best == 0);
 }
 

@@ -47,7 +47,7 @@ class _Inputs:
                 raise told from None
 
 
-_VALUES = ("parameters", "recordings", "has_law", "adequacy_json", "flags", "words", "warnings", "correlation")
+_VALUES = ("parameters", "recordings", "has_law", "adequacy_json", "flags", "summary", "warnings", "correlation")
 _TEXTS = ("answer", "text", "to_json")
 
 
@@ -110,12 +110,12 @@ class Fit:
         law does not describe the data: the row holds only if it did), not_separable (what the recording cannot
         tell it from; empty: nothing), with_drift, with_drift_lower, with_drift_upper (estimate and limits of the
         fit with a drift of the zero, where no rest tells one: lower and upper hold these limits, too; else NaN),
-        words.
+        summary.
         """
         import pandas as pd
 
         columns = ["name", "estimate", "standard_error", "lower", "upper", "unit", "verdict", "nuisance",
-                   "only_if_described", "not_separable", "with_drift", "with_drift_lower", "with_drift_upper", "words"]
+                   "only_if_described", "not_separable", "with_drift", "with_drift_lower", "with_drift_upper", "summary"]
         table = pd.DataFrame(self._core.parameters, columns=columns).set_index("name")
         numbers = ["estimate", "standard_error", "lower", "upper", "with_drift", "with_drift_lower", "with_drift_upper"]
         table[numbers] = table[numbers].astype(float)
@@ -194,7 +194,7 @@ class Fit:
         import pandas as pd
 
         laws = json.loads(self._core.to_json()).get("laws", [])
-        columns = ["law", "words", "parameters_estimated", "rms_over_peak", "delta_bic", "identified", "reason"]
+        columns = ["law", "summary", "parameters_estimated", "rms_over_peak", "delta_bic", "identified", "reason"]
         return pd.DataFrame(laws, columns=columns).set_index("law")
 
     @property
@@ -206,20 +206,20 @@ class Fit:
 
     @property
     def adequacy(self) -> dict[str, Any] | None:
-        """Whether the law describes the data: `verdict` (adequate, not_described, not_judged), `words`,
+        """Whether the law describes the data: `verdict` (adequate, not_described, not_judged), `summary`,
         `residual_over_noise` where it was judged, `causes` where it is not described. None: not tested."""
         return json.loads(self._core.adequacy_json)
 
     @property
-    def words(self) -> list[str]:
+    def summary(self) -> list[str]:
         """The recommendation and its reasons."""
-        return self._core.words
+        return self._core.summary
 
     @property
     def warnings(self) -> list[str]:
         """What the experiment cannot tell, and what a reader must know."""
         adequacy = self.adequacy
-        first = [adequacy["words"]] if adequacy and adequacy["verdict"] != "adequate" else []
+        first = [adequacy["summary"]] if adequacy and adequacy["verdict"] != "adequate" else []
         return first + self._core.warnings + self._core.flags
 
     @property
@@ -371,8 +371,8 @@ class Fit:
             interval = " .. ".join("open" if np.isnan(v) else f"{v:.4g}" for v in (row["lower"], row["upper"]))
             lines.append(f"  {name} {row['estimate']:.5g} ({interval}) {row['unit']}, {row['verdict']}")
         adequacy = self.adequacy
-        lines.append("  adequacy: " + (adequacy["words"] if adequacy else "not tested"))
-        doubted = adequacy["words"] if adequacy else None
+        lines.append("  adequacy: " + (adequacy["summary"] if adequacy else "not tested"))
+        doubted = adequacy["summary"] if adequacy else None
         lines += [f"  warning: {w}" for w in self.warnings if w != doubted]
         return "\n".join(lines) + ">"
 
@@ -410,14 +410,14 @@ class Specimens:
     @property
     def pooled(self) -> pd.DataFrame:
         """One row per material parameter, by name, SI: typical, lower, upper, unit, specimens, left_out, identified,
-        i_squared, words."""
+        i_squared, summary."""
         import pandas as pd
 
         rows = []
         for p in self._document["pooled"]:
             lower, upper = p.get("interval_SI") or (None, None)
             rows.append({"name": p["name"], "typical": p.get("typical_SI"), "lower": lower, "upper": upper,
-                         **{k: p.get(k) for k in ("unit", "specimens", "left_out", "identified", "i_squared", "words")}})
+                         **{k: p.get(k) for k in ("unit", "specimens", "left_out", "identified", "i_squared", "summary")}})
         table = pd.DataFrame(rows).set_index("name")
         for column in ("typical", "lower", "upper"):
             table[column] = table[column].astype(float)
@@ -426,7 +426,7 @@ class Specimens:
     @property
     def adequacy(self) -> dict[str, Any]:
         """Whether the law describes the recordings: `verdict` (not_described if one recording says so, else not_judged
-        if one cannot be judged, else adequate), `words`, and the names of the recordings by verdict."""
+        if one cannot be judged, else adequate), `summary`, and the names of the recordings by verdict."""
         names: dict[str, list[str]] = {}
         for r in self.recordings:
             said = (r.get("fit") or {}).get("adequacy")
@@ -434,7 +434,7 @@ class Specimens:
                 names.setdefault(said["verdict"] if said else "not_judged", []).append(r["recording"])
         verdict = next((v for v in ("not_described", "not_judged", "adequate") if v in names), "not_judged")
         words = "; ".join(f"{len(rows)} of {len(self.recordings)} recordings {v.replace('_', ' ')}" for v, rows in names.items())
-        return {"verdict": verdict, "words": words or "no recording is fitted", **names}
+        return {"verdict": verdict, "summary": words or "no recording is fitted", **names}
 
     @property
     def warnings(self) -> list[str]:
@@ -447,7 +447,7 @@ class Specimens:
                 continue
             adequacy = fit.get("adequacy")
             if adequacy and adequacy["verdict"] != "adequate":
-                found.append(f"{r['recording']}: {adequacy['words']}")
+                found.append(f"{r['recording']}: {adequacy['summary']}")
             found += [f"{r['recording']}: {flag}" for flag in fit.get("flags", [])]
         return found
 
@@ -462,8 +462,8 @@ class Specimens:
 
     def __repr__(self) -> str:
         lines = [f"<tpmkit.Specimens {self.law}, {len(self.recordings)} recordings"]
-        lines += [f"  {name}: {row['words']}" for name, row in self.pooled.iterrows()]
-        lines.append(f"  adequacy: {self.adequacy['words']}")
+        lines += [f"  {name}: {row['summary']}" for name, row in self.pooled.iterrows()]
+        lines.append(f"  adequacy: {self.adequacy['summary']}")
         lines += [f"  warning: {w}" for w in self.warnings]
         return "\n".join(lines) + ">"
 

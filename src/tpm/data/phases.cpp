@@ -327,7 +327,7 @@ class Finder {
     const Unit unit = shown_unit(dimension);
     return with_unit(significant(si / unit.to_si, 4), unit);
   }
-  void tell(std::string sentence) { found_.words.push_back(std::move(sentence)); }
+  void tell(std::string sentence) { found_.summary.push_back(std::move(sentence)); }
 
   [[nodiscard]] bool has(PhaseKind kind) const {
     return std::any_of(found_.phases.begin(), found_.phases.end(),

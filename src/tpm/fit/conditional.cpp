@@ -200,7 +200,7 @@ void mark_not_separable(FitResult& result) {
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterResult& p = result.parameters[i];
     p.not_separable = result.config.parameters[i].not_separable;
-    if (!p.not_separable.empty()) p.words = parameter_words(p, result.config.level);
+    if (!p.not_separable.empty()) p.summary = parameter_words(p, result.config.level);
   }
 }
 
@@ -227,7 +227,7 @@ void mark_conditions(FitResult& result, const ResidualFunction& function) {
       add_condition(all[i], condition_of(nuisance, bound.upper, false));
     }
   }
-  for (ParameterResult& p : all) p.words += condition_words(p, all);
+  for (ParameterResult& p : all) p.summary += condition_words(p, all);
   for (const ParameterResult& p : all) {
     if (p.first_bounds) {
       result.flags.push_back(widening_words(p));

@@ -64,10 +64,10 @@ void flag_noise(FitResult& result) {
                     kComputedShare));
   }
   if (result.noise) {
-    result.flags.push_back(result.noise->words);
+    result.flags.push_back(result.noise->summary);
   } else if (result.inflation > 1.0) {
     result.flags.push_back(
-        fmt::format("{}; the intervals count them so", result.correlation.value().words));
+        fmt::format("{}; the intervals count them so", result.correlation.value().summary));
   }
 }
 

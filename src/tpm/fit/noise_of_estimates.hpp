@@ -42,7 +42,7 @@ struct NoiseOfEstimates {
   std::vector<std::size_t> free;    ///< parameters that are not at a bound
   Eigen::MatrixXd covariance;       ///< of those, in natural values
   bool correlated = false;          ///< else rounding is all there is
-  std::string words;                ///< one sentence
+  std::string summary;              ///< one sentence
 };
 
 /// What computing leaves of a reading, in parts of it: responses and minima are exact to about
