@@ -85,7 +85,7 @@ struct ExperimentScene {
 
   /// Some contact besides the first has a protocol of its own.
   [[nodiscard]] bool has_own_protocols() const;
-  /// Whether a contact moves as it is imposed. The mass of such a tool changes no force on the
+  /// True if the motion of the contact is imposed. The mass of such a tool changes no force on the
   /// tissue.
   [[nodiscard]] bool imposes_depth(const SceneContact& contact) const;
   /// The sphere that the first contact drives or aims at, and where to.
