@@ -255,7 +255,7 @@ class Finder {
     return start;
   }
 
-  /// Whether noise alone makes readings look constant: the means of their halves are apart.
+  /// True if noise alone makes readings look constant: the means of their halves are apart.
   [[nodiscard]] bool rises_within_noise(std::size_t first, std::size_t last) const {
     constexpr double kSure = 4.0, kConstant = 0.02;  // standard deviations; of the level
     const std::size_t half = (last - first + 1) / 2;

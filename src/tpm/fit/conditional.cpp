@@ -45,7 +45,7 @@ double further_up(const FitParameter& p, double widest) {
   return moved_bound(p.upper, std::max(p.upper, std::min(rounded(next, kReadableDigits), widest)));
 }
 
-/// Whether the bound of a nuisance parameter cuts the interval of another parameter.
+/// True if the bound of a nuisance parameter cuts the interval of another parameter.
 bool cuts_an_interval(const FitResult& result, LimitingBound bound) {
   return std::any_of(result.parameters.begin(), result.parameters.end(), [&](const auto& p) {
     const auto& by = p.profile.limited_by;

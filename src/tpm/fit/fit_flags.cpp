@@ -42,7 +42,7 @@ void flag_outliers(FitResult& result, const ExperimentResiduals& function) {
       significant(worst_z / unit, 3)));
 }
 
-/// Whether the noise is the least that is believed.
+/// True if the noise is the least that is believed.
 bool is_met_exactly(const FitResult& result) {
   return !result.config.scale_known() && result.degrees_of_freedom > 0 &&
          result.least_variance > 0.0 && result.variance_factor <= result.least_variance;

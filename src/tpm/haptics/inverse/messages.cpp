@@ -179,7 +179,7 @@ InverseSettings settings_of(const Part& config) {
   return s;
 }
 
-/// Whether a device says that it is simulated. Any other word than these is none of a simulation:
+/// True if a device says that it is simulated. Any other word than these is none of a simulation:
 /// hardware keeps its guards.
 bool says_simulated(const Part& part) {
   bool said = false;

@@ -220,7 +220,7 @@ void move_handle(IdentifyRun& run, std::vector<IdentificationSample>& samples,
   }
 }
 
-/// Whether a machine that stalls may have ended the loop, or a device that was left alone by it.
+/// True if a machine that stalls may have ended the loop, or a device that was left alone by it.
 bool is_stall(StopCause cause) {
   return cause == StopCause::watchdog || cause == StopCause::communication ||
          cause == StopCause::unplugged || cause == StopCause::cycle_timeout;
