@@ -15,6 +15,7 @@
 #include "tpm/law/element/closed_form.hpp"
 #include "tpm/paper/tables.hpp"
 #include "tpm/sweep/run_sweep.hpp"
+#include "tpm/sweep/sweep_reader.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
 using namespace tpm;

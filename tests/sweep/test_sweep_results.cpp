@@ -15,6 +15,7 @@
 #include "tpm/sweep/run_sweep.hpp"
 #include "tpm/sweep/show/sweep_convergence_report.hpp"
 #include "tpm/sweep/show/sweep_report.hpp"
+#include "tpm/sweep/sweep_reader.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
 using namespace tpm;
