@@ -69,7 +69,7 @@ int main(int argc, char** argv) try {
   const SessionSummary run = session.run(device, request);
   std::printf("%s, %s\n%llu cycles, ended: %s, largest force %.3f N\n", run.device.name.c_str(),
               run.model.c_str(), static_cast<unsigned long long>(run.outcome.cycles),
-              std::string(word_of(run.outcome.cause)).c_str(), device->largest_N);
+              std::string(to_string(run.outcome.cause)).c_str(), device->largest_N);
   const SessionCheck check = verify_session(request.recording);
   std::printf("reference: %s\napart by %.6f N rms, peak %.3f N\n", check.reference.c_str(),
               check.rms_N, check.peak_N);

@@ -305,14 +305,14 @@ def draw_two(picture):
     sizes = [size_of(slice_frame(picture, cut))] * 3
     for one, state, value in zip(axes[1:], states, values):
         colouring = by_number(value, "displacement [mm]", "Both models on the same spheres", scale)
-        draw_slice(one, picture, state["position_m"], state["tools"], colouring, cut, f"{state['name']}, {state['words']}")
+        draw_slice(one, picture, state["position_m"], state["tools"], colouring, cut, f"{state['name']}, {state['summary']}")
     decorate(page, axes, sizes, picture, colouring, "; ".join(f"{s['name']}: {s['roughness']}" for s in states))
     return page
 
 
 def pages(picture):
     state = picture["states"][0]
-    words = f"{state['name']} at the end of the run, {state['words']}"
+    words = f"{state['name']} at the end of the run, {state['summary']}"
     yield "undeformed", draw_one(picture, picture["position_m"], picture["tools"], by_layer(picture, "Undeformed"), "at rest")
     for name, colouring in [
             ("deformed", by_layer(picture, "Deformed, not magnified")),

@@ -8,8 +8,8 @@ namespace tpm::peers {
 using namespace organ;
 using namespace accuracy;
 
-/// What an engine is told of the network: springs that pull along themselves, spheres with mass and
-/// drag, some held, one driven.
+/// Network as an engine takes it: springs that pull along themselves, spheres with mass and drag,
+/// some fixed, one driven.
 struct SpringNetwork {
   explicit SpringNetwork(const PosedNetwork& posed);
 

@@ -7,7 +7,7 @@
 
 namespace tpm::app {
 
-/// What a command was asked and whether it is so: what its exit code 0 or 1 says.
+/// Yes-or-no answer of a command, as its exit code 0 or 1 tells it.
 struct Verdict {
   std::string_view code;  ///< "network_stands"
   bool holds = false;

@@ -105,7 +105,7 @@ int fit_configuration(const FitOptions& options, const Session& session) {
   const FitResult result = fit_and_judge(configured(options));
   std::string text =
       session.json() ? answer_text(session, to_json(result)) : to_terminal_text(result);
-  if (!session.json() && result.adequacy) text = result.adequacy->words + "\n\n" + text;
+  if (!session.json() && result.adequacy) text = result.adequacy->summary + "\n\n" + text;
   std::vector<std::string> files;
   if (!options.folder.empty() && !options.no_draw) {
     files = write_fit_report(options.folder, result);
@@ -139,10 +139,10 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
     moduli = young_moduli(best, *probe, options.poisson.empty());
   }
   std::string text;
-  if (best.adequacy && best.adequacy->is_rejected()) text += best.adequacy->words + "\n";
+  if (best.adequacy && best.adequacy->is_rejected()) text += best.adequacy->summary + "\n";
   for (const PreparedRecording& r : recordings) {
     if (!r.read_as.empty()) text += fmt::format("{}\n", r.read_as);
-    for (const std::string& words : r.phases.words) text += fmt::format("{}\n", words);
+    for (const std::string& words : r.phases.summary) text += fmt::format("{}\n", words);
   }
   text += fmt::format("\n{}\n{}", to_terminal_text(selection), to_terminal_text(best));
   for (const std::string& words : outside_words(best)) text += fmt::format("! {}\n", words);

@@ -246,7 +246,7 @@ void warn_if_beyond_model(const ServoOutcome& outcome) {
 int exit_code_of(const ServoOutcome& outcome) {
   if (outcome.cause == StopCause::finished) return 0;
   if (outcome.cause == StopCause::signal) return InterruptWatch::exit_code();
-  tell_user("tpm: session stopped: {}{}{}\n", word_of(outcome.cause),
+  tell_user("tpm: session stopped: {}{}{}\n", to_string(outcome.cause),
             outcome.detail.empty() ? "" : ": ", outcome.detail);
   return static_cast<int>(ExitCode::environment);
 }

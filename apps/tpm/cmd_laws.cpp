@@ -53,7 +53,7 @@ Json parameter_json(const LawParameter& p) {
 }
 
 Json law_json(const LawSpec& spec, bool with_parameters) {
-  Json json{{"law", law_name(spec)}, {"words", law_words(spec)}};
+  Json json{{"law", law_name(spec)}, {"summary", law_words(spec)}};
   if (!with_parameters) return json;
   json["parameters"] = array_json(law_parameters(spec), parameter_json);
   return json;

@@ -20,9 +20,9 @@
 
 namespace tpm::app {
 
-/// What every command shares. A command registers its options on a CLI11 subcommand and sets `run`
-/// in that subcommand's callback; main() calls it once, after the whole command line was read, and
-/// nothing that CLI11 filled in is used if reading failed.
+/// State that every command shares. A command registers its options on a CLI11 subcommand and sets
+/// `run` in that subcommand's callback; main() calls it once, after the whole command line was
+/// read, and nothing that CLI11 filled in is used if reading failed.
 struct Session {
   std::string command;          ///< its words after "tpm": "hil verify"
   std::string format = "text";  ///< --format: text or json

@@ -7,7 +7,7 @@
 
 namespace tpm::app {
 
-/// What `tpm design` is told; texts are empty where the option is missing.
+/// Options of `tpm design` as typed; a text is empty if its option is missing.
 struct DesignOptions {
   std::string design;       ///< a design, or a configuration of a fit; empty: laws are studied
   std::string repetitions;  ///< simulated data sets

@@ -14,7 +14,7 @@
 
 namespace tpm::app {
 
-/// What `tpm fit` is told; texts are empty where the option is missing.
+/// Options of `tpm fit` as typed; a text is empty if its option is missing.
 struct FitOptions {
   RecordingOptions recordings;  ///< its files may also be one configuration, or one folder
   std::vector<std::string> laws;

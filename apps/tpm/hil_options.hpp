@@ -32,7 +32,7 @@ void require_libraries(const DeviceOptions& options);
 /// naming the option.
 [[nodiscard]] int listening_port(const std::string& text, const char* option);
 
-/// What was chosen; call when the command runs.
+/// Device and real-time settings of the options; to be called when the command runs.
 [[nodiscard]] DeviceChoice chosen_device(const DeviceOptions& options);
 [[nodiscard]] RealTimeWish chosen_wish(const DeviceOptions& options);
 

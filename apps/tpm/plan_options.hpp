@@ -7,7 +7,7 @@
 
 namespace tpm::app {
 
-/// What `tpm plan` and `tpm simulate --planned` are asked for.
+/// Options of `tpm plan` and `tpm simulate --planned` as typed.
 struct PlanChoice {
   std::string tolerance = "1%";
   std::string outputs = "force";

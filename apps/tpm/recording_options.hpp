@@ -12,7 +12,7 @@
 
 namespace tpm::app {
 
-/// How a file is read, as it was typed: the same options for every command.
+/// Options for reading a file as typed, the same for every command.
 struct ReadingArguments {
   std::map<std::string, std::string> texts;  ///< by the keys of reading_options()
   std::vector<std::string> units;            ///< "COLUMN=UNIT"
@@ -24,14 +24,14 @@ void add_reading_options(CLI::App& command, ReadingArguments& arguments, const c
 /// Throws Error(bad_input) naming the option.
 [[nodiscard]] ImportOptions reading_of(const ReadingArguments& arguments);
 
-/// What the user says about recordings that are read without a description.
+/// Statements of the user on recordings that are read without a description.
 struct RecordingOptions {
   std::vector<std::string> files;
   ReadingArguments reading;
   std::string contact_response;
 };
 
-/// What the user says of contact and zero, which are measured otherwise.
+/// Contact and zero as the user states them; measured if empty.
 struct PlacementArguments {
   std::string contact, zero;
 };

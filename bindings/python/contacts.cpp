@@ -26,7 +26,7 @@ std::unique_ptr<LoopContact> opened(const std::filesystem::path& file, double ra
 }
 
 Error stopped(StopCause cause) {
-  return {ExitCode::answer_is_no, "contact", "has stopped: " + std::string(word_of(cause)),
+  return {ExitCode::answer_is_no, "contact", "has stopped: " + std::string(to_string(cause)),
           "reset() before the next step"};
 }
 
@@ -85,7 +85,7 @@ py::dict state_of(LoopContact& contact) {
       py::arg("touching") = (s.row.flags & kTouching) != 0,
       py::arg("waiting") = (s.row.flags & kWaiting) != 0,
       py::arg("valid") = (s.row.flags & kBeyondModel) == 0,
-      py::arg("stop") = std::string(word_of(s.row.stop)));
+      py::arg("stop") = std::string(to_string(s.row.stop)));
 }
 
 py::dict info_of(const LoopContact& contact) {
@@ -167,7 +167,7 @@ std::string run_virtual(const std::filesystem::path& session, const std::filesys
   };
   const SessionRun run = call.run([&] { return run_session(read, {}, options); });
   call.raise();
-  return std::string(word_of(run.outcome.cause));
+  return std::string(to_string(run.outcome.cause));
 }
 
 }  // namespace

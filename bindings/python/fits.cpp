@@ -88,7 +88,7 @@ class Fit {
                            py::arg("with_drift") = drift ? Value(drift->estimate) : Value(),
                            py::arg("with_drift_lower") = drift ? drift->lower : Value(),
                            py::arg("with_drift_upper") = drift ? drift->upper : Value(),
-                           py::arg("words") = p.words));
+                           py::arg("summary") = p.summary));
     }
     return rows;
   }
@@ -265,9 +265,9 @@ void bind_fits(py::module_& module) {
                                                        : std::string("null");
                              })
       .def_property_readonly("flags", [](const Fit& f) { return f.fit().flags; })
-      .def_property_readonly("words",
+      .def_property_readonly("summary",
                              [](const Fit& f) {
-                               return f.selection() ? f.selection()->words
+                               return f.selection() ? f.selection()->summary
                                                     : std::vector<std::string>();
                              })
       .def_property_readonly("warnings",

@@ -161,7 +161,7 @@ void bind_laws(py::module_& module) {
           py::arg("path"))
       .def("to_json", [](const Law& law) { return to_text(to_json(law.file())); })
       .def_property_readonly("name", [](const Law& law) { return law_name(law.file().spec); })
-      .def_property_readonly("words", [](const Law& law) { return law_words(law.file().spec); })
+      .def_property_readonly("summary", [](const Law& law) { return law_words(law.file().spec); })
       .def_property_readonly("parameters", &Law::parameters)
       .def_property_readonly(
           "provenance",

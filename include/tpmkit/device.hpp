@@ -22,7 +22,7 @@ enum class ForcesOff : std::int32_t {
   unknown = 7,  ///< a value that is not listed
 };
 
-[[nodiscard]] std::string_view word_of(ForcesOff cause);
+[[nodiscard]] std::string_view to_string(ForcesOff cause);
 
 /// Result of a call to a device.
 enum class DeviceAnswer {
@@ -43,7 +43,7 @@ enum class DeviceLink {
   unknown,
 };
 
-[[nodiscard]] std::string_view word_of(DeviceLink link);
+[[nodiscard]] std::string_view to_string(DeviceLink link);
 
 /// Identity of a device, as it reports it.
 struct DeviceIdentity {
@@ -128,9 +128,9 @@ class HapticDevice {
   virtual DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept = 0;
   virtual DeviceStatus status() noexcept = 0;
   virtual HandState hand() noexcept { return {}; }
-  /// What the device noticed since it was opened that ended nothing and that a reader of the
-  /// session should know, a line each. Called when the loop has ended and, from another thread,
-  /// while it runs in real time.
+  /// Findings since the device was opened that did not end the session and that a reader of it
+  /// should know, one line each. Called when the loop has ended and, from another thread, while it
+  /// runs in real time.
   virtual std::vector<std::string> findings() const { return {}; }
   /// Called while the session waits for the tool to be in place. A simulated operator holds still.
   virtual void await() noexcept {}

@@ -49,7 +49,7 @@ struct FittedParameter {
   /// Why the minimum itself is not trusted ("found by one start of 5", and what to do); the
   /// parameter is then not identified, whatever the verdict. Empty: nothing.
   std::string unconfirmed;
-  std::string words;  ///< the verdict as a sentence
+  std::string summary;  ///< the verdict as a sentence
 };
 
 /// The law of the lowest BIC, where the data prefer it by more than 10 in BIC to the simplest law

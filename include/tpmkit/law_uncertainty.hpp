@@ -85,7 +85,7 @@ struct ReadingNoise {
 struct LawAdequacy {
   std::string verdict;                        ///< adequate, not_described or not_judged
   std::optional<double> residual_over_noise;  ///< of the worst recording; none if not judged
-  std::string words;                          ///< one sentence, with the likely cause
+  std::string summary;                        ///< one sentence, with the likely cause
   std::vector<std::string> causes = {};       ///< likely ones, if the law does not describe them
 
   [[nodiscard]] bool is_adequate() const { return verdict == "adequate"; }

@@ -68,8 +68,8 @@ struct ServoSettings : SessionServo {
   double most_speed_m_per_s = 5.0;  ///< of a hand; positions that imply more are rejected
   double fade_s = 0.1;              ///< time constant with which a force outside validity fades
   int status_every = 2;             ///< cycles
-  /// Whether the rendering is passive with the friction and the delay of the device, as it was
-  /// announced; empty: by the instantaneous stiffness of the model at rest.
+  /// True if the rendering was announced as passive with the friction and the delay of the device;
+  /// empty: decided by the instantaneous stiffness of the model at rest.
   std::optional<bool> passive = std::nullopt;
 };
 

@@ -32,7 +32,7 @@ enum class StopCause : std::int32_t {
   damping,           ///< damping had to be added in too many cycles
 };
 
-[[nodiscard]] std::string_view word_of(StopCause cause);
+[[nodiscard]] std::string_view to_string(StopCause cause);
 
 /// Events of a cycle.
 enum ServoFlag : std::uint32_t {

@@ -251,7 +251,7 @@ TEST_CASE("Temporary files of dead writers go when the same result is written ag
   CHECK(files_in(folder) == 3);
 }
 
-/// Whether the folder's file system knows files without a name.
+/// True if the folder's file system knows files without a name.
 bool knows_nameless_files(const test::TempFolder& folder) {
   const int file = ::open(folder.path().c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0600);
   if (file >= 0) ::close(file);

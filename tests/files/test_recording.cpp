@@ -77,7 +77,7 @@ std::string kinds(const RecordingPhases& found) {
 
 std::string all_words(const RecordingPhases& found) {
   std::string text;
-  for (const std::string& sentence : found.words) text += sentence + "\n";
+  for (const std::string& sentence : found.summary) text += sentence + "\n";
   return text;
 }
 

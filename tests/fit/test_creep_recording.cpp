@@ -316,7 +316,7 @@ TEST_CASE("noise of the imposed channel counts in adequacy, of creep and of rela
   const PreparedRecording creep = prepared_creep(trial);
   CHECK(creep.load_imposed);
   const FitResult fit = creep_fit(std::span(&creep, 1));
-  INFO(fit.adequacy.value().words);
+  INFO(fit.adequacy.value().summary);
   CHECK(fit.adequacy.value().is_adequate());
 
   PlacedTest pressed;
@@ -327,7 +327,7 @@ TEST_CASE("noise of the imposed channel counts in adequacy, of creep and of rela
   const PreparedRecording relaxing = prepare_recording("made.csv", std::move(r));
   CHECK_FALSE(relaxing.load_imposed);
   const FitResult relaxed = creep_fit(std::span(&relaxing, 1));
-  INFO(relaxed.adequacy.value().words);
+  INFO(relaxed.adequacy.value().summary);
   CHECK(relaxed.adequacy.value().is_adequate());
 }
 

@@ -163,7 +163,7 @@ TEST_CASE("a hold long compared with tau goes before one that is too short") {
     document["criterion"] = criterion;
     const DesignResult result = fit::plan(parsed(document));
     CHECK(result.ranked.front().experiment.hold_s == 40.0);
-    CHECK_THAT(result.words[1],
+    CHECK_THAT(result.summary[1],
                Contains("with a hold of 1 s") && Contains("ends before a relaxation of 10 s"));
   }
 }
@@ -178,7 +178,7 @@ TEST_CASE("a slow ramp hides a short relaxation, and the words say so") {
   const DesignResult result = fit::plan(parsed(document));
   CHECK(result.ranked.front().experiment.rate_m_per_s == 0.01);
   bool said = false;
-  for (const std::string& words : result.words) {
+  for (const std::string& words : result.summary) {
     said = said || words.find("the ramp of 4 s hides a relaxation of 0.3 s") != std::string::npos;
   }
   CHECK(said);

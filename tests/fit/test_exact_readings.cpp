@@ -64,7 +64,7 @@ void check_identified(const Selection& s, const std::string& law,
   for (const ParameterResult& p : fit.parameters) {
     const auto known = std::ranges::find(truth, p.parameter.name, &TrueValue::name);
     REQUIRE(known != truth.end());
-    INFO(p.words);
+    INFO(p.summary);
     CHECK(p.verdict == Verdict::identified);
     CHECK(p.not_separable.empty());
     REQUIRE(p.lower);

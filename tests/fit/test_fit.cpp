@@ -182,7 +182,7 @@ TEST_CASE("liver relaxation: minima, agreement of the starts, verdicts") {
   CHECK(*find(fit, "eta1").lower > 1000.0 * 5.0);
   REQUIRE(fit.hypotheses.size() == 3);
   CHECK(fit.hypotheses[0].excluded);
-  CHECK(fit.hypotheses[0].words.find("is excluded by these data") != std::string::npos);
+  CHECK(fit.hypotheses[0].summary.find("is excluded by these data") != std::string::npos);
   CHECK_FALSE(fit.hypotheses[1].excluded);  // x = 30 mm
   // each limit stands where the re-optimised deviance has risen by the 95 % point of chi-square(1)
   const ExperimentResiduals function(fit.config);
@@ -284,7 +284,7 @@ TEST_CASE("a parameter that does nothing is flat") {
   const FitResult fit = run_fit(config);
   CHECK(find(fit, "eta1").verdict == Verdict::flat);
   CHECK_FALSE(fit.covariance.full_rank);
-  CHECK(find(fit, "eta1").words.find("undetermined") != std::string::npos);
+  CHECK(find(fit, "eta1").summary.find("undetermined") != std::string::npos);
 }
 
 TEST_CASE("a measured recording is fitted along its own displacement") {

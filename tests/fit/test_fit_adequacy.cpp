@@ -54,8 +54,8 @@ TEST_CASE("a law that does not describe its recording says so first and everywhe
   trial.defect_N = 0.1;
   const PreparedRecording recording = prepared_trial(trial);
   const Selection s = selected_linear_1(recording);
-  CHECK_THAT(s.words.front(), StartsWith("no law tried describes this recording: residual "));
-  CHECK_THAT(s.words.front(), Contains("times the noise"));
+  CHECK_THAT(s.summary.front(), StartsWith("no law tried describes this recording: residual "));
+  CHECK_THAT(s.summary.front(), Contains("times the noise"));
   CHECK_FALSE(s.candidates[s.recommended].identified);
   const Json json = to_json(s);
   CHECK(json.at("adequacy").at("verdict") == "not_described");
@@ -63,16 +63,16 @@ TEST_CASE("a law that does not describe its recording says so first and everywhe
   for (const Json& p : json.at("fit").at("parameters")) {
     CHECK(p.at("only_if_described") == true);
     CHECK_THAT(p.at("verdict").get<std::string>(), Contains("only if the law described the data"));
-    CHECK_THAT(p.at("words").get<std::string>(), Contains("which it does not"));
+    CHECK_THAT(p.at("summary").get<std::string>(), Contains("which it does not"));
   }
   const test::TempFolder folder;
   write_law(folder.path() / "law.json", fitted_law(best_of(s)));
   const LawFile law = read_law(folder.path() / "law.json");
   REQUIRE(law.adequacy);
   CHECK(law.adequacy->is_rejected());
-  CHECK(law.adequacy->words == s.words.front());
-  CHECK(predict_recording(law, recording, {}).flags.front() == s.words.front());
-  CHECK(export_warnings(law, {}).front() == s.words.front());
+  CHECK(law.adequacy->summary == s.summary.front());
+  CHECK(predict_recording(law, recording, {}).flags.front() == s.summary.front());
+  CHECK(export_warnings(law, {}).front() == s.summary.front());
 }
 
 TEST_CASE("where no law tried describes a recording, the laws that were not tried are named",
@@ -88,12 +88,12 @@ TEST_CASE("where no law tried describes a recording, the laws that were not trie
   options.held_out = false;
   options.setup.profiles = false;
   const Selection classical = select_law(std::span(&recording, 1), options);
-  CHECK_THAT(classical.words.front(), StartsWith("no law tried describes this recording: ") &&
-                                          EndsWith("not tried: --family fractional"));
+  CHECK_THAT(classical.summary.front(), StartsWith("no law tried describes this recording: ") &&
+                                            EndsWith("not tried: --family fractional"));
   options.laws.push_back(parse_law_name("linear-fspringpot", "test"));
   const Selection all = select_law(std::span(&recording, 1), options);
-  CHECK_THAT(all.words.front(), StartsWith("no law tried describes this recording: ") &&
-                                    !Contains("--family fractional"));
+  CHECK_THAT(all.summary.front(), StartsWith("no law tried describes this recording: ") &&
+                                      !Contains("--family fractional"));
 }
 
 TEST_CASE("a law that describes its recording says how near it comes", "[adequacy][wired]") {
@@ -103,7 +103,7 @@ TEST_CASE("a law that describes its recording says how near it comes", "[adequac
   const LawAdequacy& adequacy = best_of(s).adequacy.value();
   CHECK(adequacy.is_adequate());
   CHECK(adequacy.residual_over_noise.value() == Approx(1.0).margin(0.25));
-  CHECK_THAT(s.words.front(), !Contains("no law tried"));
+  CHECK_THAT(s.summary.front(), !Contains("no law tried"));
   CHECK_FALSE(best_of(s).parameters.front().only_if_described);
 }
 
@@ -127,9 +127,9 @@ TEST_CASE("a drift that the rests do not show is lack of fit", "[adequacy][wired
     const LawAdequacy adequacy = test::fitted(trial).adequacy;
     if (!adequacy.is_rejected()) continue;
     ++found;
-    if (adequacy.words.find("it takes a drift of ") == std::string::npos) continue;
-    CHECK_THAT(adequacy.words, Contains("but the readings at rest show") &&
-                                   Contains("a slow branch that the law does not have"));
+    if (adequacy.summary.find("it takes a drift of ") == std::string::npos) continue;
+    CHECK_THAT(adequacy.summary, Contains("but the readings at rest show") &&
+                                     Contains("a slow branch that the law does not have"));
   }
   CHECK(found >= 14);  // 8 of 40 by the residual alone
 }
@@ -177,7 +177,7 @@ TEST_CASE("a law that another beats decisively holds nothing for identified", "[
   const FitResult& fit = best_of(s);
   CHECK(law_name(s.candidates[s.recommended].law) == "linear-1");
   CHECK(fit.adequacy.value().is_rejected());
-  CHECK_THAT(s.words.front(), StartsWith("linear-1 does not describe "));
+  CHECK_THAT(s.summary.front(), StartsWith("linear-1 does not describe "));
   for (const ParameterResult& p : fit.parameters) CHECK(p.only_if_described);
   CHECK(fitted_law(fit).adequacy.value().is_rejected());
 }
@@ -191,7 +191,7 @@ TEST_CASE("without a rest adequacy cannot be judged", "[adequacy][wired]") {
   const LawAdequacy& adequacy = best_of(s).adequacy.value();
   CHECK(adequacy.verdict == "not_judged");
   CHECK_FALSE(adequacy.residual_over_noise);
-  CHECK_THAT(adequacy.words, StartsWith("adequacy cannot be judged"));
+  CHECK_THAT(adequacy.summary, StartsWith("adequacy cannot be judged"));
 }
 
 TEST_CASE("readings at the limit of a force cell are named and censored", "[adequacy][clipping]") {
@@ -200,7 +200,7 @@ TEST_CASE("readings at the limit of a force cell are named and censored", "[adeq
   trial.clip = 0.75;
   const PreparedRecording recording = prepared_trial(trial);
   REQUIRE(recording.clipped_above);
-  CHECK_THAT(recording.phases.words.front(), StartsWith("clipping: "));
+  CHECK_THAT(recording.phases.summary.front(), StartsWith("clipping: "));
   const Selection s = selected_linear_1(recording);
   const FitResult& fit = best_of(s);
   CHECK(fit.adequacy.value().is_adequate());
@@ -264,6 +264,6 @@ TEST_CASE("a stated size of the noise is what residuals are compared with", "[ad
   CHECK(verdict(test::kNoise_N).is_adequate());
   const LawAdequacy wrong = verdict(test::kNoise_N / 3.0);
   CHECK(wrong.is_rejected());
-  CHECK_THAT(wrong.words, Contains("times the noise that is stated"));
+  CHECK_THAT(wrong.summary, Contains("times the noise that is stated"));
   CHECK(wrong.residual_over_noise.value() == Approx(3.0).epsilon(0.15));
 }

@@ -73,7 +73,7 @@ TEST_CASE("the short answer says the verdicts, adequacy and warnings of the JSON
   INFO(text);
   CHECK(lines_of(text) <= 25);
   CHECK(text.find('{') == std::string::npos);
-  CHECK_THAT(text, Contains(json.at("adequacy").at("words").get<std::string>()));
+  CHECK_THAT(text, Contains(json.at("adequacy").at("summary").get<std::string>()));
   for (const Json& words : json.at("warnings"))
     CHECK_THAT(text, Contains(words.get<std::string>()));
   for (const Json& words : json.at("fit").at("flags")) {

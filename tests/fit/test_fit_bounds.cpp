@@ -129,7 +129,7 @@ TEST_CASE("Verdicts that depend on a nuisance parameter on its bound are conditi
   const ParameterResult& exponent = named(fit, "exponent");
   REQUIRE(exponent.conditional_on.size() == 1);
   CHECK(exponent.conditional_on.front() == Condition{"contact", false, -6e-3, true});
-  CHECK_THAT(exponent.words, Contains("this holds only with contact at its lower bound -6 mm"));
+  CHECK_THAT(exponent.summary, Contains("this holds only with contact at its lower bound -6 mm"));
 
   const Json json = to_json(fit);
   for (const Json& p : json.at("parameters")) {
@@ -168,7 +168,7 @@ TEST_CASE("An interval that a bound of the contact point cuts says so", "[bounds
   const ParameterResult& exponent = named(fit, "exponent");
   REQUIRE(exponent.conditional_on.size() == 1);
   CHECK_FALSE(exponent.conditional_on.front().at_estimate);
-  CHECK_THAT(exponent.words, Contains("its interval ends with contact at its lower bound"));
+  CHECK_THAT(exponent.summary, Contains("its interval ends with contact at its lower bound"));
 }
 
 TEST_CASE("A profile that fails is not a flat profile", "[bounds]") {
@@ -205,9 +205,9 @@ TEST_CASE("A profile that fails is not a flat profile", "[bounds]") {
   CHECK(tau.verdict == Verdict::failed);
   CHECK(has_failed(tau.profile.below));
   CHECK(has_failed(tau.profile.above));
-  CHECK_THAT(tau.words, Contains("its profile failed on both sides") &&
-                            Contains("does not mean that it is unknown") &&
-                            Contains("linearised standard error"));
+  CHECK_THAT(tau.summary, Contains("its profile failed on both sides") &&
+                              Contains("does not mean that it is unknown") &&
+                              Contains("linearised standard error"));
   CHECK_THAT(to_terminal_text(fit), Contains("profile failed") && !Contains("every value from"));
   const Json p = to_json(fit).at("parameters").at(1);
   CHECK(p.at("verdict") == "profile failed");

@@ -93,7 +93,7 @@ void check_same(const FitResult& found, const FitResult& expected, const Powers&
   for (std::size_t i = 0; i < found.parameters.size(); ++i) {
     const ParameterResult& p = found.parameters[i];
     const ParameterResult& q = expected.parameters[i];
-    CAPTURE(powers.time, powers.depth, powers.force, p.words, q.words);
+    CAPTURE(powers.time, powers.depth, powers.force, p.summary, q.summary);
     const double factor = factor_of(p.parameter, powers);
     CHECK(p.parameter.name == q.parameter.name);
     CHECK(p.verdict == q.verdict);

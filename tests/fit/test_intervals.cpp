@@ -194,7 +194,7 @@ TEST_CASE("a minimum that one start of five finds is not called identified", "[i
   CHECK_THAT(verdict_text(fit.parameters[0]),
              Contains("not identified: found by one start of 5: not identified until another start "
                       "ends there (--starts 200"));
-  CHECK_THAT(fit.parameters[0].words, !Contains("is identified"));
+  CHECK_THAT(fit.parameters[0].summary, !Contains("is identified"));
 }
 
 TEST_CASE("order 1 of a spring-pot is a dashpot, and no bound", "[intervals]") {

@@ -340,7 +340,7 @@ TEST_CASE("the ends of all starts are told") {
   CHECK(fit.waterfall.deviances.front() == fit.best.deviance);
   const Json j = to_json(fit);
   CHECK(j["starts"]["end_deviances"].size() == 8);
-  CHECK_THAT(j["starts"]["words"].get<std::string>(), Contains("of 8 starts within 0.1"));
+  CHECK_THAT(j["starts"]["summary"].get<std::string>(), Contains("of 8 starts within 0.1"));
 }
 
 // --- data that cannot tell -----------------------------------------------------------------------
@@ -355,7 +355,7 @@ TEST_CASE("two equal relaxation times: the covariance is not of full rank, or sa
   int open = 0;
   for (const ParameterResult& p : fit.parameters) {
     open += p.verdict != Verdict::identified ? 1 : 0;
-    CHECK_FALSE(p.words.empty());
+    CHECK_FALSE(p.summary.empty());
   }
   CHECK(open >= 2);
 }

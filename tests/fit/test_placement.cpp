@@ -223,7 +223,7 @@ TEST_CASE("without a rest a drift and a slow branch are not separable", "[placem
     CHECK(*p.lower <= *p.with_drift->lower);
     CHECK(*p.upper >= *p.with_drift->upper);
     CHECK(*p.lower < p.estimate);
-    CHECK_THAT(p.words, Contains("with a drift of the zero or without"));
+    CHECK_THAT(p.summary, Contains("with a drift of the zero or without"));
   }
   // The written configuration says the same when it is run.
   const FitResult again = run_fit(parse_fit_config(config_json(fit.config), "test"),
@@ -286,7 +286,7 @@ TEST_CASE("a drift that no rest tells does not move k1 and tau1 out of their int
     const FitResult& fit = s.candidates.front().fit;
     for (const auto& [name, truth] : {std::pair<const char*, double>{"k1", 45.0}, {"tau1", 2.0}}) {
       const ParameterResult& p = find(fit, name);
-      CAPTURE(name, p.words);
+      CAPTURE(name, p.summary);
       if (p.verdict != Verdict::identified || !p.not_separable.empty()) continue;
       CHECK(*p.lower < truth);
       CHECK(*p.upper > truth);
@@ -444,7 +444,7 @@ TEST_CASE("a stiffness that is not told from a drift is not pooled as if it were
   CHECK(pooled.effects.specimens == 3);
   CHECK(pooled.not_separable == 2);
   CHECK(pooled.only_without.empty());
-  CHECK_THAT(pooled.effects.words, Catch::Contains("2 more left out"));
+  CHECK_THAT(pooled.effects.summary, Catch::Contains("2 more left out"));
   const SpecimenStudy none = study_of({0.5, 0.5, 0.5});
   CHECK(k_inf_of(none).only_without == "drift or a slow branch");
   CHECK_THAT(to_terminal_text(none), Catch::Contains("not identified: drift or a slow branch"));

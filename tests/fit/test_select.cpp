@@ -240,12 +240,12 @@ TEST_CASE("a law with a relaxation time that the sampling cannot support is not 
   // Identified laws compete among themselves, however much better another one is.
   CHECK(candidate(s, "linear-1").delta_bic > 10.0);
   CHECK(law_name(s.candidates[s.recommended].law) == "linear-1");
-  CHECK_THAT(fmt::format("{}", fmt::join(s.words, "\n")),
+  CHECK_THAT(fmt::format("{}", fmt::join(s.summary, "\n")),
              Catch::Contains("the data prefer linear-2, by ") &&
                  Catch::Contains(" in BIC, but do not identify its parameters (tau1 is sampled by "
                                  "fewer than 3 points); the simplest law that the protocol "
                                  "does not contradict is linear-1"));
-  CHECK_THAT(s.candidates[s.recommended].fit.adequacy.value().words,
+  CHECK_THAT(s.candidates[s.recommended].fit.adequacy.value().summary,
              Catch::Contains("linear-1 does not describe these data: linear-2 does better, by "));
   REQUIRE(s.preferred);
   CHECK(law_name(s.candidates[*s.preferred].law) == "linear-2");

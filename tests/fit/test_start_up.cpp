@@ -62,7 +62,7 @@ TEST_CASE("the tail of what rings or starts up after a step biases no interval",
                          : p.parameter.name == "tau1" ? 2.0
                                                       : 0.0;
     if (truth == 0.0) continue;
-    INFO(p.words);
+    INFO(p.summary);
     CHECK(p.lower.value() < truth);
     CHECK(p.upper.value() > truth);
   }

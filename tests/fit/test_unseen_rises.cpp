@@ -58,7 +58,7 @@ void check_truth(const FitResult& fit, double widest_k1) {
                          : p.parameter.name == "tau1" ? 2.0
                                                       : 0.0;
     if (truth == 0.0) continue;
-    INFO(p.words);
+    INFO(p.summary);
     REQUIRE(p.lower);
     REQUIRE(p.upper);
     CHECK(*p.lower < truth);
@@ -99,7 +99,7 @@ TEST_CASE("a step between two samples biases no interval, wherever it lies", "[r
   const FitResult& fit = s.candidates[s.recommended].fit;
   CHECK(law_name(fit.config.law.value()) == "linear-1");
   check_truth(fit, 1.4);
-  CHECK(std::ranges::any_of(s.words, [](const std::string& words) {
+  CHECK(std::ranges::any_of(s.summary, [](const std::string& words) {
     return words.find("is not known; the fit allows for it") != std::string::npos;
   }));
   CHECK(std::ranges::none_of(s.warnings, [](const std::string& words) {

@@ -43,7 +43,7 @@ TEST_CASE("Up to what a session is allowed, impacts come to rest whatever limits
   for (const ImpactPoint& p : study.impacts) {
     for (const RiseLimit limit : kRiseLimits) {
       const bool rests = p.rests[static_cast<std::size_t>(limit)];
-      CAPTURE(p.delay_periods, p.speed_m_per_s, p.share, word_of(limit));
+      CAPTURE(p.delay_periods, p.speed_m_per_s, p.share, to_string(limit));
       if (p.share <= RenderingCheck::kRoom) CHECK(rests);
       if (!rests) ++restless;
     }

@@ -18,7 +18,7 @@ TEST_CASE("On the clock, too, every hazard ends as it should, with forces within
   const ClockHazardStudy study = study_hazards_on_the_clock(false);
   REQUIRE(study.rows.size() >= 18);
   for (const ClockHazardRow& row : study.rows) {
-    CAPTURE(row.hazard, row.setting, word_of(row.cause), row.to_zero_s, row.tries);
+    CAPTURE(row.hazard, row.setting, to_string(row.cause), row.to_zero_s, row.tries);
     CHECK((row.cause == row.expected || is_stop_of_a_stall(row.cause)));
     CHECK(row.largest_force_N <= study.force_limit_N);
     CHECK(row.forces_off);  // of each try, also of one that a stall ended before its fault

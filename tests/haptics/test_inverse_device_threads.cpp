@@ -231,7 +231,7 @@ TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any
       DeviceIdentifyOptions options;
       options.duration_s = 8.0;
       const IdentifyRun identified = run_identification(choice, session, options);
-      CAPTURE(late_ms, word_of(identified.outcome.cause), identified.outcome.device.error_text);
+      CAPTURE(late_ms, to_string(identified.outcome.cause), identified.outcome.device.error_text);
       REQUIRE(identified.found.delay_mean_s);
       CHECK_THAT(*identified.found.delay_mean_s, WithinAbs(1e-3 * late_ms, 0.5e-3 + 1e-9));
       CHECK_THAT(*identified.found.delay_largest_s, WithinAbs(1e-3 * late_ms, 1e-3 + 1e-9));
@@ -284,7 +284,7 @@ TEST_CASE("A measurement goes on after a lost connection, and says so") {
   DeviceIdentifyOptions options;
   options.duration_s = 8.0;
   const IdentifyRun run = run_identification(choice_of(service), session, options);
-  CAPTURE(word_of(run.outcome.cause), run.outcome.device.error_text);
+  CAPTURE(to_string(run.outcome.cause), run.outcome.device.error_text);
   CHECK(run.outcome.cause == StopCause::finished);
   CHECK(run.begun_again == 1);
   CHECK(run.found.stalls == 1);  // nothing is known of the time between the connections
@@ -354,7 +354,7 @@ TEST_CASE("Each way in which a service fails ends the session with its cause") {
     faults.from = 2000;
     faults.how = c.how;
     const SessionRun run = run_on(faults);
-    CAPTURE(static_cast<int>(c.how), word_of(run.outcome.cause), run.outcome.device.error_text);
+    CAPTURE(static_cast<int>(c.how), to_string(run.outcome.cause), run.outcome.device.error_text);
     CHECK(run.outcome.cause == c.cause);
     CHECK_THAT(run.outcome.device.error_text, Contains(c.words));
   }
@@ -407,7 +407,7 @@ TEST_CASE("Events of the service end a session with their words") {
         Case{{"device-safety-triggered", "notice", "049D", "ebrake_released", "brake"},
              StopCause::finished}}) {
     const SessionRun run = run_on({}, [&c](StandInInverse& service) { service.tell(c.event); });
-    CAPTURE(c.event.name, word_of(run.outcome.cause), run.outcome.device.error_text);
+    CAPTURE(c.event.name, to_string(run.outcome.cause), run.outcome.device.error_text);
     CHECK(run.outcome.cause == c.cause);
     if (c.cause != StopCause::finished) {
       CHECK_THAT(run.outcome.device.error_text,

@@ -181,7 +181,7 @@ TEST_CASE("What was noticed of forces is recorded and said, and the session goes
   options.noticed = [&told](const std::string& line) { told.push_back(line); };
   const SessionRun run = run_session_on(session, device, limits, {}, options);
   CHECK(told == run.findings);
-  CAPTURE(word_of(run.outcome.cause), run.outcome.detail, run.largest_force_N);
+  CAPTURE(to_string(run.outcome.cause), run.outcome.detail, run.largest_force_N);
   CHECK(run.outcome.cause == StopCause::finished);
   REQUIRE(run.findings.size() == 1);
   CHECK_THAT(run.findings.front(),

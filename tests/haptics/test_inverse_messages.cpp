@@ -389,8 +389,8 @@ TEST_CASE("Versions and events are read with what they leave out") {
   for (const char* other : {"3.", "3.x", "3:5", " 3.5", "-3.5", "3.-5", "3.99999999999"}) {
     CHECK_THROWS_AS(format_of_version(other), Error);
   }
-  CHECK(word_of(format_of_version("3.4.9")) == "values");
-  CHECK(word_of(format_of_version("3.5")) == "vector");
+  CHECK(to_string(format_of_version("3.4.9")) == "values");
+  CHECK(to_string(format_of_version("3.5")) == "vector");
   for (const bool simulated : {false, true}) {
     const std::string text = version_message("3.5.0.0", simulated);
     CHECK(parse_version(text) == "3.5.0.0");

@@ -117,7 +117,7 @@ TEST_CASE("The view counts what was missed, what was lost, and keeps the cause o
   CHECK(state.at("counts").at("most_late_of_1000") == 1);
   CHECK(state.at("loop").at("lost_records") == 1);
   CHECK(state.at("over") == true);
-  CHECK(state.at("cause") == word_of(StopCause::watchdog));
+  CHECK(state.at("cause") == to_string(StopCause::watchdog));
   CHECK(state.at("tool_depth_m") == late.tool_depth_m);  // the row of the stop has none
 }
 
@@ -316,7 +316,7 @@ TEST_CASE("A session on the clock is served while it runs, to friends and others
   CHECK((run.outcome.cause == StopCause::finished || run.outcome.cause == StopCause::watchdog));
   if (run.outcome.cause == StopCause::finished) CHECK(rose >= 2);
   const Json state = Json::parse(view.state_json(0));
-  CHECK(state.at("cause") == word_of(run.outcome.cause));
+  CHECK(state.at("cause") == to_string(run.outcome.cause));
   CHECK(state.at("counts").at("missed") == run.outcome.counts.missed);
 }
 

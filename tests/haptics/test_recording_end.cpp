@@ -117,7 +117,7 @@ TEST_CASE("A session that a fault ended is recorded as a whole, and everything s
   const test::TempFolder folder;
   HilRecording recording = ended_recording(folder, 2.0);
   recording.rows.back().stop = StopCause::watchdog;
-  recording.closing["cause"] = word_of(StopCause::watchdog);
+  recording.closing["cause"] = to_string(StopCause::watchdog);
   recording.closing["detail"] = "no command for 8 ms";
   recording.closing["device_error"] = 7;
   recording.closing["device_error_text"] = "timeout";
@@ -150,7 +150,7 @@ TEST_CASE("A session that its user stopped is whole, and a finished one has noth
   const test::TempFolder folder;
   HilRecording recording = ended_recording(folder, 2.0);
   CHECK(recording_remarks(recording).empty());
-  recording.closing["cause"] = word_of(StopCause::signal);
+  recording.closing["cause"] = to_string(StopCause::signal);
   CHECK(recording.whole());
   CHECK(recording_remarks(recording) ==
         std::vector<std::string>{"the session ended early, at 1.999 s of 10.5 s: stopped by a "

@@ -210,7 +210,7 @@ TEST_CASE("A loop that feeds a hand because its delay grew unseen is stopped") {
     s.stiffness_N_per_m = hand.stiffness_N_per_m;
     const test::HandRun run = test::run_hand(s, 400.0, settings);
     const test::HandRun before = test::run_hand(s, 400.0, settings, true);
-    CAPTURE(hand.name, 1e3 * run.most_given_J, 1e3 * before.most_given_J, word_of(run.cause));
+    CAPTURE(hand.name, 1e3 * run.most_given_J, 1e3 * before.most_given_J, to_string(run.cause));
     CHECK(run.most_given_J < 1.5 * before.most_given_J + 1e-3);
     if (hand.damping_N_s_per_m < 1.0) CHECK(run.cause != StopCause::finished);
   }
@@ -235,7 +235,7 @@ TEST_CASE(
           const test::HandRun run = test::run_hand(s, stiffness, settings);
           if (run.first_2_mJ_s < 0.0) continue;
           const test::HandRun oracle = test::run_hand(s, stiffness, settings, true);
-          CAPTURE(grown_s, stiffness, hand.name, push_N, word_of(run.cause));
+          CAPTURE(grown_s, stiffness, hand.name, push_N, to_string(run.cause));
           CHECK(run.off_s - run.first_2_mJ_s <= 3.0 * grown_s + 0.02 + 1e-9);
           CHECK(run.most_given_J <= 1.5 * oracle.most_given_J + 1e-3);
         }
@@ -263,7 +263,7 @@ TEST_CASE(
       s.later_s = 20e-3;
       s.grows_at_s = 1.0;
       const test::HandRun run = test::run_hand(s, stiffness, settings);
-      CAPTURE(run.most_given_J, word_of(run.cause));
+      CAPTURE(run.most_given_J, to_string(run.cause));
       CHECK(run.most_given_J < 0.15);
       const double fed = stiffness * 20e-3 - settings.friction_N_s_per_m;
       if (hand.damping_N_s_per_m < 0.3 * fed) CHECK(run.cause == StopCause::oscillation);

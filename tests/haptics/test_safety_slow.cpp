@@ -31,7 +31,7 @@ TEST_CASE("No motion of 60,000 of passive set-ups is stopped") {
     most_delivered_J = std::max(most_delivered_J, delivered_J);
     CAPTURE(i, s.servo.period_s, s.stiffness_N_per_m, s.plant.damping_N_s_per_m,
             s.relaxation_time_s, delivered_J, row.cycle);
-    INFO(word_of(cause));
+    INFO(to_string(cause));
     REQUIRE(cause == StopCause::finished);
   }
   WARN("largest energy given: " << 1e3 * most_delivered_J << " mJ of the 2 mJ that stop a session");

@@ -295,7 +295,7 @@ TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as
   (void)unsetenv("TPM_STAND_IN_SCRIPT");
   REQUIRE(run.outcome.cause == StopCause::overrun_storm);
   const HilRecording recording = read_recording(folder / "r");
-  CHECK(recording.closing.at("cause") == word_of(StopCause::overrun_storm));
+  CHECK(recording.closing.at("cause") == to_string(StopCause::overrun_storm));
   REQUIRE_FALSE(recording.rows.empty());
   CHECK(recording.rows.back().stop == StopCause::overrun_storm);
   // One late cycle more than the session allows, each of them seen. The machine itself may have

@@ -138,8 +138,8 @@ TEST_CASE("The device says what it is; a link behind which a simulator may be is
   for (const char* mode : {"com_mode 3\n", "com_mode 4\n"}) {
     CHECK_FALSE(identity(mode).hardware);
   }
-  CHECK(word_of(identity("com_mode 3\n").link) == "simulated");
-  CHECK(word_of(identity("com_mode 4\n").link) == "network");
+  CHECK(to_string(identity("com_mode 3\n").link) == "simulated");
+  CHECK(to_string(identity("com_mode 4\n").link) == "network");
   CHECK(identity("type 37\n").left_handed);
 }
 
@@ -354,7 +354,7 @@ TEST_CASE("Each fault ends in a safe stop within 10 ms of session, with its caus
   CHECK(r.recording.rows.back().cycle >= kAt);
   CHECK(r.recording.rows.back().cycle <= kAt + 10);
   CHECK(r.recording.closed);
-  CHECK(r.recording.closing.at("cause") == word_of(fault.cause));
+  CHECK(r.recording.closing.at("cause") == to_string(fault.cause));
   CHECK(script.happened("stop"));
   CHECK(script.happened("forces_off"));
 }

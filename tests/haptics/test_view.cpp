@@ -183,7 +183,7 @@ TEST_CASE("a law with its covariance is viewed with intervals in units of their 
   // Known noise: normal quantiles. The interval of a logarithm is a factor about its estimate.
   std::ofstream(folder / "law.json") << R"({"law": "linear-1", "drive": "indentation_depth",
     "response": "contact_force", "reference_m": 0.004, "provenance": "derived",
-    "adequacy": {"verdict": "not_described", "words": "residual 9 times the noise"},
+    "adequacy": {"verdict": "not_described", "summary": "residual 9 times the noise"},
     "parameters": {"k_inf_N_per_m": 60, "k1_N_per_m": 45, "tau1_s": 2, "contact_m": 0,
                    "offset_N": -2e-5},
     "fit": {"parameters": ["k_inf_N_per_m", "tau1_s", "offset_N"],
@@ -214,10 +214,10 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
                    {"name": "drift", "estimate_SI": -9.87e-7, "interval_SI": [-6.93e-6, 4.96e-6],
                     "SI_unit": "N/s", "verdict": "identified",
                     "profile_SI_and_deviance": [[-7e-6, 7], [-9.87e-7, 3], [5e-6, null], [6e-6, 9]]}],
-    "adequacy": {"verdict": "not_described", "words": "no law tried describes this recording"},
+    "adequacy": {"verdict": "not_described", "summary": "no law tried describes this recording"},
     "flags": []})");
   fit["title"] = title;
-  const Json answer{{"fit", fit}, {"words", {"the simplest is linear-1"}}, {"warnings", {title}}};
+  const Json answer{{"fit", fit}, {"summary", {"the simplest is linear-1"}}, {"warnings", {title}}};
   const Json figures = Json::parse(R"({"figures": [{"title": "fit", "panels": [{
     "x": {"quantity": "time", "unit": "s"}, "y": {"quantity": "force", "unit": "N"},
     "series": [{"kind": "line", "label": "law", "x": [0, 1], "y": [1, 2]}]}]}]})");

@@ -229,7 +229,7 @@ TEST_CASE("relaxation and oscillation identify together what each leaves open") 
   for (const auto& [name, true_values] :
        {std::pair{"k_inf", kFast[0]}, {"k1", kFast[1]}, {"tau1", kFast[2]}}) {
     const ParameterResult& p = find(joint, name);
-    CAPTURE(name, p.words);
+    CAPTURE(name, p.summary);
     CHECK(p.verdict == Verdict::identified);
     CHECK(p.lower.value() < true_values);
     CHECK(true_values < p.upper.value());

@@ -104,7 +104,7 @@ void print_grown() {
                          stiffness, 1e3 * delay_s, 1e3 * grown_s, hand.name, push_N, speed,
                          1e3 * run.most_given_J, 1e3 * oracle.most_given_J, reached ? 1 : 0,
                          1e3 * after_s, 1e3 * (3.0 * grown_s + 0.02), run.off_s,
-                         word_of(run.cause));
+                         to_string(run.cause));
             }
           }
         }
@@ -141,7 +141,7 @@ void print_passive() {
                          stiffness, friction, 1e3 * delay_s, 1e3 * grown_s, hand.name, push_N,
                          speed, 1e3 * run.most_given_J, 1e3 * oracle.most_given_J, reached ? 1 : 0,
                          1e3 * after_s, 1e3 * (3.0 * grown_s + 0.02), run.off_s,
-                         word_of(run.cause));
+                         to_string(run.cause));
             }
           }
         }

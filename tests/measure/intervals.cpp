@@ -266,8 +266,8 @@ std::optional<Answer> quickest_answer(const Problem& p) {
   }
   Answer answer;
   answer.outliers = !left_out.empty();
-  answer.limited =
-      threshold.noise && threshold.noise->words.find("limited by resolution") != std::string::npos;
+  answer.limited = threshold.noise &&
+                   threshold.noise->summary.find("limited by resolution") != std::string::npos;
   answer.estimate = x;
   const NearMinimum search(*function, parameters);
   for (std::size_t i = 0; i < x.size(); ++i) {
@@ -310,7 +310,8 @@ Answer searched_answer(const Problem& p) {
   Answer answer;
   answer.estimate = fit.best.natural;
   answer.outliers = !left_out.empty();
-  answer.limited = fit.noise && fit.noise->words.find("limited by resolution") != std::string::npos;
+  answer.limited =
+      fit.noise && fit.noise->summary.find("limited by resolution") != std::string::npos;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     answer.held.push_back(deviance[i] - least <= threshold.rise_of(i, least));
   }

@@ -96,7 +96,7 @@ void two_kHz(const std::string& file, double seconds) {
   options.duration_s = seconds;
   const IdentifyRun run = run_identification(choice_of(service, false), session, options);
   const ServoOutcome& o = run.outcome;
-  fmt::print("| {} | {} | {} | {} | {:.0f} | {:.0f} | {} |\n", word_of(o.cause), o.cycles,
+  fmt::print("| {} | {} | {} | {} | {:.0f} | {:.0f} | {} |\n", to_string(o.cause), o.cycles,
              o.counts.missed, o.counts.time_guards, 1e6 * o.woke_late.quantile_s(0.99),
              1e6 * o.busy.quantile_s(0.99), service.forces());
 }
@@ -114,7 +114,7 @@ void delays(const std::string& file, double seconds) {
     };
     fmt::print("| {} | {} | {} | {} | {} | {} |\n", 1e3 * late_s, ms(run.found.delay_mean_s),
                ms(run.found.delay_largest_s), ms(run.found.delay_jitter_s), run.found.edges,
-               word_of(run.outcome.cause));
+               to_string(run.outcome.cause));
   }
 }
 

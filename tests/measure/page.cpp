@@ -153,7 +153,7 @@ void measure(HilSession session, double seconds, int rounds) {
       const ServoOutcome& o = m.outcome;
       const auto us = [](double time_s) { return 1e6 * time_s; };
       fmt::print("{},{},{},{},{},{},{:.0f},{:.0f},{:.0f},{:.0f},{:.0f},{:.0f},{:.0f},{}\n",
-                 kCases[k].name, round, word_of(o.cause), o.cycles, o.counts.missed,
+                 kCases[k].name, round, to_string(o.cause), o.cycles, o.counts.missed,
                  o.dropped_records, us(o.woke_late.quantile_s(0.5)),
                  us(o.woke_late.quantile_s(0.99)), us(o.woke_late.quantile_s(0.999)),
                  us(o.woke_late.max_s()), us(o.busy.quantile_s(0.5)), us(o.busy.quantile_s(0.99)),

@@ -55,7 +55,7 @@ Figure figure_of(const std::string& name) {
   return {figure_id("fit", name), name, name, {std::move(panel)}, name};
 }
 
-/// Whether it is well-formed XML in which nothing runs.
+/// True if it is well-formed XML in which nothing runs.
 bool is_harmless(const test::TempFolder& folder, const std::string& svg) {
   write_file(folder / "check.py", R"(
 import sys

@@ -167,7 +167,7 @@ TEST_CASE("bands alone: what they cannot tell is said, and that the estimates ar
   const ParameterResult& eta1 = result.parameters[1];
   REQUIRE(eta1.parameter.name == "eta1");
   CHECK(eta1.verdict == Verdict::flat);
-  CHECK_THAT(eta1.words, Contains("is undetermined by these data"));
+  CHECK_THAT(eta1.summary, Contains("is undetermined by these data"));
   CHECK(result.parameters[0].verdict == Verdict::identified);
   REQUIRE_FALSE(result.flags.empty());
   CHECK_THAT(result.flags.back(), Contains("the estimates are one point of it"));

@@ -150,7 +150,7 @@ TEST_CASE("bands about what an organ answers hold its parameters in their interv
   const FitResult fit = run_fit(config, std::vector<DataSet>{points});
   CHECK(fit.chi_square < 1e-6);
   for (std::size_t i = 0; i < true_values.size(); ++i) {
-    CAPTURE(i, fit.parameters[i].words);
+    CAPTURE(i, fit.parameters[i].summary);
     CHECK(fit.parameters[i].lower.value_or(0.0) < true_values[i]);
     CHECK(fit.parameters[i].upper.value_or(1e12) > true_values[i]);
   }

@@ -38,7 +38,7 @@ class Contacts(unittest.TestCase):
         self.assertEqual(contact.info["period_s"], 1e-3)
         self.assertIn("element", repr(contact))
         self.assertEqual(contact.adequacy["verdict"], "adequate")
-        self.assertIn(contact.adequacy["words"], repr(contact))
+        self.assertIn(contact.adequacy["summary"], repr(contact))
         for words in contact.warnings:
             self.assertIn(words, repr(contact))
 

@@ -43,7 +43,7 @@ class Fits(unittest.TestCase):
             self.assertEqual(self.fit.verdicts[name], drift if name == "k_inf" else "identified")
         self.assertEqual(table.loc["tau1", "unit"], "s")
         self.assertIn("linear-1", self.fit.laws.index)
-        self.assertTrue(self.fit.words)
+        self.assertTrue(self.fit.summary)
 
     def test_the_second_answer_with_a_drift(self):
         table = self.fit.parameters
@@ -188,14 +188,14 @@ class Fits(unittest.TestCase):
     def test_its_repr_says_verdicts_and_adequacy_and_what_to_know(self):
         text = repr(self.fit)
         self.assertTrue(text.startswith("<tpmkit.Fit linear-1"))
-        self.assertIn(self.fit.adequacy["words"], text)
+        self.assertIn(self.fit.adequacy["summary"], text)
         for words in (*self.fit.verdicts, *self.fit.warnings):
             self.assertIn(words, text)
 
     def test_its_str_is_the_short_answer(self):
         text = str(self.fit)
         self.assertLessEqual(text.count("\n"), 25)
-        for words in (self.fit.adequacy["words"], *self.fit.warnings):
+        for words in (self.fit.adequacy["summary"], *self.fit.warnings):
             self.assertIn(words, text)
         self.assertGreater(self.fit.details().count("\n"), text.count("\n"))
 

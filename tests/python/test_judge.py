@@ -31,10 +31,10 @@ class Judgements(unittest.TestCase):
         self.assertLess(row.lower, made.LAW["tau1_s"])
         self.assertGreater(row.upper, made.LAW["tau1_s"])
         self.assertEqual(row.unit, "s")
-        self.assertIn(row.words, repr(pooled))
+        self.assertIn(row.summary, repr(pooled))
         self.assertEqual(pooled.adequacy["verdict"], "not_judged")  # nothing rests before contact
         self.assertEqual(len(pooled.adequacy["not_judged"]), 3)
-        for words in (pooled.adequacy["words"], *pooled.warnings):
+        for words in (pooled.adequacy["summary"], *pooled.warnings):
             self.assertIn(words, repr(pooled))
         self.assertTrue(any("liver_1.csv: " in w for w in pooled.warnings), pooled.warnings)
 
@@ -47,7 +47,7 @@ class Judgements(unittest.TestCase):
         table = judged.quantities
         self.assertTrue((table.verdict == "adequate").all())
         self.assertTrue({"quantity", "S", "D", "E", "U"} <= set(table.columns))
-        self.assertIn(judged.words, repr(judged))
+        self.assertIn(judged.summary, repr(judged))
         for warning in judged.warnings:
             self.assertIn(warning, repr(judged))
         seen = tpmkit.validate(saved / "law.json", self.folder / "liver_1.csv", require="5%")
@@ -68,8 +68,8 @@ class Judgements(unittest.TestCase):
         self.assertEqual(len(found.ranked), 10)
         self.assertIn("experiment", found.ranked)
         self.assertEqual(found.adequacy["verdict"], "not_judged")
-        self.assertTrue(found.words)
-        for words in (found.adequacy["words"], *found.warnings):
+        self.assertTrue(found.summary)
+        for words in (found.adequacy["summary"], *found.warnings):
             self.assertIn(words, repr(found))
         with self.assertRaisesRegex(tpmkit.Error, "expected"):
             tpmkit.design({**problem, "critreion": "D"}, repetitions=0)

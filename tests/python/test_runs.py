@@ -173,7 +173,7 @@ class Plans(unittest.TestCase):
         self.assertLessEqual(str(plan).count("\n"), 25)
         for words in plan.warnings:
             self.assertIn(words, str(plan))
-        for words in (plan.adequacy["words"], *plan.warnings):
+        for words in (plan.adequacy["summary"], *plan.warnings):
             self.assertIn(words, repr(plan))
         self.assertTrue(chosen.feasible)
         self.assertLess(chosen.verified_error, 0.01)

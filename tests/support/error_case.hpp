@@ -2,6 +2,7 @@
 // Bad input and how the program is run on it (test_errors.cpp).
 #include <fstream>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,6 +27,13 @@ inline std::function<void(const TempFolder&)> with_files(Files list) {
       std::ofstream(folder / name, std::ios::binary) << bytes;
     }
   };
+}
+
+/// `text` with its first `from` replaced; throws std::logic_error if there is none.
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
+  return text.replace(at, from.size(), to);
 }
 
 inline const std::string kGarbage(

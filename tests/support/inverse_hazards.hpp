@@ -96,7 +96,7 @@ inline InverseHazardRow ended(const char* hazard, const char* expected, double b
       const DeviceStatus status = device.status();
       if (status.failed || status.forces_off != ForcesOff::none) {
         row.ended =
-            fmt::format("{}: {}", status.failed ? "communication" : word_of(status.forces_off),
+            fmt::format("{}: {}", status.failed ? "communication" : to_string(status.forces_off),
                         status.error_text);
         break;
       }

@@ -3,6 +3,7 @@
 
 #include "tpm/contact/element_contact.hpp"
 #include "tpmkit/device.hpp"
+#include "tpmkit/servo_loop.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::test {
@@ -51,6 +52,15 @@ inline ElementContact spring_of(double stiffness_N_per_m, double period_s = 1e-3
   p.Eprime_Pa = 0.0;
   p.E1_Pa = p.E2_Pa = stiffness_N_per_m / p.modulus_to_stiffness_m();
   return {p.with_relaxation_time(1e6), period_s};
+}
+
+/// Settings of a loop of `cycles` periods that pushes along z and sends its force from the first.
+inline ServoSettings guarded(std::uint64_t cycles = 10'000'000) {
+  ServoSettings s;
+  s.phase_ends = {cycles};
+  s.push = Eigen::Vector3d::UnitZ();
+  s.ramp_in_s = 0.0;
+  return s;
 }
 
 }  // namespace tpm::test

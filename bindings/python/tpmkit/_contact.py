@@ -144,11 +144,11 @@ class Contact:
     @property
     def adequacy(self) -> dict[str, Any]:
         """Whether the contact can be rendered on the device: `verdict` (adequate: passive or stable, within the
-        device and safe in six hands; not_adequate) and `words`. Whether its forces are those of the tissue only
+        device and safe in six hands; not_adequate) and `summary`. Whether its forces are those of the tissue only
         `tpm hil verify` and `tpmkit.validate` say."""
         info = self.info
         verdict = "adequate" if info["passive"] or info["acceptable"] else "not_adequate"
-        return {"verdict": verdict, "words": f"{info['verdict']}; error of the model: {info['error_bound']}"}
+        return {"verdict": verdict, "summary": f"{info['verdict']}; error of the model: {info['error_bound']}"}
 
     @property
     def warnings(self) -> list[str]:
@@ -164,7 +164,7 @@ class Contact:
         return self._core.positions()
 
     def __repr__(self) -> str:
-        lines = [f"<tpmkit.Contact {self.info['model']}", f"  adequacy: {self.adequacy['words']}"]
+        lines = [f"<tpmkit.Contact {self.info['model']}", f"  adequacy: {self.adequacy['summary']}"]
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings]) + ">"
 
 

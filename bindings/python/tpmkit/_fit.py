@@ -41,7 +41,7 @@ class _Inputs:
         return _OfTable(*by_file(self.table, lambda file: _core.fit([file], *self.options)))
 
 
-_VALUES = ("parameters", "recordings", "has_law", "adequacy_json", "flags", "words", "warnings", "correlation")
+_VALUES = ("parameters", "recordings", "has_law", "adequacy_json", "flags", "summary", "warnings", "correlation")
 _TEXTS = ("answer", "text", "to_json")
 
 
@@ -123,12 +123,12 @@ class Fit:
         law does not describe the data: the row holds only if it did), not_separable (what the recording cannot
         tell it from; empty: nothing), with_drift, with_drift_lower, with_drift_upper (estimate and limits of the
         fit with a drift of the zero, where no rest tells one: lower and upper hold these limits, too; else NaN),
-        words.
+        summary.
         """
         import pandas as pd
 
         columns = ["name", "estimate", "standard_error", "lower", "upper", "unit", "verdict", "nuisance",
-                   "only_if_described", "not_separable", "with_drift", "with_drift_lower", "with_drift_upper", "words"]
+                   "only_if_described", "not_separable", "with_drift", "with_drift_lower", "with_drift_upper", "summary"]
         table = pd.DataFrame(self._core.parameters, columns=columns).set_index("name")
         numbers = ["estimate", "standard_error", "lower", "upper", "with_drift", "with_drift_lower", "with_drift_upper"]
         table[numbers] = table[numbers].astype(float)
@@ -207,7 +207,7 @@ class Fit:
         import pandas as pd
 
         laws = json.loads(self._core.to_json()).get("laws", [])
-        columns = ["law", "words", "parameters_estimated", "rms_over_peak", "delta_bic", "identified", "reason"]
+        columns = ["law", "summary", "parameters_estimated", "rms_over_peak", "delta_bic", "identified", "reason"]
         return pd.DataFrame(laws, columns=columns).set_index("law")
 
     @property
@@ -219,20 +219,20 @@ class Fit:
 
     @property
     def adequacy(self) -> dict[str, Any] | None:
-        """Whether the law describes the data: `verdict` (adequate, not_described, not_judged), `words`,
+        """Whether the law describes the data: `verdict` (adequate, not_described, not_judged), `summary`,
         `residual_over_noise` where it was judged, `causes` where it is not described. None: not tested."""
         return json.loads(self._core.adequacy_json)
 
     @property
-    def words(self) -> list[str]:
+    def summary(self) -> list[str]:
         """The recommendation and its reasons."""
-        return self._core.words
+        return self._core.summary
 
     @property
     def warnings(self) -> list[str]:
         """What the experiment cannot tell, and what a reader must know."""
         adequacy = self.adequacy
-        first = [adequacy["words"]] if adequacy and adequacy["verdict"] != "adequate" else []
+        first = [adequacy["summary"]] if adequacy and adequacy["verdict"] != "adequate" else []
         return first + self._core.warnings + self._core.flags
 
     @property
@@ -384,8 +384,8 @@ class Fit:
             interval = " .. ".join("open" if np.isnan(v) else f"{v:.4g}" for v in (row["lower"], row["upper"]))
             lines.append(f"  {name} {row['estimate']:.5g} ({interval}) {row['unit']}, {row['verdict']}")
         adequacy = self.adequacy
-        lines.append("  adequacy: " + (adequacy["words"] if adequacy else "not tested"))
-        doubted = adequacy["words"] if adequacy else None
+        lines.append("  adequacy: " + (adequacy["summary"] if adequacy else "not tested"))
+        doubted = adequacy["summary"] if adequacy else None
         lines += [f"  warning: {w}" for w in self.warnings if w != doubted]
         return "\n".join(lines) + ">"
 

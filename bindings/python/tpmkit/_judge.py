@@ -36,15 +36,15 @@ class Validation:
         return self._document["verdict"]
 
     @property
-    def words(self) -> str:
+    def summary(self) -> str:
         """The conclusion, with its conditions."""
-        words = self._document["words"]
+        words = self._document["summary"]
         return words if isinstance(words, str) else " ".join(words)
 
     @property
     def adequacy(self) -> dict[str, Any]:
-        """`verdict` and `words`, as other results have them."""
-        return {"verdict": self.verdict, "words": self.words}
+        """`verdict` and `summary`, as other results have them."""
+        return {"verdict": self.verdict, "summary": self.summary}
 
     @property
     def warnings(self) -> list[str]:
@@ -64,7 +64,7 @@ class Validation:
         return self._document
 
     def __repr__(self) -> str:
-        return "\n".join([f"<tpmkit.Validation {self.verdict}: {self.words}", *(f"  warning: {w}" for w in self.warnings)]) + ">"
+        return "\n".join([f"<tpmkit.Validation {self.verdict}: {self.summary}", *(f"  warning: {w}" for w in self.warnings)]) + ">"
 
 
 @told
@@ -150,22 +150,22 @@ class Design:
         return self._document
 
     @property
-    def words(self) -> list[str]:
+    def summary(self) -> list[str]:
         """What the best experiment would tell, and what it would not."""
-        return list(self._document["words"])
+        return list(self._document["summary"])
 
     @property
     def adequacy(self) -> dict[str, Any]:
         """Whether simulated repetitions of the best candidate confirm its expected intervals: `verdict` (adequate,
         not_adequate if one of its parameters is covered too rarely or too often, not_judged without repetitions) and
-        `words`."""
+        `summary`."""
         check = self._document["check"]
         if not check:
-            return {"verdict": "not_judged", "words": "the expected intervals were not checked by simulated repetitions"}
+            return {"verdict": "not_judged", "summary": "the expected intervals were not checked by simulated repetitions"}
         doubts = len(check["warnings"])
         return {"verdict": "not_adequate" if doubts else "adequate",
-                "words": f"{check['data_sets']} simulated repetitions, {check['failed']} of them not fitted: "
-                         + (f"{doubts} warnings" if doubts else "they confirm the expected intervals")}
+                "summary": f"{check['data_sets']} simulated repetitions, {check['failed']} of them not fitted: "
+                           + (f"{doubts} warnings" if doubts else "they confirm the expected intervals")}
 
     @property
     def warnings(self) -> list[str]:
@@ -174,7 +174,7 @@ class Design:
         return left_out + list((self._document["check"] or {}).get("warnings", []))
 
     def __repr__(self) -> str:
-        lines = [f"<tpmkit.Design of {len(self._document['ranked'])} candidates", f"  adequacy: {self.adequacy['words']}"]
+        lines = [f"<tpmkit.Design of {len(self._document['ranked'])} candidates", f"  adequacy: {self.adequacy['summary']}"]
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings]) + ">"
 
 

@@ -172,9 +172,9 @@ class Law:
         return self._core.name
 
     @property
-    def words(self) -> str:
+    def summary(self) -> str:
         """The law in words."""
-        return self._core.words
+        return self._core.summary
 
     @property
     def parameters(self) -> dict[str, float]:

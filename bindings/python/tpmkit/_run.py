@@ -164,15 +164,15 @@ class Plan:
 
     @property
     def adequacy(self) -> dict[str, Any]:
-        """Whether a model keeps to the tolerance: `verdict` (adequate or not_adequate) and `words`. What scene and
+        """Whether a model keeps to the tolerance: `verdict` (adequate or not_adequate) and `summary`. What scene and
         reference leave out, masses, counts."""
         tolerance = self._dict["tolerance"]
         if self.choice is None:
-            return {"verdict": "not_adequate", "words": "no model meets tolerance and budget"}
+            return {"verdict": "not_adequate", "summary": "no model meets tolerance and budget"}
         error = self._dict["choice"]["verified_error"]
         verdict = "adequate" if error <= tolerance else "not_adequate"
         return {"verdict": verdict,
-                "words": f"{self.choice}: verified error {100 * error:.3g} % of the peak, {100 * tolerance:.3g} % allowed"}
+                "summary": f"{self.choice}: verified error {100 * error:.3g} % of the peak, {100 * tolerance:.3g} % allowed"}
 
     @property
     def warnings(self) -> list[str]:
@@ -196,7 +196,7 @@ class Plan:
 
     def __repr__(self) -> str:
         lines = [f"<tpmkit.Plan: {self.choice or 'nothing meets tolerance and budget'}",
-                 f"  adequacy: {self.adequacy['words']}"]
+                 f"  adequacy: {self.adequacy['summary']}"]
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings]) + ">"
 
 

@@ -27,14 +27,14 @@ class Specimens:
     @property
     def pooled(self) -> pd.DataFrame:
         """One row per material parameter, by name, SI: typical, lower, upper, unit, specimens, left_out, identified,
-        i_squared, words."""
+        i_squared, summary."""
         import pandas as pd
 
         rows = []
         for p in self._document["pooled"]:
             lower, upper = p.get("interval_SI") or (None, None)
             rows.append({"name": p["name"], "typical": p.get("typical_SI"), "lower": lower, "upper": upper,
-                         **{k: p.get(k) for k in ("unit", "specimens", "left_out", "identified", "i_squared", "words")}})
+                         **{k: p.get(k) for k in ("unit", "specimens", "left_out", "identified", "i_squared", "summary")}})
         table = pd.DataFrame(rows).set_index("name")
         for column in ("typical", "lower", "upper"):
             table[column] = table[column].astype(float)
@@ -43,7 +43,7 @@ class Specimens:
     @property
     def adequacy(self) -> dict[str, Any]:
         """Whether the law describes the recordings: `verdict` (not_described if one recording says so, else not_judged
-        if one cannot be judged, else adequate), `words`, and the names of the recordings by verdict."""
+        if one cannot be judged, else adequate), `summary`, and the names of the recordings by verdict."""
         names: dict[str, list[str]] = {}
         for r in self.recordings:
             said = (r.get("fit") or {}).get("adequacy")
@@ -51,7 +51,7 @@ class Specimens:
                 names.setdefault(said["verdict"] if said else "not_judged", []).append(r["recording"])
         verdict = next((v for v in ("not_described", "not_judged", "adequate") if v in names), "not_judged")
         words = "; ".join(f"{len(rows)} of {len(self.recordings)} recordings {v.replace('_', ' ')}" for v, rows in names.items())
-        return {"verdict": verdict, "words": words or "no recording is fitted", **names}
+        return {"verdict": verdict, "summary": words or "no recording is fitted", **names}
 
     @property
     def warnings(self) -> list[str]:
@@ -64,7 +64,7 @@ class Specimens:
                 continue
             adequacy = fit.get("adequacy")
             if adequacy and adequacy["verdict"] != "adequate":
-                found.append(f"{r['recording']}: {adequacy['words']}")
+                found.append(f"{r['recording']}: {adequacy['summary']}")
             found += [f"{r['recording']}: {flag}" for flag in fit.get("flags", [])]
         return found
 
@@ -79,7 +79,7 @@ class Specimens:
 
     def __repr__(self) -> str:
         lines = [f"<tpmkit.Specimens {self.law}, {len(self.recordings)} recordings"]
-        lines += [f"  {name}: {row['words']}" for name, row in self.pooled.iterrows()]
-        lines.append(f"  adequacy: {self.adequacy['words']}")
+        lines += [f"  {name}: {row['summary']}" for name, row in self.pooled.iterrows()]
+        lines.append(f"  adequacy: {self.adequacy['summary']}")
         lines += [f"  warning: {w}" for w in self.warnings]
         return "\n".join(lines) + ">"

@@ -49,7 +49,7 @@ double largest_factor(Dimension dimension) {
   return 1e9;
 }
 
-/// Whether a unit that carries the dimension of what changes is a rate of it ("mN/s", a force).
+/// True if a unit that carries the dimension of what changes is a rate of it ("mN/s", a force).
 bool per_second(const Unit& unit) {
   return unit.symbol.ends_with("/s") && unit.dimension != Dimension::speed;
 }

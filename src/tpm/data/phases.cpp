@@ -255,7 +255,7 @@ class Finder {
     return start;
   }
 
-  /// Whether noise alone makes readings look constant: the means of their halves are apart.
+  /// True if noise alone makes readings look constant: the means of their halves are apart.
   [[nodiscard]] bool rises_within_noise(std::size_t first, std::size_t last) const {
     constexpr double kSure = 4.0, kConstant = 0.02;  // standard deviations; of the level
     const std::size_t half = (last - first + 1) / 2;
@@ -327,7 +327,7 @@ class Finder {
     const Unit unit = shown_unit(dimension);
     return with_unit(significant(si / unit.to_si, 4), unit);
   }
-  void tell(std::string sentence) { found_.words.push_back(std::move(sentence)); }
+  void tell(std::string sentence) { found_.summary.push_back(std::move(sentence)); }
 
   [[nodiscard]] bool has(PhaseKind kind) const {
     return std::any_of(found_.phases.begin(), found_.phases.end(),

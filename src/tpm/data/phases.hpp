@@ -57,13 +57,13 @@ struct RecordingPhases {
   bool preloaded = false;  ///< the response is above 0 and rises with the first movement. A zero
                            ///< error of the force cell looks the same
   std::optional<std::size_t> detachment_index;  ///< first sample of the last phase `detached`
-  std::vector<std::string> words;               ///< all of this in sentences, oddities first
+  std::vector<std::string> summary;             ///< all of this in sentences, oddities first
 };
 
 /// Finds the phases of a recording from its drive, and contact and detachment from its response.
 /// Contact and detachment are looked for only where a depth is imposed and a contact force
 /// observed. Whatever is odd (no contact, no hold, a response that falls under load) is no error
-/// but a sentence in `words`.
+/// but a sentence in `summary`.
 ///
 /// Throws Error(bad_input), naming the recording, if it has no times or no drive, fewer than 3
 /// samples, or a value that is not finite.

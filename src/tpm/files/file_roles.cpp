@@ -113,7 +113,7 @@ void announce(const std::vector<fs::path>& files, std::vector<fs::path> Roles::*
   }
 }
 
-/// Whether a file stands in a folder or below it.
+/// True if a file stands in a folder or below it.
 bool is_within(const fs::path& file, const fs::path& folder) {
   std::error_code ec;
   const fs::path whole = fs::weakly_canonical(file, ec);

@@ -127,7 +127,7 @@ ThousandsMark decimal_mark(bool comma) noexcept {
   return comma ? ThousandsMark::comma : ThousandsMark::point;
 }
 
-/// Whether the marks of a number can be read with this decimal sign: all but it stand between
+/// True if the marks of a number can be read with this decimal sign: all but it stand between
 /// groups of three digits and are of one kind (`allowed`, or any if none is given).
 bool fits(const WrittenNumber& number, bool decimal_comma, std::optional<ThousandsMark> allowed) {
   const ThousandsMark decimal = decimal_mark(decimal_comma);

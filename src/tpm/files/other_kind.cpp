@@ -69,7 +69,7 @@ constexpr auto kFirstBytes = std::to_array<FirstBytes>({
     {"PK", "an archive, such as a workbook (.xlsx)"},
 });
 
-/// Whether a line is text in two fields or more.
+/// True if a line is text in two fields or more.
 bool has_fields(std::string_view line) {
   const auto printed = [](char c) { return c == '\t' || static_cast<unsigned char>(c) >= ' '; };
   return std::ranges::all_of(line, printed) && line.find_first_of(",;\t") != line.npos;

@@ -12,8 +12,8 @@ namespace tpm::files {
 /// @param kind the name of a schema: "scene" for schemas/scene.schema.json
 void require_not_other_kind(const Json& document, std::string_view kind, std::string_view where);
 
-/// What a file is that holds no JSON, by its first bytes: "a table of samples", "a web page"; none
-/// for JSON, also if it is damaged, and for bytes that tell nothing.
+/// Kind of a file that holds no JSON, by its first bytes: "a table of samples", "a web page"; none
+/// for JSON, also if it is damaged, and for bytes that no kind is known by.
 [[nodiscard]] std::optional<std::string_view> kind_without_json(std::string_view bytes);
 
 /// read_json of a file of one kind. A folder, a table or another document in its place is named

@@ -45,7 +45,7 @@ double further_up(const FitParameter& p, double widest) {
   return moved_bound(p.upper, std::max(p.upper, std::min(rounded(next, kReadableDigits), widest)));
 }
 
-/// Whether the bound of a nuisance parameter cuts the interval of another parameter.
+/// True if the bound of a nuisance parameter cuts the interval of another parameter.
 bool cuts_an_interval(const FitResult& result, LimitingBound bound) {
   return std::any_of(result.parameters.begin(), result.parameters.end(), [&](const auto& p) {
     const auto& by = p.profile.limited_by;
@@ -200,7 +200,7 @@ void mark_not_separable(FitResult& result) {
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterResult& p = result.parameters[i];
     p.not_separable = result.config.parameters[i].not_separable;
-    if (!p.not_separable.empty()) p.words = parameter_words(p, result.config.level);
+    if (!p.not_separable.empty()) p.summary = parameter_words(p, result.config.level);
   }
 }
 
@@ -227,7 +227,7 @@ void mark_conditions(FitResult& result, const ResidualFunction& function) {
       add_condition(all[i], condition_of(nuisance, bound.upper, false));
     }
   }
-  for (ParameterResult& p : all) p.words += condition_words(p, all);
+  for (ParameterResult& p : all) p.summary += condition_words(p, all);
   for (const ParameterResult& p : all) {
     if (p.first_bounds) {
       result.flags.push_back(widening_words(p));

@@ -53,7 +53,7 @@ void mark_unconfirmed(FitResult& result, const Confirmation& confirmation) {
         "found by one start of {}: not identified until another start ends there (--starts {}, or "
         "a law of fewer parameters)",
         confirmation.starts, std::max(kFewest, kTimes * confirmation.starts));
-    p.words = parameter_words(p, result.config.level);
+    p.summary = parameter_words(p, result.config.level);
   }
 }
 

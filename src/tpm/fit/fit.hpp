@@ -57,7 +57,7 @@ struct ParameterResult {
   /// Why the minimum itself is not trusted ("found by one start of 5", and what to do); it is then
   /// not identified, whatever its profile says.
   std::string unconfirmed;
-  std::string words;  ///< one sentence
+  std::string summary;  ///< one sentence
   Profile profile;
 };
 
@@ -74,7 +74,7 @@ struct HypothesisResult {
   double rise = 0.0;  ///< of the deviance above the best fit
   double p_value = 1.0;
   bool excluded = false;  ///< p < 1 - level
-  std::string words;
+  std::string summary;
 };
 
 /// One reading with the fitted model's answer.

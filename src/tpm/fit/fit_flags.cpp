@@ -42,7 +42,7 @@ void flag_outliers(FitResult& result, const ExperimentResiduals& function) {
       significant(worst_z / unit, 3)));
 }
 
-/// Whether the noise is the least that is believed.
+/// True if the noise is the least that is believed.
 bool is_met_exactly(const FitResult& result) {
   return !result.config.scale_known() && result.degrees_of_freedom > 0 &&
          result.least_variance > 0.0 && result.variance_factor <= result.least_variance;
@@ -64,10 +64,10 @@ void flag_noise(FitResult& result) {
                     kComputedShare));
   }
   if (result.noise) {
-    result.flags.push_back(result.noise->words);
+    result.flags.push_back(result.noise->summary);
   } else if (result.inflation > 1.0) {
     result.flags.push_back(
-        fmt::format("{}; the intervals count them so", result.correlation.value().words));
+        fmt::format("{}; the intervals count them so", result.correlation.value().summary));
   }
 }
 

@@ -188,7 +188,7 @@ void describe_parameters(FitResult& result, double level, bool profiles) {
     p.at_upper_bound = p.parameter.at_upper(p.estimate);
     p.standard_error = natural_standard_error(result, i);
     p.verdict = profiles ? verdict_of(p) : Verdict::not_profiled;
-    p.words = parameter_words(p, level);
+    p.summary = parameter_words(p, level);
   }
 }
 

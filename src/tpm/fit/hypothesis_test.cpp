@@ -54,7 +54,7 @@ HypothesisResult test_hypothesis(const ExperimentResiduals& function, const FitR
   result.rise = std::max(result.minimum.deviance - fit.best.deviance, 0.0);
   result.p_value = threshold.p_value(result.rise, fit.best.deviance, constrained);
   result.excluded = result.p_value < 1.0 - threshold.level;
-  result.words = hypothesis_words(result, threshold.level);
+  result.summary = hypothesis_words(result, threshold.level);
   return result;
 }
 

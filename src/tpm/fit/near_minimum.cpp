@@ -41,7 +41,7 @@ class NearSearch {
   NearSearch(const ResidualFunction& function, std::span<const FitParameter> parameters,
              std::span<const double> start, const FixedMask& fixed);
 
-  /// Whether the start can be evaluated.
+  /// True if the start can be evaluated.
   [[nodiscard]] bool begin();
   /// Goes on until it has converged or cannot go on.
   void run();

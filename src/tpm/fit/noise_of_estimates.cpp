@@ -374,7 +374,7 @@ std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& fu
     noise.of[noise.free[static_cast<std::size_t>(k)]] = {
         all(k, k) / plain[k], std::max(degrees, 1.0), bias[k] / std::sqrt(plain[k])};
   }
-  noise.words = words_of(noise, rows->values(), limited);
+  noise.summary = words_of(noise, rows->values(), limited);
   return noise;
 }
 

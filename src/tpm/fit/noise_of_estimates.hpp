@@ -42,11 +42,11 @@ struct NoiseOfEstimates {
   std::vector<std::size_t> free;    ///< parameters that are not at a bound
   Eigen::MatrixXd covariance;       ///< of those, in natural values
   bool correlated = false;          ///< else rounding is all there is
-  std::string words;                ///< one sentence
+  std::string summary;              ///< one sentence
 };
 
-/// What computing leaves of a reading, in parts of it: responses and minima are exact to about
-/// 1e-10, and no instrument reads nine digits.
+/// Relative error of a reading by computing: responses and minima are exact to about 1e-10, and no
+/// instrument reads nine digits.
 constexpr double kComputedShare = 1e-9;
 
 /// Mean square of that error of the values, in units of the declared noise: the least variance that

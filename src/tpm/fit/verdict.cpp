@@ -103,7 +103,7 @@ std::string failure_words(const ParameterResult& p, double level) {
   return words;
 }
 
-/// Whether the walk ended where two parts of the law change places.
+/// True if the walk ended where two parts of the law change places.
 bool exchanges(const ParameterResult& p, bool upper) {
   return (upper ? p.profile.above : p.profile.below) == ProfileEnd::exchange;
 }

@@ -53,7 +53,7 @@ Waterfall waterfall(std::span<const double> deviances, double margin) {
   w.clusters = clusters_of(w.deviances);
   w.near_best = static_cast<int>(std::ranges::count_if(
       w.deviances, [&](double d) { return d - w.deviances.front() <= margin; }));
-  w.words = waterfall_words(w);
+  w.summary = waterfall_words(w);
   return w;
 }
 

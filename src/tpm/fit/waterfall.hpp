@@ -15,7 +15,7 @@ struct Waterfall {
   int near_best = 0;              ///< ends within `margin` of the best
   int starts = 0;
   int failed = 0;     ///< starts without a usable end
-  std::string words;  ///< "17 of 50 starts within 0.1 of the best; ..."
+  std::string summary;  ///< "17 of 50 starts within 0.1 of the best; ..."
 };
 
 /// Two ends belong to one cluster if their deviances differ by less than 1e-5, relative above 1.

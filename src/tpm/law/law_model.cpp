@@ -130,13 +130,13 @@ void walk(const Protocol& protocol, std::span<const double> times_s, Contact& co
   }
 }
 
-/// Whether a law is the solution of a contact problem only while the contact grows. A contact
+/// True if a law is the solution of a contact problem only while the contact grows. A contact
 /// without relaxation has no history and may shrink and grow.
 bool depends_on_growth(const LawSpec& spec) {
   return spec.kernel == Kernel::hertz && (spec.branches > 0 || spec.fractional != Fractional::none);
 }
 
-/// Whether Ting's solution is built in for the law; of the others nothing is predicted once the
+/// True if Ting's solution is built in for the law; of the others nothing is predicted once the
 /// contact shrinks.
 bool may_shrink(const LawSpec& spec) {
   return spec.fractional == Fractional::none && spec.tension == Tension::none;

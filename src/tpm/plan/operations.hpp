@@ -1,5 +1,5 @@
 #pragma once
-// What operations cost on a machine.
+// Cost of operations on a machine.
 #include <array>
 #include <filesystem>
 #include <string>

@@ -1,5 +1,5 @@
 #pragma once
-// What a hand can feel.
+// Thresholds of perception of a hand.
 
 namespace tpm::plan {
 

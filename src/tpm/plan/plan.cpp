@@ -45,7 +45,7 @@ bool masses_known(const ExperimentScene& scene) {
                      [](const SceneContact& c) { return !c.is_tool() || c.mass_kg.has_value(); });
 }
 
-/// Whether the reference has masses: the scene says so, or they would be felt at this tolerance.
+/// True if the reference has masses: the scene says so, or they would be felt at this tolerance.
 bool reference_has_masses(const ExperimentScene& scene, const PlanSurrogate& massless,
                           const PlanRequest& request) {
   if (request.for_loop) return false;

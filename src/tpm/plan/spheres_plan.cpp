@@ -60,7 +60,7 @@ class SpheresSearch {
     plan_.request = request;
   }
 
-  /// Whether to try the next one.
+  /// True if the next one is to be tried.
   [[nodiscard]] bool run(const RefilledScene::Filling& filling) {
     TriedSpheres tried;
     tried.filling = filling;

@@ -1,5 +1,5 @@
 #pragma once
-// What the pages of all kinds of files share.
+// Shared parts of the pages of all kinds of files.
 #include <cstddef>
 #include <filesystem>
 #include <functional>

@@ -20,7 +20,7 @@ bool stopped(const HazardRow& row) {
 
 std::string outcome_of(const HazardRow& row) {
   if (!was_run(row)) return "refused: " + row.refused;
-  return std::string(word_of(row.cause));
+  return std::string(to_string(row.cause));
 }
 
 std::string in(double value, double scale, bool shown) {
@@ -67,7 +67,7 @@ std::string clock_hazard_text(const ClockHazardStudy& study) {
   for (const ClockHazardRow& row : study.rows) {
     const bool stopped_by_it = row.expected != StopCause::finished;
     text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", row.hazard, row.setting,
-                        word_of(row.cause), row.consecutive_missed,
+                        to_string(row.cause), row.consecutive_missed,
                         significant(row.largest_force_N, 3), in(row.to_zero_s, 1e3, stopped_by_it),
                         in(row.bound_s, 1e3, stopped_by_it), row.tries, row.within ? "yes" : "NO");
   }

@@ -308,7 +308,7 @@ std::vector<Hazard> faults() {
   for (const ForcesOff off :
        {ForcesOff::button, ForcesOff::velocity, ForcesOff::watchdog, ForcesOff::software,
         ForcesOff::unplugged, ForcesOff::dead_man, ForcesOff::unknown}) {
-    add("forces cut by the device", std::string(word_of(off)),
+    add("forces cut by the device", std::string(to_string(off)),
         {FaultKind::forces_off, kHeld, 1'000'000, 0, off});
   }
   add("position not a number", "for one period", {FaultKind::not_a_number, kHeld, 1, 0, {}});

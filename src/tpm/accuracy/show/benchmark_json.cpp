@@ -31,7 +31,7 @@ class RecordFields {
  public:
   explicit RecordFields(Object& json) : json_(json) {}
 
-  /// Whether a field is there: by the file, or as it is to be written.
+  /// True if a field is there: by the file, or as it is to be written.
   bool known(const char* key, bool to_write) const {
     return kReads ? json_.contains(key) : to_write;
   }
@@ -50,7 +50,7 @@ class RecordFields {
   void optional_field(const char* key, Value& value) {
     if (known(key, value != std::remove_const_t<Value>{})) field(key, value);
   }
-  /// Whether there is such a part; what is read is made.
+  /// True if there is such a part; what is read is made.
   template <class Part>
   bool has(const char* key, Part& part) {
     const bool there = known(key, part.has_value());

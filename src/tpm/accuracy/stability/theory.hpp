@@ -1,5 +1,5 @@
 #pragma once
-// What linear theory says of the step rules on one sphere.
+// Linear stability theory of the step rules on one sphere.
 #include <optional>
 #include <span>
 

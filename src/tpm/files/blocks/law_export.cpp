@@ -245,7 +245,7 @@ ExportTarget parse_export_target(std::string_view text, std::string_view where) 
 
 std::vector<std::string> export_warnings(const LawFile& law, const ExportOptions& options) {
   std::vector<std::string> warnings;
-  if (law.adequacy && !law.adequacy->is_adequate()) warnings.push_back(law.adequacy->words);
+  if (law.adequacy && !law.adequacy->is_adequate()) warnings.push_back(law.adequacy->summary);
   const bool drops = law.spec.kernel == Kernel::power || law.spec.tension != Tension::none;
   if (options.relaxation_only && drops) add_left_out(law, warnings);
   for (std::string& warning : geometry_warnings(law.spec, options.geometry, law.fitted_to)) {

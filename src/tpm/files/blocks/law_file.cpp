@@ -56,7 +56,7 @@ const Block<LawAdequacy>& adequacy_block() {
                     "in a word")),
        key("residual_over_noise", &A::residual_over_noise, number(kZeroOrMore),
            "ratio of standard deviations, of the worst recording"),
-       required(key("words", &A::words, text(1), "in a sentence")),
+       required(key("summary", &A::summary, text(1), "in a sentence")),
        key("causes", &A::causes, list(text()),
            "likely ones, where the law does not describe the data")});
   return block;

@@ -221,7 +221,7 @@ double LawUncertainty::quantile(double at_level) const {
 }
 
 Json files::to_json(const LawAdequacy& adequacy) {
-  Json json{{"verdict", adequacy.verdict}, {"words", adequacy.words}};
+  Json json{{"verdict", adequacy.verdict}, {"summary", adequacy.summary}};
   if (adequacy.residual_over_noise) {
     json["residual_over_noise"] = rounded(*adequacy.residual_over_noise, 6);
   }

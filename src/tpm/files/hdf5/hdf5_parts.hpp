@@ -1,5 +1,5 @@
 #pragma once
-// What hdf5_writer.cpp and hdf5_reader.cpp share; the only header that brings HDF5's own with it.
+// Shared parts of hdf5_writer.cpp and hdf5_reader.cpp; the only header that includes HDF5's own.
 #include <hdf5.h>
 
 #include <algorithm>

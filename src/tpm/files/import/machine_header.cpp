@@ -270,7 +270,7 @@ void describe_columns(const DelimitedTable& table, const SampleBlock& block, Mac
   header.block = block;
 }
 
-/// Whether the titles tell a recording or a spectrum.
+/// True if the titles tell a recording or a spectrum.
 bool is_understood(const MachineHeader& header) {
   const auto has = [&header](std::initializer_list<ColumnRole> roles) {
     return std::any_of(header.columns.begin(), header.columns.end(), [&](const MachineColumn& c) {

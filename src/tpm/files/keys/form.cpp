@@ -234,7 +234,7 @@ void require_list(const Json& value, const Form& form, const DocumentPlace& plac
   }
 }
 
-/// Whether a value is one of a form's words or of its JSON type: which of several its writer meant.
+/// True if a value is one of a form's words or of its JSON type: which of several its writer meant.
 bool looks_like(const Json& value, const Form& form) {
   switch (form.type) {
     case Type::any:

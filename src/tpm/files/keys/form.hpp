@@ -1,6 +1,6 @@
 #pragma once
-// What may stand in a file, as data. Readers, messages, JSON schemas and the page of keys come from
-// it; block.hpp binds it to the members of structures.
+// Permitted contents of a file, as data. Readers, messages, JSON schemas and the page of keys come
+// from it; block.hpp binds it to the members of structures.
 #include <cstddef>
 #include <cstdint>
 #include <functional>

@@ -368,7 +368,7 @@ DesignResult plan(DesignProblem problem) {
   evaluate_candidates(result, before);
   rank(result);
   find_pair(result, before);
-  result.words = design_words(result);
+  result.summary = design_words(result);
   return result;
 }
 

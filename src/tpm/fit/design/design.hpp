@@ -171,7 +171,7 @@ struct DesignResult {
   std::optional<std::size_t> cheapest;  ///< place in ranked: the least total time that identifies
                                         ///< every parameter
   DesignPair pair;                      ///< the best, and the best beside it
-  std::vector<std::string> words;       ///< for each parameter, and what limits it
+  std::vector<std::string> summary;     ///< for each parameter, and what limits it
 };
 
 /// Evaluates all candidates. Throws Error(bad_input) if the limits leave none.

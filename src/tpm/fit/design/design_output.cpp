@@ -157,7 +157,7 @@ Json to_json(const DesignResult& result, const DesignCheck* check, std::size_t t
                {"expected", to_json(result.pair.expected, problem)}};
   j["least_time"] = nullptr;
   if (result.cheapest) j["least_time"] = to_json(result.ranked[*result.cheapest].experiment);
-  j["words"] = result.words;
+  j["summary"] = result.summary;
   j["check"] = nullptr;
   if (check != nullptr) j["check"] = to_json(*check);
   return j;
@@ -171,7 +171,7 @@ std::string to_terminal_text(const DesignResult& result, const DesignCheck* chec
   for (const std::string& line : result.left_out) text += fmt::format("left out: {}\n", line);
   text += "\nexpected relative standard errors; ? marks what would not be identified\n";
   text += candidate_rows(result, top) + "\n";
-  for (const std::string& line : result.words) text += line + "\n";
+  for (const std::string& line : result.summary) text += line + "\n";
   text += "\n" + cheapest_words(result) + pair_words(result);
   if (check != nullptr) text += check_words(*check, problem.config.level);
   return text;

@@ -56,7 +56,7 @@ Recording scattered(const Trials& trials, Random& random) {
   return recording;
 }
 
-/// Whether the fitted curve stays within one sigma of the true curve over the whole record.
+/// True if the fitted curve stays within one sigma of the true curve over the whole record.
 bool predicts_true_curve(const FitResult& fit, const Trials& trials) {
   const std::vector<double>& predicted = fit.recordings.front().predicted;
   return std::equal(predicted.begin(), predicted.end(), trials.clean.response.begin(),

@@ -160,7 +160,7 @@ std::string to_terminal_text(const GroupComparison& c) {
   for (const SpecimenRow& row : c.study.rows) {
     if (!row.fit) text += fmt::format("! {} is not fitted: {}\n", row.name, row.reason);
     if (row.fit && row.fit->adequacy && row.fit->adequacy->is_rejected()) {
-      text += fmt::format("! {}: {}\n", row.name, row.fit->adequacy->words);
+      text += fmt::format("! {}: {}\n", row.name, row.fit->adequacy->summary);
     }
   }
   return text;

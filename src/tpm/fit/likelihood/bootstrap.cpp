@@ -314,7 +314,7 @@ BootstrapResult bootstrap(const Refittable& fit, std::span<const FitParameter> p
                                                 refits.of_parameter(i), left_out.of_parameter(i),
                                                 options.level));
   }
-  result.words = bootstrap_words(result);
+  result.summary = bootstrap_words(result);
   return result;
 }
 

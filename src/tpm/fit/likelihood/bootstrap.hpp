@@ -77,7 +77,7 @@ struct BootstrapResult {
   int not_converged = 0;         ///< usable ends of refits that ran out of iterations: they are
   int jackknife_failed = 0;      ///< of the refits for the acceleration
   std::vector<BootstrapParameter> parameters;
-  std::string words;  ///< one sentence; says if refits failed
+  std::string summary;  ///< one sentence; says if refits failed
 };
 
 /// Refits `replicates` times, each from the original minimum. Residuals are centred and widened by

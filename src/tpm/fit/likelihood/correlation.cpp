@@ -124,7 +124,7 @@ Correlation residual_correlation(std::span<const std::span<const double>> record
   c.ljung_box_lags = static_cast<int>(lags);
   if (c.significant) c.effective_count /= std::max(c.integrated_time, 1.0);
   c.effective_count = std::max(c.effective_count, std::min(1.0, static_cast<double>(c.count)));
-  c.words = correlation_words(c);
+  c.summary = correlation_words(c);
   return c;
 }
 

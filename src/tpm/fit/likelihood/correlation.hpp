@@ -15,7 +15,7 @@ struct Correlation {
   double ljung_box_p = 1.0;
   int ljung_box_lags = 0;  ///< 0: too few readings to test
   std::size_t count = 0;   ///< n
-  std::string words;       ///< one sentence
+  std::string summary;     ///< one sentence
 
   /// n / n_eff >= 1, for Threshold::inflation.
   [[nodiscard]] double inflation() const;

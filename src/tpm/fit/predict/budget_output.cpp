@@ -37,7 +37,7 @@ Json to_json(const ErrorBudget& b) {
   Json stages = Json::array(), lines = Json::array();
   for (const BudgetStage& stage : b.stages) {
     const Json force = array_json(stage.force_N, stored);
-    stages.push_back({{"name", stage.name}, {"words", stage.words}, {"force_N", force}});
+    stages.push_back({{"name", stage.name}, {"summary", stage.summary}, {"force_N", force}});
   }
   for (const BudgetLine& line : b.lines) {
     lines.push_back({{"name", line.name},

@@ -189,7 +189,7 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
                                   significant(duration, 3), significant(fitted, 3)));
   }
   if (law.adequacy && !law.adequacy->is_adequate()) {
-    p.flags.insert(p.flags.begin(), law.adequacy->words);
+    p.flags.insert(p.flags.begin(), law.adequacy->summary);
   }
   for (const std::string& name : law.uncertainty->at_bound) {
     p.flags.push_back(

@@ -218,7 +218,7 @@ Eigen::MatrixXd law_slopes(const LawFile& law, const std::vector<MaterialMotion>
 void carry_uncertainty(OrganMaterial& m, const OrganLessLaw& function, const LawFile& law,
                        const std::vector<MaterialMotion>& motions) {
   const auto natural = mapped<double>(m.parameters, &OrganMaterialParameter::value);
-  if (law.adequacy && !law.adequacy->is_adequate()) m.flags.push_back(law.adequacy->words);
+  if (law.adequacy && !law.adequacy->is_adequate()) m.flags.push_back(law.adequacy->summary);
   if (!law.uncertainty) {
     if (!m.readings) m.flags.emplace_back("the law carries no uncertainty: no intervals");
     return;

@@ -1,5 +1,5 @@
 #pragma once
-// What put_on_organ and fitted_scene write, and how forces are compared.
+// Parts of the output of put_on_organ and fitted_scene, and their comparison of forces.
 #include "tpm/fit/predict/organ_material.hpp"
 
 namespace tpm::fit {

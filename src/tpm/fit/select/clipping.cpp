@@ -94,8 +94,8 @@ void find_clipping(PreparedRecording& recording) {
     recording.clipped_below = run->value + half;
   }
   const Unit unit = shown_unit(quantity_dimension(r.response_quantity));
-  recording.phases.words.insert(
-      recording.phases.words.begin(),
+  recording.phases.summary.insert(
+      recording.phases.summary.begin(),
       fmt::format("clipping: {} readings in a row from {} s on are all the {}, {}, which rounding "
                   "does not make: they are censored",
                   run->length, significant(r.time_s[run->first], 4),

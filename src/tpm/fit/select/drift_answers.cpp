@@ -27,9 +27,9 @@ const ParameterResult* not_separable_in(const FitResult& fit) {
 template <class Change>
 void change_and_say(ParameterResult& p, double level, const Change& change) {
   const std::string before = parameter_words(p, level);
-  const std::string behind = p.words.starts_with(before) ? p.words.substr(before.size()) : "";
+  const std::string behind = p.summary.starts_with(before) ? p.summary.substr(before.size()) : "";
   change();
-  p.words = parameter_words(p, level) + behind;
+  p.summary = parameter_words(p, level) + behind;
 }
 
 bool has_limits_of(const ParameterResult& p, const ParameterResult& other) {

@@ -255,28 +255,28 @@ LawAdequacy stated(const FitResult& fit, const Judged& judged, std::size_t tried
   const Adequacy& a = judged.adequacy;
   result.verdict = described_name(a.described);
   if (a.described == Described::not_judged) {
-    result.words =
+    result.summary =
         "adequacy cannot be judged: too few samples at rest before the load to tell the noise";
     return result;
   }
   if (a.noise_sd > 0.0) result.residual_over_noise = a.residual_over_noise;
   if (a.described == Described::adequate) {
-    result.words =
+    result.summary =
         fmt::format("the law describes {}: {}", subject(fit, judged), times_the_noise(judged));
     return result;
   }
   const std::string law = fit.config.law ? law_name(*fit.config.law) : "the model";
   if (other) {
-    result.words = fmt::format("{} does not describe {}: {}; {} does", law, subject(fit, judged),
-                               times_the_noise(judged), law_name(*other));
+    result.summary = fmt::format("{} does not describe {}: {}; {} does", law, subject(fit, judged),
+                                 times_the_noise(judged), law_name(*other));
   } else {
-    result.words = fmt::format("no law tried describes {}: {}{}", subject(fit, judged),
-                               times_the_noise(judged),
-                               tried == 1 ? fmt::format(" (only {} was tried)", law) : "");
+    result.summary = fmt::format("no law tried describes {}: {}{}", subject(fit, judged),
+                                 times_the_noise(judged),
+                                 tried == 1 ? fmt::format(" (only {} was tried)", law) : "");
   }
   result.causes = a.causes;
   if (!a.causes.empty()) {
-    result.words += fmt::format("; likely cause: {}", fmt::join(a.causes, "; and "));
+    result.summary += fmt::format("; likely cause: {}", fmt::join(a.causes, "; and "));
   }
   return result;
 }
@@ -284,7 +284,7 @@ LawAdequacy stated(const FitResult& fit, const Judged& judged, std::size_t tried
 void add_condition(FitResult& fit, std::string_view words) {
   for (ParameterResult& p : fit.parameters) {
     p.only_if_described = true;
-    p.words += words;
+    p.summary += words;
   }
 }
 
@@ -313,7 +313,7 @@ void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings)
   const bool springpots = std::ranges::any_of(
       s.candidates, [](const Candidate& c) { return c.law.fractional != Fractional::none; });
   if (rejected && !other && !springpots && tried > 1) {
-    adequacy.words += "; laws with spring-pots were not tried: --family fractional";
+    adequacy.summary += "; laws with spring-pots were not tried: --family fractional";
   }
   state(chosen.fit, std::move(adequacy));
   if (!rejected) return;
@@ -346,9 +346,9 @@ void state_preferred(Selection& s) {
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
   LawAdequacy adequacy = chosen.fit.adequacy.value_or(LawAdequacy{});
   adequacy.verdict = described_name(Described::not_described);
-  adequacy.words = fmt::format("{} does not describe these data: {} does better, by {} in BIC",
-                               law_name(chosen.law), law_name(s.candidates[*s.preferred].law),
-                               significant(chosen.delta_bic, 3));
+  adequacy.summary = fmt::format("{} does not describe these data: {} does better, by {} in BIC",
+                                 law_name(chosen.law), law_name(s.candidates[*s.preferred].law),
+                                 significant(chosen.delta_bic, 3));
   state(chosen.fit, std::move(adequacy));
   chosen.identified = false;
   chosen.reason = "does not describe the data";

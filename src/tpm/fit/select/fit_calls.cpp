@@ -28,7 +28,7 @@ std::vector<FittedParameter> fitted_parameters(const FitResult& fit) {
                     .not_separable = p.not_separable,
                     .with_drift = p.with_drift,
                     .unconfirmed = p.unconfirmed,
-                    .words = p.words});
+                    .summary = p.summary});
   }
   return list;
 }

@@ -51,7 +51,7 @@ std::size_t end_of_load(std::span<const double> stress) {
   return static_cast<std::size_t>(fallen - stress.begin());
 }
 
-/// Whether a channel stays where it is over the last half of the load, while another goes on.
+/// True if a channel stays where it is over the last half of the load, while another goes on.
 bool was_held(std::span<const double> held, double held_noise, std::span<const double> other,
               double other_noise) {
   constexpr double kStill = 0.005, kSure = 4.0;
@@ -64,7 +64,7 @@ bool was_held(std::span<const double> held, double held_noise, std::span<const d
   return moved > kSure * other_noise / std::sqrt(static_cast<double>(quarter));
 }
 
-/// Whether the load stood still over the last half while the other channel went on by far more of
+/// True if the load stood still over the last half while the other channel went on by far more of
 /// its range than the load: creep, whichever channel has more noise.
 bool crept(std::span<const double> load, std::span<const double> other, double other_noise) {
   constexpr double kLeast = 0.01, kMuchLess = 0.2, kSure = 8.0;

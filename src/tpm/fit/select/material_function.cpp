@@ -314,17 +314,17 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   state_preferred(s);
   const Candidate& chosen = s.candidates[s.recommended];
   s.warnings = range_warnings(chosen.fit, sizes_of_function(function));
-  if (chosen.fit.adequacy) s.words.push_back(chosen.fit.adequacy->words);
-  s.words.push_back(fmt::format(
+  if (chosen.fit.adequacy) s.summary.push_back(chosen.fit.adequacy->summary);
+  s.summary.push_back(fmt::format(
       "{} of {} readings; {} {} ({}): {} parameters, rms residual {} % of the largest "
       "reading",
       function.kind(), s.samples, least_law_words(s, "they"), law_name(chosen.law),
       law_words(chosen.law), chosen.parameters - 1, significant(100.0 * chosen.rms_over_peak, 3)));
   const Candidate& best = s.candidates[s.best_bic];
   if (s.recommended != s.best_bic && !s.preferred) {
-    s.words.push_back(fmt::format("{} has the lowest BIC, by {}{}{}", law_name(best.law),
-                                  significant(chosen.delta_bic, 3), best.identified ? "" : "; ",
-                                  best.reason));
+    s.summary.push_back(fmt::format("{} has the lowest BIC, by {}{}{}", law_name(best.law),
+                                    significant(chosen.delta_bic, 3), best.identified ? "" : "; ",
+                                    best.reason));
   }
   return s;
 }

@@ -27,7 +27,7 @@ bool bends(const LawSpec& law) {
   return law.kernel != Kernel::linear || law.tension != Tension::none;
 }
 
-/// Whether contact and offset can be told apart: by a bend of the kernel, or by a response that
+/// True if contact and offset can be told apart: by a bend of the kernel, or by a response that
 /// begins to rise within the recording. Where it begins was found in noisy readings; to fix contact
 /// there would take an estimate for known.
 bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
@@ -141,7 +141,7 @@ Unit drift_unit_of(const PreparedRecording& r) {
                                                  : shown_unit(response));
 }
 
-/// Whether the rests of a recording tell its drift: those of an indentation under an imposed depth.
+/// True if the rests of a recording tell its drift: those of an indentation under an imposed depth.
 /// What is measured of a strip or a creeping specimen at rest may be the tissue.
 bool rests_unloaded(const LawSpec& law, const PreparedRecording& r) {
   return is_indentation(law) && !r.load_imposed;

@@ -72,7 +72,7 @@ RandomEffects one_specimen(const SpecimenEstimate& s, double level) {
   result.standard_error = s.standard_error;
   const double z = normal_quantile(0.5 * (1.0 + level));
   result.interval = around(s.estimate, z * s.standard_error);
-  result.words = "one specimen: nothing is known about the spread between specimens";
+  result.summary = "one specimen: nothing is known about the spread between specimens";
   return result;
 }
 
@@ -208,7 +208,7 @@ RandomEffects random_effects(std::span<const SpecimenEstimate> specimens, double
   if (r.specimens >= 3) {
     r.new_specimen = around(r.mean, t * std::hypot(std::sqrt(*r.tau_squared), r.standard_error));
   }
-  r.words = effects_words(r);
+  r.summary = effects_words(r);
   return r;
 }
 
@@ -227,9 +227,9 @@ RandomEffects random_effects_of_repeats(std::span<const SpecimenEstimate> repeat
     r.q = f;
     r.q_p_value =
         std::isfinite(f) ? fisher_tail(f, static_cast<double>(r.specimens - 1), sums.degrees) : 0;
-    r.words = effects_words(r);
+    r.summary = effects_words(r);
   }
-  r.words += repeat_words(r);
+  r.summary += repeat_words(r);
   return r;
 }
 

@@ -35,7 +35,7 @@ struct RandomEffects {
   int repeat_degrees = 0;                      ///< repeats less the specimens that have them
   std::optional<double> i_squared;             ///< max(0, (Q - (k - 1)) / Q), 0 .. 1
   std::optional<EffectInterval> new_specimen;  ///< prediction interval; empty for k < 3
-  std::string words;                           ///< one sentence
+  std::string summary;                         ///< one sentence
 };
 
 /// tau^2 maximises the restricted likelihood (Viechtbauer, J. Educ. Behav. Stat. 30 (2005) 261).

@@ -217,22 +217,22 @@ void describe_prediction(Selection& s, std::size_t i) {
     errors.push_back(
         fmt::format("{} {} %", law_name(c.law), significant(100.0 * h.rms_over_peak, 3)));
   }
-  s.words.push_back(fmt::format("{} predicted from the others, rms over peak: {}",
-                                s.candidates.front().held_out[i].what, fmt::join(errors, ", ")));
+  s.summary.push_back(fmt::format("{} predicted from the others, rms over peak: {}",
+                                  s.candidates.front().held_out[i].what, fmt::join(errors, ", ")));
 }
 
 void describe(Selection& s) {
   const Candidate& chosen = s.candidates[s.recommended];
   const Candidate& best = s.candidates[s.best_bic];
   const std::optional<LawAdequacy>& adequacy = chosen.fit.adequacy;
-  if (adequacy && adequacy->is_rejected()) s.words.push_back(adequacy->words);
-  s.words.push_back(fmt::format("{} {} ({}): {} parameters, rms residual {} % of the peak",
-                                least_law_words(s, "the data"), law_name(chosen.law),
-                                law_words(chosen.law), chosen.parameters - 1,
-                                significant(100.0 * chosen.rms_over_peak, 3)));
-  if (adequacy && !adequacy->is_rejected()) s.words.push_back(adequacy->words);
+  if (adequacy && adequacy->is_rejected()) s.summary.push_back(adequacy->summary);
+  s.summary.push_back(fmt::format("{} {} ({}): {} parameters, rms residual {} % of the peak",
+                                  least_law_words(s, "the data"), law_name(chosen.law),
+                                  law_words(chosen.law), chosen.parameters - 1,
+                                  significant(100.0 * chosen.rms_over_peak, 3)));
+  if (adequacy && !adequacy->is_rejected()) s.summary.push_back(adequacy->summary);
   if (s.recommended != s.best_bic && !s.preferred) {
-    s.words.push_back(fmt::format(
+    s.summary.push_back(fmt::format(
         "{} has the lowest BIC, by {}, {}", law_name(best.law), significant(chosen.delta_bic, 3),
         best.identified ? fmt::format("less than the margin of {}", significant(s.margin, 3))
                         : "but is not identified: " + best.reason));
@@ -241,7 +241,7 @@ void describe(Selection& s) {
     describe_prediction(s, i);
   }
   if (s.correlation.significant) {
-    s.words.push_back(fmt::format(
+    s.summary.push_back(fmt::format(
         "residuals repeat each other: {} samples count as {} readings (lag-1 correlation {})",
         s.samples, significant(s.effective_count, 3), significant(s.correlation.lag1, 2)));
   }
@@ -383,8 +383,8 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   state_adequacy(s, recordings);
   describe(s);
   for (const PreparedRecording& r : recordings) {
-    if (!r.start_up.empty()) s.words.push_back(r.start_up);
-    if (std::string rises = unseen_rise_words(r); !rises.empty()) s.words.push_back(rises);
+    if (!r.start_up.empty()) s.summary.push_back(r.start_up);
+    if (std::string rises = unseen_rise_words(r); !rises.empty()) s.summary.push_back(rises);
   }
   return s;
 }

@@ -69,7 +69,7 @@ struct Selection {
   double effective_count = 0.0;
   Correlation correlation;            ///< of the residuals that the law of least deviance leaves
   std::optional<DriftAnswers> drift;  ///< of the recommended law, if not separable
-  std::vector<std::string> words;     ///< the recommendation and its reasons
+  std::vector<std::string> summary;   ///< the recommendation and its reasons
   std::vector<std::string> warnings;  ///< what the experiment cannot tell
 };
 

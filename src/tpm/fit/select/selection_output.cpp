@@ -23,7 +23,7 @@ Json held_out_json(const Candidate& c) {
 }
 
 Json candidate_json(const Candidate& c) {
-  Json j{{"law", law_name(c.law)}, {"words", law_words(c.law)}, {"failed", c.failed}};
+  Json j{{"law", law_name(c.law)}, {"summary", law_words(c.law)}, {"failed", c.failed}};
   if (c.failed) {
     j["reason"] = c.reason;
     return j;
@@ -68,7 +68,7 @@ Json to_json(const Selection& s) {
   if (const auto& adequacy = s.candidates[s.recommended].fit.adequacy) {
     j["adequacy"] = files::to_json(*adequacy);
   }
-  j["words"] = s.words;
+  j["summary"] = s.summary;
   j["warnings"] = s.warnings;
   j["fit"] = to_json(s.candidates[s.recommended].fit);
   if (s.preferred) {
@@ -97,12 +97,12 @@ std::string to_terminal_text(const Selection& s) {
                         c.reason.empty() ? c.special : c.reason);
   }
   text += "\n";
-  for (const std::string& line : s.words) text += fmt::format("{}\n", line);
+  for (const std::string& line : s.summary) text += fmt::format("{}\n", line);
   if (s.preferred) {
     const Candidate& best = s.candidates[*s.preferred];
     text += fmt::format("\nof the law that the data prefer, {} ({}):\n", law_name(best.law),
                         law_words(best.law));
-    for (const ParameterResult& p : best.fit.parameters) text += fmt::format("- {}\n", p.words);
+    for (const ParameterResult& p : best.fit.parameters) text += fmt::format("- {}\n", p.summary);
     text += "\n";
   }
   for (const std::string& line : s.warnings) text += fmt::format("! {}\n", line);

@@ -147,7 +147,7 @@ void require_one_reference(const SpecimenRow& first, const SpecimenRow& row) {
 /// What is said of theta, said of the parameter.
 std::string in_natural_words(const PooledParameter& p) {
   constexpr std::string_view kTheta = " in theta";
-  std::string words = p.effects.words;
+  std::string words = p.effects.summary;
   const std::string_view si = si_symbol(p.parameter.unit.dimension);
   const std::string natural = p.parameter.scale == Scale::log
                                   ? std::string(" in the natural logarithm")
@@ -224,12 +224,12 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
     if (found.estimates.empty()) continue;
     PooledParameter p{found.parameter, random_effects_of_repeats(found.estimates, level),
                       found.left_out, found.not_separable, found.only_without};
-    p.effects.words = in_natural_words(p);
+    p.effects.summary = in_natural_words(p);
     if (!p.only_without.empty()) {
-      p.effects.words +=
+      p.effects.summary +=
           fmt::format("; not identified: {}: not separable in any recording", p.only_without);
     } else if (p.not_separable > 0) {
-      p.effects.words +=
+      p.effects.summary +=
           fmt::format("; {} more left out: {}: not separable", p.not_separable, found.doubt);
     }
     pooled.push_back(std::move(p));
@@ -292,7 +292,7 @@ Json to_json(const SpecimenStudy& study) {
                {"left_out", p.left_out},
                {"not_separable", p.not_separable},
                {"identified", p.only_without.empty()},
-               {"words", e.words}};
+               {"summary", e.summary}};
     if (!p.only_without.empty()) entry["only_without"] = p.only_without;
     const char* of = p.parameter.scale == Scale::log ? "of_log" : "SI";
     const auto sd_key = [&](const char* between) {
@@ -374,7 +374,7 @@ std::string to_terminal_text(const SpecimenStudy& study) {
                                       : significant(p.estimate / unit, 4));
     }
     if (row.fit->adequacy && !row.fit->adequacy->is_adequate()) {
-      text += fmt::format("  {}", row.fit->adequacy->words);
+      text += fmt::format("  {}", row.fit->adequacy->summary);
     }
     text += "\n";
   }
@@ -398,7 +398,7 @@ std::string to_terminal_text(const SpecimenStudy& study) {
                           shown(p.effects.new_specimen->upper), p.parameter.unit.symbol);
     }
     if (p.left_out > 0) text += fmt::format(", left out: {}", p.left_out);
-    text += fmt::format("\n  {}\n", p.effects.words);
+    text += fmt::format("\n  {}\n", p.effects.summary);
   }
   return text;
 }

@@ -34,7 +34,8 @@ struct UnseenRise {
 void add_rise_delays(FitConfig& config, const PreparedRecording& recording, std::size_t i,
                      const std::string& suffix);
 
-/// What the fit makes of these rises, in one sentence; empty without one.
+/// One sentence on how the fit allows for the rises of the recording that were not recorded; empty
+/// without such a rise.
 [[nodiscard]] std::string unseen_rise_words(const PreparedRecording& recording);
 
 }  // namespace tpm::fit

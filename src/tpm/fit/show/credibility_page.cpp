@@ -140,7 +140,7 @@ class EvidencePage {
                       validation_.at("u_input_from").get<std::string>())}}};
     if (tested) {
       cells["bench-test validation"] =
-          cell("/validation/verdict", validation_.at("words").get<std::string>());
+          cell("/validation/verdict", validation_.at("summary").get<std::string>());
     }
     return cells;
   }
@@ -343,8 +343,9 @@ Json law_record(const LawFile& law) {
     }
     parameters.push_back(std::move(entry));
   }
-  return {{"parameters", std::move(parameters)},
-          {"adequacy", law.adequacy ? law.adequacy->words : std::string("not stated by the law")}};
+  return {
+      {"parameters", std::move(parameters)},
+      {"adequacy", law.adequacy ? law.adequacy->summary : std::string("not stated by the law")}};
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ bool same_slice(const PlannedExperiment& a, const PlannedExperiment& b) {
          a.interval_s == b.interval_s && a.repeats == b.repeats;
 }
 
-/// Whether a logarithmic axis can show it.
+/// True if a logarithmic axis can show it.
 bool drawable(const DesignCandidate& c, const Direction& d, const ExpectedParameter& p) {
   return c.experiment.*d.along > 0.0 && std::isfinite(p.relative_error) && p.relative_error > 0.0;
 }

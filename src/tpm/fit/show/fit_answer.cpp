@@ -150,9 +150,9 @@ ShortAnswer short_answer(const FitResult& fit) {
   constexpr std::size_t kMostLines = 4;
   ShortAnswer answer;
   answer.conclusion.push_back(fit.config.title);
-  if (fit.adequacy) answer.conclusion.push_back(fit.adequacy->words);
+  if (fit.adequacy) answer.conclusion.push_back(fit.adequacy->summary);
   std::vector<std::string> hypotheses;
-  for (const HypothesisResult& h : fit.hypotheses) hypotheses.push_back("- " + h.words);
+  for (const HypothesisResult& h : fit.hypotheses) hypotheses.push_back("- " + h.summary);
   for (std::string& words : counted(std::move(hypotheses), kMostLines, "hypotheses")) {
     answer.conclusion.push_back(std::move(words));
   }
@@ -179,7 +179,7 @@ ShortAnswer short_answer(const FitResult& fit) {
                          fit.value_count, p, search);
   }
   answer.limits.push_back(std::move(search));
-  if (fit.bootstrap) answer.limits.push_back(fit.bootstrap->words);
+  if (fit.bootstrap) answer.limits.push_back(fit.bootstrap->summary);
   if (!fit.weakest_words.empty()) answer.limits.push_back("limit: " + fit.weakest_words);
   answer.warnings = fit.flags;
   return answer;
@@ -188,9 +188,9 @@ ShortAnswer short_answer(const FitResult& fit) {
 ShortAnswer short_answer(const Selection& s) {
   const FitResult& fit = s.candidates[s.recommended].fit;
   ShortAnswer answer = short_answer(fit);
-  answer.conclusion = s.words;
-  if (fit.adequacy && !contains(s.words, fit.adequacy->words)) {
-    answer.conclusion.insert(answer.conclusion.begin(), fit.adequacy->words);
+  answer.conclusion = s.summary;
+  if (fit.adequacy && !contains(s.summary, fit.adequacy->summary)) {
+    answer.conclusion.insert(answer.conclusion.begin(), fit.adequacy->summary);
   }
   answer.warnings = s.warnings;
   const std::vector<std::string> outside = outside_words(fit);

@@ -149,7 +149,7 @@ std::string pooled_csv(const SpecimenStudy& study) {
   std::string text =
       csv_line({"parameter", "SI_unit", "typical", "lower", "upper", "new_specimen_lower",
                 "new_specimen_upper", "level", reference_column(study.law), "specimens",
-                "recordings_left_out", "spread_p_value", "I_squared", "words"});
+                "recordings_left_out", "spread_p_value", "I_squared", "summary"});
   for (const PooledParameter& p : study.pooled) {
     const RandomEffects& e = p.effects;
     const auto natural = [&](double theta) { return cell(p.parameter.natural(theta)); };
@@ -158,7 +158,7 @@ std::string pooled_csv(const SpecimenStudy& study) {
                       e.new_specimen ? natural(e.new_specimen->lower) : "",
                       e.new_specimen ? natural(e.new_specimen->upper) : "", cell(study.level),
                       reference_cell(study.law), std::to_string(e.specimens),
-                      std::to_string(p.left_out), cell(e.q_p_value), cell(e.i_squared), e.words});
+                      std::to_string(p.left_out), cell(e.q_p_value), cell(e.i_squared), e.summary});
   }
   return text;
 }

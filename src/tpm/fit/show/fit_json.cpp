@@ -67,7 +67,7 @@ Json bootstrap_json(const BootstrapResult& b) {
           {"block_length", b.block_length},
           {"seed", b.options.seed},
           {"failed", b.failed},
-          {"words", b.words}};
+          {"summary", b.summary}};
 }
 
 Json correlation_json(const Correlation& c) {
@@ -75,7 +75,7 @@ Json correlation_json(const Correlation& c) {
           {"samples", c.count},
           {"effective_samples", number(c.effective_count)},
           {"significant", c.significant},
-          {"words", c.words}};
+          {"summary", c.summary}};
 }
 
 Json conditions_json(const ParameterResult& p) {
@@ -119,7 +119,7 @@ Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimate
     j["bounds_widened_from_SI"] = pair_json(p.first_bounds->lower, p.first_bounds->upper);
   }
   if (!p.conditional_on.empty()) j["conditional_on"] = conditions_json(p);
-  j["words"] = p.words;
+  j["summary"] = p.summary;
   j["profile_SI_and_deviance"] = array_json(p.profile.points, [](const ProfilePoint& point) {
     return Json{number(point.natural), number(point.deviance)};
   });
@@ -220,7 +220,7 @@ Json hypotheses_json(const FitResult& result) {
     j["p_value"] = number(h.p_value);
     j["excluded"] = h.excluded;
     j["parameters"] = parameter_values(result, h.minimum.natural);
-    j["words"] = h.words;
+    j["summary"] = h.summary;
     return j;
   });
 }
@@ -306,7 +306,7 @@ Json to_json(const FitResult& result) {
       j["noise_of_estimates"] = {{"phi", number(noise.phi)},
                                  {"step_s", number(noise.step_s)},
                                  {"beyond", number(noise.beyond)},
-                                 {"words", noise.words}};
+                                 {"summary", noise.summary}};
       j["noise_of_estimates"]["parameters"] = array_json(noise.of, [&](const NoiseOfEstimate& e) {
         return Json{{"degrees_of_freedom", number(e.degrees)},
                     {"bias_of_rounding_in_standard_errors",
@@ -327,7 +327,7 @@ Json to_json(const FitResult& result) {
   j["linearised"] = linearised_json(result);
   j["starts"] = {{"run", result.starts_run},       {"looked_at", starts_looked_at(result)},
                  {"failed", result.starts_failed}, {"agreeing_to_5_digits", result.starts_agreeing},
-                 {"seed", result.config.seed},     {"words", result.waterfall.words}};
+                 {"seed", result.config.seed},     {"summary", result.waterfall.summary}};
   j["starts"]["end_deviances"] = array_json(result.waterfall.deviances, number);
   if (result.bootstrap) j["bootstrap"] = bootstrap_json(*result.bootstrap);
   j["minima"] = minima_json(result);

@@ -74,7 +74,7 @@ std::string minima_table(const FitResult& result) {
       text += i + 1 < m.low.size() ? "," : "\n";
     }
   }
-  return text + result.waterfall.words + "\n";
+  return text + result.waterfall.summary + "\n";
 }
 
 /// "liver.csv: 500 of 600 samples fitted, rms residual 1.2 mN (0.4 % of the peak), ..."
@@ -99,7 +99,7 @@ std::string recording_line(const FitResult& result, const RecordingFit& r) {
     text += fmt::format(", {} % within the {:.4g} % prediction band",
                         significant(100.0 * *r.share_inside, 3), 100.0 * result.config.level);
   }
-  if (r.correlation) text += "; " + r.correlation->words;
+  if (r.correlation) text += "; " + r.correlation->summary;
   return text + "\n";
 }
 
@@ -122,7 +122,7 @@ std::string likelihood_line(const Likelihood& l) {
 
 std::string bootstrap_table(const FitResult& result) {
   const BootstrapResult& b = result.bootstrap.value();
-  std::string text = b.words + "\n";
+  std::string text = b.summary + "\n";
   for (std::size_t i = 0; i < b.parameters.size(); ++i) {
     const Unit& unit = result.parameters[i].parameter.unit;
     const BootstrapParameter& p = b.parameters[i];
@@ -157,8 +157,8 @@ std::string to_terminal_text(const FitResult& result) {
   text += "\n" + noise_line(result);
   if (result.likelihood) text += likelihood_line(*result.likelihood);
   text += "\n";
-  for (const ParameterResult& p : result.parameters) text += "- " + p.words + "\n";
-  for (const HypothesisResult& h : result.hypotheses) text += "- " + h.words + "\n";
+  for (const ParameterResult& p : result.parameters) text += "- " + p.summary + "\n";
+  for (const HypothesisResult& h : result.hypotheses) text += "- " + h.summary + "\n";
   if (!result.weakest_words.empty()) text += "- " + result.weakest_words + "\n";
   text += "\n" + minima_table(result) + "\n";
   if (result.bootstrap) text += bootstrap_table(result);

@@ -182,7 +182,7 @@ Figure recording_figure(const FitResult& fit, std::size_t recording) {
 Figure waterfall_figure(const FitResult& fit) {
   Figure figure{"waterfall", "Where the starts ended",
                 fmt::format("Deviance of the end of each start that was followed, sorted: {}.",
-                            fit.waterfall.words)};
+                            fit.waterfall.summary)};
   Panel panel{.x = {"start, sorted", ""}, .y = {"deviance above the best", ""}};
   Series ends{.kind = Series::Kind::points, .label = "end of a start", .provenance = "model"};
   for (std::size_t i = 0; i < fit.waterfall.deviances.size(); ++i) {

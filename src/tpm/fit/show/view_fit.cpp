@@ -227,11 +227,11 @@ void add_conclusion(ViewPage& page, const Json& answer, const Json& fit) {
   };
   const Json adequacy = fit.value("adequacy", Json());
   if (adequacy.is_object()) {
-    add(adequacy.at("words").get<std::string>(), adequacy.at("verdict") != "adequate");
+    add(adequacy.at("summary").get<std::string>(), adequacy.at("verdict") != "adequate");
   } else {
     add("whether the law describes the data was not tested", true);
   }
-  for (const Json& words : answer.value("words", Json::array())) {
+  for (const Json& words : answer.value("summary", Json::array())) {
     add(words.get<std::string>(), false);
   }
   for (const Json& warning : answer.value("warnings", Json::array())) {

@@ -29,7 +29,7 @@ namespace tpm::fit {
 [[nodiscard]] std::optional<LawFile> with_calibration_covariance(
     const LawFile& law, std::span<const PreparedRecording> calibration);
 
-/// Whether a contact of a fit is the sample at which the recording passes --contact-force.
+/// True if `contact` of a fit is the sample at which the recording passes --contact-force.
 [[nodiscard]] bool is_at_threshold(const PreparedRecording& recording, double contact);
 
 }  // namespace tpm::fit

@@ -221,7 +221,7 @@ void set_corner(RecordingParts& parts, const Recording& r) {
 
 using PieceIterator = std::vector<DrivePiece>::const_iterator;
 
-/// Whether the drive goes on after a piece in which it stood still for a moment.
+/// True if the drive goes on after a piece in which it stood still for a moment.
 bool is_pause(PieceIterator piece, PieceIterator end, const RecordingParts& parts,
               const Recording& r) {
   constexpr double kRisesOn = 0.1;  // of the drive's range

@@ -15,8 +15,8 @@ struct InstrumentEffect {
   double u_validation = 0.0, u_calibration = 0.0;
 };
 
-/// How S and D follow errors of the channels: relative ones of depth, time and response, absolute
-/// ones of time, depth and response.
+/// Derivatives of S and D by errors of the channels: relative ones of depth, time and response,
+/// absolute ones of time (s), depth and response (SI).
 struct ChannelSlopes {
   double depth_scale, time_scale, time_shift, travel;  ///< of S
   double simulated, by_simulated;                      ///< of S, by the law's response

@@ -10,7 +10,7 @@
 namespace tpm::fit {
 namespace {
 
-/// Whether a quantity varies by itself: a share of its variance is not explained by the others.
+/// True if a quantity varies by itself: a share of its variance is not explained by the others.
 bool adds_to(const Eigen::MatrixXd& c, const std::vector<Eigen::Index>& kept, Eigen::Index i) {
   if (!(c(i, i) > 0.0)) return false;
   if (kept.empty()) return true;

@@ -38,7 +38,7 @@ Eigen::MatrixXd smooth_shapes(std::span<const double> x, bool hold) {
   return shapes;
 }
 
-/// Whether a drive that is said to be held moves.
+/// True if a drive that is said to be held moves.
 bool trembles(std::span<const double> drive, double travel) {
   constexpr double kSmall = 1e-3;  // of the travel
   const auto [low, high] = std::ranges::minmax_element(drive);

@@ -75,7 +75,7 @@ Json recording_json(const RecordingComparison& r, const Applicability& a, const 
             {"loaded_s", stored(r.part.loaded_s)},
             {"left_out_s", stored(r.part.left_out_s)},
             {"whole", r.part.whole()},
-            {"words", part_words(r, law)}};
+            {"summary", part_words(r, law)}};
   if (r.part.hold_asked_s) {
     part["hold_asked_s"] = stored(*r.part.hold_asked_s);
   }
@@ -204,7 +204,7 @@ Json to_json(const Validation& v) {
   if (!v.alone.empty()) j["in_one_only"] = array_json(v.alone, quantity_json);
   j["remarks"] = v.remarks;
   j["verdict"] = verdict_key(v.verdict);
-  j["words"] = conclusion_words(v);
+  j["summary"] = conclusion_words(v);
   return j;
 }
 

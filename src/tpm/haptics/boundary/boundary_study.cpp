@@ -166,7 +166,7 @@ void list_corners(BoundaryStudy& study) {
 
 }  // namespace
 
-std::string_view word_of(RiseLimit limit) {
+std::string_view to_string(RiseLimit limit) {
   switch (limit) {
     case RiseLimit::slip:
       return "slip";

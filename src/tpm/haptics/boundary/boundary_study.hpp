@@ -69,7 +69,7 @@ struct BoundaryStudy {
   std::vector<DeviceCorner> corners;
 };
 
-[[nodiscard]] std::string_view word_of(RiseLimit limit);
+[[nodiscard]] std::string_view to_string(RiseLimit limit);
 
 [[nodiscard]] BoundaryStudy study_boundaries(const PlantSettings& plant);
 

@@ -6,7 +6,7 @@
 
 namespace tpm::haptics {
 
-std::string_view word_of(ForcesOff cause) {
+std::string_view to_string(ForcesOff cause) {
   static constexpr auto kNames = std::to_array<Word<ForcesOff>>({
       {ForcesOff::none, "none"},
       {ForcesOff::button, "button"},
@@ -19,7 +19,7 @@ std::string_view word_of(ForcesOff cause) {
   return word_for(kNames, cause, "unknown");
 }
 
-std::string_view word_of(DeviceLink link) {
+std::string_view to_string(DeviceLink link) {
   static constexpr auto kNames = std::to_array<Word<DeviceLink>>({
       {DeviceLink::none, "none"},
       {DeviceLink::synchronous, "synchronous"},

@@ -56,7 +56,7 @@ extern "C" void tpm_remember_end(int signal) {
   last_signal_seen = signal;
 }
 
-/// Whether a call that it interrupts goes on. A terminal sends SIGTTIN and SIGTTOU again for each
+/// True if a call that it interrupts goes on. A terminal sends SIGTTIN and SIGTTOU again for each
 /// call that does, so that it would never come back.
 bool restarts(int signal) noexcept {
   return std::find(kStops.begin(), kStops.end(), signal) == kStops.end();

@@ -34,7 +34,7 @@ class ForceComparison {
   void report(const Eigen::Vector3d& force_N, std::int64_t at_ns) noexcept;
   /// A state came that names no force.
   void no_report() noexcept { ++unnamed_; }
-  /// What was found, a line each. From any thread.
+  /// Findings of the comparison, one line each. May be called from any thread.
   [[nodiscard]] std::vector<std::string> findings() const;
 
  private:

@@ -284,7 +284,7 @@ void InverseDevice::identify() {
   identity_.serial = device_.id;
   identity_.firmware = device_.firmware;
   identity_.library = fmt::format("service on port {}", address_.port);
-  identity_.library_version = fmt::format("service {}, format '{}'", version_, word_of(format_));
+  identity_.library_version = fmt::format("service {}, format '{}'", version_, to_string(format_));
   identity_.link = DeviceLink::network;
   identity_.left_handed = device_.settings.handedness == "left";
   identity_.hardware = !device_.simulated;

@@ -179,7 +179,7 @@ InverseSettings settings_of(const Part& config) {
   return s;
 }
 
-/// Whether a device says that it is simulated. Any other word than these is none of a simulation:
+/// True if a device says that it is simulated. Any other word than these is none of a simulation:
 /// hardware keeps its guards.
 bool says_simulated(const Part& part) {
   bool said = false;
@@ -219,7 +219,7 @@ InverseDeviceEntry entry_of(const Part& part) {
 
 }  // namespace
 
-std::string_view word_of(InverseFormat format) {
+std::string_view to_string(InverseFormat format) {
   return format == InverseFormat::vector ? key::vector : key::values;
 }
 

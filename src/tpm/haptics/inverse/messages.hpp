@@ -15,7 +15,7 @@ namespace tpm::haptics {
 /// under "values".
 enum class InverseFormat { vector, values };
 
-[[nodiscard]] std::string_view word_of(InverseFormat format);
+[[nodiscard]] std::string_view to_string(InverseFormat format);
 
 /// Format by the answer of GET /version, "3.5.0.0". Throws Error(environment) for a version
 /// before 3.1 or from 4 on, or no version.

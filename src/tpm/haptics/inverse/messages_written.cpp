@@ -87,7 +87,7 @@ std::string force_message(InverseFormat format, std::string_view device_id,
                           const Eigen::Vector3d& force_N, std::string_view profile) {
   return fmt::format(
       R"({{{}"inverse3":[{{"device_id":{},"commands":{{"set_cursor_force":{{"{}":{}}}}}}}]}})",
-      session_text(profile), json_text(device_id), word_of(format), vector_text(force_N));
+      session_text(profile), json_text(device_id), to_string(format), vector_text(force_N));
 }
 
 std::string neutral_message(std::string_view device_id, std::string_view profile) {

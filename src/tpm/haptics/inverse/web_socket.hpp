@@ -27,7 +27,7 @@ inline constexpr std::uint16_t kCloseNormal = 1000, kCloseGoingAway = 1001,
                                kCloseProtocolError = 1002, kCloseBadText = 1007,
                                kClosePolicy = 1008, kCloseTooBig = 1009;
 
-/// What a status code means; for one that RFC 6455 does not list, "no reason".
+/// Meaning of a status code of RFC 6455; "no reason" for a code that it does not list.
 [[nodiscard]] std::string_view words_of_close(std::uint16_t code) noexcept;
 
 using FrameMask = std::array<std::uint8_t, 4>;
@@ -65,7 +65,7 @@ class WebSocketReader {
   /// Code that the connection is to be closed with; 0: no fault.
   [[nodiscard]] std::uint16_t fault() const noexcept { return fault_; }
   [[nodiscard]] const char* fault_words() const noexcept { return words_; }
-  /// Whether a message has begun and is not complete.
+  /// True between the first byte of a message and its last.
   [[nodiscard]] bool amid() const noexcept { return !buffer_.empty() || open_.has_value(); }
 
  private:

@@ -58,7 +58,7 @@ bool is_gone(int error) {
 
 }  // namespace
 
-std::string_view word_of(StopCause cause) {
+std::string_view to_string(StopCause cause) {
   static constexpr auto kNames = std::to_array<Word<StopCause>>({
       {StopCause::none, "none"},
       {StopCause::finished, "finished"},

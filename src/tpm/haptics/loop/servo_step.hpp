@@ -62,7 +62,7 @@ class ServoStep {
   [[nodiscard]] StopCause cause() const noexcept { return cause_; }
   [[nodiscard]] std::uint64_t cycles() const noexcept { return cycle_; }
   [[nodiscard]] const EnergyWatch& energy() const noexcept { return energy_; }
-  /// Whether the motion is searched for a delay that has grown.
+  /// True if the motion is searched for a delay that has grown.
   [[nodiscard]] bool passive() const noexcept { return passive_; }
 
   /// Periods of the model in one cycle, at most.

@@ -105,7 +105,7 @@ std::string serve_text(const HilSession& session, const ServeRun& run) {
       "clients      {} connections, {} refused, {} closed for a fault\n"
       "messages     {}, {} of them unreadable; {} states\n"
       "force        at most {} N, limit {} N\n",
-      session.title, word_of(run.outcome.cause), run.outcome.cycles, run.outcome.counts.missed,
+      session.title, to_string(run.outcome.cause), run.outcome.cycles, run.outcome.counts.missed,
       c.connections, c.refused, c.closed_for_fault, c.messages, c.unreadable, c.states,
       significant(run.largest_force_N, 4), significant(session.servo.force_limit_N, 4));
 }
@@ -114,7 +114,7 @@ Json serve_json(const HilSession& session, const ServeRun& run) {
   const InverseServer::Counts& c = run.counts;
   return {{"simulated_device", true},
           {"title", session.title},
-          {"cause", word_of(run.outcome.cause)},
+          {"cause", to_string(run.outcome.cause)},
           {"cycles", run.outcome.cycles},
           {"missed_periods", run.outcome.counts.missed},
           {"connections", c.connections},

@@ -15,7 +15,7 @@ inline constexpr double kVelocityWindow_s = 0.064, kSearchedDelay_s = 0.050;
 inline constexpr double kEdge_N = 0.2;     ///< of the force, to both sides
 inline constexpr int kHandleUnknowns = 5;  ///< m, b, c, k, f
 
-/// What was measured, on the grid of periods.
+/// Measured positions and commands of a handle on a grid of periods.
 struct HandleTimeline {
   double period_s = 0.0;
   std::vector<double> at_m;             ///< a period each
@@ -25,7 +25,7 @@ struct HandleTimeline {
   double stalled_s = 0.0;
 
   [[nodiscard]] std::size_t size() const { return at_m.size(); }
-  /// Whether all of `from` to `to` is known.
+  /// True if the positions of all periods from `from` to `to` (both included) are known.
   [[nodiscard]] bool covers(std::size_t from, std::size_t to) const {
     return gap[to + 1] == gap[from];
   }

@@ -149,7 +149,7 @@ std::string not_in_place(const ServoRecord& row, const DeviceLimits& limits,
 
 /// The end of a loop in the words of whoever saw it; what the device says comes first.
 std::string end_of(const ServoOutcome& outcome, double cycle_timeout_s) {
-  const std::string word(word_of(outcome.cause));
+  const std::string word(to_string(outcome.cause));
   const std::string said = outcome.device.error_text;
   if (outcome.cause == StopCause::cycle_timeout) {
     return fmt::format("{}: a call of the device, or the machine, took longer than {} ms", word,
@@ -220,7 +220,7 @@ void move_handle(IdentifyRun& run, std::vector<IdentificationSample>& samples,
   }
 }
 
-/// Whether a machine that stalls may have ended the loop, or a device that was left alone by it.
+/// True if a machine that stalls may have ended the loop, or a device that was left alone by it.
 bool is_stall(StopCause cause) {
   return cause == StopCause::watchdog || cause == StopCause::communication ||
          cause == StopCause::unplugged || cause == StopCause::cycle_timeout;
@@ -437,7 +437,7 @@ Json device_file_json(const IdentifyRun& run, const std::string& date) {
                    {"stalls", f.stalls},
                    {"stalled_s", rounded(f.stalled_s, kDigits)},
                    {"begun_again", run.begun_again},
-                   {"ended", word_of(run.outcome.cause)},
+                   {"ended", to_string(run.outcome.cause)},
                    {"stroke_m", rounded(f.stroke_m, kDigits)}};
   if (!run.ended_by.empty()) measurement["ended_by"] = run.ended_by;
   if (!run.findings.empty()) measurement["device_findings"] = run.findings;

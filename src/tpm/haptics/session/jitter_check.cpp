@@ -54,7 +54,7 @@ std::string fault_of(const JitterCheck& check) {
   const ServoOutcome& o = check.outcome;
   const double late_s = o.woke_late.quantile_s(0.99);
   if (o.cause != StopCause::finished) {
-    return fmt::format("the test ended early: {}{}{}", word_of(o.cause),
+    return fmt::format("the test ended early: {}{}{}", to_string(o.cause),
                        o.detail.empty() ? "" : ": ", o.detail);
   }
   const double stall_s = longest_stall_s(check);

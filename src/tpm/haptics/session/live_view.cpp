@@ -309,7 +309,7 @@ std::string LiveView::state_json(std::uint64_t after) const {
       {"begun", s.begun},
       {"place", s.place},
       {"over", s.over},
-      {"cause", word_of(s.cause)},
+      {"cause", to_string(s.cause)},
       {"detail", s.detail},
       {"time_s", s.time_s},
       {"cycle", row.cycle},

@@ -143,7 +143,7 @@ struct LoopContact::Stepped {
   double late = 0.0;    ///< of the last thousand calls, while the contact waits to begin
   double behind = 0.0;  ///< periods by which the tissue is behind, ServoStep::kMostSteps a call
 
-  /// Whether a loop whose call came after `missed` periods is too slow to go on.
+  /// True if a loop whose call came after `missed` periods is too slow to go on.
   bool is_too_slow(int missed, int most_late) noexcept {
     constexpr double kCalls = 1000.0, kMostBehind = 1000.0;
     if (!begun) {

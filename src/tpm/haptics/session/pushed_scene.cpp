@@ -48,10 +48,10 @@ PushedScene::PushedScene(const HilSession& session)
 
 std::size_t PushedScene::only_sphere() const {
   if (contact.kind == ContactKind::sphere) return probe().sphere;
-  throw bad_input(
-      contact_place,
-      fmt::format("a {}, and the model '{}' is pushed at one sphere", word_of(contact.kind), model),
-      "a sphere, or a model that moves several: planned, linear, curves");
+  throw bad_input(contact_place,
+                  fmt::format("a {}, and the model '{}' is pushed at one sphere",
+                              to_string(contact.kind), model),
+                  "a sphere, or a model that moves several: planned, linear, curves");
 }
 
 LoopModel PushedScene::begun(std::string_view kind, std::string_view how) const {

@@ -94,7 +94,7 @@ Json to_json(const DeviceIdentity& device) {
           {"serial", device.serial},
           {"firmware", device.firmware},
           {"library_version", device.library_version},
-          {"communication_mode", word_of(device.link)},
+          {"communication_mode", to_string(device.link)},
           {"left_handed", device.left_handed},
           {"hardware", device.hardware},
           {"assumptions", device.assumptions}};
@@ -137,14 +137,14 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
 }
 
 Json recording_closing(const ServoOutcome& outcome) {
-  Json json{{"cause", word_of(outcome.cause)},
+  Json json{{"cause", to_string(outcome.cause)},
             {"detail", outcome.detail},
             {"cycles", outcome.cycles},
             {"counts", to_json(outcome.counts)},
             {"dropped_records", outcome.dropped_records},
             {"device_error", outcome.device.error},
             {"device_error_text", std::string(outcome.device.error_text)},
-            {"forces_off", word_of(outcome.device.forces_off)}};
+            {"forces_off", to_string(outcome.device.forces_off)}};
   if (!outcome.real_time) return json;
   json["host"] = host_line();
   json["scheduling"] = outcome.scheduling;
@@ -236,12 +236,12 @@ std::string damage_line(const HilRecording& recording) {
 }
 
 std::string early_end_line(const HilRecording& recording) {
-  if (!recording.closed || recording.cause() == word_of(StopCause::finished)) return "";
+  if (!recording.closed || recording.cause() == to_string(StopCause::finished)) return "";
   const Json& closing = recording.closing;
   const std::string detail = closing.value("detail", "");
   const int error = closing.at("device_error").get<int>();
   return fmt::format("the session ended early, at {}: {}{}{}", end_words(recording),
-                     recording.cause() == word_of(StopCause::signal)
+                     recording.cause() == to_string(StopCause::signal)
                          ? "stopped by a signal, such as Ctrl-C"
                          : recording.cause(),
                      detail.empty() ? "" : ": " + detail,

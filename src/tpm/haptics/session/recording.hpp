@@ -40,7 +40,7 @@ struct HilRecording {
 
   /// Nothing is missing: neither the end nor a row.
   [[nodiscard]] bool whole() const { return closed && damaged == 0; }
-  /// Why the session ended, as word_of(StopCause); "cut off" without a closing record.
+  /// Why the session ended, as to_string(StopCause); "cut off" without a closing record.
   [[nodiscard]] std::string cause() const;
   /// Of the end: of the last row.
   [[nodiscard]] double end_s() const;
@@ -59,12 +59,12 @@ struct HilRecording {
 /// Missing part of a recording, one line for a person; empty if nothing is.
 [[nodiscard]] std::string damage_line(const HilRecording& recording);
 
-/// How a session ended that did not come to its last phase, one line for a person; empty if it
-/// did, or if the recording does not say (damage_line()).
+/// Cause of the end of a session before its last phase, one line; empty if the session came to its
+/// last phase, or if the recording does not tell (damage_line()).
 [[nodiscard]] std::string early_end_line(const HilRecording& recording);
 
-/// What whoever uses the numbers of a recording has to know first, one line each: what is missing,
-/// an early end, rows that found no room, what the device noticed.
+/// Reservations about the numbers of a recording, one line each: missing parts, an early end, rows
+/// that found no room, findings of the device.
 [[nodiscard]] std::vector<std::string> recording_remarks(const HilRecording& recording);
 
 /// "SIMULATED DEVICE" in words that suit the recording, or what the hardware is.

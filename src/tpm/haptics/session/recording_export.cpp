@@ -128,7 +128,7 @@ void write_phases(Hdf5Writer& file, const HilSession& session) {
   double start_s = 0.0;
   for (const SessionPhase& phase : session.phases) {
     names.push_back(phase.name);
-    kinds.emplace_back(word_of(phase.kind));
+    kinds.emplace_back(to_string(phase.kind));
     starts.push_back(start_s);
     ends.push_back(start_s = phase.end_s);
     from.push_back(phase.from);
@@ -187,7 +187,7 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
   write_phases(writer, recording.session);
   std::vector<std::string> causes;
   for (auto i = 0; i <= static_cast<std::int32_t>(StopCause::damping); ++i) {
-    causes.emplace_back(word_of(static_cast<StopCause>(i)));
+    causes.emplace_back(to_string(static_cast<StopCause>(i)));
   }
   writer.texts("/causes", causes);
   if (const auto remarks = recording_remarks(recording); !remarks.empty()) {

@@ -198,7 +198,7 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
   const bool own = limits.hardware() || limits.simulated;
   RenderingCheck check;
   if (session.law && session.law->adequacy && !session.law->adequacy->is_adequate()) {
-    check.warnings.push_back("law: " + session.law->adequacy->words);
+    check.warnings.push_back("law: " + session.law->adequacy->summary);
   }
   check.rate_Hz = 1.0 / session.servo.period_s;
   count_device(check, session, limits);

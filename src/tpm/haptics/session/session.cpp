@@ -206,7 +206,7 @@ std::vector<std::uint64_t> ends_of(const std::vector<SessionPhase>& phases, doub
 
 }  // namespace
 
-std::string_view word_of(SessionPhaseKind kind) {
+std::string_view to_string(SessionPhaseKind kind) {
   static constexpr auto kNames = std::to_array<Word<SessionPhaseKind>>({
       {SessionPhaseKind::approach, "approach"},
       {SessionPhaseKind::indent, "indent"},

@@ -33,7 +33,7 @@ enum class SessionPhaseKind {
   motion  ///< that of a recording, repeated
 };
 
-[[nodiscard]] std::string_view word_of(SessionPhaseKind kind);
+[[nodiscard]] std::string_view to_string(SessionPhaseKind kind);
 
 /// Instruction to the operator, and its duration.
 struct SessionPhase {

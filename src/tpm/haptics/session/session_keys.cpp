@@ -59,7 +59,8 @@ ValueType<Json> contact_type() {
   form.name = "moved_spheres";
   form.sentence = "the spheres that the tool moves, without turning";
   std::erase_if(form.kinds, [](const KindForm& kind) {
-    return kind.word != word_of(ContactKind::sphere) && kind.word != word_of(ContactKind::patch);
+    return kind.word != to_string(ContactKind::sphere) &&
+           kind.word != to_string(ContactKind::patch);
   });
   for (KindForm& kind : form.kinds) {
     std::erase_if(kind.keys, [](const KeyForm& key) { return key.name == "share"; });

@@ -119,7 +119,7 @@ struct AdmittedSession {
 [[nodiscard]] AdmittedSession admit_session(const HilSession& session, const DeviceChoice& device,
                                             const SessionRunOptions& options);
 
-/// What the caller says of a device of its own.
+/// Permissions and limits' origin of a device that the caller made.
 struct DevicePermissions {
   bool may_move = false;       ///< to initialise itself
   bool take_as_ready = false;  ///< it is initialised, where nobody can tell

@@ -142,7 +142,7 @@ Json impacts_json(const BoundaryStudy& study) {
     Json by_limit = Json::object();
     for (const RiseLimit limit : kRiseLimits) {
       const auto which = static_cast<std::size_t>(limit);
-      by_limit[std::string(word_of(limit))] = {
+      by_limit[std::string(to_string(limit))] = {
           {"comes_to_rest", p.rests[which]},
           {"delivered_to_hand_J", number_or_null(p.delivered_J[which])}};
     }

@@ -142,7 +142,7 @@ void add_glance(Document& d, const HilRecording& r, const Verification& v,
   d.heading(2, "Safe, faithful, like the experiment?");
   std::vector<Cell> lines;
   for (std::string& line : recording_remarks(r)) lines.push_back({std::move(line), Tone::bad});
-  if (s.cause == word_of(StopCause::finished)) {
+  if (s.cause == to_string(StopCause::finished)) {
     lines.push_back({"the session came to its end", Tone::good});
   }
   const Json rendering = r.header.value("rendering", Json());

@@ -11,7 +11,7 @@
 
 namespace tpm::haptics {
 
-// What each command of tpm hil shows; keys are described in docs/haptics.md.
+// Texts, JSON and pages of the commands of tpm hil; keys are described in docs/haptics.md.
 
 [[nodiscard]] Json check_json(const JitterCheck& check);
 [[nodiscard]] std::string check_text(const JitterCheck& check);

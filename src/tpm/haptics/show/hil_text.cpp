@@ -27,10 +27,10 @@ std::string us(double seconds) {
 std::string device_words(const DeviceIdentity& device) {
   if (device.hardware) {
     return fmt::format("{}, serial {}, communication {}", device.name, device.serial,
-                       word_of(device.link));
+                       to_string(device.link));
   }
   return fmt::format("SIMULATED DEVICE, no hardware: {} ({}, communication {})", device.name,
-                     device.kind, word_of(device.link));
+                     device.kind, to_string(device.link));
 }
 
 std::string times_text(const char* what, const TimeHistogram& times) {
@@ -154,7 +154,7 @@ struct PhaseKindErrors {
 std::map<std::string, PhaseKindErrors> errors_by_kind(const Verification& v) {
   std::map<std::string, PhaseKindErrors> kinds;
   for (const PhaseFidelity& p : v.phases) {
-    PhaseKindErrors& kind = kinds[std::string(word_of(p.phase.kind))];
+    PhaseKindErrors& kind = kinds[std::string(to_string(p.phase.kind))];
     ++kind.count;
     kind.squares += p.force.rms_N * p.force.rms_N * static_cast<double>(p.force.instants);
     kind.instants += p.force.instants;
@@ -165,7 +165,7 @@ std::map<std::string, PhaseKindErrors> errors_by_kind(const Verification& v) {
 
 /// Time that was verified: of a session that ended early, of how much.
 std::string verified_words(const HilRecording& recording, const Verification& v) {
-  const bool finished = recording.cause() == word_of(StopCause::finished);
+  const bool finished = recording.cause() == to_string(StopCause::finished);
   return significant(v.end_s, 6) + " s" +
          (finished ? std::string()
                    : " of " + significant(recording.session.duration_s(), 6) + " s");
@@ -207,7 +207,7 @@ Json check_json(const JitterCheck& check) {
           {"busy", times_json(o.busy)},
           {"woke_late_histogram", bins},
           {"stalls", stalls_json(check)},
-          {"cause", word_of(o.cause)},
+          {"cause", to_string(o.cause)},
           {"detail", o.detail},
           {"device_error", o.device.error},
           {"device_error_text", std::string(o.device.error_text)},
@@ -241,7 +241,7 @@ std::string check_text(const JitterCheck& check) {
       "at most {} consecutive periods missed, {} of 1000 cycles late; watchdog {} ms, a cycle may "
       "take {} ms; end: {}\n",
       o.counts.most_consecutive_missed, o.counts.most_late, significant(1e3 * check.watchdog_s, 3),
-      significant(1e3 * check.cycle_timeout_s, 3), word_of(o.cause));
+      significant(1e3 * check.cycle_timeout_s, 3), to_string(o.cause));
   text += said_by_device(o, check.findings);
   text += "timing: " + check.timing + "\n" + check.advice + "\n";
   return text + (check.session ? session_verdict_text(*check.session)
@@ -297,7 +297,7 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
       run.largest_force_N >= kLeastFeltForce_N
           ? std::string()
           : fmt::format(": no hand feels it (less than {} N, assumed)", kLeastFeltForce_N));
-  text += fmt::format("end: {}{}{}\n", word_of(o.cause), o.detail.empty() ? "" : ": ", o.detail);
+  text += fmt::format("end: {}{}{}\n", to_string(o.cause), o.detail.empty() ? "" : ": ", o.detail);
   return text + said_by_device(o, run.findings);
 }
 
@@ -306,7 +306,7 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
   for (const PhaseFidelity& p : v.phases) {
     Json json = fidelity_json(p.force);
     json["phase"] = p.phase.name;
-    json["kind"] = word_of(p.phase.kind);
+    json["kind"] = to_string(p.phase.kind);
     json["start_s"] = rounded(p.start_s, kHilDigits);
     json["depth_rms_m"] = rounded(p.depth_rms_m, kHilDigits);
     phases.push_back(std::move(json));

@@ -102,7 +102,7 @@ RowList::const_iterator after_phase(const RowList& rows, std::int32_t phase) {
                               [phase](const ServoRecord* row) { return row->phase <= phase; });
 }
 
-/// Whether the phases from a ramp or hold on repeat the experiment of the readings: held for the 30
+/// True if the phases from a ramp or hold on repeat the experiment of the readings: held for the 30
 /// s after which they were taken.
 bool repeats_experiment(const std::vector<SessionPhase>& phases, std::size_t p) {
   constexpr double kHeld_s = 30.0, kAbout_s = 1.0;

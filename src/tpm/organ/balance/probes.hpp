@@ -1,5 +1,5 @@
 #pragma once
-// What is imposed on a network: what is driven, by which histories, and loads that do not change.
+// Boundary conditions of a network: driven spheres with their histories, and constant loads.
 #include <span>
 #include <vector>
 

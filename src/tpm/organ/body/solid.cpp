@@ -243,7 +243,7 @@ class Held {
     }
   }
 
-  /// Whether every outer sphere still has what it wants without a shallow one.
+  /// True if every outer sphere still has what it wants without a shallow one.
   [[nodiscard]] bool can_spare(std::size_t place, const Wanted& wanted) const {
     return std::all_of(above_[place].begin(), above_[place].end(), [&](std::size_t outer) {
       if (below_[outer].size() <= wanted.inside) return false;

@@ -70,13 +70,13 @@ class Below {
     return found;
   }
 
-  /// Whether there was a place.
+  /// True if there was a place.
   bool add_below(std::size_t sphere) {
     return add(sphere,
                best_below(sphere, [](const Vector3d&, double distance) { return distance; }));
   }
 
-  /// Whether there was a place that makes the sphere steadier.
+  /// True if there was a place that makes the sphere steadier.
   bool steady(std::size_t sphere) {
     const Vector3d normal = normal_.col(static_cast<Eigen::Index>(sphere));
     std::vector<Vector3d> inner = inside(sphere);

@@ -16,11 +16,11 @@ inline constexpr double kSolidReach = 1.5;
 /// Least steadiness of an outer sphere.
 inline constexpr double kLeastSteadiness = 0.4;
 
-/// What is left of the stiffness of inner bonds along the normal of an outer sphere where the
-/// sphere may give way sideways: 1 - c^T (K + s I)^-1 c with the tangential stiffness K and the
+/// Stiffness of the inner bonds along the normal of an outer sphere that is free to slide, over
+/// that of one that is not, 0 to 1: 1 - c^T (K + s I)^-1 c with the tangential stiffness K and the
 /// coupling c of the inner bonds over their normal stiffness, and s = 1/4 for its six neighbours on
-/// the surface, which give way too. 1 where inner spheres lie evenly around the normal; little
-/// where all lie to one side, so that a push is answered by a slide. 0 without inner spheres.
+/// the surface, which slide too. 1 if inner spheres lie evenly around the normal; little if all lie
+/// to one side, so that a push is answered by a slide. 0 without inner spheres.
 /// @param inner from the sphere to those within reach, m
 [[nodiscard]] double steadiness(const Eigen::Vector3d& normal,
                                 std::span<const Eigen::Vector3d> inner);

@@ -1,5 +1,5 @@
 #pragma once
-// What a formulation does for scenes: two of its roles (formulation/formulation.hpp).
+// Two roles of a formulation that concern scenes (formulation/formulation.hpp).
 #include <functional>
 
 #include "tpm/organ/run/simulation.hpp"

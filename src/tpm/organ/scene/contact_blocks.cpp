@@ -103,7 +103,7 @@ const Kinds<ContactKeys, ContactKind>& contact_kinds() {
                      "of each contact; default: 10000 times the stiffest bond"));
   tool.push_back(key("mass_kg", &K::mass_kg, number(kAboveZero),
                      "of the tool, where the formulation has mass"));
-  const auto word = [](ContactKind kind) { return std::string(word_of(kind)); };
+  const auto word = [](ContactKind kind) { return std::string(to_string(kind)); };
   static const Kinds<K, ContactKind> kinds(
       {.name = "contact", .sentence = "what meets the tissue, driven by the protocol"}, &K::kind,
       {{ContactKind::sphere, word(ContactKind::sphere), "one sphere is driven, as in the paper",
@@ -127,7 +127,7 @@ const Kinds<ContactKeys, ContactKind>& contact_kinds() {
   return kinds;
 }
 
-std::string_view word_of(ContactKind kind) {
+std::string_view to_string(ContactKind kind) {
   return entry_of(kContactWords, kind).text;
 }
 

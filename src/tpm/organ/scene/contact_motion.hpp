@@ -1,5 +1,5 @@
 #pragma once
-// What a contact of a scene does by itself: the declaration of its keys, and the protocol.
+// Own motion of a contact of a scene: the declaration of its keys, and the protocol.
 #include <filesystem>
 
 #include "tpm/base/namespaces.hpp"

@@ -66,7 +66,7 @@ struct SceneContact {
 };
 
 /// The word for it in scenes and results.
-[[nodiscard]] std::string_view word_of(ContactKind kind);
+[[nodiscard]] std::string_view to_string(ContactKind kind);
 
 /// The spheres that a contact of the kinds `sphere` and `patch` drives, rising.
 [[nodiscard]] std::vector<std::size_t> spheres_of(const SceneContact& contact, const Organ& organ);
@@ -85,7 +85,7 @@ struct ExperimentScene {
 
   /// Some contact besides the first has a protocol of its own.
   [[nodiscard]] bool has_own_protocols() const;
-  /// Whether a contact moves as it is imposed. The mass of such a tool changes no force on the
+  /// True if the motion of the contact is imposed. The mass of such a tool changes no force on the
   /// tissue.
   [[nodiscard]] bool imposes_depth(const SceneContact& contact) const;
   /// The sphere that the first contact drives or aims at, and where to.

@@ -1,5 +1,5 @@
 #pragma once
-// What a step rule sees of a problem: states, their rates, and implicit stages.
+// Interface of a problem to a step rule: states, their rates, and implicit stages.
 #include "tpm/organ/steps/method.hpp"
 
 namespace tpm::organ {

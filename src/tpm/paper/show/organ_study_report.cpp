@@ -263,7 +263,7 @@ std::vector<Cell> fit_words(const OrganStudy& study) {
     const std::string name = fmt::format("{}, {}: ", study.config.fits[made.fit].name,
                                          study.config.tissues[made.tissue].name);
     for (const ParameterResult& p : made.result->parameters) {
-      items.push_back({name + p.words, tone_of(p.verdict)});
+      items.push_back({name + p.summary, tone_of(p.verdict)});
     }
     for (const std::string& flag : made.result->flags) items.push_back({name + flag, Tone::plain});
   }

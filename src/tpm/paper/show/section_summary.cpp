@@ -66,10 +66,10 @@ std::vector<Cell> verdicts(const PaperReport& report) {
                    report.figure_data.paper.relaxation_time_s() * 1e3),
        Tone::bad}};
   for (const ParameterResult& p : report.fits.reference.parameters) {
-    items.push_back({"Fit: " + p.words});
+    items.push_back({"Fit: " + p.summary});
   }
   for (const HypothesisResult& h : report.fits.reference.hypotheses) {
-    items.push_back({"Fit: " + h.words, h.excluded ? Tone::bad : Tone::plain});
+    items.push_back({"Fit: " + h.summary, h.excluded ? Tone::bad : Tone::plain});
   }
   items.push_back(held_out_sentence(report.fits));
   items.push_back({validation_sentence(report), Tone::fair});

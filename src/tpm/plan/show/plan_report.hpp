@@ -36,7 +36,7 @@ namespace tpm::plan {
 
 /// Quantity whose errors a plan states.
 [[nodiscard]] Json claim_json(const Plan& plan);
-/// Whether masses change the answer by more than the tolerance; null where that is not known.
+/// True if masses change the answer by more than the tolerance; null if that is not known.
 [[nodiscard]] Json masses_matter_json(const Plan& plan);
 
 /// Answer of the planned model, and the same in words.

@@ -71,8 +71,8 @@ Json state_json(const FiguredRun& figured) {
   const bool depth = figured.scene->protocol.drive() == Drive::displacement;
   const double depth_m = depth ? state.imposed : state.response;
   const double force_N = depth ? state.response : state.imposed;
-  json["words"] = fmt::format("t = {} s, depth {} mm, force {} N", significant(state.time_s, 4),
-                              significant(1e3 * depth_m, 4), significant(force_N, 4));
+  json["summary"] = fmt::format("t = {} s, depth {} mm, force {} N", significant(state.time_s, 4),
+                                significant(1e3 * depth_m, 4), significant(force_N, 4));
   json["roughness"] = roughness_words(smoothness_of(*figured.scene, state.position));
   return json;
 }

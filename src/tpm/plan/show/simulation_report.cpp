@@ -144,7 +144,7 @@ Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
   Json list = Json::array();
   for (const SceneContact& contact : scene.contacts) {
     const Eigen::Vector3d& d = contact.probe.direction;
-    Json json{{"kind", word_of(contact.kind)},
+    Json json{{"kind", to_string(contact.kind)},
               {"sphere", contact.probe.sphere + 1},
               {"direction", {rounded(d.x(), 9), rounded(d.y(), 9), rounded(d.z(), 9)}},
               {"share", contact.probe.share}};
@@ -194,7 +194,7 @@ std::string contacts_text(const ExperimentScene& scene, const RunNetwork& networ
       text += sideways_words(scene, contact.probe);
       continue;
     }
-    text += fmt::format("{}", word_of(contact.kind));
+    text += fmt::format("{}", to_string(contact.kind));
     if (contact.kind != ContactKind::sphere) {
       text += fmt::format(" of {} radius", sized_text(Dimension::length, contact.radius_m, 4));
     }
