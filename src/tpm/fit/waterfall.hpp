@@ -14,7 +14,7 @@ struct Waterfall {
   double margin = 0.1;            ///< of the deviance
   int near_best = 0;              ///< ends within `margin` of the best
   int starts = 0;
-  int failed = 0;     ///< starts without a usable end
+  int failed = 0;       ///< starts without a usable end
   std::string summary;  ///< "17 of 50 starts within 0.1 of the best; ..."
 };
 

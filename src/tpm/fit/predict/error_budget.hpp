@@ -23,9 +23,9 @@ enum class BudgetKind {
 
 /// The force that one stage answers with at the times of the budget.
 struct BudgetStage {
-  std::string name;   ///< "law"
+  std::string name;     ///< "law"
   std::string summary;  ///< one line: what is asked and how
-  std::string line;   ///< name of the line that leads here from the stage before; first: empty
+  std::string line;     ///< name of the line that leads here from the stage before; first: empty
   BudgetKind kind = BudgetKind::data;
   std::vector<double> force_N;
 };
