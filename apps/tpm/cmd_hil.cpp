@@ -252,10 +252,7 @@ int exit_code_of(const ServoOutcome& outcome) {
 }
 
 int run_hil(const RunChoice& choice, const Session& session) {
-  if (!session.force && std::filesystem::is_regular_file(choice.output)) {
-    throw Error(ExitCode::usage, "-o " + choice.output, "the file exists",
-                "another --output, or --overwrite");
-  }
+  require_new(choice.output, session);
   HilSession hil = read_session(choice.session, choice.changes);
   DeviceChoice device = chosen_device(choice.device);
   if (!choice.changes.motion.empty() && device.kind == "virtual") device.kind = "replay";

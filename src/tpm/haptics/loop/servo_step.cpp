@@ -427,13 +427,14 @@ StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
   // Not before: in real time a device is prepared after its loop has been made.
   if (!awaited_) device_.await();
   awaited_ = true;
-  gate_->count(static_cast<std::uint64_t>(missed) + 1);
+  const std::uint64_t periods = static_cast<std::uint64_t>(missed) + 1;
+  gate_->count(periods);
   StopCause cause = read(missed, row);
   if (cause != StopCause::none) return cause;
   row.tool_depth_m = settings_.push.dot(position_m_ - settings_.surface_m);
   const bool with_surface = !settings_.surface_before_hand_m;
   const std::uint32_t missing =
-      gate_->see(position_m_, row.tool_depth_m, with_surface, hand_.buttons != 0);
+      gate_->see(periods, position_m_, row.tool_depth_m, with_surface, hand_.buttons != 0);
   row.flags |= missing;
   cause = write(Eigen::Vector3d::Zero(), row);
   if (cause != StopCause::none) return cause;

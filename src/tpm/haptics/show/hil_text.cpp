@@ -40,7 +40,7 @@ std::string times_text(const char* what, const TimeHistogram& times) {
                      us(times.quantile_s(0.999)), us(times.max_s()));
 }
 
-/// Null if nothing was counted: the thread of a loop that hung was left behind.
+/// Null if nothing was counted: the first cycle hung.
 Json times_json(const TimeHistogram& times) {
   if (times.count() == 0) return {};
   return {{"p50_s", rounded(times.quantile_s(0.5), kHilDigits)},
@@ -67,6 +67,7 @@ std::vector<std::pair<double, std::uint64_t>> octaves(const TimeHistogram& times
 /// The extrapolation in words.
 std::string extrapolation_of(const JitterCheck& check) {
   const TimeHistogram& late = check.outcome.woke_late;
+  if (hung(check)) return "nothing, because a cycle hung";
   if (const auto hour_s = once_an_hour_s(check)) {
     return fmt::format("{} us once an hour, {}", us(*hour_s),
                        *hour_s > late.max_s()
@@ -100,7 +101,10 @@ std::string stalls_text(const JitterCheck& check) {
     text = fmt::format(
         "p99.99 of the wake-ups {} us, the watchdog waits for {} us; stalls beyond it: {}{}{}\n",
         us(late.quantile_s(0.9999)), us(check.watchdog_s), stalls_beyond_watchdog(check),
-        bound.empty() ? "" : ": ", bound);
+        hung(check)     ? ", and a cycle that hung"
+        : bound.empty() ? ""
+                        : ": ",
+        bound);
   }
   return text + fmt::format("extrapolated, not measured: {}\n", extrapolation_of(check));
 }
