@@ -290,7 +290,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
         "rest it is pushed for a second with at most {} N, which measures its delay\n",
         most_N);
   };
-  options.noticed = [](const std::string& line) { tell_user("tpm: warning: {}\n", line); };
+  options.noticed = warn_of_finding;
   std::optional<OutOfMemoryIsThrown> while_the_device_is_open;
   options.opened = [&, opened = options.opened](const DeviceIdentity& identity,
                                                 const LoopModel& model) {

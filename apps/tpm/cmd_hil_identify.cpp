@@ -79,7 +79,9 @@ std::string identified_text(const IdentifyRun& run) {
                                          : fmt::format("; begun again {} {}", run.begun_again,
                                                        run.begun_again == 1 ? "time" : "times"));
   }
-  for (const std::string& line : run.findings) text += "the device noticed: " + line + "\n";
+  for (const DeviceFinding& finding : run.findings) {
+    text += "the device noticed: " + finding.text + "\n";
+  }
   for (const std::string& line : f.not_identified) {
     text += fmt::format("not identified: {}\n", line);
   }

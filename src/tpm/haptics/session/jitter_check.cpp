@@ -223,7 +223,8 @@ void assess(JitterCheck& check) {
 }
 
 JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, double duration_s,
-                         RealTimeWish wish, const std::function<bool()>& interrupted) {
+                         RealTimeWish wish, const std::function<bool()>& interrupted,
+                         const FindingTold& noticed) {
   const DeviceLimits limits = limits_of(choice);
   HilSession session = idle_session(like, duration_s);
   if (choice.kind == "virtual") forgive_stalls(session);  // they are what is looked for
@@ -241,11 +242,15 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
   try {
     check.device = device->open();
     require_same_device(choice, check.device);
+    FindingNotices notices(*device, noticed);
+    notices.look();
+    options.idle = [&notices] { notices.look(); };
     options.prepare = [&] { device->prepare(preparation); };
     check.outcome = run_in_real_time(
         device, std::make_shared<EmptySpace>(session.servo.period_s), ServoSettings{session.servo},
         [](const ServoRecord&) {}, options);
     check.findings = device->findings();
+    notices.look();
   } catch (...) {
     device->stop();
     throw;

@@ -20,7 +20,7 @@ struct JitterCheck {
   double watchdog_s = 0.0, cycle_timeout_s = 0.0;  ///< of the sessions that it speaks for
   int late_limit = 0, missed_limit = 0;            ///< as ServoSettings::most_late, most_missed
   ServoOutcome outcome;
-  std::vector<std::string> findings;  ///< of the device, a line each
+  std::vector<DeviceFinding> findings;  ///< of the device
   bool timing_kept = false;
   std::string timing;  ///< whether the rate was kept, and for how long; or why not: one line
   std::string advice;  ///< what this machine can do and what to change, one sentence
@@ -66,9 +66,11 @@ void assess(JitterCheck& check);
 /// time? Goes on to the end whatever is late, unless the device's watchdog cuts it off or a cycle
 /// hangs for the session's cycle_timeout_s; the simulated device forgives a second
 /// (forgive_stalls()). Throws as run_session() does, also for a file of another device.
+/// @param noticed as SessionRunOptions::noticed
 [[nodiscard]] JitterCheck check_jitter(const DeviceChoice& device, const HilSession& session,
                                        double duration_s, RealTimeWish wish,
-                                       const std::function<bool()>& interrupted = {});
+                                       const std::function<bool()>& interrupted = {},
+                                       const FindingTold& noticed = {});
 
 /// Asks the gate of run_session() in real time (admit_session(), also its check of a second).
 /// @param told see make_loop_model()

@@ -179,12 +179,14 @@ std::string newtons(double force_N, int digits = 3) {
   return sized_text(Dimension::force, force_N, digits);
 }
 
-std::string said_by_device(const ServoOutcome& o, const std::vector<std::string>& findings) {
+std::string said_by_device(const ServoOutcome& o, const std::vector<DeviceFinding>& findings) {
   std::string text;
   if (o.device.error != 0) {
     text += fmt::format("the device said: error {} ({})\n", o.device.error, o.device.error_text);
   }
-  for (const std::string& line : findings) text += "the device noticed: " + line + "\n";
+  for (const DeviceFinding& finding : findings) {
+    text += "the device noticed: " + finding.text + "\n";
+  }
   return text;
 }
 
@@ -215,7 +217,7 @@ Json check_json(const JitterCheck& check) {
           {"detail", o.detail},
           {"device_error", o.device.error},
           {"device_error_text", std::string(o.device.error_text)},
-          {"device_findings", check.findings},
+          {"device_findings", to_json(check.findings)},
           {"most_consecutive_missed", o.counts.most_consecutive_missed},
           {"most_late_of_1000", o.counts.most_late},
           {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
@@ -255,7 +257,7 @@ std::string check_text(const JitterCheck& check) {
 Json run_json(const HilSession& session, const SessionRun& run) {
   const bool tested = session.law && session.law->adequacy;
   Json outcome = recording_closing(run.outcome);
-  if (!run.findings.empty()) outcome["device_findings"] = run.findings;
+  if (!run.findings.empty()) outcome["device_findings"] = to_json(run.findings);
   return {{"simulated_device", !run.device.hardware},
           {"title", session.title},
           {"device", to_json(run.device)},
