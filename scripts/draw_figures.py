@@ -22,7 +22,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
 from drawing_files import literal, save_drawing  # noqa: E402
-from matplotlib.colors import to_rgba  # noqa: E402
+from matplotlib.colors import to_hex, to_rgba  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
 from matplotlib.patheffects import withStroke  # noqa: E402
@@ -38,6 +38,8 @@ MOST_ACROSS = 4  # panels; more go on below
 # After Okabe and Ito, whose colours people with any of the usual deficiencies tell apart; darkened to a contrast of
 # 3.9 or more on white, so that thin lines show.
 MODEL_COLOURS = ["#0072B2", "#C75400", "#00805E", "#B0508A", "#9C6B00", "#3A86B8"]
+# More curves than colours are the steps of one quantity: from dark to light, in order.
+STEPS, LIGHTEST_STEP = "plasma", 0.68
 DATA_COLOURS = ["#222222", "#8A5A00", "#5B2A86", "#666666"]
 # More markers than colours, so that the fifth series does not look like the first.
 DATA_MARKERS = ["o", "s", "D", "^", "v", "X", "P"]
@@ -51,11 +53,15 @@ VERDICTS = {
 # Later lines are thinner: where curves coincide, all of them show.
 LINE_WIDTHS = [2.8, 1.8, 1.1, 0.8]
 THIN_LINE = 0.9
-# More readings than this are drawn as a grey trace, wider than the lines over it.
-DENSE, DENSE_COLOUR, DENSE_SIZE = 100, "#8C8C8C", 3.6
-WIDEST_OVER_OTHERS = 1.1  # of a line over a grey trace or a band, which it must not hide
+# More readings than this are drawn as a pale trace, wider than the lines over it.
+DENSE, DENSE_SIZE = 100, 3.6
+DENSE_COLOURS = ["#8C8C8C", "#A67C2D", "#8F6BB3"]
+# Over a trace or a band, which they must not hide; still the later the thinner, since curves may coincide.
+WIDTHS_OVER_OTHERS = [1.8, 1.0, 0.6]
 PIXELS_PER_INCH = 300
 SMALLEST_PLAIN = 1e-4  # of the numbers at an axis; smaller ones are written with a power of ten
+
+PRINTED = {"eta": "η", "lambda": "λ", "tau": "τ"}
 
 PROVENANCE = {
     "model": "computed by tpm",
@@ -109,16 +115,18 @@ def is_dense(series):
 def looks(figure):
     """Colour, marker and width of each label: one look per label throughout the figure."""
     chosen = {}
-    lines = data = 0
+    lines = data = dense = 0
     covers = any(is_dense(s) or s["kind"] == "band" for panel in figure["panels"] for s in panel["series"])
+    widths = WIDTHS_OVER_OTHERS if covers else LINE_WIDTHS
+    curves = len({s["label"] for panel in figure["panels"] for s in panel["series"] if s["kind"] == "line"})
+    colours = MODEL_COLOURS
+    if curves > len(colours):
+        colours = [to_hex(matplotlib.colormaps[STEPS](LIGHTEST_STEP * i / (curves - 1))) for i in range(curves)]
     for series in (s for panel in figure["panels"] for s in panel["series"]):
         if series["label"] in chosen:
             continue
         if series["kind"] == "line":
-            chosen[series["label"]] = {
-                "color": MODEL_COLOURS[lines % len(MODEL_COLOURS)],
-                "width": min(LINE_WIDTHS[min(lines, len(LINE_WIDTHS) - 1)], WIDEST_OVER_OTHERS if covers else math.inf),
-            }
+            chosen[series["label"]] = {"color": colours[lines], "width": widths[min(lines, len(widths) - 1)]}
             lines += 1
         elif series["kind"] == "points" and series["label"] in VERDICTS:
             colour, marker = VERDICTS[series["label"]]
@@ -127,8 +135,10 @@ def looks(figure):
             chosen[series["label"]] = {
                 "color": DATA_COLOURS[data % len(DATA_COLOURS)],
                 "marker": DATA_MARKERS[data % len(DATA_MARKERS)],
+                "dense": DENSE_COLOURS[dense % len(DENSE_COLOURS)],
             }
             data += 1
+            dense += is_dense(series)
     return chosen
 
 
@@ -157,7 +167,7 @@ def inside(axes, series):
 
 def draw_points(axes, series, look):
     dense = is_dense(series)
-    colour = DENSE_COLOUR if dense else look["color"]
+    colour = look["dense"] if dense else look["color"]
     face = "white" if is_assumed(series) else colour
     style = dict(marker=look["marker"], markersize=DENSE_SIZE if dense else look.get("size", 5), markerfacecolor=face, markeredgecolor=colour, linestyle="none")
     x, y, sd = inside(axes, series)
@@ -247,8 +257,8 @@ def axis_label(axis):
 
 
 def plain_name(text):
-    """The project's plain names as print writes them."""
-    return text.replace("eta1", "η₁").replace("lambda1", "λ₁")
+    """The project's plain names as print writes them; not within a longer word, such as a file's name."""
+    return re.sub(r"(?<![\w.-])(eta|lambda|tau)([1-9])(?![\w-]|\.\w)", lambda m: PRINTED[m[1]] + "₀₁₂₃₄₅₆₇₈₉"[int(m[2])], text)
 
 
 def tick_short_log_axis(axis_of_plot, limits):
@@ -256,12 +266,11 @@ def tick_short_log_axis(axis_of_plot, limits):
     low, high = limits
     if high / low > 100:
         return
-    if high / low > 8:
-        powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-        places = [m * 10.0**k for k in powers for m in (1, 2, 5)]
-    else:
-        places = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    axis_of_plot.set_major_locator(FixedLocator([v for v in places if low <= v <= high]))
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    places = [m * 10.0**k for k in powers for m in (1, 2, 5) if low <= m * 10.0**k <= high]
+    if len(places) < 3:
+        places = [v for v in MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high) if low <= v <= high]
+    axis_of_plot.set_major_locator(FixedLocator(places))
     axis_of_plot.set_major_formatter(FuncFormatter(plain_number))
     axis_of_plot.set_minor_locator(NullLocator())
 
@@ -311,7 +320,7 @@ def draw_panel(axes, panel, look, handles, narrow=False, letter=""):
         else:
             handle = DRAW[series["kind"]](axes, series, look[series["label"]])
         handles.setdefault(legend_text(series), handle)
-    axes.set_title(lettered(letter, panel["title"]), loc="left")
+    axes.set_title(lettered(letter, plain_name(panel["title"])), loc="left")
     if getattr(axes, "beyond", 0):
         axes.annotate(f"\u25b2 {axes.beyond} above {axes.upper_limit:g}", (0.98, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7.5,
                       color="#444444", bbox=dict(facecolor="white", edgecolor="none", alpha=0.8, pad=1.5), zorder=7)

@@ -72,9 +72,10 @@ std::vector<MaterialMotion> chosen_motions(const MaterialCommand& command, const
 
 int run_material(const MaterialCommand& command, const Session& session) {
   will_write_into(command.folder, {"scene.json", "session.json", "material.json", "material.csv",
-                                   "figures.json", "material.svg", "material.png"});
+                                   "figures.json", "material.svg", "material.png", "material.pdf"});
   if (command.intervals == "profiles") {
-    will_write_into(command.folder, {"material_profiles.svg", "material_profiles.png"});
+    will_write_into(command.folder,
+                    {"material_profiles.svg", "material_profiles.png", "material_profiles.pdf"});
   }
   const LawFile law = read_law(command.law);
   const Json scene = checked(read_json(command.scene), scene_kind(), command.scene);

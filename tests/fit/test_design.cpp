@@ -287,15 +287,19 @@ TEST_CASE("the best pair is no worse than the best done twice") {
         result.ranked.front().expected.score / std::sqrt(2.0) * (1.0 + 1e-12));
 }
 
-TEST_CASE("the figures hold a curve per rate and a panel per parameter") {
+TEST_CASE("the figures hold a curve per rate, the best candidate and a panel per parameter") {
   Json document = decay_design();
   document["candidates"][0]["rate"] = {"1 mm/s", "10 mm/s", "100 mm/s"};
   document["candidates"][0]["hold"] = {"5 s", "40 s"};
-  const std::vector<Figure> figures = design_figures(fit::plan(parsed(document)));
+  const DesignResult result = fit::plan(parsed(document));
+  const std::vector<Figure> figures = design_figures(result);
   REQUIRE(figures.size() == 2);
   REQUIRE(figures[0].panels.size() == 2);
-  CHECK(figures[0].panels[0].series.size() == 3);
-  CHECK(figures[1].panels[0].series.size() == 2);
+  REQUIRE(figures[0].panels[0].series.size() == 4);
+  CHECK(figures[1].panels[0].series.size() == 3);
+  const Series& best = figures[0].panels[0].series.back();
+  CHECK(best.label == "best candidate");
+  CHECK(best.x == std::vector{result.ranked.front().experiment.hold_s});
   CHECK(figures[0].panels[0].series[0].provenance == "model");
   CHECK_NOTHROW(to_json(figures));
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -35,6 +36,10 @@ bool same_slice(const PlannedExperiment& a, const PlannedExperiment& b) {
          a.interval_s == b.interval_s && a.repeats == b.repeats;
 }
 
+/// Standard error from which a parameter is not known at all, % of its value: the top of an axis
+/// that has something below it.
+constexpr double kUnknown_percent = 100.0;
+
 /// True if a logarithmic axis can show it.
 bool drawable(const DesignCandidate& c, const Direction& d, const ExpectedParameter& p) {
   return c.experiment.*d.along > 0.0 && std::isfinite(p.relative_error) && p.relative_error > 0.0;
@@ -51,13 +56,25 @@ Panel parameter_panel(const DesignResult& result, const Direction& d, std::size_
   Panel panel{result.problem.parameter(i).name,
               {d.quantity, d.unit, true},
               {"expected relative standard error", "%", true}};
+  double least = kUnknown_percent, most = 0.0;
   for (const auto& [across, points] : curves) {
     Series s =
         line(fmt::format(fmt::runtime(d.curve), significant(across / d.curve_to_si, 4)), {}, {});
     for (const auto& [x, y] : points) {
       s.add(x, y);
+      least = std::min(least, y);
+      most = std::max(most, y);
     }
     panel.series.push_back(std::move(s));
+  }
+  if (least < kUnknown_percent && most > kUnknown_percent) panel.y.upper = kUnknown_percent;
+  const ExpectedParameter& expected = result.ranked.front().expected.parameters[i];
+  if (drawable(result.ranked.front(), d, expected)) {
+    panel.series.push_back({.kind = Series::Kind::points,
+                            .label = "best candidate",
+                            .provenance = "model",
+                            .x = {best.*d.along / d.to_si},
+                            .y = {100.0 * expected.relative_error}});
   }
   return panel;
 }

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/show/fit_figures.hpp"
@@ -36,12 +39,33 @@ Panel force_panel(const MaterialCourse& c, bool titled) {
   return forces;
 }
 
+/// The points of a profile and more between them: the signed root of the rise is nearly straight
+/// there, and the rise itself is not.
+std::vector<ProfilePoint> between_profile_points(const ParameterResult& result, double least) {
+  constexpr int kParts = 8;
+  const std::vector<ProfilePoint>& points = result.profile.points;
+  const auto root = [&](const ProfilePoint& p) {
+    return std::copysign(std::sqrt(std::max(0.0, p.deviance - least)), p.natural - result.estimate);
+  };
+  std::vector<ProfilePoint> finer;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    for (int part = 0; part < kParts; ++part) {
+      const double t = static_cast<double>(part) / kParts;
+      const double r = std::lerp(root(points[i - 1]), root(points[i]), t);
+      finer.push_back({std::lerp(points[i - 1].natural, points[i].natural, t), least + r * r});
+    }
+  }
+  if (!points.empty()) finer.push_back(points.back());
+  return finer;
+}
+
 Panel material_profile_panel(const ReadingsFit& readings, const ParameterResult& result) {
   const FitParameter& p = result.parameter;
   Panel panel{"",
               {p.name, p.unit.symbol, p.scale == Scale::log},
-              {"rise of the deviance over its limit", "", false, 0.0, 1.6}};
-  panel.series = profile_series(result, result.profile.points, readings.fit.best.deviance,
+              {"rise of the deviance / limit", "", false, 0.0, 1.6}};
+  const double least = readings.fit.best.deviance;
+  panel.series = profile_series(result, between_profile_points(result, least), least,
                                 {readings.level, readings.rise, readings.rise});
   return panel;
 }
