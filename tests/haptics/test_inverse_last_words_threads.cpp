@@ -51,12 +51,14 @@ DeviceStatus status_after_end(const StandInFaults& faults, bool real_time) {
 
 TEST_CASE("An event that a service sends before it closes is the cause of the end") {
   using How = StandInFaults::How;
-  for (const bool real_time : {false, true}) {
+  for (const int variant : {0, 1, 2, 3}) {
+    const bool real_time = variant % 2 == 1;
     StandInFaults f;
     f.from = 5;
     f.how = How::close;
     f.close_code = 1001;
-    CAPTURE(real_time);
+    f.closes_behind_a_state = variant >= 2;  // both are read at once
+    CAPTURE(real_time, f.closes_behind_a_state);
     DeviceStatus status = status_after_end(f, real_time);
     CHECK(status.forces_off == ForcesOff::none);
     CHECK_THAT(status.error_text, Contains("closed with 1001"));
@@ -67,6 +69,58 @@ TEST_CASE("An event that a service sends before it closes is the cause of the en
     CHECK_THAT(status.error_text, Contains("device-disconnected"));
     f.last_event = "device-busy";
     CHECK(status_after_end(f, real_time).forces_off == ForcesOff::software);
+  }
+}
+
+TEST_CASE("Findings and a cut of the forces come from other threads while loop and messages run") {
+  for (const bool is_cut : {false, true}) {
+    CAPTURE(is_cut);
+    StandInFaults f;
+    f.in_use = true;
+    f.simulated = false;
+    if (!is_cut) {
+      f.from = 50;
+      f.how = StandInFaults::How::close;
+      f.close_code = 1001;
+      f.last_event = "device-disconnected";
+    }
+    StandInInverse service(PlantSettings{}, {}, true, f);
+    InverseDevice device(address_of_talker(service), limits_of("inverse3"));
+    (void)device.open();
+    std::atomic<bool> ended{false}, complete{true};
+    std::thread looking([&] {
+      while (!ended) {
+        const std::vector<DeviceFinding> found = device.findings();
+        if (found.empty() || found.front().code != "in_use") complete = false;
+      }
+    });
+    DevicePreparation preparation;
+    preparation.watchdog_s = 2.0;
+    preparation.real_time = true;
+    device.prepare(preparation);
+    std::thread loop([&] {
+      device.enable_forces();
+      Eigen::Vector3d at_m;
+      constexpr int kMostPeriods = 20'000;
+      for (int i = 0; i < kMostPeriods; ++i) {
+        if (device.read(at_m) == DeviceAnswer::failed) break;
+        if (device.write({0.0, 0.0, 0.1}) == DeviceAnswer::failed) break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      device.stop();
+    });
+    if (is_cut) {
+      while (service.forces() < 50) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      device.cut_forces();
+    }
+    loop.join();
+    ended = true;
+    looking.join();
+    CHECK(complete);
+    CHECK(device.learn_end());
+    const DeviceStatus status = device.status();
+    CHECK(status.forces_off == (is_cut ? ForcesOff::software : ForcesOff::unplugged));
+    CHECK_FALSE(status.failed);
   }
 }
 

@@ -26,12 +26,13 @@ using namespace haptics;
 /// How the stand-in departs from a service that works.
 struct StandInFaults {
   std::string version = "3.5.0.0";
-  bool simulated = true;      ///< it says so
-  bool in_use = false;        ///< its status and control mode say so
-  int close_code = 0;         ///< of How::close; 0: no close frame
-  std::string close_reason;   ///< the same
-  bool no_inventory = false;  ///< it accepts and is silent
-  bool no_events = false;     ///< nobody listens there
+  bool simulated = true;               ///< it says so
+  bool in_use = false;                 ///< its status and control mode say so
+  int close_code = 0;                  ///< of How::close; 0: no close frame
+  std::string close_reason;            ///< the same
+  bool closes_behind_a_state = false;  ///< in one piece with the close frame
+  bool no_inventory = false;           ///< it accepts and is silent
+  bool no_events = false;              ///< nobody listens there
   bool names_no_filters = false, names_no_damping = false;
   /// What it begins with; each is set by HTTP, force gate, damping and preset by a message too.
   std::string preset = "defaults", basis = "XYZ";
@@ -469,11 +470,12 @@ inline void StandInInverse::talk(Socket socket, bool events) {
         const auto texts = answer(message->payload);
         goes_on = texts.has_value();
         if (!goes_on && faults_.close_code != 0) {
-          stand_in::send_bytes(
-              socket.handle(),
-              frame_bytes(FrameKind::close,
-                          close_payload(static_cast<std::uint16_t>(faults_.close_code),
-                                        faults_.close_reason)));
+          const std::string end =
+              close_payload(static_cast<std::uint16_t>(faults_.close_code), faults_.close_reason);
+          const std::string state = state_message(7, faults_.devices.at(0), {}, faults_.simulated);
+          const bool both = faults_.closes_behind_a_state;
+          stand_in::send_bytes(socket.handle(), (both ? frame_bytes(FrameKind::text, state) : "") +
+                                                    frame_bytes(FrameKind::close, end));
         }
         for (const std::string& text : texts.value_or(std::vector<std::string>())) {
           if (faults_.late_s > 0.0) {

@@ -140,7 +140,7 @@ Eigen::Vector3d InverseDevice::force_to_send() noexcept {
   return limited(order.force_N, preparation_.max_force_N);
 }
 
-/// One message and the states that come; false if none came in time.
+/// One message and the states that come; false if none came in time or the connection is over.
 bool InverseDevice::exchange(const std::string& message, double timeout_s) {
   ++sent_;
   const std::int64_t asked_ns = now_ns();
@@ -159,7 +159,9 @@ bool InverseDevice::exchange(const std::string& message, double timeout_s) {
     return false;
   }
   for (; text; text = service_->receive(0.0)) take_state(*text);
-  return true;
+  if (service_->over().empty()) return true;
+  lose_connection(service_->over());  // behind the state came the end
+  return false;
 }
 
 void InverseDevice::take_state(const std::string& text) {
