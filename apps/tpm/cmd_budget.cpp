@@ -10,6 +10,7 @@
 #include "common_options.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/fit/predict/error_budget.hpp"
 #include "tpm/fit/show/budget_answer.hpp"
 #include "tpm/fit/show/budget_report.hpp"

@@ -7,6 +7,7 @@
 #include "answer.hpp"
 #include "common_options.hpp"
 #include "fit_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/file_kind.hpp"
 #include "tpm/files/import/recording_file.hpp"

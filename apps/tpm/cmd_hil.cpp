@@ -252,10 +252,7 @@ int exit_code_of(const ServoOutcome& outcome) {
 }
 
 int run_hil(const RunChoice& choice, const Session& session) {
-  if (!session.force && std::filesystem::is_regular_file(choice.output)) {
-    throw Error(ExitCode::usage, "-o " + choice.output, "the file exists",
-                "another --output, or --overwrite");
-  }
+  require_new(choice.output, session);
   HilSession hil = read_session(choice.session, choice.changes);
   DeviceChoice device = chosen_device(choice.device);
   if (!choice.changes.motion.empty() && device.kind == "virtual") device.kind = "replay";
@@ -293,7 +290,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
         "rest it is pushed for a second with at most {} N, which measures its delay\n",
         most_N);
   };
-  options.noticed = [](const std::string& line) { tell_user("tpm: warning: {}\n", line); };
+  options.noticed = warn_of_finding;
   std::optional<OutOfMemoryIsThrown> while_the_device_is_open;
   options.opened = [&, opened = options.opened](const DeviceIdentity& identity,
                                                 const LoopModel& model) {

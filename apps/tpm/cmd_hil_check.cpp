@@ -67,7 +67,8 @@ JitterCheck checked_hil(const HilSession& hil, const CheckChoice& choice,
   const RealTimeWish wish = chosen_wish(choice.device);
   std::optional<SessionVerdict> verdict;
   if (!choice.session.empty()) verdict = asked_gate(hil, device, wish);
-  JitterCheck check = check_jitter(device, hil, duration_s, wish, InterruptWatch::seen);
+  JitterCheck check =
+      check_jitter(device, hil, duration_s, wish, InterruptWatch::seen, warn_of_finding);
   check.session = std::move(verdict);
   return check;
 }

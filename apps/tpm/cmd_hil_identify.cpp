@@ -79,7 +79,9 @@ std::string identified_text(const IdentifyRun& run) {
                                          : fmt::format("; begun again {} {}", run.begun_again,
                                                        run.begun_again == 1 ? "time" : "times"));
   }
-  for (const std::string& line : run.findings) text += "the device noticed: " + line + "\n";
+  for (const DeviceFinding& finding : run.findings) {
+    text += "the device noticed: " + finding.text + "\n";
+  }
   for (const std::string& line : f.not_identified) {
     text += fmt::format("not identified: {}\n", line);
   }
@@ -115,6 +117,7 @@ class StartWords {
 
 int identify_hil(const IdentifyChoice& choice, const Session& session) {
   constexpr double kSlowest_Hz = 500.0, kFastest_Hz = 4000.0, kLeast_s = 5.0, kMost_s = 600.0;
+  require_new(choice.output, session);
   HilSession hil;
   if (!choice.session.empty()) hil = read_session(choice.session);
   if (!choice.rate.empty()) {
@@ -186,6 +189,7 @@ void add_hil_identify_command(CLI::App& hil, Session& session) {
       ->add_option("-o,--output", choice->output,
                    "File to write (schemas/device.schema.json), for --device-file")
       ->capture_default_str();
+  command->add_flag("--overwrite", session.force, "Replace files that exist");
   add_format_option(*command, session);
   command->footer(
       "Examples:\n  tpm hil identify --device omega7 -o device.json\n"

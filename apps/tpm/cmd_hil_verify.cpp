@@ -5,6 +5,7 @@
 #include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpm/show/short_answer.hpp"

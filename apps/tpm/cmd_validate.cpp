@@ -342,7 +342,7 @@ int run_validate(const ValidateOptions& options, const Session& session) {
   if (options.law.empty() || options.recordings.files.empty()) {
     throw Error(ExitCode::usage, "validate",
                 options.law.empty() ? "no law and no recording"
-                                    : fmt::format("'{}' and no recording", printable(options.law)),
+                                    : fmt::format("'{}' and no recording", options.law),
                 "LAW RECORDING..., or --recheck FILE");
   }
   if (!options.credibility.empty()) will_write({options.credibility});

@@ -48,6 +48,10 @@ void add_format_option(CLI::App& command, Session& session);
 /// has one of its own.
 void add_force_option(CLI::App& command, Session& session);
 
+/// Throws Error(usage) for a recording or a measurement that would replace a file, unless
+/// --overwrite was given: neither can be made again.
+void require_new(const std::string& output, const Session& session);
+
 /// Adds -o, --output for an answer beside which a table stands (csv_beside()).
 void add_output_option(CLI::App& command, std::string& output);
 

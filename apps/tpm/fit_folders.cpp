@@ -48,7 +48,7 @@ void set_specimens(const FitOptions& options, std::vector<PreparedRecording>& re
     std::smatch match;
     if (!std::regex_search(name, match, pattern) || match[1].length() == 0) {
       throw Error(ExitCode::usage, "--group-by",
-                  fmt::format("'{}' is not matched by '{}'", printable(name), printable(by)),
+                  fmt::format("'{}' is not matched by '{}'", name, printable(by)),
                   "a pattern that every file name matches");
     }
     r.specimen = match[1].str();

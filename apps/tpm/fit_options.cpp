@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "answer.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"

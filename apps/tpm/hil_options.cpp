@@ -128,6 +128,10 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
       ->capture_default_str();
 }
 
+void warn_of_finding(const DeviceFinding& finding) {
+  tell_user("tpm: warning: {}\n", finding.text);
+}
+
 DeviceChoice chosen_device(const DeviceOptions& options) {
   DeviceChoice choice = options.choice;
   choice.library = options.library;

@@ -32,6 +32,9 @@ void require_libraries(const DeviceOptions& options);
 /// naming the option.
 [[nodiscard]] int listening_port(const std::string& text, const char* option);
 
+/// Writes a finding of a device to the user while the device is still in use.
+void warn_of_finding(const DeviceFinding& finding);
+
 /// Device and real-time settings of the options; to be called when the command runs.
 [[nodiscard]] DeviceChoice chosen_device(const DeviceOptions& options);
 [[nodiscard]] RealTimeWish chosen_wish(const DeviceOptions& options);

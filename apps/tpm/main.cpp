@@ -56,6 +56,12 @@ void add_force_option(CLI::App& command, Session& session) {
                    "and results of other inputs under names that were not given");
 }
 
+void require_new(const std::string& output, const Session& session) {
+  if (session.force || !std::filesystem::is_regular_file(output)) return;
+  throw Error(ExitCode::usage, "-o " + output, "the file exists",
+              "another --output, or --overwrite");
+}
+
 void set_run(CLI::App& command, Session& session, std::function<int()> work) {
   command.callback([&session, work = std::move(work)] { session.run = work; });
 }

@@ -137,7 +137,7 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
     const bool twice = std::any_of(recordings.begin(), recordings.end(),
                                    [&](const auto& r) { return r.name == file; });
     if (twice) {
-      throw Error(ExitCode::usage, "FILE", fmt::format("'{}' is given twice", printable(file)),
+      throw Error(ExitCode::usage, "FILE", fmt::format("'{}' is given twice", file),
                   "each recording once");
     }
     recordings.push_back(prepared(file, read_recording_file(file, import), options));

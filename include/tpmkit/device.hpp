@@ -93,6 +93,14 @@ struct DeviceStatus {
   std::uint64_t saturations = 0;  ///< since prepare()
 };
 
+/// Something about a device that did not end the session and that a reader of it should know.
+struct DeviceFinding {
+  std::string code;  ///< its kind, a word that stays while the numbers in `text` change
+  std::string text;  ///< one line
+
+  [[nodiscard]] bool operator==(const DeviceFinding&) const = default;
+};
+
 /// Input of the hand besides the motion of the tool.
 struct HandState {
   float gripper_m = std::numeric_limits<float>::quiet_NaN();  ///< opening; NaN: there is none
@@ -128,10 +136,9 @@ class HapticDevice {
   virtual DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept = 0;
   virtual DeviceStatus status() noexcept = 0;
   virtual HandState hand() noexcept { return {}; }
-  /// Findings since the device was opened that did not end the session and that a reader of it
-  /// should know, one line each. Called when the loop has ended and, from another thread, while it
-  /// runs in real time.
-  virtual std::vector<std::string> findings() const { return {}; }
+  /// Findings since the device was opened, at most one of each code. Called when the loop has ended
+  /// and, from another thread, while it runs in real time.
+  virtual std::vector<DeviceFinding> findings() const { return {}; }
   /// Called while the session waits for the tool to be in place. A simulated operator holds still.
   virtual void await() noexcept {}
   /// Called when the first phase begins.

@@ -193,7 +193,9 @@ TPM_HAPTICS_API int tpm_haptics_step_after(tpm_haptics_contact *contact, uint32_
  * from the time: a loop that runs at another rate than the contact, or that is late, lives through the same
  * time as the tissue. A faster loop receives the force of the last period in between; a slower one misses
  * periods: up to the limits of tpm_haptics_step_after the force is that of its time, above them it is stopped
- * with TPM_HAPTICS_LATE. Use either this or the two above.
+ * with TPM_HAPTICS_LATE. The mean rate counts: a call lives through one period as long as the tissue stays
+ * within 1.25 periods of the clock, so the intervals of a loop of the right rate may vary, by up to 80 % of a
+ * period. Use either this or the two above.
  * @param t_s seconds of a clock that does not jump (CLOCK_MONOTONIC), rising from call to call; its origin
  *        does not matter, its size is 1e10 at most: above that a double does not tell a hundredth of a period
  * @returns as tpm_haptics_step; TPM_HAPTICS_USAGE with a zero force for a time that is not finite, is larger,

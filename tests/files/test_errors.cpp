@@ -196,3 +196,18 @@ TEST_CASE("tpm data import and pack do not replace files without --overwrite") {
   CHECK(run("data pack {}/out.csv -o {}/p.h5", folder).exit_code == 2);
   CHECK(run("data show {}/p.h5 --format json", folder).exit_code == 0);
 }
+
+TEST_CASE("tpm hil identify does not replace a file without --overwrite") {
+  const TempFolder folder;
+  with_files({{"mine.txt", "foreign\n"}})(folder);
+  const char* line = "hil identify --duration '5 s' -o {}/mine.txt";
+  const ProgramAnswer refused = run(line, folder);
+  CHECK(refused.exit_code == 2);
+  CHECK_THAT(refused.error,
+             Catch::Contains("mine.txt: the file exists; expected another --output, or "
+                             "--overwrite"));
+  CHECK(read_file(folder / "mine.txt") == "foreign\n");
+  CHECK(run(std::string(line) + " --overwrite", folder).exit_code == 0);
+  CHECK(read_json(folder / "mine.txt").at("device") == "virtual");
+  CHECK(run(line, folder).exit_code == 2);  // nor a measurement of its own
+}

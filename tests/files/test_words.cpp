@@ -282,6 +282,37 @@ TEST_CASE("a recording has a name of 255 bytes, though none is left for a descri
   CHECK(answer.exit_code == 0);
 }
 
+TEST_CASE("a path in a message, and in a command that it says to type, is never cut") {
+  const test::TempFolder folder;
+  const std::string deep = folder / (std::string(120, 'd') + " e");  // a shell wants it quoted
+  std::filesystem::create_directory(deep);
+  const std::string a = deep + "/a.csv", b = deep + "/b.csv";
+  std::string rows = "time [s],depth [mm],force [N]\n";
+  for (int i = 0; i < 60; ++i) {
+    const double depth = i < 20 ? 0.1 * i : 2.0;
+    rows += fmt::format("{},{},{}\n", 0.1 * i, depth, 0.01 * depth + 1e-5 * (i % 3));
+  }
+  write_file(a, rows);
+  write_file(b, rows);
+  for (const auto& [arguments, words] : std::vector<std::pair<std::string, std::string>>{
+           {"validate '" + a + "' '" + b + "'", "tpm fit '" + a + "' --folder fitted writes"},
+           {"predict '" + a + "' '" + b + "'", "tpm fit '" + a + "' --folder fitted writes"},
+           {"budget '" + a + "'", "tpm fit '" + a + "' --folder fitted writes"},
+           {"validate '" + a + "'", "'" + a + "' and no recording"},
+           {"fit --no-draw '" + a + "' '" + a + "'", "'" + a + "' is given twice"},
+           {"fit --no-draw '" + deep + "'", "the same bytes as '" + a + "'"},
+           {"fit --no-draw --contact '9 mm' '" + a + "'", "largest depth of '" + a + "', 2 mm"},
+           {"data show '" + deep + "/none'", "tpm: " + deep + "/none: is neither"}}) {
+    CAPTURE(arguments);
+    const Answer answer = answer_to(arguments);
+    CHECK(answer.exit_code != 0);
+    CHECK_THAT(answer.error, Contains(words));
+  }
+  write_file(deep + "/law.json", "{}");
+  CHECK_THAT(answer_to("predict '" + deep + "' '" + a + "'").error,
+             Contains("the file in it: " + deep + "/law.json"));
+}
+
 TEST_CASE("a bad value of an option is a fault of the command line, whatever the command") {
   const test::TempFolder folder;
   write_file(folder / "law.json", R"({"law": "linear", "drive": "indentation_depth",

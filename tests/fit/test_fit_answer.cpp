@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tpm/base/sized_unit.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/recording_report.hpp"
 #include "tpm/fit/verdict.hpp"

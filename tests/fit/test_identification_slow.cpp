@@ -7,7 +7,7 @@
 namespace tpm::fit {
 
 TEST_CASE("intervals at the stopping time hold the true value as often as they say") {
-  constexpr int kSimulations = 120;
+  constexpr int kSimulations = 60;
   constexpr double kRejected = 1e-3;
   for (const double phi : {0.0, 0.9}) {
     IdentifyOptions options;

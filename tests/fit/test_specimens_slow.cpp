@@ -82,7 +82,7 @@ std::map<std::string, std::pair<int, int>> spread_rejections(double rest_s, int 
 }  // namespace
 
 TEST_CASE("folders of unequal depths: the test of spread rejects as often as it says") {
-  constexpr int kFolders = 500;
+  constexpr int kFolders = 160;
   constexpr double kTellsDrift_s = 6.0;
   const auto counts = spread_rejections(kTellsDrift_s, kFolders);
   REQUIRE(counts.size() == 4);

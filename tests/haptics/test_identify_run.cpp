@@ -28,7 +28,7 @@ using Catch::Matchers::WithinRel;
 class FailingHandle final : public HapticDevice {
  public:
   FailingHandle(const HilSession& session, int after, ForcesOff how = ForcesOff::unplugged,
-                std::vector<std::string> findings = {})
+                std::vector<DeviceFinding> findings = {})
       : device_(session.plant, session.operator_script()),
         left_(after),
         how_(how),
@@ -51,7 +51,7 @@ class FailingHandle final : public HapticDevice {
     if (left_ <= 0) status.forces_off = how_;
     return status;
   }
-  std::vector<std::string> findings() const override { return findings_; }
+  std::vector<DeviceFinding> findings() const override { return findings_; }
   void await() noexcept override { device_.await(); }
   void begin() noexcept override { device_.begin(); }
   void advance(double seconds) noexcept override { device_.advance(seconds); }
@@ -62,7 +62,7 @@ class FailingHandle final : public HapticDevice {
   VirtualOmega7 device_;
   int left_;
   ForcesOff how_;
-  std::vector<std::string> findings_;
+  std::vector<DeviceFinding> findings_;
 };
 
 /// Of a free handle, 4 ms late.
@@ -241,7 +241,8 @@ TEST_CASE("Findings of a device are in its file, and void what follows from its 
       [&] {
         return std::make_shared<FailingHandle>(
             like, 100000, ForcesOff::unplugged,
-            std::vector<std::string>{"the service reported 0.1 N where 0.2 N was commanded"});
+            std::vector<DeviceFinding>{
+                {"force_differs", "the service reported 0.1 N where 0.2 N was commanded"}});
       },
       {}, like, options);
   REQUIRE(run.findings.size() == 1);
@@ -251,7 +252,7 @@ TEST_CASE("Findings of a device are in its file, and void what follows from its 
   CHECK_THAT(run.found.not_identified.back(),
              StartsWith("friction, mass: the device noticed: the service reported 0.1 N"));
   const Json file = device_file_json(run, "");
-  CHECK(file.at("measurement").at("device_findings").at(0) == run.findings.front());
+  CHECK(file.at("measurement").at("device_findings") == to_json(run.findings));
   (void)parse_device_file(file, "device.json");
 }
 

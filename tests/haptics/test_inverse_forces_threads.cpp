@@ -1,10 +1,11 @@
 // --device inverse3: the force that a service reports beside the one that was commanded.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <memory>
+#include <thread>
 
 #include "inverse_sessions.hpp"
 #include "temp_folder.hpp"
@@ -28,7 +29,9 @@ Eigen::Vector3d along_z(double newtons) {
 }
 
 std::string lines_of(const ForceComparison& forces) {
-  return fmt::format("{}", fmt::join(forces.findings(), "\n"));
+  std::string lines;
+  for (const DeviceFinding& finding : forces.findings()) lines += finding.text + "\n";
+  return lines;
 }
 
 /// What is found if `share` of a sine of 1 N and 1 Hz is reported, late by some milliseconds.
@@ -112,12 +115,42 @@ TEST_CASE("A force that is reported where none was commanded is somebody else's"
   // And where a force is commanded: another client may have the seat of the driver.
   live(1.0, 0.2, 500);
   REQUIRE(forces.findings().size() == 2);
-  CHECK_THAT(forces.findings().back(), Contains("reported 0.2 N where 1 N was commanded") &&
-                                           Contains("another client may drive the device"));
+  CHECK(forces.findings().front().code == "force_without_command");
+  CHECK(forces.findings().back().code == "force_differs");
+  CHECK_THAT(forces.findings().back().text, Contains("reported 0.2 N where 1 N was commanded") &&
+                                                Contains("another client may drive the device"));
+}
+
+TEST_CASE("Forces that are compared are read by another thread as a whole") {
+  ForceComparison forces;
+  std::atomic<bool> ending{false};
+  const std::string one = "the service reported 2 N where 1 N was commanded, apart by up to 1 N, ";
+  const std::string two = "the service reported 5 N where 2 N was commanded, apart by up to 3 N, ";
+  int torn = 0;
+  std::thread reader([&] {
+    while (!ending) {
+      for (const DeviceFinding& finding : forces.findings()) {
+        const bool whole = finding.text.starts_with(one) || finding.text.starts_with(two);
+        torn += whole && finding.text.find("for 0.3 s in all") != std::string::npos ? 0 : 1;
+      }
+    }
+  });
+  constexpr std::int64_t kLasted_ns = 300'000'000;
+  for (int i = 0; i < 20'000; ++i) {
+    const bool first = i % 2 == 0;
+    forces.begin(0);
+    forces.command(along_z(first ? 1.0 : 2.0), 0);
+    forces.report(along_z(first ? 2.0 : 5.0), 0);
+    forces.report(along_z(first ? 2.0 : 5.0), kLasted_ns);
+  }
+  ending = true;
+  reader.join();
+  CHECK(torn == 0);
+  CHECK_THAT(lines_of(forces), Contains(two));
 }
 
 /// 500 periods of 1 N on such a service.
-std::vector<std::string> findings_on(const StandInFaults& faults) {
+std::vector<DeviceFinding> findings_on(const StandInFaults& faults) {
   StandInInverse service(PlantSettings{}, {}, false, faults);
   InverseDevice device({service.port(), service.events_port(), service.port(), ""},
                        limits_of("inverse3"));
@@ -142,9 +175,9 @@ TEST_CASE("A service that gates forces during a session is noticed if it reports
   for (const double rendered : {0.5, 0.0, 1.5}) {
     CAPTURE(rendered);
     faults.rendered = rendered;
-    const std::vector<std::string> found = findings_on(faults);
+    const std::vector<DeviceFinding> found = findings_on(faults);
     REQUIRE(found.size() == 1);
-    CHECK_THAT(found.front(),
+    CHECK_THAT(found.front().text,
                Contains(fmt::format("reported {:.3g} N where 1 N was commanded", rendered)));
   }
   // One that reports the command is not noticed: this comparison cannot replace a look at filters.
@@ -152,9 +185,10 @@ TEST_CASE("A service that gates forces during a session is noticed if it reports
   faults.how = How::gate_unseen;
   CHECK(findings_on(faults).empty());
   faults.how = How::no_report;
-  const std::vector<std::string> silent = findings_on(faults);
+  const std::vector<DeviceFinding> silent = findings_on(faults);
   REQUIRE(silent.size() == 1);
-  CHECK_THAT(silent.front(), Contains("the service reported no force"));
+  CHECK(silent.front().code == "force_not_reported");
+  CHECK_THAT(silent.front().text, Contains("the service reported no force"));
 }
 
 TEST_CASE("What was noticed of forces is recorded and said, and the session goes on") {
@@ -177,19 +211,21 @@ TEST_CASE("What was noticed of forces is recorded and said, and the session goes
     if (row.phase >= 0 && !begun) service.begin();
     begun = begun || row.phase >= 0;
   };
-  std::vector<std::string> told;
-  options.noticed = [&told](const std::string& line) { told.push_back(line); };
+  std::vector<DeviceFinding> told;
+  options.noticed = [&told](const DeviceFinding& finding) { told.push_back(finding); };
   const SessionRun run = run_session_on(session, device, limits, {}, options);
   CHECK(told == run.findings);
   CAPTURE(to_string(run.outcome.cause), run.outcome.detail, run.largest_force_N);
   CHECK(run.outcome.cause == StopCause::finished);
   REQUIRE(run.findings.size() == 1);
-  CHECK_THAT(run.findings.front(),
+  CHECK(run.findings.front().code == "force_differs");
+  CHECK_THAT(run.findings.front().text,
              Contains("the service reported ") && Contains(" N was commanded"));
   CHECK_THAT(run_text(session, run), Contains("the device noticed: the service reported "));
-  CHECK(run_json(session, run).at("outcome").at("device_findings").size() == 1);
+  const Json listed = run_json(session, run).at("outcome").at("device_findings");
+  CHECK(listed == Json::array({{{"code", "force_differs"}, {"text", run.findings.front().text}}}));
   const HilRecording recording = read_recording(options.recording);
-  CHECK(recording.closing.at("device_findings").at(0) == run.findings.front());
+  CHECK(recording.closing.at("device_findings") == listed);
 }
 
 }  // namespace

@@ -9,9 +9,11 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "inverse_sessions.hpp"
 #include "tpm/haptics/loop/empty_space.hpp"
+#include "tpm/haptics/loop/servo_step.hpp"
 #include "tpm/haptics/session/jitter_check.hpp"
 #include "tpm/haptics/show/hil_report.hpp"
 #include "tpmkit/servo_loop.hpp"
@@ -140,7 +142,8 @@ TEST_CASE("A lost connection is completed after the loop, and old positions are 
   CHECK(outcome_of_last_words(DeviceAnswer::failed, true).cause == StopCause::unplugged);
   const ServoOutcome late = outcome_of_last_words(DeviceAnswer::time_guard, false);
   CHECK(late.cause == StopCause::communication);
-  CHECK_THAT(late.detail, Contains("positions older than 20 ms"));
+  CHECK_THAT(late.detail,
+             Contains(fmt::format("positions older than {:g} ms", 1e3 * ServoStep::kMostStale_s)));
 }
 
 TEST_CASE("A check that the device ended quotes it, and does not blame the machine") {
@@ -156,7 +159,7 @@ TEST_CASE("A check that the device ended quotes it, and does not blame the machi
   check.outcome.device.error = 1;
   constexpr std::string_view kSaid = "device-disconnected";
   kSaid.copy(check.outcome.device.error_text, kSaid.size());
-  check.findings = {"another client may use the device 049D"};
+  check.findings = {{"in_use", "another client may use the device 049D"}};
   assess(check);
   const std::string text = check_text(check);
   CHECK_THAT(text, Contains("the device said: error 1 (device-disconnected)\n") &&
@@ -165,7 +168,7 @@ TEST_CASE("A check that the device ended quotes it, and does not blame the machi
   CHECK_THAT(text, !Contains("would help"));
   const Json json = check_json(check);
   CHECK(json.at("device_error_text").get<std::string>() == kSaid);
-  CHECK(json.at("device_findings").size() == 1);
+  CHECK(json.at("device_findings").at(0).at("code") == "in_use");
   check.outcome.cause = StopCause::overrun_storm;
   assess(check);
   CHECK_THAT(check.advice, Contains("would help"));
@@ -204,9 +207,12 @@ TEST_CASE("What a service does not say of gravity, and a mount of a preset, are 
   StandInInverse service(PlantSettings{}, {}, false, f);
   InverseDevice device(address_of_talker(service), limits_of("inverse3"));
   (void)device.open();
-  CHECK_THAT(fmt::format("{}", fmt::join(device.findings(), "\n")),
-             Contains("does not name gravity compensation: it is unknown") &&
-                 Contains("mount at 0.02 0 0 m beside the preset 'arm_front_centered'"));
+  const std::vector<DeviceFinding> found = device.findings();
+  REQUIRE(found.size() == 2);
+  CHECK(found[0].code == "gravity_not_reported");
+  CHECK_THAT(found[0].text, Contains("does not name gravity compensation: it is unknown"));
+  CHECK(found[1].code == "mount_beside_preset");
+  CHECK_THAT(found[1].text, Contains("mount at 0.02 0 0 m beside the preset 'arm_front_centered'"));
 }
 
 TEST_CASE("An inventory that cannot be read and no events are of the environment, with the port") {

@@ -61,7 +61,8 @@ TEST_CASE("A simulated device that another client drives is refused, hardware is
   InverseDevice device(address, limits_of("inverse3"));
   CHECK(device.open().hardware);
   REQUIRE(device.findings().size() == 1);
-  CHECK_THAT(device.findings().front(),
+  CHECK(device.findings().front().code == "in_use");
+  CHECK_THAT(device.findings().front().text,
              Contains("another client may use the device 049D (status in_use true, control mode "
                       "'force'): end it, or its forces add to those of this session"));
 }
@@ -135,9 +136,10 @@ TEST_CASE("A client that pushes while the session commands nothing is told") {
     REQUIRE(device.write(Eigen::Vector3d::Zero()) == DeviceAnswer::ok);
   }
   REQUIRE(device.findings().size() == 1);
-  CHECK_THAT(device.findings().front(), Contains("the service reported up to 1 N where nothing was "
-                                                 "commanded") &&
-                                            Contains("another client pushes"));
+  CHECK_THAT(device.findings().front().text,
+             Contains("the service reported up to 1 N where nothing was "
+                      "commanded") &&
+                 Contains("another client pushes"));
   CHECK_FALSE(device.status().failed);  // it is told, and ends nothing
 }
 

@@ -493,46 +493,5 @@ TEST_CASE("The example client in Python is served in both formats, and names a s
   CHECK_FALSE(Contains("no session begins").match(files::read_file(listed)));
 }
 
-TEST_CASE("The simulated hand moves as the oscillator that it is, as late as the session says") {
-  const int late = GENERATE(0, 5);
-  SimulatedHandSettings settings;
-  settings.plant.encoder_step_m = 0.0;
-  settings.plant.delay_periods = late;
-  SimulatedHand hand(settings);
-  (void)hand.open();
-  hand.prepare({});
-  hand.enable_forces();
-  const double force_N = 1.0;
-  const PlantSettings& plant = settings.plant;
-  const double mass = plant.mass_kg + plant.arm.mass_kg, stiffness = plant.arm.stiffness_N_per_m;
-  const double half_rate = (plant.damping_N_s_per_m + plant.arm.damping_N_s_per_m) / (2.0 * mass);
-  const double w = std::sqrt(stiffness / mass - half_rate * half_rate);
-  Eigen::Vector3d at_m;
-  for (int i = 1; i <= 300; ++i) {
-    (void)hand.write({force_N, 0.0, 0.0});
-    hand.advance(plant.period_s);
-    (void)hand.read(at_m);
-    const double t = std::max(0, i - late) * plant.period_s;
-    const double exact =
-        force_N / stiffness *
-        (1.0 - std::exp(-half_rate * t) * (std::cos(w * t) + half_rate / w * std::sin(w * t)));
-    REQUIRE_THAT(at_m.x(), WithinAbs(exact, 1e-12));
-  }
-}
-
-TEST_CASE("The simulated hand stays at the set point of its arm, if it has one") {
-  SimulatedHandSettings settings;
-  settings.plant.arm_set_point_m = 0.004;
-  settings.plant.encoder_step_m = 0.0;
-  SimulatedHand hand(settings);
-  (void)hand.open();
-  hand.prepare({});
-  hand.enable_forces();
-  hand.advance(5.0);
-  Eigen::Vector3d at_m;
-  (void)hand.read(at_m);
-  CHECK_THAT(at_m.dot(settings.plant.push), WithinAbs(0.004, 1e-9));
-}
-
 }  // namespace
 }  // namespace tpm::haptics

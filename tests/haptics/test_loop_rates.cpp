@@ -1,9 +1,11 @@
 // A loop of one's own at another rate than its contact: its forces are those of the right one, or
 // it is told.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <random>
 #include <string>
 
 #include "hil_scenes.hpp"
@@ -105,8 +107,55 @@ TEST_CASE("A loop that is too slow is told so while its contact still waits to b
   // A loop that stalls while it waits is none.
   RatedContact stalled(true);
   Eigen::Vector3d force_N;
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 120; ++i) {
     CHECK(stalled->step(tool_at(0.0), force_N, i % 20 == 0 ? 300 : 0) == StopCause::none);
+  }
+}
+
+TEST_CASE("A tool at rest is waited for by the time that passes, not by the calls") {
+  const Json patient = test::with(test::short_session(), "/limits", Json{{"late_cycles", 1000}});
+  RatedContact contact(true, patient);
+  Eigen::Vector3d force_N;
+  int calls = 0;
+  do {
+    REQUIRE(contact->step(tool_at(0.0), force_N, 3) == StopCause::none);
+    ++calls;
+  } while (contact->state().row.phase < 0 && calls < 300);
+  CHECK(calls == 65);  // 0.25 s after the first call, and the call that begins
+  // Nobody saw what the tool did in a gap of 0.3 s.
+  RatedContact gap(true);
+  for (const int missed : {0, 299, 0, 0}) {
+    CHECK(gap->step(tool_at(0.0), force_N, missed) == StopCause::none);
+    CHECK(gap->state().row.phase == -1);
+  }
+}
+
+TEST_CASE("A loop of the right mean rate is not late, however much its intervals vary") {
+  const auto held = [](double varies, unsigned seed) {
+    RatedContact contact;
+    std::mt19937 random(seed);
+    double time_s = 0.0;
+    RatedEnd end;
+    while (time_s < 20.0 && end.cause == StopCause::none) {
+      const double share = 2.0 * static_cast<double>(random()) / 4294967295.0 - 1.0;
+      time_s += 1e-3 * (1.0 + varies * share);
+      Eigen::Vector3d force_N;
+      end.cause = contact->step_at(time_s, tool_at(std::min(time_s, 5.0)), force_N);
+      end.force_N = force_N.z();
+    }
+    end.time_s = contact->state().time_s;
+    return end;
+  };
+  const double right_N = held(0.0, 1).force_N;
+  REQUIRE(right_N > 0.1);
+  for (const double varies : {0.3, 0.5, 0.8}) {
+    for (const unsigned seed : {1U, 2U, 3U}) {
+      CAPTURE(varies, seed);
+      const RatedEnd end = held(varies, seed);
+      CHECK(end.cause == StopCause::none);
+      CHECK(end.force_N == Approx(right_N).epsilon(1e-3));
+      CHECK(end.time_s == Approx(20.0).margin(6e-3));
+    }
   }
 }
 

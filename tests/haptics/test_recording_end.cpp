@@ -122,8 +122,8 @@ TEST_CASE("A session that a fault ended is recorded as a whole, and everything s
   recording.closing["device_error"] = 7;
   recording.closing["device_error_text"] = "timeout";
   recording.closing["dropped_records"] = 3;
-  recording.closing["device_findings"] =
-      Json::array({"the service reported 0.5 N where 1 N was commanded"});
+  recording.closing["device_findings"] = to_json(std::vector<DeviceFinding>{
+      {"force_differs", "the service reported 0.5 N where 1 N was commanded"}});
   const SaidOfRecording said = everything_said_of(recording, folder);
   check_that_all_say(said,
                      "the session ended early, at 1.999 s of 10.5 s: watchdog of the device: no "
@@ -134,7 +134,7 @@ TEST_CASE("A session that a fault ended is recorded as a whole, and everything s
   CHECK(said.json.at("whole") == true);
   CHECK(said.json.at("end") == "watchdog of the device");
   CHECK(said.json.at("end_detail") == "no command for 8 ms");
-  CHECK(said.json.at("device_findings").size() == 1);
+  CHECK(said.json.at("device_findings") == recording.closing.at("device_findings"));
   CHECK(said.report.at("end") == "watchdog of the device");
 
   put_recording(recording, folder / "ended.tpmrec");

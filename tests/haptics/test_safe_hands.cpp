@@ -102,6 +102,8 @@ TEST_CASE("Of measured hardware the largest delay and a period more count") {
   CHECK(check.friction_N_s_per_m == 0.25);
   CHECK(check.acceptable());
   CHECK_THAT(check.verdict(), Contains("of six hands stable with: "));
+  // What counts is printed, not the whole periods around it.
+  CHECK_THAT(check.verdict(), Contains("1000 Hz, 2.2 ms of delay, friction"));
 }
 
 TEST_CASE(

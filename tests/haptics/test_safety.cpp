@@ -61,8 +61,8 @@ TEST_CASE("What would be unstable is refused before a device is opened, with the
   CHECK_THAT(refused(stiff_session("3 MPa")), Contains("unstable"));
   CHECK_THAT(refused(stiff_session("0.5 MPa")),
              Contains("too stiff for the device") && Contains("at most 5e+03 N/m"));
-  CHECK_THAT(refused(stiff_session("1 MPa", 2)), Contains("2 periods of delay"));
-  CHECK_THAT(refused(stiff_session("12 kPa", 50)), Contains("50 periods of delay"));
+  CHECK_THAT(refused(stiff_session("1 MPa", 2)), Contains("1000 Hz, 2 ms of delay, friction"));
+  CHECK_THAT(refused(stiff_session("12 kPa", 50)), Contains("50 ms of delay"));
   // Hardware is not for trying.
   DeviceChoice omega;
   omega.kind = "omega7";
@@ -70,6 +70,32 @@ TEST_CASE("What would be unstable is refused before a device is opened, with the
   CHECK_THAT(refused(stiff_session("1e6 kPa"), omega), Contains("unstable"));
   CHECK_THAT(refused(test::short_session(), omega, true),
              Contains("--accept-unstable: is not for the device 'omega7'"));
+}
+
+TEST_CASE("A stable rendering with too little margin is refused, but not called unstable") {
+  const auto checked = [](const char* modulus) {
+    const HilSession session = test::parsed(stiff_session(modulus));
+    const LoopModel loop = make_loop_model(session);
+    return check_rendering(session, *loop.model, loop, "virtual");
+  };
+  const RenderingCheck thin = checked("1 MPa");
+  CHECK(thin.spectral_radius < 1.0);
+  CHECK(thin.stiffness_N_per_m < thin.stable_N_per_m);
+  CHECK(thin.stiffness_N_per_m > RenderingCheck::kRoom * thin.stable_N_per_m);
+  CHECK_FALSE(thin.acceptable());
+  const std::string refusal = refused(stiff_session("1 MPa"));
+  CHECK_THAT(refusal,
+             Contains("stability: stable with the operator's arm, but with too little margin: "
+                      "stiffness 1.26e+04 N/m") &&
+                 Contains("80 % of the 1.35e+04 N/m at which it becomes unstable"));
+  CHECK_THAT(refusal, !Contains("unstable: "));
+  CHECK(to_json(thin).at("stable") == false);
+  CHECK(to_json(thin).at("unstable") == false);
+
+  const RenderingCheck beyond = checked("3 MPa");
+  CHECK(beyond.spectral_radius >= 1.0);
+  CHECK_THAT(beyond.verdict(), Catch::Matchers::StartsWith("unstable: "));
+  CHECK(to_json(beyond).at("unstable") == true);
 }
 
 /// Mean of the force sent in the second half of the first hold, N.

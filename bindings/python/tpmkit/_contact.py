@@ -103,7 +103,8 @@ class Contact:
         """The same at the time `t_s` of your clock, from which the number of periods since the last call follows.
 
         A loop that runs at another rate than the contact lives through the same time as the tissue. A faster one receives
-        the force of the last period in between; one that misses periods in too many calls is stopped.
+        the force of the last period in between; one that misses periods in too many calls is stopped. The mean rate
+        counts: intervals may vary by up to 80 % of a period about it.
 
         `t_s` are seconds of a clock that does not jump, such as time.monotonic(), rising from call to call, at most 1e10.
         Raises tpmkit.Error once the contact has stopped, tpmkit.ArgumentError (a ValueError) for a time that is not finite,

@@ -58,6 +58,17 @@ std::string for_terminal(std::string_view text, LineEnds line_ends) {
   return safe;
 }
 
+std::string shell_word(std::string_view name) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./:=@%+,-";
+  std::string word(name);
+  if (word.starts_with('-')) word.insert(0, "./");
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
 std::string with_arguments_for_options(std::string_view message) {
   const auto is_letter = [](char c) { return c >= 'a' && c <= 'z'; };
   const auto begins_word = [&](std::size_t at) {

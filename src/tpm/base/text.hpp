@@ -26,6 +26,10 @@ enum class LineEnds { kept, escaped };
 /// are not UTF-8 become '?'. Tabs stay.
 [[nodiscard]] std::string for_terminal(std::string_view text, LineEnds line_ends);
 
+/// A file name as a shell takes it: quoted where it has to be. For a command that a user is to
+/// type, whole.
+[[nodiscard]] std::string shell_word(std::string_view name);
+
 /// A message of this library for one who calls it: options of the command line are arguments there,
 /// so that "--device-file" becomes "device_file". Commands that it names as a whole stay ("tpm hil
 /// identify --device omega7").

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpmkit/error.hpp"
 
@@ -135,13 +136,12 @@ Json read_json_of(const std::filesystem::path& path, std::string_view kind) {
   const KindMarks* wanted = marks_of(kind);
   if (wanted == nullptr) return read_json(path);
   const bool law = kind == "law";
-  const std::string name = printable(path.string());
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) {
     const std::filesystem::path within = path / fmt::format("{}.json", kind);
     const std::string expected =
         std::filesystem::exists(within, ignored)
-            ? fmt::format("the file in it: {}", printable(within.string()))
+            ? fmt::format("the file in it: {}", within.string())
             : fmt::format("{}: a file, for {}", wanted->called, wanted->command);
     throw bad_input(path.string(), "is a folder", expected);
   }
@@ -153,7 +153,7 @@ Json read_json_of(const std::filesystem::path& path, std::string_view kind) {
       law && *called == kTable
           ? fmt::format("a fitted law; a recording is fitted first: tpm fit {} --folder "
                         "fitted writes fitted/law.json",
-                        name)
+                        shell_word(path.string()))
           : fmt::format("{}, for {}", wanted->called, wanted->command));
 }
 

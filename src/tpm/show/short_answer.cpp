@@ -81,17 +81,6 @@ std::string to_text(const ShortAnswer& answer, std::size_t most) {
   return text;
 }
 
-std::string shell_word(std::string_view name) {
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./:=@%+,-";
-  std::string word(name);
-  if (word.starts_with('-')) word.insert(0, "./");
-  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
-}
-
 void end_answer(ShortAnswer& answer, const std::string& folder,
                 const std::vector<std::string>& files, const std::string& next) {
   if (!files.empty()) {

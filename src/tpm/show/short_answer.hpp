@@ -2,7 +2,6 @@
 #include <cstddef>
 #include <functional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
@@ -28,9 +27,6 @@ struct ShortAnswer {
 
 /// At most `most` lines, each ended. A line feed within a part becomes a blank.
 [[nodiscard]] std::string to_text(const ShortAnswer& answer, std::size_t most = kAnswerLines);
-
-/// A file name as a shell takes it: quoted where it has to be.
-[[nodiscard]] std::string shell_word(std::string_view name);
 
 /// Adds the lines that end an answer: the files of a folder, where the rest is, what to type next.
 /// @param files may be empty: nothing was written

@@ -244,7 +244,7 @@ CurveDescription read_description(const std::filesystem::path& path) {
   if (const std::string& id = description.header.id; id != path.stem().string()) {
     throw bad_input(place.key("id").where,
                     fmt::format("'{}' is not the file's name", printable(id)),
-                    fmt::format("'{}'", printable(path.stem().string())));
+                    fmt::format("'{}'", path.stem().string()));
   }
   return description;
 }

@@ -87,11 +87,13 @@ std::vector<ImportedSeries> datasets_series(std::vector<DigitizedDataset> datase
   }
   if (!all.empty()) return all;
   if (options.dataset.empty()) throw bad_input(file, "no dataset has points", "a digitised curve");
-  throw bad_input(
-      file,
-      fmt::format("no dataset '{}'{}", printable(options.dataset),
-                  did_you_mean(options.dataset, names)),
-      listed(names, [](const std::string& name) { return fmt::format("'{}'", printable(name)); }));
+  constexpr std::size_t kMostOfName = 200;  // names are to be typed
+  throw bad_input(file,
+                  fmt::format("no dataset '{}'{}", printable(options.dataset),
+                              did_you_mean(options.dataset, names)),
+                  listed(names, [](const std::string& name) {
+                    return fmt::format("'{}'", printable(name, kMostOfName));
+                  }));
 }
 
 using AllSeries = std::vector<ImportedSeries>;

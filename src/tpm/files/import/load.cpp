@@ -58,7 +58,7 @@ CurveFiles find_files(const std::string& path_or_id) {
   }
   const auto ids = known_ids();
   if (std::find(ids.begin(), ids.end(), path_or_id) == ids.end()) {
-    throw bad_input(printable(path_or_id),
+    throw bad_input(path_or_id,
                     "is neither a curve file nor a known curve" + did_you_mean(path_or_id, ids),
                     fmt::format("a .csv or .json file, or one of {}", fmt::join(ids, ", ")));
   }
@@ -289,7 +289,7 @@ Kind load_kind(const std::string& path_or_id, std::string_view wanted) {
         "; single readings are fitted through a configuration, such as: "
         "tpm fit configs/liver_all.json";
   } else if (wanted == "recording" && std::holds_alternative<ValueSet>(curve)) {
-    expected += fmt::format("; values are only shown: tpm data show {}", path_or_id);
+    expected += fmt::format("; values are only shown: tpm data show {}", shell_word(path_or_id));
   }
   throw bad_input(path_or_id, fmt::format("is a curve of kind {}", curve_kind(curve)), expected);
 }

@@ -63,12 +63,13 @@ RecordingFile read_described(const fs::path& path, const ImportOptions& options)
 /// Which of several datasets is meant has to be said.
 void require_one(const ImportedFile& imported, const std::string& file) {
   if (imported.series.size() == 1) return;
+  constexpr std::size_t kMostOfName = 200, kMostOfAll = 2000;  // names are to be typed
   std::string names;
   for (const ImportedSeries& series : imported.series) {
-    names += fmt::format("{}'{}'", names.empty() ? "" : ", ", printable(series.name));
+    names += fmt::format("{}'{}'", names.empty() ? "" : ", ", printable(series.name, kMostOfName));
   }
   throw bad_input(file, fmt::format("holds {} curves", imported.series.size()),
-                  fmt::format("--dataset with one of {}", printable(names, 200)));
+                  fmt::format("--dataset with one of {}", printable(names, kMostOfAll)));
 }
 
 /// The importer would make readings of separate experiments out of such a curve.

@@ -232,12 +232,11 @@ void require_contact_within(double contact, std::span<const PreparedRecording> r
     const double deepest = r.load_imposed ? r.phases.peak_response : r.phases.peak_drive;
     if (contact < deepest) continue;
     const Unit unit = shown_unit(quantity_dimension(law_drive(r.recording)));
-    throw Error(
-        ExitCode::usage, std::string(where),
-        fmt::format("{} is not below the largest depth of '{}', {}",
-                    with_unit(significant(contact / unit.to_si, 4), unit), printable(r.name),
-                    with_unit(significant(deepest / unit.to_si, 4), unit)),
-        "the depth at which the probe begins to touch");
+    throw Error(ExitCode::usage, std::string(where),
+                fmt::format("{} is not below the largest depth of '{}', {}",
+                            with_unit(significant(contact / unit.to_si, 4), unit), r.name,
+                            with_unit(significant(deepest / unit.to_si, 4), unit)),
+                "the depth at which the probe begins to touch");
   }
 }
 

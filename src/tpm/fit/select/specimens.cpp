@@ -171,8 +171,7 @@ void require_distinct_files(std::span<const PreparedRecording> recordings) {
     if (sum.empty()) continue;
     for (std::size_t k = 0; k < i; ++k) {
       if (recordings[k].recording.header.sha256 != sum) continue;
-      throw bad_input(recordings[i].name,
-                      fmt::format("the same bytes as '{}'", printable(recordings[k].name)),
+      throw bad_input(recordings[i].name, fmt::format("the same bytes as '{}'", recordings[k].name),
                       "each recording once: a copy is no second specimen");
     }
   }

@@ -133,7 +133,7 @@ void add_law(ViewPage& page, const std::filesystem::path& file) {
   page.fact("provenance of the parameters", std::string(provenance_name(law.provenance)));
   if (law.adequacy) {
     page.description["lead"] =
-        Json::array({{{"text", law.adequacy->words}, {"doubt", !law.adequacy->is_adequate()}}});
+        Json::array({{{"text", law.adequacy->summary}, {"doubt", !law.adequacy->is_adequate()}}});
   }
   std::string interval = "interval";
   if (const auto& u = law.uncertainty) {

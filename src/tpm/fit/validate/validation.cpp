@@ -313,7 +313,7 @@ Validation validate(const ValidationRequest& request) {
   }
   if (request.at && std::ranges::find(request.recordings, *request.at, &PreparedRecording::name) ==
                         request.recordings.end()) {
-    throw Error(ExitCode::usage, "--at-recording", fmt::format("'{}'", printable(*request.at)),
+    throw Error(ExitCode::usage, "--at-recording", fmt::format("'{}'", *request.at),
                 "the name of one of the recordings");
   }
   if (request.presses.empty()) require_each_once(request.recordings);

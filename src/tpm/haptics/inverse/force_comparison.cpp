@@ -30,9 +30,8 @@ void ForceComparison::begin(std::int64_t at_ns) noexcept {
   before_ = now_;
   since_ns_ = at_ns;
   apart_ = false;
-  named_ = unnamed_ = 0;
-  apart_ns_ = unasked_ns_ = 0;
-  unasked_N_ = farthest_N_ = commanded_N_ = reported_N_ = 0.0;
+  totals_ = {};
+  published_.write(totals_);
 }
 
 void ForceComparison::command(const Eigen::Vector3d& force_N, std::int64_t at_ns) noexcept {
@@ -45,8 +44,18 @@ void ForceComparison::command(const Eigen::Vector3d& force_N, std::int64_t at_ns
   last_N_ = force_N;
 }
 
+void ForceComparison::no_report() noexcept {
+  ++totals_.unnamed;
+  published_.write(totals_);
+}
+
 void ForceComparison::report(const Eigen::Vector3d& force_N, std::int64_t at_ns) noexcept {
-  ++named_;
+  ++totals_.named;
+  compare(force_N, at_ns);
+  published_.write(totals_);
+}
+
+void ForceComparison::compare(const Eigen::Vector3d& force_N, std::int64_t at_ns) noexcept {
   const Eigen::Vector3d lowest_N = now_.lowest_N.cwiseMin(before_.lowest_N),
                         highest_N = now_.highest_N.cwiseMax(before_.highest_N);
   const Eigen::Vector3d nearest_N = force_N.cwiseMax(lowest_N).cwiseMin(highest_N);
@@ -64,38 +73,44 @@ void ForceComparison::report(const Eigen::Vector3d& force_N, std::int64_t at_ns)
   const std::int64_t lasted_ns = at_ns - counted_until_ns_;
   counted_until_ns_ = at_ns;
   if (largest_N == 0.0) {
-    unasked_N_ = std::max(unasked_N_.load(), force_N.norm());
-    unasked_ns_ += lasted_ns;
+    totals_.unasked_N = std::max(totals_.unasked_N, force_N.norm());
+    totals_.unasked_ns += lasted_ns;
     return;
   }
-  apart_ns_ += lasted_ns;
-  if (apart_N <= farthest_N_) return;
-  farthest_N_ = apart_N;
-  commanded_N_ = last_N_.norm();
-  reported_N_ = force_N.norm();
+  totals_.apart_ns += lasted_ns;
+  if (apart_N <= totals_.farthest_N) return;
+  totals_.farthest_N = apart_N;
+  totals_.commanded_N = last_N_.norm();
+  totals_.reported_N = force_N.norm();
 }
 
-std::vector<std::string> ForceComparison::findings() const {
-  if (named_ == 0 && unnamed_ > 0) {
-    return {"the service reported no force: whether it renders those commanded is not known"};
+std::vector<DeviceFinding> ForceComparison::findings() const {
+  const Totals totals = published_.read();
+  if (totals.named == 0 && totals.unnamed > 0) {
+    return {{"force_not_reported",
+             "the service reported no force: whether it renders those commanded is not known"}};
   }
   const auto in_all = [](std::int64_t ns) {
     return fmt::format("for {:.3g} s in all", static_cast<double>(ns) * 1e-9);
   };
-  std::vector<std::string> lines;
-  if (unasked_ns_ > 0) {
-    lines.push_back(fmt::format(
-        "the service reported up to {:.3g} N where nothing was commanded, {}: another client "
-        "pushes (end it), or a tissue of the service",
-        unasked_N_.load(), in_all(unasked_ns_)));
+  std::vector<DeviceFinding> found;
+  if (totals.unasked_ns > 0) {
+    found.push_back(
+        {"force_without_command",
+         fmt::format("the service reported up to {:.3g} N where nothing was commanded, {}: another "
+                     "client pushes (end it), or a tissue of the service",
+                     totals.unasked_N, in_all(totals.unasked_ns))});
   }
-  if (apart_ns_ > 0) {
-    lines.push_back(fmt::format(
-        "the service reported {:.3g} N where {:.3g} N was commanded, apart by up to {:.3g} N, {}: "
-        "another client may drive the device, or something may gate, scale or add forces",
-        reported_N_.load(), commanded_N_.load(), farthest_N_.load(), in_all(apart_ns_)));
+  if (totals.apart_ns > 0) {
+    found.push_back(
+        {"force_differs",
+         fmt::format("the service reported {:.3g} N where {:.3g} N was commanded, apart by up to "
+                     "{:.3g} N, {}: another client may drive the device, or something may gate, "
+                     "scale or add forces",
+                     totals.reported_N, totals.commanded_N, totals.farthest_N,
+                     in_all(totals.apart_ns))});
   }
-  return lines;
+  return found;
 }
 
 }  // namespace tpm::haptics

@@ -1,11 +1,11 @@
 #pragma once
 #include <Eigen/Core>
-#include <atomic>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/haptics/loop/published.hpp"
+#include "tpmkit/device.hpp"
 
 namespace tpm::haptics {
 
@@ -33,11 +33,14 @@ class ForceComparison {
   void command(const Eigen::Vector3d& force_N, std::int64_t at_ns) noexcept;
   void report(const Eigen::Vector3d& force_N, std::int64_t at_ns) noexcept;
   /// A state came that names no force.
-  void no_report() noexcept { ++unnamed_; }
-  /// Findings of the comparison, one line each. May be called from any thread.
-  [[nodiscard]] std::vector<std::string> findings() const;
+  void no_report() noexcept;
+  /// Findings of the comparison: force_not_reported, force_without_command, force_differs. May be
+  /// called from any thread.
+  [[nodiscard]] std::vector<DeviceFinding> findings() const;
 
  private:
+  void compare(const Eigen::Vector3d& force_N, std::int64_t at_ns) noexcept;
+
   struct Commands {
     Eigen::Vector3d lowest_N = Eigen::Vector3d::Zero(), highest_N = Eigen::Vector3d::Zero();
     double largest_N = 0.0;
@@ -51,11 +54,14 @@ class ForceComparison {
   Eigen::Vector3d last_N_ = Eigen::Vector3d::Zero();
   bool apart_ = false;
   std::int64_t apart_since_ns_ = 0, counted_until_ns_ = 0;
-  // For findings().
-  std::atomic<std::uint64_t> named_{0}, unnamed_{0};
-  std::atomic<std::int64_t> apart_ns_{0}, unasked_ns_{0};  ///< unasked: nothing was commanded
-  std::atomic<double> unasked_N_{0.0};
-  std::atomic<double> farthest_N_{0.0}, commanded_N_{0.0}, reported_N_{0.0};
+  struct Totals {
+    std::uint64_t named = 0, unnamed = 0;       ///< states with a force and without
+    std::int64_t apart_ns = 0, unasked_ns = 0;  ///< unasked: nothing was commanded
+    double unasked_N = 0.0;
+    double farthest_N = 0.0, commanded_N = 0.0, reported_N = 0.0;  ///< of the largest difference
+  };
+  Totals totals_;
+  Published<Totals> published_;  ///< for findings()
 };
 
 }  // namespace tpm::haptics

@@ -247,9 +247,10 @@ void InverseDevice::exchange_in_turn() noexcept {
     ask_for_first_state();
     begun_ = true;
     while (!ending_ && service_->over().empty()) {
+      const bool cut = cut_;  // before the force: what is cut later is not in this message
       const Eigen::Vector3d force_N = force_to_send();
       (void)exchange(force_message(format_, device_.id, force_N), kMostUnanswered_s);
-      if (cut_) zero_sent_ = true;
+      if (cut) zero_sent_ = true;
       look_for_events();
       wait_for_order();
     }
@@ -273,7 +274,9 @@ void InverseDevice::say_goodbye() noexcept {
   }
   if (service_->over().empty()) service_->close();
   try {
-    if (fault_ == Fault::connection) hear_last_events();
+    const Fault fault = fault_;
+    const bool being_set = failing_ && fault == Fault::none;  // by the thread of the loop
+    if (fault == Fault::connection || being_set) hear_last_events();
   } catch (...) {  // no memory: the cause stays that of the connection
   }
   if (events_ != nullptr) events_->close();
@@ -367,9 +370,9 @@ std::int64_t InverseDevice::session_ns() const noexcept {
   return static_cast<std::int64_t>(static_cast<double>(written_) * preparation_.period_s * 1e9);
 }
 
-std::vector<std::string> InverseDevice::findings() const {
-  std::vector<std::string> found = noticed_;
-  for (std::string& line : forces_.findings()) found.push_back(std::move(line));
+std::vector<DeviceFinding> InverseDevice::findings() const {
+  std::vector<DeviceFinding> found = noticed_;
+  for (DeviceFinding& finding : forces_.findings()) found.push_back(std::move(finding));
   return found;
 }
 

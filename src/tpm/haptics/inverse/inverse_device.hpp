@@ -67,7 +67,7 @@ class InverseDevice final : public HapticDevice {
   DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
   DeviceStatus status() noexcept override;
   HandState hand() noexcept override;
-  std::vector<std::string> findings() const override;  // from any thread
+  std::vector<DeviceFinding> findings() const override;  // from any thread
   void stop() noexcept override;
   bool learn_end() noexcept override;
   void cut_forces() noexcept override;
@@ -125,7 +125,7 @@ class InverseDevice final : public HapticDevice {
   std::unique_ptr<WebSocketClient> service_, events_;
   std::int64_t session_ = 0;
   InverseDeviceEntry device_;
-  std::vector<std::string> noticed_;  ///< at the opening
+  std::vector<DeviceFinding> noticed_;  ///< at the opening
   DeviceIdentity identity_;
   DevicePreparation preparation_;
   bool prepared_ = false;

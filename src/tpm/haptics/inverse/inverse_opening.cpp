@@ -165,10 +165,11 @@ void InverseDevice::look_for_other_clients() {
   }
   const bool commanded = !device_.control_mode.empty() && device_.control_mode != "idle";
   if (device_.simulated || !(device_.in_use || commanded)) return;
-  noticed_.push_back(fmt::format(
-      "another client may use the device {} (status in_use {}, control mode '{}'): end it, or its "
-      "forces add to those of this session",
-      printable(device_.id), device_.in_use, printable(device_.control_mode)));
+  noticed_.push_back(
+      {"in_use",
+       fmt::format("another client may use the device {} (status in_use {}, control mode "
+                   "'{}'): end it, or its forces add to those of this session",
+                   printable(device_.id), device_.in_use, printable(device_.control_mode))});
 }
 
 /// What the service says of its devices now, as this session sees them.
@@ -266,14 +267,15 @@ void InverseDevice::require_neutral() const {
 void InverseDevice::notice_settings() {
   const InverseSettings& s = device_.settings;
   if (!s.gravity_named) {
-    noticed_.push_back(
-        "the service does not name gravity compensation: it is unknown how much of the device's "
-        "weight the hand carries");
+    noticed_.push_back({"gravity_not_reported",
+                        "the service does not name gravity compensation: it is unknown how much of "
+                        "the device's weight the hand carries"});
   }
   if (!s.preset.empty() && !(s.mount_position_m.norm() < kMounted_m)) {
-    noticed_.push_back(fmt::format(
-        "the service names a mount at {} m beside the preset '{}': taken as that of the preset",
-        fmt::join(s.mount_position_m, " "), printable(s.preset)));
+    noticed_.push_back({"mount_beside_preset",
+                        fmt::format("the service names a mount at {} m beside the preset "
+                                    "'{}': taken as that of the preset",
+                                    fmt::join(s.mount_position_m, " "), printable(s.preset))});
   }
 }
 

@@ -20,6 +20,9 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t kRingRows = 1U << 16U;  // 16 s at 4 kHz
 
+/// In place of the time since which a cycle lasts: the watch has given it up.
+constexpr std::int64_t kLeftBehind = -1;
+
 /// What the threads of a session share. The stuck thread of a cycle that does not end keeps it
 /// alive.
 struct Shared {
@@ -34,15 +37,19 @@ struct Shared {
   ServoStep step;
   boost::lockfree::spsc_queue<ServoRecord> ring{kRingRows};
   std::atomic<std::uint64_t> dropped{0};
-  std::atomic<std::uint64_t> cycle{0};
   std::atomic<std::int64_t> busy_since_ns{0};  ///< 0: sleeping, or over
   std::atomic<StopCause> wanted{StopCause::none};
   std::atomic<bool> scheduled{false}, begin{false}, over{false};
   // Written by the loop before `over`, read after it.
   std::string scheduling;
   std::exception_ptr refused;  ///< by the system, or forces that could not be switched on
+  std::int64_t stop_took_ns = 0;
+  // Of completed cycles. Written by the loop between two cycles; whoever sets busy_since_ns to
+  // kLeftBehind reads them from then on.
   TimeHistogram woke_late, busy;
-  std::int64_t stop_took_ns = 0, first_cycle_ns = 0;
+  ServoCounts counts;
+  std::uint64_t cycles = 0;
+  std::int64_t first_cycle_ns = 0;
 
  private:
   /// Every page of the ring is there before the loop begins, also where memory cannot be locked.
@@ -78,15 +85,21 @@ void serve(Shared& s) noexcept {
       cause = s.step.cycle(static_cast<int>(std::min<std::int64_t>(missed, 1'000'000)), row);
       s.device->advance(period_s);
       const std::int64_t done = now_ns();
+      std::int64_t since = woke;
+      if (!s.busy_since_ns.compare_exchange_strong(since, 0, std::memory_order_acq_rel)) {
+        s.step.stop(StopCause::cycle_timeout);
+        return;
+      }
       row.woke_late_s = static_cast<float>(static_cast<double>(late_ns) * 1e-9);
       row.busy_s = static_cast<float>(static_cast<double>(done - woke) * 1e-9);
       s.woke_late.note(late_ns);
       s.busy.note(done - woke);
+      s.counts = s.step.counts();
+      s.cycles = s.step.cycles();
       if (s.first_cycle_ns == 0 && row.phase >= 0) {
         s.first_cycle_ns = deadline - static_cast<std::int64_t>(row.cycle) * period_ns;
       }
       if (!s.ring.push(row)) s.dropped.fetch_add(1, std::memory_order_relaxed);
-      s.cycle.store(row.cycle, std::memory_order_release);
     }
     if (cause != StopCause::none) s.stop_took_ns = now_ns() - woke;
     s.busy_since_ns.store(0, std::memory_order_release);
@@ -216,29 +229,35 @@ bool watch(const std::shared_ptr<Shared>& s, const RealTimeOptions& options,
     if (ForcesOffGuard::ended_by_signal() || (options.interrupted && options.interrupted())) {
       s->wanted.store(StopCause::signal, std::memory_order_release);
     }
-    const std::int64_t since = s->busy_since_ns.load(std::memory_order_acquire);
-    if (since != 0 && now_ns() - since > limit_ns) {
+    std::int64_t since = s->busy_since_ns.load(std::memory_order_acquire);
+    if (since != 0 && now_ns() - since > limit_ns &&
+        s->busy_since_ns.compare_exchange_strong(since, kLeftBehind, std::memory_order_acq_rel)) {
       // Should the stuck call come back, its thread ends there.
       s->wanted.store(StopCause::cycle_timeout, std::memory_order_release);
       cut_forces_from_outside(s);
       stop_took_ns = now_ns() - since;
+      s->busy.note(stop_took_ns);  // so far
       return true;
     }
   }
   return false;
 }
 
+/// What is known of the completed cycles, also if the last one hangs.
+void fill_counts(ServoOutcome& outcome, const Shared& s) {
+  outcome.cycles = s.cycles;
+  outcome.counts = s.counts;
+  outcome.woke_late = s.woke_late;
+  outcome.busy = s.busy;
+  outcome.first_cycle_monotonic_ns = s.first_cycle_ns;
+}
+
 void fill(ServoOutcome& outcome, Shared& s) {
   s.step.complete_cause();
   if (outcome.detail.empty()) outcome.detail = s.step.detail();
   outcome.cause = s.step.cause();
-  outcome.cycles = s.step.cycles();
-  outcome.counts = s.step.counts();
   outcome.device = s.step.device_status();
-  outcome.woke_late = s.woke_late;
-  outcome.busy = s.busy;
   outcome.stop_took_s = static_cast<double>(s.stop_took_ns) * 1e-9;
-  outcome.first_cycle_monotonic_ns = s.first_cycle_ns;
 }
 
 }  // namespace
@@ -266,7 +285,6 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
   if (timed_out) {
     loop.leave_behind();
     outcome.cause = StopCause::cycle_timeout;
-    outcome.cycles = shared->cycle.load(std::memory_order_acquire) + 1;
     outcome.stop_took_s = static_cast<double>(stop_took_ns) * 1e-9;
     outcome.detail = "a cycle did not end within the limit; its thread was left behind";
   } else {
@@ -280,6 +298,7 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
     outcome.detail = "something that is no error was thrown by whoever records";
   }
   outcome.dropped_records = shared->dropped;
+  fill_counts(outcome, *shared);
   if (timed_out) return outcome;
   if (shared->refused) {
     device->stop();

@@ -1,5 +1,7 @@
 #include "tpm/haptics/loop/servo_step.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -10,8 +12,6 @@ namespace tpm::haptics {
 namespace {
 
 constexpr std::size_t kLateWindow = 1000;
-/// Positions of earlier calls are used for so long; a jump is judged over no more either.
-constexpr double kMostStale_s = 0.020;
 
 StopCause cause_of(ForcesOff off) {
   switch (off) {
@@ -112,6 +112,12 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
   gate_.emplace(*settings_.gate, settings_.period_s);
 }
 
+std::string ServoStep::detail() const {
+  if (!too_stale_) return {};
+  return fmt::format("positions older than {:g} ms: the answers of the device were late or missing",
+                     1e3 * kMostStale_s);
+}
+
 StopCause ServoStep::read(int missed, ServoRecord& row) noexcept {
   const Eigen::Vector3d before = position_m_;
   const DeviceAnswer answer = device_.read(position_m_);
@@ -135,7 +141,7 @@ StopCause ServoStep::read(int missed, ServoRecord& row) noexcept {
   if (answer != DeviceAnswer::time_guard) {
     stale_ = 0;
   } else if (since_s > kMostStale_s) {
-    detail_ = "positions older than 20 ms: the answers of the device were late or missing";
+    too_stale_ = true;
     return StopCause::communication;
   }
   return StopCause::none;
@@ -427,13 +433,14 @@ StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
   // Not before: in real time a device is prepared after its loop has been made.
   if (!awaited_) device_.await();
   awaited_ = true;
-  gate_->count(static_cast<std::uint64_t>(missed) + 1);
+  const std::uint64_t periods = static_cast<std::uint64_t>(missed) + 1;
+  gate_->count(periods);
   StopCause cause = read(missed, row);
   if (cause != StopCause::none) return cause;
   row.tool_depth_m = settings_.push.dot(position_m_ - settings_.surface_m);
   const bool with_surface = !settings_.surface_before_hand_m;
   const std::uint32_t missing =
-      gate_->see(position_m_, row.tool_depth_m, with_surface, hand_.buttons != 0);
+      gate_->see(periods, position_m_, row.tool_depth_m, with_surface, hand_.buttons != 0);
   row.flags |= missing;
   cause = write(Eigen::Vector3d::Zero(), row);
   if (cause != StopCause::none) return cause;

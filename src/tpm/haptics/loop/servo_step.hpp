@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "tpm/haptics/loop/delay_watch.hpp"
@@ -39,6 +40,9 @@ namespace tpm::haptics {
 /// that is being sent.
 class ServoStep {
  public:
+  /// Positions of earlier calls are used for so long; a jump is not counted over a longer time.
+  static constexpr double kMostStale_s = 0.020;
+
   /// @param device, model must live as long as this
   ServoStep(HapticDevice& device, ContactModel& model, ServoSettings settings);
 
@@ -55,7 +59,7 @@ class ServoStep {
     if (known != StopCause::none) cause_ = known;
   }
   /// The cause in words where it alone does not say enough; else empty.
-  [[nodiscard]] const char* detail() const noexcept { return detail_; }
+  [[nodiscard]] std::string detail() const;
 
   [[nodiscard]] const ServoCounts& counts() const noexcept { return counts_; }
   [[nodiscard]] const DeviceStatus& device_status() const noexcept { return status_; }
@@ -147,7 +151,7 @@ class ServoStep {
   int late_now_ = 0;
   bool begun_ = false, awaited_ = false;
   StopCause cause_ = StopCause::none;
-  const char* detail_ = "";
+  bool too_stale_ = false;
 };
 
 }  // namespace tpm::haptics

@@ -6,9 +6,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <set>
 
 #include "tpm/haptics/loop/real_time.hpp"
+#include "tpm/haptics/serve/inverse_connection.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
@@ -18,7 +18,6 @@ constexpr std::size_t kMostWaitingBytes = 262'144;  // that a client does not re
 constexpr std::size_t kMostDiscarded = 16'777'216;  // after the last word to a client
 constexpr std::int64_t kTimeToAsk_ns = 2'000'000'000, kTimeToLeave_ns = 2'000'000'000,
                        kTimeToDrive_ns = 2'000'000'000;  ///< of silence, then others may
-constexpr int kMostLines = 20;                           // in the log, of one client
 constexpr int kLook_ms = 50;
 constexpr double kFarthest_m = 1.0;  // a place that a hand is asked to go to
 
@@ -27,34 +26,6 @@ bool waits() {
 }
 
 }  // namespace
-
-struct InverseServer::Connection {
-  enum class Stage { asking, open, leaving, gone };
-
-  explicit Connection(Socket s) : socket(std::move(s)), since_ns(now_ns()) {}
-
-  Socket socket;
-  Stage stage = Stage::asking;
-  std::int64_t since_ns;  ///< of the stage
-  std::int64_t session = 0;
-  bool events = false, centred = false, shut = false;
-  bool turned_away = false;    ///< beyond the number that is served: told so, and nothing more
-  std::int64_t pushed_ns = 0;  ///< its last force as the driver
-  std::string head, out;
-  WebSocketReader reader{WebSocketSide::server, kMostMessageBytes};
-  std::size_t discarded = 0;
-  int lines = 0;
-  std::set<std::string> told;  ///< said to the log once, however often the client does it
-
-  [[nodiscard]] bool first(const std::string& what) {
-    const bool room = told.size() < static_cast<std::size_t>(kMostLines);  // it may name anything
-    return room && told.insert(what).second;
-  }
-  void enter(Stage next) {
-    stage = next;
-    since_ns = now_ns();
-  }
-};
 
 InverseServer::InverseServer(ServedHand& hand, InverseServerSettings settings)
     : hand_(hand),
@@ -77,10 +48,11 @@ InverseServer::Counts InverseServer::counts() const noexcept {
 }
 
 void InverseServer::say(Connection& c, const std::string& line) {
-  if (!settings_.log || ++c.lines > kMostLines) return;
+  if (!settings_.log || ++c.lines > Connection::kMostLines) return;
   const std::string who = c.session == 0 ? "a connection" : fmt::format("client {}", c.session);
   settings_.log(
-      fmt::format("{}: {}{}", who, line, c.lines == kMostLines ? " (its last line here)" : ""));
+      fmt::format("{}: {}{}", who, line,
+                  c.lines == Connection::kMostLines ? " (its last line but who drives)" : ""));
 }
 
 void InverseServer::serve() {
@@ -109,6 +81,7 @@ void InverseServer::serve() {
     if (wanted[0].revents != 0) accept_new(listening_, false);
     if (wanted[1].revents != 0) accept_new(events_, true);
     send_events();
+    tell_driver();
     std::erase_if(connections_, [](const auto& c) { return c->stage == Connection::Stage::gone; });
   }
   for (const auto& c : connections_) {
@@ -146,7 +119,7 @@ void InverseServer::accept_new(const Socket& listening, bool events) {
   };
   if (count(false) >= kMostConnections) {
     ++refused_;
-    if (settings_.log && !full_ && ++times_full_ <= kMostLines) {
+    if (settings_.log && !full_ && ++times_full_ <= Connection::kMostLines) {
       settings_.log(fmt::format("{} connections are open: others are refused", kMostConnections));
     }
     full_ = true;
@@ -175,7 +148,7 @@ void InverseServer::look_at(Connection& c) {
   }
   if (c.stage == Stage::open && driver_ == c.session && c.session != 0 &&
       now_ns() - c.pushed_ns > kTimeToDrive_ns) {
-    stop_driving(c);
+    drive(0);
   }
   if (c.stage != Stage::leaving) return;
   if (c.out.empty() && !c.shut) {
@@ -369,10 +342,7 @@ void InverseServer::obey(Connection& c, const InverseCommand& command) {
     if (driver_ == c.session) hand_.push(Eigen::Vector3d::Zero());
     return;
   }
-  if (driver_ == 0 && !command.force_N->isZero()) {
-    driver_ = c.session;
-    say(c, "drives");
-  }
+  if (driver_ == 0 && !command.force_N->isZero()) drive(c.session);
   if (driver_ == c.session) {
     c.pushed_ns = now_ns();
     return hand_.push(*command.force_N);
@@ -442,16 +412,23 @@ void InverseServer::fault(Connection& c, std::uint16_t code, const std::string& 
   release(c);
 }
 
-void InverseServer::stop_driving(Connection& c) {
-  driver_ = 0;
-  hand_.let_go();
-  say(c, "drives no more");
+/// @param session 0: nobody
+void InverseServer::drive(std::int64_t session) {
+  driver_ = session;
+  if (session == 0) hand_.let_go();
+  driver_log_.change(session);
+  tell_driver();
+}
+
+void InverseServer::tell_driver() {
+  if (!settings_.log) return;
+  if (const std::string line = driver_log_.line(now_ns()); !line.empty()) settings_.log(line);
 }
 
 /// Whatever this client held is free again.
 void InverseServer::release(Connection& c) {
   if (c.session == 0) return;
-  if (driver_ == c.session) stop_driving(c);
+  if (driver_ == c.session) drive(0);
   if (mover_ == c.session) {
     mover_ = 0;
     hand_.move_to(std::nullopt);

@@ -10,6 +10,7 @@
 
 #include "tpm/haptics/inverse/loopback.hpp"
 #include "tpm/haptics/inverse/messages.hpp"
+#include "tpm/haptics/serve/driver_log.hpp"
 
 namespace tpm::haptics {
 
@@ -48,7 +49,7 @@ struct InverseServerSettings {
 /// exactly one state for each message. The first client that asks for a force drives until it
 /// leaves, or asks for nothing in two seconds; others read. A setting that this device does not
 /// have stays, and the log says so. What strangers can take is bounded: connections, bytes, lines
-/// of the log.
+/// that each connection adds to the log, lines about who drives (DriverLog).
 class InverseServer {
  public:
   /// @param hand must live as long as this. Throws Error(environment) if the port is taken.
@@ -86,7 +87,8 @@ class InverseServer {
   void move(Connection& c, const Eigen::Vector3d& position_m);
   void fault(Connection& c, std::uint16_t code, const std::string& why);
   void release(Connection& c);
-  void stop_driving(Connection& c);
+  void drive(std::int64_t session);
+  void tell_driver();
   void end_of(Connection& c);
   void send(Connection& c, std::string_view bytes);
   void flush(Connection& c);
@@ -104,6 +106,7 @@ class InverseServer {
   int times_full_ = 0;
   std::int64_t next_session_ = 1, driver_ = 0, mover_ = 0,
                presser_ = 0;  ///< sessions; 0: none
+  DriverLog driver_log_;
   std::atomic<std::uint64_t> connected_{0}, refused_{0}, messages_{0}, states_{0}, unreadable_{0},
       closed_for_fault_{0};
   std::atomic<bool> ending_{false};

@@ -79,7 +79,7 @@ void SimulatedHand::step() noexcept {
   on_their_way_[oldest_] = no_longer_than(wanted_N, limit_N);
   oldest_ = (oldest_ + 1) % on_their_way_.size();
   rendered_N_ = forces_on_ ? on_their_way_[oldest_] : Eigen::Vector3d::Zero();
-  largest_N_ = std::max(largest_N_, rendered_N_.norm());
+  largest_N_ = std::max(largest_N_.load(), rendered_N_.norm());
   const OperatorAim aim = settings_.script.at(time_s_);
   Eigen::Vector3d goal_m = wish.goal_m, force_N = rendered_N_;
   if (!wish.guided && plant.arm_set_point_m) {
@@ -97,7 +97,16 @@ void SimulatedHand::step() noexcept {
     at_m_[axis] = goal_m[axis] + next[0];
     speed_m_per_s_[axis] = next[1];
   }
+  meet_stop();
   time_s_ += plant.period_s;
+}
+
+void SimulatedHand::meet_stop() noexcept {
+  const double away_m = at_m_.norm();
+  if (away_m <= settings_.reach_m) return;
+  const Eigen::Vector3d outwards = at_m_ / away_m;
+  at_m_ = settings_.reach_m * outwards;
+  speed_m_per_s_ -= std::max(0.0, speed_m_per_s_.dot(outwards)) * outwards;
 }
 
 void SimulatedHand::advance(double seconds) noexcept {

@@ -14,7 +14,7 @@ struct SimulatedHandSettings {
   PlantSettings plant;
   OperatorScript script;       ///< of the hand, while nobody moves it
   double force_limit_N = 8.0;  ///< of tissue and client together; nobody raises it
-  double reach_m = 0.075;      ///< where the hand can be asked to go
+  double reach_m = 0.075;      ///< from the middle of the workspace to its end
 };
 
 /// A simulated device, the hand that holds it, and a client that pushes it as well as the tissue.
@@ -25,7 +25,9 @@ struct SimulatedHandSettings {
 ///     m x'' + b x' + k (x - goal) = F_tissue + F_client
 ///
 /// along each axis; the forces are those of `delay_periods` ago. Where the script asks for a push
-/// in place of a place, the goal is where the hand is and the push is added.
+/// in place of a place, the goal is where the hand is and the push is added. At the end of the
+/// workspace the device meets a stop, as a mechanism does: it keeps its speed along the stop and
+/// loses that against it.
 ///
 /// The hand holds a grip that leans with it: by kLean_rad_per_m about the axis across its way from
 /// the middle of the workspace. Its buttons are those that a client presses.
@@ -51,7 +53,7 @@ class SimulatedHand final : public HapticDevice, public ServedHand {
 
   static constexpr double kLean_rad_per_m = 10.0;
 
-  /// Largest force that was rendered, N; of the loop's thread.
+  /// Largest force that was rendered, N; from any thread.
   [[nodiscard]] double largest_N() const noexcept { return largest_N_; }
 
  private:
@@ -61,6 +63,7 @@ class SimulatedHand final : public HapticDevice, public ServedHand {
     bool guided = false;
   };
   void step() noexcept;
+  void meet_stop() noexcept;
   [[nodiscard]] Eigen::Vector3d client_force_N() const noexcept;
 
   SimulatedHandSettings settings_;
@@ -72,10 +75,11 @@ class SimulatedHand final : public HapticDevice, public ServedHand {
   TripleBuffer<InverseState> shown_;
   Eigen::Vector3d at_m_, speed_m_per_s_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero(), rendered_N_ = Eigen::Vector3d::Zero();
-  double time_s_ = 0.0, owed_s_ = 0.0, largest_N_ = 0.0;
+  double time_s_ = 0.0, owed_s_ = 0.0;
   std::vector<Eigen::Vector3d> on_their_way_;  ///< forces, a ring
   std::size_t oldest_ = 0;
   std::uint64_t saturations_ = 0;
+  std::atomic<double> largest_N_{0.0};
   std::atomic<bool> forces_on_{false};
   /// Of what a client may push with; lowered by prepare() while the server's thread may already
   /// read.

@@ -213,9 +213,9 @@ void move_handle(IdentifyRun& run, std::vector<IdentificationSample>& samples,
                  : never_begun.empty()        ? end_of(run.outcome, like.cycle_timeout_s)
                                               : never_begun;
   if (cause == StopCause::cycle_timeout) return;  // a call may still be under way
-  for (std::string& line : device->findings()) {
-    if (std::ranges::find(run.findings, line) == run.findings.end()) {
-      run.findings.push_back(std::move(line));
+  for (DeviceFinding& finding : device->findings()) {
+    if (std::ranges::find(run.findings, finding) == run.findings.end()) {
+      run.findings.push_back(std::move(finding));
     }
   }
 }
@@ -260,7 +260,8 @@ void identify(IdentifyRun& run, const std::vector<IdentificationSample>& samples
     found.mass_certain = false;
     found.viscous_N_s_per_m = found.viscous_lower_95_N_s_per_m = std::nullopt;
     found.coulomb_low_N = found.coulomb_high_N = std::nullopt;
-    found.not_identified.push_back("friction, mass: the device noticed: " + run.findings.front());
+    found.not_identified.push_back("friction, mass: the device noticed: " +
+                                   run.findings.front().text);
   }
   if (run.ended_by.empty()) return;
   found.not_identified.push_back(fmt::format("everything after {}: {}", lasted, run.ended_by));
@@ -440,7 +441,7 @@ Json device_file_json(const IdentifyRun& run, const std::string& date) {
                    {"ended", to_string(run.outcome.cause)},
                    {"stroke_m", rounded(f.stroke_m, kDigits)}};
   if (!run.ended_by.empty()) measurement["ended_by"] = run.ended_by;
-  if (!run.findings.empty()) measurement["device_findings"] = run.findings;
+  if (!run.findings.empty()) measurement["device_findings"] = to_json(run.findings);
   if (!date.empty()) measurement["date"] = date;
   if (run.real_time) {
     measurement["host"] = host_line();

@@ -28,7 +28,7 @@ struct IdentifyRun {
   /// False if less than kLeastMeasured_s was measured because it ended early: nothing is
   /// identified.
   bool counts = true;
-  std::vector<std::string> findings;  ///< of the device (HapticDevice::findings)
+  std::vector<DeviceFinding> findings;  ///< of the device
   /// Ends by a stall, after each of which the measurement went on with a new connection.
   int begun_again = 0;
   bool real_time = false;

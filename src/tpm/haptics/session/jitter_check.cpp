@@ -140,6 +140,11 @@ std::string advice_of(const JitterCheck& check) {
                        "by its wake-ups this machine can do no rate above "
                        "500 Hz");
   if (device_ended(check.outcome.cause)) return can + "; the device ended the test, not the time";
+  if (hung(check)) {
+    return fmt::format(
+        "{}; a cycle did not end within {}: a call of the device hung, or the machine", can,
+        ms(check.cycle_timeout_s));
+  }
   if (silence_s(check, stall_s) >= kLongestWatchdog_s) {
     return fmt::format(
         "{}; stalls of {} are longer than any watchdog of the device: give the loop a core of its "
@@ -159,6 +164,10 @@ std::string advice_of(const JitterCheck& check) {
 
 }  // namespace
 
+bool hung(const JitterCheck& check) {
+  return check.outcome.cause == StopCause::cycle_timeout;
+}
+
 std::uint64_t stalls_beyond_watchdog(const JitterCheck& check) {
   constexpr double kRounding_us = 1e-3;
   const TimeHistogram& late = check.outcome.woke_late;
@@ -175,7 +184,9 @@ double observed_s(const JitterCheck& check) {
 
 std::optional<double> most_stalls_per_s(const JitterCheck& check) {
   constexpr double kShare = 0.95, kOfNone = 3.0;
-  if (check.outcome.cycles == 0 || check.outcome.woke_late.count() == 0) return std::nullopt;
+  if (hung(check) || check.outcome.cycles == 0 || check.outcome.woke_late.count() == 0) {
+    return std::nullopt;
+  }
   const auto stalls = static_cast<double>(stalls_beyond_watchdog(check));
   const double most =
       stalls == 0.0 ? kOfNone : 0.5 * chi_squared_quantile(kShare, 2.0 * (stalls + 1.0));
@@ -196,7 +207,7 @@ std::string stall_bound(const JitterCheck& check) {
 std::optional<double> once_an_hour_s(const JitterCheck& check) {
   constexpr double kHour_s = 3600.0, kShare = 1e-3, kFurther = 1e-4;
   const TimeHistogram& late = check.outcome.woke_late;
-  if (late.count() < kFewestToExtrapolate) return std::nullopt;
+  if (hung(check) || late.count() < kFewestToExtrapolate) return std::nullopt;
   const double at_s = late.quantile_s(1.0 - kShare), further_s = late.quantile_s(1.0 - kFurther);
   const double slope_s = (further_s - at_s) / std::log(kShare / kFurther);
   const double tail_s =
@@ -212,7 +223,8 @@ void assess(JitterCheck& check) {
 }
 
 JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, double duration_s,
-                         RealTimeWish wish, const std::function<bool()>& interrupted) {
+                         RealTimeWish wish, const std::function<bool()>& interrupted,
+                         const FindingTold& noticed) {
   const DeviceLimits limits = limits_of(choice);
   HilSession session = idle_session(like, duration_s);
   if (choice.kind == "virtual") forgive_stalls(session);  // they are what is looked for
@@ -230,11 +242,15 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
   try {
     check.device = device->open();
     require_same_device(choice, check.device);
+    FindingNotices notices(*device, noticed);
+    notices.look();
+    options.idle = [&notices] { notices.look(); };
     options.prepare = [&] { device->prepare(preparation); };
     check.outcome = run_in_real_time(
         device, std::make_shared<EmptySpace>(session.servo.period_s), ServoSettings{session.servo},
         [](const ServoRecord&) {}, options);
     check.findings = device->findings();
+    notices.look();
   } catch (...) {
     device->stop();
     throw;

@@ -138,10 +138,30 @@ struct LoopContact::Stepped {
   // Of step_at(): periods of the contact, counted by the caller's clock.
   bool timed = false;
   double begun_s = 0.0, last_s = 0.0, periods = 0.0;
-  int still = 0;  ///< calls in a row whose time is that of the call before
+  double usual = 0.0;  ///< interval of the caller's loop, mean of the last calls, periods
+  int intervals = 0;   ///< of which it is the mean
+  int still = 0;       ///< calls in a row whose time is that of the call before
   // Of both: what ServoStep does not judge of a loop that is too slow.
   double late = 0.0;    ///< of the last thousand calls, while the contact waits to begin
   double behind = 0.0;  ///< periods by which the tissue is behind, ServoStep::kMostSteps a call
+
+  /// Periods to live through in a call `since` periods after the one before it and `ahead` of the
+  /// tissue. One a call as long as that keeps within kOff of the clock: intervals that vary about
+  /// the right mean do not make a period missed now and one too many then.
+  double due(double since, double ahead) noexcept {
+    constexpr double kFast = 0.75, kSlow = 1.5, kOff = 1.25, kLongest = 2.0, kMost = 1e6;
+    constexpr int kCalls = 50;
+    if (since == 0.0) return 0.0;
+    intervals = std::min(intervals + 1, kCalls);
+    usual += (std::min(since, kLongest) - usual) / intervals;
+    double lived = 1.0;
+    // Of a faster loop the call nearest to the end of a period.
+    if (usual < kFast) lived = ahead + 0.5 * since >= 1.0 ? 1.0 : 0.0;
+    if (usual >= kSlow) lived = std::max(0.0, std::round(ahead));
+    if (ahead - lived > kOff) lived = std::round(ahead);
+    if (ahead - lived < -kOff) lived = 0.0;
+    return std::min(lived, kMost);
+  }
 
   /// True if a loop whose call came after `missed` periods is too slow to go on.
   bool is_too_slow(int missed, int most_late) noexcept {
@@ -231,18 +251,7 @@ StopCause LoopContact::step_at(double time_s, const Eigen::Vector3d& position_m,
     s.begun_s = time_s;
     return step(position_m, force_N, 0);
   }
-  constexpr double kOff = 0.75, kMost = 1e6;
-  const double ahead = (time_s - s.begun_s) / settings_.period_s - s.periods;
-  double lived = 1.0;
-  if (since < kOff) {
-    // A faster loop: the call nearest to the end of a period.
-    lived = ahead + 0.5 * since >= 1.0 ? 1.0 : 0.0;
-  } else {
-    // One period a call as long as that keeps within three quarters of one of the clock: jitter and
-    // a rate that is a little off do not make a period missed now and one too many then.
-    if (ahead - lived > kOff) lived = std::min(std::round(ahead), kMost);
-    if (ahead - lived < -kOff) lived = 0.0;
-  }
+  const double lived = s.due(since, (time_s - s.begun_s) / settings_.period_s - s.periods);
   s.periods += lived;
   if (lived > 0.0) return step(position_m, force_N, static_cast<int>(lived) - 1);
   if (s.cause == StopCause::none) force_N = s.device.force_N();

@@ -65,7 +65,8 @@ class LoopContact {
                  int missed = 0) noexcept;
   /// The same by the caller's clock: the number of periods since the last step follows from the
   /// time, so that a loop at another rate lives through the same time as the contact. Between two
-  /// periods of the contact the force of the last one is held.
+  /// periods of the contact the force of the last one is held. The mean rate counts, not each
+  /// interval: the contact lives through one period a call while it is within 1.25 of the clock.
   /// @param time_s of any clock that does not jump; rising from call to call, at most kMostTime_s
   ///               in size: a hundredth of any period must still tell
   /// @returns as step(); kBadTime, with a zero force and without a step, for a time that is not

@@ -100,6 +100,14 @@ Json to_json(const DeviceIdentity& device) {
           {"assumptions", device.assumptions}};
 }
 
+Json to_json(const std::vector<DeviceFinding>& findings) {
+  Json list = Json::array();
+  for (const DeviceFinding& finding : findings) {
+    list.push_back({{"code", finding.code}, {"text", finding.text}});
+  }
+  return list;
+}
+
 Json recording_header(const HilSession& session, const DeviceIdentity& device,
                       const LoopModel& model, bool real_time, const SessionNotes& notes,
                       const Json& rendering) {
@@ -262,7 +270,7 @@ std::vector<std::string> recording_remarks(const HilRecording& recording) {
         fmt::format("{} rows found no room while the session ran, and are missing", dropped));
   }
   for (const Json& finding : recording.closing.value("device_findings", Json::array())) {
-    remarks.push_back("the device noticed: " + finding.get<std::string>());
+    remarks.push_back("the device noticed: " + finding.at("text").get<std::string>());
   }
   return remarks;
 }

@@ -27,6 +27,7 @@ struct SessionNotes {
 
 [[nodiscard]] Json to_json(const DeviceIdentity& device);
 [[nodiscard]] Json to_json(const ServoCounts& counts);
+[[nodiscard]] Json to_json(const std::vector<DeviceFinding>& findings);
 
 /// A recorded session.
 struct HilRecording {

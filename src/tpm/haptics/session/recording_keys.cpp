@@ -134,6 +134,12 @@ const FileKind& recording_closing_kind() {
         "marker", "set by the operator during the session; the row has the flag marked",
         {required_key("cycle", count_form(), "of the row"),
          required_key("by", one_of({"key", "button"}).form, "a key is known to 20 ms")});
+    const FormPtr finding = object_form(
+        "device_finding", "of the device, that ended nothing",
+        {required_text("code",
+                       "its kind, as docs/haptics.md lists them; a device of a caller's own "
+                       "may have others"),
+         required_text("text", "in words, with its numbers")});
     return FileKind{
         "hil_closing", "The closing record of a recorded session of tpm hil",
         "What stands behind the rows of a .tpmrec file whose session came to an end",
@@ -154,7 +160,7 @@ const FileKind& recording_closing_kind() {
              optional_key("stop_took_s", number().form, "until forces were off"),
              optional_key("clock", clock, "in real time"),
              optional_key("markers", list_form(marker, 0), "set by the operator"),
-             optional_key("device_findings", list_form(text().form, 0),
+             optional_key("device_findings", list_form(finding, 0),
                           "what the device noticed and that ended nothing")})};
   };
   static const FileKind kind = made();

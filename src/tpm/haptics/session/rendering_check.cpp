@@ -143,17 +143,24 @@ void warn_of_rests(RenderingCheck& check, const HilSession& session) {
 
 std::string RenderingCheck::verdict() const {
   const std::string what = fmt::format(
-      "stiffness {} N/m at {} Hz, {} periods of delay{}, friction {} N s/m",
-      significant(stiffness_N_per_m, 3), significant(rate_Hz, 4), delay_periods,
+      "stiffness {} N/m at {} Hz, {} ms of delay{}, friction {} N s/m",
+      significant(stiffness_N_per_m, 3), significant(rate_Hz, 4), significant(1e3 * delay_s, 3),
       delay_measured ? ""
                      : fmt::format(" ({}: {} ms and no friction count)",
                                    delay_note.empty() ? "not measured on this device" : delay_note,
                                    significant(1e3 * delay_s, 3)),
       significant(friction_N_s_per_m, 2));
+  if (unstable()) {
+    return fmt::format(
+        "unstable: {}; stable with the operator's arm up to {} N/m, of which {} % are allowed",
+        what, significant(stable_N_per_m, 3), significant(100.0 * kRoom, 2));
+  }
   if (!stable()) {
     return fmt::format(
-        "unstable: {}; stable with the operator's arm up to {} N/m, of which {} are allowed", what,
-        significant(stable_N_per_m, 3), kRoom);
+        "stable with the operator's arm, but with too little margin: {}; at most {} N/m, which is "
+        "{} % of the {} N/m at which it becomes unstable",
+        what, significant(kRoom * stable_N_per_m, 3), significant(100.0 * kRoom, 2),
+        significant(stable_N_per_m, 3));
   }
   if (!within_device()) {
     return fmt::format("too stiff for the device: {}; at most {} N/m", what,
@@ -240,6 +247,7 @@ Json to_json(const RenderingCheck& check) {
   constexpr int kDigits = 6;
   Json json{{"verdict", check.verdict()},
             {"stable", check.stable()},
+            {"unstable", check.unstable()},
             {"passive", check.passive()},
             {"within_device", check.within_device()},
             {"follows_encoder", check.follows_encoder()},

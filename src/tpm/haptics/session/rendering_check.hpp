@@ -13,7 +13,7 @@ namespace tpm::haptics {
 struct RenderingCheck {
   double rate_Hz = 0.0;
   double delay_s = 0.0;   ///< that counts, both paths of the device
-  int delay_periods = 0;  ///< the same in whole periods, rounded up
+  int delay_periods = 0;  ///< the same in whole periods, rounded up: for stability with the arm
   double longest_delay_s = std::numeric_limits<double>::infinity();  ///< that is guarded
   bool delay_measured = true;  ///< false: hardware that nobody has measured
   /// Why the delay counts as not measured although a file says it; empty otherwise.
@@ -36,9 +36,13 @@ struct RenderingCheck {
   std::vector<std::string> warnings;
 
   [[nodiscard]] bool passive() const { return stiffness_N_per_m <= passive_N_per_m; }
-  /// With room: the boundary is that of small motions, and impacts and limits take away from it.
+  /// The linear loop grows.
+  [[nodiscard]] bool unstable() const {
+    return spectral_radius >= 1.0 || stiffness_N_per_m > stable_N_per_m;
+  }
+  /// With margin: the boundary is that of small motions, and impacts and limits reduce it.
   [[nodiscard]] bool stable() const {
-    return spectral_radius < 1.0 && stiffness_N_per_m <= kRoom * stable_N_per_m;
+    return !unstable() && stiffness_N_per_m <= kRoom * stable_N_per_m;
   }
   [[nodiscard]] bool within_device() const { return stiffness_N_per_m <= largest_N_per_m; }
   /// A step of the encoder is felt as it is. Where it makes a larger force than may come within a
@@ -55,8 +59,8 @@ struct RenderingCheck {
     return stable() && within_device() && follows_encoder() && safe_in_hands() &&
            delay_is_guarded();
   }
-  static constexpr double kRoom = 0.8;
-  /// One line: passive, stable, or why not.
+  static constexpr double kRoom = 0.8;  ///< share of stable_N_per_m that is allowed
+  /// One line: passive, stable, too little margin, or why not.
   [[nodiscard]] std::string verdict() const;
 };
 

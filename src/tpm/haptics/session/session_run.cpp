@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <set>
 
 #include "tpm/files/row_log.hpp"
 #include "tpm/haptics/device/device_file.hpp"
@@ -70,29 +69,11 @@ class Markers {
   Json list_ = Json::array();
 };
 
-/// Tells each finding of a device once, though its numbers grow.
-class Notices {
- public:
-  Notices(const HapticDevice& device, std::function<void(const std::string&)> tell)
-      : device_(device), tell_(std::move(tell)) {}
-  void look() {
-    if (!tell_) return;
-    for (const std::string& line : device_.findings()) {
-      if (told_.insert(line.substr(0, line.find_first_of("0123456789"))).second) tell_(line);
-    }
-  }
-
- private:
-  const HapticDevice& device_;
-  std::function<void(const std::string&)> tell_;
-  std::set<std::string> told_;  ///< up to their first number
-};
-
 /// @param prepare prepares the device and lets the recording appear
 ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
                       const std::shared_ptr<ContactModel>& stepped, const ServoSettings& servo,
                       const SessionRunOptions& options, RowLogWriter& log, Markers& markers,
-                      double& largest_force_N, Notices& notices,
+                      double& largest_force_N, FindingNotices& notices,
                       const std::function<void()>& prepare) {
   const RecordSink sink = [&](const ServoRecord& written) {
     ServoRecord row = written;
@@ -228,7 +209,7 @@ SessionRun run_admitted(AdmittedSession admitted, const HilSession& session,
     require_same_device(choice, run.device);
     require_clock(choice, run.device, options.real_time);
     if (options.opened) options.opened(run.device, run.model);
-    Notices notices(*device, options.noticed);
+    FindingNotices notices(*device, options.noticed);
     notices.look();
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time,
@@ -245,7 +226,7 @@ SessionRun run_admitted(AdmittedSession admitted, const HilSession& session,
     run.findings = device->findings();
     notices.look();
     Json closing = recording_closing(run.outcome);
-    if (!run.findings.empty()) closing["device_findings"] = run.findings;
+    if (!run.findings.empty()) closing["device_findings"] = to_json(run.findings);
     if (!markers.list().empty()) closing["markers"] = markers.list();
     log.close(to_text(closing));
   } catch (...) {

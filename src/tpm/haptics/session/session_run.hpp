@@ -6,6 +6,7 @@
 
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/inverse/inverse_device.hpp"
+#include "tpm/haptics/session/finding_notices.hpp"
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/rendering_check.hpp"
 
@@ -54,9 +55,8 @@ struct SessionRunOptions {
   std::function<void(const ServoRecord&)> watcher;
   /// Called when the device is open and its forces are still off.
   std::function<void(const DeviceIdentity&, const LoopModel&)> opened;
-  /// Told once for each finding of the device (HapticDevice::findings), in real time when it is
-  /// noticed; from the thread that writes records.
-  std::function<void(const std::string&)> noticed;
+  /// Told once for each finding of the device, in real time when it is noticed.
+  FindingTold noticed;
   PlanningTold planning;  ///< see make_loop_model()
 };
 
@@ -69,8 +69,8 @@ struct SessionRun {
   std::optional<RenderingCheck> on_hardware = std::nullopt;
   std::string hardware_kind;  ///< of that device
   ServoOutcome outcome;
-  double largest_force_N = 0.0;       ///< that was sent to the device
-  std::vector<std::string> findings;  ///< of the device (HapticDevice::findings)
+  double largest_force_N = 0.0;         ///< that was sent to the device
+  std::vector<DeviceFinding> findings;  ///< of the device
 };
 
 /// Forces below this are not felt through a handle, N; assumed.

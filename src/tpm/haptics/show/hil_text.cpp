@@ -40,7 +40,7 @@ std::string times_text(const char* what, const TimeHistogram& times) {
                      us(times.quantile_s(0.999)), us(times.max_s()));
 }
 
-/// Null if nothing was counted: the thread of a loop that hung was left behind.
+/// Null if nothing was counted: the first cycle hung.
 Json times_json(const TimeHistogram& times) {
   if (times.count() == 0) return {};
   return {{"p50_s", rounded(times.quantile_s(0.5), kHilDigits)},
@@ -67,6 +67,7 @@ std::vector<std::pair<double, std::uint64_t>> octaves(const TimeHistogram& times
 /// The extrapolation in words.
 std::string extrapolation_of(const JitterCheck& check) {
   const TimeHistogram& late = check.outcome.woke_late;
+  if (hung(check)) return "nothing, because a cycle hung";
   if (const auto hour_s = once_an_hour_s(check)) {
     return fmt::format("{} us once an hour, {}", us(*hour_s),
                        *hour_s > late.max_s()
@@ -100,7 +101,10 @@ std::string stalls_text(const JitterCheck& check) {
     text = fmt::format(
         "p99.99 of the wake-ups {} us, the watchdog waits for {} us; stalls beyond it: {}{}{}\n",
         us(late.quantile_s(0.9999)), us(check.watchdog_s), stalls_beyond_watchdog(check),
-        bound.empty() ? "" : ": ", bound);
+        hung(check)     ? ", and a cycle that hung"
+        : bound.empty() ? ""
+                        : ": ",
+        bound);
   }
   return text + fmt::format("extrapolated, not measured: {}\n", extrapolation_of(check));
 }
@@ -175,12 +179,14 @@ std::string newtons(double force_N, int digits = 3) {
   return sized_text(Dimension::force, force_N, digits);
 }
 
-std::string said_by_device(const ServoOutcome& o, const std::vector<std::string>& findings) {
+std::string said_by_device(const ServoOutcome& o, const std::vector<DeviceFinding>& findings) {
   std::string text;
   if (o.device.error != 0) {
     text += fmt::format("the device said: error {} ({})\n", o.device.error, o.device.error_text);
   }
-  for (const std::string& line : findings) text += "the device noticed: " + line + "\n";
+  for (const DeviceFinding& finding : findings) {
+    text += "the device noticed: " + finding.text + "\n";
+  }
   return text;
 }
 
@@ -211,7 +217,7 @@ Json check_json(const JitterCheck& check) {
           {"detail", o.detail},
           {"device_error", o.device.error},
           {"device_error_text", std::string(o.device.error_text)},
-          {"device_findings", check.findings},
+          {"device_findings", to_json(check.findings)},
           {"most_consecutive_missed", o.counts.most_consecutive_missed},
           {"most_late_of_1000", o.counts.most_late},
           {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
@@ -251,7 +257,7 @@ std::string check_text(const JitterCheck& check) {
 Json run_json(const HilSession& session, const SessionRun& run) {
   const bool tested = session.law && session.law->adequacy;
   Json outcome = recording_closing(run.outcome);
-  if (!run.findings.empty()) outcome["device_findings"] = run.findings;
+  if (!run.findings.empty()) outcome["device_findings"] = to_json(run.findings);
   return {{"simulated_device", !run.device.hardware},
           {"title", session.title},
           {"device", to_json(run.device)},
