@@ -1,6 +1,4 @@
 // Fits: of recordings and material functions by the simplest law, of configurations.
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <map>
 
@@ -230,8 +228,7 @@ Fit fit_files(const FitRequest& request) {
   for (const std::string& file : request.files) {
     for (const PreparedRecording& before : recordings) {
       if (before.name != file) continue;
-      throw Error(ExitCode::usage, "fit", fmt::format("'{}' is given twice", file),
-                  "each recording once");
+      throw Error(ExitCode::usage, "fit", "'" + file + "' is given twice", "each recording once");
     }
     RecordingFile read = read_recording_file(file, request.import);
     recordings.push_back(prepare_recording(file, std::move(read.recording), phases));
