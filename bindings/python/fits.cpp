@@ -226,6 +226,10 @@ Fit fit_files(const FitRequest& request) {
   phases.contact_response = request.contact_force_N;
   std::vector<PreparedRecording> recordings;
   for (const std::string& file : request.files) {
+    for (const PreparedRecording& before : recordings) {
+      if (before.name != file) continue;
+      throw Error(ExitCode::usage, "fit", "'" + file + "' is given twice", "each recording once");
+    }
     RecordingFile read = read_recording_file(file, request.import);
     recordings.push_back(prepare_recording(file, std::move(read.recording), phases));
     recordings.back().import = request.import;

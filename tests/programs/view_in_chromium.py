@@ -301,6 +301,37 @@ def look_at_fit(chromium, tpm, folder):
         page.check_whole()
 
 
+def look_at_names(chromium, tpm, folder):
+    """Places that have names and no number: the names stand at the axis and in the reading, at any width; the page is of
+    figures, under their title, with the note that is drawn below them."""
+    axes = {"x": {"quantity": "", "unit": "", "names": ["peak force", "force at end of hold", "relaxation ratio"]},
+            "y": {"quantity": "E, of the measured value", "unit": "%"}}
+    series = [{"kind": "line", "label": "no error", "provenance": "assumed", "x": [0.5, 3.5], "y": [0, 0]},
+              {"kind": "points", "label": "E", "x": [1, 2, 3], "y": [-2.5, 1.0, 0.5]}]
+    figures = {"figures": [{"name": "named", "title": "Model error", "caption": "By quantity.", "note": "a note",
+                            "panels": [{**axes, "series": series}]}]}
+    (folder / "figures.json").write_text(json.dumps(figures))
+    subprocess.run([tpm, "view", folder / "figures.json", "-o", folder / "named.html"], check=True, capture_output=True)
+    page = Page(chromium, folder / "named.html")
+    assert (page.text("badge"), page.text("title")) == ("FIGURES", "Model error"), (page.text("badge"), page.text("title"))
+    assert page.js("plots[0].name()") == "Model error: E, of the measured value, %", page.js("plots[0].name()")
+    assert page.text("reading-0").startswith("peak force"), page.text("reading-0")
+    assert "By quantity. a note" in page.js("document.body.textContent")
+    for width in (400, 1400):
+        chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+        page.frame()
+        drawn = page.js("""(() => {
+            const g = plots[0].canvas.getContext('2d'), write = g.fillText, seen = [];
+            g.fillText = (text, x, y) => { const w = g.measureText(text).width, a = g.textAlign; seen.push([text, a === 'center' ? x - w / 2 : a === 'right' ? x - w : x, y, w]); write.call(g, text, x, y); };
+            plots[0].draw(); delete g.fillText;
+            return seen.filter(([text]) => plots[0].d.x.names.includes(text)); })()""")
+        assert [text for text, *_ in drawn] == axes["x"]["names"], (width, drawn)
+        assert all(x >= 0 and x + w <= page.js("plots[0].width") for _, x, _, w in drawn), (width, drawn)
+        for i, (_, x, y, w) in enumerate(drawn):
+            assert all(abs(y - b) > 10 or x + w <= a or a + c <= x for _, a, b, c in drawn[i + 1:]), (width, drawn)
+    page.check_whole()
+
+
 def look_at_lines(chromium, tpm, folder):
     """A line of many values that begins late is not drawn before; names of all series fit into a narrow window; an axis
     ends where the figure's does, and the page says what is beyond."""
@@ -351,6 +382,7 @@ def main():
             look_at_tool(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
             look_at_recording(chromium, sys.argv[1], folder)
             look_at_fit(chromium, sys.argv[1], folder)
+            look_at_names(chromium, sys.argv[1], folder)
             look_at_lines(chromium, sys.argv[1], folder)
         finally:
             chromium.close()

@@ -30,6 +30,10 @@ class Fits(unittest.TestCase):
     def tearDownClass(cls):
         cls.folder.cleanup()
 
+    def test_the_same_file_twice_is_refused_as_by_the_command(self):
+        with self.assertRaisesRegex(tpmkit.ArgumentError, "is given twice; expected each recording once"):
+            tpmkit.fit([self.file, self.file])
+
     def test_the_law_that_made_the_recording_is_found(self):
         self.assertEqual(self.fit.law.name, "linear-1")
         table = self.fit.parameters

@@ -46,7 +46,16 @@ Json axis_of(const Json& axis) {
   for (const char* end : {"lower", "upper"}) {  // what the decision is made on
     if (axis.contains(end)) json[end] = axis.at(end);
   }
+  if (axis.contains("names")) json["names"] = axis.at("names");  // at 1, 2, ...
   return json;
+}
+
+/// What stands below the plots of a figure.
+std::string caption_of(const Json& figure) {
+  std::string caption = figure.value("caption", "");
+  const std::string note = figure.value("note", "");
+  if (!caption.empty() && !note.empty()) caption += ' ';
+  return caption + note;
 }
 
 /// The panels of figures.json as plots. Maps of colours are figures of their own and left out.
@@ -55,7 +64,7 @@ void add_figures(ViewPage& page, const Json& figures, const std::string& where) 
     for (const Json& figure : figures.at("figures")) {
       for (const Json& panel : figure.at("panels")) {
         Json plot{{"title", figure.at("title")},
-                  {"caption", figure.value("caption", "")},
+                  {"caption", caption_of(figure)},
                   {"x", axis_of(panel.at("x"))},
                   {"y", axis_of(panel.at("y"))},
                   {"series", Json::array()}};
@@ -267,6 +276,10 @@ bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file
   try {
     const Json& fit = json.contains("fit") ? json.at("fit") : json;
     if (json.contains("figures")) {
+      page.description["kind"] = "figures";
+      page.description["badge"] = "FIGURES";
+      const Json& figures = json.at("figures");
+      if (figures.size() == 1) page.description["title"] = figures.at(0).at("title");
       add_figures(page, json, file.string());
     } else if (is_law(json)) {
       add_law_and_figures(page, file);
