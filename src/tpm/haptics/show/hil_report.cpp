@@ -42,7 +42,8 @@ std::vector<Series> asked_depths(const HilRecording& recording, const std::vecto
     const OperatorAim aim = script.at(time);
     const bool place = aim.aim == OperatorPiece::Aim::place;
     if (place && !before) {
-      stretches.push_back(line("asked for", {}, {}));
+      stretches.push_back(
+          line("asked for", {}, {}, std::string(provenance_name(Provenance::assumed))));
     }
     before = place;
     if (!place) continue;
@@ -62,6 +63,11 @@ Series some_points(std::string label, const std::vector<double>& x, const std::v
     series.add(x[i], y[i]);
   }
   return series;
+}
+
+/// Origin of what the device says of itself: the place of the tool, and the work of the hand.
+std::string origin_of(const HilRecording& recording) {
+  return recording.simulated() ? "simulated" : std::string(provenance_name(Provenance::measured));
 }
 
 /// The recording whose motion was repeated, if there is one.
@@ -91,14 +97,19 @@ Figure session_figure(const HilRecording& recording, const Verification& v) {
   std::vector<Series> forces{line("reference", time, thinned(v.reference_N)),
                              some_points("commanded", v.time_s, v.commanded_N, "model")};
   add_measured(forces, recording);
-  std::vector<Series> depths = asked_depths(recording, time);
-  depths.push_back(line("tool", time, thinned(v.depth_m, 1e3)));
+  std::vector<Series> depths{line("tool", time, thinned(v.depth_m, 1e3), origin_of(recording))};
+  for (Series& stretch : asked_depths(recording, time)) depths.push_back(std::move(stretch));
+  std::vector<Series> errors{line("error", time, thinned(v.error_N, 1e3))};
+  const double most_mN = 1e3 * kMostError * v.all.peak_N;
+  for (const double limit : {-most_mN, most_mN}) {
+    errors.push_back({.kind = Series::Kind::level,
+                      .provenance = "model",
+                      .y = {limit},
+                      .text = fmt::format("{} % of the peak", significant(100.0 * kMostError, 2))});
+  }
   figure.panels = {{"motion", seconds, {"depth", "mm"}, std::move(depths)},
                    {"force", seconds, {"contact force", "N"}, std::move(forces)},
-                   {"commanded less reference",
-                    seconds,
-                    {"force error", "mN"},
-                    {line("error", time, thinned(v.error_N, 1e3))}}};
+                   {"commanded less reference", seconds, {"force error", "mN"}, std::move(errors)}};
   return figure;
 }
 
@@ -116,7 +127,7 @@ Figure energy_figure(const HilRecording& recording) {
           {{"energy",
             {"time", "s"},
             {"energy", "mJ"},
-            {line("observed", thinned(time), thinned(observed)),
+            {line("observed", thinned(time), thinned(observed), origin_of(recording)),
              line("predicted leak", thinned(time), thinned(leak))}}}};
 }
 
