@@ -25,6 +25,7 @@ using Catch::Matchers::Contains;
 using namespace test::inverse_sessions;
 using test::StandInFaults;
 using test::StandInInverse;
+using How = StandInFaults::How;
 
 InverseAddress address_of_talker(const StandInInverse& service) {
   return {service.port(), service.events_port(), service.port(), ""};
@@ -50,7 +51,6 @@ DeviceStatus status_after_end(const StandInFaults& faults, bool real_time) {
 }
 
 TEST_CASE("An event that a service sends before it closes is the cause of the end") {
-  using How = StandInFaults::How;
   for (const int variant : {0, 1, 2, 3}) {
     const bool real_time = variant % 2 == 1;
     StandInFaults f;
