@@ -101,11 +101,12 @@ Figure session_figure(const HilRecording& recording, const Verification& v) {
   for (Series& stretch : asked_depths(recording, time)) depths.push_back(std::move(stretch));
   std::vector<Series> errors{line("error", time, thinned(v.error_N, 1e3))};
   const double most_mN = 1e3 * kMostError * v.all.peak_N;
-  for (const double limit : {-most_mN, most_mN}) {
-    errors.push_back({.kind = Series::Kind::level,
-                      .provenance = "model",
-                      .y = {limit},
-                      .text = fmt::format("{} % of the peak", significant(100.0 * kMostError, 2))});
+  if (!time.empty()) {
+    const std::string limit = fmt::format("{} % of the peak", significant(100.0 * kMostError, 2));
+    for (const double side : {-most_mN, most_mN}) {
+      errors.push_back(line(limit, {time.front(), time.back()}, {side, side},
+                            std::string(provenance_name(Provenance::assumed))));
+    }
   }
   figure.panels = {{"motion", seconds, {"depth", "mm"}, std::move(depths)},
                    {"force", seconds, {"contact force", "N"}, std::move(forces)},
