@@ -87,7 +87,8 @@ TEST_CASE("A loop at any rate has the forces of the right one, or is told that i
           CHECK(contact->state().row.stop == StopCause::overrun_storm);
           CHECK(end.force_N == 0.0);
           CHECK(rate_Hz < 950.0);
-          if (rate_Hz <= 500.0) CHECK(end.calls < 150);
+          // A hundred late ones, after those that the gate waits for.
+          if (rate_Hz <= 500.0) CHECK(end.calls < (start_gate ? 200 : 150));
           continue;
         }
         CHECK(rate_Hz > 500.0);
@@ -100,13 +101,17 @@ TEST_CASE("A loop at any rate has the forces of the right one, or is told that i
 
 TEST_CASE("A loop that is too slow is told so while its contact still waits to begin") {
   RatedContact contact(true);
-  const RatedEnd end = end_of(contact, {.rate_Hz = 100.0});
-  CHECK(end.cause == StopCause::overrun_storm);
-  CHECK(end.calls < 150);
-  CHECK(contact->state().row.phase == -1);
+  Eigen::Vector3d force_N;
+  StopCause cause = StopCause::none;
+  int calls = 0;
+  while (cause == StopCause::none && calls < 150) {  // of a tool that never rests
+    cause = contact->step_at(1e-2 * calls, {0.0, 0.0, 2e-2 + 1e-3 * (calls % 2)}, force_N);
+    CHECK(contact->state().row.phase == -1);
+    ++calls;
+  }
+  CHECK(cause == StopCause::overrun_storm);
   // A loop that stalls while it waits is none.
   RatedContact stalled(true);
-  Eigen::Vector3d force_N;
   for (int i = 0; i < 120; ++i) {
     CHECK(stalled->step(tool_at(0.0), force_N, i % 20 == 0 ? 300 : 0) == StopCause::none);
   }

@@ -231,7 +231,7 @@ class EvidencePage {
         table.rows.push_back(std::move(row));
       }
       d.table(std::move(table));
-      const Cell part = number_cell(fmt::format("/validation/recordings/{}/compared/words", i));
+      const Cell part = number_cell(fmt::format("/validation/recordings/{}/compared/summary", i));
       d.bullets({{"compared: " + part.text, part.tone}});
     }
     if (!validation_.contains("pooled")) return;

@@ -294,8 +294,8 @@ bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file
       return false;
     }
   } catch (const Json::exception& e) {
-    throw bad_input(file.string(), fmt::format("is not as tpm fit writes it ({})", e.what()),
-                    "a file of tpm fit");
+    throw bad_input(file.string(), fmt::format("is not as tpm writes it ({})", e.what()),
+                    "a file that tpm has written, such as its law.json or figures.json");
   }
   return true;
 }
