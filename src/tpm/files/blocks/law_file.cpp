@@ -40,13 +40,6 @@ struct LawKeys {
   Json fit;
 };
 
-/// Some of the quantities of files.
-ValueType<Quantity> quantity_among(std::initializer_list<Quantity> all) {
-  std::vector<Word<Quantity>> words;
-  for (const Quantity one : all) words.push_back({one, quantity_name(one)});
-  return word(words);
-}
-
 const Block<LawAdequacy>& adequacy_block() {
   using A = LawAdequacy;
   static const Block<A> block(
@@ -152,6 +145,12 @@ std::vector<double> values_of(const NamedValues& values, const LawSpec& spec,
 }
 
 }  // namespace
+
+ValueType<Quantity> files::quantity_among(std::initializer_list<Quantity> all) {
+  std::vector<Word<Quantity>> words;
+  for (const Quantity one : all) words.push_back({one, quantity_name(one)});
+  return word(words);
+}
 
 std::string law_key(const LawParameter& parameter) {
   std::string unit(si_symbol(parameter.dimension));

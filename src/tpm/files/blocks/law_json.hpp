@@ -1,9 +1,11 @@
 #pragma once
+#include <initializer_list>
 #include <span>
 #include <string_view>
 
 #include "tpm/files/json.hpp"
 #include "tpm/files/keys/file_kind.hpp"
+#include "tpm/files/keys/types.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_uncertainty.hpp"
 
@@ -11,6 +13,9 @@ namespace tpm::files {
 
 /// A law with its parameters.
 [[nodiscard]] const FileKind& law_kind();
+
+/// Some of the quantities of files.
+[[nodiscard]] ValueType<Quantity> quantity_among(std::initializer_list<Quantity> all);
 
 /// Throws Error(bad_input) for anything that schemas/law.schema.json or the law does not allow: an
 /// unknown law or key, a missing parameter without a preset, a value out of range.

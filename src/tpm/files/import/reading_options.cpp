@@ -5,13 +5,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 
 #include "tpm/base/enum_names.hpp"
+#include "tpm/base/lists.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/clock_text.hpp"
+#include "tpm/files/keys/more_types.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -83,11 +86,33 @@ std::string text_or_empty(const std::optional<T>& value, std::string (*text)(con
 using Text = const std::string&;
 using Where = std::string_view;
 
+FormPtr plain_form() {
+  return files::text(1).form;
+}
+
+FormPtr count_form() {
+  return either_form({whole<int>(0, 1e9).form, plain_form()});
+}
+
+FormPtr flag_form() {
+  return files::flag().form;
+}
+
+FormPtr list_of_plain_form() {
+  return list_form(plain_form(), 0);
+}
+
+template <Dimension dimension>
+FormPtr quantity_form() {
+  return files::quantity(dimension).form;
+}
+
 /// A key, how its text is read, and how it is written; an empty text says nothing.
 struct ReadingKey {
   ReadingOption option;
   void (*set)(ImportOptions&, Text, Where);
   std::string (*text)(const ImportOptions&);
+  FormPtr (*form)() = plain_form;  ///< in files, unless it is one of the choices
 };
 
 constexpr auto kKeys = std::to_array<ReadingKey>({
@@ -135,12 +160,14 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
      [](ImportOptions& o, Text t, Where w) { o.header_rows = count_from(t, 0, w); },
      [](const ImportOptions& o) {
        return text_or_empty<int>(o.header_rows, [](const int& n) { return std::to_string(n); });
-     }},
+     },
+     count_form},
     {{"block", "Which of several blocks of samples in a file, from 1"},
      [](ImportOptions& o, Text t, Where w) { o.block = count_from(t, 1, w); },
      [](const ImportOptions& o) {
        return text_or_empty<int>(o.block, [](const int& n) { return std::to_string(n); });
-     }},
+     },
+     count_form},
     {{"time", "Column of the times: name, or number from 1"},
      [](ImportOptions& o, Text t, Where) { o.time_column = t; },
      [](const ImportOptions& o) { return o.time_column; }},
@@ -179,12 +206,14 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
      }},
     {{"negate_drive", "The machine counts the imposed motion negative"},
      [](ImportOptions& o, Text t, Where w) { o.negate_drive = parse_word(kTruths, "word", t, w); },
-     [](const ImportOptions& o) { return std::string(o.negate_drive ? "true" : ""); }},
+     [](const ImportOptions& o) { return std::string(o.negate_drive ? "true" : ""); },
+     flag_form},
     {{"negate_response", "The machine counts the force or stress negative"},
      [](ImportOptions& o, Text t, Where w) {
        o.negate_response = parse_word(kTruths, "word", t, w);
      },
-     [](const ImportOptions& o) { return std::string(o.negate_response ? "true" : ""); }},
+     [](const ImportOptions& o) { return std::string(o.negate_response ? "true" : ""); },
+     flag_form},
     {{"step_time",
       "Time of the step on the file's clock, for G(t), J(t) and a strain or stress "
       "that is kept: \"185 s\" or 11:09:16; times count from there"},
@@ -213,13 +242,15 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
      [](const ImportOptions& o) {
        return text_or_empty<double>(o.rest_length_m,
                                     [](const double& m) { return in_units(m, 1e-3, "mm"); });
-     }},
+     },
+     quantity_form<Dimension::length>},
     {{"area", "Cross section, of that specimen: for a column of its force"},
      [](ImportOptions& o, Text t, Where w) { o.area_m2 = positive_size(t, Dimension::area, w); },
      [](const ImportOptions& o) {
        return text_or_empty<double>(o.area_m2,
                                     [](const double& a) { return in_units(a, 1e-6, "mm^2"); });
-     }},
+     },
+     quantity_form<Dimension::area>},
     {{"spring_constant",
       "Spring constant of the cantilever: JPK force files (instead of that of the file), and "
       "tables with the "
@@ -230,7 +261,8 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
      [](const ImportOptions& o) {
        return text_or_empty<double>(o.spring_constant_N_per_m,
                                     [](const double& k) { return in_units(k, 1.0, "N/m"); });
-     }},
+     },
+     quantity_form<Dimension::stiffness>},
     {{"deflection_sensitivity",
       "Deflection per volt, of tables with a deflection in V or mV, such as \"50 nm/V\""},
      [](ImportOptions& o, Text t, Where w) {
@@ -243,8 +275,59 @@ constexpr auto kKeys = std::to_array<ReadingKey>({
     {{"segments",
       "Segments to read, of JPK force files: kinds, such as extend,pause; default: all"},
      [](ImportOptions& o, Text t, Where) { o.segments = list_from(t); },
-     [](const ImportOptions& o) { return fmt::format("{}", fmt::join(o.segments, ",")); }},
+     [](const ImportOptions& o) { return fmt::format("{}", fmt::join(o.segments, ",")); },
+     list_of_plain_form},
 });
+
+constexpr std::string_view kUnits = "units";
+
+/// The key as a file has it: its sentence is that of the help.
+KeyForm key_form(const ReadingKey& key) {
+  std::string sentence(key.option.meaning);
+  sentence.front() = static_cast<char>(std::tolower(static_cast<unsigned char>(sentence.front())));
+  FormPtr form = key.option.choices.empty()
+                     ? key.form()
+                     : one_of(list_from(std::string(key.option.choices))).form;
+  return optional_key(std::string(key.option.key), std::move(form), std::move(sentence));
+}
+
+/// How a recording that has no description is read, as a file states it.
+ImportOptions import_of(const Json& json, const DocumentPlace& place) {
+  ImportOptions import;
+  for (const auto& [key, value] : json.items()) {
+    const DocumentPlace here = place.key(key);
+    if (key == kUnits) {
+      for (const auto& [column, unit] : value.items()) {
+        set_reading_unit(import, column, unit.get<std::string>(), here.key(column).where);
+      }
+    } else if (value.is_array()) {
+      import.segments = value.get<std::vector<std::string>>();
+    } else {
+      set_reading_option(import, key, value.is_string() ? value.get<std::string>() : value.dump(),
+                         here.where);
+    }
+  }
+  return import;
+}
+
+Json json_of(const ImportOptions& import) {
+  Json json = Json::object();
+  for (const ReadingKey& known : kKeys) {
+    const std::string text = known.text(import);
+    if (text.empty()) continue;
+    const Form::Type type = known.form()->type;
+    Json& value = json[std::string(known.option.key)];
+    if (type == Form::Type::list) {
+      value = import.segments;
+    } else if (type == Form::Type::flag) {
+      value = true;
+    } else {
+      value = text;
+    }
+  }
+  if (!import.units.empty()) json[std::string(kUnits)] = import.units;
+  return json;
+}
 
 constexpr auto kOptions = [] {
   std::array<ReadingOption, kKeys.size()> options{};
@@ -264,7 +347,7 @@ void set_reading_option(ImportOptions& options, std::string_view key, const std:
     if (known.option.key == key) return known.set(options, text, where);
   }
   auto keys = mapped<std::string>(kKeys, [](const ReadingKey& k) { return k.option.key; });
-  keys.emplace_back("units");
+  keys.emplace_back(kUnits);
   throw unknown_word(where, "unknown option", key, keys);
 }
 
@@ -282,6 +365,13 @@ std::vector<std::pair<std::string, std::string>> reading_texts(const ImportOptio
     if (!text.empty()) texts.emplace_back(known.option.key, std::move(text));
   }
   return texts;
+}
+
+ValueType<ImportOptions> reading_type() {
+  std::vector<KeyForm> keys = mapped<KeyForm>(kKeys, key_form);
+  keys.push_back(
+      optional_key(std::string(kUnits), map_form(plain_form()), "of columns, by their names"));
+  return {object_form("", "", std::move(keys)), import_of, json_of};
 }
 
 bool says_how_to_read(const ImportOptions& options) {

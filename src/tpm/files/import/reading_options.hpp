@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/files/import/import.hpp"
+#include "tpm/files/keys/types.hpp"
 
 namespace tpm::files {
 
@@ -35,6 +36,9 @@ void set_reading_unit(ImportOptions& options, const std::string& column, const s
 /// The options that say something, as texts that set_reading_option takes; without the units.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> reading_texts(
     const ImportOptions& options);
+
+/// The options as an object in a file, with the key `units` for a map of columns.
+[[nodiscard]] ValueType<ImportOptions> reading_type();
 
 /// True if an option that concerns the content of a file says something.
 [[nodiscard]] bool says_how_to_read(const ImportOptions& options);

@@ -3,6 +3,7 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/keys/more_types.hpp"
+#include "tpm/files/keys/placed.hpp"
 
 namespace tpm::files {
 namespace {
@@ -105,6 +106,23 @@ ValueType<std::string> text_like(std::string pattern, std::string what, std::str
                       .example = std::move(example),
                       .pattern = std::move(pattern)});
   return type;
+}
+
+double StatedQuantity::in(Dimension dimension) const {
+  return parse_quantity(text, dimension, place.where);
+}
+
+Unit StatedQuantity::unit(Dimension dimension) const {
+  return parse_unit(split_quantity(text).unit, dimension, place.where);
+}
+
+ValueType<StatedQuantity> stated_quantity() {
+  return converted<StatedQuantity>(
+      text(1).named("some_quantity", "a number and a unit, such as \"12 kPa\""),
+      [](std::string value, const DocumentPlace& place) {
+        return StatedQuantity{std::move(value), place};
+      },
+      [](const StatedQuantity& from) { return from.text; });
 }
 
 ValueType<double> number(Range range) {
