@@ -391,7 +391,8 @@ TEST_CASE("mistakes in a configuration are named") {
   refuse("\"4 mm/s\"", "\"4 mm\"", "/data/0/protocol/rate");
   refuse("\"4 mm/s\"", "\"0 mm/s\"", "0 m/s; expected above 0 m/s");
   refuse("\"relative\": 0.1", "\"absolute\": \"0.1 N\"", "needs 'relative'");
-  refuse("\"relative\": 0.1", "\"relative\": -0.1", "not above 0");
+  refuse("\"relative\": 0.1", "\"relative\": -0.1",
+         "/data/0/noise/relative: -0.1; expected above 0");
   refuse("[\"E1\", \"E2\", \"Eprime\"]", "[\"E1\", \"E2\", \"eta1\"]", "different dimensions");
   refuse("\"A0\": \"12.56 mm^2\"", "\"E1\": \"12 kPa\"", "is set by 'E' and by 'fixed'");
   refuse("{\"eta1\": \"5 Pa s\"}", "{\"eta2\": \"5 Pa s\"}",

@@ -4,6 +4,7 @@
 #include "odd_documents.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/import/description.hpp"
+#include "tpm/files/import/reading_options.hpp"
 #include "tpm/fit/design/design.hpp"
 #include "tpm/fit/likelihood/fit_keys.hpp"
 
@@ -51,6 +52,50 @@ TEST_CASE("schema and reader of a curve's description agree on odd ones", "[keys
        of_source("data/literature_values.json"), of_source("configs/oscillation_example/hold.json"),
        of_source("configs/oscillation_example/spectrum.json"), example_of(curve_kind())},
       300);
+}
+
+TEST_CASE("the schema of a fit shows the defaults of the library and the rules of the reader") {
+  const Json schema = json_schema(fit_kind());
+  const auto default_of = [&](const char* block, const char* name) {
+    return schema.at("definitions").at(block).at("properties").at(name).value("default", Json());
+  };
+  CHECK(default_of("starts", "count") == FitConfig{}.starts);
+  CHECK(default_of("starts", "seed") == FitConfig{}.seed);
+  CHECK(default_of("profile", "level") == FitConfig{}.level);
+  CHECK(default_of("profile", "enabled") == FitConfig{}.profiles);
+  CHECK(default_of("loss", "width") == RobustLoss{}.width);
+  CHECK(default_of("bootstrap", "replicates") == BootstrapOptions{}.replicates);
+  CHECK(default_of("bootstrap", "resample") == "residuals");
+  CHECK(default_of("bootstrap", "block_length").is_null());
+  CHECK(default_of("fit_noise", "scale") == "known");
+  CHECK(default_of("fit_data", "from").is_null());
+  const auto noise = schema.at("definitions").at("fit_noise").at("description").get<std::string>();
+  CHECK(noise.find("only with the distribution 'student_t'") != std::string::npos);
+}
+
+TEST_CASE("options of reading a recording are read as they are written") {
+  ImportOptions options;
+  for (const auto& [name, text] :
+       std::vector<std::pair<std::string, std::string>>{{"decimal", "comma"},
+                                                        {"separator", "semicolon"},
+                                                        {"header_rows", "3"},
+                                                        {"drive", "Depth"},
+                                                        {"negate_response", "true"},
+                                                        {"step_time", "185 s"},
+                                                        {"rest_length", "20 mm"},
+                                                        {"segments", "extend,pause"}}) {
+    set_reading_option(options, name, text, "test");
+  }
+  set_reading_unit(options, "Force", "mN", "test");
+  const ValueType<ImportOptions> type = reading_type();
+  const Json written = type.write(options);
+  CHECK(written.at("negate_response") == true);
+  CHECK(written.at("segments") == Json::array({"extend", "pause"}));
+  CHECK(written.at("units") == Json{{"Force", "mN"}});
+  CHECK(type.form->keys.size() == reading_options().size() + 1);  // and the units
+  const DocumentPlace place{"test"};
+  CHECK_NOTHROW(require_form(written, *type.form, place));
+  CHECK(type.write(type.read(written, place)) == written);
 }
 
 TEST_CASE("examples of fits, designs and laws are read", "[keys]") {

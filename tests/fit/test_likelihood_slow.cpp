@@ -449,7 +449,7 @@ TEST_CASE("mistakes about the noise are named") {
          "without Student's t");
   refuse(R"({"kind": "absolute", "absolute": "1 mN", "distribution": "student_t",
              "degrees_of_freedom": 2})",
-         "a number above 2");
+         "/data/0/noise/degrees_of_freedom: 2; expected above 2");
   refuse(R"({"kind": "relative_to_datum", "relative": "estimated"})",
          "estimated under 'relative_to_datum'");
   refuse(R"({"kind": "absolute", "absolute": "estimated", "scale": "estimated"})",
@@ -458,7 +458,7 @@ TEST_CASE("mistakes about the noise are named") {
              "scale": "estimated"})",
          "estimated under distribution 'laplace'");
   refuse(R"({"kind": "relative_to_model", "relative": "guessed"})",
-         "neither a number nor 'estimated'");
+         "/data/0/noise/relative: 'guessed'; expected \"estimated\"");
   CHECK_THROWS_WITH(law_config(R"({"kind": "absolute", "absolute": "estimated"})",
                                R"(, "loss": {"kind": "huber"})"),
                     Contains("either a loss, or a likelihood"));

@@ -269,28 +269,24 @@ void add_measurements(const Table& measurements, const Table& conditions, const 
   }
 }
 
-FitProblem parse_fit_tables(const Json& written, const fs::path& path) {
-  const Json problem = checked(written, fit_tables_kind(), path.string());
-  const auto file = [&](const char* key) {
-    return path.parent_path() / problem.at(key).get<std::string>();
+FitProblem parse_fit_tables(Json document, const fs::path& path) {
+  const TableFiles files = take_table_files(document, path.string());
+  const auto table = [&](const std::string& file, Names needed, Names optional) {
+    return read_table(path.parent_path() / file, needed, optional);
   };
-  Json document = Json::object();
-  for (const auto& [key, value] : problem.items()) {
-    if (!key.ends_with("_file")) document[key] = value;
-  }
-  add_parameters(read_table(file("parameter_file"),
-                            {"parameterId", "parameterScale", "lowerBound", "upperBound",
-                             "nominalValue", "estimate"},
-                            {"unit", "sets"}),
+  add_parameters(table(files.parameters,
+                       {"parameterId", "parameterScale", "lowerBound", "upperBound", "nominalValue",
+                        "estimate"},
+                       {"unit", "sets"}),
                  document);
-  const Table observables = read_table(
-      file("observable_file"), {"observableId", "observableFormula", "noiseFormula", "unit"},
-      {"noiseDistribution"});
-  const Table conditions = read_table(file("condition_file"), {"conditionId", "protocol"},
-                                      {"depth", "load", "rate", "rateProvenance"});
-  const Table measurements = read_table(
-      file("measurement_file"), {"observableId", "simulationConditionId", "time", "measurement"},
-      {"noiseParameters", "label", "provenance"});
+  const Table observables =
+      table(files.observables, {"observableId", "observableFormula", "noiseFormula", "unit"},
+            {"noiseDistribution"});
+  const Table conditions = table(files.conditions, {"conditionId", "protocol"},
+                                 {"depth", "load", "rate", "rateProvenance"});
+  const Table measurements =
+      table(files.measurements, {"observableId", "simulationConditionId", "time", "measurement"},
+            {"noiseParameters", "label", "provenance"});
   FitProblem result;
   add_measurements(measurements, conditions, observables, document, result.data);
   result.config = parse_fit_config(document, path.string(), path.parent_path());
@@ -301,7 +297,7 @@ FitProblem parse_fit_tables(const Json& written, const fs::path& path) {
 
 FitProblem read_fit_problem(const fs::path& path) {
   const Json document = read_json(path);
-  if (document.contains("measurement_file")) return parse_fit_tables(document, path);
+  if (has_table_files(document)) return parse_fit_tables(document, path);
   FitProblem problem;
   problem.config = parse_fit_config(document, path.string(), path.parent_path());
   return problem;

@@ -6,7 +6,6 @@
 
 #include "tpm/base/lists.hpp"
 #include "tpm/fit/likelihood/config_parts.hpp"
-#include "tpm/fit/likelihood/experiment_refit.hpp"
 #include "tpm/fit/likelihood/fit_keys.hpp"
 #include "tpm/organ/scene/organ_model.hpp"
 #include "tpmkit/error.hpp"
@@ -18,69 +17,54 @@ namespace tpm::fit {
 
 namespace {
 
-/// A robust loss stands for a likelihood that nobody wrote down: nothing that needs one goes with
-/// it.
-void require_plain_noise_under_loss(const FitConfig& config, const DocumentPlace& place) {
-  if (config.loss.kind == Loss::none) return;
-  for (const DataChoice& data : config.data) {
-    if (data.noise.shape == ErrorShape::normal && !data.estimates_sigma()) continue;
-    throw bad_input(place.key("loss").where,
-                    "beside a noise distribution or an estimated standard deviation",
-                    "either a loss, or a likelihood such as 'student_t'");
-  }
-}
-
-constexpr std::string_view kOrganModel = "organ";
-
-BootstrapOptions parse_bootstrap(const Json& j, const FitConfig& config,
-                                 const DocumentPlace& place) {
-  BootstrapOptions options;
-  options.replicates = j.value("replicates", options.replicates);
-  options.seed = j.value("seed", config.seed);
-  options.level = config.level;
-  options.block_length = j.value("block_length", options.block_length);
-  options.resampling =
-      parse_resampling(j.value("resample", std::string(resampling_name(options.resampling))),
-                       place.key("resample").where);
-  return options;
-}
-
-LawSpec parse_law(const Json& j, const DocumentPlace& place) {
-  LawSpec spec = parse_law_name(j.at("name").get<std::string>(), place.key("name").where);
-  const std::string drive = j.value("drive", std::string(quantity_name(spec.drive)));
-  spec.drive = parse_quantity_name(drive, place.key("drive").where);
+LawSpec law_of(const StatedLaw& stated) {
+  LawSpec spec = parse_law_name(stated.name.value, stated.name.place.where);
+  spec.drive = stated.drive;
   if (is_answered_by_stress(spec.drive)) spec.response = Quantity::stress;
-  spec.reference = quantity_at(j, "reference", quantity_dimension(spec.drive), place);
-  require_valid(spec, place.where);
+  spec.reference = stated.reference.in(quantity_dimension(spec.drive));
+  require_valid(spec, stated.place.where);
   return spec;
 }
 
-/// The organ of the scene that the document names, ready for experiments.
-void read_organ(const Json& document, FitConfig& config, const std::filesystem::path& folder,
-                const DocumentPlace& place) {
-  const bool wanted = config.model == kOrganModel;
-  if (!wanted && !config.law) {
-    const auto makes = [](const Formulation& f) { return f.as<ModelMaker>() != nullptr; };
-    const Formulation* found = find_formulation(config.model);
-    if (found == nullptr || !makes(*found)) {
-      refuse_formulation(config.model, "model", place.key("model").where,
-                         fmt::format("{}, {}", formulations_that(makes), kOrganModel));
-    }
+/// The organ of the scene that a configuration names, ready for experiments.
+std::shared_ptr<const Tissue> organ_of(const std::filesystem::path& scene) {
+  auto tissue = std::make_shared<Tissue>(read_tissue(scene));
+  require_standing(*tissue, scene.string());
+  return tissue;
+}
+
+/// The model: a law, an organ or a formulation of the paper's element.
+void set_model(const StatedFit& stated, FitConfig& config) {
+  if (stated.law) {
+    config.law = law_of(*stated.law);
+    return;
   }
-  if (wanted != document.contains("scene")) {
-    throw bad_input(place.key("scene").where, wanted ? "missing" : "without the model 'organ'",
-                    "\"model\": \"organ\" and the scene that holds the organ, or neither");
+  config.tension = {stated.tension.value_or(config.tension.kind), 0.0};
+  if (!stated.model) return;
+  config.model = stated.model->value;
+  if (config.model == kOrganModel) {
+    config.organ = organ_of(config.folder / config.scene);
+    return;
   }
-  if (!wanted) return;
-  if (config.tension.kind != TensionRule::Kind::exact) {
-    throw bad_input(place.key("tension").where, "a rule for lambda1 beside the model 'organ'",
-                    "no tension: the bonds of a network pull along themselves");
-  }
-  config.scene = document.at("scene").get<std::string>();
-  const std::filesystem::path path = folder / config.scene;
-  auto tissue = std::make_shared<Tissue>(read_tissue(path));
-  require_standing(*tissue, path.string());
-  config.organ = std::move(tissue);
+  const auto makes = [](const Formulation& f) { return f.as<ModelMaker>() != nullptr; };
+  const Formulation* found = find_formulation(config.model);
+  if (found != nullptr && makes(*found)) return;
+  refuse_formulation(config.model, "model", stated.model->place.where,
+                     fmt::format("{}, {}", formulations_that(makes), kOrganModel));
+}
+
+void require_sound_element(const FitConfig& config, const DocumentPlace& place) {
+  if (!has_element(config)) return;
+  TpmVector fixed{};
+  std::copy(config.fixed.begin(), config.fixed.end(), fixed.begin());
+  require_valid(from_vector(fixed), place.key("fixed").where);
+}
+
+BootstrapOptions bootstrap_of(const StatedBootstrap& stated, const FitConfig& config) {
+  BootstrapOptions options = stated.options;
+  options.seed = stated.seed.value_or(config.seed);
+  options.level = config.level;
+  return options;
 }
 
 }  // namespace
@@ -129,65 +113,21 @@ TpmVector fitted_element(const FitConfig& config, std::span<const double> natura
   return vector;
 }
 
-FitConfig parse_fit_config(const Json& written, std::string_view where,
+FitConfig parse_fit_config(const Json& document, std::string_view where,
                            const std::filesystem::path& folder) {
-  const Json document = checked(written, fit_kind(), where);
+  const StatedFit stated = stated_fit(document, where);
   const DocumentPlace place{std::string(where)};
-  FitConfig config;
+  FitConfig config = stated.config;
   config.folder = folder;
-  config.title = document.at("title").get<std::string>();
-  config.model = document.value("model", config.model);
-  if (document.value("tension", "exact") == "frozen_at_peak") {
-    config.tension = TensionRule::frozen_at_peak();
-  }
-  read_organ(document, config, folder, place);
-  if (document.contains("law")) {
-    if (document.contains("model") || document.contains("tension")) {
-      throw bad_input(place.key("law").where, "beside 'model' or 'tension'",
-                      "either a law of the family or a formulation of the paper's element");
-    }
-    config.law = parse_law(document.at("law"), place.key("law"));
-  }
-  std::size_t index = 0;
-  for (const auto& j : document.at("data")) {
-    config.data.push_back(parse_data(j, config, place.key("data").key(std::to_string(index++))));
-  }
-  name_noise_parameters(config);
+  set_model(stated, config);
+  config.data = data_of(stated.data, config);
   const std::unique_ptr<Model> model = make_model(config);
-  parse_parameters(document, *model, config, place);
-  config.fixed = parse_fixed(document, *model, config, place);
-  require_each_set_once(config, *model, document, place);
-  if (has_element(config)) {
-    TpmVector fixed{};
-    std::copy(config.fixed.begin(), config.fixed.end(), fixed.begin());
-    require_valid(from_vector(fixed), place.key("fixed").where);
-  }
-  if (document.contains("loss")) {
-    const Json& loss = document.at("loss");
-    config.loss.kind = parse_loss(loss.at("kind").get<std::string>(), place.key("loss").where);
-    config.loss.width = loss.value("width", config.loss.width);
-    require_plain_noise_under_loss(config, place);
-  }
-  config.adjust_correlation = document.value("correlation", "adjust") == "adjust";
-  if (document.contains("starts")) {
-    config.starts = document.at("starts").value("count", config.starts);
-    config.seed = document.at("starts").value("seed", config.seed);
-  }
-  if (document.contains("profile")) {
-    config.level = document.at("profile").value("level", config.level);
-    config.profiles = document.at("profile").value("enabled", true);
-  }
-  if (document.contains("bootstrap")) {
-    config.bootstrap = parse_bootstrap(document.at("bootstrap"), config, place.key("bootstrap"));
-  }
-  if (document.contains("hypotheses")) {
-    parse_hypotheses(document.at("hypotheses"), config, place.key("hypotheses"));
-  }
-  for (const DataChoice& data : config.data) {
-    if (data.noise.scale_known == config.scale_known()) continue;
-    throw bad_input(place.key("data").where, "some noise scales are known and others estimated",
-                    "all known or all estimated");
-  }
+  config.parameters = parameters_of(stated, *model, config);
+  config.fixed = fixed_values(stated.fixed, *model, config);
+  require_each_set_once(config, *model, stated.fixed, place);
+  require_sound_element(config, place);
+  if (stated.bootstrap) config.bootstrap = bootstrap_of(*stated.bootstrap, config);
+  config.hypotheses = hypotheses_of(stated.hypotheses, config);
   return config;
 }
 

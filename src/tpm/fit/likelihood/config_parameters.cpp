@@ -8,7 +8,6 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
-#include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/config_parts.hpp"
 #include "tpm/organ/scene/organ_model.hpp"
@@ -19,7 +18,7 @@
 namespace tpm::fit {
 namespace {
 
-std::size_t parse_target(std::string_view name, const Model& model, const DocumentPlace& place) {
+std::size_t target_of(std::string_view name, const Model& model, const DocumentPlace& place) {
   const auto all = model.parameters();
   const auto found = std::ranges::find(all, name, &ParameterDescription::name);
   if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
@@ -27,157 +26,131 @@ std::size_t parse_target(std::string_view name, const Model& model, const Docume
                      mapped<std::string>(all, &ParameterDescription::name));
 }
 
-/// The places of the data sets named under "for".
-std::vector<std::size_t> parse_scope(const Json& j, const FitConfig& config,
-                                     const DocumentPlace& place) {
+/// The places of the data sets of these names.
+std::vector<std::size_t> scope_of(const std::vector<Placed<std::string>>& names,
+                                  const FitConfig& config) {
   std::vector<std::size_t> scope;
-  if (!j.contains("for")) return scope;
-  for (const auto& name : j.at("for")) {
-    const auto dataset = name.get<std::string>();
-    bool found = false;
+  for (const auto& [name, place] : names) {
+    const std::size_t before = scope.size();
     for (std::size_t i = 0; i < config.data.size(); ++i) {
-      if (config.data[i].dataset != dataset) continue;
-      scope.push_back(i);
-      found = true;
+      if (config.data[i].dataset == name) scope.push_back(i);
     }
-    if (found) continue;
-    throw bad_input(place.key("for").where,
-                    fmt::format("'{}' is no data set of this fit", printable(dataset)),
+    if (scope.size() > before) continue;
+    throw bad_input(place.where, fmt::format("'{}' is no data set of this fit", printable(name)),
                     "a name that stands under /data");
   }
   return scope;
 }
 
-/// "prior" of a parameter, by what reads a quantity of it under a key.
-template <class Read>
-std::optional<Prior> parse_prior(const Json& j, const DocumentPlace& place, const Read& read) {
-  if (!j.contains("prior")) return std::nullopt;
-  const DocumentPlace here = place.key("prior");
-  const Prior prior{read(j.at("prior"), "mean", here), read(j.at("prior"), "sd", here),
-                    j.at("prior").value("from", "")};
+std::optional<Prior> prior_of(const std::optional<StatedPrior>& stated, Dimension dimension) {
+  if (!stated) return std::nullopt;
+  const Prior prior{stated->mean.in(dimension), stated->sd.in(dimension), stated->from};
   if (prior.sd > 0.0) return prior;
-  throw bad_input(here.key("sd").where, "not above 0", "a standard deviation above 0");
+  throw bad_input(stated->sd.place.where, "not above 0", "a standard deviation above 0");
 }
 
 /// "1 mN/s" as "1 mN": what changes per second.
-std::string without_second(const Json& j, std::string_view key, const DocumentPlace& place) {
+void remove_second(StatedQuantity& rate) {
   constexpr std::string_view kPerSecond = "/s";
-  std::string text = j.at(std::string(key)).get<std::string>();
-  if (text.ends_with(kPerSecond)) return text.substr(0, text.size() - kPerSecond.size());
-  throw bad_input(place.key(key).where, fmt::format("'{}' is no drift", printable(text)),
-                  "the recording's response per second, such as \"1 mN/s\"");
+  if (!rate.text.ends_with(kPerSecond)) {
+    throw bad_input(rate.place.where, fmt::format("'{}' is no drift", printable(rate.text)),
+                    "the recording's response per second, such as \"1 mN/s\"");
+  }
+  rate.text.resize(rate.text.size() - kPerSecond.size());
 }
 
 /// The place in config.data of the recording that a drift or a rise belongs to.
-std::size_t recording_of(const std::string& kind, const Json& j, const FitConfig& config,
-                         const DocumentPlace& here) {
-  if (j.contains("sets") || j.contains("for")) {
-    throw bad_input(here.where, "beside 'sets' or 'for'",
-                    fmt::format("a {} of one recording alone", kind));
+std::size_t recording_of(const Placed<std::string>& of, const FitConfig& config) {
+  const auto found = std::ranges::find(config.data, of.value, &DataChoice::dataset);
+  if (found != config.data.end() && found->protocol.kind == FitProtocol::measured) {
+    return static_cast<std::size_t>(found - config.data.begin());
   }
-  const auto of = j.at(kind).at("of").get<std::string>();
-  const auto found = std::ranges::find(config.data, of, &DataChoice::dataset);
-  if (found == config.data.end() || found->protocol.kind != ProtocolChoice::Kind::measured) {
-    throw bad_input(here.key("of").where,
-                    fmt::format("'{}' is no recording of this fit", printable(of)),
-                    "the name of a recording (protocol 'measured') under /data");
-  }
-  return static_cast<std::size_t>(found - config.data.begin());
-}
-
-/// A linear drift of the zero of one recording.
-EstimatedParameter parse_drift(const std::string& name, const Json& j, const FitConfig& config,
-                               const DocumentPlace& place) {
-  const DocumentPlace here = place.key("drift");
-  const std::size_t choice = recording_of("drift", j, config, here);
-  const Dimension dimension = reading_dimension(config, config.data[choice]);
-  const auto read = [&](const Json& object, std::string_view key, const DocumentPlace& at) {
-    return parse_quantity(without_second(object, key, at), dimension, at.key(key).where);
-  };
-  EstimatedParameter parameter;
-  FitParameter& fit = parameter.fit;
-  fit.name = name;
-  fit.scale = parse_scale(j.value("scale", "linear"), place.key("scale").where);
-  fit.unit = per_second(parse_unit(split_quantity(without_second(j, "start", place)).unit,
-                                   dimension, place.key("start").where));
-  fit.start = read(j, "start", place);
-  fit.lower = read(j, "lower", place);
-  fit.upper = read(j, "upper", place);
-  require_valid(fit, place.where);
-  parameter.prior = parse_prior(j, place, read);
-  parameter.drift = DriftTerm{choice, quantity_at(j.at("drift"), "origin", Dimension::time, here)};
-  return parameter;
+  throw bad_input(of.place.where,
+                  fmt::format("'{}' is no recording of this fit", printable(of.value)),
+                  "the name of a recording (protocol 'measured') under /data");
 }
 
 /// Name, start, bounds and scale of an estimated parameter.
-FitParameter parse_search(const std::string& name, const Json& j, Dimension dimension,
-                          const DocumentPlace& place) {
-  const auto start = j.at("start").get<std::string>();
+FitParameter search_of(const std::string& name, const StatedParameter& stated,
+                       Dimension dimension) {
   FitParameter fit;
   fit.name = name;
-  fit.start = quantity_at(j, "start", dimension, place);
-  fit.unit = parse_unit(split_quantity(start).unit, dimension, place.key("start").where);
-  fit.lower = quantity_at(j, "lower", dimension, place);
-  fit.upper = quantity_at(j, "upper", dimension, place);
-  const DocumentPlace scale_place = place.key("scale");
-  fit.scale = parse_scale(j.value("scale", "log"), scale_place.where);
-  require_valid(fit, place.where);
+  fit.start = stated.start.in(dimension);
+  fit.unit = stated.start.unit(dimension);
+  fit.lower = stated.lower.in(dimension);
+  fit.upper = stated.upper.in(dimension);
+  fit.scale = stated.scale.value_or(Scale::log);
+  require_valid(fit, stated.place.where);
   return fit;
 }
 
-/// The delay of a rise of one recording's drive between two samples.
-EstimatedParameter parse_rise(const std::string& name, const Json& j, const FitConfig& config,
-                              const DocumentPlace& place) {
-  const DocumentPlace here = place.key("rise");
-  EstimatedParameter parameter;
-  parameter.fit = parse_search(name, j, Dimension::time, place);
-  if (j.contains("prior")) {
-    parameter.prior = parse_prior(
-        j, place, [](const Json& object, std::string_view key, const DocumentPlace& at) {
-          return quantity_at(object, key, Dimension::time, at);
-        });
+/// A linear drift of the zero of one recording.
+EstimatedParameter drift_of(const std::string& name, StatedParameter stated,
+                            const FitConfig& config) {
+  const std::size_t choice = recording_of(stated.drift->of, config);
+  const Dimension dimension = reading_dimension(config, config.data[choice]);
+  for (StatedQuantity* rate : {&stated.start, &stated.lower, &stated.upper}) remove_second(*rate);
+  if (stated.prior) {
+    remove_second(stated.prior->mean);
+    remove_second(stated.prior->sd);
   }
-  const Json& rise = j.at("rise");
-  parameter.rise = RiseTerm{recording_of("rise", j, config, here),
-                            quantity_at(rise, "begin", Dimension::time, here),
-                            quantity_at(rise, "end", Dimension::time, here)};
-  if (config.organ) throw bad_input(here.where, "with the model 'organ'", "a law");
-  if (parameter.rise->begin_s < parameter.rise->end_s) return parameter;
-  throw bad_input(here.key("end").where, "not behind 'begin'", "a later sample");
+  stated.scale = stated.scale.value_or(Scale::linear);
+  EstimatedParameter parameter;
+  parameter.fit = search_of(name, stated, dimension);
+  parameter.fit.unit = per_second(parameter.fit.unit);
+  parameter.prior = prior_of(stated.prior, dimension);
+  parameter.drift = DriftTerm{choice, stated.drift->origin_s};
+  return parameter;
 }
 
-EstimatedParameter parse_parameter(const std::string& name, const Json& j, const Model& model,
-                                   const FitConfig& config, const DocumentPlace& place) {
-  if (j.contains("drift")) return parse_drift(name, j, config, place);
-  if (j.contains("rise")) return parse_rise(name, j, config, place);
-  EstimatedParameter parameter;
-  const std::vector<std::size_t> scope = parse_scope(j, config, place);
-  if (j.contains("sets")) {
-    for (const auto& target : j.at("sets")) {
-      parameter.sets.push_back(
-          {parse_target(target.get<std::string>(), model, place.key("sets")), scope});
-    }
-  } else {
-    parameter.sets.push_back({parse_target(name, model, place), scope});
+/// The delay of a rise of one recording's drive between two samples.
+EstimatedParameter rise_of(const std::string& name, const StatedParameter& stated,
+                           const FitConfig& config) {
+  const StatedRise& rise = *stated.rise;
+  if (config.organ) {
+    throw bad_input(stated.place.where, "a rise with the model 'organ'", "a law");
   }
-  const Dimension dimension = model.parameters()[parameter.sets.front().parameter].dimension;
-  for (const Target& target : parameter.sets) {
-    if (model.parameters()[target.parameter].dimension == dimension) continue;
-    throw bad_input(place.key("sets").where, "the parameters set have different dimensions",
+  EstimatedParameter parameter;
+  parameter.fit = search_of(name, stated, Dimension::time);
+  parameter.prior = prior_of(stated.prior, Dimension::time);
+  parameter.rise = RiseTerm{recording_of(rise.of, config), rise.begin_s, rise.end_s};
+  return parameter;
+}
+
+/// The model parameters that take the value of an estimated one. They have one dimension.
+std::vector<Target> targets_of(const std::string& name, const StatedParameter& stated,
+                               const Model& model, const FitConfig& config) {
+  const std::vector<std::size_t> scope = scope_of(stated.data, config);
+  if (stated.sets.empty()) return {{target_of(name, model, stated.place), scope}};
+  std::vector<Target> targets;
+  for (const auto& [target, place] : stated.sets) {
+    targets.push_back({target_of(target, model, place), scope});
+    const auto dimension = [&](const Target& t) {
+      return model.parameters()[t.parameter].dimension;
+    };
+    if (dimension(targets.back()) == dimension(targets.front())) continue;
+    throw bad_input(place.where, "the parameters set have different dimensions",
                     "parameters of one dimension");
   }
-  parameter.fit = parse_search(name, j, dimension, place);
-  parameter.prior =
-      parse_prior(j, place, [&](const Json& object, std::string_view key, const DocumentPlace& at) {
-        return quantity_at(object, key, dimension, at);
-      });
-  parameter.not_separable = j.value("not_separable", "");
+  return targets;
+}
+
+EstimatedParameter parameter_of(const std::string& name, const StatedParameter& stated,
+                                const Model& model, const FitConfig& config) {
+  if (stated.drift) return drift_of(name, stated, config);
+  if (stated.rise) return rise_of(name, stated, config);
+  EstimatedParameter parameter;
+  parameter.sets = targets_of(name, stated, model, config);
+  const Dimension dimension = model.parameters()[parameter.sets.front().parameter].dimension;
+  parameter.fit = search_of(name, stated, dimension);
+  parameter.prior = prior_of(stated.prior, dimension);
+  parameter.not_separable = stated.not_separable;
   const FitParameter& fit = parameter.fit;
   for (const Target& target : parameter.sets) {
     const auto [low, high] = model.range(target.parameter);
     if (fit.lower >= low && fit.upper <= high) continue;
     throw bad_input(
-        place.key(fit.lower < low ? "lower" : "upper").where,
+        (fit.lower < low ? stated.lower : stated.upper).place.where,
         fmt::format("outside the range of {}", model.parameters()[target.parameter].name),
         fmt::format("bounds from {} to {} (SI)", shortest(low), shortest(high)));
   }
@@ -199,70 +172,71 @@ const EstimatedParameter& find_parameter(const FitConfig& config, const std::str
 
 /// The noise parameters that the data sets name, with their dimensions, each once. Throws
 /// Error(bad_input) for a name that stands for two dimensions.
-std::vector<std::pair<std::string, Dimension>> noise_parameters(const FitConfig& config,
-                                                                const DocumentPlace& place) {
+std::vector<std::pair<std::string, Dimension>> noise_parameters(
+    const FitConfig& config, const std::vector<StatedData>& stated) {
   std::vector<std::pair<std::string, Dimension>> list;
-  const auto add = [&](const std::string& name, Dimension dimension) {
+  const auto add = [&](const std::string& name, Dimension dimension, const DocumentPlace& place) {
     const auto same = [&](const auto& entry) { return entry.first == name; };
     const auto found = std::find_if(list.begin(), list.end(), same);
     if (name.empty()) return;
     if (found == list.end()) {
       list.emplace_back(name, dimension);
     } else if (found->second != dimension) {
-      throw bad_input(place.key("data").where,
+      throw bad_input(place.where,
                       fmt::format("noise parameter '{}' is {} and {}", printable(name),
                                   dimension_name(found->second), dimension_name(dimension)),
                       "one noise parameter for each dimension");
     }
   };
-  for (const DataChoice& data : config.data) {
-    add(data.sigma_a, reading_dimension(config, data));
-    add(data.sigma_b, Dimension::dimensionless);
+  for (std::size_t i = 0; i < config.data.size(); ++i) {
+    const DataChoice& data = config.data[i];
+    add(data.sigma_a, reading_dimension(config, data), stated[i].noise.place);
+    add(data.sigma_b, Dimension::dimensionless, stated[i].noise.place);
   }
   return list;
 }
 
-/// A noise parameter: as it stands under /parameters, or for the data to decide.
-EstimatedParameter parse_noise_parameter(const std::string& name, Dimension dimension,
-                                         const Json& parameters, const DocumentPlace& place) {
+/// A noise parameter: as the file states it, or for the data to decide.
+EstimatedParameter noise_parameter_of(const std::string& name, Dimension dimension,
+                                      const StatedFit& whole) {
+  const auto found =
+      std::ranges::find(whole.parameters, name, &std::pair<std::string, StatedParameter>::first);
   EstimatedParameter parameter;
-  if (!parameters.contains(name)) {
+  if (found == whole.parameters.end()) {
     parameter.fit.name = name;
     parameter.fit.unit = shown_unit(dimension);
     parameter.from_data = true;
     return parameter;
   }
-  const Json& j = parameters.at(name);
-  if (j.contains("sets") || j.contains("for") || j.contains("prior")) {
-    throw bad_input(place.key(name).where, "'sets', 'for' or 'prior' of a parameter of the noise",
+  const StatedParameter& stated = found->second;
+  if (!stated.sets.empty() || !stated.data.empty() || stated.prior) {
+    throw bad_input(stated.place.where, "'sets', 'for' or 'prior' of a parameter of the noise",
                     "data sets that name it under /noise");
   }
-  parameter.fit = parse_search(name, j, dimension, place.key(name));
+  parameter.fit = search_of(name, stated, dimension);
   if (parameter.fit.lower > 0.0) return parameter;
-  throw bad_input(place.key(name).key("lower").where, "not above 0", "a positive lower bound");
+  throw bad_input(stated.lower.place.where, "not above 0", "a positive lower bound");
 }
 
 }  // namespace
 
-void parse_parameters(const Json& document, const Model& model, FitConfig& config,
-                      const DocumentPlace& place) {
-  const auto of_noise = noise_parameters(config, place);
-  const Json& parameters = document.at("parameters");
-  for (const auto& [name, j] : parameters.items()) {
+std::vector<EstimatedParameter> parameters_of(const StatedFit& stated, const Model& model,
+                                              const FitConfig& config) {
+  const auto of_noise = noise_parameters(config, stated.data);
+  std::vector<EstimatedParameter> parameters;
+  for (const auto& [name, one] : stated.parameters) {
     const bool is_noise = std::any_of(of_noise.begin(), of_noise.end(),
                                       [&n = name](const auto& entry) { return entry.first == n; });
-    if (is_noise) continue;
-    config.parameters.push_back(
-        parse_parameter(name, j, model, config, place.key("parameters").key(name)));
+    if (!is_noise) parameters.push_back(parameter_of(name, one, model, config));
   }
   for (const auto& [name, dimension] : of_noise) {
-    config.parameters.push_back(
-        parse_noise_parameter(name, dimension, parameters, place.key("parameters")));
+    parameters.push_back(noise_parameter_of(name, dimension, stated));
   }
+  return parameters;
 }
 
-std::vector<double> parse_fixed(const Json& document, const Model& model, const FitConfig& config,
-                                const DocumentPlace& place) {
+std::vector<double> fixed_values(const StatedValues& stated, const Model& model,
+                                 const FitConfig& config) {
   std::vector<double> values;
   if (config.law) {
     for (const LawParameter& p : law_parameters(*config.law)) {
@@ -274,16 +248,14 @@ std::vector<double> parse_fixed(const Json& document, const Model& model, const 
     const TpmVector paper = to_vector({});
     values.assign(paper.begin(), paper.end());
   }
-  if (!document.contains("fixed")) return values;
-  for (const auto& [name, value] : document.at("fixed").items()) {
-    const std::size_t target = parse_target(name, model, place.key("fixed"));
-    values[target] = parse_quantity(value.get<std::string>(), model.parameters()[target].dimension,
-                                    place.key("fixed").key(name).where);
+  for (const auto& [name, value] : stated) {
+    const std::size_t target = target_of(name, model, value.place);
+    values[target] = value.in(model.parameters()[target].dimension);
   }
   return values;
 }
 
-void require_each_set_once(const FitConfig& config, const Model& model, const Json& document,
+void require_each_set_once(const FitConfig& config, const Model& model, const StatedValues& fixed,
                            const DocumentPlace& place) {
   for (std::size_t choice = 0; choice < config.data.size(); ++choice) {
     std::vector<std::string> setter(model.parameters().size());
@@ -302,11 +274,7 @@ void require_each_set_once(const FitConfig& config, const Model& model, const Js
         if (target.applies_to(choice)) claim(target.parameter, p.fit.name);
       }
     }
-    if (document.contains("fixed")) {
-      for (const auto& [name, value] : document.at("fixed").items()) {
-        claim(parse_target(name, model, place.key("fixed")), "fixed");
-      }
-    }
+    for (const auto& [name, value] : fixed) claim(target_of(name, model, value.place), "fixed");
     for (std::size_t i = 0; i < setter.size(); ++i) {
       if (!setter[i].empty() || !std::isnan(config.fixed[i])) continue;
       throw bad_input(place.where,
@@ -317,26 +285,22 @@ void require_each_set_once(const FitConfig& config, const Model& model, const Js
   }
 }
 
-void parse_hypotheses(const Json& list, FitConfig& config, const DocumentPlace& place) {
-  std::size_t index = 0;
-  for (const auto& j : list) {
-    const DocumentPlace here = place.key(std::to_string(index++)).key("values");
-    Hypothesis hypothesis;
-    hypothesis.name = j.at("name").get<std::string>();
-    for (const auto& [name, value] : j.at("values").items()) {
-      const FitParameter& p = find_parameter(config, name, here.key(name)).fit;
-      const double si =
-          parse_quantity(value.get<std::string>(), p.unit.dimension, here.key(name).where);
+std::vector<Hypothesis> hypotheses_of(const std::vector<StatedHypothesis>& stated,
+                                      const FitConfig& config) {
+  return mapped<Hypothesis>(stated, [&](const StatedHypothesis& one) {
+    Hypothesis hypothesis{one.name, {}};
+    for (const auto& [name, value] : one.values) {
+      const FitParameter& p = find_parameter(config, name, value.place).fit;
+      const double si = value.in(p.unit.dimension);
       if (!(si >= p.lower && si <= p.upper)) {
-        throw bad_input(
-            here.key(name).where,
-            fmt::format("{} is outside the parameter's bounds", value.get<std::string>()),
-            "a value within them");
+        throw bad_input(value.place.where,
+                        fmt::format("{} is outside the parameter's bounds", value.text),
+                        "a value within them");
       }
       hypothesis.values.emplace_back(name, si);
     }
-    config.hypotheses.push_back(std::move(hypothesis));
-  }
+    return hypothesis;
+  });
 }
 
 }  // namespace tpm::fit

@@ -2,22 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "tpm/base/distributions.hpp"
-#include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/likelihood/fit_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
 namespace {
-
-constexpr auto kShapes = std::to_array<Word<ErrorShape>>({{ErrorShape::normal, "normal"},
-                                                          {ErrorShape::laplace, "laplace"},
-                                                          {ErrorShape::student_t, "student_t"}});
 
 /// ln p(z) of the standardised error.
 double standard_log_density(const ErrorLaw& law, double z) {
@@ -37,11 +32,7 @@ double standard_log_density(const ErrorLaw& law, double z) {
 }  // namespace
 
 std::string_view error_shape_name(ErrorShape shape) noexcept {
-  return entry_of(kShapes, shape).text;
-}
-
-ErrorShape parse_error_shape(std::string_view text, std::string_view where) {
-  return parse_word(kShapes, "noise distribution", text, where);
+  return entry_of(kErrorShapeWords, shape).text;
 }
 
 void require_valid(const ErrorLaw& law, std::string_view where) {

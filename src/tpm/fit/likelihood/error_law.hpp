@@ -26,7 +26,6 @@ struct ErrorLaw {
   double degrees_of_freedom = 4.0;  ///< nu of student_t, > 2 so that a standard deviation exists
 };
 
-[[nodiscard]] ErrorShape parse_error_shape(std::string_view text, std::string_view where);
 [[nodiscard]] std::string_view error_shape_name(ErrorShape shape) noexcept;
 
 /// Throws Error(bad_input) naming `where` if nu is not a finite number above 2.

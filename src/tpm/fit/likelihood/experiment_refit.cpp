@@ -3,19 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
-#include "tpm/base/enum_names.hpp"
 #include "tpm/base/lists.hpp"
+#include "tpm/fit/likelihood/fit_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
 namespace {
-
-constexpr auto kResamplings =
-    std::to_array<Word<Resampling>>({{Resampling::residuals, "residuals"},
-                                     {Resampling::blocks, "blocks"},
-                                     {Resampling::recordings, "recordings"}});
 
 /// A parameter of some data sets only goes unseen in draws that leave them out.
 void require_shared_parameters(const FitConfig& config) {
@@ -38,11 +32,11 @@ void require_shared_parameters(const FitConfig& config) {
 }  // namespace
 
 std::string_view resampling_name(Resampling resampling) noexcept {
-  return entry_of(kResamplings, resampling).text;
+  return entry_of(kResamplingWords, resampling).text;
 }
 
 Resampling parse_resampling(std::string_view text, std::string_view where) {
-  return parse_word(kResamplings, "resampling", text, where);
+  return parse_word(kResamplingWords, "resampling", text, where);
 }
 
 ExperimentRefit::ExperimentRefit(const ExperimentResiduals& function) : function_(function) {

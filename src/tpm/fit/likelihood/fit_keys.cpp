@@ -3,330 +3,335 @@
 #include <algorithm>
 #include <iterator>
 
-#include "tpm/data/curve_words.hpp"
-#include "tpm/files/keys/more_types.hpp"
+#include "tpm/files/blocks/law_json.hpp"
+#include "tpm/fit/likelihood/fit_words.hpp"
 
 namespace tpm::fit {
 namespace {
 
 constexpr double kLargestSeed = 9007199254740991.0;  // 2^53 - 1
 
-/// Of a dimension that the model knows.
-FormPtr some_quantity() {
-  static const FormPtr form =
-      text(1).named("some_quantity", "a number and a unit, such as \"12 kPa\"").form;
-  return form;
+ValueType<std::uint64_t> seed_type() {
+  return whole<std::uint64_t>(0, kLargestSeed);
 }
 
-FormPtr of_dimension(Dimension dimension, Range range = {}) {
-  return files::quantity(dimension, range).form;
+ValueType<std::vector<Placed<std::string>>> distinct_texts() {
+  return list(placed(text(1)), {.fewest = 1, .distinct = true});
 }
 
-FormPtr number_or_text() {
-  return either_form({number().form, text(1).form});
-}
-
-FormPtr distinct_texts() {
-  return list(text(1), {.fewest = 1, .distinct = true}).form;
-}
-
-FormPtr words(std::vector<std::string> all) {
-  return one_of(std::move(all)).form;
-}
-
-FormPtr fit_parameter_form() {
-  const FormPtr prior = object_form(
+const Block<StatedPrior>& prior_block() {
+  using P = StatedPrior;
+  static const Block<P> block(
       "prior", "a normal distribution, whose residual (value - mean) / sd is added to the fit",
-      {required_key("mean", some_quantity(), "its mean"),
-       required_key("sd", some_quantity(), "its standard deviation"),
-       optional_key("from", text().form, "what measured it")});
-  const FormPtr drift = object_form(
+      {required(key("mean", &P::mean, stated_quantity(), "its mean")),
+       required(key("sd", &P::sd, stated_quantity(), "its standard deviation")),
+       key("from", &P::from, text_if_any(), "what measured it")});
+  return block;
+}
+
+const Block<StatedDrift>& drift_block() {
+  using D = StatedDrift;
+  static const Block<D> block(
       "drift", "a slope of the zero of a recording: slope (t - origin) is added to the answer",
-      {required_key("of", text(1).form, "the recording"),
-       required_key("origin", of_dimension(Dimension::time), "when the slope adds nothing")});
-  const FormPtr rise = object_form(
+      {required(key("of", &D::of, placed(text(1)), "the recording")),
+       required(key("origin", &D::origin_s, files::quantity(Dimension::time),
+                    "when the slope adds nothing"))});
+  return block;
+}
+
+const Block<StatedRise>& rise_block() {
+  using R = StatedRise;
+  static const Block<R> block(
       "rise",
       "two samples of a recording between which the drive rises: the parameter is the delay of "
       "the rise's centre against that of a straight line",
-      {required_key("of", text(1).form, "the recording"),
-       required_key("begin", of_dimension(Dimension::time), "the sample before"),
-       required_key("end", of_dimension(Dimension::time), "the sample behind")});
-  return object_form(
+      {required(key("of", &R::of, placed(text(1)), "the recording")),
+       required(key("begin", &R::begin_s, files::quantity(Dimension::time), "the sample before")),
+       required(key("end", &R::end_s, files::quantity(Dimension::time), "the sample behind"))},
+      {{"'begin' before 'end'", [](const R& rise) {
+          return rise.begin_s < rise.end_s ? std::nullopt
+                                           : std::optional(Fault{"end", "not behind 'begin'"});
+        }}});
+  return block;
+}
+
+const Block<StatedParameter>& parameter_block() {
+  using P = StatedParameter;
+  static const Block<P> block(
       "fit_parameter", "a parameter that is estimated",
-      {required_key("start", some_quantity(), "where the search begins"),
-       required_key("lower", some_quantity(), "least value"),
-       required_key("upper", some_quantity(), "largest value"),
-       optional_key("scale", words({"log", "linear", "inverse_square"}),
-                    "coordinate of the search; default log"),
-       optional_key("sets", distinct_texts(),
-                    "model parameters that take this value; default: the one of the same name"),
-       optional_key("for", distinct_texts(),
-                    "data sets that this parameter belongs to (an offset of one recording); "
-                    "default: all"),
-       optional_key("prior", prior, "what a measurement of its own tells"),
-       optional_key("drift", drift,
-                    "the parameter is a slope of the zero of this recording, in its response per "
-                    "second such as \"1 mN/s\""),
-       optional_key("rise", rise,
-                    "the parameter is the delay of a rise of the drive between two samples, such "
-                    "as \"10 ms\""),
-       optional_key("not_separable", text(1).form,
-                    "what the data cannot tell the parameter from; it is then not called "
-                    "identified")});
+      {required(key("start", &P::start, stated_quantity(), "where the search begins")),
+       required(key("lower", &P::lower, stated_quantity(), "least value")),
+       required(key("upper", &P::upper, stated_quantity(), "largest value")),
+       key("scale", &P::scale, word(kScaleWords),
+           "coordinate of the search; default log, of a drift linear"),
+       key("sets", &P::sets, distinct_texts(),
+           "model parameters that take this value; default: the one of the same name"),
+       key("for", &P::data, distinct_texts(),
+           "data sets that this parameter belongs to (an offset of one recording); default: all"),
+       key("prior", &P::prior, prior_block().type(), "what a measurement of its own tells"),
+       key("drift", &P::drift, drift_block().type(),
+           "the parameter is a slope of the zero of this recording, in its response per second "
+           "such as \"1 mN/s\""),
+       key("rise", &P::rise, rise_block().type(),
+           "the parameter is the delay of a rise of the drive between two samples, such as \"10 "
+           "ms\""),
+       key("not_separable", &P::not_separable, text(1),
+           "what the data cannot tell the parameter from; it is then not called identified")},
+      {{"a drift or a rise of one recording alone", [](const P& p) -> std::optional<Fault> {
+          const bool alone = p.drift || p.rise;
+          if (!alone || (p.sets.empty() && p.data.empty())) return std::nullopt;
+          return Fault{p.drift ? "drift" : "rise", "beside 'sets' or 'for'"};
+        }}});
+  return block;
 }
 
-FormPtr fit_law_form() {
-  return object_form(
+const Block<StatedLaw>& law_block_of_fit() {
+  using L = StatedLaw;
+  static const Block<L> block(
       "fit_law", "a law of the family instead of the paper's element",
-      {required_key("name", text(1).form,
-                    "kernel, branches, tension: linear-1-elastic, power-2, hertz-fzener"),
-       optional_key("drive", words({"indentation_depth", "strain", "relative_length"}),
-                    "answered by a contact force or a stress; default indentation_depth"),
-       required_key("reference", some_quantity(),
+      {required(key("name", &L::name, placed(text(1)),
+                    "kernel, branches, tension: linear-1-elastic, power-2, hertz-fzener")),
+       key("drive", &L::drive,
+           quantity_among(
+               {Quantity::indentation_depth, Quantity::strain, Quantity::relative_length}),
+           "answered by a contact force or a stress"),
+       required(key("reference", &L::reference, stated_quantity(),
                     "reference depth of the kernel, such as \"5 mm\" (\"0.2\" for a relative "
-                    "length)")});
+                    "length)"))});
+  return block;
 }
 
-FormPtr fit_protocol_form() {
-  std::vector<std::string> provenances;
-  for (const auto& entry : kProvenances) provenances.emplace_back(entry.text);
-  Form form{.type = Form::Type::kinds,
-            .name = "fit_protocol",
-            .sentence = "what was imposed; depth, load and hold are the data's"};
-  form.kinds = {
-      {"ramp_hold",
-       "a ramp that is held",
-       {required_key("rate", of_dimension(Dimension::speed, kAboveZero), "speed of the ramp"),
-        optional_key("rate_provenance", words(std::move(provenances)),
-                     "where the rate comes from")}},
-      {"step_hold", "a step that is held", {}},
-      {"static", "long after each step", {}},
-      {"creep", "a load as a step", {}},
-      {"measured", "the drive of a recording", {}},
-      {"oscillation",
-       "small oscillations",
-       {optional_key("operating_depth", some_quantity(),
-                     "depth of the tissue (or relative length) that they are about; default the "
-                     "law's reference")}}};
-  return shared(std::move(form));
+constexpr auto kTensionWords = std::to_array<Word<TensionRule::Kind>>(
+    {{TensionRule::Kind::exact, "exact"}, {TensionRule::Kind::frozen_at_peak, "frozen_at_peak"}});
+constexpr auto kCorrelationWords = std::to_array<Word<bool>>({{true, "adjust"}, {false, "ignore"}});
+
+/// A key of what needs neither the model nor the data.
+Key<StatedFit> of_config(const Key<FitConfig>& one) {
+  return within(&StatedFit::config, one);
 }
 
-FormPtr fit_noise_form() {
-  return object_form(
-      "fit_noise", "scatter of a reading y about the model",
-      {optional_key("kind",
-                    words({"relative_to_datum", "absolute", "combined", "per_row", "log",
-                           "relative_to_model"}),
-                    "needed unless the distribution is log_normal"),
-       optional_key("distribution", words({"normal", "log_normal", "laplace", "student_t"}),
-                    "shape of the noise, sigma being its scale; default normal; log_normal is the "
-                    "kind log"),
-       optional_key("degrees_of_freedom", number().form, "of student_t, above 2; default 4"),
-       optional_key("relative", number_or_text(),
-                    "b of sigma = b |y| (relative_to_datum), a + b |y| (combined), b |model|, or "
-                    "of the logarithm (log); or \"estimated\" or \"estimated NAME\": sigma = a + b "
-                    "|model| with b among the parameters"),
-       optional_key("absolute", text(1).form,
-                    "a, such as \"5 mN\"; or \"estimated\" or \"estimated NAME\""),
-       optional_key("scale", words({"known", "estimated"}),
-                    "estimated: right up to one common factor; thresholds come from F. Default "
-                    "known")});
+/// The keys that stand before the data.
+std::vector<Key<StatedFit>> keys_of_model() {
+  using F = StatedFit;
+  return {required(of_config(key("title", &FitConfig::title, text(), "what the fit is"))),
+          unread<F>("description", text().form, "what else is to be said"),
+          key("model", &F::model, placed(text(1)),
+              "a formulation for fits (tpm simulate --list-formulations) or organ: the paper's "
+              "element by its closed form (default) or by CVODES, or the network of a scene"),
+          of_config(key("scene", &FitConfig::scene, text(1),
+                        "with the model organ: the file that holds the organ, its bonds and "
+                        "anchors, relative to this file; its material is not used")),
+          key("law", &F::law, placed(law_block_of_fit().type(), &StatedLaw::place),
+              "a law of the family instead of the paper's element; its parameters are listed by "
+              "tpm laws NAME"),
+          key("tension", &F::tension, word(kTensionWords),
+              "exact: lambda1(e); frozen_at_peak: as the paper; default exact")};
 }
 
-FormPtr fit_import_form() {
-  const FormPtr plain = text(1).form;
-  const FormPtr whole_or_text = either_form({whole<int>(0, 1e9).form, plain});
-  return object_form(
-      "fit_import", "what the file does not say, as the options of tpm data import",
-      {optional_key("encoding", words({"auto", "utf-8", "latin-1"}), "of the text"),
-       optional_key("separator", words({"auto", "comma", "semicolon", "tab", "blank"}),
-                    "between columns"),
-       optional_key("decimal", words({"auto", "point", "comma"}), "decimal sign"),
-       optional_key("thousands", words({"auto", "none", "comma", "point", "apostrophe", "space"}),
-                    "mark between groups of three digits"),
-       optional_key("header_rows", whole_or_text, "rows above the samples, if not found"),
-       optional_key("block", whole_or_text, "which of several blocks of samples, from 1"),
-       optional_key("time", plain, "column"),
-       optional_key("drive", plain, "column"),
-       optional_key("response", plain, "column"),
-       optional_key("sd", plain, "column of standard deviations"),
-       optional_key("frequency", plain, "column"),
-       optional_key("storage", plain, "column"),
-       optional_key("loss", plain, "column"),
-       optional_key("drive_quantity", plain, "what the column of the drive holds"),
-       optional_key("response_quantity", plain, "what the column of the response holds"),
-       optional_key("negate_drive", flag().form, "the drive has the other sign"),
-       optional_key("negate_response", flag().form, "the response has the other sign"),
-       optional_key("step_time", plain,
-                    "time of the step on the file's clock, for G(t), J(t) and what is kept after a "
-                    "step: \"185 s\" or 11:09:16; earlier samples are left out and times count "
-                    "from it"),
-       optional_key("from", plain, "samples before this time of the file are not read"),
-       optional_key("until", plain, "samples after this time of the file are not read"),
-       optional_key("rest_length", of_dimension(Dimension::length),
-                    "unloaded length of the specimen, by which a length or an elongation is "
-                    "divided"),
-       optional_key("area", of_dimension(Dimension::area),
-                    "cross section of the specimen, by which a force is divided"),
-       optional_key("spring_constant", of_dimension(Dimension::stiffness),
-                    "of a cantilever, such as \"0.05 N/m\": JPK force files, instead of that of "
-                    "the file; tables with the height of a piezo"),
-       optional_key("deflection_sensitivity", plain,
-                    "tables with a deflection in V or mV, such as \"50 nm/V\""),
-       optional_key("segments", list_form(plain, 0),
-                    "JPK force files: kinds of segments to read, such as extend and pause; all if "
-                    "left out"),
-       optional_key("units", map_form(plain), "of columns, by their names")});
+const Block<RobustLoss>& loss_block() {
+  using L = RobustLoss;
+  static const Block<L> block(
+      "loss", "a robust loss",
+      {required(key("kind", &L::kind, word(kLossWords), "its shape")),
+       key("width", &L::width, number({.least = 1e-6}), "in standard deviations")});
+  return block;
 }
 
-FormPtr fit_data_form() {
-  const FormPtr selector = object_form(
-      "selector",
-      "picks readings by their imposed depth or load and by their label; a missing key matches all",
-      {optional_key("depth", of_dimension(Dimension::length), "imposed depth"),
-       optional_key("load", of_dimension(Dimension::force), "imposed load"),
-       optional_key("label", text().form, "of the row")});
-  const FormPtr selectors = list_form(selector, 0);
-  return object_form(
-      "fit_data", "a data set with its protocol and noise",
-      {required_key("dataset", text(1).form,
-                    "id of a shipped curve (tpm data list) or a path ending in .csv or .json, "
-                    "relative to this file"),
-       required_key("protocol", fit_protocol_form(), "what was imposed"),
-       required_key("noise", fit_noise_form(), "scatter of a reading"),
-       optional_key("stiffness_per_modulus", of_dimension(Dimension::length, kAboveZero),
-                    "oscillation, moduli under a law of contact force over depth: A0/l0, the "
-                    "contact's stiffness over the modulus, such as \"12.56 mm\""),
-       optional_key("import", fit_import_form(),
-                    "recordings and spectra without a description: what the file does not say"),
-       optional_key("from", of_dimension(Dimension::time),
-                    "recordings: earlier samples are not fitted"),
-       optional_key("to", of_dimension(Dimension::time),
-                    "recordings: later samples are predicted, not fitted"),
-       optional_key("imposed", one_of({"drive", "response"}).form,
-                    "recordings of stress over strain or force over depth: response where the load "
-                    "was imposed and the strain or depth answers (creep); its noise is then one of "
-                    "what answers"),
-       optional_key("clipped_above", some_quantity(),
-                    "recordings: limit of the force cell; readings from here on are censored: of "
-                    "each it counts only that it lay at the limit or beyond"),
-       optional_key("clipped_below", some_quantity(), "the same of the smallest reading"),
-       optional_key("exclude", selectors, "readings that are not used"),
-       optional_key("hold_out", selectors, "readings that are not fitted but predicted")});
+const Block<FitConfig>& starts_block() {
+  using C = FitConfig;
+  static const Block<C> block("starts", "where searches begin",
+                              {key("count", &C::starts, whole<std::size_t>(1, 100000),
+                                   "the first is the given start, the others a Latin hypercube"),
+                               key("seed", &C::seed, seed_type(), "of random numbers")});
+  return block;
 }
 
-/// The keys of both kinds that stand before the data, and behind them.
-std::vector<KeyForm> keys_of_model() {
-  KeyForm title = required_key("title", text().form, "what the fit is");
-  return {std::move(title),
-          optional_key("description", text().form, "what else is to be said"),
-          optional_key("model", text(1).form,
-                       "a formulation for fits (tpm simulate --list-formulations) or organ: the "
-                       "paper's element by its closed form (default) or by CVODES, or the network "
-                       "of a scene"),
-          optional_key("scene", text(1).form,
-                       "with the model organ: the file that holds the organ, its bonds and "
-                       "anchors, relative to this file; its material is not used"),
-          optional_key("law", fit_law_form(),
-                       "a law of the family instead of the paper's element; its parameters are "
-                       "listed by tpm laws NAME"),
-          optional_key("tension", words({"exact", "frozen_at_peak"}),
-                       "exact: lambda1(e); frozen_at_peak: as the paper; default exact")};
+const Block<FitConfig>& profile_block() {
+  using C = FitConfig;
+  static const Block<C> block("profile", "intervals from the profile of the likelihood",
+                              {key("level", &C::level, number({.least = 0.01, .most = 0.9999}),
+                                   "probability that they hold the value"),
+                               key("enabled", &C::profiles, flag(), "whether they are found")});
+  return block;
 }
 
-std::vector<KeyForm> keys_of_statistics() {
-  const FormPtr seed = whole<std::uint64_t>(0, kLargestSeed).form;
-  const FormPtr loss =
-      object_form("loss", "a robust loss",
-                  {required_key("kind", words({"none", "huber", "cauchy"}), "its shape"),
-                   optional_key("width", number({.least = 1e-6}).form,
-                                "in standard deviations; default 1.345")});
-  const FormPtr starts = object_form(
-      "starts", "where searches begin",
-      {optional_key("count", whole<int>(1, 100000).form,
-                    "the first is the given start, the others a Latin hypercube; default 50"),
-       optional_key("seed", seed, "default 0")});
-  const FormPtr profile = object_form(
-      "profile", "intervals from the profile of the likelihood",
-      {optional_key("level", number({.least = 0.01, .most = 0.9999}).form, "default 0.95"),
-       optional_key("enabled", flag().form, "default true")});
-  const FormPtr bootstrap = object_form(
+const Block<StatedBootstrap>& bootstrap_block() {
+  using B = StatedBootstrap;
+  const auto of_options = [](const Key<BootstrapOptions>& one) { return within(&B::options, one); };
+  static const Block<B> block(
       "bootstrap", "refits to resampled data, beside the profiles",
-      {optional_key("replicates", whole<int>(20, 1e6).form, "default 1000"),
-       optional_key("resample", words({"residuals", "blocks", "recordings"}),
-                    "single residuals (default), runs of neighbours, or whole data sets"),
-       optional_key("block_length", whole<int>(1, 1e6).form,
-                    "of blocks, in readings; default from the residuals' correlation"),
-       optional_key("seed", seed, "default: the seed of the starts")});
-  const FormPtr hypothesis =
-      object_form("hypothesis", "values of parameters that are tested",
-                  {required_key("name", text().form, "what it is called"),
-                   required_key("values", map_form(some_quantity(), 1), "of parameters")});
-  return {optional_key("loss", loss, "a robust loss"),
-          optional_key("correlation", words({"adjust", "ignore"}),
-                       "whether intervals count correlated neighbours of a recording as fewer "
-                       "readings; default adjust"),
-          optional_key("starts", starts, "where searches begin"),
-          optional_key("profile", profile, "intervals from the profile of the likelihood"),
-          optional_key("bootstrap", bootstrap, "refits to resampled data, beside the profiles"),
-          optional_key("hypotheses", list_form(hypothesis, 0), "what is tested")};
+      {of_options(key("replicates", &BootstrapOptions::replicates, whole<int>(20, 1e6),
+                      "how many refits")),
+       of_options(key("resample", &BootstrapOptions::resampling, word(kResamplingWords),
+                      "single residuals, runs of neighbours, or whole data sets")),
+       with_default(of_options(key("block_length", &BootstrapOptions::block_length,
+                                   whole<std::size_t>(1, 1e6),
+                                   "of blocks, in readings; default from the residuals' "
+                                   "correlation")),
+                    nullptr),
+       key("seed", &B::seed, seed_type(), "default: the seed of the starts")});
+  return block;
 }
 
-FormPtr fit_form(std::string name, std::vector<KeyForm> of_data) {
-  std::vector<KeyForm> keys = keys_of_model();
-  std::move(of_data.begin(), of_data.end(), std::back_inserter(keys));
-  std::vector<KeyForm> statistics = keys_of_statistics();
-  std::move(statistics.begin(), statistics.end(), std::back_inserter(keys));
-  return object_form(std::move(name), "", std::move(keys));
+const Block<StatedHypothesis>& hypothesis_block() {
+  using H = StatedHypothesis;
+  static const Block<H> block(
+      "hypothesis", "values of parameters that are tested",
+      {required(key("name", &H::name, text(), "what it is called")),
+       required(key("values", &H::values, map_of(stated_quantity(), 1), "of parameters"))});
+  return block;
+}
+
+/// The keys that stand behind the data.
+std::vector<Key<StatedFit>> keys_of_statistics() {
+  using F = StatedFit;
+  return {of_config(key("loss", &FitConfig::loss, loss_block().type(), "a robust loss")),
+          of_config(key("correlation", &FitConfig::adjust_correlation, word(kCorrelationWords),
+                        "whether intervals count correlated neighbours of a recording as fewer "
+                        "readings")),
+          of_config(members("starts", starts_block(), "where searches begin")),
+          of_config(
+              members("profile", profile_block(), "intervals from the profile of the likelihood")),
+          key("bootstrap", &F::bootstrap, bootstrap_block().type(),
+              "refits to resampled data, beside the profiles"),
+          key("hypotheses", &F::hypotheses, list(hypothesis_block().type()), "what is tested")};
+}
+
+template <class T>
+std::vector<Key<T>> joined(std::vector<Key<T>> keys, const std::vector<Key<T>>& middle,
+                           const std::vector<Key<T>>& last) {
+  keys.insert(keys.end(), middle.begin(), middle.end());
+  keys.insert(keys.end(), last.begin(), last.end());
+  return keys;
+}
+
+std::vector<Rule<StatedFit>> fit_rules() {
+  using F = StatedFit;
+  const auto is_organ = [](const F& fit) { return fit.model && fit.model->value == kOrganModel; };
+  return {{"\"model\": \"organ\" and the scene that holds the organ, or neither",
+           [=](const F& fit) -> std::optional<Fault> {
+             if (is_organ(fit) != fit.config.scene.empty()) return std::nullopt;
+             return Fault{"scene", is_organ(fit) ? "missing" : "without the model 'organ'"};
+           }},
+          {"no tension with the model organ: the bonds of a network pull along themselves",
+           [=](const F& fit) -> std::optional<Fault> {
+             const auto exact = TensionRule::Kind::exact;
+             if (!is_organ(fit) || fit.tension.value_or(exact) == exact) return std::nullopt;
+             return Fault{"tension", "a rule for lambda1 beside the model 'organ'"};
+           }},
+          {"either a law of the family or a formulation of the paper's element",
+           [](const F& fit) -> std::optional<Fault> {
+             if (!fit.law || (!fit.model && !fit.tension)) return std::nullopt;
+             return Fault{"law", "beside 'model' or 'tension'"};
+           }},
+          // A robust loss stands for a likelihood that nobody wrote down: nothing that needs one
+          // goes with it.
+          {"either a loss, or a likelihood such as 'student_t'",
+           [](const F& fit) -> std::optional<Fault> {
+             const bool plain = std::ranges::all_of(fit.data, [](const StatedData& data) {
+               return data.noise.shape() == ErrorShape::normal && !data.noise.estimates_sigma();
+             });
+             if (plain || fit.config.loss.kind == Loss::none) return std::nullopt;
+             return Fault{"loss", "beside a noise distribution or an estimated standard deviation"};
+           }},
+          {"scales of the noise that are all known or all estimated",
+           [](const F& fit) -> std::optional<Fault> {
+             const auto known = std::ranges::count_if(
+                 fit.data, [](const StatedData& data) { return data.noise.scale_known; });
+             if (known == 0 || known == std::ssize(fit.data)) return std::nullopt;
+             return Fault{"data", "some noise scales are known and others estimated"};
+           }}};
+}
+
+const Block<StatedFit>& fit_block() {
+  using F = StatedFit;
+  static const Block<F> block(
+      "fit", "",
+      joined<F>(
+          keys_of_model(),
+          {required(with_example(
+               key("parameters", &F::parameters,
+                   map_of(placed(parameter_block().type(), &StatedParameter::place), 1),
+                   "that are estimated"),
+               {{"E",
+                 {{"start", "12 kPa"},
+                  {"lower", "1 kPa"},
+                  {"upper", "200 kPa"},
+                  {"sets", {"E1", "E2", "Eprime"}}}}})),
+           key("fixed", &F::fixed, map_of(stated_quantity()),
+               "model parameters fixed at a value; what is neither estimated nor fixed has the "
+               "paper's value (with a law: contact and offset 0, spacing infinite)"),
+           required(with_example(
+               key("data", &F::data, list(data_block().type(), {.fewest = 1}), "what is fitted"),
+               Json::array(
+                   {Json{{"dataset", "evren_static"},
+                         {"protocol", {{"kind", "static"}}},
+                         {"noise", {{"kind", "relative_to_datum"}, {"relative", 0.1}}}}})))},
+          keys_of_statistics()),
+      fit_rules());
+  return block;
+}
+
+const std::vector<Key<TableFiles>>& table_keys() {
+  using T = TableFiles;
+  const auto file = [](const char* name, std::string T::*member, const char* sentence) {
+    return required(key(name, member, text(1), sentence));
+  };
+  static const std::vector<Key<T>> keys{
+      file("parameter_file", &T::parameters, "parameters.csv, relative to this file"),
+      file("observable_file", &T::observables, "observables.csv"),
+      file("condition_file", &T::conditions, "conditions.csv"),
+      file("measurement_file", &T::measurements, "measurements.csv")};
+  return keys;
 }
 
 }  // namespace
 
 const FileKind& fit_kind() {
+  static const FileKind kind{
+      "fit", "Configuration of tpm fit",
+      "What is fitted to which data. Quantities are texts of a number and a unit, such as \"12 "
+      "kPa\"",
+      fit_block().form()};
+  return kind;
+}
+
+const FileKind& fit_tables_kind() {
   const auto made = [] {
-    KeyForm parameters =
-        required_key("parameters", map_form(fit_parameter_form(), 1), "that are estimated");
-    parameters.example = {{"E",
-                           {{"start", "12 kPa"},
-                            {"lower", "1 kPa"},
-                            {"upper", "200 kPa"},
-                            {"sets", {"E1", "E2", "Eprime"}}}}};
-    KeyForm data = required_key("data", list_form(fit_data_form(), 1), "what is fitted");
-    data.example =
-        Json::array({Json{{"dataset", "evren_static"},
-                          {"protocol", {{"kind", "static"}}},
-                          {"noise", {{"kind", "relative_to_datum"}, {"relative", 0.1}}}}});
+    std::vector<KeyForm> keys;
+    const auto add = [&keys](const auto& some) {
+      for (const auto& one : some) keys.push_back(one.form);
+    };
+    add(keys_of_model());
+    add(table_keys());
+    add(keys_of_statistics());
     return FileKind{
-        "fit", "Configuration of tpm fit",
-        "What is fitted to which data. Quantities are texts of a number and a unit, such as \"12 "
-        "kPa\"",
-        fit_form("fit",
-                 {parameters,
-                  optional_key("fixed", map_form(some_quantity()),
-                               "model parameters fixed at a value; what is neither estimated nor "
-                               "fixed has the paper's value (with a law: contact and offset 0, "
-                               "spacing infinite)"),
-                  data})};
+        "fit_tables",
+        "A fit whose parameters, observables, conditions and measurements stand in tables after "
+        "PEtab",
+        "The other keys are those of the configuration of tpm fit, without parameters, fixed and "
+        "data",
+        object_form("fit_tables", "", std::move(keys))};
   };
   static const FileKind kind = made();
   return kind;
 }
 
-const FileKind& fit_tables_kind() {
-  const auto file = [](const char* key, const char* sentence) {
-    return required_key(key, text(1).form, sentence);
-  };
-  static const FileKind kind{
-      "fit_tables",
-      "A fit whose parameters, observables, conditions and measurements stand in tables after "
-      "PEtab",
-      "The other keys are those of the configuration of tpm fit, without parameters, fixed and "
-      "data",
-      fit_form("fit_tables", {file("parameter_file", "parameters.csv, relative to this file"),
-                              file("observable_file", "observables.csv"),
-                              file("condition_file", "conditions.csv"),
-                              file("measurement_file", "measurements.csv")})};
-  return kind;
+StatedFit stated_fit(const Json& document, std::string_view where) {
+  return fit_block().made(checked(document, fit_kind(), where), DocumentPlace{std::string(where)});
+}
+
+bool has_table_files(const Json& document) {
+  return std::ranges::any_of(
+      table_keys(), [&](const Key<TableFiles>& one) { return document.contains(one.form.name); });
+}
+
+TableFiles take_table_files(Json& problem, std::string_view where) {
+  problem = checked(std::move(problem), fit_tables_kind(), where);
+  TableFiles files;
+  read_keys(table_keys(), problem, DocumentPlace{std::string(where)}, files);
+  for (const Key<TableFiles>& one : table_keys()) problem.erase(one.form.name);
+  return files;
 }
 
 }  // namespace tpm::fit

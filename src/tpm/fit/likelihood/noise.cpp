@@ -7,33 +7,14 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/likelihood/fit_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
-namespace {
-
-constexpr auto kNoiseKinds = std::to_array<Word<NoiseKind>>({
-    {NoiseKind::relative_to_datum, "relative_to_datum"},
-    {NoiseKind::absolute, "absolute"},
-    {NoiseKind::combined, "combined"},
-    {NoiseKind::per_row, "per_row"},
-    {NoiseKind::log, "log"},
-    {NoiseKind::relative_to_model, "relative_to_model"},
-});
-
-constexpr auto kLosses = std::to_array<Word<Loss>>(
-    {{Loss::none, "none"}, {Loss::huber, "huber"}, {Loss::cauchy, "cauchy"}});
-
-}  // namespace
 
 std::string_view noise_kind_name(NoiseKind kind) noexcept {
-  return entry_of(kNoiseKinds, kind).text;
-}
-
-NoiseKind parse_noise_kind(std::string_view text, std::string_view where) {
-  return parse_word(kNoiseKinds, "noise kind", text, where);
+  return entry_of(kNoiseKindWords, kind).text;
 }
 
 bool uses_relative(NoiseKind kind) {
@@ -46,11 +27,7 @@ bool uses_absolute(NoiseKind kind) {
 }
 
 std::string_view loss_name(Loss loss) noexcept {
-  return entry_of(kLosses, loss).text;
-}
-
-Loss parse_loss(std::string_view text, std::string_view where) {
-  return parse_word(kLosses, "loss", text, where);
+  return entry_of(kLossWords, loss).text;
 }
 
 ErrorLaw error_law(const Noise& noise) {

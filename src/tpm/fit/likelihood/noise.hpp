@@ -31,7 +31,6 @@ struct Noise {
 /// Shape of the noise and the scale on which it adds.
 [[nodiscard]] ErrorLaw error_law(const Noise& noise);
 
-[[nodiscard]] NoiseKind parse_noise_kind(std::string_view text, std::string_view where);
 [[nodiscard]] std::string_view noise_kind_name(NoiseKind kind) noexcept;
 
 /// True if b and a are part of the standard deviation.
@@ -50,7 +49,6 @@ struct RobustLoss {
   double width = 1.345;  ///< in standard deviations, > 0
 };
 
-[[nodiscard]] Loss parse_loss(std::string_view text, std::string_view where);
 [[nodiscard]] std::string_view loss_name(Loss loss) noexcept;
 
 /// Contribution of one datum: up to two residuals with their derivatives by f.

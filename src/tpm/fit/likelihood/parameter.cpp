@@ -2,29 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 
-#include "tpm/base/enum_names.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/fit/likelihood/fit_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
-namespace {
-
-constexpr auto kScales = std::to_array<Word<Scale>>(
-    {{Scale::log, "log"}, {Scale::linear, "linear"}, {Scale::inverse_square, "inverse_square"}});
-
-}  // namespace
-
-Scale parse_scale(std::string_view text, std::string_view where) {
-  return parse_word(kScales, "scale", text, where);
-}
 
 std::string_view scale_name(Scale scale) noexcept {
-  return entry_of(kScales, scale).text;
+  return entry_of(kScaleWords, scale).text;
 }
 
 double FitParameter::theta(double p) const {

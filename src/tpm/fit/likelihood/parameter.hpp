@@ -16,7 +16,6 @@ enum class Scale {
                    ///< when it is large, so x -> infinity is the regular point theta = 0.
 };
 
-[[nodiscard]] Scale parse_scale(std::string_view text, std::string_view where);
 [[nodiscard]] std::string_view scale_name(Scale scale) noexcept;
 
 /// One estimated parameter. All values SI, lower <= start <= upper; for log and inverse_square

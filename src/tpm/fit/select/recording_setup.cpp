@@ -11,6 +11,7 @@
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/reading_options.hpp"
+#include "tpm/fit/likelihood/fit_words.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
@@ -313,25 +314,6 @@ std::vector<DataSet> data_sets(std::span<const PreparedRecording> recordings) {
   return mapped<DataSet>(recordings, &PreparedRecording::recording);
 }
 
-namespace {
-
-Json import_json(const ImportOptions& import) {
-  Json j = Json::object();
-  for (const auto& [key, text] : reading_texts(import)) {
-    if (key == "segments") {
-      j[key] = import.segments;
-    } else if (text == "true") {
-      j[key] = true;
-    } else {
-      j[key] = text;
-    }
-  }
-  if (!import.units.empty()) j["units"] = import.units;
-  return j;
-}
-
-}  // namespace
-
 Json config_json(const FitConfig& config) {
   const std::unique_ptr<Model> model = make_model(config);
   const auto text = [](double value, const Unit& unit) {
@@ -399,8 +381,8 @@ Json config_json(const FitConfig& config) {
       entry["noise"]["absolute"] = text(d.noise.absolute, shown_unit(quantity_dimension(read)));
     }
     if (uses_relative(d.noise.kind)) entry["noise"]["relative"] = d.noise.relative;
-    entry["noise"]["scale"] = d.noise.scale_known ? "known" : "estimated";
-    if (const Json import = import_json(d.import); !import.empty()) entry["import"] = import;
+    entry["noise"]["scale"] = word_for(kNoiseScaleWords, d.noise.scale_known);
+    if (says_how_to_read(d.import)) entry["import"] = reading_type().write(d.import);
     const auto set_limit = [&](const char* key, const std::optional<double>& limit) {
       if (!limit) return;
       entry[key] = text(*limit, shown_unit(quantity_dimension(config.law->response)));
