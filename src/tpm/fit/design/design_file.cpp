@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/lists.hpp"
@@ -10,8 +9,9 @@
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/protocol_block.hpp"
-#include "tpm/files/keys/more_types.hpp"
+#include "tpm/files/keys/placed.hpp"
 #include "tpm/fit/design/design.hpp"
+#include "tpm/fit/likelihood/fit_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -28,6 +28,7 @@ struct GridKeys {
   ProtocolLists lists;
   std::vector<double> intervals_s;
   std::vector<int> repeats{1};
+  DocumentPlace place = {};
 };
 
 std::vector<Key<GridKeys>> grid_keys(ProtocolKind kind,
@@ -75,19 +76,17 @@ const Block<PlannedNoise>& noise_block(Dimension dimension) {
 struct DesignKeys {
   std::string title;
   Json model, law, tension, parameters, fixed;  ///< of the fit, whose reader reads them
-  std::vector<std::string> nuisance;
-  std::vector<std::pair<std::string, double>> known;
+  std::vector<Placed<std::string>> nuisance;
+  std::vector<std::pair<std::string, Placed<double>>> known;
   PlannedNoise force;
   std::optional<PlannedNoise> depth;
   bool scale_known = true;
   double correlation_time_s = 0.0;
   MachineLimits limits;
   std::vector<GridKeys> candidates, previous;
-  std::string criterion = "worst";
+  Placed<std::string> criterion{"worst", {}};
   double factor = 2.0, level = FitConfig{}.level;
 };
-
-constexpr std::array<Word<bool>, 2> kScales{{{true, "known"}, {false, "estimated"}}};
 
 const Block<DesignKeys>& planned_noise_block() {
   using K = DesignKeys;
@@ -95,7 +94,7 @@ const Block<DesignKeys>& planned_noise_block() {
       "planned_noise", "scatter of the readings",
       {required(key("force", &K::force, noise_block(Dimension::force).type(), "of a force")),
        key("depth", &K::depth, noise_block(Dimension::length).type(), "of a depth: of creep"),
-       key("scale", &K::scale_known, word(kScales),
+       key("scale", &K::scale_known, word(kNoiseScaleWords),
            "estimated: right up to one factor, intervals from Student's t"),
        key("correlation_time", &K::correlation_time_s,
            files::quantity(Dimension::time, kZeroOrMore),
@@ -142,23 +141,14 @@ FormPtr planned_law_form() {
       "planned_law", "a law of the family instead of the paper's element",
       {required_key("name", text(1).form,
                     "kernel, branches, tension: linear-1-elastic, power-2, hertz-fzener"),
-       optional_key("drive", one_of({"indentation_depth", "relative_length"}).form,
-                    "answered by a contact force or a stress; default indentation_depth"),
+       optional_key("drive", one_of({"indentation_depth"}).form,
+                    "answered by a contact force; default indentation_depth"),
        required_key("reference", text(1).form, "reference depth of the kernel, such as \"5 mm\"")});
 }
 
 const Block<DesignKeys>& design_block() {
   using K = DesignKeys;
-  ValueType<K> noise = planned_noise_block().type();
-  Key<K> noise_key{{.name = "noise",
-                    .form = noise.form,
-                    .sentence = "scatter of the readings",
-                    .required = true},
-                   [](K& into, const Json& value, const DocumentPlace& place) {
-                     read_keys(planned_noise_block().keys(), value, place, into);
-                   },
-                   [](const K& from) { return planned_noise_block().write(from); }};
-  const auto grids = list(grid_kinds().type());
+  const auto grid = placed(grid_kinds().type(), &GridKeys::place);
   static const Block<K> block(
       "design", "",
       {required(key("title", &K::title, text(), "what the design is")),
@@ -177,21 +167,30 @@ const Block<DesignKeys>& design_block() {
        key("fixed", &K::fixed, as_json(map_form(text(1).form)),
            "model parameters fixed at a value; what is neither estimated nor fixed has the paper's "
            "value (with a law: contact and offset 0, spacing infinite)"),
-       key("nuisance", &K::nuisance, list(text(1), {.distinct = true}),
+       key("nuisance", &K::nuisance, list(placed(text(1)), {.distinct = true}),
            "parameters of which every recording has its own, such as an offset"),
-       key("known", &K::known, map_of(number({.least = 1e-6, .most = 1e6})),
+       key("known", &K::known, map_of(placed(number({.least = 1e-6, .most = 1e6}))),
            "relative standard errors known beforehand, such as {\"E1\": 0.3}"),
-       noise_key, key("limits", &K::limits, limits_block().type(), "of machine and tissue"),
-       required(key("candidates", &K::candidates, list(grid_kinds().type(), {.fewest = 1}),
+       required(members("noise", planned_noise_block(), "scatter of the readings")),
+       key("limits", &K::limits, limits_block().type(), "of machine and tissue"),
+       required(key("candidates", &K::candidates, list(grid, {.fewest = 1}),
                     "grids: every combination is a candidate")),
-       key("previous", &K::previous, grids,
+       key("previous", &K::previous, list(grid),
            "experiments already done, every combination once: their information is added"),
-       with_default(
-           key("criterion", &K::criterion, text(), "worst, all, or the name of a parameter"),
-           "worst"),
+       with_default(key("criterion", &K::criterion, placed(text()),
+                        "worst, all, or the name of a parameter"),
+                    "worst"),
        key("identified_factor", &K::factor, number({.least = 1.000001, .most = 1e6}),
            "identified: the interval reaches no further than value / factor and value * factor"),
-       key("level", &K::level, number({.least = 0.01, .most = 0.9999}), "of the intervals")});
+       key("level", &K::level, number({.least = 0.01, .most = 0.9999}), "of the intervals")},
+      {{"the noise of a depth beside creep (/noise/depth)",
+        [](const K& keys) -> std::optional<Fault> {
+          const auto is_creep = [](const GridKeys& g) { return g.kind == ProtocolKind::creep; };
+          const bool creep = std::ranges::any_of(keys.candidates, is_creep) ||
+                             std::ranges::any_of(keys.previous, is_creep);
+          if (!creep || keys.depth) return std::nullopt;
+          return Fault{"noise", "creep without the noise of a depth"};
+        }}});
   return block;
 }
 
@@ -203,12 +202,11 @@ PlannedExperiment planned(const ProtocolBlock& block) {
 }
 
 /// All combinations; those that differ only in their repeats stand side by side.
-void add_grid(const GridKeys& grid, const DocumentPlace& place,
-              std::vector<PlannedExperiment>& experiments) {
-  const auto protocols = combinations(grid.kind, grid.lists, place);
+void add_grid(const GridKeys& grid, std::vector<PlannedExperiment>& experiments) {
+  const auto protocols = combinations(grid.kind, grid.lists, grid.place);
   const std::size_t count = protocols.size() * grid.intervals_s.size() * grid.repeats.size();
   if (experiments.size() + count > kMostCandidates) {
-    throw bad_input(place.where, fmt::format("{} experiments", experiments.size() + count),
+    throw bad_input(grid.place.where, fmt::format("{} experiments", experiments.size() + count),
                     fmt::format("at most {}", kMostCandidates));
   }
   for (const ProtocolBlock& protocol : protocols) {
@@ -222,12 +220,9 @@ void add_grid(const GridKeys& grid, const DocumentPlace& place,
   }
 }
 
-std::vector<PlannedExperiment> experiments_of(const std::vector<GridKeys>& grids,
-                                              const DocumentPlace& place) {
+std::vector<PlannedExperiment> experiments_of(const std::vector<GridKeys>& grids) {
   std::vector<PlannedExperiment> experiments;
-  for (std::size_t i = 0; i < grids.size(); ++i) {
-    add_grid(grids[i], place.key(std::to_string(i)), experiments);
-  }
+  for (const GridKeys& grid : grids) add_grid(grid, experiments);
   return experiments;
 }
 
@@ -246,9 +241,6 @@ FitConfig parse_model(const DesignKeys& keys, const DocumentPlace& place) {
                               {"protocol", {{"kind", "measured"}}},
                               {"noise", {{"kind", "per_row"}}}}});
   FitConfig config = parse_fit_config(fit, place.where);
-  if (config.law && config.law->drive != Quantity::indentation_depth) {
-    throw bad_input(place.key("law/drive").where, "a stretched strip", "indentation_depth");
-  }
   // The search of a simulated fit begins at the true values.
   config.starts = 1;
   config.profiles = false;
@@ -256,7 +248,7 @@ FitConfig parse_model(const DesignKeys& keys, const DocumentPlace& place) {
 }
 
 std::size_t parameter_place(const FitConfig& config, const std::string& name,
-                            const DocumentPlace& place, std::string_view besides) {
+                            const DocumentPlace& place, std::string_view besides = "one of ") {
   const std::vector<FitParameter> all = searched_parameters(config);
   const auto found = std::ranges::find(all, name, &FitParameter::name);
   if (found != all.end()) return static_cast<std::size_t>(found - all.begin());
@@ -267,16 +259,15 @@ std::size_t parameter_place(const FitConfig& config, const std::string& name,
       fmt::format("{}{}", besides, fmt::join(names, ", ")));
 }
 
-void separate_nuisance(const DesignKeys& keys, DesignProblem& problem, const DocumentPlace& place) {
+void separate_nuisance(const DesignKeys& keys, DesignProblem& problem) {
   auto& list = problem.config.parameters;
-  for (const std::string& name : keys.nuisance) {
-    const std::size_t i = parameter_place(problem.config, name, place.key("nuisance"), "one of ");
+  for (const auto& [name, place] : keys.nuisance) {
+    const std::size_t i = parameter_place(problem.config, name, place);
     problem.nuisance.push_back(list[i]);
     list.erase(list.begin() + static_cast<std::ptrdiff_t>(i));
+    if (!list.empty()) continue;
+    throw bad_input(place.where, "every parameter is a nuisance", "at least one that is not");
   }
-  if (!list.empty()) return;
-  throw bad_input(place.key("nuisance").where, "every parameter is a nuisance",
-                  "at least one that is not");
 }
 
 void require_sizes(const DesignProblem& problem, const DocumentPlace& place) {
@@ -287,33 +278,21 @@ void require_sizes(const DesignProblem& problem, const DocumentPlace& place) {
   }
 }
 
-void set_known(const DesignKeys& keys, DesignProblem& problem, const DocumentPlace& place) {
+void set_known(const DesignKeys& keys, DesignProblem& problem) {
   problem.known.assign(problem.config.parameters.size(), std::numeric_limits<double>::infinity());
   for (const auto& [name, error] : keys.known) {
-    problem.known[parameter_place(problem.config, name, place.key("known"), "one of ")] = error;
+    problem.known[parameter_place(problem.config, name, error.place)] = error.value;
   }
 }
 
-void set_criterion(const DesignKeys& keys, DesignProblem& problem, const DocumentPlace& place) {
-  const std::string& criterion = keys.criterion;
+void set_criterion(const DesignKeys& keys, DesignProblem& problem) {
+  const auto& [criterion, place] = keys.criterion;
   if (criterion == "all" || criterion == "worst") {
     problem.criterion = criterion == "all" ? Criterion::all : Criterion::worst;
     return;
   }
   problem.criterion = Criterion::parameter;
-  problem.criterion_parameter =
-      parameter_place(problem.config, criterion, place.key("criterion"), "all, worst, ");
-}
-
-void require_creep_noise(const DesignProblem& problem, const DocumentPlace& place) {
-  if (problem.depth_noise) return;
-  const auto is_creep = [](const PlannedExperiment& e) { return e.kind == ExperimentKind::creep; };
-  if (std::none_of(problem.candidates.begin(), problem.candidates.end(), is_creep) &&
-      std::none_of(problem.previous.begin(), problem.previous.end(), is_creep)) {
-    return;
-  }
-  throw bad_input(place.key("noise").where, "creep without the noise of a depth",
-                  "it under /noise/depth");
+  problem.criterion_parameter = parameter_place(problem.config, criterion, place, "all, worst, ");
 }
 
 }  // namespace
@@ -332,18 +311,17 @@ DesignProblem parse_design(const Json& written, std::string_view where) {
   const DesignKeys keys = design_block().made(checked(written, design_kind(), where), place);
   DesignProblem problem;
   problem.config = parse_model(keys, place);
-  separate_nuisance(keys, problem, place);
+  separate_nuisance(keys, problem);
   require_sizes(problem, place);
-  set_known(keys, problem, place);
+  set_known(keys, problem);
   problem.force_noise = keys.force;
   problem.depth_noise = keys.depth;
   problem.scale_known = keys.scale_known;
   problem.correlation_time_s = keys.correlation_time_s;
   problem.limits = keys.limits;
-  problem.candidates = experiments_of(keys.candidates, place.key("candidates"));
-  problem.previous = experiments_of(keys.previous, place.key("previous"));
-  require_creep_noise(problem, place);
-  set_criterion(keys, problem, place);
+  problem.candidates = experiments_of(keys.candidates);
+  problem.previous = experiments_of(keys.previous);
+  set_criterion(keys, problem);
   problem.factor = keys.factor;
   problem.config.level = keys.level;
   return problem;
