@@ -271,7 +271,20 @@ TEST_CASE("bad claims give one line that names file and claim") {
   CHECK_THAT(value("step_force(a, 1, 1, -1, 1, 1, 1, 1)"),
              Contains("claim 'c1': expression 'step_force") && Contains("E1 = -1 Pa"));
   CHECK_THAT(refusal({{"kind", "value"}, {"printed", "4"}}),
-             Contains("key 'expression' is missing"));
+             Contains("key 'expression' is missing; expected it, because the kind is 'value'"));
+  CHECK_THAT(refusal({{"kind", "value"}, {"printed", {"4", "5"}}, {"expression", "a"}}),
+             Contains("claim 'c1': a range is printed; expected one number"));
+  CHECK_THAT(refusal({{"kind", "band"}, {"printed", "4"}, {"expression", "a"}}),
+             Contains("claim 'c1': one number is printed; expected two"));
+  // The name of a key follows from its declaration.
+  CHECK_THAT(refusal({{"kind", "agree"}, {"left", "a"}}), Contains("key 'right' is missing"));
+  CHECK_THAT(refusal({{"kind", "inequality"}, {"left", "a"}, {"right", "b"}}),
+             Contains("key 'relation' is missing"));
+  CHECK_THAT(refusal({{"kind", "range"}, {"printed", {"4", "5"}}, {"expression", "a"}}),
+             Contains("key 'over' is missing"));
+  CHECK_THAT(refusal({{"kind", "table"}, {"tables", {"T"}}}), Contains("key 'series' is missing"));
+  CHECK_THAT(refusal({{"kind", "dimension"}, {"expression", "a"}}),
+             Contains("key 'claimed_dimension' is missing"));
   CHECK_THAT(
       refusal({{"kind", "value"}, {"printed", "4"}, {"unit", "furlong"}, {"expression", "a"}}),
       Contains("claim 'c1': unknown unit 'furlong'"));

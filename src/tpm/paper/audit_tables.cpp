@@ -2,6 +2,7 @@
 // The kinds of claims that speak of many numbers at once: bands, tables and misfits.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tpm/base/distributions.hpp"
@@ -28,19 +29,17 @@ std::string row_words(const PrintedTable& table, std::size_t row) {
                              with_unit(table.rows[row].front(), table.columns.front().unit));
 }
 
-/// True if the row has the printed values that key `rows` asks for.
+/// True if the row has the printed values that the claim asks for.
 bool selected(const ClaimReader& claim, const PrintedTable& table, std::size_t row) {
-  if (!claim.has("rows")) return true;
-  for (const auto& [name, value] : claim.required("rows").items()) {
-    if (table.rows[row][table.column(name, claim.at())] != value.get<std::string>()) return false;
-  }
-  return true;
+  return !claim->rows || std::ranges::all_of(*claim->rows, [&](const auto& asked) {
+    return table.rows[row][table.column(asked.first, claim.at())] == asked.second;
+  });
 }
 
 std::vector<ClaimRow> claim_rows(const ClaimReader& claim) {
   std::vector<ClaimRow> rows;
-  for (const Json& id : claim.required("tables")) {
-    const PrintedTable& table = claim.set().table(id.get<std::string>(), claim.at());
+  for (const std::string& id : claim.needed(&Claim::tables)) {
+    const PrintedTable& table = claim.set().table(id, claim.at());
     for (std::size_t r = 0; r < table.rows.size(); ++r) {
       if (selected(claim, table, r)) rows.push_back({&table, r, row_words(table, r)});
     }
@@ -49,19 +48,10 @@ std::vector<ClaimRow> claim_rows(const ClaimReader& claim) {
   return rows;
 }
 
-struct Series {
-  std::string column;
-  std::string expression;
-};
-
-std::vector<Series> series_of(const ClaimReader& claim) {
-  return mapped<Series>(claim.required("series"), [](const Json& item) {
-    return Series{item.at("column").get<std::string>(), item.at("expression").get<std::string>()};
-  });
-}
-
-std::string expressions(const std::vector<Series>& all) {
-  const auto words = [](const Series& s) { return fmt::format("{} = {}", s.column, s.expression); };
+std::string expressions(const std::vector<ClaimSeries>& all) {
+  const auto words = [](const ClaimSeries& s) {
+    return fmt::format("{} = {}", s.column, s.expression);
+  };
   return listed(all, words, "; ");
 }
 
@@ -69,7 +59,7 @@ void check_single_band(const ClaimReader& claim, Finding& finding) {
   const ClaimValue value(claim);
   const Scope scope = claim.scope();
   const Unit unit = claim.unit();
-  const auto [low, high] = printed_pair(claim);
+  const auto [low, high] = claim.printed_pair();
   const double computed = value.total(scope) / unit.to_si;
   finding.printed = fmt::format("{} - {}", low.text, with_unit(high.text, unit));
   finding.recomputed = {computed, unit};
@@ -84,8 +74,8 @@ void check_single_band(const ClaimReader& claim, Finding& finding) {
 }
 
 void check_band_rows(const ClaimReader& claim, Finding& finding) {
-  const std::string expression = claim.text("expression");
-  const auto band = claim.required("band").get<std::vector<std::string>>();
+  const std::string& expression = claim.needed(&Claim::expression);
+  const Claim::Texts& band = claim.needed(&Claim::band);
   finding.expression = expression;
   finding.verdict = AuditVerdict::holds;
   AuditCells cells;
@@ -113,7 +103,7 @@ void check_band_rows(const ClaimReader& claim, Finding& finding) {
 }  // namespace
 
 void check_band(const ClaimReader& claim, Finding& finding) {
-  if (claim.has("tables")) {
+  if (claim->tables) {
     check_band_rows(claim, finding);
   } else {
     check_single_band(claim, finding);
@@ -121,13 +111,13 @@ void check_band(const ClaimReader& claim, Finding& finding) {
 }
 
 void check_table(const ClaimReader& claim, Finding& finding) {
-  const std::vector<Series> series = series_of(claim);
+  const std::vector<ClaimSeries>& series = claim.needed(&Claim::series);
   AuditCells cells;
   double worst = 0.0;
   finding.verdict = AuditVerdict::holds;
   for (const ClaimRow& row : claim_rows(claim)) {
     const Scope scope = claim.row_scope(*row.table, row.row);
-    for (const Series& s : series) {
+    for (const ClaimSeries& s : series) {
       const std::size_t column = row.table->column(s.column, claim.at());
       const Unit& unit = row.table->columns[column].unit;
       const DigitCheck check =
@@ -148,7 +138,7 @@ void check_table(const ClaimReader& claim, Finding& finding) {
 }
 
 void check_misfit(const ClaimReader& claim, Finding& finding) {
-  const std::vector<Series> series = series_of(claim);
+  const std::vector<ClaimSeries>& series = claim.needed(&Claim::series);
   const Unit plain{"", Dimension::dimensionless, 1.0};
   const Unit percent = parse_unit("%", claim.at());
   double squared = 0.0;
@@ -156,7 +146,7 @@ void check_misfit(const ClaimReader& claim, Finding& finding) {
   int data = 0;
   for (const ClaimRow& row : claim_rows(claim)) {
     const Scope scope = claim.row_scope(*row.table, row.row);
-    for (const Series& s : series) {
+    for (const ClaimSeries& s : series) {
       const std::size_t column = row.table->column(s.column, claim.at());
       const Unit& unit = row.table->columns[column].unit;
       const double measured = row.table->si(row.row, column, claim.at());
@@ -177,8 +167,8 @@ void check_misfit(const ClaimReader& claim, Finding& finding) {
   finding.printed = fmt::format("{} data", data);
   finding.difference_percent = 100.0 * worst;
   finding.recomputed = {100.0 * worst, percent};
-  if (!claim.has("relative_error")) return;
-  const double sigma = claim.quantity(claim.text("relative_error"), claim.scope());
+  if (!claim->relative_error) return;
+  const double sigma = claim.quantity(*claim->relative_error, claim.scope());
   if (!(sigma > 0.0)) throw bad_input(claim.at(), "'relative_error' is not above 0", "e.g. 10 %");
   const double limit = chi_squared_quantile(0.95, data);
   finding.recomputed = {squared / (sigma * sigma), plain};

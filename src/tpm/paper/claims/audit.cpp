@@ -60,12 +60,11 @@ Placeholders placeholders(const ClaimReader& claim, const Finding& finding) {
     values["total"] = std::to_string(finding.cells->cells);
     values["rounded"] = std::to_string(finding.cells->by_rounding);
   }
-  if (claim.has("report")) {
-    for (const auto& [name, item] : claim.required("report").items()) {
-      const Unit unit = parse_unit(item.value("unit", ""), claim.at());
-      const double si = claim.evaluate(item.at("expression").get<std::string>(), claim.scope());
-      values[name] = number_text({si / unit.to_si, unit});
-    }
+  if (!claim->report) return values;
+  for (const auto& [name, number] : *claim->report) {
+    const Unit unit = parse_unit(number.unit.value_or(""), claim.at());
+    const double si = claim.evaluate(number.expression, claim.scope());
+    values[name] = number_text({si / unit.to_si, unit});
   }
   return values;
 }
@@ -88,28 +87,25 @@ std::string fill(const std::string& text, const Placeholders& values, std::strin
   return filled.append(text, from);
 }
 
-/// The template that belongs to the verdict.
-std::string_view consequence_key(const Finding& finding) {
-  if (finding.verdict == AuditVerdict::undetermined) return "if_open";
-  return finding.stands() ? "if_holds" : "if_fails";
-}
-
-Finding examine(const ClaimSet& set, const Json& item) {
+Finding examine(const ClaimSet& set, const Claim& item) {
   const ClaimReader claim(set, item);
   Finding finding;
-  finding.id = claim.text("id");
-  finding.topic = claim.text_or("topic", "");
-  finding.kind = claim.text("kind");
-  finding.where = claim.text("where");
-  finding.claim = claim.text("quote");
+  finding.id = item.id;
+  finding.topic = item.topic.value_or("");
+  finding.kind = item.kind;
+  finding.where = item.where;
+  finding.claim = item.quote;
   kind_named(finding.kind, claim.at()).check(claim, finding);
   const Placeholders values = placeholders(claim, finding);
   // All templates are filled, so that a wrong one does not wait for the day it is needed.
-  std::map<std::string_view, std::string> consequences;
-  for (const std::string_view key : {"if_holds", "if_fails", "if_open"}) {
-    if (claim.has(key)) consequences[key] = fill(claim.text(key), values, claim.at());
-  }
-  finding.consequence = consequences[consequence_key(finding)];
+  const auto filled = [&](const std::optional<std::string>& text) {
+    return text ? fill(*text, values, claim.at()) : std::string{};
+  };
+  const std::string holds = filled(item.if_holds), fails = filled(item.if_fails);
+  const std::string open = filled(item.if_open);
+  finding.consequence = finding.verdict == AuditVerdict::undetermined ? open
+                        : finding.stands()                            ? holds
+                                                                      : fails;
   return finding;
 }
 
@@ -149,7 +145,7 @@ AuditReport run_audit(const Json& claims, std::string_view file) {
   AuditReport report;
   report.title = set.title;
   report.file = set.file;
-  for (const Json& item : set.claims) report.findings.push_back(examine(set, item));
+  for (const Claim& item : set.claims) report.findings.push_back(examine(set, item));
   return report;
 }
 

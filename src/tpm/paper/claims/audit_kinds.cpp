@@ -19,10 +19,9 @@ namespace {
 
 /// The inputs that the cause search may change: those named in `search`, else all.
 std::vector<AuditInput> searchable(const ClaimReader& claim, std::vector<AuditInput> inputs) {
-  if (!claim.has("search")) return inputs;
-  const auto names = claim.required("search").get<std::vector<std::string>>();
+  if (!claim->search) return inputs;
   std::erase_if(inputs, [&](const AuditInput& input) {
-    return std::find(names.begin(), names.end(), input.name) == names.end();
+    return std::ranges::find(*claim->search, input.name) == claim->search->end();
   });
   return inputs;
 }
@@ -50,16 +49,14 @@ double inverse_laplace(const Transform& transform, double time) {
 
 /// Left side of an "agree" claim in a scope; the time of a transform is bound there.
 double left_side(const ClaimReader& claim, const Scope& scope) {
-  const std::string left = claim.text("left");
-  if (!claim.has("transform")) return claim.evaluate(left, scope);
-  const auto variable = claim.required("transform").at("variable").get<std::string>();
-  const auto time_name = claim.required("transform").at("time").get<std::string>();
-  const double time = claim.evaluate(time_name, scope);
+  const std::string& left = claim.needed(&Claim::left);
+  if (!claim->transform) return claim.evaluate(left, scope);
+  const double time = claim.evaluate(claim->transform->time, scope);
   if (!(time > 0.0)) throw bad_input(claim.at(), "inverse transform at t <= 0", "times above 0");
   return inverse_laplace(
       [&](double s) {
         Scope inner = scope;
-        inner.values[variable] = s;
+        inner.values[claim->transform->variable] = s;
         return claim.evaluate(left, inner);
       },
       time);
@@ -67,11 +64,10 @@ double left_side(const ClaimReader& claim, const Scope& scope) {
 
 /// The scopes in which an "agree" claim is compared, with words for each.
 std::vector<std::pair<std::string, Scope>> samples(const ClaimReader& claim) {
-  if (!claim.has("vary")) return {{"", claim.scope()}};
-  const Json& vary = claim.required("vary");
-  const auto symbol = vary.at("symbol").get<std::string>();
+  if (!claim->vary) return {{"", claim.scope()}};
+  const auto& [symbol, values] = *claim->vary;
   std::vector<std::pair<std::string, Scope>> all;
-  for (const auto& value : vary.at("values").get<std::vector<std::string>>()) {
+  for (const std::string& value : values) {
     Scope scope = claim.scope();
     // A number, not a formula: it must mean the same in every definition that uses the name.
     scope.values[symbol] = claim.quantity(value, scope);
@@ -104,25 +100,11 @@ AuditVerdict audit_verdict(DigitVerdict verdict) noexcept {
 
 }  // namespace
 
-std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim) {
-  const Json& printed = claim.required("printed");
-  if (!printed.is_array()) {
-    throw bad_input(claim.at(), "key 'printed' is one number", "two, low and high");
-  }
-  auto low = parse_printed(printed.at(0).get<std::string>(), claim.at());
-  auto high = parse_printed(printed.at(1).get<std::string>(), claim.at());
-  if (!(low.value < high.value)) {
-    throw bad_input(claim.at(), fmt::format("'printed' is {} to {}", low.text, high.text),
-                    "low before high");
-  }
-  return {std::move(low), std::move(high)};
-}
-
 void check_value(const ClaimReader& claim, Finding& finding) {
   const ClaimValue value(claim);
   const Scope scope = claim.scope();
   const Unit unit = claim.unit();
-  const PrintedNumber printed = parse_printed(claim.text("printed"), claim.at());
+  const PrintedNumber printed = claim.printed();
   const DigitCheck check = compare_digits(printed, value.total(scope) / unit.to_si);
   finding.printed = with_unit(printed.text, unit);
   finding.recomputed = {check.computed, unit};
@@ -149,19 +131,17 @@ void add_check(Finding& finding, std::string what, const DigitCheck& check, cons
 void check_range(const ClaimReader& claim, Finding& finding) {
   const ClaimValue value(claim);
   const Unit unit = claim.unit();
-  const auto [low, high] = printed_pair(claim);
-  const Json& over = claim.required("over");
-  const auto symbol = over.at("symbol").get<std::string>();
+  const auto [low, high] = claim.printed_pair();
+  const ClaimRange& over = claim.needed(&Claim::over);
   finding.printed = fmt::format("{} - {}", low.text, with_unit(high.text, unit));
   finding.expression = value.expression();
   double worst = 0.0;
   finding.verdict = AuditVerdict::holds;
-  for (const auto& [printed, end] : {std::pair(low, "from"), std::pair(high, "to")}) {
+  for (const auto& [printed, end] : {std::pair(low, over.from), std::pair(high, over.to)}) {
     Scope scope = claim.scope();
-    const auto at_text = over.at(end).get<std::string>();
-    scope.values[symbol] = claim.quantity(at_text, scope);
+    scope.values[over.symbol] = claim.quantity(end, scope);
     const DigitCheck check = compare_digits(printed, value.total(scope) / unit.to_si);
-    add_check(finding, fmt::format("{} = {}", symbol, at_text), check, unit);
+    add_check(finding, fmt::format("{} = {}", over.symbol, end), check, unit);
     const double difference = check.difference_percent.value_or(0.0);
     if (!finding.recomputed || std::abs(difference) > std::abs(worst)) {
       finding.recomputed = {check.computed, unit};
@@ -192,9 +172,9 @@ const PrintedSymbol* printed_alone(const ClaimReader& claim, const std::string& 
 }  // namespace
 
 void check_agree(const ClaimReader& claim, Finding& finding) {
-  const std::string left = claim.text("left");
-  const std::string right = claim.text("right");
-  const double tolerance = parse_number(claim.text_or("tolerance", "1e-9"), claim.at());
+  const std::string& left = claim.needed(&Claim::left);
+  const std::string& right = claim.needed(&Claim::right);
+  const double tolerance = parse_number(claim->tolerance.value_or("1e-9"), claim.at());
   const Unit unit = claim.unit();
   double worst = -1.0;
   for (const auto& [words, scope] : samples(claim)) {
@@ -222,18 +202,17 @@ void check_agree(const ClaimReader& claim, Finding& finding) {
     finding.recomputed = {b, unit};
     finding.difference_percent = percent;
     finding.inputs = claim.inputs(right, scope);
-    if (!claim.has("transform")) append(finding.inputs, claim.inputs(left, scope));
+    if (!claim->transform) append(finding.inputs, claim.inputs(left, scope));
   }
-  finding.expression = claim.has("transform")
-                           ? fmt::format("inverse Laplace of {} = {}", left, right)
-                           : fmt::format("{} = {}", left, right);
+  finding.expression = claim->transform ? fmt::format("inverse Laplace of {} = {}", left, right)
+                                        : fmt::format("{} = {}", left, right);
   finding.verdict = worst <= tolerance ? AuditVerdict::holds : AuditVerdict::contradicted;
 }
 
 void check_inequality(const ClaimReader& claim, Finding& finding) {
-  const std::string left = claim.text("left");
-  const std::string right = claim.text("right");
-  const std::string relation = claim.text("relation");
+  const std::string& left = claim.needed(&Claim::left);
+  const std::string& right = claim.needed(&Claim::right);
+  const std::string& relation = claim.needed(&Claim::relation);
   const Scope scope = claim.scope();
   const Unit unit = claim.unit();
   const double a = claim.evaluate(left, scope) / unit.to_si;
@@ -255,7 +234,7 @@ void check_inequality(const ClaimReader& claim, Finding& finding) {
 }
 
 void check_dimension(const ClaimReader& claim, Finding& finding) {
-  const std::string name = claim.text("expression");
+  const std::string& name = claim.needed(&Claim::expression);
   const PrintedSymbol* symbol = claim.set().symbol(name);
   if (symbol == nullptr) {
     const auto known = mapped<std::string>(claim.set().symbols, &PrintedSymbol::name);
@@ -264,8 +243,7 @@ void check_dimension(const ClaimReader& claim, Finding& finding) {
         fmt::format("unknown symbol '{}'{}", printable(name), did_you_mean(name, known)),
         "a name from 'symbols'");
   }
-  const std::string claimed = claim.text("claimed_dimension");
-  const Unit example = parse_unit(claimed, claim.at());
+  const Unit example = parse_unit(claim.needed(&Claim::claimed_dimension), claim.at());
   finding.printed = with_unit(symbol->value, symbol->unit);
   finding.expression =
       fmt::format("'{}' is a unit of {}; a {} is claimed", symbol->unit.symbol,

@@ -33,7 +33,4 @@ void check_misfit(const ClaimReader& claim, Finding& finding);
 /// Adds a comparison of digits to the details, and to the verdict unless that is worse already.
 void add_check(Finding& finding, std::string what, const DigitCheck& check, const Unit& unit);
 
-/// Key "printed" of a range or a band: two numbers, low before high.
-[[nodiscard]] std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim);
-
 }  // namespace tpm::paper

@@ -13,32 +13,33 @@
 
 namespace tpm::paper {
 
-ClaimReader::ClaimReader(const ClaimSet& set, const Json& claim)
-    : set_(set),
-      claim_(claim),
-      at_(fmt::format("{}: claim '{}'", set.file, printable(claim.at("id").get<std::string>()))) {}
+ClaimReader::ClaimReader(const ClaimSet& set, const Claim& claim)
+    : set_(set), claim_(claim), at_(fmt::format("{}: claim '{}'", set.file, printable(claim.id))) {}
 
-const Json& ClaimReader::required(std::string_view key) const {
-  const auto found = claim_.find(key);
-  if (found == claim_.end()) {
-    throw bad_input(at_, fmt::format("key '{}' is missing", key),
-                    fmt::format("it, because the kind is '{}'", printable(text("kind"))));
-  }
-  return *found;
-}
-
-std::string ClaimReader::text(std::string_view key) const {
-  const Json& value = required(key);
-  if (!value.is_string()) throw bad_input(at_, fmt::format("key '{}' is a list", key), "one text");
-  return value.get<std::string>();
-}
-
-std::string ClaimReader::text_or(std::string_view key, std::string_view otherwise) const {
-  return has(key) ? text(key) : std::string(otherwise);
+void ClaimReader::refuse_without(const std::string& key) const {
+  throw bad_input(at_, fmt::format("key '{}' is missing", key),
+                  fmt::format("it, because the kind is '{}'", printable(claim_.kind)));
 }
 
 Unit ClaimReader::unit() const {
-  return parse_unit(text_or("unit", ""), at_);
+  return parse_unit(claim_.unit.value_or(""), at_);
+}
+
+PrintedNumber ClaimReader::printed() const {
+  const Claim::Texts& printed = needed(&Claim::printed);
+  if (printed.size() == 1) return parse_printed(printed.front(), at_);
+  throw bad_input(at_, "a range is printed", "one number");
+}
+
+std::pair<PrintedNumber, PrintedNumber> ClaimReader::printed_pair() const {
+  const Claim::Texts& printed = needed(&Claim::printed);
+  if (printed.size() != 2) {
+    throw bad_input(at_, "one number is printed", "two, low and high");
+  }
+  auto low = parse_printed(printed[0], at_);
+  auto high = parse_printed(printed[1], at_);
+  if (low.value < high.value) return {std::move(low), std::move(high)};
+  throw bad_input(at_, fmt::format("printed is {} to {}", low.text, high.text), "low before high");
 }
 
 void ClaimReader::bind(Scope& scope, const std::string& name, const std::string& value) const {
@@ -56,10 +57,8 @@ void ClaimReader::bind(Scope& scope, const std::string& name, const std::string&
 }
 
 void ClaimReader::bind_own(Scope& scope) const {
-  if (!has("with")) return;
-  for (const auto& [name, value] : required("with").items()) {
-    bind(scope, name, value.get<std::string>());
-  }
+  if (!claim_.with) return;
+  for (const auto& [name, value] : *claim_.with) bind(scope, name, value);
 }
 
 Scope ClaimReader::scope() const {
@@ -115,27 +114,19 @@ void append(std::vector<AuditInput>& inputs, std::vector<AuditInput> more) {
   }
 }
 
-ClaimValue::ClaimValue(const ClaimReader& reader) : reader_(reader) {
-  if (reader.has("solve")) {
-    const Json& solve = reader.required("solve");
-    unknown_ = solve.at("unknown").get<std::string>();
-    left_ = solve.at("left").get<std::string>();
-    right_ = solve.at("right").get<std::string>();
-    from_ = solve.at("from").get<std::string>();
-    to_ = solve.at("to").get<std::string>();
-    terms_ = {unknown_};
-    expression_ = fmt::format("{} that solves {} = {}", unknown_, left_, right_);
-  } else if (reader.has("terms")) {
-    terms_ = reader.required("terms").get<std::vector<std::string>>();
-    expression_ = fmt::format("{}", fmt::join(terms_, " + "));
-  } else {
-    terms_ = {reader.text("expression")};
-    expression_ = terms_.front();
+ClaimValue::ClaimValue(const ClaimReader& reader) : reader_(reader), solve_(reader->solve) {
+  if (solve_) {
+    terms_ = {solve_->unknown};
+    expression_ =
+        fmt::format("{} that solves {} = {}", solve_->unknown, solve_->left, solve_->right);
+    return;
   }
+  terms_ = reader->terms ? *reader->terms : Claim::Texts{reader.needed(&Claim::expression)};
+  expression_ = fmt::format("{}", fmt::join(terms_, " + "));
 }
 
 double ClaimValue::term(std::size_t index, const Scope& scope) const {
-  return unknown_.empty() ? reader_.evaluate(terms_[index], scope) : root(scope);
+  return solve_ ? root(scope) : reader_.evaluate(terms_[index], scope);
 }
 
 double ClaimValue::total(const Scope& scope) const {
@@ -147,17 +138,18 @@ double ClaimValue::total(const Scope& scope) const {
 double ClaimValue::root(const Scope& scope) const {
   const auto residual = [&](double value) {
     Scope inner = scope;
-    inner.formulas.erase(unknown_);
-    inner.values[unknown_] = value;
-    return reader_.evaluate(left_, inner) - reader_.evaluate(right_, inner);
+    inner.formulas.erase(solve_->unknown);
+    inner.values[solve_->unknown] = value;
+    return reader_.evaluate(solve_->left, inner) - reader_.evaluate(solve_->right, inner);
   };
-  const double low = reader_.quantity(from_, scope);
-  const double high = reader_.quantity(to_, scope);
+  const double low = reader_.quantity(solve_->from, scope);
+  const double high = reader_.quantity(solve_->to, scope);
   const double at_low = residual(low);
   const double at_high = residual(high);
   if (!(low < high) || at_low * at_high > 0.0) {
-    throw bad_input(reader_.at(), fmt::format("the equation for '{}' has no root there", unknown_),
-                    fmt::format("a sign change between 'from' ({}) and 'to' ({})", from_, to_));
+    throw bad_input(
+        reader_.at(), fmt::format("the equation for '{}' has no root there", solve_->unknown),
+        fmt::format("a sign change between 'from' ({}) and 'to' ({})", solve_->from, solve_->to));
   }
   if (at_low == 0.0) return low;
   if (at_high == 0.0) return high;
@@ -169,7 +161,7 @@ double ClaimValue::root(const Scope& scope) const {
 }
 
 std::vector<AuditInput> ClaimValue::inputs(const Scope& scope) const {
-  if (unknown_.empty()) {
+  if (!solve_) {
     std::vector<AuditInput> all;
     for (const std::string& t : terms_) {
       append(all, reader_.inputs(t, scope));
@@ -177,9 +169,9 @@ std::vector<AuditInput> ClaimValue::inputs(const Scope& scope) const {
     return all;
   }
   Scope inner = scope;
-  inner.values[unknown_] = root(scope);
-  auto inputs = reader_.inputs(fmt::format("({}) - ({})", left_, right_), inner);
-  std::erase_if(inputs, [&](const AuditInput& i) { return i.name == unknown_; });
+  inner.values[solve_->unknown] = root(scope);
+  auto inputs = reader_.inputs(fmt::format("({}) - ({})", solve_->left, solve_->right), inner);
+  std::erase_if(inputs, [&](const AuditInput& i) { return i.name == solve_->unknown; });
   return inputs;
 }
 

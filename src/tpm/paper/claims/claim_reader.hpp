@@ -1,34 +1,45 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/printed_number.hpp"
 #include "tpm/paper/claims/audit.hpp"
 #include "tpm/paper/claims/claims.hpp"
 
 namespace tpm::paper {
 
-/// Reads the keys of one claim and evaluates formulas in its scope. Errors name file and claim.
+/// One claim, whose formulas are evaluated in its scope. Errors name file and claim.
 class ClaimReader {
  public:
   /// Keeps references to both.
-  ClaimReader(const ClaimSet& set, const Json& claim);
+  ClaimReader(const ClaimSet& set, const Claim& claim);
 
   [[nodiscard]] const ClaimSet& set() const noexcept { return set_; }
   [[nodiscard]] const std::string& at() const noexcept { return at_; }
 
-  [[nodiscard]] bool has(std::string_view key) const { return claim_.contains(key); }
-  /// Value of a key that this kind of claim needs; Error(bad_input) if it is missing.
-  [[nodiscard]] const Json& required(std::string_view key) const;
-  [[nodiscard]] std::string text(std::string_view key) const;
-  [[nodiscard]] std::string text_or(std::string_view key, std::string_view otherwise) const;
-  /// Key "unit", "" if missing.
+  [[nodiscard]] const Claim* operator->() const noexcept { return &claim_; }
+  /// What this kind of claim needs; Error(bad_input) with the key if it is missing.
+  template <class V>
+  [[nodiscard]] const V& needed(std::optional<V> Claim::*member) const {
+    if (const std::optional<V>& value = claim_.*member) return *value;
+    Claim only;
+    only.*member = V{};
+    refuse_without(claim_key(only));
+  }
+  /// Of the printed number; of a plain one if the claim says none.
   [[nodiscard]] Unit unit() const;
+  /// The printed number. Throws Error(bad_input) for the ends of a range.
+  [[nodiscard]] PrintedNumber printed() const;
+  /// The ends of a range or a band, low before high.
+  [[nodiscard]] std::pair<PrintedNumber, PrintedNumber> printed_pair() const;
 
-  /// Values that key "with" binds.
+  /// Values that the claim binds.
   [[nodiscard]] Scope scope() const;
-  /// As above for one row of a table: its cells and constants, then "with".
+  /// As above for one row of a table: its cells and constants, then the claim's.
   [[nodiscard]] Scope row_scope(const PrintedTable& table, std::size_t row) const;
   /// Binds a name to a quantity or a formula; the dimension must be that of the symbol.
   void bind(Scope& scope, const std::string& name, const std::string& value) const;
@@ -43,17 +54,17 @@ class ClaimReader {
 
  private:
   void bind_own(Scope& scope) const;
+  [[noreturn]] void refuse_without(const std::string& key) const;
 
   const ClaimSet& set_;
-  const Json& claim_;
+  const Claim& claim_;
   std::string at_;
 };
 
 /// Adds the inputs that are not known yet.
 void append(std::vector<AuditInput>& inputs, std::vector<AuditInput> more);
 
-/// A number for a claim: a sum of terms, or the root of an equation (keys "expression", "terms" or
-/// "solve").
+/// A number for a claim: an expression, a sum of terms, or the root of an equation.
 class ClaimValue {
  public:
   explicit ClaimValue(const ClaimReader& reader);
@@ -71,7 +82,7 @@ class ClaimValue {
 
   const ClaimReader& reader_;
   std::vector<std::string> terms_;
-  std::string unknown_, left_, right_, from_, to_;  ///< of "solve"
+  std::optional<ClaimEquation> solve_;
   std::string expression_;
 };
 

@@ -112,64 +112,101 @@ const Block<PrintedTable>& table_block() {
   return block;
 }
 
-/// A claim as it stands in the file: its kind, which audit_kinds.cpp lists, says which keys it
-/// needs, and ClaimReader reads them.
-FormPtr claim_form() {
-  const FormPtr some = text(1).form, name = name_text().form;
-  const FormPtr printed = either_form({some, list_form(some, 2, 2)});
-  const FormPtr from_to_of_symbol = object_form(
-      "range_of_symbol", "a range of a symbol",
-      {required_key("symbol", name, "which"), required_key("from", some, "its first value"),
-       required_key("to", some, "its last value")});
-  const FormPtr equation = object_form(
+const Block<ClaimRange>& range_block() {
+  using R = ClaimRange;
+  static const Block<R> block("range_of_symbol", "a range of a symbol",
+                              {required(key("symbol", &R::symbol, name_text(), "which")),
+                               required(key("from", &R::from, text(1), "its first value")),
+                               required(key("to", &R::to, text(1), "its last value"))});
+  return block;
+}
+
+const Block<ClaimEquation>& equation_block() {
+  using E = ClaimEquation;
+  static const Block<E> block(
       "equation", "an equation of one unknown",
-      {required_key("unknown", name, "what is looked for"),
-       required_key("left", some, "its left side"), required_key("right", some, "its right side"),
-       required_key("from", some, "least value"), required_key("to", some, "largest value")});
-  const FormPtr vary =
-      object_form("vary", "values of a symbol",
-                  {required_key("symbol", name, "which"),
-                   required_key("values", list_form(some, 1), "quantities or formulas")});
-  const FormPtr transform = object_form("transform", "an inverse Laplace transform",
-                                        {required_key("variable", name, "of the transform"),
-                                         required_key("time", name, "of the function")});
-  const FormPtr series = object_form("series", "an expression beside a column",
-                                     {required_key("column", name, "of the table"),
-                                      required_key("expression", some, "what it should be")});
-  const FormPtr reported = object_form("reported", "a number that the report gives",
-                                       {required_key("expression", some, "its value"),
-                                        optional_key("unit", text().form, "its unit")});
-  return object_form(
+      {required(key("unknown", &E::unknown, name_text(), "what is looked for")),
+       required(key("left", &E::left, text(1), "its left side")),
+       required(key("right", &E::right, text(1), "its right side")),
+       required(key("from", &E::from, text(1), "least value")),
+       required(key("to", &E::to, text(1), "largest value"))});
+  return block;
+}
+
+const Block<ClaimValues>& vary_block() {
+  using V = ClaimValues;
+  static const Block<V> block("vary", "values of a symbol",
+                              {required(key("symbol", &V::symbol, name_text(), "which")),
+                               required(key("values", &V::values, list(text(1), {.fewest = 1}),
+                                            "quantities or formulas"))});
+  return block;
+}
+
+const Block<ClaimTransform>& transform_block() {
+  using T = ClaimTransform;
+  static const Block<T> block(
+      "transform", "an inverse Laplace transform",
+      {required(key("variable", &T::variable, name_text(), "of the transform")),
+       required(key("time", &T::time, name_text(), "of the function"))});
+  return block;
+}
+
+const Block<ClaimSeries>& series_block() {
+  using S = ClaimSeries;
+  static const Block<S> block(
+      "series", "an expression beside a column",
+      {required(key("column", &S::column, name_text(), "of the table")),
+       required(key("expression", &S::expression, text(1), "what it should be"))});
+  return block;
+}
+
+const Block<ClaimNumber>& reported_block() {
+  using N = ClaimNumber;
+  static const Block<N> block("reported", "a number that the report gives",
+                              {required(key("expression", &N::expression, text(1), "its value")),
+                               key("unit", &N::unit, text(), "its unit")});
+  return block;
+}
+
+const Block<Claim>& claim_block() {
+  using C = Claim;
+  static const Block<C> block(
       "claim", "something that the paper says",
-      {required_key("id", some, "its name, once in the file"),
-       optional_key("topic", some, "what it is about"),
-       required_key("kind", some, "how it is checked"),
-       required_key("where", some, "where the paper says so"),
-       required_key("quote", some, "the paper's own words"),
-       optional_key("printed", printed, "the number, or the ends of a range, as printed"),
-       optional_key("unit", text().form, "of the printed number"),
-       optional_key("expression", some, "what the number should be"),
-       optional_key("terms", list_form(some, 2), "or the terms of a sum"),
-       optional_key("solve", equation, "or the root of an equation"),
-       optional_key("left", some, "left side of a relation"),
-       optional_key("right", some, "right side of a relation"),
-       optional_key("relation", one_of({"<", "<=", ">", ">="}).form, "between the two"),
-       optional_key("vary", vary, "at which the claim is examined"),
-       optional_key("over", from_to_of_symbol, "over which the claim is examined"),
-       optional_key("transform", transform, "to be inverted"),
-       optional_key("tolerance", some, "relative"),
-       optional_key("tables", list_form(some, 1), "ids of tables"),
-       optional_key("rows", map_form(some), "names of columns and what they are in the rows meant"),
-       optional_key("series", list_form(series, 1), "columns and what they should be"),
-       optional_key("band", list_form(name, 2, 2), "columns with the ends of a band"),
-       optional_key("relative_error", some, "of the comparison"),
-       optional_key("claimed_dimension", some, "a unit of the dimension that is claimed"),
-       optional_key("with", map_form(some), "names and what is put in their place"),
-       optional_key("search", list_form(name, 0), "symbols that may be the cause of a failure"),
-       optional_key("report", map_form(reported), "further numbers"),
-       optional_key("if_holds", some, "what follows if it holds"),
-       optional_key("if_fails", some, "what follows if it fails"),
-       optional_key("if_open", some, "what follows if it is undetermined")});
+      {required(key("id", &C::id, text(1), "its name, once in the file")),
+       key("topic", &C::topic, text(1), "what it is about"),
+       required(key("kind", &C::kind, text(1), "how it is checked")),
+       where_key(&C::where),
+       required(key("quote", &C::quote, text(1), "the paper's own words")),
+       key("printed", &C::printed, list(text(1), {.fewest = 2, .most = 2, .one_too = true}),
+           "the number, or the ends of a range, as printed"),
+       key("unit", &C::unit, text(), "of the printed number"),
+       key("expression", &C::expression, text(1), "what the number should be"),
+       key("terms", &C::terms, list(text(1), {.fewest = 2}), "or the terms of a sum"),
+       key("solve", &C::solve, equation_block().type(), "or the root of an equation"),
+       key("left", &C::left, text(1), "left side of a relation"),
+       key("right", &C::right, text(1), "right side of a relation"),
+       key("relation", &C::relation, one_of({"<", "<=", ">", ">="}), "between the two"),
+       key("vary", &C::vary, vary_block().type(), "at which the claim is examined"),
+       key("over", &C::over, range_block().type(), "over which the claim is examined"),
+       key("transform", &C::transform, transform_block().type(), "to be inverted"),
+       key("tolerance", &C::tolerance, text(1), "relative"),
+       key("tables", &C::tables, list(text(1), {.fewest = 1}), "ids of tables"),
+       key("rows", &C::rows, map_of(text(1)),
+           "names of columns and what they are in the rows meant"),
+       key("series", &C::series, list(series_block().type(), {.fewest = 1}),
+           "columns and what they should be"),
+       key("band", &C::band, list(name_text(), {.fewest = 2, .most = 2}),
+           "columns with the ends of a band"),
+       key("relative_error", &C::relative_error, text(1), "of the comparison"),
+       key("claimed_dimension", &C::claimed_dimension, text(1),
+           "a unit of the dimension that is claimed"),
+       key("with", &C::with, map_of(text(1)), "names and what is put in their place"),
+       key("search", &C::search, list(name_text()), "symbols that may be the cause of a failure"),
+       key("report", &C::report, map_of(reported_block().type()), "further numbers"),
+       key("if_holds", &C::if_holds, text(1), "what follows if it holds"),
+       key("if_fails", &C::if_fails, text(1), "what follows if it fails"),
+       key("if_open", &C::if_open, text(1), "what follows if it is undetermined")});
+  return block;
 }
 
 struct ClaimsKeys {
@@ -177,7 +214,7 @@ struct ClaimsKeys {
   std::vector<PrintedSymbol> symbols;
   std::vector<Definition> definitions;
   std::vector<PrintedTable> tables;
-  Json claims;
+  std::vector<Claim> claims;
 };
 
 const Block<ClaimsKeys>& claims_block() {
@@ -191,8 +228,8 @@ const Block<ClaimsKeys>& claims_block() {
        required(key("symbols", &K::symbols, list(symbol_block().type()), "named numbers")),
        key("definitions", &K::definitions, list(definition_block().type()), "names for formulas"),
        key("tables", &K::tables, list(table_block().type()), "printed tables"),
-       required(
-           key("claims", &K::claims, as_json(list_form(claim_form(), 1)), "what is recomputed"))});
+       required(key("claims", &K::claims, list(claim_block().type(), {.fewest = 1}),
+                    "what is recomputed"))});
   return block;
 }
 
@@ -246,6 +283,15 @@ const PrintedTable& ClaimSet::table(std::string_view id, std::string_view at) co
   throw unknown_word(at, "unknown table", id, mapped<std::string>(tables, &PrintedTable::id));
 }
 
+std::string claim_key(const Claim& only) {
+  const auto& keys = claim_block().keys();
+  return std::ranges::find_if(keys,
+                              [&](const Key<Claim>& one) {
+                                return !one.form.required && !one.write(only).is_null();
+                              })
+      ->form.name;
+}
+
 std::filesystem::path paper_claims_path() {
   return share_dir() / "data" / "paper_claims.json";
 }
@@ -297,8 +343,7 @@ ClaimSet read_claims(const Json& written, std::string_view file) {
   set.tables = std::move(keys.tables);
   set.claims = std::move(keys.claims);
   require_unique(
-      set.claims, [](const Json& c) { return c.at("id").get<std::string>(); },
-      fmt::format("{}: claims", file));
+      set.claims, [](const Claim& c) { return c.id; }, fmt::format("{}: claims", file));
   return set;
 }
 

@@ -2,6 +2,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
@@ -53,6 +54,58 @@ struct PrintedTable {
   [[nodiscard]] double si(std::size_t row, std::size_t column, std::string_view at) const;
 };
 
+/// An equation of one unknown, whose root lies between two quantities or formulas.
+struct ClaimEquation {
+  std::string unknown, left, right, from, to;
+};
+
+struct ClaimTransform {
+  std::string variable, time;
+};
+
+struct ClaimRange {
+  std::string symbol, from, to;
+};
+
+struct ClaimValues {
+  std::string symbol;
+  std::vector<std::string> values;
+};
+
+/// An expression beside a column of a table.
+struct ClaimSeries {
+  std::string column, expression;
+};
+
+struct ClaimNumber {
+  std::string expression;
+  std::optional<std::string> unit;
+};
+
+/// Something that the paper says. Which members a claim needs follows from its kind
+/// (audit_kinds.hpp).
+struct Claim {
+  using Texts = std::vector<std::string>;
+  using Bindings = std::vector<std::pair<std::string, std::string>>;
+
+  std::string id, kind, where, quote;
+  std::optional<std::string> topic, unit, expression, left, right, relation, tolerance,
+      relative_error, claimed_dimension, if_holds, if_fails, if_open;
+  std::optional<Texts> printed;  ///< a number, or the ends of a range
+  std::optional<Texts> terms, tables, band, search;
+  std::optional<Bindings> rows, with;
+  std::optional<ClaimEquation> solve;
+  std::optional<ClaimTransform> transform;
+  std::optional<ClaimRange> over;
+  std::optional<ClaimValues> vary;
+  std::optional<std::vector<ClaimSeries>> series;
+  std::optional<std::vector<std::pair<std::string, ClaimNumber>>> report;
+};
+
+/// The key of a member that a claim may leave out.
+/// @param only a claim with this member and no other of them
+[[nodiscard]] std::string claim_key(const Claim& only);
+
 /// A claims file, read: what a paper prints, in which units, and the formulas that connect it.
 struct ClaimSet {
   std::string file;  ///< for messages
@@ -60,7 +113,7 @@ struct ClaimSet {
   Evaluator evaluator;
   std::vector<PrintedSymbol> symbols;
   std::vector<PrintedTable> tables;
-  Json claims;  ///< array; each has a unique id and a kind
+  std::vector<Claim> claims;  ///< each has a unique id
 
   [[nodiscard]] const PrintedSymbol* symbol(std::string_view name) const noexcept;
   /// Throws Error(bad_input) starting with `at` if there is no such table.
