@@ -114,14 +114,14 @@ class Calibration {
   double determinant_ = 0.0;
 };
 
-bool has_value(const Json& point) {
-  return point.is_object() && point.contains("value") && point.at("value").is_array() &&
-         point.at("value").size() >= 2;
-}
-
-void add_value(const Json& point, const std::string& where, DigitizedDataset& dataset) {
-  dataset.x.push_back(number(point.at("value")[0], where));
-  dataset.y.push_back(number(point.at("value")[1], where));
+/// Adds the coordinates of a point. False if the file states none.
+bool add_value(const Json& point, const std::string& where, DigitizedDataset& dataset) {
+  if (!point.is_object()) return false;
+  const auto value = point.find("value");
+  if (value == point.end() || !value->is_array() || value->size() < 2) return false;
+  dataset.x.push_back(number(value->at(0), where));
+  dataset.y.push_back(number(value->at(1), where));
+  return true;
 }
 
 const Json& axes_of(const Json& project, const Json& dataset, const std::string& where) {
@@ -142,10 +142,7 @@ DigitizedDataset read_dataset(const Json& project, const Json& json, const std::
   std::optional<Calibration> calibration;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::string place = fmt::format("{}, point {}", where, i + 1);
-    if (has_value(points[i])) {
-      add_value(points[i], place, dataset);
-      continue;
-    }
+    if (add_value(points[i], place, dataset)) continue;
     const Pixel pixel{number(member(points[i], "x", place), place),
                       number(member(points[i], "y", place), place)};
     if (!calibration) calibration.emplace(axes_of(project, json, where), where);
@@ -162,8 +159,8 @@ DigitizedDataset read_old_dataset(const Json& json, const std::string& file) {
   const Json& points = list(json, "data", where);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::string place = fmt::format("{}, point {}", where, i + 1);
-    if (!has_value(points[i])) throw bad_input(place, "has no value", "a list of x and y");
-    add_value(points[i], place, dataset);
+    if (add_value(points[i], place, dataset)) continue;
+    throw bad_input(place, "has no value", "a list of x and y");
   }
   return dataset;
 }

@@ -244,14 +244,27 @@ Error bad_row(const GroupReader& group, std::size_t row, const RowFault& fault) 
                    fault.expected);
 }
 
-/// Throws Error(bad_input) for the first number that is none.
-void require_finite(const GroupReader& group, const char* column, const std::vector<double>& values,
-                    bool any_sign = true) {
+/// A column. Throws Error(bad_input) for the first number that is none.
+std::vector<double> finite(GroupReader& group, const char* column) {
+  std::vector<double> values = group.numbers(column);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!std::isfinite(values[i])) throw bad_row(group, i, {column, "not a number", "a number"});
-    if (any_sign || values[i] >= 0.0) continue;
+  }
+  return values;
+}
+
+std::vector<double> finite_if_any(GroupReader& group, const char* column) {
+  return group.has(column) ? finite(group, column) : std::vector<double>{};
+}
+
+/// A column of standard deviations, if there is one.
+std::vector<double> deviations(GroupReader& group, const char* column) {
+  std::vector<double> values = finite_if_any(group, column);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] >= 0.0) continue;
     throw bad_row(group, i, {column, fmt::format("{} is negative", values[i]), "at least 0"});
   }
+  return values;
 }
 
 PointSet read_points(GroupReader& group, CurveHeader header) {
@@ -285,18 +298,14 @@ Recording read_recording(GroupReader& group, CurveHeader header) {
   Recording recording;
   recording.header = std::move(header);
   recording.provenance = parse_provenance(group.attribute("provenance"), group.where());
-  recording.response = group.numbers("response");
+  recording.response = finite(group, "response");
   recording.response_quantity = group.quantity("response");
-  if (group.has("time")) recording.time_s = group.numbers("time");
+  recording.time_s = finite_if_any(group, "time");
   if (group.has("drive")) {
-    recording.drive = group.numbers("drive");
+    recording.drive = finite(group, "drive");
     recording.drive_quantity = group.quantity("drive");
   }
-  if (group.has("response_sd")) recording.response_sd = group.numbers("response_sd");
-  require_finite(group, "response", recording.response);
-  require_finite(group, "time", recording.time_s);
-  require_finite(group, "drive", recording.drive);
-  require_finite(group, "response_sd", recording.response_sd, false);
+  recording.response_sd = deviations(group, "response_sd");
   if (recording.response.empty()) throw bad_input(group.where(), "has no rows", "one at least");
   for (std::size_t i = 0; i < recording.time_s.size(); ++i) {
     if (is_time_in_range(recording.time_s[i])) continue;
@@ -319,16 +328,11 @@ Spectrum read_spectrum(GroupReader& group, CurveHeader header) {
   spectrum.header = std::move(header);
   spectrum.provenance = parse_provenance(group.attribute("provenance"), group.where());
   spectrum.dimension = quantity_dimension(group.quantity("storage"));
-  spectrum.frequency_Hz = group.numbers("frequency");
-  spectrum.storage = group.numbers("storage");
-  spectrum.loss = group.numbers("loss");
-  if (group.has("storage_sd")) spectrum.storage_sd = group.numbers("storage_sd");
-  if (group.has("loss_sd")) spectrum.loss_sd = group.numbers("loss_sd");
-  require_finite(group, "frequency", spectrum.frequency_Hz);
-  require_finite(group, "storage", spectrum.storage);
-  require_finite(group, "loss", spectrum.loss);
-  require_finite(group, "storage_sd", spectrum.storage_sd, false);
-  require_finite(group, "loss_sd", spectrum.loss_sd, false);
+  spectrum.frequency_Hz = finite(group, "frequency");
+  spectrum.storage = finite(group, "storage");
+  spectrum.loss = finite(group, "loss");
+  spectrum.storage_sd = deviations(group, "storage_sd");
+  spectrum.loss_sd = deviations(group, "loss_sd");
   if (const auto fault =
           find_spectrum_fault(spectrum.frequency_Hz, spectrum.storage, spectrum.loss)) {
     throw bad_row(group, fault->row, {"row", fault->what, fault->expected});
