@@ -457,4 +457,8 @@ TEST_CASE("one table says what protocols need, for scenes and for what sets the 
   CHECK_THAT(
       refusal_of([&] { (void)parsed(R"({"kind": "creep", "depth": "1 mm"})", Openness::open); }),
       Contains("is no key of the kind 'creep'; expected one of load, duration"));
+  const ProtocolBlock endless =
+      parsed(R"({"kind": "step_hold", "depth": "4 mm", "hold": "1e200 s"})", Openness::complete);
+  CHECK_THAT(refusal_of([&] { (void)endless.protocol({"f.json: key /protocol"}); }),
+             Contains("f.json: key /protocol: ") && Contains("expected times within 1e15 s"));
 }

@@ -205,15 +205,19 @@ double ProtocolBlock::number(std::string_view key, const DocumentPlace& place) c
 Protocol ProtocolBlock::protocol(const DocumentPlace& place) const {
   std::vector<double> number;  // in the order of the keys
   for (const NumberKey& key : numbers_of(kind)) number.push_back(in_range(*this, key, place));
-  switch (kind) {
-    case ProtocolKind::ramp_hold:
-      return ramp_and_hold(number[0], number[1], number[2]);
-    case ProtocolKind::step_hold:
-      return step_and_hold(number[0], number[1]);
-    case ProtocolKind::creep:
-      return creep(number[0], number[1]);
-    case ProtocolKind::knots:
-      break;
+  try {
+    switch (kind) {
+      case ProtocolKind::ramp_hold:
+        return ramp_and_hold(number[0], number[1], number[2]);
+      case ProtocolKind::step_hold:
+        return step_and_hold(number[0], number[1]);
+      case ProtocolKind::creep:
+        return creep(number[0], number[1]);
+      case ProtocolKind::knots:
+        break;
+    }
+  } catch (const Error& error) {  // knows neither the file nor the key
+    throw error.within(place.where);
   }
   return protocol_of_knots(knots, drive, place.key("knots"));
 }
