@@ -268,9 +268,11 @@ HilSession parse_session(const Json& written, std::string_view where,
   require_a_period(keys.limits, session.servo.period_s, place.key("limits"));
   Json with_motion = json;
   if (session.law) {
-    embed_motion(with_motion, *session.law, session.servo.period_s, folder, place);
-    if (keys.motion)
-      keys.motion = motion_block().read(with_motion.at("motion"), place.key("motion"));
+    if (keys.motion && keys.motion->recording) {
+      const Json motion = embedded_motion(folder / *keys.motion->recording, *session.law,
+                                          session.servo.period_s, place.key("motion"));
+      keys.motion = motion_block().read(with_motion["motion"] = motion, place.key("motion"));
+    }
   } else if (keys.motion) {
     throw bad_input(place.key("motion").where, "is for the model 'law' only",
                     "\"model\": {\"kind\": \"law\", ...}: the law knows where contact began");
@@ -339,7 +341,7 @@ HilSession read_session(const std::filesystem::path& file, const SessionChanges&
     json["model"] = {{"kind", "law"}, {"law", files::to_json(read_law(changes.law))}};
   }
   if (!changes.motion.empty()) {
-    if (json.at("model").value("kind", "") != "law") {
+    if (session_block().made(json, {file.string()}).model.kind != "law") {
       throw Error(ExitCode::usage, "--replay-motion", "the session feels no law",
                   "--law FILE beside it: the law knows the depth at which contact began");
     }

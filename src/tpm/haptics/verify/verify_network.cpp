@@ -243,14 +243,6 @@ void run_reference(Verification& v, const QuasiStatic& network, const Protocol& 
   }
 }
 
-/// Of the model, N/m; the first recordings do not name it.
-std::optional<double> recorded_stiffness(const Json& header) {
-  const Json& model = header.at("model");
-  const char* key = "instantaneous_stiffness_N_per_m";
-  if (!model.contains(key)) return std::nullopt;
-  return model.at(key).get<double>();
-}
-
 }  // namespace
 
 Verification verify_along_push(const HilRecording& recording, const VerifyOptions& options) {
@@ -292,7 +284,7 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
     ask_others(v, recording, motion, protocol, rows,
                element_constants(tissue.element("hil verify")), options);
   }
-  if (const auto stiffness_N_per_m = recorded_stiffness(recording.header)) {
+  if (const auto stiffness_N_per_m = recording.opened.model.stiffness_N_per_m) {
     v.motion_error_N = options.motion_tolerance_m * *stiffness_N_per_m;
   }
   v.material = material_words(recording.session.scene);
