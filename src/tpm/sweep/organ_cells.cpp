@@ -156,6 +156,38 @@ class SharedPlans {
   std::vector<std::pair<std::string, std::shared_ptr<SharedPlan>>> plans_;  ///< last used first
 };
 
+/// Of the network, in a scene with a cell's values.
+QuasiStaticOptions options_of(const Json& changed) {
+  QuasiStaticOptions options;
+  if (changed.contains(kIntegrator)) {
+    options = integrator_block().read(changed.at(kIntegrator), {kIntegrator}, Numbers::also_si);
+  }
+  options.tolerance = changed.value("tolerance", options.tolerance);
+  return options;
+}
+
+/// Puts material and protocol of a cell into its scene.
+/// @param protocol of the scene as it stands in the file
+void set_light(ExperimentScene& scene, const Json& changed, ProtocolBlock protocol,
+               const std::vector<SceneField>& fields, std::span<const double> swept) {
+  const DocumentPlace place{"scene"};
+  const Json said = changed.value("material", Json::object());
+  if (said.contains("E")) {
+    throw bad_input(place.key("material").key("E").where, "of a scene that is swept",
+                    "the moduli of its bonds, which tpm network build prints");
+  }
+  MaterialBlock material = parse_material(said, scene.tissue.materials.lateral(),
+                                          scene.tissue.network.organ, place.key("material"));
+  scene.tissue.materials = std::move(material.materials);
+  scene.tissue.by_constants = material.by_constants;
+  for (std::size_t i = 0; i < swept.size(); ++i) {
+    fields[i].set(scene.tissue.materials.materials.front(), swept[i]);
+    fields[i].set(protocol, swept[i]);
+  }
+  scene.protocol = protocol.protocol(place.key("protocol"));
+  require_possible(scene.protocol, scene.contacts, scene.tissue, place.key("protocol"));
+}
+
 /// One organ after another.
 class OrganCell final : public CellModel {
  public:
@@ -256,15 +288,6 @@ class OrganCell final : public CellModel {
                 "a smaller tolerance");
   }
 
-  [[nodiscard]] static QuasiStaticOptions options_of(const Json& changed) {
-    QuasiStaticOptions options;
-    if (changed.contains(kIntegrator)) {
-      options = integrator_block().read(changed.at(kIntegrator), {kIntegrator}, Numbers::also_si);
-    }
-    options.tolerance = changed.value("tolerance", options.tolerance);
-    return options;
-  }
-
   /// The scene with the cell's values. Finding the spheres and their bonds takes much longer than
   /// a run: they are kept while only the material and the protocol change. They are always those
   /// of the scene's own material and protocol, so that no cell depends on which one was before.
@@ -279,23 +302,7 @@ class OrganCell final : public CellModel {
     }
     key = structure.dump();
     ExperimentScene scene = base_of(structure, key, texts);
-    const DocumentPlace place{"scene"};
-    const Json said = changed.value("material", Json::object());
-    if (said.contains("E")) {
-      throw bad_input(place.key("material").key("E").where, "of a scene that is swept",
-                      "the moduli of its bonds, which tpm network build prints");
-    }
-    MaterialBlock material = parse_material(said, scene.tissue.materials.lateral(),
-                                            scene.tissue.network.organ, place.key("material"));
-    scene.tissue.materials = std::move(material.materials);
-    scene.tissue.by_constants = material.by_constants;
-    ProtocolBlock protocol = setup_.protocol;
-    for (std::size_t i = 0; i < swept.size(); ++i) {
-      fields_[i].set(scene.tissue.materials.materials.front(), swept[i]);
-      fields_[i].set(protocol, swept[i]);
-    }
-    scene.protocol = protocol.protocol(place.key("protocol"));
-    require_possible(scene.protocol, scene.contacts, scene.tissue, place.key("protocol"));
+    set_light(scene, changed, setup_.protocol, fields_, swept);
     return scene;
   }
 

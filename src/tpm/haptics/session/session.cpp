@@ -14,7 +14,7 @@
 #include "tpm/haptics/session/session_keys.hpp"
 #include "tpm/haptics/session/session_phases.hpp"
 #include "tpm/haptics/session/surface_scene.hpp"
-#include "tpm/organ/scene/blocks.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpmkit/error.hpp"
 
@@ -104,15 +104,16 @@ void require_within_reach(HilSession& session, const DeviceLimits& device,
 }
 
 /// Refuses what else than the hand would press on the tissue.
-void require_hand_alone(const Json& scene, const std::string& where) {
-  if (scene.contains("contacts")) {
-    throw bad_input(DocumentPlace{where}.key("contacts").where,
+void require_hand_alone(const Json& scene, const DocumentPlace& place) {
+  const SceneKeys keys = scene_block().made(scene, place);
+  if (keys.contacts) {
+    throw bad_input(place.key("contacts").where,
                     "the hand is the only contact of a session, and its motion the protocol",
                     "no contacts; a patch or another place is 'contact' of the model");
   }
-  if (scene.contains("loads")) {
-    throw bad_input(DocumentPlace{where}.key("loads").where,
-                    "a session starts from the tissue without loads", "a scene without them");
+  if (keys.loads) {
+    throw bad_input(place.key("loads").where, "a session starts from the tissue without loads",
+                    "a scene without them");
   }
 }
 
@@ -143,7 +144,7 @@ void set_tissue(HilSession& session, const SessionModelKeys& model, const Docume
     session.scene =
         with_mesh_listed(without_schema_key(tissue.is_string() ? read_json(file) : tissue), where,
                          tissue.is_string() ? file.parent_path() : folder);
-    require_hand_alone(session.scene, where);
+    require_hand_alone(session.scene, {where});
   }
 }
 
