@@ -42,6 +42,12 @@ void put_recording(const HilRecording& recording, const std::string& file) {
   }
 }
 
+/// With the header and the closing record that it has now.
+HilRecording read_again(const HilRecording& recording, const test::TempFolder& folder) {
+  put_recording(recording, folder / "changed.tpmrec");
+  return read_recording(folder / "changed.tpmrec");
+}
+
 struct SaidOfRecording {
   std::string text, brief, page, view;
   Json json, report;
@@ -87,7 +93,7 @@ TEST_CASE("A recording that was cut off is verified as far as it goes, and is no
   const test::TempFolder folder;
   HilRecording recording = ended_recording(folder, 2.5);
   recording.closed = false;
-  recording.closing = Json();
+  recording = read_again(recording, folder);
   const SaidOfRecording said = everything_said_of(recording, folder);
   check_that_all_say(said, "the recording is cut off at 2.499 s of ");
   CHECK(said.json.at("whole") == false);
@@ -124,6 +130,7 @@ TEST_CASE("A session that a fault ended is recorded as a whole, and everything s
   recording.closing["dropped_records"] = 3;
   recording.closing["device_findings"] = to_json(std::vector<DeviceFinding>{
       {"force_differs", "the service reported 0.5 N where 1 N was commanded"}});
+  recording = read_again(recording, folder);
   const SaidOfRecording said = everything_said_of(recording, folder);
   check_that_all_say(said,
                      "the session ended early, at 1.999 s of 10.5 s: watchdog of the device: no "
@@ -151,6 +158,7 @@ TEST_CASE("A session that its user stopped is whole, and a finished one has noth
   HilRecording recording = ended_recording(folder, 2.0);
   CHECK(recording_remarks(recording).empty());
   recording.closing["cause"] = to_string(StopCause::signal);
+  recording = read_again(recording, folder);
   CHECK(recording.whole());
   CHECK(recording_remarks(recording) ==
         std::vector<std::string>{"the session ended early, at 1.999 s of 10.5 s: stopped by a "

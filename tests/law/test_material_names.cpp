@@ -9,7 +9,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/organ/run/scene_runner.hpp"
 #include "tpm/organ/scene/organ_model.hpp"
-#include "tpm/sweep/cell_model.hpp"
+#include "tpm/sweep/sweep_keys.hpp"
 
 using namespace tpm;
 using namespace tpm::base;
@@ -33,11 +33,16 @@ const char* const kScene = R"({"organ": {"kind": "block", "cells": [2, 2, 2], "s
   "protocol": {"kind": "ramp_hold", "depth": "2 mm", "rate": "4 mm/s", "hold": "2 s"},
   "tolerance": 1e-7})";
 
+/// Of sweeps whose cells end with a force.
+std::shared_ptr<const SweepModel> swept_model(const Json& scene) {
+  const Json document{{"model", "organ"}, {"scene", scene}, {"outputs", {"end_force"}}};
+  return organ_sweep_model(sweep_kinds().made(document, {"s.json"}), "s.json", {});
+}
+
 /// The last force of each cell of a sweep over one target.
 std::vector<double> swept_forces(const Json& scene, const std::string& target,
                                  const std::vector<double>& values) {
-  const Json document{{"scene", scene}, {"outputs", {"end_force"}}};
-  const auto model = organ_sweep_model(document, "s.json", {});
+  const auto model = swept_model(scene);
   const auto [least, largest] = std::minmax_element(values.begin(), values.end());
   const auto cell = model->cell_model({{target, 0, values.size(), *least, *largest}});
   std::vector<double> forces;
@@ -108,8 +113,7 @@ TEST_CASE("a sweep says which parameters a material has, and what a value may be
         "material.tau2, material.A0, material.l0");
   CHECK(refusal("material.tau1", 0.0) == "material.tau1: tau1 = 0 s; expected above 0");
   CHECK(refusal("/material/E1", 1.0).find("is not in the scene") != std::string::npos);
-  const Json document{{"scene", scene}, {"outputs", {"end_force"}}};
-  const auto model = organ_sweep_model(document, "s.json", {});
+  const auto model = swept_model(scene);
   CHECK(model->dimension_of("material.tau2", "here") == Dimension::time);
   CHECK(model->dimension_of("material.g2", "here") == Dimension::stress);
   CHECK(model->dimension_of("material.stiffening", "here") == Dimension::length);

@@ -100,7 +100,7 @@ void CellRunner::run_cell(std::size_t cell, CellBlock& block) {
       for (const SkipCondition& skip : sweep_.skip) {
         if (expressions_->evaluator.evaluate(skip.when, expressions_->scope, "skip") == 0.0)
           continue;
-        return set_aside(cell, CellStatus::skipped, skip.reason, block);
+        return set_aside(cell, CellStatus::skipped, skip.reason.value_or(skip.when), block);
       }
     }
     std::fill(counts_.begin(), counts_.end(), 0);

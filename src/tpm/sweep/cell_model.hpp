@@ -87,16 +87,16 @@ class SweepModel {
       const std::vector<SweptTarget>& swept) const = 0;
 };
 
-/// The paper's star in closed form: indentation, creep or both
-/// (blocks material, indentation, creep and outputs of SWEEP.json).
-[[nodiscard]] std::shared_ptr<const SweepModel> single_contact_model(const Json& document,
+struct SweepKeys;
+
+/// The paper's star in closed form: indentation, creep or both.
+[[nodiscard]] std::shared_ptr<const SweepModel> single_contact_model(const SweepKeys& keys,
                                                                      std::string_view where);
 
-/// The quasi-static network of a scene (block `scene`, which may not be a file's name any more, and
-/// outputs). Parameters are JSON pointers to numbers in the scene, and those of its
-/// first material by name: material.tau2.
+/// The quasi-static network of a scene, which may not be a file's name any more. Parameters are
+/// JSON pointers to numbers in the scene, and those of its first material by name: material.tau2.
 /// @param folder that a mesh in the scene is relative to
 [[nodiscard]] std::shared_ptr<const SweepModel> organ_sweep_model(
-    const Json& document, std::string_view where, const std::filesystem::path& folder);
+    const SweepKeys& keys, std::string_view where, const std::filesystem::path& folder);
 
 }  // namespace tpm::sweep

@@ -10,10 +10,9 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/lists.hpp"
-#include "tpm/files/blocks/protocol_block.hpp"
 #include "tpm/law/element/closed_form.hpp"
 #include "tpm/law/relaxation/creep_exact.hpp"
-#include "tpm/sweep/sweep_outputs.hpp"
+#include "tpm/sweep/sweep_keys.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::sweep {
@@ -245,47 +244,30 @@ class ContactModel final : public SweepModel {
   std::vector<SweepVariable> variables_;
 };
 
-void read_values(const Json& block, const DocumentPlace& place,
-                 std::initializer_list<std::size_t> indices, ContactValues& values) {
-  for (const std::size_t index : indices) {
-    const ContactParameter& parameter = entry_of(kContactParameters, index);
-    if (!block.contains(std::string(parameter.text))) continue;
-    values[index] = quantity_at(block, parameter.text, parameter.dimension, place);
-  }
-}
-
-ContactSetup read_setup(const Json& document, const DocumentPlace& place) {
+ContactSetup setup_of(const SweepKeys& keys, const DocumentPlace& place) {
+  require_valid(keys.material, place.key("material").where);
   ContactSetup setup;
-  const TpmVector defaults = to_vector(TpmParameters{});
-  std::copy(defaults.begin(), defaults.end(), setup.values.begin());
+  const TpmVector material = to_vector(keys.material);
+  std::copy(material.begin(), material.end(), setup.values.begin());
   std::fill(setup.values.begin() + kTpmParameterCount, setup.values.end(), kNotGiven);
-  if (document.contains("material")) {
-    read_values(document.at("material"), place.key("material"),
-                {kE1, kE2, kEprime, kEta1, kSpacing, kA0, kL0}, setup.values);
-    require_valid(element_of(setup.values), place.key("material").where);
-  }
   const auto put = [&](std::size_t index, const std::optional<double>& value, double otherwise) {
     setup.values[index] = value.value_or(otherwise);
   };
   // What jumps may be held for ever; a ramp's hold has an end.
-  if (document.contains("indentation")) {
-    const ProtocolBlock block =
-        parse_protocol_block(document.at("indentation"), place.key("indentation"), Openness::open);
-    const bool step = block.kind == ProtocolKind::step_hold;
+  if (keys.indentation) {
+    const bool step = keys.indentation->kind == ProtocolKind::step_hold;
     setup.indentation = step ? Indentation::step_hold : Indentation::ramp_hold;
-    put(kDepth, block.depth_m, kNotGiven);
-    put(kRate, block.rate_m_per_s, kNotGiven);
-    put(kHold, block.hold_s, step ? kForever : kNotGiven);
+    put(kDepth, keys.indentation->depth_m, kNotGiven);
+    put(kRate, keys.indentation->rate_m_per_s, kNotGiven);
+    put(kHold, keys.indentation->hold_s, step ? kForever : kNotGiven);
   }
   setup.values[kDuration] = kForever;
-  setup.creep = document.contains("creep");
+  setup.creep = keys.creep.has_value();
   if (setup.creep) {
-    const ProtocolBlock block = parse_protocol_block(document.at("creep"), place.key("creep"),
-                                                     Openness::open, ProtocolKind::creep);
-    put(kLoad, block.load_N, kNotGiven);
-    put(kDuration, block.duration_s, kForever);
+    put(kLoad, keys.creep->load_N, kNotGiven);
+    put(kDuration, keys.creep->duration_s, kForever);
   }
-  setup.outputs = parse_sweep_outputs(document.at("outputs"), place.key("outputs"));
+  setup.outputs = outputs_of(keys.outputs, place.key("outputs"));
   return setup;
 }
 
@@ -307,10 +289,10 @@ void require_experiments(const ContactSetup& setup, const DocumentPlace& place) 
 
 }  // namespace
 
-std::shared_ptr<const SweepModel> single_contact_model(const Json& document,
+std::shared_ptr<const SweepModel> single_contact_model(const SweepKeys& keys,
                                                        std::string_view where) {
   const DocumentPlace place{std::string(where)};
-  ContactSetup setup = read_setup(document, place);
+  ContactSetup setup = setup_of(keys, place);
   require_experiments(setup, place);
   return std::make_shared<ContactModel>(std::move(setup));
 }

@@ -15,7 +15,7 @@
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/plan/shared_plan.hpp"
 #include "tpm/sweep/scene_field.hpp"
-#include "tpm/sweep/sweep_outputs.hpp"
+#include "tpm/sweep/sweep_keys.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
@@ -38,6 +38,7 @@ struct OrganSetup {
 };
 
 constexpr std::string_view kNetwork = "quasi_static";
+constexpr const char* kIntegrator = "integrator";
 constexpr double kLeastOfSweep = 1e-6, kMostOfSweep = 0.5;
 constexpr double kLeastTolerance = 1e-12;  // of QuasiStaticOptions
 
@@ -155,6 +156,38 @@ class SharedPlans {
   std::vector<std::pair<std::string, std::shared_ptr<SharedPlan>>> plans_;  ///< last used first
 };
 
+/// Of the network, in a scene with a cell's values.
+QuasiStaticOptions options_of(const Json& changed) {
+  QuasiStaticOptions options;
+  if (changed.contains(kIntegrator)) {
+    options = integrator_block().read(changed.at(kIntegrator), {kIntegrator}, Numbers::also_si);
+  }
+  options.tolerance = changed.value("tolerance", options.tolerance);
+  return options;
+}
+
+/// Puts material and protocol of a cell into its scene.
+/// @param protocol of the scene as it stands in the file
+void set_light(ExperimentScene& scene, const Json& changed, ProtocolBlock protocol,
+               const std::vector<SceneField>& fields, std::span<const double> swept) {
+  const DocumentPlace place{"scene"};
+  const Json said = changed.value("material", Json::object());
+  if (said.contains("E")) {
+    throw bad_input(place.key("material").key("E").where, "of a scene that is swept",
+                    "the moduli of its bonds, which tpm network build prints");
+  }
+  MaterialBlock material = parse_material(said, scene.tissue.materials.lateral(),
+                                          scene.tissue.network.organ, place.key("material"));
+  scene.tissue.materials = std::move(material.materials);
+  scene.tissue.by_constants = material.by_constants;
+  for (std::size_t i = 0; i < swept.size(); ++i) {
+    fields[i].set(scene.tissue.materials.materials.front(), swept[i]);
+    fields[i].set(protocol, swept[i]);
+  }
+  scene.protocol = protocol.protocol(place.key("protocol"));
+  require_possible(scene.protocol, scene.contacts, scene.tissue, place.key("protocol"));
+}
+
 /// One organ after another.
 class OrganCell final : public CellModel {
  public:
@@ -255,22 +288,12 @@ class OrganCell final : public CellModel {
                 "a smaller tolerance");
   }
 
-  [[nodiscard]] static QuasiStaticOptions options_of(const Json& changed) {
-    QuasiStaticOptions options;
-    options.tolerance = changed.value("tolerance", options.tolerance);
-    if (!changed.contains("integrator")) return options;
-    const Json& block = changed.at("integrator");
-    options.stages = block.value("stages", options.stages);
-    options.step_s = positive_at(block, "step", Dimension::time, {"integrator"});
-    return options;
-  }
-
   /// The scene with the cell's values. Finding the spheres and their bonds takes much longer than
   /// a run: they are kept while only the material and the protocol change. They are always those
   /// of the scene's own material and protocol, so that no cell depends on which one was before.
   ExperimentScene scene_of(std::span<const double> swept, const Json& changed, std::string& key) {
     Json texts = setup_.scene;  // as the schema knows it: with quantities as in the file
-    texts.erase("integrator");
+    texts.erase(kIntegrator);
     Json structure = texts;
     for (std::size_t i = 0; i < swept.size(); ++i) {
       if (fields_[i].is_light()) continue;
@@ -279,23 +302,7 @@ class OrganCell final : public CellModel {
     }
     key = structure.dump();
     ExperimentScene scene = base_of(structure, key, texts);
-    const DocumentPlace place{"scene"};
-    if (changed.value("material", Json::object()).contains("E")) {
-      throw bad_input(place.key("material").key("E").where, "of a scene that is swept",
-                      "the moduli of its bonds, which tpm network build prints");
-    }
-    MaterialBlock material =
-        parse_material(changed.value("material", Json::object()), scene.tissue.materials.lateral(),
-                       scene.tissue.network.organ, place.key("material"));
-    scene.tissue.materials = std::move(material.materials);
-    scene.tissue.by_constants = material.by_constants;
-    ProtocolBlock protocol = setup_.protocol;
-    for (std::size_t i = 0; i < swept.size(); ++i) {
-      fields_[i].set(scene.tissue.materials.materials.front(), swept[i]);
-      fields_[i].set(protocol, swept[i]);
-    }
-    scene.protocol = protocol.protocol(place.key("protocol"));
-    require_possible(scene.protocol, scene.contacts, scene.tissue, place.key("protocol"));
+    set_light(scene, changed, setup_.protocol, fields_, swept);
     return scene;
   }
 
@@ -408,19 +415,17 @@ void require_outputs(const OrganSetup& setup, const DocumentPlace& place) {
 
 }  // namespace
 
-std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::string_view where,
+std::shared_ptr<const SweepModel> organ_sweep_model(const SweepKeys& keys, std::string_view where,
                                                     const std::filesystem::path& folder) {
   const DocumentPlace place{std::string(where)};
-  OrganSetup setup(document.at("scene"));
+  OrganSetup setup(keys.scene);
   setup.folder = folder;
-  if (document.contains("tolerance")) {
-    const auto text = document.at("tolerance").get<std::string>();
-    setup.tolerance = parse_quantity(text, Dimension::dimensionless, place.key("tolerance").where);
-    if (document.contains("integrator")) {
-      throw bad_input(place.key("tolerance").where, "beside an integrator", "one of the two");
-    }
+  setup.tolerance = keys.tolerance;
+  const bool stepped = !keys.integrator.is_null();
+  if (setup.tolerance && stepped) {
+    throw bad_input(place.key("tolerance").where, "beside an integrator", "one of the two");
   }
-  setup.outputs = parse_sweep_outputs(document.at("outputs"), place.key("outputs"));
+  setup.outputs = outputs_of(keys.outputs, place.key("outputs"));
   require_one_protocol(setup.scene, place.key("scene"));
   const ExperimentScene scene =
       parse_experiment(setup.scene, fmt::format("{}: scene", where), folder);
@@ -429,15 +434,13 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::s
                     "the tissue: without a comparison");
   }
   require_runnable(scene);
-  if (scene.formulation.kind != kNetwork && (setup.tolerance || document.contains("integrator"))) {
-    throw bad_input(place.key(setup.tolerance ? "tolerance" : "integrator").where,
+  if (scene.formulation.kind != kNetwork && (setup.tolerance || stepped)) {
+    throw bad_input(place.key(setup.tolerance ? "tolerance" : kIntegrator).where,
                     fmt::format("beside the formulation '{}'", scene.formulation.kind),
                     fmt::format("a scene of the formulation '{}'", kNetwork));
   }
   // Of the sweep, not of the scene; here where pointers find it.
-  if (document.contains("integrator")) {
-    setup.scene["integrator"] = document.at("integrator");
-  }
+  if (stepped) setup.scene[kIntegrator] = keys.integrator;
   setup.protocol =
       parse_protocol_block(setup.scene.at("protocol"), DocumentPlace{"scene"}, Openness::complete);
   setup.material = scene.tissue.materials.materials.front();

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -31,8 +32,8 @@ struct SweptParameter {
 
 /// Cells for which a condition holds are not run.
 struct SkipCondition {
-  std::string when;  ///< an expression; anything but 0 means skip
-  std::string reason;
+  std::string when;                   ///< an expression; anything but 0 means skip
+  std::optional<std::string> reason;  ///< none: the expression
 };
 
 /// A scalar computed from parameters and other scalars.

@@ -13,8 +13,7 @@ namespace tpm::sweep {
 namespace {
 
 void require_no_samples(const SweepReader& sweep, const ReadAxis& axis) {
-  const Json& described = sweep.document().at("axes").at(sweep.axis(axis.name));
-  if (!described.contains("samples")) return;
+  if (sweep.said_of(axis).kind != AxisKind::samples) return;
   throw bad_input("sweep", fmt::format("axis '{}' holds samples", axis.name),
                   "an axis of ever finer places");
 }

@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <set>
 
-#include "tpm/base/enum_names.hpp"
 #include "tpm/base/lists.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
@@ -16,7 +14,6 @@
 #include "tpm/fit/expression/expression.hpp"
 #include "tpm/sweep/sweep.hpp"
 #include "tpm/sweep/sweep_keys.hpp"
-#include "tpm/sweep/sweep_outputs.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
@@ -28,29 +25,17 @@ std::string usual_name(const std::string& target) {
   return target.substr(target.find_last_of("/.") + 1);
 }
 
-enum class PointKind { random, latin_hypercube, sobol, plain_sobol, sensitivity };
-
-constexpr std::array<Word<PointKind>, 5> kPointKinds{{
-    {PointKind::random, "random"},
-    {PointKind::latin_hypercube, "latin_hypercube"},
-    {PointKind::sobol, "sobol"},
-    {PointKind::plain_sobol, "plain_sobol"},
-    {PointKind::sensitivity, "sensitivity"},
-}};
-
 /// The points of an axis of samples.
 struct SampledPoints {
   std::shared_ptr<const CubePoints> set;
   std::uint64_t count = 0;
 };
 
-SampledPoints parse_points(const Json& axis, int dimensions, const DocumentPlace& place) {
-  const PointKind kind =
-      parse_word(kPointKinds, "kind of samples", axis.at("samples").get<std::string>(),
-                 place.key("samples").where);
-  const auto count = axis.at("count").get<std::uint64_t>();
-  const auto seed = axis.value("seed", std::uint64_t{0});
-  if (axis.contains("replicates") != (kind == PointKind::sensitivity)) {
+SampledPoints points_of(const AxisKeys& axis, const DocumentPlace& place) {
+  const auto dimensions = static_cast<int>(axis.parameters.size());
+  const PointKind kind = axis.points;
+  const std::uint64_t count = axis.count, seed = axis.seed;
+  if (axis.replicates.has_value() != (kind == PointKind::sensitivity)) {
     throw bad_input(place.key("replicates").where, "belongs to samples of kind 'sensitivity'",
                     "a number of replicates there, and nowhere else");
   }
@@ -71,8 +56,7 @@ SampledPoints parse_points(const Json& axis, int dimensions, const DocumentPlace
       case PointKind::sensitivity:
         break;
     }
-    const SensitivityDesign design{dimensions, count, axis.at("replicates").get<std::uint64_t>(),
-                                   seed};
+    const SensitivityDesign design{dimensions, count, axis.replicates.value(), seed};
     return {sensitivity_points(design), design.cells()};
   } catch (const Error& error) {
     throw error.within(place.where);
@@ -84,54 +68,57 @@ class AxisReader {
  public:
   AxisReader(Sweep& sweep, const DocumentPlace& place) : sweep_(sweep), place_(place) {}
 
-  void read(const Json& axis) {
+  void read(const AxisKeys& axis) {
     const DocumentPlace here = place_.key(std::to_string(sweep_.axes.size()));
-    if (axis.contains("parameter")) return single(axis, here);
-    if (axis.contains("samples")) return sampled(axis, here);
-    together(axis, here);
+    switch (axis.kind) {
+      case AxisKind::single:
+        return single(axis, here);
+      case AxisKind::together:
+        return together(axis, here.key("together"), here);
+      case AxisKind::samples:
+        return sampled(axis, here.key("parameters"), here);
+    }
   }
 
  private:
   /// One parameter, whose values are the coordinate.
-  void single(const Json& axis, const DocumentPlace& here) {
-    const auto target = axis.at("parameter").get<std::string>();
-    const Dimension dimension = sweep_.model->dimension_of(target, here.key("parameter").where);
-    CountedValues values = parse_values(without(axis, {"parameter", "name"}), dimension, here);
-    const std::string name = axis.value("name", usual_name(target));
+  void single(const AxisKeys& axis, const DocumentPlace& here) {
+    const Dimension dimension =
+        sweep_.model->dimension_of(axis.parameter, here.key("parameter").where);
+    CountedValues values = values_of(axis.values, dimension, here);
+    const std::string name = name_or(axis.name, usual_name(axis.parameter));
     add_axis(name, values.count, here);
-    add_parameter(name, target, dimension, std::move(values.values), here);
+    add_parameter(name, axis.parameter, dimension, std::move(values.values), here);
   }
 
   /// Several parameters with a list each, which go on together.
-  void together(const Json& axis, const DocumentPlace& here) {
+  void together(const AxisKeys& axis, const DocumentPlace& lists, const DocumentPlace& here) {
     std::uint64_t count = 0;
-    const DocumentPlace lists = here.key("together");
-    for (const auto& [target, object] : axis.at("together").items()) {
+    for (const auto& [target, said] : axis.parameters) {
       const DocumentPlace at = lists.key(target);
       const Dimension dimension = sweep_.model->dimension_of(target, at.where);
-      CountedValues values = parse_values(without(object, {"name"}), dimension, at);
+      CountedValues values = values_of(said, dimension, at);
       if (count != 0 && values.count != count) {
         throw bad_input(at.where, fmt::format("{} values beside {}", values.count, count),
                         "lists of one length");
       }
-      if (count == 0) add_axis(axis.value("name", "case"), count = values.count, here);
-      add_parameter(object.value("name", usual_name(target)), target, dimension,
+      if (count == 0) add_axis(name_or(axis.name, "case"), count = values.count, here);
+      add_parameter(name_or(said.name, usual_name(target)), target, dimension,
                     std::move(values.values), at);
     }
   }
 
   /// Points in the box between the ends of several parameters.
-  void sampled(const Json& axis, const DocumentPlace& here) {
-    const Json& parameters = axis.at("parameters");
-    const SampledPoints points = parse_points(axis, static_cast<int>(parameters.size()), here);
-    add_axis(axis.value("name", "sample"), points.count, here);
+  void sampled(const AxisKeys& axis, const DocumentPlace& ends, const DocumentPlace& here) {
+    const SampledPoints points = points_of(axis, here);
+    add_axis(name_or(axis.name, "sample"), points.count, here);
     int dimension_of_cube = 0;
-    for (const auto& [target, object] : parameters.items()) {
-      const DocumentPlace at = here.key("parameters").key(target);
+    for (const auto& [target, said] : axis.parameters) {
+      const DocumentPlace at = ends.key(target);
       const Dimension dimension = sweep_.model->dimension_of(target, at.where);
-      const SweepRange range = parse_range(object, dimension, at);
+      const SweepRange range = range_of(said, dimension, at);
       add_parameter(
-          object.value("name", usual_name(target)), target, dimension,
+          name_or(said.name, usual_name(target)), target, dimension,
           ParameterValues::samples(range.from, range.to, range.scale,
                                    [set = points.set, d = dimension_of_cube++](
                                        std::uint64_t point) { return set->coordinate(point, d); }),
@@ -139,10 +126,8 @@ class AxisReader {
     }
   }
 
-  static Json without(const Json& object, std::initializer_list<const char*> keys) {
-    Json rest = object;
-    for (const char* key : keys) rest.erase(key);
-    return rest;
+  static std::string name_or(const std::string& name, const std::string& otherwise) {
+    return name.empty() ? otherwise : name;
   }
 
   void add_axis(const std::string& name, std::uint64_t size, const DocumentPlace& here) {
@@ -173,12 +158,11 @@ class AxisReader {
   std::set<std::string> names_, targets_;
 };
 
-void read_formulas(const Json& outputs, Sweep& sweep) {
-  for (const Json& output : outputs) {
-    if (!output.is_object() || !output.contains("formula")) continue;
-    sweep.formulas.push_back(
-        {output.at("name").get<std::string>(), output.at("formula").get<std::string>()});
-    sweep.variables.push_back({sweep.formulas.back().name, "", sweep.formulas.back().text, {}});
+void add_formulas(const std::vector<OutputKeys>& outputs, Sweep& sweep) {
+  for (const OutputKeys& output : outputs) {
+    if (output.kind) continue;
+    sweep.formulas.push_back({output.name, output.formula});
+    sweep.variables.push_back({output.name, "", output.formula, {}});
   }
 }
 
@@ -233,29 +217,21 @@ void require_expressions(const Sweep& sweep, const DocumentPlace& place) {
   }
 }
 
-void read_axes(const Json& document, Sweep& sweep, const DocumentPlace& place) {
-  AxisReader reader(sweep, place.key("axes"));
-  for (const Json& axis : document.at("axes")) reader.read(axis);
+void read_axes(const std::vector<AxisKeys>& axes, Sweep& sweep, const DocumentPlace& place) {
+  AxisReader reader(sweep, place);
+  for (const AxisKeys& axis : axes) reader.read(axis);
   double cells = 1.0;
   for (const SweepAxis& axis : sweep.axes) cells *= static_cast<double>(axis.size);
   if (cells > kMostCells) {
-    throw bad_input(place.key("axes").where, fmt::format("{} cells", significant(cells, 3)),
+    throw bad_input(place.where, fmt::format("{} cells", significant(cells, 3)),
                     fmt::format("at most {}", significant(kMostCells, 1)));
   }
 }
 
-/// Puts the scene in the place of its file's name. Returns the folder that its mesh is relative to.
-std::filesystem::path put_scene_in(Json& document, const std::filesystem::path& folder) {
-  if (!document.contains("scene") || !document.at("scene").is_string()) return folder;
-  const std::filesystem::path file = folder / document.at("scene").get<std::string>();
-  document.at("scene") = without_schema_key(read_json(file));
-  return file.parent_path();
-}
-
-std::string sha256_of_mesh(const Json& document, const std::filesystem::path& folder) {
-  const Json::json_pointer mesh("/scene/organ/mesh");
-  if (!document.contains(mesh)) return {};
-  return sha256_hex(read_file(folder / document.at(mesh).get<std::string>()));
+std::string sha256_of_mesh(const Json& scene, const std::filesystem::path& folder) {
+  const Json::json_pointer mesh("/organ/mesh");
+  if (!scene.contains(mesh)) return {};
+  return sha256_hex(read_file(folder / scene.at(mesh).get<std::string>()));
 }
 
 /// So many cells that their numbers fill some 1.5 MB.
@@ -309,29 +285,32 @@ Sweep parse_sweep(const Json& written, std::string_view where,
                   const std::filesystem::path& folder) {
   Json document = checked(written, sweep_kind(), where);
   const DocumentPlace place{std::string(where)};
-  const std::filesystem::path scene_folder = put_scene_in(document, folder);
-  Sweep sweep;
-  sweep.title = document.value("title", "");
-  sweep.description = document.value("description", "");
-  sweep.model = document.contains("scene") ? organ_sweep_model(document, where, scene_folder)
-                                           : single_contact_model(document, where);
-  read_axes(document, sweep, place);
-  sweep.variables = sweep.model->variables();
-  read_formulas(document.at("outputs"), sweep);
-  require_own_names(sweep, place.key("axes"), place.key("outputs"));
-  for (const Json& skip : document.value("skip", Json::array())) {
-    const auto when = skip.at("when").get<std::string>();
-    sweep.skip.push_back({when, skip.value("reason", when)});
+  SweepKeys keys = sweep_kinds().made(document, place);
+  std::filesystem::path scene_folder = folder;
+  if (keys.scene.is_string()) {  // the scene stands in the place of its file's name
+    const std::filesystem::path file = folder / keys.scene.get<std::string>();
+    document["scene"] = keys.scene = without_schema_key(read_json(file));
+    scene_folder = file.parent_path();
   }
+  Sweep sweep;
+  sweep.title = keys.title;
+  sweep.description = keys.description;
+  sweep.model = keys.subject == SweepSubject::organ ? organ_sweep_model(keys, where, scene_folder)
+                                                    : single_contact_model(keys, where);
+  read_axes(keys.axes, sweep, place.key("axes"));
+  sweep.variables = sweep.model->variables();
+  add_formulas(keys.outputs, sweep);
+  require_own_names(sweep, place.key("axes"), place.key("outputs"));
+  sweep.skip = keys.skip;
   require_expressions(sweep, place);
-  sweep.block_cells = document.value("block", usual_block(sweep));
+  sweep.block_cells = keys.block.value_or(usual_block(sweep));
   try {
     static_cast<void>(sweep.model->cell_model(sweep.swept()));
   } catch (const Error& error) {
     throw error.within(where);
   }
   sweep.document = document.dump();
-  const std::string mesh = sha256_of_mesh(document, scene_folder);
+  const std::string mesh = sha256_of_mesh(keys.scene, scene_folder);
   sweep.fingerprint =
       sha256_hex(fmt::format("{}\n{}\n{}\n{}", version(), sweep.block_cells, sweep.document, mesh));
   return sweep;

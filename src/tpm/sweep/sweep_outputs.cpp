@@ -39,38 +39,17 @@ double quantity(const Json& value, Dimension dimension, const DocumentPlace& pla
                         place.where);
 }
 
-SweepOutput plain_output(const std::string& word) {
-  const OutputForm& entry = *find_entry(kOutputWords, word);
-  return {entry.meaning, {word, std::string(entry.unit), std::string(entry.words), {}}, 0.0};
-}
-
-SweepOutput timed_output(const Json& object, const DocumentPlace& place) {
-  const auto entry = std::find_if(kOutputWords.begin(), kOutputWords.end(), [&](const auto& word) {
-    return word.when != When::fixed && object.contains(std::string(word.text));
-  });
-  const std::string key(entry->text);
-  const DocumentPlace here = place.key(key);
-  SweepOutput output{entry->meaning,
-                     {object.at("name").get<std::string>(),
-                      std::string(entry->unit),
-                      std::string(entry->words),
-                      {}},
-                     0.0};
-  const Json& when = object.at(key);
-  if (entry->when == When::at) {
-    output.time_s = quantity(when, Dimension::time, here);
-    return output;
-  }
-  const CountedValues places = parse_values(when, Dimension::time, here);
-  auto& times = output.variable.times_s;
+std::vector<double> rising_times(const ValueKeys& said, const DocumentPlace& place) {
+  const CountedValues places = values_of(said, Dimension::time, place);
   if (places.count > kMostTimes) {
-    throw bad_input(here.where, "too many times", fmt::format("at most {}", kMostTimes));
+    throw bad_input(place.where, "too many times", fmt::format("at most {}", kMostTimes));
   }
+  std::vector<double> times;
   for (std::uint64_t i = 0; i < places.count; ++i) times.push_back(places.values.at(i));
   if (std::adjacent_find(times.begin(), times.end(), std::greater_equal<>()) != times.end()) {
-    throw bad_input(here.where, "times that do not rise", "rising times");
+    throw bad_input(place.where, "times that do not rise", "rising times");
   }
-  return output;
+  return times;
 }
 
 }  // namespace
@@ -79,34 +58,31 @@ std::span<const OutputForm> output_forms() {
   return kOutputWords;
 }
 
-std::vector<SweepOutput> parse_sweep_outputs(const Json& list, const DocumentPlace& place) {
-  std::vector<SweepOutput> outputs;
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const DocumentPlace here = place.key(std::to_string(i));
-    if (list[i].is_object() && list[i].contains("formula")) continue;
-    outputs.push_back(list[i].is_string() ? plain_output(list[i].get<std::string>())
-                                          : timed_output(list[i], here));
+std::vector<SweepOutput> outputs_of(const std::vector<OutputKeys>& outputs,
+                                    const DocumentPlace& place) {
+  std::vector<SweepOutput> found;
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const OutputKeys& said = outputs[i];
+    if (!said.kind) continue;
+    const OutputForm& form = entry_of(kOutputWords, *said.kind);
+    SweepOutput output{
+        *said.kind, {said.name, std::string(form.unit), std::string(form.words), {}}, said.time_s};
+    if (form.when == When::over) {
+      output.variable.times_s =
+          rising_times(said.times, place.key(std::to_string(i)).key(form.text));
+    }
+    found.push_back(std::move(output));
   }
-  return outputs;
+  return found;
 }
 
-std::vector<double> parse_list(const Json& list, Dimension dimension, const DocumentPlace& place) {
-  std::vector<double> values;
-  for (const Json& value : list) {
-    values.push_back(quantity(value, dimension, place.key(std::to_string(values.size()))));
-  }
-  return values;
-}
-
-SweepRange parse_range(const Json& object, Dimension dimension, const DocumentPlace& place) {
-  for (const char* key : {"from", "to"}) {
-    if (!object.contains(key))
-      throw bad_input(place.where, fmt::format("no '{}'", key), "two ends");
-  }
-  const SweepRange range{
-      quantity(object.at("from"), dimension, place.key("from")),
-      quantity(object.at("to"), dimension, place.key("to")),
-      object.value("scale", "linear") == "log" ? AxisScale::logarithmic : AxisScale::linear};
+SweepRange range_of(const ValueKeys& said, Dimension dimension, const DocumentPlace& place) {
+  const auto end = [&](const Json& value, const char* key) {
+    if (value.is_null()) throw bad_input(place.where, fmt::format("no '{}'", key), "two ends");
+    return quantity(value, dimension, place.key(key));
+  };
+  const SweepRange range{end(said.from, "from"), end(said.to, "to"),
+                         said.scale.value_or(AxisScale::linear)};
   if (range.scale == AxisScale::logarithmic && !(range.from > 0.0 && range.to > 0.0)) {
     throw bad_input(place.where, "a logarithmic range with an end that is not above 0",
                     "two ends above 0");
@@ -114,22 +90,23 @@ SweepRange parse_range(const Json& object, Dimension dimension, const DocumentPl
   return range;
 }
 
-CountedValues parse_values(const Json& object, Dimension dimension, const DocumentPlace& place) {
-  const bool has_range = object.contains("from") || object.contains("to") ||
-                         object.contains("count") || object.contains("scale");
-  if (object.contains("values") == has_range) {
+CountedValues values_of(const ValueKeys& said, Dimension dimension, const DocumentPlace& place) {
+  const bool has_range = !said.from.is_null() || !said.to.is_null() || said.count || said.scale;
+  if (said.values.empty() != has_range) {
     throw bad_input(place.where, has_range ? "values and a range" : "no values",
                     "'values', or 'from', 'to' and 'count'");
   }
-  if (object.contains("values")) {
-    auto values = parse_list(object.at("values"), dimension, place.key("values"));
-    const std::uint64_t count = values.size();
-    return {ParameterValues::list(std::move(values)), count};
+  if (!has_range) {
+    std::vector<double> values;
+    const DocumentPlace at = place.key("values");
+    for (const Json& value : said.values) {
+      values.push_back(quantity(value, dimension, at.key(std::to_string(values.size()))));
+    }
+    return {ParameterValues::list(std::move(values)), said.values.size()};
   }
-  const SweepRange range = parse_range(object, dimension, place);
-  if (!object.contains("count")) throw bad_input(place.where, "no 'count'", "how many values");
-  const auto count = object.at("count").get<std::uint64_t>();
-  return {ParameterValues::range(range.from, range.to, count, range.scale), count};
+  const SweepRange range = range_of(said, dimension, place);
+  if (!said.count) throw bad_input(place.where, "no 'count'", "how many values");
+  return {ParameterValues::range(range.from, range.to, *said.count, range.scale), *said.count};
 }
 
 void require_identifier(const std::string& name, std::string_view where) {

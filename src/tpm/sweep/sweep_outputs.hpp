@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -43,29 +44,44 @@ struct OutputForm {
 };
 [[nodiscard]] std::span<const OutputForm> output_forms();
 
-/// Reads the block `outputs`, without its formulas. Throws Error(bad_input).
-[[nodiscard]] std::vector<SweepOutput> parse_sweep_outputs(const Json& list,
-                                                           const DocumentPlace& place);
+/// A list or a range of values as a file says it. The dimension of a parameter's values is known
+/// to the model alone.
+struct ValueKeys {
+  std::string name;  ///< of the parameter; empty: that of what it changes
+  std::vector<Json> values;
+  Json from, to;  ///< null: none
+  std::optional<std::uint64_t> count;
+  std::optional<AxisScale> scale;
+};
 
-/// Two ends and how what lies between is spread: {"from", "to", "scale"}. Throws Error(bad_input).
+/// An output as a file says it.
+struct OutputKeys {
+  std::optional<SweepOutput::Kind> kind;  ///< none: a formula
+  std::string name;
+  double time_s = 0.0;  ///< of one at a time
+  ValueKeys times;      ///< of a curve
+  std::string formula;
+};
+
+/// Those of the model, without formulas. Throws Error(bad_input).
+[[nodiscard]] std::vector<SweepOutput> outputs_of(const std::vector<OutputKeys>& outputs,
+                                                  const DocumentPlace& place);
+
+/// Two ends and how what lies between is spread. Throws Error(bad_input).
 struct SweepRange {
   double from = 0.0, to = 0.0;
   AxisScale scale = AxisScale::linear;
 };
-[[nodiscard]] SweepRange parse_range(const Json& object, Dimension dimension,
-                                     const DocumentPlace& place);
+[[nodiscard]] SweepRange range_of(const ValueKeys& said, Dimension dimension,
+                                  const DocumentPlace& place);
 
-/// A list or a range of quantities, {"values": [...]} or {"from", "to", "count", "scale"}.
-/// Throws Error(bad_input).
+/// A list or a range of quantities. Throws Error(bad_input).
 struct CountedValues {
   ParameterValues values;
   std::uint64_t count = 0;
 };
-[[nodiscard]] CountedValues parse_values(const Json& object, Dimension dimension,
-                                         const DocumentPlace& place);
-/// A list of quantities. Throws Error(bad_input).
-[[nodiscard]] std::vector<double> parse_list(const Json& list, Dimension dimension,
-                                             const DocumentPlace& place);
+[[nodiscard]] CountedValues values_of(const ValueKeys& said, Dimension dimension,
+                                      const DocumentPlace& place);
 
 /// Throws Error(bad_input) unless a text can stand for a number in an expression.
 void require_identifier(const std::string& name, std::string_view where);

@@ -56,6 +56,11 @@ std::size_t SweepReader::axis(const std::string& name) const {
   throw unknown_word("sweep", "no axis", name, mapped<std::string>(axes_, &ReadAxis::name));
 }
 
+AxisKeys SweepReader::said_of(const ReadAxis& of) const {
+  const std::size_t number = axis(of.name);
+  return axis_kinds().read(document_.at("axes").at(number), {"sweep"});
+}
+
 std::uint64_t SweepReader::cells() const {
   std::uint64_t cells = 1;
   for (const ReadAxis& axis : axes_) cells *= axis.places.size();

@@ -9,6 +9,7 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/sweep/sweep_keys.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
 namespace tpm::sweep {
@@ -42,8 +43,8 @@ class SweepReader {
   explicit SweepReader(const std::filesystem::path& file);
 
   [[nodiscard]] const std::string& title() const { return title_; }
-  /// SWEEP.json as it was read.
-  [[nodiscard]] const Json& document() const { return document_; }
+  /// An axis as SWEEP.json says it.
+  [[nodiscard]] AxisKeys said_of(const ReadAxis& of) const;
   [[nodiscard]] const std::vector<ReadAxis>& axes() const { return axes_; }
   /// Variables, then counts of operations as count_NAME.
   [[nodiscard]] const std::vector<ReadVariable>& variables() const { return variables_; }

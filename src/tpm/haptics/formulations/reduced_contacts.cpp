@@ -6,6 +6,7 @@
 #include "tpm/contact/element_contact.hpp"
 #include "tpm/haptics/session/loop_maker.hpp"
 #include "tpm/haptics/session/pushed_scene.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
 #include "tpm/plan/plan_model.hpp"
 #include "tpmkit/error.hpp"
 
@@ -48,8 +49,9 @@ class ReducedLoop final : public ReducedContact, public LoopMaker {
 };
 
 LoopModel element_model(const HilSession& session) {
-  const Tissue tissue = parse_tissue(session.scene, session.scene_place, {});
-  if (session.scene.at("organ").value("kind", "") != "star") {
+  const SceneKeys scene = scene_block().made(session.scene, {session.scene_place});
+  const Tissue tissue = tissue_of(scene, session.scene_place, {});
+  if (scene.organ.kind != OrganKind::star) {
     throw bad_input(session.scene_place, "is no star",
                     "an organ of the kind star for the model 'element'");
   }

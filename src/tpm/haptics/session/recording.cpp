@@ -9,7 +9,6 @@
 #include "tpm/files/document_place.hpp"
 #include "tpm/files/row_log.hpp"
 #include "tpm/haptics/loop/real_time.hpp"
-#include "tpm/haptics/session/recording_keys.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
@@ -32,12 +31,13 @@ Json times_json(const TimeHistogram& times) {
           {"max_s", times.max_s()}};
 }
 
-void set_surface(HilSession& session, const Json& by_phase, const std::string& where) {
+void set_surface(HilSession& session, std::vector<std::vector<double>> by_phase,
+                 const std::string& where) {
   if (by_phase.size() != session.phases.size()) {
     throw bad_input(where, "has surfaces for another number of phases", "one list for each");
   }
   for (std::size_t i = 0; i < by_phase.size(); ++i) {
-    session.phases[i].surface_m = by_phase[i].get<std::vector<double>>();
+    session.phases[i].surface_m = std::move(by_phase[i]);
   }
 }
 
@@ -64,6 +64,17 @@ void require_written_out(const Json& session, const DocumentPlace& place) {
   if (motion.is_object() && motion.contains("recording")) {
     throw refuse(place.key("motion").key("recording"));
   }
+}
+
+/// Of a session in real time.
+void require_times(const RecordingClosing& closing, const DocumentPlace& place) {
+  const auto require = [&](const char* key, bool there) {
+    if (there || !closing.scheduling) return;
+    throw bad_input(place.key(key).where, "is missing", "it beside 'scheduling'");
+  };
+  require("host", closing.host.has_value());
+  require("woke_late", closing.woke_late.has_value());
+  require("busy", closing.busy.has_value());
 }
 
 /// "1.66 s of 6.5 s"
@@ -166,14 +177,6 @@ Json recording_closing(const ServoOutcome& outcome) {
   return json;
 }
 
-bool HilRecording::simulated() const {
-  return header.value("simulated_device", true);
-}
-
-std::string HilRecording::cause() const {
-  return closed ? closing.at("cause").get<std::string>() : "cut off";
-}
-
 double HilRecording::end_s() const {
   return rows.empty() ? 0.0 : time_s(rows.back());
 }
@@ -189,22 +192,22 @@ double HilRecording::commanded_N(const ServoRecord& row) const {
 
 HilRecording read_recording(const std::filesystem::path& file) {
   const RowLog log = read_row_log(file);
-  const std::string at_header = file.string() + ": header";
+  const DocumentPlace at_header{file.string() + ": header"};
   HilRecording recording;
   recording.name = file.filename().string();
-  recording.header = parse_json(log.header, at_header);
-  const std::size_t row_bytes = row_bytes_of(format_of(recording.header));
+  Json header = parse_json(log.header, at_header.where);
+  const std::size_t row_bytes = row_bytes_of(format_of(header));
   if (row_bytes == 0 || log.row_bytes != row_bytes) {
     throw bad_input(file.string(), "is a recording of another version of tpm", kFormat);
   }
-  recording.header = checked(std::move(recording.header), recording_header_kind(), at_header);
-  const std::string at_session = at_header + ": session";
-  const Json& session = recording.header.at("session");
-  require_written_out(session, DocumentPlace{at_session});
-  recording.session = parse_session(session, at_session, {});
-  if (recording.header.contains("surface_by_phase_m")) {  // before, slides went straight
-    set_surface(recording.session, recording.header.at("surface_by_phase_m"),
-                DocumentPlace{at_header}.key("surface_by_phase_m").where);
+  recording.header = checked(std::move(header), recording_header_kind(), at_header.where);
+  recording.opened = recording_header_block().made(recording.header, at_header);
+  const std::string at_session = at_header.where + ": session";
+  require_written_out(recording.opened.session, DocumentPlace{at_session});
+  recording.session = parse_session(recording.opened.session, at_session, {});
+  if (recording.opened.surface_by_phase_m) {
+    set_surface(recording.session, *recording.opened.surface_by_phase_m,
+                at_header.key("surface_by_phase_m").where);
   }
   recording.rows.resize(log.rows);
   for (std::size_t i = 0; i < log.rows; ++i) {
@@ -218,14 +221,11 @@ HilRecording read_recording(const std::filesystem::path& file) {
   recording.closed = log.closed;
   recording.damaged = log.damaged;
   if (log.closed) {
-    const std::string at_closing = file.string() + ": closing record";
-    recording.closing = parse_json(log.closing, at_closing);
-    recording.closing = checked(std::move(recording.closing), recording_closing_kind(), at_closing);
-    for (const char* key : {"host", "woke_late", "busy"}) {
-      if (!recording.closing.contains("scheduling") || recording.closing.contains(key)) continue;
-      throw bad_input(DocumentPlace{at_closing}.key(key).where, "is missing",
-                      "it beside 'scheduling'");
-    }
+    const DocumentPlace at{file.string() + ": closing record"};
+    recording.closing =
+        checked(parse_json(log.closing, at.where), recording_closing_kind(), at.where);
+    recording.ended = recording_closing_block().made(recording.closing, at);
+    require_times(recording.ended, at);
   }
   return recording;
 }
@@ -245,17 +245,15 @@ std::string damage_line(const HilRecording& recording) {
 
 std::string early_end_line(const HilRecording& recording) {
   if (!recording.closed || recording.cause() == to_string(StopCause::finished)) return "";
-  const Json& closing = recording.closing;
-  const std::string detail = closing.value("detail", "");
-  const int error = closing.at("device_error").get<int>();
-  return fmt::format("the session ended early, at {}: {}{}{}", end_words(recording),
-                     recording.cause() == to_string(StopCause::signal)
-                         ? "stopped by a signal, such as Ctrl-C"
-                         : recording.cause(),
-                     detail.empty() ? "" : ": " + detail,
-                     error == 0 ? ""
-                                : fmt::format(" (the device said: error {}, {})", error,
-                                              closing.at("device_error_text").get<std::string>()));
+  const RecordingClosing& closing = recording.ended;
+  return fmt::format(
+      "the session ended early, at {}: {}{}{}", end_words(recording),
+      recording.cause() == to_string(StopCause::signal) ? "stopped by a signal, such as Ctrl-C"
+                                                        : recording.cause(),
+      closing.detail.empty() ? "" : ": " + closing.detail,
+      closing.device_error == 0 ? ""
+                                : fmt::format(" (the device said: error {}, {})",
+                                              closing.device_error, closing.device_error_text));
 }
 
 std::vector<std::string> recording_remarks(const HilRecording& recording) {
@@ -264,29 +262,25 @@ std::vector<std::string> recording_remarks(const HilRecording& recording) {
     if (!line.empty()) remarks.push_back(std::move(line));
   }
   if (!recording.closed) return remarks;
-  const auto dropped = recording.closing.at("dropped_records").get<std::uint64_t>();
-  if (dropped > 0) {
+  if (const auto dropped = recording.ended.dropped_records; dropped > 0) {
     remarks.push_back(
         fmt::format("{} rows found no room while the session ran, and are missing", dropped));
   }
-  for (const Json& finding : recording.closing.value("device_findings", Json::array())) {
-    remarks.push_back("the device noticed: " + finding.at("text").get<std::string>());
+  for (const DeviceFinding& finding : recording.ended.device_findings) {
+    remarks.push_back("the device noticed: " + finding.text);
   }
   return remarks;
 }
 
 std::string device_line(const HilRecording& recording) {
-  const Json& device = recording.header.at("device");
-  const std::string name = device.at("name").get<std::string>();
-  const std::string mode = device.at("communication_mode").get<std::string>();
+  const RecordedDevice& device = recording.opened.device;
   if (!recording.simulated()) {
-    return fmt::format("{}, serial {}, firmware {}, library {}, communication {}", name,
-                       device.at("serial").get<std::string>(),
-                       device.at("firmware").get<std::string>(),
-                       device.at("library_version").get<std::string>(), mode);
+    return fmt::format("{}, serial {}, firmware {}, library {}, communication {}", device.name,
+                       device.serial, device.firmware, device.library_version,
+                       device.communication_mode);
   }
-  return fmt::format("SIMULATED DEVICE, no hardware: {} ({}, communication {})", name,
-                     device.at("kind").get<std::string>(), mode);
+  return fmt::format("SIMULATED DEVICE, no hardware: {} ({}, communication {})", device.name,
+                     device.kind, device.communication_mode);
 }
 
 }  // namespace tpm::haptics

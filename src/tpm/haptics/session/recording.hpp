@@ -5,16 +5,11 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/haptics/session/recording_keys.hpp"
 #include "tpm/haptics/session/session.hpp"
 #include "tpmkit/servo_loop.hpp"
 
 namespace tpm::haptics {
-
-/// Notes that a person adds to a recording. Codes, not names: the recording may be passed on.
-/// Nothing is required.
-struct SessionNotes {
-  std::string date, operator_code, subject_code;
-};
 
 /// Header before the rows of a recording: format, session with its scene, device, model, what
 /// was known of its rendering before (RenderingCheck).
@@ -33,20 +28,22 @@ struct SessionNotes {
 struct HilRecording {
   std::string name;  ///< of the file, without folders
   Json header;
+  RecordingHeader opened;  ///< the header, read
   HilSession session;
   std::vector<ServoRecord> rows;
   bool closed = false;      ///< the session came to an end, of whatever cause
   Json closing;             ///< null unless closed
+  RecordingClosing ended;   ///< the same, read
   std::size_t damaged = 0;  ///< rows that were written and are not whole; left out
 
   /// Nothing is missing: neither the end nor a row.
   [[nodiscard]] bool whole() const { return closed && damaged == 0; }
   /// Why the session ended, as to_string(StopCause); "cut off" without a closing record.
-  [[nodiscard]] std::string cause() const;
+  [[nodiscard]] std::string cause() const { return closed ? ended.cause : "cut off"; }
   /// Of the end: of the last row.
   [[nodiscard]] double end_s() const;
   /// The device was simulated, replayed, or may be: no motor is known to have moved.
-  [[nodiscard]] bool simulated() const;
+  [[nodiscard]] bool simulated() const { return opened.simulated_device; }
   [[nodiscard]] double time_s(const ServoRecord& row) const;
   /// Force sent to the device against the push, N.
   [[nodiscard]] double commanded_N(const ServoRecord& row) const;

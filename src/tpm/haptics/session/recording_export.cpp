@@ -157,29 +157,30 @@ std::string yes_or_no(bool value) {
 
 void export_recording(const HilRecording& recording, std::string_view sha256,
                       const std::filesystem::path& file) {
+  const RecordingHeader& header = recording.opened;
   Hdf5Writer writer(file);
   const auto attribute = [&writer](const char* name, const std::string& text) {
     if (!text.empty()) writer.attribute("/", name, text);
   };
   attribute("format", "tpm hil session 1");
   attribute("exported_by", fmt::format("tpm {}", version()));
-  attribute("recorded_by", fmt::format("tpm {}", recording.header.value("version", "")));
+  attribute("recorded_by", fmt::format("tpm {}", header.version));
   attribute("recording", recording.name);
   attribute("recording_sha256", std::string(sha256));
   attribute("title", recording.session.title);
   attribute("simulated_device", yes_or_no(recording.simulated()));
   attribute("device", device_line(recording));
-  const Json& device = recording.header.at("device");
-  for (const char* key :
-       {"kind", "name", "serial", "firmware", "library_version", "communication_mode"}) {
-    attribute(fmt::format("device_{}", key).c_str(), device.value(key, ""));
-  }
-  attribute("time", recording.header.value("time", ""));
-  const Json notes = recording.header.value("notes", Json::object());
-  for (const char* key : {"date", "operator_code", "subject_code"}) {
-    attribute(key, notes.value(key, ""));
-  }
-  attribute("model", recording.header.at("model").value("name", ""));
+  attribute("device_kind", header.device.kind);
+  attribute("device_name", header.device.name);
+  attribute("device_serial", header.device.serial);
+  attribute("device_firmware", header.device.firmware);
+  attribute("device_library_version", header.device.library_version);
+  attribute("device_communication_mode", header.device.communication_mode);
+  attribute("time", header.time);
+  attribute("date", header.notes.date);
+  attribute("operator_code", header.notes.operator_code);
+  attribute("subject_code", header.notes.subject_code);
+  attribute("model", header.model.name);
   attribute("whole", yes_or_no(recording.whole()));
   attribute("damaged_rows", std::to_string(recording.damaged));
   attribute("cause", recording.cause());

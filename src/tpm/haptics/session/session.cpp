@@ -14,7 +14,7 @@
 #include "tpm/haptics/session/session_keys.hpp"
 #include "tpm/haptics/session/session_phases.hpp"
 #include "tpm/haptics/session/surface_scene.hpp"
-#include "tpm/organ/scene/blocks.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpmkit/error.hpp"
 
@@ -104,15 +104,16 @@ void require_within_reach(HilSession& session, const DeviceLimits& device,
 }
 
 /// Refuses what else than the hand would press on the tissue.
-void require_hand_alone(const Json& scene, const std::string& where) {
-  if (scene.contains("contacts")) {
-    throw bad_input(DocumentPlace{where}.key("contacts").where,
+void require_hand_alone(const Json& scene, const DocumentPlace& place) {
+  const SceneKeys keys = scene_block().made(scene, place);
+  if (keys.contacts) {
+    throw bad_input(place.key("contacts").where,
                     "the hand is the only contact of a session, and its motion the protocol",
                     "no contacts; a patch or another place is 'contact' of the model");
   }
-  if (scene.contains("loads")) {
-    throw bad_input(DocumentPlace{where}.key("loads").where,
-                    "a session starts from the tissue without loads", "a scene without them");
+  if (keys.loads) {
+    throw bad_input(place.key("loads").where, "a session starts from the tissue without loads",
+                    "a scene without them");
   }
 }
 
@@ -143,7 +144,7 @@ void set_tissue(HilSession& session, const SessionModelKeys& model, const Docume
     session.scene =
         with_mesh_listed(without_schema_key(tissue.is_string() ? read_json(file) : tissue), where,
                          tissue.is_string() ? file.parent_path() : folder);
-    require_hand_alone(session.scene, where);
+    require_hand_alone(session.scene, {where});
   }
 }
 
@@ -268,9 +269,11 @@ HilSession parse_session(const Json& written, std::string_view where,
   require_a_period(keys.limits, session.servo.period_s, place.key("limits"));
   Json with_motion = json;
   if (session.law) {
-    embed_motion(with_motion, *session.law, session.servo.period_s, folder, place);
-    if (keys.motion)
-      keys.motion = motion_block().read(with_motion.at("motion"), place.key("motion"));
+    if (keys.motion && keys.motion->recording) {
+      const Json motion = embedded_motion(folder / *keys.motion->recording, *session.law,
+                                          session.servo.period_s, place.key("motion"));
+      keys.motion = motion_block().read(with_motion["motion"] = motion, place.key("motion"));
+    }
   } else if (keys.motion) {
     throw bad_input(place.key("motion").where, "is for the model 'law' only",
                     "\"model\": {\"kind\": \"law\", ...}: the law knows where contact began");
@@ -339,7 +342,7 @@ HilSession read_session(const std::filesystem::path& file, const SessionChanges&
     json["model"] = {{"kind", "law"}, {"law", files::to_json(read_law(changes.law))}};
   }
   if (!changes.motion.empty()) {
-    if (json.at("model").value("kind", "") != "law") {
+    if (session_block().made(json, {file.string()}).model.kind != "law") {
       throw Error(ExitCode::usage, "--replay-motion", "the session feels no law",
                   "--law FILE beside it: the law knows the depth at which contact began");
     }

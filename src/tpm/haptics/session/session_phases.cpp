@@ -104,7 +104,7 @@ void add_creep(PhaseList& list, const TouchKeys& block, const DocumentPlace& pla
   }
 }
 
-/// The block as embed_motion() leaves it.
+/// The block with the motion itself.
 void add_motion(PhaseList& list, const MotionKeys& block, const DocumentPlace& place) {
   const std::vector<double>& depths = block.depths_m;
   if (depths.empty()) {
@@ -150,16 +150,13 @@ double parameter_of(const LawFile& law, std::string_view name) {
 
 }  // namespace
 
-void embed_motion(Json& session, const LawFile& law, double period_s,
-                  const std::filesystem::path& folder, const DocumentPlace& place) {
-  if (!session.contains("motion") || !session.at("motion").contains("recording")) return;
+Json embedded_motion(const std::filesystem::path& file, const LawFile& law, double period_s,
+                     const DocumentPlace& place) {
   constexpr double kMostSamples = 20000.0, kRelaxed = 10.0, kLongestWait_s = 600.0;
   const double contact_m = parameter_of(law, "contact"), offset_N = parameter_of(law, "offset");
-  const std::filesystem::path file =
-      folder / session.at("motion").at("recording").get<std::string>();
   const Recording recording = read_recording_file(file, {}).recording;
   if (recording.drive_quantity != Quantity::indentation_depth) {
-    throw bad_input(place.key("motion").where,
+    throw bad_input(place.where,
                     fmt::format("a recording of a {}", quantity_name(recording.drive_quantity)),
                     "one of an indentation depth");
   }
@@ -175,11 +172,11 @@ void embed_motion(Json& session, const LawFile& law, double period_s,
     depths.push_back(value_at(path, time_s) - contact_m);
     measured.push_back(value_at(forces, time_s) - offset_N);
   }
-  session["motion"] = {{"name", file.filename().string()},
-                       {"initial_hold_s", std::min(kRelaxed * longest_time_s(law), kLongestWait_s)},
-                       {"spacing_s", spacing_s},
-                       {"depths_m", std::move(depths)},
-                       {"measured_N", std::move(measured)}};
+  return {{"name", file.filename().string()},
+          {"initial_hold_s", std::min(kRelaxed * longest_time_s(law), kLongestWait_s)},
+          {"spacing_s", spacing_s},
+          {"depths_m", std::move(depths)},
+          {"measured_N", std::move(measured)}};
 }
 
 std::vector<SessionPhase> phases_of(const SessionKeys& session, const DocumentPlace& place) {

@@ -4,12 +4,11 @@
 
 namespace tpm::haptics {
 
-/// Puts the motion itself in place of the name of a recording in the block `motion`: depths from
-/// the law's contact point on, evenly spaced in time, linear between the samples of the recording;
-/// and for how long the first depth has to be held until the law is in equilibrium under it.
-/// @param folder that the name is relative to
-void embed_motion(Json& session, const LawFile& law, double period_s,
-                  const std::filesystem::path& folder, const DocumentPlace& place);
+/// The block `motion` with the motion of a recording: depths from the law's contact point on,
+/// evenly spaced in time, linear between the samples of the recording; and for how long the first
+/// depth has to be held until the law is in equilibrium under it. Throws Error(bad_input).
+[[nodiscard]] Json embedded_motion(const std::filesystem::path& file, const LawFile& law,
+                                   double period_s, const DocumentPlace& place);
 
 /// The phases that the blocks `indentations`, `slides`, `creep` and `motion` lead to. Throws
 /// Error(bad_input).

@@ -157,15 +157,11 @@ void add_glance(Document& d, const HilRecording& r, const Verification& v,
   if (s.cause == to_string(StopCause::finished)) {
     lines.push_back({"the session came to its end", Tone::good});
   }
-  const Json rendering = r.header.value("rendering", Json());
-  if (rendering.is_object()) {
-    lines.push_back({rendering.at("verdict").get<std::string>(),
-                     rendering.at("passive").get<bool>()  ? Tone::good
-                     : rendering.at("stable").get<bool>() ? Tone::plain
-                                                          : Tone::bad});
-    for (const Json& warning : rendering.at("warnings")) {
-      lines.push_back({warning.get<std::string>(), Tone::bad});
-    }
+  if (const auto& rendering = r.opened.rendering) {
+    lines.push_back({rendering->verdict, rendering->passive  ? Tone::good
+                                         : rendering->stable ? Tone::plain
+                                                             : Tone::bad});
+    for (const std::string& warning : rendering->warnings) lines.push_back({warning, Tone::bad});
   }
   lines.push_back({fmt::format("the force commanded is within {} of the reference, in parts of the "
                                "session's peak of {} N",
@@ -189,30 +185,30 @@ void add_glance(Document& d, const HilRecording& r, const Verification& v,
 }
 
 void add_identity(Document& d, const HilRecording& r) {
-  const Json& device = r.header.at("device");
+  const RecordingHeader& header = r.opened;
+  const RecordedDevice& device = header.device;
   Table table{"", {{"what"}, {"value"}}};
   const auto row = [&](const char* what, std::string value) {
     table.rows.push_back({{what}, {value.empty() ? "not known" : std::move(value)}});
   };
-  row("device", device.at("name").get<std::string>());
-  row("kind", device.at("kind").get<std::string>());
-  row("communication mode", device.at("communication_mode").get<std::string>());
-  row("serial", device.at("serial").get<std::string>());
-  row("firmware", device.at("firmware").get<std::string>());
-  row("library", device.at("library_version").get<std::string>());
-  row("model in the loop", r.header.at("model").at("name").get<std::string>());
-  row("its error", r.header.at("model").at("error_bound").get<std::string>());
+  row("device", device.name);
+  row("kind", device.kind);
+  row("communication mode", device.communication_mode);
+  row("serial", device.serial);
+  row("firmware", device.firmware);
+  row("library", device.library_version);
+  row("model in the loop", header.model.name);
+  row("its error", header.model.error_bound);
   row("rate", significant(1.0 / r.session.servo.period_s, 4) + " Hz");
-  row("time", r.header.at("time").get<std::string>());
-  row("tpm", r.header.at("version").get<std::string>());
-  const Json notes = r.header.value("notes", Json::object());
-  row("date", notes.value("date", ""));
-  row("operator", notes.value("operator_code", ""));
-  row("subject", notes.value("subject_code", ""));
+  row("time", header.time);
+  row("tpm", header.version);
+  row("date", header.notes.date);
+  row("operator", header.notes.operator_code);
+  row("subject", header.notes.subject_code);
   d.heading(2, "Device and model");
   d.table(std::move(table));
   std::vector<Cell> assumed;
-  for (const Json& line : device.at("assumptions")) assumed.push_back({line.get<std::string>()});
+  for (const std::string& line : device.assumptions) assumed.push_back({line});
   if (!assumed.empty()) d.bullets(std::move(assumed));
 }
 
@@ -309,19 +305,17 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
       {fmt::format("end: {}", s.cause), s.cause == "finished" ? Tone::good : Tone::bad});
   if (!r.closed) {
     lines.push_back({"nothing is said of timing without the closing record", Tone::bad});
-  } else if (r.closing.contains("scheduling")) {
-    lines.push_back({r.closing.at("host").get<std::string>()});
-    lines.push_back({r.closing.at("scheduling").get<std::string>()});
-    for (const char* key : {"woke_late", "busy"}) {
-      const Json& t = r.closing.at(key);
-      const auto us = [&](const char* q) { return significant(1e6 * t.at(q).get<double>(), 3); };
-      lines.push_back(
-          {fmt::format("{}: p50 {} us, p99 {} us, p99.9 {} us, max {} us",
-                       std::string(key) == "busy" ? "work of a cycle" : "woke after the deadline",
-                       us("p50_s"), us("p99_s"), us("p999_s"), us("max_s"))});
-    }
-    lines.push_back(
-        {fmt::format("records dropped: {}", r.closing.at("dropped_records").get<std::uint64_t>())});
+  } else if (r.ended.scheduling) {
+    lines.push_back({r.ended.host.value()});
+    lines.push_back({*r.ended.scheduling});
+    const auto add_times = [&](const char* what, const RecordedTimes& t) {
+      const auto us = [](double time_s) { return significant(1e6 * time_s, 3); };
+      lines.push_back({fmt::format("{}: p50 {} us, p99 {} us, p99.9 {} us, max {} us", what,
+                                   us(t.p50_s), us(t.p99_s), us(t.p999_s), us(t.max_s))});
+    };
+    add_times("woke after the deadline", r.ended.woke_late.value());
+    add_times("work of a cycle", r.ended.busy.value());
+    lines.push_back({fmt::format("records dropped: {}", r.ended.dropped_records)});
   } else {
     lines.push_back({"virtual time: deadlines are met by definition, nothing is said of timing"});
   }
@@ -391,7 +385,7 @@ void write_hil_report(const HilRecording& recording, const Verification& v,
   add_energy(d, summary);
   add_timing(d, recording, summary);
   add_identity(d, recording);
-  add_plan(d, recording.header.at("model").value("plan", Json()));
+  add_plan(d, recording.opened.model.plan);
   add_fidelity(d, v);
   typeset(d);
   write_document(folder, d, {session_figure(recording, v), energy_figure(recording)}, python);

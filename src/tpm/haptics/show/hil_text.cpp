@@ -336,7 +336,6 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
          {"reached_m", rounded(e.reached_m, kHilDigits)},
          {"cause", cause_of_difference(e, v.material)}});
   }
-  const Json closing = recording.closed ? recording.closing : Json::object();
   std::vector<std::string> notes = recording_remarks(recording);
   notes.insert(notes.end(), v.notes.begin(), v.notes.end());
   return {
@@ -348,8 +347,8 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
       {"whole", v.whole},
       {"damaged_rows", recording.damaged},
       {"end", recording.cause()},
-      {"end_detail", closing.value("detail", "")},
-      {"device_findings", closing.value("device_findings", Json::array())},
+      {"end_detail", recording.ended.detail},
+      {"device_findings", to_json(recording.ended.device_findings)},
       {"without_equilibrium", v.without_equilibrium},
       {"notes", notes},
       {"end_s", rounded(v.end_s, kHilDigits)},

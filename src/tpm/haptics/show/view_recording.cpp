@@ -92,7 +92,7 @@ void add_curves(const HilRecording& recording, std::size_t most_samples, ViewPag
       {curves.series(
           "work", [](const HilRecording&, const ServoRecord& row) { return row.observed_J; },
           kMilli)});
-  if (recording.header.value("time", "") == "real") {
+  if (recording.opened.time == "real") {
     page.plot_over_time("time of a cycle's work", "us",
                         {curves.series(
                             "work",
@@ -193,16 +193,15 @@ void add_phases(const HilRecording& recording, ViewPage& page) {
 }
 
 void add_session_facts(const HilRecording& recording, ViewPage& page) {
-  const Json& header = recording.header;
+  const RecordingHeader& header = recording.opened;
   page.fact("device", device_line(recording));
-  page.fact("model in the loop", header.at("model").value("name", ""));
-  page.fact("error of the model", header.at("model").value("error_bound", ""));
-  page.fact("time", header.value("time", ""));
-  page.fact("recorded by", fmt::format("tpm {}", header.value("version", "")));
-  const Json notes = header.value("notes", Json::object());
-  page.fact("date", notes.value("date", ""));
-  page.fact("operator", notes.value("operator_code", ""));
-  page.fact("subject", notes.value("subject_code", ""));
+  page.fact("model in the loop", header.model.name);
+  page.fact("error of the model", header.model.error_bound);
+  page.fact("time", header.time);
+  page.fact("recorded by", fmt::format("tpm {}", header.version));
+  page.fact("date", header.notes.date);
+  page.fact("operator", header.notes.operator_code);
+  page.fact("subject", header.notes.subject_code);
   page.fact("end", recording.cause());
   for (const std::string& line : recording_remarks(recording)) page.fact("note", line);
   const std::size_t waiting = recording.rows.size() - shown_rows(recording).size();

@@ -9,6 +9,7 @@
 #include "tpm/haptics/verify/verify_parts.hpp"
 #include "tpm/organ/balance/quasistatic.hpp"
 #include "tpm/organ/scene/scene.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
 #include "tpm/organ/steps/method.hpp"
 #include "tpm/work/progress.hpp"
 #include "tpmkit/curve_file.hpp"
@@ -140,8 +141,8 @@ std::string material_words(const Json& scene) {
 /// readings of the same depth: of sessions on the paper's star or liver that repeat that
 /// experiment.
 void put_beside_experiment(Verification& v, const HilRecording& recording, const RowList& rows) {
-  const std::string organ = recording.session.scene.at("organ").value("kind", "");
-  if (organ != "star" && organ != "liver") return;
+  const OrganKind organ = scene_block().made(recording.session.scene, {recording.name}).organ.kind;
+  if (organ != OrganKind::star && organ != OrganKind::liver) return;
   const PointSet readings = load_points("evren_relaxation");
   const std::vector<SessionPhase>& phases = recording.session.phases;
   for (std::size_t p = 0; p < phases.size(); ++p) {
@@ -243,14 +244,6 @@ void run_reference(Verification& v, const QuasiStatic& network, const Protocol& 
   }
 }
 
-/// Of the model, N/m; the first recordings do not name it.
-std::optional<double> recorded_stiffness(const Json& header) {
-  const Json& model = header.at("model");
-  const char* key = "instantaneous_stiffness_N_per_m";
-  if (!model.contains(key)) return std::nullopt;
-  return model.at(key).get<double>();
-}
-
 }  // namespace
 
 Verification verify_along_push(const HilRecording& recording, const VerifyOptions& options) {
@@ -292,7 +285,7 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
     ask_others(v, recording, motion, protocol, rows,
                element_constants(tissue.element("hil verify")), options);
   }
-  if (const auto stiffness_N_per_m = recorded_stiffness(recording.header)) {
+  if (const auto stiffness_N_per_m = recording.opened.model.stiffness_N_per_m) {
     v.motion_error_N = options.motion_tolerance_m * *stiffness_N_per_m;
   }
   v.material = material_words(recording.session.scene);

@@ -75,12 +75,14 @@ struct OrganBlock {
 /// The block of the same body filled with spheres whose spacing is the own one over `finer`, and
 /// the number of spheres that it states; none where cells or layers cannot be so many. A shell
 /// keeps its thickness by its number of layers.
+/// @param written the block as it stands in the file
 /// @param organ what the block leads to
 /// Throws Error(bad_input) for kinds whose spheres are given one by one.
 [[nodiscard]] std::optional<std::pair<Json, std::size_t>> refilled_organ(
-    const Json& block, const Organ& organ, double finer, const DocumentPlace& place);
+    const Json& written, const OrganKeys& block, const Organ& organ, double finer,
+    const DocumentPlace& place);
 /// The values of `finer` that make sense for a block, rising, 1 among them.
-[[nodiscard]] std::vector<double> refilling_steps(const Json& block, const Organ& organ);
+[[nodiscard]] std::vector<double> refilling_steps(const OrganKeys& block, const Organ& organ);
 
 /// Block `bonds` as a file says it.
 struct BondKeys {

@@ -306,14 +306,13 @@ std::size_t nearest_outer_sphere(const Organ& organ, const Eigen::Vector3d& plac
   return static_cast<std::size_t>(nearest);
 }
 
-std::vector<double> refilling_steps(const Json& block, const Organ& organ) {
+std::vector<double> refilling_steps(const OrganKeys& block, const Organ& organ) {
   constexpr int kMostParts = 12, kSteps = 18;  // of cells or layers; of the spacing of a solid
   std::vector<double> steps;
-  if (block.at("kind") == "block") {
-    const auto cells = block.at("cells").get<std::array<int, 3>>();
-    const int common = std::gcd(cells[0], std::gcd(cells[1], cells[2]));
+  if (block.kind == OrganKind::block) {
+    const int common = std::gcd(block.cells[0], std::gcd(block.cells[1], block.cells[2]));
     for (int i = 1; i <= kMostParts * common; ++i) steps.push_back(static_cast<double>(i) / common);
-  } else if (block.value("filling", "shell") == "solid") {
+  } else if (is_solid(block)) {
     for (int i = -kSteps; i <= kSteps; ++i) steps.push_back(std::exp2(i / 3.0));
   } else {
     const int own = organ.layer_count();
@@ -333,23 +332,25 @@ std::optional<int> whole(double number, int least) {
   return static_cast<int>(rounded_number);
 }
 
-Refilled refilled_block(Json block, const Organ& organ, double finer) {
+Refilled refilled_block(Json written, const OrganKeys& block, const Organ& organ, double finer) {
   constexpr int kFewestCells = 2;
-  for (Json& cells : block.at("cells")) {
-    const auto count = whole(cells.get<double>() * finer, kFewestCells);
+  std::array<int, 3> cells = block.cells;
+  for (int& along : cells) {
+    const auto count = whole(along * finer, kFewestCells);
     if (!count) return std::nullopt;
-    cells = *count;
+    along = *count;
   }
-  block["spacing"] = shortest(organ.spacing / finer) + " m";
+  written["cells"] = cells;
+  written["spacing"] = shortest(organ.spacing / finer) + " m";
   const double spheres = static_cast<double>(organ.size()) * finer * finer * finer;  // about
-  return std::pair{std::move(block), static_cast<std::size_t>(std::round(spheres))};
+  return std::pair{std::move(written), static_cast<std::size_t>(std::round(spheres))};
 }
 
-/// The measures that a liver has by its count and spacing, stated.
-Json stated_shape(const Json& block, const Organ& organ, bool solid, const DocumentPlace& place) {
-  Json stated = block.value("shape", Json::object());
-  LiverShape shape = shape_of(organ_kinds().made(block, place), place);
-  if (!solid) {
+/// States the measures that a liver has by its count and spacing.
+void state_shape(Json& stated, const OrganKeys& block, const Organ& organ,
+                 const DocumentPlace& place) {
+  LiverShape shape = shape_of(block, place);
+  if (!is_solid(block)) {
     const auto outer =
         static_cast<std::size_t>(std::count(organ.layer.begin(), organ.layer.end(), 0));
     shape = scaled(shape, organ.spacing / even_spacing(liver_surface(shape), outer));
@@ -357,23 +358,19 @@ Json stated_shape(const Json& block, const Organ& organ, bool solid, const Docum
   stated["width"] = shortest(shape.width) + " m";
   stated["height"] = shortest(shape.height) + " m";
   stated["depth"] = shortest(shape.depth) + " m";
-  return stated;
 }
 
 }  // namespace
 
-Refilled refilled_organ(const Json& block, const Organ& organ, double finer,
-                        const DocumentPlace& place) {
-  const OrganKeys keys = organ_kinds().made(block, place);
-  const OrganKind kind = keys.kind;
-  if (kind == OrganKind::star || kind == OrganKind::listed) {
+Refilled refilled_organ(const Json& written, const OrganKeys& block, const Organ& organ,
+                        double finer, const DocumentPlace& place) {
+  if (block.kind == OrganKind::star || block.kind == OrganKind::listed) {
     throw bad_input(place.key("kind").where, "spheres that are given one by one",
                     "a body that can be filled with more of them: liver, mesh or block");
   }
-  if (kind == OrganKind::block) return refilled_block(block, organ, finer);
-  const bool solid = is_solid(keys);
-  Json refilled = block;
-  if (!solid) {
+  if (block.kind == OrganKind::block) return refilled_block(written, block, organ, finer);
+  Json refilled = written;
+  if (!is_solid(block)) {
     const auto layers = whole(organ.layer_count() * finer, 1);
     if (!layers) return std::nullopt;
     refilled["layers"] = *layers;
@@ -382,8 +379,9 @@ Refilled refilled_organ(const Json& block, const Organ& organ, double finer,
       std::round(static_cast<double>(organ.size()) * finer * finer * finer));
   refilled["count"] = count;
   refilled.erase("spacing");
-  if (kind == OrganKind::liver && !block.value("shape", Json::object()).contains("width")) {
-    refilled["shape"] = stated_shape(block, organ, solid, place);
+  const bool has_width = block.shape && block.shape->has_width;
+  if (block.kind == OrganKind::liver && !has_width) {
+    state_shape(refilled["shape"], block, organ, place);
   }
   return std::pair{std::move(refilled), count};
 }

@@ -14,13 +14,7 @@ struct ProtocolFileKeys {
   OutputKeys outputs;
 };
 
-}  // namespace
-
-bool has_protocol(const Json& document) {
-  return document.is_object() && document.contains("protocol");
-}
-
-const FileKind& protocol_kind() {
+const Block<ProtocolFileKeys>& protocol_file_block() {
   static const Block<ProtocolFileKeys> block(
       "protocol_file", "what is done to a tissue, and when its response is asked for",
       {required(key("protocol", &ProtocolFileKeys::protocol, protocol_kinds().type(),
@@ -28,27 +22,35 @@ const FileKind& protocol_kind() {
        key("outputs", &ProtocolFileKeys::outputs, outputs_block().type(),
            "when the response is told; default 61 times, evenly; fields are of a scene and not "
            "used")});
+  return block;
+}
+
+}  // namespace
+
+bool has_protocol(const Json& document) {
+  return document.is_object() && document.contains("protocol");
+}
+
+const FileKind& protocol_kind() {
   static const FileKind kind{
       "protocol", "What is done to a tissue",
       "The blocks protocol and outputs of a scene, as tpm predict reads them from any file that "
       "has them. Quantities are texts of a number and a unit, such as \"4 mm/s\"",
-      block.form()};
+      protocol_file_block().form()};
   return kind;
 }
 
 ProtocolFile parse_protocol_file(const Json& document, std::string_view where) {
   Json blocks = Json::object();
-  for (const char* key : {"protocol", "outputs"}) {
-    if (document.is_object() && document.contains(key)) blocks[key] = document.at(key);
+  for (const Key<ProtocolFileKeys>& key : protocol_file_block().keys()) {
+    const std::string& name = key.form.name;
+    if (document.is_object() && document.contains(name)) blocks[name] = document.at(name);
   }
-  blocks = checked(std::move(blocks), protocol_kind(), where);
   const DocumentPlace place{std::string(where)};
-  const DocumentPlace at = place.key("protocol");
-  Protocol protocol = protocol_kinds().made(blocks.at("protocol"), at).protocol(at);
-  const DocumentPlace at_outputs = place.key("outputs");
-  const OutputKeys outputs =
-      outputs_block().made(blocks.value("outputs", Json::object()), at_outputs);
-  std::vector<double> times = outputs_of(outputs, protocol, at_outputs).times_s;
+  const ProtocolFileKeys keys =
+      protocol_file_block().made(checked(std::move(blocks), protocol_kind(), where), place);
+  Protocol protocol = keys.protocol.protocol(place.key("protocol"));
+  std::vector<double> times = outputs_of(keys.outputs, protocol, place.key("outputs")).times_s;
   return {std::move(protocol), std::move(times)};
 }
 

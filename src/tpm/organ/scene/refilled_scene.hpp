@@ -2,10 +2,12 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
+#include "tpm/organ/scene/scene_keys.hpp"
 
 namespace tpm::organ {
 
@@ -37,9 +39,12 @@ class RefilledScene {
   [[nodiscard]] const ExperimentScene& own() const { return own_; }
 
  private:
+  [[nodiscard]] std::optional<std::pair<Json, std::size_t>> refilled(double finer) const;
+
   std::string where_;
   Json document_;
   std::filesystem::path folder_;
+  SceneKeys keys_;
   ExperimentScene own_;
 };
 

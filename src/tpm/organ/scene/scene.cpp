@@ -240,8 +240,9 @@ Tissue parse_tissue(const Json& scene, std::string_view where,
 
 Json with_mesh_listed(Json scene, std::string_view where, const std::filesystem::path& folder) {
   scene = checked(std::move(scene), scene_kind(), where);
-  if (scene.at("organ").at("kind") != "mesh") return scene;
-  const Organ organ = parse_tissue(scene, where, folder).network.organ;
+  const SceneKeys keys = scene_block().made(scene, DocumentPlace{std::string(where)});
+  if (keys.organ.kind != OrganKind::mesh) return scene;
+  const Organ organ = tissue_of(keys, where, folder).network.organ;
   Json spheres = Json::array();
   for (std::size_t i = 0; i < organ.size(); ++i) {
     const auto column = static_cast<Eigen::Index>(i);
@@ -250,8 +251,8 @@ Json with_mesh_listed(Json scene, std::string_view where, const std::filesystem:
                        {"layer", organ.layer[i] + 1},
                        {"normal", {normal.x(), normal.y(), normal.z()}}});
   }
-  const auto mesh = scene.at("organ").at("mesh").get<std::string>();
-  const std::string said = scene.value("description", "");
+  const std::string& mesh = keys.organ.mesh;
+  const std::string said = keys.description.value_or("");
   scene["description"] =
       fmt::format("{}{}Its spheres fill the mesh {}, SHA-256 {}.", said, said.empty() ? "" : " ",
                   mesh, sha256_hex(read_file(folder / mesh)));

@@ -150,11 +150,11 @@ Panel sweep_curves(const SweepReader& sweep, const ReadVariable& v, const std::s
 
 /// The parameter's samples are spread evenly in its logarithm.
 bool sampled_in_logarithm(const SweepReader& sweep, const ReadAxis& axis, const std::string& name) {
-  const Json& described = sweep.document().at("axes").at(sweep.axis(axis.name));
-  if (!described.contains("parameters")) return false;
-  const Json& parameters = described.at("parameters");
   const std::string target = sweep.parameter_target(name);
-  return parameters.contains(target) && parameters.at(target).value("scale", "") == "log";
+  const AxisKeys said = sweep.said_of(axis);
+  return std::ranges::any_of(said.parameters, [&](const auto& one) {
+    return one.first == target && one.second.scale == AxisScale::logarithmic;
+  });
 }
 
 /// A number over each parameter of an axis of samples.
