@@ -329,6 +329,51 @@ TEST_CASE("inches, pounds and bytes that are not UTF-8") {
   CHECK_THAT(columns_words(latin.findings), Contains("latin-1, because it is not UTF-8"));
 }
 
+TEST_CASE("units are read as machines write them, and weights ask for the force that is meant") {
+  const Reader read;
+  const auto seconds = [&](const std::string& unit) {
+    return read("Elapsed Time\tDisp\tLoad\n" + unit + "\tmm\tN\n0\t0\t0\n1\t1\t1\n2\t1\t0.5\n")
+        .recording;
+  };
+  for (const char* unit : {"Sec", "SEC", "sec.", "Sek.", "[Sec]", "Seconds", "Sekunden"}) {
+    INFO(unit);
+    CHECK_THAT(seconds(unit).time_s.at(2), WithinRel(2.0, 1e-12));
+    CHECK_THAT(seconds(unit).drive.at(1), WithinRel(1e-3, 1e-12));
+  }
+  const Recording r =
+      read("Time (Sec),Distance (Millimeter),Force (KN)\n0,0,0\n1,1,1\n2,1,1\n").recording;
+  CHECK_THAT(r.response.at(1), WithinRel(1e3, 1e-12));
+  CHECK_THAT(r.drive.at(1), WithinRel(1e-3, 1e-12));
+  // A texture analyser counts forces in grams.
+  const std::string grams = "Force (g),Distance (mm),Time (sec)\n0,0,0\n100,1,1\n90,1,2\n";
+  CHECK_THAT(read.refusal(grams), Contains("unknown unit 'g' of a force") &&
+                                      Contains("--unit \"Force=gf\" for the weight"));
+  ImportOptions gram_force;
+  gram_force.units["Force"] = "gf";
+  CHECK_THAT(read(grams, gram_force).recording.response.at(1), WithinRel(0.980665, 1e-12));
+  CHECK_THAT(read.refusal("Time,Depth,Load\ns,mm,lbs\n0,0,0\n1,1,1\n2,1,1\n"),
+             Contains("--unit \"Load=lbf\""));
+}
+
+TEST_CASE("a column of another title is the drive if nothing else can be") {
+  const Reader read;
+  const auto table = [](const std::string& titles) {
+    return titles + "\n0,0,0,5\n1,1,1,5\n2,1,0.5,5\n";
+  };
+  CHECK_THAT(read(table("Time (s),Kolbenweg (mm),Load (N),Width (mm)")).recording.drive.at(1),
+             WithinRel(1e-3, 1e-12));
+  // Two columns of lengths: neither is taken, and both are listed.
+  const RecordingFile two = read(table("Time (s),Gap (mm),Load (N),Sensor (mm)"));
+  CHECK(two.recording.drive.empty());
+  CHECK_THROWS_WITH(require_drive_column(two, "two.csv"),
+                    Contains("--drive with one of column 2 'Gap', column 4 'Sensor'"));
+  // A gap beside a strain is not what was imposed.
+  CHECK(read(table("Time (s),Strain [-],Stress (Pa),Gap (mm)")).recording.drive_quantity ==
+        Quantity::strain);
+  const Recording stretched = read(table("Time (s),L/L0,Stress (kPa),Note")).recording;
+  CHECK(stretched.drive_quantity == Quantity::relative_length);
+}
+
 TEST_CASE("times of day and of a stopwatch are seconds") {
   CHECK(find_clock_seconds("11:09:16.5") == 40156.5);
   CHECK(find_clock_seconds("0:01:23,5") == 83.5);

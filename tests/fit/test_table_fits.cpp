@@ -131,6 +131,20 @@ TEST_CASE("a pipe is read, and what cannot be fitted says what to type", "[table
   const test::ProgramRun turned = test::run_in(folder, "fit negative.csv --no-draw");
   CHECK(turned.code == 3);
   CHECK_THAT(turned.said, Contains("the response falls") && Contains("--negate-response"));
+  // A cell that starts at its limit: the force falls, but while the probe rests.
+  std::string started = "Time (s),Depth (mm),Force (N)\n";
+  for (int i = 0; i <= 150; ++i) {
+    const double t = 0.1 * i;
+    const double depth = 2.0 * std::clamp(t - 2.0, 0.0, 2.0);
+    const double noise = 2e-4 * ((i * 7919) % 13 - 6) / 6.0;
+    started +=
+        fmt::format("{:.1f},{:.3f},{:.5f}\n", t, depth, i < 3 ? 9.99 : force_at(t - 1.0) + noise);
+  }
+  write_file(folder / "started.csv", started);
+  const test::ProgramRun spoilt = test::run_in(folder, "fit started.csv --no-draw");
+  CHECK(spoilt.code == 3);
+  CHECK_THAT(spoilt.said, Contains("the first 3 samples of the response lie far off") &&
+                              Contains("--from-time \"0.3 s\"") && !Contains("--negate"));
   const test::ProgramRun only = test::run_in(folder, "fit held.csv --no-draw");
   CHECK(only.code == 3);
   CHECK_THAT(only.said, Contains("only a hold") && !Contains("--negate"));

@@ -134,6 +134,19 @@ TEST_CASE("a ramp of few samples is known but for its corners, one of many altog
   CHECK(unseen_rises(ramp(5.02, 2.0)).empty());
 }
 
+TEST_CASE("a ramp whose steps lie about the threshold of a rise has none", "[rise]") {
+  // Rounding and noise put some of its steps above the threshold of a rise, and others below it.
+  const std::vector<Knot> ramp{{0.0, 0.0}, {1.0, 0.0}, {3.5, 8e-3}, {60.0, 8e-3}};
+  CHECK(unseen_rises(prepare_recording("even.csv", driven(ramp, 20.0, 7))).empty());
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
+    Recording noisy = driven({{0.0, 0.0}, {1.0, 0.0}, {2.25, 4e-3}, {60.0, 4e-3}}, 20.0, seed);
+    Random random(seed + 100);
+    for (double& depth : noisy.drive) depth += 2e-5 * random.normal();
+    INFO(seed);
+    CHECK(unseen_rises(prepare_recording("noisy.csv", std::move(noisy))).empty());
+  }
+}
+
 TEST_CASE("the derivative by a delay is that of the answer", "[rise]") {
   const PreparedRecording one =
       prepare_recording("step.csv", driven(steps({5.01}, 4e-3, 40.0), 20.0, 5));

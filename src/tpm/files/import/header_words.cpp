@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tpm/files/import/refused_words.hpp"
+#include "tpm/files/import/unit_words.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::files {
@@ -138,6 +139,9 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"penetracion", kDepth},
     {"penetrazione", kDepth},
     {"displacement", kDisplacement},
+    {"disp", kDisplacement},
+    {"displ", kDisplacement},
+    {"lvdt", kDisplacement},
     {"extension", kDisplacement},
     {"elongation", kDisplacement},
     {"allongement", kDisplacement},
@@ -152,16 +156,19 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"weg", kTravel},
     {"course", kTravel},
     {"stroke", kTravel},
+    {"travel", kTravel},
     {"carrera", kTravel},
     {"corsa", kTravel},
     {"recorrido", kTravel},
     {"traverse", kCrosshead},
     {"crosshead", kCrosshead},
+    {"distance", kCrosshead},
     {"traversenweg", kCrosshead},
     {"position", kCrosshead},
     {"posicion", kCrosshead},
     {"posizione", kCrosshead},
     {"stretch", kStretch},
+    {"lambda", kStretch},
     {"length", kStretch},
     {"lange", kStretch},
     {"longueur", kStretch},
@@ -256,6 +263,17 @@ std::optional<Recognized> recognize_step_response(std::string_view name) {
   return std::nullopt;
 }
 
+/// L/L0: a length over the unloaded one, the zero as a letter, a digit or an index.
+bool is_ratio_of_lengths(std::string_view name) {
+  std::string text;
+  for (const char c : name) {
+    if (c != ' ' && c != '_') text += c;
+  }
+  constexpr auto kRatios = std::to_array<std::string_view>(
+      {"L/L0", "l/l0", "L/Lo", "l/lo", "L/L\xE2\x82\x80", "l/l\xE2\x82\x80"});
+  return std::ranges::find(kRatios, text) != kRatios.end();
+}
+
 /// Greek letters by their names, as words of their own.
 std::string spelled_out(std::string_view name) {
   std::string text;
@@ -268,6 +286,8 @@ std::string spelled_out(std::string_view name) {
       text += " gamma ";
     } else if (c == U'\u03B5') {
       text += " epsilon ";
+    } else if (c == U'\u03BB') {
+      text += " lambda ";
     } else if (c == U'\u03C3') {
       text += " sigma ";
     } else if (c == U'\u03C4') {
@@ -353,10 +373,10 @@ std::optional<Recognized> recognize_words(const std::vector<std::string>& words)
 std::optional<ColumnTitle> split_at(std::string_view title, std::string_view separator) {
   const auto cut = title.rfind(separator);
   if (cut == std::string_view::npos || cut == 0) return std::nullopt;
-  const auto unit = trimmed(title.substr(cut + separator.size()));
+  const std::string unit = written_unit(trimmed(title.substr(cut + separator.size())));
   const bool known = is_unit(unit) || is_foreign_unit(unit);
   if (unit.empty() || !known || is_plain_number(unit)) return std::nullopt;
-  return ColumnTitle{std::string(trimmed(title.substr(0, cut))), std::string(unit)};
+  return ColumnTitle{std::string(trimmed(title.substr(0, cut))), unit};
 }
 
 /// A unit behind a mark that also stands inside names ("Force N", "Force/N", "step-1"): taken only
@@ -387,14 +407,16 @@ ColumnTitle split_title(std::string_view title) {
   if (open != std::string_view::npos && open > 0) {
     // "Load (N) Ch. 1": the unit may stand inside the title.
     const auto close = text.find(text[open] == '[' ? ']' : ')', open);
-    const std::string_view unit =
-        close == std::string_view::npos ? "" : trimmed(text.substr(open + 1, close - open - 1));
+    const std::string unit = close == std::string_view::npos
+                                 ? std::string()
+                                 : written_unit(trimmed(text.substr(open + 1, close - open - 1)));
     const bool square = text[open] == '[';
     const bool number = is_plain_number(unit) && !(square && unit == "1");
-    if (!unit.empty() && !number && (square || is_unit(unit) || is_foreign_unit(unit))) {
+    if (!unit.empty() && !number &&
+        (square || is_unit(unit) || is_foreign_unit(unit) || force_of_weight(unit))) {
       const std::string_view before = trimmed(text.substr(0, open));
       const std::string_view after = trimmed(text.substr(close + 1));
-      return {fmt::format("{}{}{}", before, after.empty() ? "" : " ", after), std::string(unit)};
+      return {fmt::format("{}{}{}", before, after.empty() ? "" : " ", after), unit};
     }
   }
   for (const std::string_view separator : {" / ", ", ", " in ", " en ", "_"}) {
@@ -444,6 +466,7 @@ bool is_dimension_of(const Recognized& meaning, Dimension dimension) {
 std::optional<Recognized> recognize_title(std::string_view name) {
   if (const auto primes = recognize_primes(name)) return primes;
   if (const auto function = recognize_step_response(name)) return function;
+  if (is_ratio_of_lengths(name)) return kStretch;
   const std::vector<std::string> words = words_of(spelled_out(name));
   const auto known = recognize_words(words);
   // The standard deviation of a force is no deviation from what was asked for.

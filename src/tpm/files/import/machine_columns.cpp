@@ -4,6 +4,7 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/files/import/unit_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -29,6 +30,15 @@ std::string unit_option(const MachineColumn& column, Dimension dimension) {
 Unit unit_of(const MachineColumn& column, Dimension dimension, const std::string& file) {
   const std::string where = fmt::format("{}: {}", file, column.label());
   if (is_unit(column.unit) || column.unit.empty()) return parse_unit(column.unit, dimension, where);
+  const auto force = dimension == Dimension::force ? force_of_weight(column.unit) : std::nullopt;
+  if (force) {
+    const std::string name =
+        column.name.empty() ? std::to_string(column.index + 1) : printable(column.name);
+    throw bad_input(where, fmt::format("unknown unit '{}' of a force", printable(column.unit)),
+                    fmt::format("--unit \"{}={}\" for the weight of such a mass, or another unit "
+                                "of force: {}",
+                                name, *force, units_of(dimension)));
+  }
   throw bad_input(where, fmt::format("unknown unit '{}'", printable(column.unit)),
                   unit_option(column, dimension));
 }

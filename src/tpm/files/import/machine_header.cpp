@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 
+#include "tpm/files/import/unit_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -33,7 +36,7 @@ bool is_unit_row(const HeaderRow& row) {
   for (const std::string& field : row.cells) {
     if (field.empty() || field == "-") continue;
     ++filled;
-    const std::string_view cell = without_brackets(field);
+    const std::string cell = written_unit(without_brackets(field));
     const bool number = cell.find_first_not_of("0123456789") == std::string_view::npos;
     const bool unit = is_unit(cell) && !number;
     if (unit) ++units;
@@ -201,6 +204,43 @@ void recognize_by_unit(MachineColumn& column, bool timed) {
   }
 }
 
+/// Sizes of the specimen, which no machine moves.
+bool is_size_of_specimen(std::string_view name) {
+  constexpr auto kSizes = std::to_array<std::string_view>(
+      {"thick", "width", "diameter", "radius", "gauge", "gage", "dicke", "breite", "durchmesser",
+       "radio", "rayon", "epaisseur", "largeur"});
+  std::string small(name);
+  std::ranges::transform(small, small.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::ranges::any_of(
+      kSizes, [&small](std::string_view size) { return small.find(size) != std::string::npos; });
+}
+
+/// Beside a time and a response that are known by their titles, the only other column in a unit of
+/// length is what was imposed, whatever its title.
+void recognize_lone_length(std::vector<MachineColumn>& columns) {
+  const auto has = [&columns](ColumnRole role) {
+    return std::ranges::any_of(columns, [role](const MachineColumn& column) {
+      return column.meaning && column.meaning->role == role;
+    });
+  };
+  if (!has(ColumnRole::time) || !has(ColumnRole::response)) return;
+  if (has(ColumnRole::drive) || has(ColumnRole::height) || has(ColumnRole::deflection)) return;
+  MachineColumn* lone = nullptr;
+  for (MachineColumn& column : columns) {
+    if (column.meaning || column.refused || is_size_of_specimen(column.name)) continue;
+    if (!is_unit(column.unit) || parse_unit(column.unit, {}).dimension != Dimension::length) {
+      continue;
+    }
+    if (lone != nullptr) return;
+    lone = &column;
+  }
+  constexpr int kLast = 9;  // behind every title
+  if (lone != nullptr) {
+    lone->meaning = Recognized{ColumnRole::drive, Quantity::indentation_depth, kLast};
+  }
+}
+
 /// "T" is a time only where its unit says so or where nothing contradicts: it may be a temperature.
 void doubt_capital_t(MachineColumn& column) {
   const std::string name = column.name.substr(0, column.name.find_first_of(" ([0123456789"));
@@ -226,7 +266,7 @@ MachineColumn described_column(std::size_t index, const HeaderRows& rows,
                                const ImportOptions& options) {
   const ColumnTitle title = split_title(cell_or_empty(rows.titles, index));
   const std::string cell = cell_or_empty(rows.units, index);
-  const std::string unit(without_brackets(cell));
+  const std::string unit = written_unit(without_brackets(cell));
   MachineColumn column{
       index, title.name, unit.empty() ? title.unit : unit, recognize_title(title.name), {},
       false, false};
@@ -236,7 +276,7 @@ MachineColumn described_column(std::size_t index, const HeaderRows& rows,
   for (const auto& [selector, said] : options.units) {
     column.unit_is_chosen |= selector == column.name || selector == std::to_string(index + 1);
   }
-  column.unit = chosen;
+  column.unit = written_unit(chosen);
   const bool per_second = is_unit(column.unit) && parse_unit(column.unit, {}).symbol == "Hz" &&
                           column.unit.find("Hz") == std::string::npos;
   if (per_second && is_angular(column.name)) column.unit = "rad/s";
@@ -266,6 +306,7 @@ void describe_columns(const DelimitedTable& table, const SampleBlock& block, Mac
     recognize_by_unit(column, timed);
     doubt_unit(column);
   }
+  recognize_lone_length(header.columns);
   header.rows = block.first;
   header.block = block;
 }

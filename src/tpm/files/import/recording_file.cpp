@@ -174,6 +174,16 @@ MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& optio
   return result;
 }
 
+void require_drive_column(const RecordingFile& read, const std::string& file) {
+  const Recording& recording = read.recording;
+  const bool driven = !recording.drive.empty() || is_step_response(recording.response_quantity);
+  if (driven || recording.time_s.empty()) return;
+  const auto others = std::ranges::find(read.findings, "not used", &ImportFinding::what);
+  if (others == read.findings.end()) return;
+  throw bad_input(file, "no column is recognised as a depth, displacement, strain or length",
+                  fmt::format("--drive with one of {}", others->value));
+}
+
 RecordingFile read_recording_file(const fs::path& path, const ImportOptions& options) {
   MeasuredFile measured = read_measured_file(path, options);
   if (auto* file = std::get_if<RecordingFile>(&measured)) return std::move(*file);

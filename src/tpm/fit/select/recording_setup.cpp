@@ -61,26 +61,59 @@ bool is_only_a_hold(const PreparedRecording& r) {
                      [](const Phase& phase) { return phase.kind == PhaseKind::hold; });
 }
 
-/// Loading that falls much farther than it rises is counted the other way.
-bool falls_instead(const std::vector<double>& values, double noise_sd) {
+/// Loading that falls much farther than it rises from where it starts is counted the other way.
+bool falls_instead(std::span<const double> values, double start, double noise_sd) {
   constexpr double kMuch = 3.0, kNoise = 20.0;
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  const double fall = values.front() - *low, rise = *high - values.front();
+  const auto [low, high] = std::ranges::minmax_element(values);
+  const double fall = start - *low, rise = *high - start;
   return fall > kMuch * std::max(rise, 0.0) && fall > kNoise * noise_sd;
+}
+
+/// Number of samples, from the first one on, in which the drive rests.
+std::size_t samples_of_still_drive(const PreparedRecording& r) {
+  constexpr double kStill = 1e-4;  // of the range
+  const std::vector<double>& drive = r.recording.drive;
+  const auto [low, high] = std::ranges::minmax_element(drive);
+  const double still = std::max(4.0 * r.phases.drive_jitter_sd, kStill * (*high - *low));
+  std::size_t n = 1;
+  while (n < drive.size() && std::abs(drive[n] - drive.front()) <= still) ++n;
+  return n;
+}
+
+/// Readings that start far off the level of the rest and reach it while the drive still rests: a
+/// cell that was switched on or tared, and not a response that is counted the other way.
+void require_no_start_up(const PreparedRecording& r, std::span<const double> response) {
+  constexpr std::size_t kFewest = 8;
+  constexpr double kFarOff = 20.0;  // standard deviations of the noise
+  const std::size_t resting = samples_of_still_drive(r);
+  if (resting < kFewest || resting >= response.size()) return;
+  const std::span<const double> rest = response.first(resting);
+  const double level = median({rest.begin(), rest.end()});
+  if (falls_instead(response, level, r.phases.noise_sd_estimate)) return;
+  std::size_t settled = 0;
+  for (std::size_t i = 0; i < resting / 2; ++i) {
+    if (std::abs(rest[i] - level) > kFarOff * r.phases.noise_sd_estimate) settled = i + 1;
+  }
+  if (settled == 0) return;
+  throw bad_input(
+      fmt::format("recording '{}'", r.name),
+      fmt::format("the first {} samples of the response lie far off the others at rest", settled),
+      fmt::format("--from-time \"{} s\", which leaves them out",
+                  significant(r.recording.time_s[settled], 6)));
 }
 
 }  // namespace
 
 void require_rise(const PreparedRecording& r) {
   if (is_only_a_hold(r)) return;
-  const std::vector<double>& drive = r.recording.drive;
-  const auto loaded =
-      std::max_element(drive.begin(), drive.end()) - drive.begin() + std::ptrdiff_t{1};
-  const bool down = falls_instead(drive, r.phases.drive_jitter_sd);
-  const std::vector<double>& all = r.recording.response;
-  const std::vector<double> response(all.begin(), down ? all.end() : all.begin() + loaded);
-  const bool response_down = falls_instead(response, r.phases.noise_sd_estimate);
+  const std::span<const double> drive = r.recording.drive;
+  const auto loaded = static_cast<std::size_t>(std::ranges::max_element(drive) - drive.begin()) + 1;
+  const bool down = falls_instead(drive, drive.front(), r.phases.drive_jitter_sd);
+  const std::span<const double> all = r.recording.response;
+  const std::span<const double> response = down ? all : all.first(loaded);
+  const bool response_down = falls_instead(response, response.front(), r.phases.noise_sd_estimate);
   if (!down && !response_down) return;
+  if (!down) require_no_start_up(r, response);
   const bool both = down && response_down;
   const bool turns_drive = r.load_imposed ? response_down : down;  // the option that does
   throw bad_input(fmt::format("recording '{}'", r.name),

@@ -31,6 +31,22 @@ class Motions {
     return std::abs(r_.drive[i + 1] - r_.drive[i]) / (r_.time_s[i + 1] - r_.time_s[i]);
   }
 
+  /// Number of intervals, those from `first` to `end` among them, that move one way at a quarter of
+  /// their fastest speed or more: a ramp whose steps lie about the threshold of direction() is cut
+  /// into pieces by its noise, or by rounding.
+  [[nodiscard]] std::size_t intervals_of_ramp(std::size_t first, std::size_t end) const {
+    constexpr double kAlike = 0.25;  // of the speed
+    double fastest = 0.0;
+    for (std::size_t i = first; i < end; ++i) fastest = std::max(fastest, speed(i));
+    const bool rises = r_.drive[end] > r_.drive[first];
+    const auto goes_on = [&](std::size_t i) {
+      return (r_.drive[i + 1] > r_.drive[i]) == rises && speed(i) >= kAlike * fastest;
+    };
+    while (first > 0 && goes_on(first - 1)) --first;
+    while (end + 1 < r_.drive.size() && goes_on(end)) ++end;
+    return end - first;
+  }
+
  private:
   const Recording& r_;
   double jitter_, range_ = 0.0;
@@ -59,6 +75,10 @@ std::vector<UnseenRise> unseen_rises(const PreparedRecording& r) {
     }
     while (end + 1 < time.size() && motions.direction(end) == direction) ++end;
     const std::size_t count = end - i;
+    if (motions.intervals_of_ramp(i, end) > kCorners) {
+      i = end;
+      continue;
+    }
     const auto add = [&](std::size_t at, double earliest, double latest) {
       const double lasts_s = time[at + 1] - time[at];
       if (at + 1 < touched || time[at + 1] > r.to_s) return;
