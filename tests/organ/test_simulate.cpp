@@ -106,7 +106,9 @@ TEST_CASE("outputs by number and by spacing, the ends among them", "[heavy]") {
 TEST_CASE("a run in parts is the run of the whole, within its tolerance", "[heavy]") {
   for (const std::string& protocol : {kPush, kLoad}) {
     const ExperimentScene scene = small_scene(protocol);
-    const SimulationRecord record = run_of(scene).record;
+    SimulationRecord record = run_of(scene).record;
+    // The side before a jump is one of them.
+    std::erase_if(record.curve, [](const CurvePoint& p) { return p.between; });
     std::vector<double> times;
     for (const CurvePoint& p : record.curve) times.push_back(p.time_s);
     const BondSystem bonds = scene.tissue.bonds();

@@ -13,6 +13,7 @@
 #include "tpm/organ/bonds/contact_stiffness.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/plan/show/plan_report.hpp"
+#include "tpm/plan/show/view_simulation.hpp"
 
 using namespace tpm;
 using namespace tpm::files;
@@ -324,6 +325,16 @@ TEST_CASE("of masses that scene and reference leave out there is one number and 
   CHECK(text.find(words) == text.rfind(words));
   CHECK_THAT(text, !Contains("masses do not matter"));
   CHECK_THAT(text, !Contains("inertia: matters"));
+  // The result and its page state it as well.
+  const test::TempFolder folder;
+  const std::vector<double> times{0.0, 0.3};
+  const ExperimentScene scene = liver(ramp("3 mm", "10 mm/s"));
+  write_planned_run(plan, scene, times, run_planned(plan, scene, times), folder / "p.h5");
+  CHECK(Hdf5Reader(folder / "p.h5").numbers("/claim/masses_left_out").at(0) ==
+        *plan.masses_left_out);
+  const std::string page =
+      view_simulation(folder / "p.h5", read_file(folder / "p.h5"), {}).description["facts"].dump();
+  CHECK_THAT(page, Contains(words) && Contains("error at most"));
 }
 
 TEST_CASE("finer networks are tried where no coarser one meets the tolerance", "[heavy]") {

@@ -185,6 +185,16 @@ class Plans(unittest.TestCase):
             with self.assertRaisesRegex(tpmkit.Error, f"^plan: {next(iter(wrong))} is .*; expected "):
                 tpmkit.plan(SCENE, **wrong)
 
+    def test_masses_that_are_left_out_are_stated_with_the_error(self):
+        scene = {"organ": {"kind": "liver", "count": 60}, "contacts": [{"kind": "ball", "radius": "10 mm"}]}
+        moved = {"protocol": {"kind": "ramp_hold", "depth": "2 mm", "rate": "20 mm/s", "hold": "0.5 s"}}
+        plan = tpmkit.plan(scene | moved, tolerance="1%")
+        self.assertEqual(plan.adequacy["verdict"], "not_adequate")
+        self.assertIn("by masses, which the model leaves out", plan.adequacy["summary"])
+        loaded = {"protocol": {"kind": "creep", "load": "0.05 N", "duration": "2 s"}}
+        plan = tpmkit.plan(scene | loaded, tolerance="1%")
+        self.assertIn("not known what masses would change", plan.adequacy["summary"])
+
 
 class Recordings(unittest.TestCase):
     def test_a_recording_is_read(self):

@@ -171,8 +171,13 @@ class Plan:
             return {"verdict": "not_adequate", "summary": "no model meets tolerance and budget"}
         error = self._dict["choice"]["verified_error"]
         verdict = "adequate" if error <= tolerance else "not_adequate"
-        return {"verdict": verdict,
-                "summary": f"{self.choice}: verified error {100 * error:.3g} % of the peak, {100 * tolerance:.3g} % allowed"}
+        summary = f"{self.choice}: verified error {100 * error:.3g} % of the peak, {100 * tolerance:.3g} % allowed"
+        left_out = self._dict["masses_left_out"]
+        if left_out is not None:
+            summary += f"; {100 * left_out:.3g} % of it by masses, which the model leaves out"
+        elif self._dict["masses_matter"] is None:
+            summary += "; not known what masses would change"
+        return {"verdict": verdict, "summary": summary}
 
     @property
     def warnings(self) -> list[str]:

@@ -136,6 +136,9 @@ LoopModel planned_model(const HilSession& session, const PlanningTold& told) {
   if (plan.masses_left_out) {
     loop.error_bound += fmt::format("; masses, which are left out, would change {}",
                                     percent(*plan.masses_left_out));
+  } else if (!plan.masses_unknown.empty()) {
+    loop.error_bound +=
+        fmt::format("; not known what masses would change: {}", plan.masses_unknown);
   }
   loop.plan = json_of(plan);
   if (told) told("model for the loop");

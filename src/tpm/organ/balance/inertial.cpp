@@ -9,6 +9,7 @@
 #include "tpm/base/require.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/organ/balance/inertial_integration.hpp"
+#include "tpm/organ/balance/resumed_run.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
@@ -80,10 +81,11 @@ class MotionRun {
   MotionRun(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
             const Probes& probes, const Inertia& inertia, const InertialOptions& options,
             double omega, const Protocol& protocol, std::span<const double> times_s,
-            const InertialObserver& observer, const InertialState* from)
+            const InertialObserver& observer, const InertialState* from, const StepObserver& steps)
       : options_(options),
         protocol_(protocol),
         observer_(observer),
+        steps_(steps),
         times_s_(times_s),
         order_(rising_order(times_s)),
         tissue_(bonds, rest, constraints, probes, protocol),
@@ -121,7 +123,7 @@ class MotionRun {
       }
     }
     const double end = knots_.back().time_s;
-    while (next_ < order_.size()) put(end);
+    while (next_ < order_.size()) put(end, value_at(protocol_, end));
     finish(end);
     return std::move(result_);
   }
@@ -168,34 +170,63 @@ class MotionRun {
     const double begin_s = std::max(from.time_s, begin_s_);
     if (begin_s == from.time_s) change_speed(from.time_s, speed_before, velocity_before);
     integration_->restart(begin_s, to.time_s);
-    while (next_ < order_.size() && times_s_[order_[next_]] < to.time_s) {
-      const double time = times_s_[order_[next_]];
-      // CVODES refuses times that rounding alone separates from where it starts.
-      const bool apart = time - begin_s > 1e-14 * std::max(std::abs(time), to.time_s);
-      if (apart) advance(time, to.time_s);
-      put(time);
+    begin_smooth();
+    // CVODES refuses times that rounding alone separates from where it starts.
+    const auto is_ahead = [&](double time_s) {
+      return time_s - integration_->time_s() > 1e-14 * std::max(std::abs(time_s), to.time_s);
+    };
+    const auto put_reached = [&] {
+      while (next_ < order_.size() && asked_s() < to.time_s && !is_ahead(asked_s())) {
+        put(asked_s(), value_at(protocol_, asked_s()));
+      }
+    };
+    put_reached();
+    while (is_ahead(to.time_s)) {
+      const bool stops = integration_->watches_gaps() && next_ < order_.size();
+      step_towards(stops ? std::min(asked_s(), to.time_s) : to.time_s, to.time_s);
+      put_reached();
     }
-    advance(to.time_s, to.time_s);
     // Asked for twice, the corner is answered from either side.
-    while (next_ + 1 < order_.size() && times_s_[order_[next_]] == to.time_s &&
+    while (next_ + 1 < order_.size() && asked_s() == to.time_s &&
            times_s_[order_[next_ + 1]] == to.time_s) {
-      put(to.time_s);
+      put(to.time_s, equation_.imposed_value(to.time_s));
     }
+    if (steps_.corner) steps_.corner();
   }
 
-  void advance(double time_s, double stop_s) {
-    for (;;) {
-      const double reached = integration_->advance_to(time_s);
-      if (reached == time_s && !equation_.meets(time_s, integration_->state())) return;
-      const ToolImpact impact = integration_->strike(reached);
-      integration_->spend(impact.work_J, impact.lost_J);
-      const double of_probe = tissue_.depth_driven() ? impact.on_tissue_N_s : 0.0;
-      if (impact.on_tissue_N_s != 0.0) {
-        result_.impacts.push_back({reached, of_probe, impact.on_tissue_N_s});
-      }
-      if (reached < stop_s) integration_->restart(reached, stop_s);
-      if (!(time_s - reached > 1e-14 * std::max(std::abs(time_s), stop_s))) return;
+  [[nodiscard]] double asked_s() const { return times_s_[order_[next_]]; }
+
+  /// One step; what a tool meets in it is struck.
+  void step_towards(double time_s, double stop_s) {
+    using Reached = InertialIntegration::Reached;
+    const Reached reached = integration_->step_towards(time_s);
+    show_step();
+    const double now_s = integration_->time_s();
+    const bool strikes =
+        reached == Reached::meeting ||
+        (reached == Reached::target && equation_.meets(now_s, integration_->state()));
+    if (!strikes) return;
+    const ToolImpact impact = integration_->strike(now_s);
+    integration_->spend(impact.work_J, impact.lost_J);
+    const double of_probe = tissue_.depth_driven() ? impact.on_tissue_N_s : 0.0;
+    if (impact.on_tissue_N_s != 0.0) {
+      result_.impacts.push_back({now_s, of_probe, impact.on_tissue_N_s});
     }
+    if (now_s < stop_s) integration_->restart(now_s, stop_s);
+    begin_smooth();
+  }
+
+  void begin_smooth() {
+    if (steps_.corner) steps_.corner();
+    show_step();
+  }
+
+  void show_step() {
+    if (!steps_.step) return;
+    const double now_s = integration_->time_s();
+    const auto state = integration_->state();
+    show(now_s, equation_.imposed_value(now_s), equation_.response(now_s, state), state,
+         steps_.step);
   }
 
   void begin(double time_s) {
@@ -219,22 +250,24 @@ class MotionRun {
         {time_s, impulse + impact.on_tissue_N_s, on_driven_spheres + impact.on_tissue_N_s});
   }
 
-  void put(double time_s) {
+  void put(double time_s, double imposed) {
     const auto row = static_cast<Eigen::Index>(order_[next_++]);
-    result_.response[row] = equation_.response(time_s, integration_->state());
+    // A time that rounding separates from the one reached is answered there.
+    const auto state = integration_->state_at(std::min(time_s, integration_->time_s()));
+    result_.response[row] = equation_.response(time_s, state);
     result_.of_driven_sphere[row] = equation_.drag_on_driven_sphere_N();
-    if (observer_) show(time_s, result_.response[row]);
+    if (observer_) show(time_s, imposed, result_.response[row], state, observer_);
   }
 
-  void show(double time_s, double response) {
+  void show(double time_s, double imposed, double response,
+            const Eigen::Map<const Eigen::VectorXd>& state, const InertialObserver& to) {
     std::vector<double> beside;
     for (std::size_t g = 1; g < tissue_.groups(); ++g) {
-      beside.push_back(equation_.response(time_s, integration_->state(), g));
+      beside.push_back(equation_.response(time_s, state, g));
     }
-    const TissueMotion& now = equation_.unpack(time_s, integration_->state());
-    observer_(
-        {time_s, value_at(protocol_, time_s), response, now.position, now.viscous, {}, beside},
-        equation_.contact_pushes_N(time_s, integration_->state()));
+    const TissueMotion& now = equation_.unpack(time_s, state);
+    to({time_s, imposed, response, now.position, now.viscous, {}, beside},
+       equation_.contact_pushes_N(time_s, state));
   }
 
   void finish(double end) {
@@ -262,6 +295,7 @@ class MotionRun {
   const InertialOptions& options_;
   const Protocol& protocol_;
   const InertialObserver& observer_;
+  const StepObserver& steps_;
   std::span<const double> times_s_;
   std::vector<std::size_t> order_;
   std::size_t next_ = 0;  ///< the first of order_ not answered yet
@@ -299,14 +333,15 @@ Inertial::Inertial(const BondSystem& bonds, Positions rest, Constraints constrai
 }
 
 InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s,
-                          const InertialObserver& observer, const InertialState* from) const {
+                          const InertialObserver& observer, const InertialState* from,
+                          const StepObserver& steps) const {
   require_times_within(protocol, times_s);
   require_no_jump_of_depth(protocol);
   for (const DriveGroup& group : probes_.loading().beside) require_no_jump_of_depth(group.protocol);
   if (from) require_later(times_s, from->time_s);
   return MotionRun(bonds_, rest_, constraints_, probes_,
                    inertia_of(bonds_, mass_kg_, lowest_, options_), options_,
-                   lowest_.angular_frequency(), protocol, times_s, observer, from)
+                   lowest_.angular_frequency(), protocol, times_s, observer, from, steps)
       .go();
 }
 

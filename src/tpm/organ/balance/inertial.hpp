@@ -90,6 +90,14 @@ struct InertialState {
 using InertialObserver =
     std::function<void(const QuasiStaticState&, const Eigen::VectorXd& contact_push_N)>;
 
+/// Told of the steps of a run, so that extremes between asked times can be found.
+struct StepObserver {
+  /// Gets the state at the end of each step.
+  InertialObserver step;
+  /// Told where what follows is not smooth with what was before: at a corner or an impact.
+  std::function<void()> corner;
+};
+
 struct InertialRun {
   /// Contact force, N, or depth, m, at each asked time. The force is what the probe exerts on the
   /// tissue, impacts left out: on the driven sphere, which is tissue, or through the contacts of a
@@ -136,12 +144,14 @@ class Inertial {
   /// infinite force; Error(numerical) where CVODES gives up, with the time.
   /// @param observer if any, sees positions, viscous elongations and contacts at each asked time in
   /// turn
+  /// @param steps if any, told of every step
   /// @param from if any, where to go on in the protocol instead of beginning at rest: the end of a
   ///        run of the same network and options. No time before it can be asked for; the account of
   ///        the energy and `stored_at_start_J` go on, the impacts and the work counted do not.
   [[nodiscard]] InertialRun run(const Protocol& protocol, std::span<const double> times_s,
                                 const InertialObserver& observer = {},
-                                const InertialState* from = nullptr) const;
+                                const InertialState* from = nullptr,
+                                const StepObserver& steps = {}) const;
 
   /// The mode that the damping ratio is one of.
   [[nodiscard]] const LowestMode& lowest() const { return lowest_; }

@@ -260,7 +260,7 @@ double InertialEquation::drag_on_driven_sphere_N() const {
 
 double InertialEquation::response(double time_s, const ConstVector& state, std::size_t group) {
   const TissueMotion& now = unpack(time_s, state);
-  forces(time_s, force_);
+  if (tissue_.depth_driven(group)) forces(time_s, force_);
   return tissue_.response(now.position, force_, group) +
          (group == 0 ? drag_on_driven_sphere_N() : drag_N(group));
 }

@@ -56,6 +56,10 @@ class InertialEquation {
 
   /// The piece of the protocol that holds from now on, linear in time.
   void set_piece(const Knot& from, const Knot& to);
+  /// Value imposed on the first group in the piece, m or N.
+  [[nodiscard]] double imposed_value(double time_s) const {
+    return tissue_.path().value(0, imposed(time_s));
+  }
   /// Rate of the depth imposed on the first group, m/s; 0 under a load.
   [[nodiscard]] double imposed_speed() const;
   /// Velocities that imposed depths give what they drive, m/s; 0 elsewhere.

@@ -72,6 +72,7 @@ InertialIntegration::InertialIntegration(InertialEquation& eq, const InertialOpt
       context_(sundials::make_context()),
       state_(N_VNew_Serial(eq.size(), context_.get())),
       error_(N_VClone(state_.get())),
+      within_(N_VClone(state_.get())),
       memory_(
           CVodeCreate(options.formula == MotionFormula::bdf ? CV_BDF : CV_ADAMS, context_.get())) {
   view(state_.get()) = start;
@@ -140,17 +141,16 @@ void InertialIntegration::spend(double work_J, double contact_heat_J) {
 void InertialIntegration::restart(double time_s, double stop_s) {
   if (started_) before_ = work();
   started_ = true;
+  time_s_ = time_s;
   void* m = memory_.get();
   check(CVodeReInit(m, time_s, state_.get()), "CVodeReInit");
   if (energy_) check(CVodeQuadReInit(m, energy_.get()), "CVodeQuadReInit");
   check(CVodeSetStopTime(m, stop_s), "CVodeSetStopTime");
 }
 
-double InertialIntegration::advance_to(double time_s) {
-  double reached = 0.0;
-  // Between steps a contact force is not interpolated: gaps are small differences of places.
+InertialIntegration::Reached InertialIntegration::step_towards(double time_s) {
   if (watches_gaps_) check(CVodeSetStopTime(memory_.get(), time_s), "CVodeSetStopTime");
-  const int flag = CVode(memory_.get(), time_s, state_.get(), &reached, CV_NORMAL);
+  const int flag = CVode(memory_.get(), time_s, state_.get(), &time_s_, CV_ONE_STEP);
   if (flag < 0) {
     double at = 0.0;
     check(CVodeGetCurrentTime(memory_.get(), &at), "CVodeGetCurrentTime");
@@ -160,7 +160,14 @@ double InertialIntegration::advance_to(double time_s) {
   }
   double at = 0.0;
   if (energy_) check(CVodeGetQuad(memory_.get(), &at, energy_.get()), "CVodeGetQuad");
-  return flag == CV_ROOT_RETURN ? reached : time_s;
+  if (flag == CV_ROOT_RETURN) return Reached::meeting;
+  return time_s_ == time_s ? Reached::target : Reached::within;
+}
+
+Eigen::Map<const Eigen::VectorXd> InertialIntegration::state_at(double time_s) {
+  if (time_s == time_s_) return state();
+  check(CVodeGetDky(memory_.get(), time_s, 0, within_.get()), "CVodeGetDky");
+  return {NV_DATA_S(within_.get()), equation_.size()};
 }
 
 Eigen::Map<const Eigen::VectorXd> InertialIntegration::state() const {

@@ -19,9 +19,18 @@ class InertialIntegration {
 
   /// Begins a piece that ends at `stop_s`, from the state reached.
   void restart(double time_s, double stop_s);
-  /// @returns the time reached: `time_s`, or the first at which a tool meets a sphere
-  /// Throws Error(numerical) with the time where CVODES gives up.
-  [[nodiscard]] double advance_to(double time_s);
+  /// What ends a step.
+  enum class Reached { within, target, meeting };
+  /// One step, at most up to `time_s`, which tools may not step over: to the first time at which
+  /// one meets a sphere. Throws Error(numerical) with the time where CVODES gives up.
+  Reached step_towards(double time_s);
+  /// Tools are watched: a contact force is not interpolated between steps, for gaps are small
+  /// differences of places. Steps end at asked times then.
+  [[nodiscard]] bool watches_gaps() const { return watches_gaps_; }
+  /// The time reached.
+  [[nodiscard]] double time_s() const { return time_s_; }
+  /// The state within the last step.
+  [[nodiscard]] Eigen::Map<const Eigen::VectorXd> state_at(double time_s);
   /// The impact of what touches, now; to be followed by restart().
   ToolImpact strike(double time_s);
 
@@ -41,7 +50,8 @@ class InertialIntegration {
 
   InertialEquation& equation_;
   sundials::Context context_;
-  sundials::Vector state_, error_, energy_;
+  sundials::Vector state_, error_, within_, energy_;
+  double time_s_ = 0.0;
   sundials::Matrix matrix_;
   sundials::LinearSolver solver_;
   sundials::Cvodes memory_;

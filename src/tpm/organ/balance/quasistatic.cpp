@@ -11,6 +11,8 @@
 #include "tpm/law/relaxation/sampled_function.hpp"
 #include "tpm/organ/balance/buckling.hpp"
 #include "tpm/organ/balance/contact_landing.hpp"
+#include "tpm/organ/balance/resumed_run.hpp"
+#include "tpm/organ/balance/shown_responses.hpp"
 #include "tpm/organ/balance/stage_tangents.hpp"
 #include "tpm/organ/balance/step_growth.hpp"
 #include "tpmkit/error.hpp"
@@ -57,6 +59,7 @@ class Run {
       if (begin && to.time_s <= begin->time_s) continue;
       if (begin && from.time_s < begin->time_s) from = {state_.time_s, state_.imposed};
       if (to.time_s == from.time_s) {
+        if (options_.extremes) show_extreme(shown_now(response_now()), energy_);  // before the jump
         move_to(to.value, false);
       } else {
         cross(from, to);
@@ -65,7 +68,7 @@ class Run {
     if (next_ < order_.size()) hold_on(knots.back());
     result_.work = work();
     result_.solver = tissue_.equilibrium().choice();
-    if (options_.energies) result_.energy = with_stored(energy_, stored_J());
+    if (options_.energies) result_.energy = with_stored(energy_, stored_J(state_));
     result_.position = state_.position;
     result_.viscous = state_.viscous;
     return std::move(result_);
@@ -141,6 +144,7 @@ class Run {
     tissue_.bonds().followed(state_.position, state_.followed);
     state_.imposed = path().single() ? begin.imposed : path().coordinate_at(begin.time_s);
     if (begin.energy) energy_ = *begin.energy;
+    shown_.see(begin);
     follow(state_.imposed, false);
   }
 
@@ -148,8 +152,6 @@ class Run {
     if (!response_) response_ = tissue_.response(state_);
     return *response_;
   }
-
-  [[nodiscard]] double stored_J() const { return stored_J(state_); }
 
   template <class State>
   [[nodiscard]] double stored_J(const State& state) const {
@@ -165,14 +167,14 @@ class Run {
   /// Goes to an imposed value through equilibria, at once or with everything relaxed on the way.
   /// Such a move is reversible: the work is what is stored.
   void move_to(double value, bool relaxed) {
-    const double before_J = stored_J();
+    const double before_J = stored_J(state_);
     follow(value, relaxed);
-    energy_.work_J += stored_J() - before_J;
+    energy_.work_J += stored_J(state_) - before_J;
   }
 
   /// Waits for ever; what the springs lose then and the probe adds turns into heat.
   void settle() {
-    const double before_J = stored_J();
+    const double before_J = stored_J(state_);
     const auto loads_J = [&] {
       return tissue_.loads_J(state_.position, state_.imposed, response_now());
     };
@@ -180,7 +182,7 @@ class Run {
     follow(state_.imposed, true);
     const double work_J = loads_J() - loads_before_J;
     energy_.work_J += work_J;
-    energy_.dissipated_J += work_J + before_J - stored_J();
+    energy_.dissipated_J += work_J + before_J - stored_J(state_);
   }
 
   void follow(double value, bool relaxed) {
@@ -276,7 +278,7 @@ class Run {
 
   void stand_still(double until_s) {
     while (next_ < order_.size() && times_s_[order_[next_]] < until_s) {
-      put(response_now(), state_, energy_);
+      put(response_now(), energy_);
     }
     state_.time_s = until_s;
   }
@@ -289,15 +291,19 @@ class Run {
     return sum;
   }
 
+  /// Of an asked time, by its rank, in the step just found.
+  [[nodiscard]] double fraction_of(std::size_t rank, double h) const {
+    return std::max((times_s_[order_[rank]] - state_.time_s) / h, 0.0);
+  }
+
   /// Answers the times asked for within the step just found, its end left out.
   void report_within(double h, double rate, const std::optional<StepEnergy>& energy) {
     std::vector<double> fractions;
-    for (std::size_t i = next_; i < order_.size(); ++i) {
-      const double time = times_s_[order_[i]];
-      if (!(time < state_.time_s + h)) break;
-      fractions.push_back(std::max((time - state_.time_s) / h, 0.0));
+    for (std::size_t i = next_; i < order_.size() && times_s_[order_[i]] < state_.time_s + h; ++i) {
+      fractions.push_back(fraction_of(i, h));
     }
     if (tangents_ || !observer_) answer(fractions, h, rate);
+    if (options_.extremes && energy) shown_.add_extremes(*energy, tissue_.groups(), fractions);
     for (std::span<const double> rest = fractions; observer_ && !rest.empty();) {
       const std::size_t count = std::min<std::size_t>(kLanes, rest.size());
       show_within(rest.first(count), h, rate, energy);
@@ -346,7 +352,9 @@ class Run {
       if (fractions[i] == 0.0) states[i].response = response_now();
       const double loads_J =
           tissue_.loads_J(states[i].position, states[i].imposed, states[i].response);
-      show(states[i], energy ? with(energy->until(fractions[i], loads_J)) : energy_);
+      const QuasiStaticEnergy spent = energy ? with(energy->until(fractions[i], loads_J)) : energy_;
+      const bool asked = next_ < order_.size() && fraction_of(next_, h) == fractions[i];
+      asked ? show(std::move(states[i]), spent) : show_extreme(std::move(states[i]), spent);
     }
   }
 
@@ -362,7 +370,7 @@ class Run {
         continue;
       }
       if (tangents_) derivative_row(next_) = tangents_->response(state_);
-      put(response_now(), state_, energy_);
+      put(response_now(), energy_);
     }
   }
 
@@ -382,28 +390,41 @@ class Run {
     result_.response[static_cast<Eigen::Index>(order_[next_++])] = response;
   }
 
-  void put(double response, const TissueState& state, const QuasiStaticEnergy& spent) {
+  void put(double response, const QuasiStaticEnergy& spent) {
     if (!observer_) return put(response);
-    QuasiStaticState shown{state.time_s,   state.imposed, response,
-                           state.position, state.viscous, std::nullopt};
-    show(shown, spent);
+    show(shown_now(response), spent);
+  }
+
+  [[nodiscard]] QuasiStaticState shown_now(double response) const {
+    return {state_.time_s, state_.imposed, response, state_.position, state_.viscous, std::nullopt};
   }
 
   /// Puts the response of a state, and shows it at the time that was asked for.
-  void show(QuasiStaticState& state, const QuasiStaticEnergy& spent) {
+  void show(QuasiStaticState state, const QuasiStaticEnergy& spent) {
     state.time_s = times_s_[order_[next_]];
+    complete(state, spent);
+    put(state.response);
+    shown_.see(state);
+    observer_(state);
+  }
+
+  /// Shows a state that was not asked for, if a response is larger than all shown before.
+  void show_extreme(QuasiStaticState state, const QuasiStaticEnergy& spent) {
+    state.between = true;
+    complete(state, spent);
+    if (shown_.exceeded_by(state)) observer_(state);
+    shown_.see(state);
+  }
+
+  void complete(QuasiStaticState& state, const QuasiStaticEnergy& spent) const {
     if (!path().single()) {
       state.beside = tissue_.beside_responses(
           state.position, {tissue_.bonds().mean_viscous(state.viscous), 0.0, state_.closed},
           state.imposed);
       state.imposed = path().value(0, state.imposed);
     }
-    put(state.response);
-    if (options_.energies) {
-      state.energy = state.energy ? with_stored(spent, state.energy->stored_J)
-                                  : with_stored(spent, stored_J(state));
-    }
-    observer_(state);
+    if (!options_.energies) return;
+    state.energy = with_stored(spent, state.energy ? state.energy->stored_J : stored_J(state));
   }
 
   const Protocol& protocol_;
@@ -416,33 +437,14 @@ class Run {
   StageBalance stages_;
   std::optional<StageTangents> tangents_;
   ContactLanding landing_;
+  ShownResponses shown_;
   TissueState state_;
   std::optional<double> response_;  ///< there, once known
   QuasiStaticEnergy energy_;
   QuasiStaticRun result_;
 };
 
-void require_same_network(const QuasiStaticState& from, const BondSystem& bonds) {
-  const auto spheres = static_cast<std::size_t>(from.position.cols());
-  const auto rows = static_cast<std::size_t>(from.viscous.rows());
-  const bool same_branches = from.viscous.cols() == bonds.most_branches();
-  if (spheres == bonds.spheres() && rows == bonds.size() && same_branches) return;
-  throw bad_input(
-      "state",
-      fmt::format("{} spheres and {} bonds of {} branches", spheres, rows, from.viscous.cols()),
-      fmt::format("{}, {} and {}, as the network has", bonds.spheres(), bonds.size(),
-                  bonds.most_branches()));
-}
-
 }  // namespace
-
-void require_later(std::span<const double> times_s, double from_s) {
-  for (const double time : times_s) {
-    if (time >= from_s) continue;
-    throw bad_input("times", fmt::format("{} s", shortest(time)),
-                    fmt::format("times from {} s on, where the run begins", shortest(from_s)));
-  }
-}
 
 QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Constraints constraints,
                          Probes probes, QuasiStaticOptions options)

@@ -11,9 +11,6 @@
 
 namespace tpm::organ {
 
-/// Throws Error(bad_input) if a time is asked for before the one that a run begins at.
-void require_later(std::span<const double> times_s, double from_s);
-
 /// Changes of one law of a BondSystem (viscous_law.hpp).
 struct LawChange {
   std::vector<double> share;               ///< of each gamma_j; they add up to 0
@@ -56,6 +53,10 @@ struct QuasiStaticOptions {
   /// If given, told what a run took that throws Error.
   std::function<void(const QuasiStaticWork&)> on_failure = nullptr;
   bool energies = false;  ///< work and dissipation are integrated along
+  /// With energies: the observer is shown, besides the asked times, every state in which a response
+  /// is larger than in all states shown before and smaller soon after, so that the largest response
+  /// shown does not depend on the times asked for.
+  bool extremes = false;
   EquilibriumOptions equilibrium = {.solver = StiffnessSolver::automatic};
   std::vector<TangentDirection> directions = {};  ///< of the derivatives to be found
   /// Tolerance of the balance of a derivative, as `tolerance`; none: that.
@@ -78,6 +79,7 @@ struct QuasiStaticState {
   Eigen::MatrixXd viscous;                  ///< m_j by (bond, branch), m; see BondSystem
   std::optional<QuasiStaticEnergy> energy;  ///< if asked for; until here
   std::vector<double> beside = {};          ///< responses of the other groups (Loading)
+  bool between = false;  ///< an extreme of a response that was not asked for
 };
 
 /// Gets the state at every asked time, in the order of time. What it throws ends the run.

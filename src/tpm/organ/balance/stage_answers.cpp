@@ -66,17 +66,26 @@ LaneVector StageBalance::responses(const Within& states) {
   return plain + tissue_.adjoint_sign() * (force_ * lane_field_.transpose());
 }
 
-LaneVector StageBalance::powers_per_rate(const Within& states, const LaneVector& response) const {
-  if (tissue_.path().single()) return tissue_.depth_driven() ? response : LaneVector(-response);
+std::vector<LaneVector> StageBalance::responses_of_groups(const Within& states,
+                                                          const LaneVector& first) const {
+  std::vector<LaneVector> responses{first};
+  if (tissue_.path().single()) return responses;
   LaneMatrix force = LaneMatrix::Zero(kLanes, coordinates_);
   tissue_.add_load(states.imposed, force);
   bonds_.add_forces(states.position, states.mean_viscous, force);
+  for (std::size_t g = 1; g < tissue_.groups(); ++g) {
+    responses.push_back(tissue_.response(states.position, force, g));
+  }
+  return responses;
+}
+
+LaneVector StageBalance::powers_per_rate(const Within& states,
+                                         const std::vector<LaneVector>& responses) const {
   LaneVector sum = LaneVector::Zero();
   for (std::size_t g = 0; g < tissue_.groups(); ++g) {
     const LaneVector slope =
         states.imposed.unaryExpr([&](double at) { return tissue_.path().slope(g, at); });
-    const LaneVector of_group = g == 0 ? response : tissue_.response(states.position, force, g);
-    sum += (tissue_.depth_driven(g) ? 1.0 : -1.0) * slope.cwiseProduct(of_group);
+    sum += (tissue_.depth_driven(g) ? 1.0 : -1.0) * slope.cwiseProduct(responses[g]);
   }
   return sum;
 }
@@ -185,13 +194,15 @@ StepEnergy StageBalance::energy_of_step(const TissueState& state, double h, doub
   StepEnergy energy;
   energy.h_s_ = h;
   energy.rate_ = rate;
+  energy.response_.assign(tissue_.groups(), StepEnergy::Series::Zero());
   for (const double side : {-1.0, 1.0}) {
     std::array<double, kLanes> fractions{};
     for (std::size_t i = 0; i < kLanes; ++i) {
       fractions[i] = 0.5 * (1.0 + side * Points::abscissa()[i]);
     }
     const Within states = within(state, fractions, h, rate);
-    const LaneVector per_rate = powers_per_rate(states, responses(states));
+    const std::vector<LaneVector> of_groups = responses_of_groups(states, responses(states));
+    const LaneVector per_rate = powers_per_rate(states, of_groups);
     const LaneVector heat = heat_W(states);
     for (std::size_t i = 0; i < kLanes; ++i) {
       const auto lane = static_cast<Eigen::Index>(i);
@@ -199,12 +210,16 @@ StepEnergy StageBalance::energy_of_step(const TissueState& state, double h, doub
           Points::weights()[i] * legendre(side * Points::abscissa()[i]).head<StepEnergy::kPoints>();
       energy.per_rate_ += per_rate[lane] * projected;
       energy.heat_W_ += heat[lane] * projected;
+      for (std::size_t g = 0; g < of_groups.size(); ++g) {
+        energy.response_[g] += of_groups[g][lane] * projected;
+      }
     }
   }
   for (Eigen::Index n = 0; n < StepEnergy::kPoints; ++n) {
     const double norm = 0.5 * static_cast<double>(2 * n + 1);
     energy.per_rate_[n] *= norm;
     energy.heat_W_[n] *= norm;
+    for (StepEnergy::Series& response : energy.response_) response[n] *= norm;
   }
   bool by_load = false;
   for (std::size_t g = 0; g < tissue_.groups(); ++g) by_load = by_load || !tissue_.depth_driven(g);
@@ -221,6 +236,27 @@ StepEnergy StageBalance::energy_of_step(const TissueState& state, double h, doub
     energy.loads_at_end_J_ = loads_J(1);
   }
   return energy;
+}
+
+StepEnergy::Extreme StepEnergy::largest_response(std::size_t group) const {
+  constexpr int kParts = 4 * kPoints;  // a polynomial of degree kPoints - 1 turns less often
+  const auto at = [&](double fraction) {
+    return std::abs(response_[group].dot(legendre(2.0 * fraction - 1.0).head<kPoints>()));
+  };
+  Extreme largest;
+  for (int i = 0; i <= kParts; ++i) {
+    const double fraction = static_cast<double>(i) / kParts;
+    if (const double size = at(fraction); size > largest.size) largest = {fraction, size};
+  }
+  // Halves the distance to its neighbours while the middle of the three is the largest.
+  for (double apart = 0.5 / kParts; apart > 1e-9; apart *= 0.5) {
+    const double middle = largest.fraction;
+    for (const double fraction : {middle - apart, middle + apart}) {
+      if (fraction < 0.0 || fraction > 1.0) continue;
+      if (const double size = at(fraction); size > largest.size) largest = {fraction, size};
+    }
+  }
+  return largest;
 }
 
 double StepEnergy::integral(const Series& series, double fraction) {

@@ -44,6 +44,12 @@ class StepEnergy {
   /// Of the whole step.
   [[nodiscard]] QuasiStaticEnergy whole() const { return until(1.0, loads_at_end_J_); }
 
+  /// The largest absolute response of a group in a step, and the fraction at which it stands.
+  struct Extreme {
+    double fraction = 0.0, size = 0.0;
+  };
+  [[nodiscard]] Extreme largest_response(std::size_t group) const;
+
  private:
   friend class StageBalance;
   [[nodiscard]] static double integral(const Series& series, double fraction);
@@ -51,6 +57,7 @@ class StepEnergy {
   /// Coefficients of the series; power per rate of what is imposed: of a depth its force, of a load
   /// minus its depth (F du = d(F u) - u dF).
   Series per_rate_ = Series::Zero(), heat_W_ = Series::Zero();
+  std::vector<Series> response_;  ///< of each group
   double h_s_ = 0.0, rate_ = 0.0;
   double loads_at_start_J_ = 0.0, loads_at_end_J_ = 0.0;
 };
@@ -162,8 +169,12 @@ class StageBalance {
   [[nodiscard]] Within within(const TissueState& state, std::span<const double> fractions, double h,
                               double rate) const;
   [[nodiscard]] LaneVector responses(const Within& states);
-  /// Power per rate of the path's coordinate (StepEnergy), where responses() is the last call.
-  [[nodiscard]] LaneVector powers_per_rate(const Within& states, const LaneVector& response) const;
+  /// The responses of every group, of the first those that are given.
+  [[nodiscard]] std::vector<LaneVector> responses_of_groups(const Within& states,
+                                                            const LaneVector& first) const;
+  /// Power per rate of the path's coordinate (StepEnergy).
+  [[nodiscard]] LaneVector powers_per_rate(const Within& states,
+                                           const std::vector<LaneVector>& responses) const;
   /// Power that the branches turn into heat.
   [[nodiscard]] LaneVector heat_W(const Within& states) const;
 

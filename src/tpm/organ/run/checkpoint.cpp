@@ -215,9 +215,10 @@ void write_checkpoint(const fs::path& path, const std::string& identity,
   std::vector<double> curve, beside;
   for (const CurvePoint& p : record.curve) {
     beside.insert(beside.end(), p.beside.begin(), p.beside.end());
-    curve.insert(curve.end(), {p.time_s, p.imposed, p.response, p.energy.work_J,
-                               p.energy.dissipated_J, p.energy.stored_J,
-                               static_cast<double>(p.touching), p.overlap_m, p.force_on_tissue_N});
+    curve.insert(
+        curve.end(),
+        {p.time_s, p.imposed, p.response, p.energy.work_J, p.energy.dissipated_J, p.energy.stored_J,
+         static_cast<double>(p.touching), p.overlap_m, p.force_on_tissue_N, p.between ? 1.0 : 0.0});
   }
   file.numbers("/curve", curve);
   file.numbers("/curve_beside", beside);
@@ -255,7 +256,7 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   const std::size_t bonds = lists.whole(lists.list("/bonds", 0).front(), "the bonds");
   const std::size_t branches = lists.whole(lists.list("/branches", 0).front(), "the branches");
   Checkpoint checkpoint;
-  constexpr std::size_t kColumns = 9;
+  constexpr std::size_t kColumns = 10;
   const std::vector<double> curve = lists.list("/curve", kColumns);
   const std::vector<double> beside = lists.list("/curve_beside", 1);
   const std::size_t points = curve.size() / kColumns;
@@ -270,7 +271,8 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
                                        static_cast<int>(lists.whole(p[6], "the tools that touch")),
                                        p[7],
                                        p[8],
-                                       {own, own + static_cast<std::ptrdiff_t>(groups)}});
+                                       {own, own + static_cast<std::ptrdiff_t>(groups)},
+                                       p[9] != 0.0});
   }
   checkpoint.record.outputs = lists.states("/outputs", spheres, bonds, branches);
   checkpoint.record.validity = read_validity(lists);

@@ -2,12 +2,13 @@
 #include <chrono>
 #include <span>
 
+#include "tpm/organ/run/curve_extremes.hpp"
 #include "tpm/organ/run/simulation.hpp"
 
 namespace tpm::organ {
 
 /// The times at which a run is watched: those of the outputs, 200 even parts of the protocol, and
-/// its corners; rising. The same whatever is written, so that limits are dated alike.
+/// the corners of every contact's protocol; rising.
 [[nodiscard]] std::vector<double> times_to_watch(const ExperimentScene& scene);
 
 /// Keeps what a run shows. The watched times are cut into parts; at the end of a part the run
@@ -26,10 +27,16 @@ class Recorder {
   /// The times of the next part; empty if all is done.
   [[nodiscard]] std::span<const double> next_part() const;
 
-  /// Takes the state at the next of those times. Throws Interrupted, with a checkpoint of the last
-  /// whole part left behind, and Error(numerical) where a load goes through the organ.
+  /// Takes the state at the next of those times, or an extreme before it. Throws Interrupted, with
+  /// a checkpoint of the last whole part left behind, and Error(numerical) where a load goes
+  /// through the organ.
   /// @param contact_push_N of each contact where bodies have mass
   void see(const QuasiStaticState& state, const Eigen::VectorXd& contact_push_N = {});
+
+  /// Where spheres have mass: takes a step of the integrator, to find extremes between those times.
+  void follow(const QuasiStaticState& step, const Eigen::VectorXd& contact_push_N);
+  /// What is followed from now on is not smooth with what was.
+  void corner();
 
   /// Ends a part at the state last seen; now and then writes a checkpoint.
   /// @param error_estimate of the part, N or m
@@ -52,12 +59,17 @@ class Recorder {
   /// Part of the record that stands in whole parts.
   struct Whole {
     std::size_t curve = 0, outputs = 0;
+    std::size_t watched = 0;  ///< of the watched times
     Validity validity;
     QuasiStaticState state;
     std::optional<InertialState> motion;
   };
 
   void require_within(const QuasiStaticState& state) const;
+  [[nodiscard]] CurvePoint point_of(const QuasiStaticState& state,
+                                    const Eigen::VectorXd& contact_push_N) const;
+  void keep(const QuasiStaticState& state, const Eigen::VectorXd& contact_push_N);
+  void insert_extremes();
   void close();
   void save();
   [[noreturn]] void stop(double time_s);
@@ -65,10 +77,13 @@ class Recorder {
   const ExperimentScene& scene_;
   const RunNetwork& network_;
   const SimulationControls& controls_;
-  std::size_t parts_;
   std::string identity_;
   ValidityWatch watch_;
+  CurveExtremes extremes_;
+  std::vector<CurvePoint> found_;  ///< extremes that the curve does not have yet
   std::vector<double> times_;
+  std::vector<double> part_ends_s_;  ///< rising, the last the end of times_
+  std::size_t watched_ = 0;          ///< of times_
   Clock::time_point saved_;
   SimulationRecord record_;
   QuasiStaticState seen_;

@@ -31,8 +31,8 @@ struct RunNetwork {
 [[nodiscard]] Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& network,
                                         std::optional<double> of_imposed_kg = std::nullopt);
 
-/// A point of the response. The same history is watched whatever is written: it is fine enough to
-/// be drawn, and dates what passes a limit.
+/// A point of the response. The history is watched finely enough to be drawn and to date what
+/// passes a limit, whatever is written; extremes between the watched times are points as well.
 struct CurvePoint {
   double time_s = 0.0;
   double imposed = 0.0;             ///< depth, m, or load, N
@@ -42,6 +42,7 @@ struct CurvePoint {
   double overlap_m = 0.0;           ///< the largest of their contacts
   double force_on_tissue_N = 0.0;   ///< force_on_tissue_N()
   std::vector<double> beside = {};  ///< responses of contacts with protocols of their own, in turn
+  bool between = false;             ///< an extreme between the watched times
 };
 
 /// Parts of a run; each begins afresh, and a checkpoint can be written after it.

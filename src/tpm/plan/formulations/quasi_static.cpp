@@ -44,6 +44,7 @@ class QuasiStaticFormulation final : public Formulation,
       const QuasiStatic equations(driven.bonds, driven.rest, driven.constraints, driven.probes,
                                   {.tolerance = part.tolerance,
                                    .energies = true,
+                                   .extremes = true,
                                    .equilibrium = {.solver = scene.formulation.solver}});
       const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
       const QuasiStaticRun run = equations.run(part.protocol, times, see, recorder.latest());

@@ -1,4 +1,7 @@
 // Everything has relaxed under what is imposed at each time.
+#include <algorithm>
+#include <optional>
+
 #include "tpm/organ/run/recorder.hpp"
 #include "tpm/organ/run/scene_runner.hpp"
 #include "tpm/organ/run/static_path.hpp"
@@ -9,6 +12,16 @@ namespace {
 // A static run takes some factorisations at each stride: it iterates earlier than a quasi-static
 // one, which shares a factorisation between many solutions.
 constexpr double kStaticOperations = 2e11;
+
+/// The value before a jump at a time; none if nothing jumps there.
+std::optional<double> value_before_jump(const Protocol& protocol, double time_s) {
+  const auto knots = protocol.knots();
+  const auto at = std::ranges::lower_bound(knots, time_s, {}, &Knot::time_s);
+  if (knots.end() - at < 2 || at->time_s != time_s || std::next(at)->time_s != time_s) {
+    return std::nullopt;
+  }
+  return at->value;
+}
 
 class StaticFormulation final : public Formulation, public SceneRunner, public StateRunner {
  public:
@@ -37,6 +50,11 @@ class StaticFormulation final : public Formulation, public SceneRunner, public S
     const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
       if (recorder.latest()) path.start_from(*recorder.latest());
       for (const double time : times) {
+        if (const auto before = value_before_jump(scene.protocol, time)) {
+          QuasiStaticState state = path.move_to(*before, time);
+          state.between = true;
+          recorder.see(state);
+        }
         recorder.see(path.move_to(value_at(scene.protocol, time), time));
       }
       recorder.close_part(0.0);

@@ -1,6 +1,7 @@
 // Declared in tpm/plan/show/plan_report.hpp.
 // What a planned model answered.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -41,6 +42,11 @@ void write_claim(const Plan& plan, Hdf5Writer& file) {
                  {rounded(shown_error(plan, *c.verified_response_error), 6)});
   }
   file.numbers("/claim/tolerance", {plan.request.tolerance});
+  if (plan.masses_left_out) file.numbers("/claim/masses_left_out", {*plan.masses_left_out});
+  const std::vector<std::string> warnings = plan_warnings(plan);
+  if (!warnings.empty()) {
+    file.attribute("/claim", "warnings", fmt::format("{}", fmt::join(warnings, "\n")));
+  }
 }
 
 }  // namespace

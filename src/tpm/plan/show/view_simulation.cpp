@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "tpm/base/text.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
 #include "tpm/show/view_parts.hpp"
 #include "tpmkit/error.hpp"
@@ -155,6 +156,22 @@ void add_curves(const Hdf5Reader& file, ViewPage& page) {
   add_plot(page, time, file, "/curve/dissipated_J", "dissipated energy", "mJ", kMilli);
 }
 
+/// What a planned model is claimed to be accurate to, and what a reader must know of it.
+void add_claim(const Hdf5Reader& file, ViewPage& page) {
+  if (!file.has("/claim/verified_error")) return;
+  const auto share = [&](const char* name) {
+    return significant(100.0 * file.numbers(std::string("/claim/") + name).at(0), 3);
+  };
+  page.fact("model", file.attribute("/", "model"));
+  page.fact("claim", fmt::format("{}: error at most {} %, verified {} % ({}); {} % allowed",
+                                 file.attribute("/claim", "quantity"), share("claimed_error"),
+                                 share("verified_error"), file.attribute("/claim", "norm"),
+                                 share("tolerance")));
+  if (file.has_attribute("/claim", "warnings")) {
+    page.fact("warning", file.attribute("/claim", "warnings"));
+  }
+}
+
 void add_origin(const Hdf5Reader& file, ViewPage& page) {
   const auto attribute = [&file](const char* name) {
     return file.has_attribute("/", name) ? file.attribute("/", name) : std::string();
@@ -186,6 +203,7 @@ ViewPage view_simulation(const std::filesystem::path& path, std::string_view byt
   }
   ViewPage page = begun_page("simulation", path, bytes);
   add_origin(file, page);
+  add_claim(file, page);
   if (file.has("/spheres/position_m")) {
     add_organ(file, path, options.most_numbers, page);
   } else {
