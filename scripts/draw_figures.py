@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Draws the figures described in a figures.json of `tpm`: one SVG each, and for print PNG and PDF.
+"""Draws the figures described in a figures.json of `tpm`: one SVG each, and for print PDF and PNG.
 
-    draw_figures.py FIGURES.json FOLDER [--print]
+    draw_figures.py FIGURES.json FOLDER [--pdf | --print]
 
 Where a number comes from decides how it looks: what the model computes is a line; what was measured
 or printed is filled; what is assumed is open, hatched or dashed, and the legend says so. The same
@@ -13,7 +13,6 @@ import json
 import math
 import re
 import sys
-import textwrap
 from pathlib import Path
 
 import matplotlib
@@ -23,17 +22,22 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
 from drawing_files import literal, save_drawing  # noqa: E402
 from matplotlib.colors import to_hex, to_rgba  # noqa: E402
+from matplotlib.font_manager import FontProperties  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
 from matplotlib.patheffects import withStroke  # noqa: E402
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
+from matplotlib.textpath import text_to_path  # noqa: E402
 
-# Lengths in inches, so that text keeps its size whatever the number of panels.
-PAGE_WIDTH, SINGLE_PAGE_WIDTH, PANEL_HEIGHT = 8.9, 6.1, 2.75
-LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 0.62, 0.12, 0.32, 0.66, 0.50
+# Lengths in inches, so that text keeps its size whatever the number of panels. Widths of journals: two columns
+# (180 mm), and one and a half (130 mm) for one panel. At 400 pixels the text of the wider is still 7 pixels high.
+PAGE_WIDTH, SINGLE_PAGE_WIDTH, PANEL_HEIGHT = 180 / 25.4, 130 / 25.4, 2.5
+LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 0.66, 0.12, 0.32, 0.72, 0.52
 EDGE = 0.06  # between the title of an axis and what stands left of it
-LEGEND_ROW, NOTE_ROW = 0.172, 0.16
-MOST_ACROSS = 4  # panels; more go on below
+LEGEND_ROW, NOTE_ROW, TITLE_ROW = 0.178, 0.165, 0.17
+HANDLE = 0.45  # of a legend's text, and the gap before the next
+MOST_ACROSS = 2  # panels; more go on below
+TITLE_SIZE, LEGEND_SIZE, NOTE_SIZE = 9.5, 8.5, 7.5  # points
 
 # After Okabe and Ito, whose colours people with any of the usual deficiencies tell apart; darkened to a contrast of
 # 3.9 or more on white, so that thin lines show.
@@ -80,10 +84,10 @@ STYLE = {
     "pdf.fonttype": 42,
     "svg.hashsalt": "tpmkit",
     "font.family": ["DejaVu Sans"],
-    "font.size": 8.5,
-    "axes.titlesize": 9,
-    "axes.labelsize": 8.5,
-    "legend.fontsize": 8,
+    "font.size": 9,
+    "axes.titlesize": TITLE_SIZE,
+    "axes.labelsize": 9,
+    "legend.fontsize": LEGEND_SIZE,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -308,7 +312,7 @@ def name_places(axes, names):
         axes.set_xlabel("")  # its place is taken by the names
 
 
-def draw_panel(axes, panel, look, handles, narrow=False, letter=""):
+def draw_panel(axes, panel, look, handles, title):
     """Draws one panel and adds a handle per new legend text to `handles`."""
     axes.upper_limit = panel["y"].get("upper")
     many = repeated_lines(panel)
@@ -320,7 +324,7 @@ def draw_panel(axes, panel, look, handles, narrow=False, letter=""):
         else:
             handle = DRAW[series["kind"]](axes, series, look[series["label"]])
         handles.setdefault(legend_text(series), handle)
-    axes.set_title(lettered(letter, plain_name(panel["title"])), loc="left")
+    axes.set_title(title, loc="left")
     if getattr(axes, "beyond", 0):
         axes.annotate(f"\u25b2 {axes.beyond} above {axes.upper_limit:g}", (0.98, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7.5,
                       color="#444444", bbox=dict(facecolor="white", edgecolor="none", alpha=0.8, pad=1.5), zorder=7)
@@ -333,10 +337,8 @@ def draw_panel(axes, panel, look, handles, narrow=False, letter=""):
             tick_short_log_axis(getattr(axes, f"{name}axis"), getattr(axes, f"get_{name}lim")())
         elif not SMALLEST_PLAIN < max(abs(v) for v in getattr(axes, f"get_{name}lim")()) < 1e5:
             # No power of ten apart from the ticks: it would lie on its neighbour's.
-            getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(3 if narrow else 5))
+            getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(5))
             getattr(axes, f"{name}axis").set_major_formatter(FuncFormatter(plain_number))
-        elif narrow and name == "x":
-            axes.xaxis.set_major_locator(MaxNLocator(3))
     if "names" in panel["y"]:
         axes.set_yticks(range(1, len(panel["y"]["names"]) + 1), [plain_name(name) for name in panel["y"]["names"]], fontsize=7.5)
         axes.tick_params(axis="y", length=0)
@@ -370,8 +372,20 @@ def lettered(letter, title):
     return f"({letter}) {title}".strip()
 
 
-def wrap(parts, per_row):
-    return ["    ".join(parts[i:i + per_row]) for i in range(0, len(parts), per_row)]
+def text_width(text, size):
+    """Inches of a line of text of `size` points."""
+    return text_to_path.get_text_width_height_descent(text, FontProperties(family=STYLE["font.family"], size=size), False)[0] / 72
+
+
+def wrapped(parts, size, width, between=" "):
+    """Lines no wider than `width` inches, unless a part alone is."""
+    lines = []
+    for part in parts:
+        if lines and text_width(lines[-1] + between + part, size) <= width:
+            lines[-1] += between + part
+        else:
+            lines.append(part)
+    return lines
 
 
 def keep_inside(page, axes, least):
@@ -397,32 +411,35 @@ def draw_figure(figure):
         import work_precision  # beside this file; other figures do without
         return work_precision.draw_figure(figure, axis_label, lambda i, n, title: lettered(letter_of(i, n), title))
     panels, look = figure["panels"], looks(figure)
-    labels = {legend_text(s) for panel in panels for s in panel["series"]}
-    columns = 1 if len(panels) == 1 else 2
+    labels = list(dict.fromkeys(legend_text(s) for panel in panels for s in panel["series"]))
     width = SINGLE_PAGE_WIDTH if len(panels) == 1 else PAGE_WIDTH
-    notes = wrap(provenance_note(figure), 2 if len(panels) == 1 else 3)
-    if figure.get("note"):
-        notes = textwrap.wrap(figure["note"], 70 if len(panels) == 1 else 120) + notes
-    rows = -(-len(labels) // columns)
+    room = width - LEFT - RIGHT
+    columns = 2 if len(labels) > 1 and max(text_width(label, LEGEND_SIZE) for label in labels) <= room / 2 - HANDLE else 1
+    entries = ["\n".join(wrapped(label.split(" "), LEGEND_SIZE, room / columns - HANDLE)) for label in labels]
+    rows = -(-len(labels) // columns) + sum(entry.count("\n") for entry in entries)
+    notes = wrapped((figure.get("note") or "").split(), NOTE_SIZE, room) + wrapped(provenance_note(figure), NOTE_SIZE, room, "; ")
     across = min(len(panels), MOST_ACROSS)
-    panel_width = (width - LEFT - RIGHT - (across - 1) * GAP) / across
+    panel_width = (room - (across - 1) * GAP) / across
+    titles = [wrapped(lettered(letter_of(i, len(panels)), plain_name(panel["title"])).split(" "), TITLE_SIZE, panel_width + GAP / 2)
+              for i, panel in enumerate(panels)]
+    top = TOP + (max(len(lines) for lines in titles) - 1) * TITLE_ROW
     below_axis = BELOW_AXIS + below_names(panels, panel_width)
     below = below_axis + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08
     stacked = -(-len(panels) // across)
-    row_height = TOP + PANEL_HEIGHT + below_axis
-    height = TOP + PANEL_HEIGHT + below + (stacked - 1) * row_height
+    row_height = top + PANEL_HEIGHT + below_axis
+    height = top + PANEL_HEIGHT + below + (stacked - 1) * row_height
     page = plt.figure(figsize=(width, height))
     handles = {}
     for i, panel in enumerate(panels):
         left = LEFT + i % across * (panel_width + GAP)
         bottom = below + (stacked - 1 - i // across) * row_height
         axes = page.add_axes([left / width, bottom / height, panel_width / width, PANEL_HEIGHT / height])
-        draw_panel(axes, panel, look, handles, narrow=across > 3, letter=letter_of(i, len(panels)))
+        draw_panel(axes, panel, look, handles, "\n".join(titles[i]))
         keep_inside(page, axes, left - (GAP if i % across else LEFT) + EDGE)
-    page.legend(handles.values(), handles.keys(), loc="upper left", ncol=columns, frameon=False, borderaxespad=0,
+    page.legend([handles[label] for label in labels], entries, loc="upper left", ncol=columns, frameon=False, borderaxespad=0,
                 bbox_to_anchor=(LEFT / width, (below - below_axis) / height), handlelength=2.2, labelspacing=0.45)
     for i, note in enumerate(notes):
-        page.text(LEFT / width, (0.08 + (len(notes) - 1 - i) * NOTE_ROW) / height, note, fontsize=7, color="#555555", va="bottom")
+        page.text(LEFT / width, (0.08 + (len(notes) - 1 - i) * NOTE_ROW) / height, note, fontsize=NOTE_SIZE, color="#555555", va="bottom")
     return page
 
 
@@ -438,13 +455,14 @@ def with_own_ids(svg, name):
     return re.sub(r"<[^>]*>", own, svg)  # the tags alone: what a user named stays as it is
 
 
-def save(figure, folder, for_print, reads):
+def save(figure, folder, pdf, png, reads):
     page = draw_figure(figure)
     save_drawing(page, folder / f"{figure['id']}.svg", lambda svg: with_own_ids(svg, figure["id"]), reads,
-                 metadata={"Date": None, "Creator": None})
-    if for_print:
+                 dpi=PIXELS_PER_INCH, metadata={"Date": None, "Creator": None})
+    if png:
         save_drawing(page, folder / f"{figure['id']}.png", reads=reads, dpi=PIXELS_PER_INCH, metadata={"Software": None})
-        save_drawing(page, folder / f"{figure['id']}.pdf", reads=reads,
+    if pdf:
+        save_drawing(page, folder / f"{figure['id']}.pdf", reads=reads, dpi=PIXELS_PER_INCH,
                      metadata={"CreationDate": None, "Creator": None, "Producer": None})
     plt.close(page)
 
@@ -453,7 +471,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("figures", type=Path, help="figures.json as written by tpm")
     parser.add_argument("folder", type=Path, help="where the drawings go")
-    parser.add_argument("--print", dest="for_print", action="store_true", help="write PNG (300 dpi) and PDF beside each SVG")
+    formats = parser.add_mutually_exclusive_group()
+    formats.add_argument("--pdf", action="store_true", help="write a PDF beside each SVG")
+    formats.add_argument("--print", dest="for_print", action="store_true", help="write PNG (300 dpi) and PDF beside each SVG")
     arguments = parser.parse_args()
     try:
         figures = literal(json.loads(arguments.figures.read_text(encoding="utf-8"))["figures"])
@@ -463,7 +483,7 @@ def main():
     matplotlib.rcdefaults()  # not what a matplotlibrc of this machine says
     matplotlib.rcParams.update(STYLE)
     for figure in figures:
-        save(figure, arguments.folder, arguments.for_print, [arguments.figures])
+        save(figure, arguments.folder, arguments.pdf or arguments.for_print, arguments.for_print, [arguments.figures])
 
 
 if __name__ == "__main__":

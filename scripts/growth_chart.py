@@ -144,24 +144,26 @@ def draw(options):
     cases = [json.loads(line) for line in pathlib.Path(options.record).read_text().splitlines()]
     print_tables(cases)
     plt.rcParams.update(draw_figures.STYLE)
-    figure, axes = plt.subplots(1, 3, figsize=(draw_figures.PAGE_WIDTH, 3.5))
+    figure, axes = plt.subplots(2, 2, figsize=(draw_figures.PAGE_WIDTH, 6.2))
+    rest = axes.flat[3]  # where the legend stands
+    rest.axis("off")
     panels = [("shell", "factorise_s", "(a) shell: one factorisation", "processor time [s]"),
               ("solid", "factorise_s", "(b) solid: one factorisation", "processor time [s]"),
               ("shell", "factor_entries", "(c) shell: entries of the factor", "entries")]
     handles = {}
-    for axis, (kind, key, title, label) in zip(axes, panels):
+    for axis, (kind, key, title, label) in zip(axes.flat, panels):
         for colour, marker, solver in zip(draw_figures.MODEL_COLOURS, draw_figures.DATA_MARKERS, NAMES):
             points = curve(cases, kind, solver, key)
             if not points:
                 continue
             handles[solver], = axis.loglog(*zip(*points), color=colour, marker=marker, markersize=4,
                                            linewidth=2.2 if solver == "tpm" else 1.3, label=NAMES[solver])
-        axis.set_title(title)
+        axis.set_title(title, loc="left")
         axis.set_xlabel("spheres")
         axis.set_ylabel(label)
-    figure.legend(handles.values(), [NAMES[s] for s in handles], loc="lower center", ncols=3, frameon=False)
-    figure.subplots_adjust(left=0.07, right=0.99, top=0.92, bottom=0.3, wspace=0.3)
-    save_drawing(figure, options.figure, metadata={"Date": None})
+    rest.legend(handles.values(), [NAMES[s] for s in handles], loc="center", frameon=False)
+    figure.subplots_adjust(left=0.1, right=0.98, top=0.95, bottom=0.08, wspace=0.3, hspace=0.34)
+    save_drawing(figure, options.figure, metadata={"Date": None, "Creator": None})
 
 
 def main():

@@ -8,8 +8,9 @@ lists names.
 import matplotlib.pyplot as plt
 from matplotlib.lines import Line2D
 
-PAGE_WIDTH, PANEL_HEIGHT, LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 8.9, 3.7, 0.95, 0.12, 0.32, 1.05, 0.50
-LEGEND_ROW, BAND_ROW, COLUMNS = 0.172, 0.165, 4
+# Inches: two columns of a journal (180 mm); panels stand one below the other, for their points are many.
+PAGE_WIDTH, PANEL_HEIGHT, LEFT, RIGHT, TOP, BELOW_AXIS = 180 / 25.4, 3.4, 1.1, 0.12, 0.32, 0.54
+LEGEND_ROW, BAND_ROW, COLUMNS = 0.185, 0.165, 3
 
 # One look per method in every chart. Colours after Okabe and Ito, and two greys.
 BLUE, RED, GREEN, PINK, ORANGE, SKY, BLACK, GREY = (
@@ -59,12 +60,12 @@ def draw_limit(axes, series):
         for x in series["x"]:
             axes.axvline(x, color=BLACK, linewidth=1, linestyle=(0, (5, 2)), zorder=2)
             axes.annotate(series["text"], (x, 0.98), xycoords=("data", "axes fraction"), xytext=(-2, 0), textcoords="offset points",
-                          rotation=90, ha="right", va="top", fontsize=7.5, color=BLACK)
+                          rotation=90, ha="right", va="top", fontsize=8, color=BLACK)
     else:
         for y in series["y"]:
             axes.axhline(y, color=GREY, linewidth=0.9, linestyle=":", zorder=1)
             axes.annotate(series["text"], (0.01, y), xycoords=("axes fraction", "data"), xytext=(0, 2), textcoords="offset points",
-                          ha="left", va="bottom", fontsize=7, color="#666666", zorder=6,
+                          ha="left", va="bottom", fontsize=7.5, color="#666666", zorder=6,
                           bbox=dict(facecolor="white", edgecolor="none", alpha=0.7, pad=0.6))
 
 
@@ -139,15 +140,16 @@ def draw_panel(page, place, band_height, panel, look, rows, axis_label, title):
 def draw_figure(figure, axis_label, title_of):
     panels, look, rows = figure["panels"], curves(figure), failure_rows(figure)
     legend_rows = -(-len(look) // COLUMNS)
-    below = BELOW_AXIS + legend_rows * LEGEND_ROW + 0.12
+    below = BELOW_AXIS + legend_rows * LEGEND_ROW + 0.12  # the lowest panel
     band = len(rows) * BAND_ROW
-    height = TOP + band + PANEL_HEIGHT + below
+    row_height = TOP + band + PANEL_HEIGHT + BELOW_AXIS
+    height = len(panels) * row_height + below - BELOW_AXIS
     page = plt.figure(figsize=(PAGE_WIDTH, height))
-    width = (PAGE_WIDTH - LEFT - RIGHT - (len(panels) - 1) * GAP) / len(panels)
     for i, panel in enumerate(panels):
-        place = [(LEFT + i * (width + GAP)) / PAGE_WIDTH, below / height, width / PAGE_WIDTH, PANEL_HEIGHT / height]
+        bottom = below + (len(panels) - 1 - i) * row_height
+        place = [LEFT / PAGE_WIDTH, bottom / height, 1 - (LEFT + RIGHT) / PAGE_WIDTH, PANEL_HEIGHT / height]
         draw_panel(page, place, band / height, panel, look, rows, axis_label, title_of(i, len(panels), panel["title"]))
     handles = [Line2D([], [], color=style[0], linewidth=0.9, **marker_style(style)) for style in look.values()]
-    page.legend(handles, list(look), loc="upper left", ncol=COLUMNS, frameon=False, borderaxespad=0, handlelength=2.0, labelspacing=0.4, fontsize=7.5,
+    page.legend(handles, list(look), loc="upper left", ncol=COLUMNS, frameon=False, borderaxespad=0, handlelength=2.0, labelspacing=0.4, fontsize=8,
                 columnspacing=1.2, bbox_to_anchor=(0.25 / PAGE_WIDTH, (below - BELOW_AXIS) / height))
     return page

@@ -250,10 +250,11 @@ void add_commands(CLI::App& app, Session& session) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"tpm: check a viscoelastic soft-tissue model against data", "tpm"};
+  CLI::App app{"tpm: from a force recording to a soft-tissue model to validate, simulate and feel",
+               "tpm"};
   app.require_subcommand(1);
   app.footer(
-      "Example:\n  tpm paper tables --depths 2,4,6,8 --spacings 20,25,30,35\n"
+      "Example:\n  tpm example recording\n  tpm fit recording.csv\n"
       "Each command explains itself: tpm COMMAND --help, or tpm help COMMAND");
   app.set_version_flag("-V,--version", fmt::format("tpm {}", version()), "Print the version");
   Session session;

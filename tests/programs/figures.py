@@ -56,6 +56,24 @@ def faults_of_verdicts():
     return faults
 
 
+def faults_of_layout(drawing):
+    """Three panels do not stand side by side, and no text leaves the page: half of 400 pixels is enough for a panel."""
+    root = drawing.getroot()
+    width = float(root.get("viewBox").split()[2])
+    faults = [] if abs(width - 180 / 25.4 * 72) < 0.1 else [f"a figure of three panels is {width} points wide"]
+    panels = {}
+    for group in root.iter("{http://www.w3.org/2000/svg}g"):
+        if "axes_" in group.get("id", ""):
+            numbers = group.find(".//{http://www.w3.org/2000/svg}path").get("d").split()
+            panels[group.get("id")] = round(float(numbers[1]))
+    if len(panels) != 3 or len(set(panels.values())) != 2:
+        faults.append(f"three panels do not stand in two columns: left edges {panels}")
+    words = [e.text for e in root.iter() if e.tag.endswith("}text")]
+    if any(len(w or "") > 110 for w in words) or any("A title" in (w or "") and len(w) > 60 for w in words):
+        faults.append(f"a text is not wrapped: {words}")
+    return faults
+
+
 def main():
     axis = {"quantity": "BIC", "unit": "", "logarithmic": False}
     figure = {"id": "a", "title": "", "caption": "", "panels": [
@@ -65,7 +83,9 @@ def main():
     of_names = panel("", {**axis, "names": ["linear", "power-1"]}, [band, series("E", "derived", [1.0, 2.0])])
     of_names["x"]["names"] = ["peak force", "half time"]
     numbered = panel("", axis, of_names["series"])
-    figures = [figure] + [{"id": id, "title": "", "caption": "", "panels": [p]} for id, p in (("b", of_names), ("c", numbered))]
+    long = {**panel("A title of a panel that is far too long for one line above half of a page", axis,
+                    [series("a label that is far too long to stand beside another one below a figure " * 2, "measured", [1.0])])}
+    figures = [figure, {"id": "d", "title": "", "caption": "", "panels": [long, long, long]}] + [{"id": id, "title": "", "caption": "", "panels": [p]} for id, p in (("b", of_names), ("c", numbered))]
     faults = faults_of_views() + faults_of_verdicts()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -91,8 +111,12 @@ def main():
         if heights[0] != heights[1]:
             faults.append(f"names that stand upright take room below as if they stood aslant: {heights}")
         png = (folder / "x/a.png").read_bytes()
-        if int.from_bytes(png[16:20], "big") != 2670:  # 8.9 inches at 300 dpi
-            faults.append("the PNG has not 300 dpi")
+        if int.from_bytes(png[16:20], "big") != int(180 / 25.4 * 300):
+            faults.append("the PNG has not 300 dpi, or is not as wide as two columns of a journal (180 mm)")
+        subprocess.run([sys.executable, SCRIPT, folder / "figures.json", folder / "pdf", "--pdf"], check=True)
+        if {f.name for f in (folder / "pdf").iterdir()} != {f"{id}.{ending}" for id in "abcd" for ending in ("svg", "pdf")}:
+            faults.append(f"--pdf wrote {sorted(f.name for f in (folder / 'pdf').iterdir())}")
+        faults += faults_of_layout(tree.parse(folder / "x/d.svg"))
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")

@@ -206,15 +206,14 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
   if (python.empty()) return;
   std::vector<std::string> words{std::filesystem::absolute(figures_json).string(),
                                  std::filesystem::absolute(folder).string()};
-  if (drawings == Drawings::for_print) words.emplace_back("--print");
+  words.emplace_back(drawings == Drawings::for_print ? "--print" : "--pdf");
   std::vector<std::filesystem::path> files;
   const Json figures = read_json(figures_json);
   for (const Json& figure : figures.at("figures")) {
     const auto id = figure.at("id").get<std::string>();
     files.push_back(folder / (id + ".svg"));
-    if (drawings == Drawings::svg) continue;
-    files.push_back(folder / (id + ".png"));
     files.push_back(folder / (id + ".pdf"));
+    if (drawings == Drawings::for_print) files.push_back(folder / (id + ".png"));
   }
   run_script(python, "draw_figures.py", words, files);
 }

@@ -16,14 +16,14 @@ namespace tpm::show {
 /// and write the rest.
 [[nodiscard]] std::string find_drawing_python();
 
-/// Formats of each figure: SVG alone, or PNG (300 dpi) and PDF too.
-enum class Drawings { svg, for_print };
+/// Formats of each figure: SVG and PDF, or PNG (300 dpi) too.
+enum class Drawings { for_report, for_print };
 
-/// Draws every figure of a figures.json into `folder`, one file each, with
+/// Draws every figure of a figures.json into `folder`, one file per format, with
 /// scripts/draw_figures.py. Throws Error(environment) with the last words of the script if it
 /// fails.
 void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
-                  const std::filesystem::path& folder, Drawings drawings = Drawings::svg);
+                  const std::filesystem::path& folder, Drawings drawings = Drawings::for_report);
 
 /// Writes figures.json into `folder` and draws its figures there as SVG, PNG and PDF. Returns the
 /// names of the files that were written, after those of `files`: without a Python with matplotlib
@@ -32,9 +32,9 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
                                                      const std::vector<Figure>& figures,
                                                      std::vector<std::string> files = {});
 
-/// Writes a document with its figures into `folder`: report.md, report.html, figures.json and
-/// figures/ID.svg. Without a Python a line stands in place of each figure. Throws as draw_figures
-/// does.
+/// Writes a document with its figures into `folder`: report.md, report.html, figures.json,
+/// figures/ID.svg and figures/ID.pdf. Without a Python a line stands in place of each figure.
+/// Throws as draw_figures does.
 void write_document(const std::filesystem::path& folder, const Document& document,
                     const std::vector<Figure>& figures, const std::string& python);
 
@@ -51,8 +51,8 @@ void write_report(const std::filesystem::path& folder, const Document& document,
 void draw_network(const std::string& python, const std::filesystem::path& picture_json,
                   const std::filesystem::path& stem);
 
-/// Draws pictures.json of a simulation into `folder` with scripts/draw_deformation.py, SVG and PNG.
-/// Returns the names of the files, none without a Python. Throws as draw_figures does.
+/// Draws pictures.json of a simulation into `folder` with scripts/draw_deformation.py, as SVG, PNG
+/// and PDF. Returns the names of the files, none without a Python. Throws as draw_figures does.
 /// @param two there are two states to be drawn side by side
 [[nodiscard]] std::vector<std::string> draw_deformation(const std::string& python,
                                                         const std::filesystem::path& pictures_json,

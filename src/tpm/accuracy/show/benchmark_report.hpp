@@ -65,8 +65,8 @@ void put_result(BenchmarkRecord& record, BenchmarkResult result, Json run);
 [[nodiscard]] std::string setting_words(const BenchmarkPoint& point);
 
 /// Writes report.md, report.html, benchmark.json, a CSV for each problem, figures.json and
-/// figures/*.svg into `folder`, and report.run.json, which says when and where. Without times all
-/// but the last are the same from run to run.
+/// figures/*.{svg,pdf} into `folder`, and report.run.json, which says when and where. Without times
+/// all but the last are the same from run to run.
 /// @param python from find_drawing_python()
 void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path& folder,
                      const std::string& python);

@@ -20,8 +20,8 @@ namespace tpm::accuracy {
 [[nodiscard]] std::vector<std::string> stability_sentences(const StabilityStudy& study);
 
 /// Writes report.md, report.html, stability.json, limits.csv, limiting_cases.csv, servo.csv,
-/// map_ID.csv for each map, figures.json and figures/*.svg into `folder`, and report.run.json, the
-/// only file that changes from run to run.
+/// map_ID.csv for each map, figures.json and figures/*.{svg,pdf} into `folder`, and
+/// report.run.json, the only file that changes from run to run.
 /// @param python from find_drawing_python()
 /// @param seconds wall time of the study
 void write_stability(const StabilityStudy& study, const std::filesystem::path& folder,

@@ -8,7 +8,7 @@
 
 namespace tpm::fit {
 
-/// Writes prediction.csv, prediction.json, figures.json and the figure as SVG and PNG into
+/// Writes prediction.csv, prediction.json, figures.json and the figure as SVG, PNG and PDF into
 /// `folder`. Returns the names of the files. Throws Error(environment) if drawing is not possible;
 /// the other files are then already there.
 [[nodiscard]] std::vector<std::string> write_prediction_report(const std::filesystem::path& folder,

@@ -7,7 +7,7 @@
 
 namespace tpm::fit {
 
-/// Writes validation.csv, validation.json, figures.json and its figures as SVG and PNG into
+/// Writes validation.csv, validation.json, figures.json and its figures as SVG, PNG and PDF into
 /// `folder`: E with U against the requirement, and the motion beside those of the calibration.
 /// Returns the names of the files. Throws Error(environment) if drawing is not possible; the other
 /// files are then already there.

@@ -25,8 +25,8 @@ namespace tpm::paper {
 [[nodiscard]] std::string curves_csv(const OrganStudy& study);
 
 /// Writes report.md, report.html, experiments.json, readings.csv, fits.csv, curves.csv,
-/// figures.json and figures/*.svg into `folder`, and report.run.json, the only file that changes
-/// from run to run.
+/// figures.json and figures/*.{svg,pdf} into `folder`, and report.run.json, the only file that
+/// changes from run to run.
 /// @param python from find_drawing_python()
 /// @param seconds wall time of the study
 void write_organ_study(const OrganStudy& study, const std::filesystem::path& folder,

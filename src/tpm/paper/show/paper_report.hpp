@@ -40,8 +40,8 @@ struct PaperReport {
 [[nodiscard]] Document paper_document(const PaperReport& report);
 
 /// Writes report.html, report.md, tables.{md,csv,tex,json}, audit.json, fit_*.json,
-/// validation.json, figures.json and figures/*.svg into `folder`, and report.run.json, the only
-/// file that changes from run to run.
+/// validation.json, figures.json and figures/*.{svg,pdf} into `folder`, and report.run.json, the
+/// only file that changes from run to run.
 /// @param python from find_drawing_python()
 void write_paper_report(const PaperReport& report, const std::filesystem::path& folder,
                         const std::string& python);

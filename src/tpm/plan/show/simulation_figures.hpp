@@ -16,8 +16,8 @@ struct FiguredRun {
   const SimulationRun* run;
 };
 
-/// Draws all of them into a folder as SVG and PNG. Returns the names of the files, figures.json and
-/// pictures.json, from which they can be drawn again, among them.
+/// Draws all of them into a folder as SVG, PNG and PDF. Returns the names of the files,
+/// figures.json and pictures.json, from which they can be drawn again, among them.
 /// @param runs one or two, of the same spheres
 /// Throws Error(environment) if drawing is not possible; the two JSON files are then there.
 std::vector<std::string> write_simulation_figures(const std::filesystem::path& folder,
