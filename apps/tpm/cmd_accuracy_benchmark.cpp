@@ -168,7 +168,8 @@ void add_benchmark_command(CLI::App& accuracy, Session& session) {
                       "CSV file to append to: instead, measure named pieces of work (all, or those "
                       "given in place of problems) by processor time, a row for each");
   command
-      ->add_option("--commit", choice->commit, "With --append-to: what the program was built from")
+      ->add_option("--commit", choice->commit,
+                   "Commit that the program was built from: with --append-to")
       ->capture_default_str();
   add_format_option(*command, session);
   command->footer(

@@ -237,21 +237,24 @@ void add_figure_options(CLI::App& command, ImportArguments& a) {
   add("--dataset", a.options.dataset, "Only the dataset of this name");
   add("--depth", a.depth, "Depth of the indentation: of a relaxation curve, such as \"4 mm\"");
   add("--load", a.load, "Imposed load of a creep curve, such as \"0.98 N\"");
-  add("--time-origin", a.time_origin, "With --depth or --load: end_of_ramp or load_applied")
+  add("--time-origin", a.time_origin,
+      "Event from which times count: end_of_ramp or load_applied; with --depth or --load")
       ->each(reads_word(parse_time_origin, "--time-origin"));
 }
 
 void add_description_options(CLI::App& command, ImportArguments& a) {
   const auto add = options_of_group(command, "Description");
-  add("--provenance", a.provenance, "Else measured for machines and digitized for figures")
+  add("--provenance", a.provenance,
+      "Provenance of the numbers (default: measured for machines, digitized for figures)")
       ->each(reads_word(parse_provenance, "--provenance"));
   add("--title", a.options.header.title, "One line that says what the curve is");
-  add("--citation", a.options.header.citation, "Authors, journal, year, pages");
-  add("--doi", a.options.header.doi, "Bare DOI");
+  add("--citation", a.options.header.citation, "Publication: authors, journal, year, pages");
+  add("--doi", a.options.header.doi, "DOI of the publication, without https://doi.org/");
   add("--specimen", a.options.header.specimen, "What was tested");
-  add("--probe-shape", a.options.header.probe.shape, "hemisphere, sphere, flat punch or cone");
-  add("--probe-diameter", a.probe_diameter, "Such as \"4 mm\"");
-  add("--note", a.options.header.note, "What a reader has to know");
+  add("--probe-shape", a.options.header.probe.shape,
+      "Shape of the probe: hemisphere, sphere, flat punch or cone");
+  add("--probe-diameter", a.probe_diameter, "Diameter of the probe, such as \"4 mm\"");
+  add("--note", a.options.header.note, "Note for the reader of the curve");
 }
 
 }  // namespace

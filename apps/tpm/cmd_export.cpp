@@ -118,7 +118,7 @@ void add_export_command(CLI::App& app, Session& session) {
                       "Angle between axis and surface of a cone, such as \"45 deg\"");
   command->add_option("--punch-radius", texts->punch, "Radius of a flat punch");
   command->add_option("--area", texts->area, "Cross section, of a bar");
-  command->add_option("--length", texts->length, "Length of that bar");
+  command->add_option("--length", texts->length, "Length of a bar");
   command->add_option("--poisson", texts->poisson, "Poisson's ratio (default 0.49)");
   command->add_option("--earliest", texts->from,
                       "Earliest time of a fractional law (default 0.01 s)");

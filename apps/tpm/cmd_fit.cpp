@@ -285,7 +285,8 @@ void add_fit_command(CLI::App& app, Session& session) {
       *command, options->folder,
       ": figures and files (default: NAME_fit for recordings, none for a configuration)");
   add_verbose_option(*command, options->verbose, "every law tried, starts, readings");
-  command->add_flag("--no-draw", options->no_draw, "Write no figures and files")->excludes(folder);
+  command->add_flag("--no-draw", options->no_draw, "Write no figures and no files")
+      ->excludes(folder);
   add_recording_options(*command, options->recordings);
   add_placement_options(*command, options->placement);
   command->add_option("-o,--output", options->output, "File to write (default: the terminal)");
@@ -308,7 +309,7 @@ void add_fit_command(CLI::App& app, Session& session) {
                       "Depth that coefficients refer to: as secants, e.g. \"4 mm\"; of recordings "
                       "(default: the largest; of a folder the largest that all reach)");
   command->add_option("--group-by", options->group_by,
-                      "What tells the specimens of a folder apart: a pattern of the file names "
+                      "How the specimens of a folder are told apart: a pattern of the file names "
                       "with one group, e.g. \"(liver[0-9]+)_\", or a column or key of the files");
   command->add_flag("--compare", options->compare,
                     "Compare two folders: ratio of each parameter, and of Young's moduli, with "

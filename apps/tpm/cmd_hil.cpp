@@ -357,7 +357,7 @@ void add_hil_command(CLI::App& app, Session& session) {
                   "Go through the motion of this recording of a depth instead of the session's "
                   "phases; with --device omega7 the operator is asked to");
   run->add_option("--date", choice->notes.date,
-                  "Stands in the recording; default with a real device: now");
+                  "Date of the session, stands in the recording; default with a real device: now");
   run->add_option("--operator", choice->notes.operator_code,
                   "Code of who runs the session; stands in the recording");
   run->add_option("--subject", choice->notes.subject_code,

@@ -81,8 +81,9 @@ void add_identify_command(CLI::App& app, Session& session) {
                    "Stop when every material parameter is known to this part of its estimate")
       ->capture_default_str();
   command
-      ->add_option("--patience", options->patience,
-                   "And stays so until there are this many times as many samples, 1 or more")
+      ->add_option(
+          "--patience", options->patience,
+          "Factor by which the number of samples must grow while --target stays met, 1 or more")
       ->capture_default_str();
   command->add_option("--level", options->level, "Confidence level, 0.9 or 90%: of the intervals")
       ->capture_default_str();

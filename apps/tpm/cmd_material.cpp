@@ -123,7 +123,8 @@ void add_material_command(CLI::App& app, Session& session) {
   command
       ->add_option(
           "--intervals", options->intervals,
-          "law: fit to the law's force, intervals from its covariance; readings: fit to "
+          "Source of the intervals: law: fit to the law's force, intervals from its covariance; "
+          "readings: fit to "
           "the recordings, intervals from their scatter by derivatives; profiles: the same "
           "by likelihood profiles (minutes)")
       ->check(one_of_words({"law", "readings", "profiles"}))

@@ -130,7 +130,7 @@ void add_options(CLI::App& command, TableOptions& options) {
                    "Ramp-and-hold with the true eta1: end of ramp and end of hold");
   command.add_option("--depths", options.depths, "Indentation depths (default 2,4,6,8 mm)");
   command.add_option("--spacings", options.spacings, "Sphere spacings x (default 20,25,30,35 mm)");
-  command.add_option("--E", options.E, "E1, E2 and E' together (default 12 kPa)");
+  command.add_option("--E", options.E, "Modulus of all springs: E1, E2 and E' (default 12 kPa)");
   command.add_option("--E1", options.E1, "Spring of the Kelvin-Voigt unit");
   command.add_option("--E2", options.E2, "Series spring");
   command.add_option("--Eprime", options.Eprime, "Modulus of the lateral bonds");

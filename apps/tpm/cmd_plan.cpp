@@ -35,16 +35,18 @@ void add_plan_options(CLI::App& command, PlanChoice& choice) {
   command.add_option("--budget-file", choice.budget,
                      "budget.json of tpm budget, for --tolerance data");
   command
-      .add_option("--outputs", choice.outputs,
-                  "What the tolerance is about: force (the response) or field (displacements)")
+      .add_option(
+          "--outputs", choice.outputs,
+          "Quantity that the tolerance concerns: force (the response) or field (displacements)")
       ->check(one_of_words({"force", "field"}))
       ->capture_default_str();
   command.add_option("--loop-rate", choice.rate,
                      "Rate of the servo loop, such as \"1 kHz\": every period needs its answer");
-  command.add_option("--wall", choice.wall, "Computing time, such as \"0.1 s per s\"");
-  command.add_option(
-      "--costs", choice.costs,
-      "File of --calibrate, or nominal; default: this machine's, if it was calibrated");
+  command.add_option("--wall", choice.wall,
+                     "Computing time per simulated time, such as \"0.1 s per s\"");
+  command.add_option("--costs", choice.costs,
+                     "Times of operations: a file of --calibrate, or nominal; default: this "
+                     "machine's, if it was calibrated");
 }
 
 namespace {
@@ -293,7 +295,7 @@ void add_plan_command(CLI::App& app, Session& session) {
                  "Try everything, also where that takes more than twice as long as the reference")
       ->excludes("--brief");
   command->add_flag("--estimate", choice->estimate,
-                    "Say what planning would take, from one coarse run, and do no more");
+                    "Print how long planning would take, from one coarse run, and end");
   command->add_flag("--calibrate", choice->calibrate,
                     "Measure what operations cost on this machine, and keep it");
   add_verbose_option(*command, choice->verbose,

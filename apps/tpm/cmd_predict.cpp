@@ -128,10 +128,11 @@ void add_predict_command(CLI::App& app, Session& session) {
       "Depth of the indentation: instead of a file, a ramp to this depth, \"4 mm\"; with "
       "--frequencies the depth about which "
       "the tissue oscillates (default: the law's reference)");
-  command->add_option("--frequencies", options->frequencies,
-                      "Instead of a protocol: storage and loss of the law over frequency, small "
-                      "oscillations: \"1 Hz, 10 Hz\", or \"0.001 Hz : 100 Hz : 16\" for 16 at "
-                      "equal ratios");
+  command->add_option(
+      "--frequencies", options->frequencies,
+      "Frequencies of storage and loss of the law, small oscillations: instead of a "
+      "protocol, \"1 Hz, 10 Hz\", or \"0.001 Hz : 100 Hz : 16\" for 16 at "
+      "equal ratios");
   command->add_option("--level", options->level,
                       "Confidence level, 0.9 or 90%: of the bands (default: that of the fit)");
   command

@@ -314,7 +314,7 @@ void add_sweep_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--workers", choice->workers, "Threads, 1 to 1024 (default: all processors)");
   command->add_option("--shard", choice->shard,
-                      "I/N: compute the I-th of N parts, into a file of its own for merge");
+                      "Part to compute, I/N: the I-th of N, into a file of its own for merge");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm sweep configs/sweep_x_depth.json -o sweep.h5\n"

@@ -254,7 +254,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   plotting->add_option("--y", choice->y, "Axis drawn upwards, and of families");
   plotting->add_option("--at", choice->at, "Place on an axis, AXIS=VALUE: that is not drawn");
   plotting->add_option("--pareto", choice->pareto,
-                       "MISFIT,COST: cells that no other betters in both");
+                       "Draw the cells that no other improves in two variables: MISFIT,COST");
   plotting->footer(
       "Example:\n  tpm sweep configs/sweep_x_depth.json -o sweep.h5\n"
       "  tpm sweep plot sweep.h5 --folder figures");

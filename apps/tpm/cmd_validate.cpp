@@ -426,12 +426,12 @@ void add_validate_command(CLI::App& app, Session& session) {
                       "protocols differ");
   CLI::Option* credibility =
       command->add_option("--credibility", options->credibility,
-                          "Write a page (HTML) with the evidence under the headings of V&V 40");
+                          "Page to write (HTML), with the evidence under the headings of V&V 40");
   command
-      ->add_option(
-          "--evidence", options->evidence,
-          "Evidence of that page: CATEGORY=FILE, such as \"code verification=checks.json\" (may be "
-          "repeated); the file is named with its SHA-256")
+      ->add_option("--evidence", options->evidence,
+                   "Evidence for the page of --credibility: CATEGORY=FILE, such as \"code "
+                   "verification=checks.json\" (may be "
+                   "repeated); the file is named with its SHA-256")
       ->allow_extra_args(false)
       ->needs(credibility);
   command->add_option("--question", options->words.question, "Question of interest, of that page")

@@ -91,8 +91,9 @@ void add_view_command(CLI::App& app, Session& session) {
   command->add_option(
       "-o,--output", choice->output,
       "File to write (HTML; default: the name of FILE ending in .html, in this folder)");
-  command->add_flag("--no-organ", choice->no_organ,
-                    "Of a recording: curves only, without recomputing the organ from the motion");
+  command->add_flag(
+      "--no-organ", choice->no_organ,
+      "Show the curves of a recording only, without recomputing the organ from the motion");
   add_force_option(*command, session);
   add_format_option(*command, session);
   command->footer(

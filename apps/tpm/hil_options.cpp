@@ -76,15 +76,15 @@ void add_inverse_ports(CLI::App& command, DeviceOptions& options, const char* of
   add_port("--inverse-port", address.port,
            fmt::format("Port of the Inverse service: its simulation channel{}", of));
   add_port("--inverse-events-port", address.events_port,
-           "Port of its events, of versions from 3.5 on");
+           "Port of the Inverse service's events, of versions from 3.5 on");
   add_port("--inverse-http-port", address.old_http_port,
-           "Port of its HTTP, of versions before 3.5");
+           "Port of the Inverse service's HTTP, of versions before 3.5");
 }
 
 void add_device_options(CLI::App& command, DeviceOptions& options) {
   command
       .add_option("--device", options.choice.kind,
-                  "virtual, replay, plugin, omega7, inverse3 or another device with a file in "
+                  "Device: virtual, replay, plugin, omega7, inverse3 or another with a file in "
                   "configs/devices")
       ->check([](const std::string& kind) {
         if (kind == "plugin") return std::string();
@@ -98,25 +98,28 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
   command.add_option("--serial", options.serial,
                      "Serial number of the device, where there are several; of --device inverse3 "
                      "its id");
-  command.add_option("--index", options.index, "Its place in the list of tpm hil devices")
+  command
+      .add_option("--index", options.index, "Place of the device in the list of tpm hil devices")
       ->check(CLI::Range(0, 127));
   add_dhd_library(command, options);
   command.add_option(
       "--plugin", options.plugin,
       "Library of a device plugin, after tpmkit/haptic_device.h: of --device plugin");
-  command.add_option(
-      "--device-file", options.file,
-      "What was measured of the device (tpm hil identify; schemas/device.schema.json); "
-      "without it hardware counts as 20 ms late and free of friction");
+  command.add_option("--device-file", options.file,
+                     "File with limits and measured properties of the device (tpm hil identify; "
+                     "schemas/device.schema.json); "
+                     "without it hardware counts as 20 ms late and free of friction");
   add_inverse_ports(command, options, ", of --device inverse3");
-  command.add_option("--inverse-id", options.choice.inverse.device_id,
-                     "Which device of the service, where there are several: as --serial");
+  command.add_option(
+      "--inverse-id", options.choice.inverse.device_id,
+      "Identifier of the device at the service, where there are several: as --serial");
   command
       .add_option("--inverse-gravity", options.choice.inverse.gravity_carried,
                   "Share of the device's weight that the service is to carry")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--device-recording", options.replay, "What --device replay plays");
+  command.add_option("--device-recording", options.replay,
+                     "Recording whose motion --device replay plays");
   command.add_flag("--may-move", options.choice.may_move,
                    "The device may move by itself to initialise");
   command.add_flag("--take-as-ready", options.choice.take_as_ready,

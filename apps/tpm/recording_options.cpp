@@ -79,11 +79,12 @@ void add_recording_options(CLI::App& command, RecordingOptions& options) {
 
 void add_placement_options(CLI::App& command, PlacementArguments& arguments) {
   command.add_option("--contact", arguments.contact,
-                     "Depth of contact that is held, of recordings, e.g. \"0.3 mm\" (default: the "
+                     "Depth of contact that is fixed, of recordings, e.g. \"0.3 mm\" (default: the "
                      "onset of the force, measured with its uncertainty)");
-  command.add_option("--zero", arguments.zero,
-                     "Reading without a load that is held, of recordings, e.g. \"12 mN\" (default: "
-                     "measured before contact)");
+  command.add_option(
+      "--zero", arguments.zero,
+      "Reading without a load that is fixed, of recordings, e.g. \"12 mN\" (default: "
+      "measured before contact)");
 }
 
 void hold_placement(const PlacementArguments& arguments, const RecordingOptions& options,

@@ -5,8 +5,9 @@
 
 - every relative link in a Markdown page leads to a file, and its anchor to a heading;
 - every docs/PAGE.md named in a source, a script or a page exists;
-- every command of tpm in a page of docs or reports is one, and has the options that stand behind it;
-- every script, configuration, test and example that a page of docs or reports names is there;
+- every command of tpm in a page is one, and has the options that stand behind it, in a table or a sentence too;
+- every script, configuration, test and example that a page names is there, and every program of the tests that it runs
+  is made. The commands of reports are not run: they measure;
 - docs/README.md links every page of docs, docs/site and reports, and the site's start lists every page of docs once;
 - docs has at most 35 pages beside those of docs/site, and reports at most 16, one in each folder: MOST;
 - three questions, as a new user types them, are answered two links from README.md at most: QUESTIONS;
@@ -204,22 +205,59 @@ def without_example(root, program):
             yield f"{call} --help: has no example that calls it"
 
 
+# Pages whose commands are looked at: these and all of docs and reports.
+OTHERS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "paper/paper.md")
+CALLED = re.compile(r"(?:^\s*(?:\$ )?(?:time )?(?:build/release/)?|`|&& |\| )tpm ([a-z][^`#|&>]*)")
+
+
+def lines_of(text):
+    """The lines of a page, those of prose behind a dot; a command that goes over lines, in backticks or behind a backslash,
+    is one."""
+    text = re.sub(r" *\\\n *", " ", text)
+    parts = re.split(r"(^ *```[^\n]*\n.*?^ *```|(?:^    [^\n]*\n)+|\n\s*\n)", text, flags=re.M | re.S)
+    for n, part in enumerate(parts):
+        joined = part if n % 2 else re.sub(r"`[^`]+`", lambda match: re.sub(r"\s*\n\s*", " ", match[0]), part)
+        yield from (line if n % 2 else f".{line}" for line in joined.splitlines())
+
+
+def faults_of_calls(name, text, options):
+    for line in lines_of(text):
+        for call in CALLED.findall(re.sub(r"\$\([^)]*\)", "", line)):
+            words, command = call.split(), ()
+            while len(words) > len(command) and (*command, words[len(command)]) in options:
+                command = (*command, words[len(command)])
+            if not command and "completion" not in line:  # an argument of a script
+                yield f"{name}: tpm {call.strip()}: no such command"
+            for option in re.findall(r"(?<!\S)(--?[A-Za-z][\w-]*)", call) if command else ():
+                if option not in options[command]:
+                    yield f"{name}: tpm {' '.join(command)} has no option {option}"
+
+
 def false_commands(root, program):
     from command_help import commands
 
     options = {tuple(c.words): {name for _, rows in c.sections for item, _ in rows for name in re.findall(r"(?<![\w-])--?[A-Za-z][\w-]*", item)}
                for c in commands(program)}
-    for page in [root / "README.md", *tracked(root / "docs", ".md"), *tracked(root / "reports", ".md")]:
-        for line in page.read_text(encoding="utf-8").splitlines():
-            for call in re.findall(r"(?:^\s*(?:\$ )?(?:time )?(?:build/release/)?|`|&& |\| )tpm ([a-z][^`#|&>]*)", re.sub(r"\$\([^)]*\)", "", line)):
-                words, command = call.split(), ()
-                while len(words) > len(command) and (*command, words[len(command)]) in options:
-                    command = (*command, words[len(command)])
-                if not command and "completion" not in line:  # an argument of a script
-                    yield f"{page.relative_to(root)}: tpm {call.strip()}: no such command"
-                for option in re.findall(r"(?<!\S)(--?[A-Za-z][\w-]*)", call) if command else ():
-                    if option not in options[command]:
-                        yield f"{page.relative_to(root)}: tpm {' '.join(command)} has no option {option}"
+    for page in [*(root / name for name in OTHERS), *tracked(root / "docs", ".md"), *tracked(root / "reports", ".md")]:
+        yield from faults_of_calls(page.relative_to(root), page.read_text(encoding="utf-8"), options)
+    # The check itself: an option behind the end of a line is looked at.
+    for false in ("a `tpm fit r.csv\n--false` b", "    $ tpm fit r.csv \\\n      --false\n", "```sh\ntpm fit r.csv --false\n```\n"):
+        if len(list(faults_of_calls("", false, {("fit",): set()}))) != 1:
+            yield f"documentation.py: does not notice {false!r}"
+
+
+def lost_programs(root):
+    """A program of the tests that a page runs is made: measure_NAME, a room's, or a file's of its own."""
+    rooms = {f.parent.name for f in (root / "tests").glob("*/test_*.cpp")}
+    made = {f"measure_{f.stem}" for f in (root / "tests/measure").glob("*.cpp")}
+    made |= {f"test_{room}{label}" for room in rooms for label in ("", "_slow", "_threads")}
+    made |= {f.stem for f in (root / "tests").glob("*/test_*.cpp")
+             if f.stem.endswith("_dummy") or re.search(r'include "(?:counted_allocations|formulation_suite)\.hpp"', f.read_text(encoding="utf-8"))}
+    for page in tracked(root, ".md"):
+        text = page.read_text(encoding="utf-8")
+        for name in sorted(set(re.findall(r"build/\w+/tests/((?:test|measure)_\w+)|(?:ninja -C \S+|--target) ((?:test|measure)_\w+)", text))):
+            if (name[0] or name[1]) not in made:
+                yield f"{page.relative_to(root)}: runs {name[0] or name[1]}: no such program"
 
 
 MANUAL = ("NAME", "SYNOPSIS", "OPTIONS", "EXAMPLES", "EXIT STATUS", "ENVIRONMENT", "FILES", "SEE ALSO")
@@ -297,7 +335,7 @@ def false_excerpts(root, program):
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
     faults = [*broken_links(root), *lost_pages(root), *lost_files(root), *unlisted_pages(root), *too_many_pages(root), *unanswered(root), *faults_of_paper(root),
-              *differing_groups(root, program), *without_example(root, program), *false_commands(root, program), *short_manuals(root, program), *far_pages(root),
+              *differing_groups(root, program), *without_example(root, program), *false_commands(root, program), *lost_programs(root), *short_manuals(root, program), *far_pages(root),
               *false_excerpts(root, program)]
     for fault in faults:
         print(fault)

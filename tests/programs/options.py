@@ -5,7 +5,8 @@
     options.py ROOT TPM --write    writes that table
 
 A help text begins with the meaning, up to the first of , ; : ( -- what follows is the command's own. A name may have
-only one meaning, one kind, and a kind that is shown unless it is a flag. A meaning may have only one name.
+only one meaning, one kind, and a kind that is shown unless it is a flag. A meaning may have only one name. It can be read
+alone, as docs/commands.md lists it: it is not a value of the option, and does not refer to what was said before.
 """
 
 import collections
@@ -18,6 +19,9 @@ from pathlib import Path
 
 def meaning(text):
     return re.split(r"[,;:(]", text)[0].strip()
+
+
+REFERS = re.compile(r"(?:With|Of|Its|Such|Instead|Else|And|\w+ of (?:its|that))\b")
 
 
 def all_options(command, path=""):
@@ -44,6 +48,8 @@ def faults_of(usage):
             faults.append(f"{name} ({kinds['']}): the help does not say of which kind its values are")
         for m in meanings:
             by_meaning[m].add(name)
+            if REFERS.match(m) or m in next(iter(kinds)).split(",") or re.fullmatch(r"[a-z]\w*", m):
+                faults.append(f"{name} means '{m}', which cannot be read alone")
     faults += [f"{' and '.join(sorted(names))} are called '{m}'" for m, names in by_meaning.items() if len(names) > 1]
     return faults
 
@@ -56,12 +62,13 @@ def self_test():
         command("a", option("--rate", "Speed, of a ramp", kind="SPEED"), option("--force", "Replace", flag=True),
                 option("--samples", "Laws drawn", kind="COUNT"), option("--plain", "Said nowhere")),
         command("b", option("--rate", "Servo rate", kind="FREQUENCY"), option("--force", "Replace (files)", flag=True),
-                option("--draws", "Laws drawn: here", kind="COUNT"))]}
+                option("--draws", "Laws drawn: here", kind="COUNT"),
+                option("--intervals", "law: or readings", kind="WORD"), option("--width", "Such as 4 mm", kind="LENGTH"))]}
     found = faults_of(usage)
-    for expected in ("--rate means", "--rate takes", "--plain", "--draws and --samples"):
+    for expected in ("--rate means", "--rate takes", "--plain", "--draws and --samples", "--intervals means 'law'", "--width means 'Such"):
         if not any(expected in fault for fault in found):
             sys.exit(f"this test does not find '{expected}'")
-    if any("--force" in fault for fault in found) or len(found) != 4:
+    if any("--force" in fault for fault in found) or len(found) != 6:
         sys.exit(f"this test finds what is no fault: {found}")
 
 

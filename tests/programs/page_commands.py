@@ -2,7 +2,8 @@
 """Runs the commands of pages and compares what they print with what the page shows.
 
     page_commands.py ROOT TPM [PAGE ...]    runs the commands of docs, docs/site and README.md, or of the pages named
-    page_commands.py ROOT marked            each command of these pages is one that is run, or is marked (runs nothing)
+    page_commands.py ROOT marked            each command of these pages, and of the other pages outside of reports, is one that
+                                            is run, or is marked (runs nothing)
 
 In an indented block a line `$ COMMAND` is run, in a folder of the page's own with the project's configs beside it; the
 lines up to the next command have to be printed, in this order: `...` stands for any lines, and at the end of a line for
@@ -18,7 +19,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-CALL = re.compile(r"(tpm|scripts/\S+|build/\S+|\./[\w/-]+(?:\.\w+)?|python3|cmake|ctest|ninja|cc|g\+\+|patch|apt|apt-get|docker|spack|conda) ")
+CALL = re.compile(r"(?:time |sudo |nice |env |[A-Z_]+=\S+ )*(?:tpm|scripts/\S+|build/\S+|ENV/\S+|\./[\w/-]+(?:\.\w+)?|python3?|pip3?|cmake|ctest|ninja|make|cc|gcc|g\+\+|git|"
+                  r"patch|apt|apt-get|docker|podman|spack|conda|rattler-build|sbatch|srun|mpirun|snakemake|curl|wget|chromium|export)(?: |$)")
+# Pages whose commands are marked or absent; nothing is run here. Those of reports: documentation.py.
+NOT_OF_DOCS = ["CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "paper/paper.md", "tests/fixtures/README.md"]
 NOT_RUN = re.compile(r"<!-- not run: \S.*-->\s*\Z")
 
 
@@ -58,9 +62,14 @@ def unmarked(name, text):
         for line in lines:
             if CALL.match(line) and not left_out:
                 yield f"{name}: {line}: is not run; expected '$ ' before it, or <!-- not run: REASON --> above"
-    for match in re.finditer(r"^```(?:sh|bash|console)\n", text, re.M):
-        if not NOT_RUN.search(text[: match.start()]):
-            yield f"{name}: a block of a shell is not run; expected <!-- not run: REASON --> above it"
+    prose = list(text)
+    for match in re.finditer(r"^( *)```([^\n]*)\n(.*?)^\1```", text, re.M | re.S):
+        prose[match.start():match.end()] = "\n" * (match.end() - match.start())
+        calls = [line.strip() for line in match[3].splitlines() if CALL.match(line.strip().removeprefix("$ "))]
+        if (calls or match[2] in ("sh", "bash", "shell", "console")) and not NOT_RUN.search(text[: match.start()]):
+            yield f"{name}: a block of a shell is not run ({(calls or [''])[0]}); expected <!-- not run: REASON --> above it"
+    for line in re.findall(r"^ {1,3}\$ .*|^\$ .*|^\t+\$ .*", "".join(prose), re.M):
+        yield f"{name}: {line.strip()}: is not run; expected an indentation by four blanks"
 
 
 def missing_line(shown, printed):
@@ -120,11 +129,14 @@ def sources_of(root):
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
     if program == "marked":
-        faults = [fault for name in [*pages_of(root), "CONTRIBUTING.md"]
+        faults = [fault for name in [*pages_of(root), *NOT_OF_DOCS]
                   for fault in unmarked(name, (root / name).read_text(encoding="utf-8"))]
         # The check itself: a command without its sign is noticed.
         assert list(unmarked("", "\n    tpm fit a.csv\n")) and not list(unmarked("", "\n    $ tpm fit a.csv\n"))
         assert not list(unmarked("", "\n<!-- not run: why -->\n\n    tpm fit a.csv\n"))
+        for escaped in ("    time pip install a\n", "```\n$ tpm fit a.csv\n```\n", "- a list\n\n  $ tpm fit a.csv\n", "  ```text\n  mpirun -n 2 tpm\n  ```\n"):
+            assert list(unmarked("", "\n" + escaped)), escaped
+        assert not list(unmarked("", "\n```python\nfor i in a:\n    $ no\n```\n"))
     else:
         faults = [fault for name in sys.argv[3:] or pages_of(root) for fault in faults_of(root, name, program)]
     for fault in faults:
