@@ -3,6 +3,7 @@
 #include <cmath>
 #include <deque>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "hil_scenes.hpp"
@@ -254,6 +255,24 @@ TEST_CASE("Findings of a device are in its file, and void what follows from its 
   const Json file = device_file_json(run, "");
   CHECK(file.at("measurement").at("device_findings") == to_json(run.findings));
   (void)parse_device_file(file, "device.json");
+}
+
+TEST_CASE("A finding is told once, although the measurement begins again on a new connection") {
+  const HilSession like = late_and_free();
+  std::vector<std::string> told;
+  DeviceIdentifyOptions options;
+  options.duration_s = 8.0;
+  options.noticed = [&told](const DeviceFinding& finding) { told.push_back(finding.code); };
+  int left = 5000;
+  const IdentifyRun run = run_identification_on(
+      [&] {
+        const std::vector<DeviceFinding> findings{{"in_use", "another client may use the device"}};
+        return std::make_shared<FailingHandle>(like, std::exchange(left, 100000),
+                                               ForcesOff::unplugged, findings);
+      },
+      {}, like, options);
+  CHECK(run.begun_again == 1);
+  CHECK(told == std::vector<std::string>{"in_use"});
 }
 
 TEST_CASE("A start that cannot be is refused at once, with what would work") {
