@@ -306,7 +306,7 @@ TEST_CASE("A start that cannot be is refused at once, with what would work") {
 
 TEST_CASE("A wait that is given up says what was missing, and the watcher sees it from the start") {
   HilSession far = late_and_free();
-  far.plant.origin_m = {0.0, 0.0, 0.09};
+  far.plant.origin_m = {0.0, 0.0, 0.07};
   far.plant.arm_set_point_m = 0.0;
   DeviceIdentifyOptions options;
   std::uint32_t first = 0;
@@ -318,11 +318,11 @@ TEST_CASE("A wait that is given up says what was missing, and the watcher sees i
   CHECK((first & kOutOfReach) != 0);
   CHECK_FALSE(run.counts);
   CHECK(run.ended_by ==
-        "the handle was 90 mm from the middle of the workspace for 60 s; at most 55 mm");
+        "the handle was 70 mm from the middle of the workspace for 60 s; at most 55 mm");
   CHECK_THAT(
       test::refusal_of(
           [&] { (void)check_delay(std::make_shared<FailingHandle>(far, 1000000), {}, far, {}); }),
-      Contains("ended early: the handle was 90 mm from") && Contains("expected a handle at rest"));
+      Contains("ended early: the handle was 70 mm from") && Contains("expected a handle at rest"));
 }
 
 TEST_CASE(
