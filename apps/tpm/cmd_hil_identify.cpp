@@ -134,6 +134,7 @@ int identify_hil(const IdentifyChoice& choice, const Session& session) {
   const InterruptWatch interrupts(InterruptWatch::Of::motors);
   options.interrupted = InterruptWatch::seen;
   StartWords words(limits, options.real_time);
+  options.noticed = warn_of_finding;
   options.watcher = [&words](const ServoRecord& row) { words.see(row); };
   if (hardware) {
     tell_user(

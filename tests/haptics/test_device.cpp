@@ -134,6 +134,84 @@ TEST_CASE("The simulated device clips, watches for commands and for speed, and s
   CHECK(fast.status().forces_off == ForcesOff::velocity);
 }
 
+/// An Omega.7 that nobody holds, pushed for a number of periods; the largest distances from the x
+/// axis and along it, m.
+struct FarthestPush {
+  explicit FarthestPush(const PlantSettings& settings) : device(settings, still()) {
+    (void)device.open();
+    device.prepare({});
+    device.enable_forces();
+  }
+  void push(const Eigen::Vector3d& force_N, int periods) {
+    for (int i = 0; i < periods; ++i) {
+      (void)device.write(force_N);
+      device.advance(1e-3);
+      (void)device.read(at_m);
+      along_m = std::max(along_m, std::abs(at_m.x()));
+      around_m = std::max(around_m, std::hypot(at_m.y(), at_m.z()));
+    }
+  }
+  VirtualOmega7 device;
+  Eigen::Vector3d at_m = Eigen::Vector3d::Zero();
+  double along_m = 0.0, around_m = 0.0;
+};
+
+TEST_CASE("The handle of the simulated Omega.7 stops at the end of its workspace, and comes back") {
+  PlantSettings loose = bare();
+  loose.arm = {0.0, 0.0, 0.0, 0.0};
+  loose.push = GENERATE(Eigen::Vector3d(Eigen::Vector3d::UnitX()),
+                        Eigen::Vector3d(-Eigen::Vector3d::UnitZ()),
+                        Eigen::Vector3d(Eigen::Vector3d(1.0, 2.0, -2.0) / 3.0));
+  CAPTURE(loose.push.transpose());
+  const double half_step_m = 0.51e-5;  // of the encoder
+  const auto [radius_m, half_length_m] = kOmega7Workspace;
+  {
+    FarthestPush pushed(loose);
+    pushed.push({0.5, 0.0, 0.0}, 5000);  // 0.5 N on 0.3 kg: 55 mm are behind it after 0.26 s
+    CHECK_THAT(pushed.at_m.x(), WithinAbs(half_length_m, half_step_m));
+    CHECK(pushed.along_m <= half_length_m + half_step_m);
+    CHECK(pushed.around_m <= half_step_m);
+    pushed.push({0.0, 0.5, 0.0}, 200);  // it slides along the stop ...
+    CHECK_THAT(pushed.at_m.x(), WithinAbs(half_length_m, half_step_m));
+    CHECK(pushed.at_m.y() > 0.02);
+    pushed.push({-0.5, 0.0, 0.0}, 200);  // ... and nothing keeps it there
+    CHECK(pushed.at_m.x() < 0.04);
+    CHECK(pushed.device.status().forces_off == ForcesOff::none);
+  }
+  FarthestPush pushed(loose);
+  pushed.push({0.0, 0.3, -0.4}, 5000);
+  CHECK_THAT(pushed.at_m.y(), WithinAbs(0.6 * radius_m, half_step_m));
+  CHECK_THAT(pushed.at_m.z(), WithinAbs(-0.8 * radius_m, half_step_m));
+  pushed.push({-0.5, 0.0, 0.0}, 2000);  // into the edge
+  CHECK_THAT(pushed.at_m.x(), WithinAbs(-half_length_m, half_step_m));
+  CHECK(pushed.around_m <= radius_m + 2.0 * half_step_m);
+}
+
+TEST_CASE("A hand that wants a place beyond the stop does not push harder and harder") {
+  PlantSettings s = bare();
+  s.arm.correction_per_s = 3.0;
+  constexpr double kWanted_m = 0.070, kLong_s = 20.0;
+  OperatorPiece far{OperatorPiece::Aim::place, kLong_s, kWanted_m, kWanted_m};
+  OperatorPiece back{OperatorPiece::Aim::place, 1.0, 0.0, 0.0};
+  VirtualOmega7 device(s, OperatorScript({far, back}));
+  CHECK_THAT(device.open().assumptions.back(),
+             Catch::Contains("0.16 m diameter and 0.11 m length"));
+  device.prepare({});
+  device.enable_forces();
+  Eigen::Vector3d at_m;
+  const auto live = [&](double seconds) {
+    for (int i = 0; i < static_cast<int>(std::lround(seconds / 1e-3)); ++i) {
+      (void)device.write(Eigen::Vector3d::Zero());
+      device.advance(1e-3);
+    }
+    (void)device.read(at_m);
+  };
+  live(kLong_s);
+  CHECK_THAT(at_m.x(), WithinAbs(kOmega7Workspace.half_length_m, 1e-5));
+  live(0.5);  // as quickly as from 55 mm, had there been no stop
+  CHECK(at_m.x() < 0.03);
+}
+
 TEST_CASE("A simulated watchdog can be told to forgive, and names that among its assumptions") {
   PlantSettings s = bare();
   s.least_watchdog_s = 0.01;

@@ -1,4 +1,4 @@
-// Findings of a device: told once by their code, and while tpm hil check runs.
+// Findings of a device: told once by their code, and while tpm hil check or identify runs.
 #include <algorithm>
 #include <atomic>
 #include <catch2/catch.hpp>
@@ -9,6 +9,7 @@
 #include "inverse_sessions.hpp"
 #include "tpm/haptics/serve/inverse_server.hpp"
 #include "tpm/haptics/session/finding_notices.hpp"
+#include "tpm/haptics/session/identify_run.hpp"
 #include "tpm/haptics/session/jitter_check.hpp"
 #include "tpmkit/servo_loop.hpp"
 
@@ -67,8 +68,8 @@ class PushedByAnother final : public ServedHand {
   void let_go() noexcept override {}
 };
 
-TEST_CASE("A check tells of another client while it runs, as a session does") {
-  PushedByAnother hand;
+/// Settings of a server whose device is simulated and has neutral settings.
+InverseServerSettings neutral_server() {
   InverseServerSettings settings;
   settings.events_port = 0;
   settings.device.id = "SIMULATED";
@@ -78,14 +79,30 @@ TEST_CASE("A check tells of another client while it runs, as a session does") {
   settings.device.settings.filters_named = settings.device.settings.damping_named = true;
   settings.device.settings.gravity_named = settings.device.settings.gravity_compensation = true;
   settings.device.settings.gravity_scaling = 1.0;
-  const InverseServer server(hand, std::move(settings));
+  return settings;
+}
+
+DeviceChoice device_of(const InverseServer& server) {
   DeviceChoice choice;
   choice.kind = "inverse3";
   choice.inverse = {server.port(), server.events_port(), server.port(), ""};
+  return choice;
+}
+
+/// Slow, with a device and a loop that wait for a machine that stalls.
+HilSession waiting_session() {
   HilSession session;
   session.servo.period_s = 0.01;
   session.preparation.watchdog_s = 10.0;
   session.cycle_timeout_s = 60.0;
+  return session;
+}
+
+TEST_CASE("A check tells of another client while it runs, as a session does") {
+  PushedByAnother hand;
+  const InverseServer server(hand, neutral_server());
+  const DeviceChoice choice = device_of(server);
+  const HilSession session = waiting_session();
   std::vector<std::string> told;  // by the thread that writes records
   std::atomic<bool> heard{false};
   JitterCheck check;
@@ -103,6 +120,33 @@ TEST_CASE("A check tells of another client while it runs, as a session does") {
   CHECK(check.outcome.cause != StopCause::finished);
   REQUIRE(check.findings.size() == 1);
   CHECK(check.findings.front().code == "force_without_command");
+}
+
+TEST_CASE("An identification tells of another client while it runs, and once") {
+  PushedByAnother hand;
+  const InverseServer server(hand, neutral_server());
+  std::vector<std::string> told;  // by the thread that writes records
+  std::atomic<bool> heard{false};
+  DeviceIdentifyOptions options;
+  options.duration_s = 600.0;
+  options.real_time = true;
+  options.interrupted = [&heard] { return heard.load(); };
+  options.noticed = [&](const DeviceFinding& finding) {
+    told.push_back(finding.code);
+    heard = true;
+  };
+  IdentifyRun run;
+  // Where the machine stalls, late states may end it before the difference has lasted.
+  constexpr int kMostTries = 100;
+  for (int i = 0; i < kMostTries && !heard; ++i) {
+    run = run_identification(device_of(server), waiting_session(), options);
+  }
+  REQUIRE_FALSE(told.empty());
+  CHECK(run.outcome.cause == StopCause::signal);
+  CHECK(std::ranges::count(told, told.front()) == 1);
+  CHECK(std::ranges::any_of(run.findings, [&told](const DeviceFinding& finding) {
+    return finding.code == told.front();
+  }));
 }
 
 TEST_CASE("A check tells before it begins that a device may be in use") {

@@ -1,4 +1,4 @@
-// Numbers of docs/haptics.md about the Inverse3 are those of the code.
+// Numbers of docs/haptics.md are those of the code.
 #include <fmt/format.h>
 
 #include <catch2/catch.hpp>
@@ -6,6 +6,7 @@
 
 #include "tpm/files/file.hpp"
 #include "tpm/haptics/device/device_limits.hpp"
+#include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/inverse/force_comparison.hpp"
 #include "tpm/haptics/loop/servo_step.hpp"
 #include "tpm/haptics/serve/driver_log.hpp"
@@ -27,7 +28,7 @@ std::string haptics_page() {
   return page;
 }
 
-TEST_CASE("The page about the Inverse3 states the limits that the code has") {
+TEST_CASE("The page about haptic devices states the limits that the code has") {
   const std::string page = haptics_page();
   const auto ms = [](double seconds) { return fmt::format("{:g} ms", 1e3 * seconds); };
   CHECK_THAT(page, Contains("only late states for " + ms(ServoStep::kMostStale_s)));
@@ -39,6 +40,9 @@ TEST_CASE("The page about the Inverse3 states the limits that the code has") {
                                  ForceComparison::kLasts_s)));
   CHECK_THAT(page, Contains(fmt::format("stays within {:g} mm of the centre",
                                         1e3 * limits_of("virtual").reach_m)));
+  CHECK_THAT(page, Contains(fmt::format("of {:g} mm diameter and {:g} mm length",
+                                        2e3 * kOmega7Workspace.radius_m,
+                                        2e3 * kOmega7Workspace.half_length_m)));
   CHECK_THAT(page, Contains(fmt::format("A message has at most {} KiB", kMostMessageBytes / 1024)));
   CHECK_THAT(page,
              Contains(fmt::format("At most {} clients connect", InverseServer::kMostConnections)));

@@ -31,7 +31,7 @@ TEST_CASE("No hazard leaves its bounds, and nothing that is passive is refused",
   CHECK(count([](const HazardRow& r) { return r.cause == StopCause::oscillation; }) >= 1);
   CHECK(count([](const HazardRow& r) { return r.cause == StopCause::energy; }) >= 1);
   CHECK(count([](const HazardRow& r) { return r.cause == StopCause::position_jump; }) >= 1);
-  CHECK(count([](const HazardRow& r) { return r.accepted; }) >= 4);
+  CHECK(count([](const HazardRow& r) { return r.unchecked; }) >= 4);
   CHECK(hazard_text(study) == hazard_text(study_hazards()));
 }
 

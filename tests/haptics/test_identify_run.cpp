@@ -3,6 +3,7 @@
 #include <cmath>
 #include <deque>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "hil_scenes.hpp"
@@ -256,6 +257,24 @@ TEST_CASE("Findings of a device are in its file, and void what follows from its 
   (void)parse_device_file(file, "device.json");
 }
 
+TEST_CASE("A finding is told once, although the measurement begins again on a new connection") {
+  const HilSession like = late_and_free();
+  std::vector<std::string> told;
+  DeviceIdentifyOptions options;
+  options.duration_s = 8.0;
+  options.noticed = [&told](const DeviceFinding& finding) { told.push_back(finding.code); };
+  int left = 5000;
+  const IdentifyRun run = run_identification_on(
+      [&] {
+        const std::vector<DeviceFinding> findings{{"in_use", "another client may use the device"}};
+        return std::make_shared<FailingHandle>(like, std::exchange(left, 100000),
+                                               ForcesOff::unplugged, findings);
+      },
+      {}, like, options);
+  CHECK(run.begun_again == 1);
+  CHECK(told == std::vector<std::string>{"in_use"});
+}
+
 TEST_CASE("A start that cannot be is refused at once, with what would work") {
   const test::TempFolder folder;
   const auto refused = [&](const char* key, double value) {
@@ -287,7 +306,7 @@ TEST_CASE("A start that cannot be is refused at once, with what would work") {
 
 TEST_CASE("A wait that is given up says what was missing, and the watcher sees it from the start") {
   HilSession far = late_and_free();
-  far.plant.origin_m = {0.0, 0.0, 0.09};
+  far.plant.origin_m = {0.0, 0.0, 0.07};
   far.plant.arm_set_point_m = 0.0;
   DeviceIdentifyOptions options;
   std::uint32_t first = 0;
@@ -299,11 +318,11 @@ TEST_CASE("A wait that is given up says what was missing, and the watcher sees i
   CHECK((first & kOutOfReach) != 0);
   CHECK_FALSE(run.counts);
   CHECK(run.ended_by ==
-        "the handle was 90 mm from the middle of the workspace for 60 s; at most 55 mm");
+        "the handle was 70 mm from the middle of the workspace for 60 s; at most 55 mm");
   CHECK_THAT(
       test::refusal_of(
           [&] { (void)check_delay(std::make_shared<FailingHandle>(far, 1000000), {}, far, {}); }),
-      Contains("ended early: the handle was 90 mm from") && Contains("expected a handle at rest"));
+      Contains("ended early: the handle was 70 mm from") && Contains("expected a handle at rest"));
 }
 
 TEST_CASE(

@@ -3,11 +3,13 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "counted_allocations.hpp"
 #include "hil_scenes.hpp"
 #include "shaken_contact.hpp"
 #include "temp_folder.hpp"
+#include "tpm/haptics/device/virtual_omega7.hpp"
 #include "tpm/haptics/session/live_view.hpp"
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpmkit/error.hpp"
@@ -33,12 +35,25 @@ Json stiff_session(const char* modulus, int delay = 0) {
   return json;
 }
 
+/// On a simulated Omega.7 whose gate has no ceiling of the stiffness, and takes its encoder for
+/// exact.
+SessionRun run_without_ceilings(const HilSession& session, const SessionRunOptions& options) {
+  DeviceLimits limits = limits_of("virtual");
+  limits.stiffness_N_per_m = std::numeric_limits<double>::infinity();
+  limits.encoder_step_m = 0.0;
+  HilSession exact = session;
+  exact.plant.encoder_step_m = 0.0;
+  return run_session_on(exact,
+                        std::make_shared<VirtualOmega7>(session.plant, session.operator_script()),
+                        limits, {}, options);
+}
+
 SessionRun accepted(const Json& json) {
   const test::TempFolder folder;
   SessionRunOptions options;
   options.recording = folder / "r";
   options.accept_unstable = true;
-  return run_session(test::parsed(json), {}, options);
+  return run_without_ceilings(test::parsed(json), options);
 }
 
 std::string refused(const Json& json, const DeviceChoice& choice = {}, bool accept = false) {
@@ -98,14 +113,47 @@ TEST_CASE("A stable rendering with too little margin is refused, but not called 
   CHECK(to_json(beyond).at("unstable") == true);
 }
 
-/// Mean of the force sent in the second half of the first hold, N.
+TEST_CASE("What --accept-unstable accepts is instability, and no other refusal") {
+  // Too stiff for the device, also where it would be unstable.
+  for (const char* modulus : {"0.5 MPa", "3 MPa"}) {
+    CAPTURE(modulus);
+    const std::string refusal = refused(stiff_session(modulus), {}, true);
+    CHECK_THAT(refusal, Contains("too stiff for the device") && Contains("at most 5e+03 N/m"));
+    CHECK_THAT(refusal, !Contains("--accept-unstable"));
+    CHECK_THAT(refused(stiff_session(modulus)), !Contains("--accept-unstable"));
+  }
+  // A force that is lost.
+  const Json lost = test::with(stiff_session("12 kPa"), "/limits", {{"slew_N_per_s", 1.0}});
+  CHECK_THAT(refused(lost, {}, true), Contains("the rise of the force is limited too much"));
+  CHECK_THAT(refused(lost), !Contains("--accept-unstable"));
+  // A depth outside the workspace.
+  const Json far =
+      test::with(test::short_session(), "/indentations/depths", Json::array({"0.5 m"}));
+  CHECK_THAT(refused(far, {}, true), Contains("from the centre of the workspace"));
+  // Stability with the arm, and with six hands.
+  for (const int delay : {50, 10}) {
+    CAPTURE(delay);
+    const Json late = stiff_session("12 kPa", delay);
+    CHECK_THAT(refused(late), Contains("; --accept-unstable"));
+    CHECK(refused(late, {}, true) == "nothing was refused");
+  }
+  // A rendering whose delay is longer than any that was tried.
+  RenderingCheck slow;
+  slow.rise_N = slow.stable_N_per_m = slow.largest_N_per_m = slow.hands_N_per_m = 1e9;
+  slow.longest_delay_s = 0.021;
+  CHECK(slow.refusal(true).empty());
+  slow.delay_s = 0.022;
+  CHECK_THAT(slow.refusal(true), Contains("the delay is longer than any that is guarded"));
+}
+
+/// Mean of the force sent in the second half of the first hold, N, also of what is refused for its
+/// rise.
 double held_force_N(const Json& json) {
   const test::TempFolder folder;
   const HilSession session = test::parsed(json);
   SessionRunOptions options;
   options.recording = folder / "r";
-  options.accept_unstable = true;
-  (void)run_session(session, {}, options);
+  (void)run_without_ceilings(session, options);
   const HilRecording recording = read_recording(folder / "r");
   const SessionPhase& hold = session.phases.at(2);
   REQUIRE(hold.kind == SessionPhaseKind::hold);

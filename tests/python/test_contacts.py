@@ -104,9 +104,9 @@ class Contacts(unittest.TestCase):
         self.assertEqual(contact.step_at(1.001, here).tolist(), [0.0, 0.0, 0.0])
 
     def test_what_is_unstable_is_refused_by_its_argument(self):
-        stiff = json.loads(self.file.read_text())
-        stiff["model"]["scene"]["material"]["E2"] = "12 MPa"
-        self.file.write_text(json.dumps(stiff))
+        late = json.loads(self.file.read_text())
+        late["virtual_device"] = {"delay_periods": 50}
+        self.file.write_text(json.dumps(late))
         output = Path(self.folder.name) / "s.tpmrec"
         with self.assertRaisesRegex(tpmkit.Error, "unstable.* accept_unstable$"):
             tpmkit.run_session(self.file, output)

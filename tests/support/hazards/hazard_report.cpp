@@ -39,7 +39,7 @@ std::string hazard_text(const HazardStudy& study) {
   for (const HazardRow& row : study.rows) {
     text +=
         fmt::format("| {} | {}{} | {} | {} | {} | {} | {} | {} | {} |\n", row.hazard, row.setting,
-                    row.accepted ? ", accepted as unstable" : "", outcome_of(row),
+                    row.unchecked ? ", without this check" : "", outcome_of(row),
                     in(row.largest_force_N, 1.0, was_run(row)),
                     in(row.largest_rise_N, 1.0, was_run(row)) + (row.damped ? " (damped)" : ""),
                     in(row.delivered_J, 1e3, was_run(row)), in(row.to_zero_s, 1e3, stopped(row)),

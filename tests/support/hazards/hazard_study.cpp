@@ -430,17 +430,17 @@ bool is_within(const HazardRow& row, const Hazard& hazard, const HazardBounds& b
          row.to_zero_s <= limit_s * (1.0 + 1e-9);
 }
 
-HazardRow row_of(const Hazard& hazard, bool accepted, const HazardBounds& bounds) {
+HazardRow row_of(const Hazard& hazard, bool unchecked, const HazardBounds& bounds) {
   HazardRow row;
   row.hazard = hazard.name;
   row.setting = hazard.setting;
-  row.accepted = accepted;
+  row.unchecked = unchecked;
   const auto run = [&] {
     const HilSession session = parse_session(hazard.session, "session", {});
     const LoopModel model = make_loop_model(session);
     const RenderingCheck rendering = check_rendering(session, *model.model, model, "virtual");
     row.passive = rendering.passive() && rendering.within_device() && rendering.follows_encoder();
-    if (!rendering.acceptable() && !accepted) {
+    if (!rendering.acceptable() && !unchecked) {
       row.refused = rendering.verdict();
       row.refused_by_check = true;
       return;

@@ -9,11 +9,11 @@ namespace tpm::haptics {
 /// What became of one hazard, on the simulated device in virtual time.
 struct HazardRow {
   std::string hazard, setting;
-  bool accepted = false;  ///< run with --accept-unstable after a refusal, in the row before
-  bool passive = false;   ///< by the check before the session
-  std::string refused;    ///< in words; empty: it ran
-  /// The check before the session refused it, which --accept-unstable overrules; a session that
-  /// cannot be read stays refused.
+  bool unchecked = false;  ///< run although the check refused it, in the row before
+  bool passive = false;    ///< by the check before the session
+  std::string refused;     ///< in words; empty: it ran
+  /// The check before the session refused it; it is run once more without. A session that cannot
+  /// be read stays refused.
   bool refused_by_check = false;
   StopCause cause = StopCause::none;
   double largest_force_N = 0.0;  ///< sent
@@ -44,7 +44,7 @@ struct HazardStudy {
   [[nodiscard]] bool safe() const;
 };
 
-/// Runs all hazards, deterministic. What is refused as unstable is run once more, accepted.
+/// Runs all hazards, deterministic. What the check refuses is run once more without it.
 [[nodiscard]] HazardStudy study_hazards();
 
 }  // namespace tpm::haptics

@@ -8,6 +8,8 @@ namespace {
 PlantSettings limited(PlantSettings settings, const DeviceLimits& limits) {
   settings.motor_limit_N = std::min(settings.motor_limit_N, limits.force_N);
   settings.encoder_step_m = std::max(settings.encoder_step_m, limits.encoder_step_m);
+  settings.workspace = limits.kind == "virtual" ? kOmega7Workspace
+                                                : CylinderWorkspace{limits.reach_m, limits.reach_m};
   return settings;
 }
 

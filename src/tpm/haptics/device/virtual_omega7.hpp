@@ -8,12 +8,18 @@
 
 namespace tpm::haptics {
 
+/// 160 mm diameter and 110 mm length: the maker's data sheet, as remembered; assumed. Wider across
+/// and shorter along than the sphere of DeviceLimits::reach_m, in which sessions have to fit.
+inline constexpr CylinderWorkspace kOmega7Workspace{0.080, 0.055};
+
 /// A simulated Omega.7 held by a simulated arm, or another device of the list whose row says
 /// `plant`. Its time passes in advance() only; in real time its watchdog counts by the clock too,
 /// from enable_forces() on, as that of a device does.
 class VirtualOmega7 final : public HapticDevice {
  public:
-  /// @param limits the motors are no stronger, the encoders no finer
+  /// @param limits the motors are no stronger, the encoders no finer. The handle stops at the end
+  /// of
+  ///        kOmega7Workspace, of another device at that of a cylinder around its reach
   VirtualOmega7(const PlantSettings& settings, OperatorScript script,
                 const DeviceLimits& limits = limits_of("virtual"));
 

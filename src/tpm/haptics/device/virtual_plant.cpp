@@ -1,5 +1,6 @@
 #include "tpm/haptics/device/virtual_plant.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <unsupported/Eigen/MatrixFunctions>
@@ -44,6 +45,12 @@ std::vector<std::string> assumptions_of(const PlantSettings& s) {
       line_of("eye of the operator: a wrong depth is corrected at %g a second (assumed)",
               s.arm.correction_per_s),
   };
+  if (s.workspace) {
+    assumptions.push_back(
+        line_of("stop at the end of the workspace, a cylinder about x of %g m ",
+                2.0 * s.workspace->radius_m) +
+        line_of("diameter and %g m length (assumed)", 2.0 * s.workspace->half_length_m));
+  }
   if (s.least_watchdog_s > 0.0)
     assumptions.push_back(
         line_of("a watchdog that waits %g s at least, which no Omega.7 does", s.least_watchdog_s));
@@ -62,6 +69,32 @@ VirtualPlant::VirtualPlant(const PlantSettings& settings, OperatorScript script)
   const OperatorAim first = script_.at(0.0);
   along_ = meant_ = settings_.arm_set_point_m.value_or(first.value);
   across_ = first.across_m;
+  meet_stop();
+}
+
+void VirtualPlant::meet_stop() noexcept {
+  stop_.setZero();
+  if (!settings_.workspace) return;
+  const CylinderWorkspace& workspace = *settings_.workspace;
+  const Eigen::Vector3d at_m = position_m();
+  const double around_m = std::hypot(at_m.y(), at_m.z());
+  const double beyond_end_m = std::abs(at_m.x()) - workspace.half_length_m;
+  const double beyond_side_m = around_m - workspace.radius_m;
+  if (!(beyond_end_m > 0.0 || beyond_side_m > 0.0)) return;
+  Eigen::Vector3d moved_m = Eigen::Vector3d::Zero(), speed = velocity_m_per_s();
+  const auto meet = [&](const Eigen::Vector3d& outwards, double beyond_m) {
+    if (!(beyond_m > 0.0)) return;
+    moved_m -= beyond_m * outwards;
+    speed -= std::max(0.0, speed.dot(outwards)) * outwards;
+    stop_ += outwards;
+  };
+  meet(Eigen::Vector3d::UnitX() * std::copysign(1.0, at_m.x()), beyond_end_m);
+  meet(Eigen::Vector3d(0.0, at_m.y(), at_m.z()) / std::max(around_m, workspace.radius_m),
+       beyond_side_m);
+  along_ += moved_m.dot(push_);
+  across_ += moved_m - moved_m.dot(push_) * push_;
+  along_speed_ = speed.dot(push_);
+  across_speed_ = speed - along_speed_ * push_;
 }
 
 void VirtualPlant::begin() noexcept {
@@ -115,7 +148,10 @@ void VirtualPlant::advance() noexcept {
   if (place) {
     // Coming from a push, the hand means to be where it is.
     if (!aimed_at_place_) meant_ = along_;
-    const double meant_rate = aim.rate + settings_.arm.correction_per_s * (aim.value - along_);
+    const double off_m = aim.value - along_;
+    const bool beyond_stop = stop_.dot(push_) * off_m > 0.0;
+    const double correction_per_s = beyond_stop ? 0.0 : settings_.arm.correction_per_s;
+    const double meant_rate = aim.rate + correction_per_s * off_m;
     const Eigen::Vector3d state(along_ - meant_, along_speed_ - meant_rate,
                                 push - drag * meant_rate);
     const Eigen::Vector2d next = to_place_ * state;
@@ -140,6 +176,7 @@ void VirtualPlant::advance() noexcept {
   }
   ++periods_;
   if (velocity_m_per_s().norm() > settings_.velocity_limit_m_per_s) too_fast_ = true;
+  meet_stop();
 }
 
 }  // namespace tpm::haptics

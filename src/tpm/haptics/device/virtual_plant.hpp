@@ -20,6 +20,11 @@ struct ArmSettings {
   [[nodiscard]] bool operator==(const ArmSettings&) const = default;
 };
 
+/// Workspace of a simulated device: a cylinder about the x axis, around the origin.
+struct CylinderWorkspace {
+  double radius_m = 0.0, half_length_m = 0.0;
+};
+
 /// A simulated Omega.7 and the arm that holds it.
 struct PlantSettings {
   double period_s = 1e-3;          ///< of the commands
@@ -36,6 +41,9 @@ struct PlantSettings {
   ArmSettings arm;
   Eigen::Vector3d push = -Eigen::Vector3d::UnitZ();    ///< unit vector along which the script goes
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();  ///< from where
+  /// At its end the handle meets a stop, as that of a mechanism does: it keeps its speed along the
+  /// stop and loses that against it. Empty: no stop.
+  std::optional<CylinderWorkspace> workspace = std::nullopt;
 };
 
 /// Assumptions among the settings, one line each.
@@ -46,7 +54,8 @@ struct PlantSettings {
 [[nodiscard]] Eigen::Matrix<double, 2, 3> place_propagator(const PlantSettings& settings);
 
 /// The motion of device and arm under held commands: exact for a constant force and an intended
-/// place that moves at constant speed, so that no integrator adds damping of its own.
+/// place that moves at constant speed, so that no integrator adds damping of its own. A hand whose
+/// handle is at a stop does not correct a depth beyond it.
 class VirtualPlant {
  public:
   VirtualPlant(const PlantSettings& settings, OperatorScript script);
@@ -88,8 +97,10 @@ class VirtualPlant {
   Eigen::Vector3d command_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d across_ = Eigen::Vector3d::Zero(), across_speed_ = Eigen::Vector3d::Zero();
   double along_ = 0.0, along_speed_ = 0.0;
-  double meant_ = 0.0;  ///< place, m
+  double meant_ = 0.0;                              ///< place, m
+  Eigen::Vector3d stop_ = Eigen::Vector3d::Zero();  ///< outwards, where the handle is at a stop
   [[nodiscard]] OperatorAim aim() noexcept;
+  void meet_stop() noexcept;
 
   bool aimed_at_place_ = true, waiting_ = false;
   long periods_ = 0, since_command_ = 0;

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <thread>
 
 #include "tpm/base/text.hpp"
@@ -188,12 +189,15 @@ void move_handle(IdentifyRun& run, std::vector<IdentificationSample>& samples,
       preparation_for(like, choice, options.real_time, options.interrupted);
   preparation.max_force_N = servo.force_limit_N;
   const ForcesOffGuard guard(*device);
+  FindingNotices notices(*device, options.noticed);
   try {
     run.device = device->open();
     if (choice.kind != "virtual") require_same_device(choice, run.device);
     if (options.opened) options.opened(run.device);
+    notices.look();
     if (options.real_time) {
       RealTimeOptions real = real_time_options(like, options.wish, options.interrupted);
+      real.idle = [&notices] { notices.look(); };
       real.prepare = [&] { device->prepare(preparation); };
       run.outcome = run_in_real_time(device, model, servo, sink, real);
     } else {
@@ -213,6 +217,7 @@ void move_handle(IdentifyRun& run, std::vector<IdentificationSample>& samples,
                  : never_begun.empty()        ? end_of(run.outcome, like.cycle_timeout_s)
                                               : never_begun;
   if (cause == StopCause::cycle_timeout) return;  // a call may still be under way
+  notices.look();
   for (DeviceFinding& finding : device->findings()) {
     if (std::ranges::find(run.findings, finding) == run.findings.end()) {
       run.findings.push_back(std::move(finding));
@@ -347,6 +352,12 @@ IdentifyRun run_identification_on(const MakesDevice& make, const DeviceChoice& c
   run.real_time = options.real_time;
   std::vector<IdentificationSample> samples;
   DeviceIdentifyOptions part = options;
+  std::set<std::string> told;  // codes, by any of the parts
+  if (options.noticed) {
+    part.noticed = [&options, &told](const DeviceFinding& finding) {
+      if (told.insert(finding.code).second) options.noticed(finding);
+    };
+  }
   for (;;) {
     const ServoCounts before = run.outcome.counts;
     const std::uint64_t cycles_before = run.outcome.cycles;

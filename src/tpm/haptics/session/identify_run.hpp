@@ -12,6 +12,8 @@ struct DeviceIdentifyOptions {
   std::function<bool()> interrupted;
   /// Called when the device is open and its forces are still off; what it throws ends the run.
   std::function<void(const DeviceIdentity&)> opened;
+  /// Told once for each finding of the device, in real time when it is noticed.
+  FindingTold noticed;
   /// Sees every record, also those of the wait for the handle, on the thread that writes them.
   std::function<void(const ServoRecord&)> watcher;
 };

@@ -184,9 +184,10 @@ LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOpt
   }
   require_within(session_, limits);
   rendering_ = check_rendering(session_, *loop_.model, loop_, limits);
-  if (!rendering_.acceptable() && !options.accept_unstable) {
+  const std::string refusal = rendering_.refusal(options.accept_unstable);
+  if (!refusal.empty()) {
     throw Error(
-        ExitCode::answer_is_no, file.string(), rendering_.verdict(),
+        ExitCode::answer_is_no, file.string(), refusal,
         "a device file with a measured delay (tpm hil identify), a softer tissue or a higher "
         "rate; the device 'virtual' where nothing has motors");
   }

@@ -22,8 +22,8 @@ struct LoopContactOptions {
   std::filesystem::path device_file;
   bool start_gate = true;    ///< forces wait until the tool is in free air and at rest
   double longest_s = 600.0;  ///< of a law file: for how long spring-pots keep their history, > 0
-  /// Do not refuse what check_rendering() refuses. Only of a device without motors ("virtual"):
-  /// else Error(usage).
+  /// Do not refuse what would be unstable (RenderingCheck::refusal()). Only of a device without
+  /// motors ("virtual"): else Error(usage).
   bool accept_unstable = false;
 };
 

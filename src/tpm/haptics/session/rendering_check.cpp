@@ -139,23 +139,30 @@ void warn_of_rests(RenderingCheck& check, const HilSession& session) {
       significant(100.0 * std::exp(-shortest_s / check.recovery_s), 2), significant(needed_s, 3)));
 }
 
+/// Stiffness, delay and friction that count.
+std::string what_counts(const RenderingCheck& check) {
+  const std::string delay = significant(1e3 * check.delay_s, 3);
+  const std::string not_measured =
+      check.delay_measured
+          ? std::string()
+          : fmt::format(" ({}: {} ms and no friction count)",
+                        check.delay_note.empty() ? "not measured on this device" : check.delay_note,
+                        delay);
+  return fmt::format("stiffness {} N/m at {} Hz, {} ms of delay{}, friction {} N s/m",
+                     significant(check.stiffness_N_per_m, 3), significant(check.rate_Hz, 4), delay,
+                     not_measured, significant(check.friction_N_s_per_m, 2));
+}
+
 }  // namespace
 
-std::string RenderingCheck::verdict() const {
-  const std::string what = fmt::format(
-      "stiffness {} N/m at {} Hz, {} ms of delay{}, friction {} N s/m",
-      significant(stiffness_N_per_m, 3), significant(rate_Hz, 4), significant(1e3 * delay_s, 3),
-      delay_measured ? ""
-                     : fmt::format(" ({}: {} ms and no friction count)",
-                                   delay_note.empty() ? "not measured on this device" : delay_note,
-                                   significant(1e3 * delay_s, 3)),
-      significant(friction_N_s_per_m, 2));
-  if (unstable()) {
+std::string RenderingCheck::refusal(bool accept_unstable) const {
+  const std::string what = what_counts(*this);
+  if (unstable() && !accept_unstable) {
     return fmt::format(
         "unstable: {}; stable with the operator's arm up to {} N/m, of which {} % are allowed",
         what, significant(stable_N_per_m, 3), significant(100.0 * kRoom, 2));
   }
-  if (!stable()) {
+  if (!stable() && !accept_unstable) {
     return fmt::format(
         "stable with the operator's arm, but with too little margin: {}; at most {} N/m, which is "
         "{} % of the {} N/m at which it becomes unstable",
@@ -174,7 +181,7 @@ std::string RenderingCheck::verdict() const {
         significant(stiffness_N_per_m * encoder_step_m, 3), significant(rise_N, 3),
         significant(stiffness_N_per_m * encoder_step_m * rate_Hz, 3));
   }
-  if (!safe_in_hands()) {
+  if (!safe_in_hands() && !accept_unstable) {
     return fmt::format(
         "a weakly damped hand would receive energy: {}; at most {} N/m keep six hands below {} "
         "mJ{}",
@@ -185,6 +192,12 @@ std::string RenderingCheck::verdict() const {
     return fmt::format("the delay is longer than any that is guarded: {}; measured at most {} ms",
                        what, significant(1e3 * kLongestDelay_s, 3));
   }
+  return {};
+}
+
+std::string RenderingCheck::verdict() const {
+  if (std::string refused = refusal(false); !refused.empty()) return refused;
+  const std::string what = what_counts(*this);
   if (!passive()) {
     return fmt::format(
         "stable with the operator's arm (up to {} N/m), not passive: {}; passive with every "

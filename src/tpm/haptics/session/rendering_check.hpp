@@ -55,10 +55,15 @@ struct RenderingCheck {
   [[nodiscard]] bool safe_in_hands() const { return stiffness_N_per_m <= hands_N_per_m; }
   /// Of hardware: gate and supervisor were tried for a delay as long as this, see six_hands.hpp.
   [[nodiscard]] bool delay_is_guarded() const { return delay_s <= longest_delay_s * (1.0 + 1e-12); }
-  [[nodiscard]] bool acceptable() const {
-    return stable() && within_device() && follows_encoder() && safe_in_hands() &&
-           delay_is_guarded();
+  [[nodiscard]] bool acceptable() const { return refusal(false).empty(); }
+  /// Only stability, of the arm or of six hands, may be in the way: what refusal(true) leaves out.
+  [[nodiscard]] bool acceptable_if_unstable() const {
+    return within_device() && follows_encoder() && delay_is_guarded();
   }
+  /// Why it is refused, one line; empty: it is not.
+  /// @param accept_unstable instability is no reason, with the operator's arm or with six hands;
+  ///        each other reason still is
+  [[nodiscard]] std::string refusal(bool accept_unstable) const;
   static constexpr double kRoom = 0.8;  ///< share of stable_N_per_m that is allowed
   /// One line: passive, stable, too little margin, or why not.
   [[nodiscard]] std::string verdict() const;

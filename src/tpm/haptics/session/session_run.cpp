@@ -110,12 +110,17 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
     throw Error(ExitCode::usage, "--accept-unstable", "is not for the device '" + choice.kind + "'",
                 "--device virtual");
   }
-  if (rendering.acceptable() || options.accept_unstable || choice.kind == "replay") return;
-  throw Error(ExitCode::answer_is_no, "stability", rendering.verdict(),
-              fmt::format("a softer tissue, a higher rate, a shorter delay or a faster rise; {}",
-                          limits.plant ? "--accept-unstable"
-                                       : "a device file with a measured delay (tpm hil identify); "
-                                         "the device 'virtual', where nothing has motors"));
+  const std::string refusal = rendering.refusal(options.accept_unstable);
+  if (refusal.empty() || choice.kind == "replay") return;
+  std::string expected = "a softer tissue, a higher rate, a shorter delay or a faster rise";
+  if (!limits.plant) {
+    expected +=
+        "; a device file with a measured delay (tpm hil identify); the device 'virtual', where "
+        "nothing has motors";
+  } else if (rendering.acceptable_if_unstable()) {
+    expected += "; --accept-unstable";
+  }
+  throw Error(ExitCode::answer_is_no, "stability", refusal, expected);
 }
 
 std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {

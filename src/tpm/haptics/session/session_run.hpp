@@ -39,7 +39,9 @@ struct SessionRunOptions {
   bool real_time = false;
   RealTimeWish wish = RealTimeWish::ignore;
   std::filesystem::path recording;
-  bool accept_unstable = false;  ///< of a simulated device only
+  /// Runs what RenderingCheck refuses for its stability, and nothing else that it refuses. Of a
+  /// simulated device only.
+  bool accept_unstable = false;
   /// Of hardware whose delay a device file states, in real time: measure it for a second before the
   /// session (check_delay() in identify_run.hpp). The larger delay counts; without an answer the
   /// device counts as not measured. A device of the caller (run_session_on) is not checked.
