@@ -64,6 +64,13 @@ struct ResultColumn {
     is_shown = true;
     return *this;
   }
+  /// Is seen of a number in place of its digits.
+  ResultColumn& as(std::string (*text)(double)) {
+    return in_words([of = member, text](const Row& row) {
+      const Json value = of(row);
+      return Cell{value.is_null() ? "-" : text(value.template get<double>())};
+    });
+  }
   /// Is seen in place of the member.
   ResultColumn& in_words(std::function<Cell(const Row&)> text) {
     words = std::move(text);
