@@ -4,7 +4,7 @@
 
 #include "design_options.hpp"
 #include "tpm/fit/coverage.hpp"
-#include "tpm/fit/show/fit_csv.hpp"
+#include "tpm/show/json_table_csv.hpp"
 
 namespace tpm::app {
 
@@ -23,8 +23,9 @@ int check_intervals(const DesignOptions& options, const Session& session) {
   const CoverageResult result =
       check_coverage(config, static_cast<int>(parse_whole_number(sets, "--repetitions", 1)),
                      design_seed(options.seed));
-  deliver(session.json() ? to_text(to_json(result)) : to_terminal_text(result), options.output);
-  deliver_csv(coverage_csv(result), csv);
+  const Json json = tpm::fit::to_json(result);
+  deliver(session.json() ? to_text(json) : to_terminal_text(result), options.output);
+  deliver_csv(json_table_csv(Json::array({json}), "/parameters"), csv);
   constexpr double kSuspicious = 0.001;
   return exit_code(std::ranges::none_of(
       result.parameters, [](const ParameterCoverage& p) { return p.p_value < kSuspicious; }));

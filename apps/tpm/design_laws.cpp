@@ -6,7 +6,7 @@
 #include "design_options.hpp"
 #include "recording_options.hpp"
 #include "tpm/fit/design/recovery.hpp"
-#include "tpm/fit/show/fit_csv.hpp"
+#include "tpm/show/json_table_csv.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {
@@ -48,7 +48,7 @@ int check_choice_of_law(const DesignOptions& options, const Session& session) {
   }
   deliver(session.json() ? to_text(results_json(results)) : to_terminal_text(results),
           options.output);
-  deliver_csv(recovery_csv(results), csv);
+  deliver_csv(json_table_csv(results_json(results).at("laws"), "/choices"), csv);
   return exit_code(std::ranges::all_of(results, &RecoveryResult::fulfilled));
 }
 

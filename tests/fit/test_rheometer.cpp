@@ -193,7 +193,9 @@ TEST_CASE("A strain is fitted from its file alone, by linear and power kernels",
     CHECK(std::filesystem::exists(folder.path() / "shear_fit" / name));
   }
   CHECK_THAT(read_file(folder.path() / "shear_fit" / "parameters.csv"),
-             Catch::StartsWith("parameter,SI_unit,estimate,standard_error,lower,upper,level,"));
+             Catch::StartsWith("name,SI_unit,scale,bounds_SI_lower,bounds_SI_upper,estimate_SI,"
+                               "standard_error_SI,interval_SI_lower,interval_SI_upper,") &&
+                 Contains(",confidence_level"));
   CHECK(test::run_in(folder, "fit shear_fit/config.json").code == 0);
 }
 

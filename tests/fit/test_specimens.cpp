@@ -165,12 +165,12 @@ TEST_CASE("Beside an answer in JSON stands its table as CSV", "[specimens]") {
   };
   for (const Case& c : std::vector<Case>{
            {"fit pig/3mm.csv --laws power-1 --no-held-out --no-profiles --no-draw",
-            "parameter,SI_unit,estimate,"},
-           {"fit pig/3mm.csv --laws power-1 --no-draw", "parameter,SI_unit,estimate,"},
-           {"fit pig --laws power-1 --no-draw", "parameter,SI_unit,typical,"},
+            "name,SI_unit,scale,"},
+           {"fit pig/3mm.csv --laws power-1 --no-draw", "name,SI_unit,scale,"},
+           {"fit pig --laws power-1 --no-draw", "name,unit,typical_SI,"},
            {"design " TPM_TEST_SOURCE_DIR "/configs/coverage_absolute.json --repetitions 3",
-            "parameter,level,data_sets,"},
-           {"design --laws linear-1 --repetitions 1", "law,noise_over_peak,margin,"},
+            "seed,confidence_level,data_sets,"},
+           {"design --laws linear-1 --repetitions 1", "law,noise_over_peak,seed,"},
            {"predict law.json --frequencies '1 Hz : 100 Hz : 3'",
             "frequency_Hz,storage_N_per_m,"}}) {
     INFO(c.command);
@@ -253,7 +253,8 @@ TEST_CASE("A folder under a probe answers in pascals", "[specimens]") {
   CHECK(moduli.at("moduli").size() == 3);  // of k_inf and k1, and of both together
   CHECK(moduli.at("moduli").at(0).at("interval_from") == "pooled");
   CHECK(moduli.at("poisson_ratio_provenance") == "given");
-  CHECK(read_file(folder.path() / "out" / "young_moduli.csv").starts_with("modulus,of,SI_unit"));
+  CHECK(read_file(folder.path() / "out" / "young_moduli.csv")
+            .starts_with("name,of,unit,estimate_SI,"));
 }
 
 TEST_CASE("A reference depth can be chosen, and the coefficients are those at it", "[specimens]") {

@@ -22,3 +22,12 @@ TEST_CASE("A table of JSON keeps its keys, and the units within, as CSV", "[csv]
         "\"a, b\",0.005,1.25,yes,0.5 2,k2,,\n"
         "c,,,,,,,x\n");
 }
+
+TEST_CASE("The limits of an interval are two columns, of which one may be empty", "[csv]") {
+  const Json rows = Json::parse(R"([{"name": "k1", "interval_SI": [null, 2.5], "times_s": [1, 2]},
+                                    {"name": "k2", "interval_SI": [1.5, null]}])");
+  CHECK(json_table_csv(rows) ==
+        "name,interval_SI_lower,interval_SI_upper,times_s\n"
+        "k1,,2.5,1 2\n"
+        "k2,1.5,,\n");
+}

@@ -131,5 +131,7 @@ struct OrganStudy {
 /// Machine-readable, keys in docs/json.md; 5 significant digits, which is what the
 /// organ's runs and searches are good for.
 [[nodiscard]] Json to_json(const OrganStudy& study);
+/// A point of an answer to an experiment: where it is and the response, under keys with units.
+[[nodiscard]] Json point_json(const StudyCondition& condition, double x, double response);
 
 }  // namespace tpm::paper

@@ -63,14 +63,6 @@ Json condition_json(const StudyCondition& c) {
   return j;
 }
 
-const char* place_key(Kind kind) {
-  return kind == Kind::static_ ? "depth_m" : "time_s";
-}
-
-const char* response_key(Kind kind) {
-  return kind == Kind::creep ? "depth_m" : "force_N";
-}
-
 Json curve_json(const OrganStudy& study, const StudyCurve& curve) {
   const StudyCondition& c = study.config.conditions[curve.condition];
   Json j = condition_json(c);
@@ -78,8 +70,7 @@ Json curve_json(const OrganStudy& study, const StudyCurve& curve) {
   j["failure"] = curve.failure.empty() ? Json(nullptr) : Json(curve.failure);
   j["readings"] = array_json(curve.readings, [&](const StudyReading& r) {
     Json reading{{"label", r.label}};
-    reading[place_key(c.kind)] = number(r.x);
-    reading[response_key(c.kind)] = number(r.response);
+    reading.update(point_json(c, r.x, r.response));
     if (r.against_first) reading["against_first"] = rounded(*r.against_first, 4);
     return reading;
   });
@@ -97,6 +88,11 @@ Json curves_json(const OrganStudy& study) {
 }
 
 }  // namespace
+
+Json point_json(const StudyCondition& condition, double x, double response) {
+  return {{condition.kind == Kind::static_ ? "depth_m" : "time_s", number(x)},
+          {condition.kind == Kind::creep ? "depth_m" : "force_N", number(response)}};
+}
 
 Json to_json(const OrganStudy& study) {
   Json tissues = array_json(study.config.tissues, [](const StudyTissue& t) {

@@ -1,6 +1,7 @@
 #include "tpm/show/json_table_csv.hpp"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <vector>
 
@@ -15,6 +16,14 @@ std::string scalar_cell(const Json& value) {
   if (value.is_null()) return {};
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+/// Two limits under a key that says so.
+bool is_interval(std::string_view key, const Json& value) {
+  constexpr std::array<std::string_view, 4> kWords{"interval", "bounds", "band", "new_specimen"};
+  return value.size() == 2 && std::ranges::any_of(kWords, [key](std::string_view word) {
+           return key.find(word) != std::string_view::npos;
+         });
 }
 
 /// Flat rows and their columns in the order in which these were first met.
@@ -64,6 +73,11 @@ class FlatTable {
       } else if (value.is_array()) {
         const bool plain = std::ranges::none_of(value, &Json::is_structured);
         if (!plain || value.empty()) continue;
+        if (is_interval(key, value)) {
+          set(column + "_lower", scalar_cell(value[0]), row);
+          set(column + "_upper", scalar_cell(value[1]), row);
+          continue;
+        }
         std::string cell;
         for (const Json& v : value) cell += (cell.empty() ? "" : " ") + scalar_cell(v);
         set(column, std::move(cell), row);

@@ -11,7 +11,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/show/draw.hpp"
-#include "tpm/show/table_document.hpp"
+#include "tpm/show/result_table.hpp"
 
 namespace tpm::accuracy {
 namespace {
@@ -33,25 +33,53 @@ std::string verdict_words(const StabilityVerdict& v) {
   return name + ", " + (v.error < kRounding ? "exact" : percent(v.error));
 }
 
-Table limits_table(const StabilityStudy& study) {
-  Table table{"Limits found by bisection to 1 % and those of theory.",
-              {{"problem"},
-               {"rule"},
-               {"theory"},
-               {"theory, s", true},
-               {"found, s", true},
-               {"found/theory", true}}};
-  for (const StabilityLimit& l : study.limits) {
+const ResultTable<StabilityLimit>& limits_table() {
+  using Row = StabilityLimit;
+  using Of = ResultColumn<Row>;
+  const auto found = [](const Row& l) {
+    return Cell{std::isfinite(l.found_s) ? number(l.found_s) : "not found"};
+  };
+  const auto ratio = [](const Row& l) {
     const bool good = std::abs(l.ratio() - 1.0) <= 0.02;
-    table.rows.push_back({{l.problem},
-                          {step_rule_name(l.rule)},
-                          {l.theory},
-                          {number(l.theory_s)},
-                          {std::isfinite(l.found_s) ? number(l.found_s) : "not found"},
-                          {number(l.ratio()), good ? Tone::good : Tone::bad}});
-  }
+    return Cell{number(l.ratio()), good ? Tone::good : Tone::bad};
+  };
+  static const ResultTable<Row> table(
+      {Of("problem", &Row::problem).shown("problem"),
+       Of("rule", [](const Row& l) { return step_rule_name(l.rule); }).shown("rule"),
+       Of("theory", &Row::theory).shown("theory"),
+       Of("theory_s", &Row::theory_s).shown("theory, s", 1),
+       Of("found_s", &Row::found_s, 4).or_left_out().shown("found, s", 1).in_words(found),
+       Of("found_over_theory", &Row::ratio, 4)
+           .or_left_out()
+           .shown("found/theory", 1)
+           .in_words(ratio)});
   return table;
 }
+
+/// What a rule did, of a cell of either kind.
+template <class Row>
+std::vector<ResultColumn<Row>> verdict_columns() {
+  return {{"rule", [](const Row& c) { return step_rule_name(c.rule); }},
+          {"class", [](const Row& c) { return stability_class_name(c.verdict.found); }},
+          ResultColumn<Row>(
+              "error_of_peak", [](const Row& c) { return c.verdict.error; }, 4)
+              .or_left_out()};
+}
+
+std::vector<ResultColumn<LimitingCell>> limiting_columns() {
+  using Row = LimitingCell;
+  std::vector<ResultColumn<Row>> columns = verdict_columns<Row>();
+  columns.emplace_back("expected", [](const Row& c) { return stability_class_name(c.expected); });
+  columns.emplace_back("right", &Row::right);
+  columns.emplace_back("reason", [](const Row& c) { return c.verdict.reason; }).or_left_out();
+  return columns;
+}
+
+const ResultTable<ServoRow> kServoRows({{"problem", &ServoRow::problem},
+                                        {"rate_Hz", &ServoRow::rate_Hz}});
+const ResultTable<ServoCell> kServoCells(verdict_columns<ServoCell>());
+const ResultTable<LimitingCase> kLimitingCases({{"case", &LimitingCase::name}});
+const ResultTable<LimitingCell> kLimitingCells(limiting_columns());
 
 Table servo_table(const StabilityStudy& study, const std::string& problem) {
   Table table{
@@ -165,13 +193,6 @@ void add_maps(Document& document, const StabilityStudy& study, const std::vector
   }
 }
 
-Json verdict_json(StepRule rule, const StabilityVerdict& v) {
-  Json json{{"rule", step_rule_name(rule)}, {"class", stability_class_name(v.found)}};
-  if (std::isfinite(v.error)) json["error_of_peak"] = v.error;
-  if (!v.reason.empty()) json["reason"] = v.reason;
-  return json;
-}
-
 /// @param figures of stability_figures
 Document stability_document(const StabilityStudy& study, const std::vector<Figure>& figures) {
   Document document;
@@ -186,7 +207,8 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
   if (!study.limits.empty()) {
     document.heading(2, "Limits");
     document.paragraph(study_organ_words());
-    document.table(limits_table(study));
+    document.table(
+        limits_table().page("Limits found by bisection to 1 % and those of theory.", study.limits));
   }
   if (!study.servo.empty()) document.heading(2, "At servo rate");
   for (const std::string& problem : each_once(study.servo, &ServoRow::problem)) {
@@ -199,17 +221,6 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
   if (!study.maps.empty()) add_maps(document, study, figures);
   typeset(document);
   return document;
-}
-
-/// One line per limit.
-std::string stability_limits_csv(const StabilityStudy& study) {
-  std::string text =
-      csv_line({"problem", "rule", "theory", "theory_s", "found_s", "found_over_theory"});
-  for (const StabilityLimit& l : study.limits) {
-    text += csv_line({l.problem, step_rule_name(l.rule), l.theory, significant(l.theory_s, 6),
-                      number(l.found_s), number(l.ratio())});
-  }
-  return text;
 }
 
 /// One line per run of a map. SI units in the column names.
@@ -225,35 +236,6 @@ std::string stability_map_csv(const StabilityStudy& study, const std::string& id
       text +=
           csv_line({step_rule_name(map.rule), significant(p.x, 6), significant(p.step_s, 6),
                     std::string(stability_class_name(p.verdict.found)), number(p.verdict.error)});
-    }
-  }
-  return text;
-}
-
-/// One line per rule and servo rate.
-std::string stability_servo_csv(const StabilityStudy& study) {
-  std::string text = csv_line({"problem", "rate_Hz", "rule", "class", "error_of_peak"});
-  for (const ServoRow& row : study.servo) {
-    for (const ServoCell& cell : row.cells) {
-      text += csv_line({row.problem, significant(row.rate_Hz, 4), step_rule_name(cell.rule),
-                        std::string(stability_class_name(cell.verdict.found)),
-                        number(cell.verdict.error)});
-    }
-  }
-  return text;
-}
-
-/// One line per rule and limiting case.
-std::string limiting_cases_csv(const StabilityStudy& study) {
-  std::string text =
-      csv_line({"case", "rule", "class", "error_of_peak", "expected", "right", "reason"});
-  for (const LimitingCase& limiting_case : study.limiting_cases) {
-    for (const LimitingCell& cell : limiting_case.cells) {
-      text +=
-          csv_line({limiting_case.name, step_rule_name(cell.rule),
-                    std::string(stability_class_name(cell.verdict.found)),
-                    number(cell.verdict.error), std::string(stability_class_name(cell.expected)),
-                    cell.right ? "yes" : "no", cell.verdict.reason});
     }
   }
   return text;
@@ -312,32 +294,17 @@ Json to_json(const StabilityStudy& study) {
   Json json;
   json["summary"] = stability_sentences(study);
   json["networks"] = study_organ_words();
-  for (const StabilityLimit& l : study.limits) {
-    Json limit{{"problem", l.problem},
-               {"rule", step_rule_name(l.rule)},
-               {"theory", l.theory},
-               {"theory_s", l.theory_s}};
-    if (std::isfinite(l.found_s)) limit["found_s"] = l.found_s;
-    json["limits"].push_back(std::move(limit));
-  }
+  if (!study.limits.empty()) json["limits"] = limits_table().list(study.limits);
   for (const ServoRow& row : study.servo) {
-    Json rate{{"problem", row.problem}, {"rate_Hz", row.rate_Hz}};
-    for (const ServoCell& cell : row.cells) {
-      rate["rules"].push_back(verdict_json(cell.rule, cell.verdict));
-    }
+    Json rate = kServoRows.object(row);
+    rate["rules"] = kServoCells.list(row.cells);
     json["servo"].push_back(std::move(rate));
   }
   for (const LimitingCase& limiting_case : study.limiting_cases) {
-    Json entry{{"case", limiting_case.name},
-               {"setup", limiting_case.setup},
-               {"expected", limiting_case.expected}};
-    for (const LimitingCell& cell : limiting_case.cells) {
-      Json of_rule = verdict_json(cell.rule, cell.verdict);
-      of_rule["expected"] = stability_class_name(cell.expected);
-      of_rule["right"] = cell.right;
-      entry["rules"].push_back(std::move(of_rule));
-    }
-    json["limiting_cases"].push_back(std::move(entry));
+    json["limiting_cases"].push_back({{"case", limiting_case.name},
+                                      {"setup", limiting_case.setup},
+                                      {"expected", limiting_case.expected},
+                                      {"rules", kLimitingCells.list(limiting_case.cells)}});
   }
   for (const StabilityMap& map : study.maps) {
     std::map<std::string, int> counts;
@@ -359,10 +326,13 @@ void write_stability(const StabilityStudy& study, const std::filesystem::path& f
   const std::vector<Figure> figures = stability_figures(study);
   write_report(folder, stability_document(study, figures), figures, python, {{"runs", seconds}});
   write_file(folder / "stability.json", to_text(to_json(study)));
-  if (!study.limits.empty()) write_file(folder / "limits.csv", stability_limits_csv(study));
+  if (!study.limits.empty()) write_file(folder / "limits.csv", limits_table().csv(study.limits));
   if (!study.limiting_cases.empty())
-    write_file(folder / "limiting_cases.csv", limiting_cases_csv(study));
-  if (!study.servo.empty()) write_file(folder / "servo.csv", stability_servo_csv(study));
+    write_file(folder / "limiting_cases.csv", nested_csv(kLimitingCases, study.limiting_cases,
+                                                         &LimitingCase::cells, kLimitingCells));
+  if (!study.servo.empty())
+    write_file(folder / "servo.csv",
+               nested_csv(kServoRows, study.servo, &ServoRow::cells, kServoCells));
   for (const std::string& id : map_ids(study)) {
     write_file(folder / fmt::format("map_{}.csv", id), stability_map_csv(study, id));
   }

@@ -7,9 +7,8 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/show/document.hpp"
+#include "tpm/show/result_table.hpp"
 #include "tpm/show/run_record.hpp"
-#include "tpm/show/table_document.hpp"
 
 namespace tpm::accuracy {
 namespace {
@@ -36,24 +35,24 @@ std::string summary_of_group(const std::string& name) {
   return {};
 }
 
-Table table_of_group(const VerificationRun& verification, const std::string& name) {
-  Table table{"",
-              {{"what is verified"},
-               {"quantity"},
-               {"measured", true},
-               {"required", true},
-               {"verdict"},
-               {"reference"}}};
-  for (const VerificationRow& row : verification.rows) {
-    if (row.group != name) continue;
-    const Tone tone = row.holds() ? Tone::good : Tone::bad;
-    table.rows.push_back({{row.what},
-                          {row.quantity},
-                          {measured_words(row), tone},
-                          {expected_words(row)},
-                          {verdict_of(row), tone},
-                          {row.source}});
-  }
+Tone tone_of(const VerificationRow& row) {
+  return row.holds() ? Tone::good : Tone::bad;
+}
+
+const ResultTable<VerificationRow>& verification_table() {
+  using Row = VerificationRow;
+  using Of = ResultColumn<Row>;
+  const auto measured = [](const Row& row) { return Cell{measured_words(row), tone_of(row)}; };
+  const auto required = [](const Row& row) { return Cell{expected_words(row)}; };
+  const auto verdict = [](const Row& row) { return Cell{verdict_of(row), tone_of(row)}; };
+  static const ResultTable<Row> table(
+      {Of("group", &Row::group), Of("what", &Row::what).shown("what is verified"),
+       Of("quantity", &Row::quantity).shown("quantity"),
+       Of("measured", &Row::measured).or_left_out().shown("measured", 1).in_words(measured),
+       Of("expected", &Row::expected, 0).shown("required", 1).in_words(required),
+       Of("tolerance", &Row::tolerance, 0), Of("failure", &Row::failure).or_left_out(),
+       Of("holds", &Row::holds).shown("verdict").in_words(verdict),
+       Of("reference", &Row::source).shown("reference")});
   return table;
 }
 
@@ -90,7 +89,9 @@ Document verification_document(const VerificationRun& verification) {
   for (const std::string& name : each_once(verification.rows, &VerificationRow::group)) {
     std::string summary = summary_of_group(name);
     document.heading(2, fmt::format("{}: {}", name, summary));
-    document.table(table_of_group(verification, name));
+    std::vector<VerificationRow> rows = verification.rows;
+    std::erase_if(rows, [&](const VerificationRow& row) { return row.group != name; });
+    document.table(verification_table().page("", rows));
   }
   typeset(document);
   return document;
@@ -124,33 +125,16 @@ std::vector<VerificationLine> verification_lines(const VerificationRun& verifica
 }
 
 Json to_json(const VerificationRun& verification) {
-  constexpr int kKeptDigits = 6;
   Json json{{"checks", verification.rows.size()},
             {"failed", verification.failed()},
             {"holds", verification.failed() == 0},
-            {"rows", Json::array()}};
+            {"rows", verification_table().list(verification.rows)}};
   if (verification.flaw != 0.0) json["flaw"] = verification.flaw;
-  for (const VerificationRow& row : verification.rows) {
-    Json entry{{"group", row.group},      {"what", row.what},         {"quantity", row.quantity},
-               {"reference", row.source}, {"expected", row.expected}, {"tolerance", row.tolerance}};
-    if (std::isfinite(row.measured)) entry["measured"] = rounded(row.measured, kKeptDigits);
-    if (!row.failure.empty()) entry["failure"] = row.failure;
-    entry["holds"] = row.holds();
-    json["rows"].push_back(std::move(entry));
-  }
   return json;
 }
 
 std::string verification_csv(const VerificationRun& verification) {
-  std::string text = csv_line(
-      {"group", "what", "quantity", "measured", "expected", "tolerance", "verdict", "reference"});
-  for (const VerificationRow& row : verification.rows) {
-    text +=
-        csv_line({row.group, row.what, row.quantity,
-                  row.failure.empty() ? significant(row.measured, 6) : "", shortest(row.expected),
-                  shortest(row.tolerance), row.holds() ? "holds" : "fails", row.source});
-  }
-  return text;
+  return verification_table().csv(verification.rows);
 }
 
 void write_verification(const VerificationRun& verification, const std::filesystem::path& folder,

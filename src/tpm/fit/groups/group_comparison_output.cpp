@@ -8,7 +8,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/groups/group_comparison.hpp"
-#include "tpm/show/table_document.hpp"
+#include "tpm/show/json_table_csv.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -167,41 +167,11 @@ std::string to_terminal_text(const GroupComparison& c) {
 }
 
 std::string comparison_csv(const GroupComparison& c) {
-  std::string text = csv_line({"quantity", "SI_unit", "first", "first_lower", "first_upper",
-                               "first_specimens", "second", "second_lower", "second_upper",
-                               "second_specimens", "kind", "second_against_first", "lower", "upper",
-                               "level", "p_value", "p_value_holm", "left_out", "reason"});
-  const auto cell = [](double v) { return significant(v, kDigits); };
-  const auto add = [&](const ComparedQuantity& q, bool tested) {
-    std::vector<std::string> cells{q.parameter.name, q.si_unit};
-    for (const auto& typical : q.typical) {
-      const auto natural = [&](double theta) { return cell(q.parameter.natural(theta)); };
-      for (std::string value :
-           typical
-               ? std::vector<std::string>{natural(typical->mean), natural(typical->interval.lower),
-                                          natural(typical->interval.upper),
-                                          std::to_string(typical->specimens)}
-               : std::vector<std::string>(4)) {
-        cells.push_back(std::move(value));
-      }
-    }
-    cells.push_back(is_ratio(q) ? "ratio" : "difference");
-    if (q.difference) {
-      const GroupDifference& d = *q.difference;
-      for (const double theta : {d.difference, d.interval.lower, d.interval.upper}) {
-        cells.push_back(cell(shown_difference(q, theta)));
-      }
-      cells.insert(cells.end(),
-                   {cell(c.study.level), cell(d.p_value), tested ? cell(q.p_holm) : std::string()});
-    } else {
-      cells.insert(cells.end(), {"", "", "", cell(c.study.level), "", ""});
-    }
-    cells.insert(cells.end(), {std::to_string(q.left_out[0] + q.left_out[1]), q.reason});
-    text += csv_line(cells);
-  };
-  for (const ComparedQuantity& q : c.parameters) add(q, true);
-  for (const ComparedQuantity& q : c.moduli) add(q, false);
-  return text;
+  const Json all = to_json(c);
+  Json rows = all.at("parameters");
+  for (const Json& modulus : all.value("young_moduli", Json::array())) rows.push_back(modulus);
+  for (Json& row : rows) row["confidence_level"] = c.study.level;
+  return json_table_csv(rows, "/groups");
 }
 
 }  // namespace tpm::fit

@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
-#include "tpm/fit/verdict.hpp"
+#include "tpm/show/json_table_csv.hpp"
 #include "tpm/show/table_document.hpp"
 
 namespace tpm::fit {
@@ -22,38 +23,19 @@ std::string cell(const std::optional<double>& value) {
   return value ? cell(*value) : std::string();
 }
 
-/// The depth at which coefficients are secants; empty where they do not depend on one.
-std::string reference_cell(const std::optional<LawSpec>& law) {
-  return law && depends_on_reference(*law) ? cell(law->reference) : std::string();
+/// Rows with what all of them depend on: the level and, of a secant, the depth of reference.
+Json with_conditions(Json rows, double level, const std::optional<LawSpec>& law) {
+  for (Json& row : rows) {
+    row["confidence_level"] = level;
+    if (law && depends_on_reference(*law)) {
+      row[si_key(law->drive, "reference")] = rounded(law->reference, kCells);
+    }
+  }
+  return rows;
 }
 
-/// "depth_reference_m", or "reference" of a law of stress.
-std::string reference_column(const std::optional<LawSpec>& law) {
-  return law ? si_key(law->drive, "reference") : std::string("depth_reference_m");
-}
-
-std::vector<std::string> parameter_columns(const std::optional<LawSpec>& law) {
-  return {"parameter",   "SI_unit",     "estimate", "standard_error",
-          "lower",       "upper",       "level",    reference_column(law),
-          "lower_bound", "upper_bound", "at_bound", "verdict"};
-}
-
-std::vector<std::string> parameter_cells(const FitResult& fit, const ParameterResult& p,
-                                         const std::string& name) {
-  return {name,
-          si_unit(p.parameter),
-          cell(p.estimate),
-          cell(p.standard_error),
-          cell(p.lower),
-          cell(p.upper),
-          cell(fit.config.level),
-          reference_cell(fit.config.law),
-          cell(p.parameter.lower),
-          cell(p.parameter.upper),
-          p.at_lower_bound   ? "lower"
-          : p.at_upper_bound ? "upper"
-                             : "no",
-          verdict_text(p)};
+Json parameter_rows(const FitResult& fit) {
+  return with_conditions(to_json(fit).at("parameters"), fit.config.level, fit.config.law);
 }
 
 /// Each sample of a recording with the law's answer and its prediction band.
@@ -77,11 +59,7 @@ std::string samples_csv(const FitResult& fit, std::size_t recording) {
 }  // namespace
 
 std::string parameters_csv(const FitResult& fit) {
-  std::string text = csv_line(parameter_columns(fit.config.law));
-  for (const ParameterResult& p : fit.parameters) {
-    text += csv_line(parameter_cells(fit, p, p.parameter.name));
-  }
-  return text;
+  return json_table_csv(parameter_rows(fit));
 }
 
 std::string readings_csv(const FitResult& fit) {
@@ -103,103 +81,53 @@ std::string readings_csv(const FitResult& fit) {
 }
 
 std::string laws_csv(const Selection& selection) {
-  std::string text =
-      csv_line({"law", "recommended", "parameters_estimated", "rms_over_peak", "delta_bic",
-                "delta_aicc", "identified", "held_out_rms_over_peak", "reason"});
-  for (std::size_t i = 0; i < selection.candidates.size(); ++i) {
-    const Candidate& c = selection.candidates[i];
-    std::string held;
-    for (const HeldOut& h : c.held_out) {
-      held += (held.empty() ? "" : " ") + cell(h.rms_over_peak);
-    }
-    text +=
-        csv_line({law_name(c.law), i == selection.recommended ? "yes" : "no",
-                  c.failed ? "" : std::to_string(c.parameters - 1),
-                  c.failed ? "" : cell(c.rms_over_peak), c.failed ? "" : cell(c.delta_bic),
-                  c.failed ? "" : cell(c.delta_aicc), c.identified ? "yes" : "no", held, c.reason});
+  Json laws = to_json(selection).at("laws");
+  for (std::size_t i = 0; i < laws.size(); ++i) {
+    laws[i]["recommended"] = i == selection.recommended;
+    laws[i]["held_out_rms_over_peak"] =
+        array_json(laws[i].value("held_out", Json::array()),
+                   [](const Json& held_out) { return held_out.at("rms_over_peak"); });
   }
-  return text;
+  return json_table_csv(laws);
 }
 
 std::string specimens_csv(const SpecimenStudy& study, const std::optional<ContactGeometry>& probe) {
-  std::vector<std::string> columns{"recording", "specimen"};
-  for (std::string& column : parameter_columns(study.law)) columns.push_back(std::move(column));
-  std::string text = csv_line(columns);
+  Json rows = Json::array();
   for (const SpecimenRow& row : study.rows) {
-    for (std::size_t i = 0; row.fit && i < row.place.size(); ++i) {
-      std::vector<std::string> cells{row.name, row.specimen};
-      for (std::string& c :
-           parameter_cells(*row.fit, row.parameter(i), row.fit->parameters[i].parameter.name)) {
-        cells.push_back(std::move(c));
-      }
-      text += csv_line(cells);
+    if (!row.fit) continue;
+    const auto add = [&](const Json& of) {
+      Json& added = rows.emplace_back(Json{{"recording", row.name}, {"specimen", row.specimen}});
+      added.update(of);
+    };
+    const Json parameters = parameter_rows(*row.fit);
+    for (std::size_t i = 0; i < row.place.size(); ++i) {
+      Json pooled_as = parameters[row.place[i]];
+      pooled_as["name"] = parameters[i].at("name");
+      add(pooled_as);
     }
-    if (!row.fit || !probe) continue;
-    for (const YoungModulus& m : young_moduli(*row.fit, *probe, false).moduli) {
-      text += csv_line({row.name, row.specimen, m.name, m.unit, cell(m.estimate),
-                        cell(m.standard_error), cell(m.lower), cell(m.upper),
-                        cell(row.fit->config.level), reference_cell(row.fit->config.law), "", "",
-                        "", m.verdict});
+    if (!probe) continue;
+    const YoungModuli moduli = young_moduli(*row.fit, *probe, false);
+    for (Json& modulus :
+         with_conditions(to_json(moduli).at("moduli"), moduli.level, row.fit->config.law)) {
+      modulus["SI_unit"] = std::exchange(modulus["unit"], nullptr);
+      modulus.erase("unit");
+      add(modulus);
     }
   }
-  return text;
+  return json_table_csv(rows);
 }
 
 std::string pooled_csv(const SpecimenStudy& study) {
-  std::string text =
-      csv_line({"parameter", "SI_unit", "typical", "lower", "upper", "new_specimen_lower",
-                "new_specimen_upper", "level", reference_column(study.law), "specimens",
-                "recordings_left_out", "spread_p_value", "I_squared", "summary"});
-  for (const PooledParameter& p : study.pooled) {
-    const RandomEffects& e = p.effects;
-    const auto natural = [&](double theta) { return cell(p.parameter.natural(theta)); };
-    text += csv_line({p.parameter.name, si_unit(p.parameter), natural(e.mean),
-                      natural(e.interval.lower), natural(e.interval.upper),
-                      e.new_specimen ? natural(e.new_specimen->lower) : "",
-                      e.new_specimen ? natural(e.new_specimen->upper) : "", cell(study.level),
-                      reference_cell(study.law), std::to_string(e.specimens),
-                      std::to_string(p.left_out), cell(e.q_p_value), cell(e.i_squared), e.summary});
-  }
-  return text;
-}
-
-std::string coverage_csv(const CoverageResult& result) {
-  std::string text = csv_line({"parameter", "level", "data_sets", "failed", "covered", "coverage",
-                               "open_intervals", "binomial_p_value", "seed"});
-  for (const ParameterCoverage& p : result.parameters) {
-    text += csv_line({p.name, cell(result.level), std::to_string(result.sets),
-                      std::to_string(result.failed), std::to_string(p.covered),
-                      cell(static_cast<double>(p.covered) / result.sets),
-                      std::to_string(p.one_sided), cell(p.p_value), std::to_string(result.seed)});
-  }
-  return text;
-}
-
-std::string recovery_csv(std::span<const RecoveryResult> results) {
-  std::string text = csv_line({"law", "noise_over_peak", "margin", "trials", "returned",
-                               "equivalent", "larger", "failed", "fulfilled", "seed"});
-  for (const RecoveryResult& r : results) {
-    for (const ChoiceCount& c : r.choices) {
-      text += csv_line({law_name(r.law), cell(r.noise), cell(c.margin), std::to_string(c.trials),
-                        std::to_string(c.returned), std::to_string(c.equivalent),
-                        std::to_string(c.larger), std::to_string(r.failed),
-                        c.fulfilled() ? "yes" : "no", std::to_string(r.seed)});
-    }
-  }
-  return text;
+  return json_table_csv(with_conditions(to_json(study).at("pooled"), study.level, study.law));
 }
 
 std::string moduli_csv(const YoungModuli& moduli) {
-  std::string text = csv_line({"modulus", "of", "SI_unit", "estimate", "standard_error", "lower",
-                               "upper", "level", "interval_from", "depth_reference_m",
-                               "poisson_ratio", "poisson_ratio_provenance", "geometry", "verdict"});
-  for (const YoungModulus& m : moduli.moduli) {
-    text += csv_line({m.name, m.of, m.unit, cell(m.estimate), cell(m.standard_error), cell(m.lower),
-                      cell(m.upper), cell(moduli.level), m.basis, cell(moduli.reference_m),
-                      cell(moduli.poisson_ratio), moduli.poisson_assumed ? "assumed" : "given",
-                      moduli.geometry, m.verdict});
-  }
-  return text;
+  Json all = to_json(moduli);
+  Json rows = std::move(all["moduli"]);
+  all.erase("moduli");
+  all.erase("warnings");
+  for (Json& row : rows) row.update(all);
+  return json_table_csv(rows);
 }
 
 std::vector<std::string> write_fit_csv(const std::filesystem::path& folder, const FitResult& fit) {

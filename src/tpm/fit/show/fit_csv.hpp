@@ -1,12 +1,9 @@
 #pragma once
 #include <filesystem>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "tpm/fit/coverage.hpp"
-#include "tpm/fit/design/recovery.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
@@ -27,11 +24,6 @@ namespace tpm::fit {
                                         const std::optional<ContactGeometry>& probe = {});
 /// Each pooled parameter.
 [[nodiscard]] std::string pooled_csv(const SpecimenStudy& study);
-
-/// Coverage of intervals: each parameter of a configuration.
-[[nodiscard]] std::string coverage_csv(const CoverageResult& result);
-/// Counts of laws that were returned from their own data: each law and margin.
-[[nodiscard]] std::string recovery_csv(std::span<const RecoveryResult> results);
 
 /// Each Young's modulus.
 [[nodiscard]] std::string moduli_csv(const YoungModuli& moduli);

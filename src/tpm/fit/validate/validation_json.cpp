@@ -6,7 +6,7 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/validate/validation.hpp"
-#include "tpm/show/table_document.hpp"
+#include "tpm/show/json_table_csv.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -209,35 +209,25 @@ Json to_json(const Validation& v) {
 }
 
 std::string to_csv(const Validation& v) {
-  constexpr std::size_t kColumns = 14;
-  std::string text = csv_line({"recording", "quantity", "unit", "S", "D", "E", "U", "u_val",
-                               "u_num", "u_input", "u_D", "k", "R", "verdict"});
-  const auto cell = [](double value) { return significant(value, kStoredDigits); };
-  const auto add_verdict = [&](const std::string& name, ModelVerdict verdict) {
-    std::vector<std::string> row(kColumns);
-    row.front() = name;
-    row[1] = "all quantities";
-    row.back() = verdict_key(verdict);
-    text += csv_line(row);
+  const Json all = to_json(v);
+  Json rows = Json::array();
+  const auto add = [&rows](const Json& recording, const Json& quantity) {
+    Json& row = rows.emplace_back(Json{{"recording", recording}});
+    row.update(quantity);
   };
-  for (const RecordingComparison& r : v.recordings) {
-    for (const QuantityComparison& q : r.quantities) {
-      text += csv_line({r.name, q.name, q.unit.symbol, cell(q.simulated), cell(q.measured),
-                        cell(q.e.error), cell(q.e.expanded()), cell(q.e.u_val), cell(q.u_num),
-                        cell(q.u_input), cell(q.u_D), cell(q.e.coverage),
-                        q.limit ? cell(*q.limit) : "", std::string(verdict_key(q.verdict))});
-    }
-    add_verdict(r.name, r.verdict);
+  const auto add_verdict = [&](const Json& recording, const Json& verdict) {
+    add(recording, Json{{"quantity", "all quantities"}, {"verdict", verdict}});
+  };
+  for (const Json& r : all.at("recordings")) {
+    for (const Json& quantity : r.at("quantities")) add(r.at("recording"), quantity);
+    add_verdict(r.at("recording"), r.at("verdict"));
   }
-  for (const PooledQuantity& p : v.pooled) {
-    text += csv_line({"mean", p.name, p.relative ? "1" : p.unit.symbol,
-                      p.relative ? "" : cell(p.simulated), p.relative ? "" : cell(p.measured),
-                      cell(p.e.error), cell(p.e.expanded()), cell(p.e.u_val), "", "", "",
-                      cell(p.e.coverage), p.limit ? cell(*p.limit) : "",
-                      std::string(verdict_key(p.verdict))});
+  for (Json quantity : all.value("pooled", Json::array())) {
+    quantity.erase("recordings");
+    add("mean", quantity);
   }
-  if (v.recordings.size() > 1) add_verdict("mean", v.verdict);
-  return text;
+  if (v.recordings.size() > 1) add_verdict("mean", all.at("verdict"));
+  return json_table_csv(rows);
 }
 
 }  // namespace tpm::fit

@@ -6,6 +6,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/show/result_table.hpp"
 
 namespace tpm::haptics {
 namespace {
@@ -151,22 +152,31 @@ Json impacts_json(const BoundaryStudy& study) {
   });
 }
 
-Json corners_json(const BoundaryStudy& study) {
-  return array_json(study.corners, [](const DeviceCorner& c) {
-    Json json{{"device", c.device},
-              {"stiffness_N_per_m", c.stiffness_N_per_m},
-              {"damping_N_s_per_m", c.damping_N_s_per_m},
-              {"friction_needed_N_s_per_m", c.needed_N_s_per_m},
-              {"friction_needed_with_a_period_of_delay_N_s_per_m", c.needed_delayed_N_s_per_m},
-              {"assumed_friction_N_s_per_m", nullptr},
-              {"passive", nullptr}};
-    if (c.assumed_friction_N_s_per_m) {
-      json["assumed_friction_N_s_per_m"] = {c.assumed_friction_N_s_per_m->first,
-                                            c.assumed_friction_N_s_per_m->second};
-      json["passive"] = c.assumed_friction_N_s_per_m->first > c.needed_N_s_per_m;
-    }
-    return json;
-  });
+const ResultTable<DeviceCorner>& corner_table() {
+  using Row = DeviceCorner;
+  using Of = ResultColumn<Row>;
+  const auto passive = [](const Row& c) {
+    return c.assumed_friction_N_s_per_m
+               ? Json(c.assumed_friction_N_s_per_m->first > c.needed_N_s_per_m)
+               : Json(nullptr);
+  };
+  const auto verdict = [=](const Row& c) {
+    if (!c.assumed_friction_N_s_per_m) return Cell{"none: its friction is not known"};
+    const auto& [least, most] = *c.assumed_friction_N_s_per_m;
+    return Cell{fmt::format("{} (friction assumed to be {} to {})",
+                            passive(c).get<bool>() ? "passive" : "not passive",
+                            significant(least, 3), significant(most, 3))};
+  };
+  static const ResultTable<Row> table(
+      {Of("device", &Row::device).shown("device", -10),
+       Of("stiffness_N_per_m", &Row::stiffness_N_per_m, 0).shown("N/m", 7),
+       Of("damping_N_s_per_m", &Row::damping_N_s_per_m, 0).shown("N s/m", 7),
+       Of("friction_needed_N_s_per_m", &Row::needed_N_s_per_m, 0).shown("needed", 9),
+       Of("friction_needed_with_a_period_of_delay_N_s_per_m", &Row::needed_delayed_N_s_per_m, 0)
+           .shown("needed, 1 late", 15),
+       {"assumed_friction_N_s_per_m", &Row::assumed_friction_N_s_per_m},
+       Of("passive", passive).shown("verdict").in_words(verdict)});
+  return table;
 }
 
 /// A letter for each limit of the rise: the tool comes to rest, or it does not.
@@ -209,24 +219,10 @@ std::string impact_text(const BoundaryStudy& study) {
 }
 
 std::string corner_text(const BoundaryStudy& study) {
-  std::string text = fmt::format(
-      "\nfriction that a device needs to be passive at 1 kHz with all of its maker's stiffness and "
-      "damping (software limits of CHAI3D), N s/m\n{:<10}{:>8}{:>8}{:>10}{:>16}  verdict\n",
-      "device", "N/m", "N s/m", "needed", "needed, 1 late");
-  for (const DeviceCorner& c : study.corners) {
-    std::string verdict = "none: its friction is not known";
-    if (c.assumed_friction_N_s_per_m) {
-      const auto& [least, most] = *c.assumed_friction_N_s_per_m;
-      verdict = fmt::format("{} (friction assumed to be {} to {})",
-                            least > c.needed_N_s_per_m ? "passive" : "not passive",
-                            significant(least, 3), significant(most, 3));
-    }
-    text += fmt::format("{:<10}{:>8}{:>8}{:>10}{:>16}  {}\n", c.device,
-                        significant(c.stiffness_N_per_m, 4), significant(c.damping_N_s_per_m, 4),
-                        significant(c.needed_N_s_per_m, 4),
-                        significant(c.needed_delayed_N_s_per_m, 4), verdict);
-  }
-  return text;
+  return "\nfriction that a device needs to be passive at 1 kHz with all of its maker's stiffness "
+         "and "
+         "damping (software limits of CHAI3D), N s/m\n" +
+         corner_table().text(study.corners);
 }
 
 /// Where impacts come to rest with the slip of a session, a panel for each delay.
@@ -276,7 +272,7 @@ Json boundary_json(const BoundaryStudy& study) {
           {"shortest_forward_euler", points_json(study.shortest, "measured_s", "predicted_s")},
           {"shortest_exact", points_json(study.shortest_exact, "measured_s", "predicted_s")},
           {"impacts", impacts_json(study)},
-          {"device_corners", corners_json(study)},
+          {"device_corners", corner_table().list(study.corners)},
           {"worst_passive", rounded(worst_difference(study.passive), kBoundaryDigits)},
           {"worst_stable", rounded(worst_difference(study.stable), kBoundaryDigits)}};
 }

@@ -252,23 +252,8 @@ void add_fidelity(Document& d, const Verification& v) {
   }
   for (const std::string& note : v.notes) others.push_back({note, Tone::bad});
   if (!others.empty()) d.bullets(std::move(others));
-  Table table{"Force error by phase; depth: how well the operator followed, rms",
-              {{"phase"},
-               {"start s", true},
-               {"rms mN", true},
-               {"max mN", true},
-               {"max of peak", true},
-               {"depth um", true}}};
-  for (const PhaseFidelity& p : v.phases) {
-    const bool good = p.force.max_N <= kMostError * v.all.peak_N;
-    table.rows.push_back({{p.phase.name},
-                          {significant(p.start_s, 5)},
-                          {mN(p.force.rms_N)},
-                          {mN(p.force.max_N)},
-                          {percent(p.force.max_N, v.all.peak_N), good ? Tone::good : Tone::bad},
-                          {significant(1e6 * p.depth_rms_m, 3)}});
-  }
-  d.table(std::move(table));
+  d.table(phase_table(v).page("Force error by phase; depth: how well the operator followed, rms",
+                              v.phases));
 }
 
 void add_experiment(Document& d, const Verification& v) {
@@ -278,24 +263,7 @@ void add_experiment(Document& d, const Verification& v) {
       "Readings of pig liver (Samur et al. 2007, as printed) at the same depths, without "
       "error bars and with a rate that is not stated; the difference says how well the "
       "material of the session is chosen, not how well it is rendered.");
-  Table table{"",
-              {{"depth mm", true},
-               {"rate mm/s", true},
-               {"reading"},
-               {"measured N", true},
-               {"commanded N", true},
-               {"difference", true},
-               {"because"}}};
-  for (const BesideExperiment& e : v.experiment) {
-    table.rows.push_back({{significant(1e3 * e.depth_m, 3)},
-                          {significant(1e3 * e.rate_m_per_s, 3)},
-                          {e.label},
-                          {significant(e.measured_N, 3)},
-                          {significant(e.commanded_N, 3)},
-                          {percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1)},
-                          {cause_of_difference(e, v.material)}});
-  }
-  d.table(std::move(table));
+  d.table(experiment_table(v).page("", v.experiment));
 }
 
 void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
@@ -347,6 +315,44 @@ void add_energy(Document& d, const RecordingSummary& s) {
 }
 
 }  // namespace
+
+ResultTable<PhaseFidelity> phase_table(const Verification& v) {
+  using Row = PhaseFidelity;
+  using Of = ResultColumn<Row>;
+  const double peak_N = v.all.peak_N;
+  const auto force = [](auto member) { return [member](const Row& p) { return p.force.*member; }; };
+  const auto of_peak = [=](const Row& p) {
+    const bool good = p.force.max_N <= kMostError * peak_N;
+    return Cell{percent(p.force.max_N, peak_N), good ? Tone::good : Tone::bad};
+  };
+  return {{Of("phase", [](const Row& p) { return p.phase.name; }).shown("phase"),
+           {"kind", [](const Row& p) { return to_string(p.phase.kind); }},
+           Of("start_s", &Row::start_s).shown("start s", 1, 1.0, 5),
+           {"instants", force(&ForceFidelity::instants)},
+           Of("rms_N", force(&ForceFidelity::rms_N)).shown("rms mN", 1, 1e-3, 3),
+           Of("max_N", force(&ForceFidelity::max_N)).shown("max mN", 1, 1e-3, 3),
+           Of("peak_N", force(&ForceFidelity::peak_N)).shown("max of peak", 1).in_words(of_peak),
+           Of("depth_rms_m", &Row::depth_rms_m).shown("depth um", 1, 1e-6, 3)}};
+}
+
+ResultTable<BesideExperiment> experiment_table(const Verification& v) {
+  using Row = BesideExperiment;
+  using Of = ResultColumn<Row>;
+  const auto difference = [](const Row& e) {
+    return Cell{percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1)};
+  };
+  const auto cause = [material = v.material](const Row& e) {
+    return cause_of_difference(e, material);
+  };
+  return {{Of("depth_m", &Row::depth_m).shown("depth mm", 1, 1e-3, 3),
+           Of("rate_m_per_s", &Row::rate_m_per_s).shown("rate mm/s", 1, 1e-3, 3),
+           Of("label", &Row::label).shown("reading"),
+           Of("measured_N", &Row::measured_N, 0).shown("measured N", 1, 1.0, 3),
+           Of("commanded_N", &Row::commanded_N).shown("commanded N", 1, 1.0, 3),
+           Of("reference_N", &Row::reference_N).shown("difference", 1).in_words(difference),
+           {"reached_m", &Row::reached_m},
+           Of("cause", cause).shown("because")}};
+}
 
 RecordingSummary summary_of(const HilRecording& recording) {
   RecordingSummary s;

@@ -7,6 +7,7 @@
 #include "tpm/haptics/verify/verify.hpp"
 #include "tpm/show/document.hpp"
 #include "tpm/show/figure.hpp"
+#include "tpm/show/result_table.hpp"
 #include "tpm/show/short_answer.hpp"
 
 namespace tpm::haptics {
@@ -27,6 +28,10 @@ namespace tpm::haptics {
 /// The short answer of a verification: how far the forces are off, where, what limits the
 /// comparison, and every note.
 [[nodiscard]] ShortAnswer short_answer(const HilRecording& recording, const Verification& v);
+
+/// Force errors of the phases of a verification, and its readings of the experiment.
+[[nodiscard]] ResultTable<PhaseFidelity> phase_table(const Verification& v);
+[[nodiscard]] ResultTable<BesideExperiment> experiment_table(const Verification& v);
 
 /// Energy and limits of a recording, from its rows.
 struct RecordingSummary {

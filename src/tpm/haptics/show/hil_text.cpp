@@ -308,15 +308,7 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
 }
 
 Json verification_json(const HilRecording& recording, const Verification& v) {
-  Json phases = Json::array(), others = Json::array(), experiment = Json::array();
-  for (const PhaseFidelity& p : v.phases) {
-    Json json = fidelity_json(p.force);
-    json["phase"] = p.phase.name;
-    json["kind"] = to_string(p.phase.kind);
-    json["start_s"] = rounded(p.start_s, kHilDigits);
-    json["depth_rms_m"] = rounded(p.depth_rms_m, kHilDigits);
-    phases.push_back(std::move(json));
-  }
+  Json others = Json::array();
   for (const CrossCheck& o : v.others) {
     Json json = fidelity_json(o.commanded);
     json["name"] = o.name;
@@ -324,17 +316,6 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
     json["end_s"] = rounded(o.end_s, kHilDigits);
     json["apart_from_reference_N"] = rounded(o.apart_N, kHilDigits);
     others.push_back(std::move(json));
-  }
-  for (const BesideExperiment& e : v.experiment) {
-    experiment.push_back(
-        {{"depth_m", rounded(e.depth_m, kHilDigits)},
-         {"rate_m_per_s", rounded(e.rate_m_per_s, kHilDigits)},
-         {"label", e.label},
-         {"measured_N", e.measured_N},
-         {"commanded_N", rounded(e.commanded_N, kHilDigits)},
-         {"reference_N", e.reference_N ? Json(rounded(*e.reference_N, kHilDigits)) : Json()},
-         {"reached_m", rounded(e.reached_m, kHilDigits)},
-         {"cause", cause_of_difference(e, v.material)}});
   }
   std::vector<std::string> notes = recording_remarks(recording);
   notes.insert(notes.end(), v.notes.begin(), v.notes.end());
@@ -359,9 +340,9 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
       {"reference_error_N", rounded(v.reference_error_N, kHilDigits)},
       {"model_error_N", rounded(v.model_error_N, kHilDigits)},
       {"all", fidelity_json(v.all)},
-      {"phases", phases},
+      {"phases", phase_table(v).list(v.phases)},
       {"others", others},
-      {"experiment", experiment}};
+      {"experiment", experiment_table(v).list(v.experiment)}};
 }
 
 std::string motion_cost(const Verification& v, double per_newton, std::string_view unit) {

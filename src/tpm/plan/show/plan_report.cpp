@@ -9,6 +9,7 @@
 
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/show/result_table.hpp"
 #include "tpmkit/version.hpp"
 
 namespace tpm::plan {
@@ -34,19 +35,53 @@ std::string time_text(double seconds) {
   return significant(seconds, 3) + " s";
 }
 
-Json candidate_json(const Plan& plan, const PlannedCandidate& c) {
-  return {{"name", c.name},
-          {"formulation", c.formulation},
-          {"settings", c.settings},
-          {"reach", c.reach == ModelReach::full ? "full" : "reduced"},
-          {"cost_s_per_s", number(c.cost_s_per_s)},
-          {"period_s", number(c.period_s)},
-          {"claimed_error", number(shown_error(plan, c.claimed_error))},
-          {"verified_error", number(shown_error(plan, c.verified_error))},
-          {"verified_response_error", number(shown_error(plan, c.verified_response_error))},
-          {"accurate", c.accurate},
-          {"feasible", c.feasible},
-          {"reason", c.reason.empty() ? Json(nullptr) : Json(c.reason)}};
+/// Null if there is none.
+template <class Row>
+Json reason_of(const Row& row) {
+  return row.reason.empty() ? Json(nullptr) : Json(row.reason);
+}
+
+ResultTable<PlannedCandidate> frontier(const Plan& plan) {
+  using Row = PlannedCandidate;
+  using Of = ResultColumn<Row>;
+  constexpr int kWidth = 10;
+  const auto error = [&plan](std::optional<double> Row::*of) {
+    return [&plan, of](const Row& c) { return shown_error(plan, c.*of); };
+  };
+  const auto why = [&plan](const Row& c) {
+    return Cell{!c.feasible            ? c.reason
+                : plan.masses_left_out ? "meets both but for masses"
+                                       : "meets both"};
+  };
+  return {
+      {Of("name", &Row::name).shown("candidate", -26),
+       {"formulation", &Row::formulation},
+       {"settings", &Row::settings},
+       {"reach", [](const Row& c) { return c.reach == ModelReach::full ? "full" : "reduced"; }},
+       Of("cost_s_per_s", &Row::cost_s_per_s).shown("per s", kWidth).as(time_text),
+       Of("period_s", &Row::period_s).shown("a period", kWidth).as(time_text),
+       Of("claimed_error", error(&Row::claimed_error)).shown("claimed", kWidth).as(share_text),
+       Of("verified_error", error(&Row::verified_error)).shown("verified", kWidth).as(share_text),
+       {"verified_response_error", error(&Row::verified_response_error)},
+       {"accurate", &Row::accurate},
+       {"feasible", &Row::feasible},
+       Of("reason", reason_of<Row>).shown("").in_words(why)}};
+}
+
+const ResultTable<TriedSpheres>& tried_spheres() {
+  using Row = TriedSpheres;
+  using Of = ResultColumn<Row>;
+  const auto run = [](const Row& t) { return Cell{t.peak ? time_text(t.operations_s) : "-"}; };
+  const auto reason = [](const Row& t) { return Cell{t.reason}; };
+  static const ResultTable<Row> table(
+      {Of("spheres", [](const Row& t) { return t.filling.spheres; }).shown("spheres", 9),
+       Of("spacing_m", &Row::spacing_m).shown("spacing, mm", 11, 1e-3, 3),
+       Of("area_ratio", &Row::area_ratio).shown("area", 10, 1.0, 3),
+       Of("peak", &Row::peak).shown("peak", 12, 1.0, 5),
+       Of("claimed_error", &Row::claimed_error).shown("claimed", 10).as(share_text),
+       Of("run_s", &Row::operations_s).shown("a run", 10).in_words(run),
+       Of("reason", reason_of<Row>).shown("").in_words(reason)});
+  return table;
 }
 
 Json relevance_json(const Plan& plan) {
@@ -173,32 +208,6 @@ std::string choice_text(const Plan& plan) {
   return text;
 }
 
-std::string candidate_row(const Plan& plan, const PlannedCandidate& c) {
-  const auto or_dash = [](const std::optional<double>& value, auto&& words) {
-    return value ? words(*value) : std::string("-");
-  };
-  return fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}  {}", c.name,
-                     or_dash(c.cost_s_per_s, time_text), or_dash(c.period_s, time_text),
-                     or_dash(shown_error(plan, c.claimed_error), share_text),
-                     or_dash(shown_error(plan, c.verified_error), share_text),
-                     !c.feasible            ? c.reason
-                     : plan.masses_left_out ? "meets both but for masses"
-                                            : "meets both");
-}
-
-std::string frontier_head() {
-  return fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}", "candidate", "per s", "a period",
-                     "claimed", "verified");
-}
-
-std::string frontier_text(const Plan& plan) {
-  std::string text = frontier_head() + "\n";
-  for (const PlannedCandidate& c : plan.candidates) {
-    text += candidate_row(plan, c) + "\n";
-  }
-  return text;
-}
-
 /// What is planned, and what is asked for.
 std::string subject_text(const Plan& plan) {
   const PlanRequest& request = plan.request;
@@ -262,22 +271,13 @@ std::vector<const PlannedCandidate*> run_candidates(const Plan& plan) {
 }  // namespace
 
 Json spheres_json(const SpheresPlan& plan) {
-  Json tried = array_json(plan.tried, [](const TriedSpheres& t) {
-    return Json{{"spheres", t.filling.spheres},
-                {"spacing_m", rounded(t.spacing_m, kPlanDigits)},
-                {"area_ratio", number(t.area_ratio)},
-                {"peak", number(t.peak)},
-                {"claimed_error", number(t.claimed_error)},
-                {"run_s", rounded(t.operations_s, kPlanDigits)},
-                {"reason", t.reason.empty() ? Json(nullptr) : Json(t.reason)}};
-  });
   return {{"tolerance", plan.request.tolerance},
           {"most", plan.request.most},
           {"spheres", plan.choice ? Json(plan.chosen().filling.spheres) : Json(nullptr)},
           {"claimed_error", plan.choice ? number(plan.chosen().claimed_error) : Json(nullptr)},
           {"limit_peak", rounded(plan.limit_peak, kPlanDigits)},
           {"limit_uncertainty", rounded(plan.limit_uncertainty, kPlanDigits)},
-          {"tried", std::move(tried)}};
+          {"tried", tried_spheres().list(plan.tried)}};
 }
 
 std::string spheres_words(const SpheresPlan& plan) {
@@ -294,16 +294,7 @@ std::string spheres_words(const SpheresPlan& plan) {
 
 std::string spheres_text(const SpheresPlan& plan) {
   std::string text = spheres_words(plan) + "\n";
-  text += fmt::format("\n{:>9} {:>11} {:>10} {:>12} {:>10} {:>10}\n", "spheres", "spacing, mm",
-                      "area", "peak", "claimed", "a run");
-  for (const TriedSpheres& t : plan.tried) {
-    text += fmt::format("{:>9} {:>11} {:>10} {:>12} {:>10} {:>10}  {}\n", t.filling.spheres,
-                        significant(1e3 * t.spacing_m, 3),
-                        t.area_ratio ? significant(*t.area_ratio, 3) : std::string("-"),
-                        t.peak ? significant(*t.peak, 5) : std::string("-"),
-                        t.claimed_error ? share_text(*t.claimed_error) : std::string("-"),
-                        t.peak ? time_text(t.operations_s) : std::string("-"), t.reason);
-  }
+  text += "\n" + tried_spheres().text(plan.tried);
   return text + fmt::format("{:>9} {:>11} {:>10} {:>12} {:>10}  a line in the spacing, 95 %\n\n",
                             "limit", 0, plan.tried.front().area_ratio ? "1" : "-",
                             significant(plan.limit_peak, 5), share_text(plan.limit_uncertainty));
@@ -378,12 +369,12 @@ Json plan_json(const Plan& plan) {
             {"costs", request.costs.source},
             {"response", plan.by_depth ? "force_N" : "depth_m"}};
   json["claim"] = claim_json(plan);
-  json["choice"] = plan.choice ? candidate_json(plan, plan.chosen()) : Json(nullptr);
+  json["choice"] = plan.choice ? frontier(plan).object(plan.chosen()) : Json(nullptr);
   json["margin"] = plan.choice ? Json(rounded(margin(plan), kPlanDigits)) : Json(nullptr);
   const auto offline = run_offline(plan);
   json["network_offline_s"] = offline ? Json(rounded(offline->second, kPlanDigits)) : Json(nullptr);
   json["without_budget"] = plan.without_budget
-                               ? candidate_json(plan, plan.candidates[*plan.without_budget])
+                               ? frontier(plan).object(plan.candidates[*plan.without_budget])
                                : Json(nullptr);
   json["needs_full_model"] = plan.needs_full;
   json["masses_matter"] = masses_matter_json(plan);
@@ -396,8 +387,7 @@ Json plan_json(const Plan& plan) {
                   {"reference_run_s", rounded(plan.work.reference_run_s, kPlanDigits)},
                   {"reference_s", rounded(plan.work.reference_s, kPlanDigits)},
                   {"all_s", rounded(plan.work.all_s, kPlanDigits)}};
-  json["frontier"] = array_json(plan.candidates,
-                                [&](const PlannedCandidate& c) { return candidate_json(plan, c); });
+  json["frontier"] = frontier(plan).list(plan.candidates);
   json["relevance"] = relevance_json(plan);
   json["changes"] = changes_json(plan);
   json["validity_passed"] = plan.validity;
@@ -407,7 +397,7 @@ Json plan_json(const Plan& plan) {
 
 std::string plan_text(const Plan& plan) {
   std::string text = subject_text(plan) + choice_text(plan);
-  text += "\n" + frontier_text(plan);
+  text += "\n" + frontier(plan).text(plan.candidates);
   text +=
       fmt::format("\nreference: {}; peak {} {}; differs from its cross-check ({}) by {}\n",
                   plan.reference.method,
@@ -435,10 +425,10 @@ ShortAnswer short_answer(const Plan& plan) {
   ShortAnswer answer;
   answer.conclusion = text_lines(subject_text(plan) + choice_text(plan));
   const std::vector<const PlannedCandidate*> run = run_candidates(plan);
-  answer.head = {frontier_head()};
+  answer.head = {frontier(plan).head()};
   for (const PlannedCandidate* c : run) {
     if (answer.rows.size() == kShown && run.size() > kShown + 1) break;
-    answer.rows.push_back(candidate_row(plan, *c));
+    answer.rows.push_back(frontier(plan).line(*c));
   }
   const std::size_t shown = answer.rows.size();
   const auto others = [count = plan.candidates.size(), run = run.size()](std::size_t from) {
