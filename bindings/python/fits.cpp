@@ -14,6 +14,7 @@
 #include "tpm/fit/select/instrument_of_recording.hpp"
 #include "tpm/fit/select/material_function.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
+#include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/fit/select/rows_left_out.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
@@ -119,21 +120,32 @@ class Fit {
   }
   /// The response of the fitted model and its standard error by the parameters' covariance (NaN
   /// where that is not of full rank).
+  /// @param at_surface depths count from the surface, and the sensor has no zero error; else the
+  ///   contact and the offset are those of `dataset`
   [[nodiscard]] py::tuple predict(const Protocol& protocol, const Numbers& times_s,
-                                  std::size_t dataset) const {
+                                  std::size_t dataset, bool at_surface) const {
     if (dataset >= fit_.config.data.size()) {
       throw bad_input("dataset", std::to_string(dataset),
                       "0 to " + std::to_string(fit_.config.data.size() - 1));
     }
     const std::unique_ptr<Model> model = make_model(fit_.config);
-    const std::vector<double> values = model_parameters(fit_.config, fit_.best.natural, dataset);
+    std::vector<double> values = model_parameters(fit_.config, fit_.best.natural, dataset);
+    std::vector<bool> left_out(values.size(), false);
+    if (at_surface && fit_.config.law) {
+      const std::vector<LawParameter> of_law = law_parameters(*fit_.config.law);
+      for (std::size_t i = 0; i < of_law.size(); ++i) {
+        if (!belongs_to_recording(*fit_.config.law, of_law[i])) continue;
+        values.at(i) = 0.0;
+        left_out.at(i) = true;
+      }
+    }
     std::vector<FitParameter> parameters;
     for (const EstimatedParameter& p : fit_.config.parameters) parameters.push_back(p.fit);
     Eigen::MatrixXd along = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(values.size()),
                                                   static_cast<Eigen::Index>(parameters.size()));
     for (std::size_t j = 0; j < parameters.size(); ++j) {
       for (const Target& target : fit_.config.parameters[j].sets) {
-        if (!target.applies_to(dataset)) continue;
+        if (!target.applies_to(dataset) || left_out.at(target.parameter)) continue;
         along(static_cast<Eigen::Index>(target.parameter), static_cast<Eigen::Index>(j)) = 1.0;
       }
     }

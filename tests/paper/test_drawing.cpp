@@ -101,6 +101,19 @@ TEST_CASE("names with markup, quotes, dollars or 255 bytes are drawn as they sta
   }
 }
 
+TEST_CASE("figures of a report come as SVG for its page and as PDF for print") {
+  const test::TempFolder folder;
+  Document document;
+  document.title = "report";
+  const Figure figure = figure_of("x");
+  document.blocks.emplace_back(Picture{figure.id, "title", "caption"});
+  write_document(folder.path(), document, {figure}, find_drawing_python());
+  CHECK(read_file(folder / "figures/fit_x.svg").find("<svg") != std::string::npos);
+  CHECK(read_file(folder / "figures/fit_x.pdf").substr(0, 5) == "%PDF-");
+  CHECK(read_file(folder / "report.html").find("<svg role=") != std::string::npos);
+  CHECK_FALSE(std::filesystem::exists(folder / "figures/fit_x.png"));
+}
+
 TEST_CASE("no program of the current folder is run, and no file of it read, to draw") {
   const test::TempFolder folder;
   const std::string python = find_drawing_python();

@@ -70,8 +70,13 @@ class Fits(unittest.TestCase):
     def test_predictions_are_those_of_the_fitted_law(self):
         protocol = tpmkit.Protocol.ramp_and_hold(2e-3, 1e-3, 10.0)
         times = np.linspace(0.0, 12.0, 25)
+        placed = self.fit.predict(protocol, times, placement="fitted")
+        np.testing.assert_allclose(placed["value"], self.fit.law.respond(protocol, times), rtol=1e-12)
         predicted = self.fit.predict(protocol, times)
-        np.testing.assert_allclose(predicted["value"], self.fit.law.respond(protocol, times), rtol=1e-12)
+        self.assertEqual((predicted["value"].iloc[0], predicted["standard_error"].iloc[0]), (0.0, 0.0))  # at the surface
+        self.assertGreater(placed["standard_error"].iloc[0], 0.0)
+        with self.assertRaisesRegex(tpmkit.ArgumentError, "placement is 'own'; expected 'surface' or 'fitted'"):
+            self.fit.predict(protocol, times, placement="own")
         truth = tpmkit.Law("linear-1", made.LAW).respond(protocol, times)
         off = np.abs(predicted["value"] - truth)[1:] / predicted["standard_error"][1:]
         self.assertLess(off.max(), 4.0)  # standard errors

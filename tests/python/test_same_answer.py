@@ -40,6 +40,21 @@ class SameAnswer(unittest.TestCase):
     def test_of_a_recording(self):
         self.compare([])
 
+    def test_of_a_prediction(self):
+        fit = tpmkit.fit(self.file, law="linear-1")
+        fit.law.write(self.folder / "law.json")
+        protocol = tpmkit.Protocol.ramp_and_hold(2e-3, 1e-3, 10.0)
+        for placement, options in (("surface", []), ("fitted", ["--placement", "fitted"])):
+            told = subprocess.run([PROGRAM, "predict", "law.json", "--depth", "2 mm", "--rate", "1 mm/s", "--hold", "10 s",
+                                   "--format", "json", *options], cwd=self.folder, capture_output=True, text=True, check=True)
+            answer = json.loads(told.stdout)
+            self.assertEqual(answer["placement"], placement)
+            here = fit.predict(protocol, answer["time_s"], placement=placement)
+            for name, key in (("value", "mean_N"), ("standard_error", "standard_error_N")):
+                difference = max(abs(a - b) for a, b in zip(here[name], answer[key]))
+                self.assertLess(difference, 1e-4 * max(answer[key]), f"{placement}: {name}")
+        self.assertEqual(fit.predict(protocol, [0.0])["value"].iloc[0], 0.0)
+
     def test_of_a_strip_whose_length_area_and_sign_are_told(self):
         with self.file.open(newline="") as file:
             rows = list(csv.reader(file))

@@ -261,16 +261,20 @@ class Fit:
         return frames
 
     @told
-    def predict(self, protocol: Protocol, times_s: npt.ArrayLike, *, dataset: int = 0) -> pd.DataFrame:
-        """What the fitted model answers to another protocol.
+    def predict(
+        self, protocol: Protocol, times_s: npt.ArrayLike, *, placement: str = "surface", dataset: int = 0
+    ) -> pd.DataFrame:
+        """What the fitted law answers to another protocol. The answer is that of `tpm predict`.
 
         Parameters
         ----------
         protocol
-            Of the same drive as the data. Its depths count from where those of the recording do: the
-            contact point and the offset of `dataset` are part of the model.
+            Of the same drive as the data.
+        placement
+            Contact and zero: "surface" (depths count from the surface, and the sensor has no zero error) or "fitted"
+            (depths and forces count as in the recording: its contact point and offset, with their uncertainty).
         dataset
-            Whose nuisance parameters are used, from 0.
+            The recording whose contact point and offset these are, from 0.
 
         Returns
         -------
@@ -279,8 +283,11 @@ class Fit:
         """
         import pandas as pd
 
+        if placement not in ("surface", "fitted"):
+            raise _core.ArgumentError(f"predict: placement is {placement!r:.60}; expected 'surface' or 'fitted'")
         times = times_of(times_s)
-        value, error = self._core.predict(protocol, times, _whole("predict", "dataset", dataset, 0, 2**31))
+        place = _whole("predict", "dataset", dataset, 0, 2**31)
+        value, error = self._core.predict(protocol, times, place, placement == "surface")
         return pd.DataFrame({"value": value, "standard_error": error}, index=pd.Index(times, name="time_s"))
 
     @told
