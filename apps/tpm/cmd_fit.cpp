@@ -17,6 +17,7 @@
 #include "tpm/fit/petab.hpp"
 #include "tpm/fit/predict/fitted_scene.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
 #include "tpm/fit/show/fit_report.hpp"
@@ -241,7 +242,9 @@ int fit(const FitOptions& options, const Session& session) {
         {prepared(files.front(), std::get<RecordingFile>(std::move(measured)), options.recordings)},
         session);
   }
-  return fit_recordings(options, read_recordings(options.recordings), session);
+  std::vector<PreparedRecording> recordings = read_recordings(options.recordings);
+  require_distinct_readings(recordings);
+  return fit_recordings(options, std::move(recordings), session);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/fit/select/rows_left_out.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/select/young_moduli.hpp"
 #include "tpm/fit/show/fit_answer.hpp"
 #include "tpm/fit/show/fit_report.hpp"
@@ -249,6 +250,7 @@ Fit fit_files(const FitRequest& request) {
     warn_of_rows_left_out(recordings.back(), read.findings);
     take_instrument(recordings.back(), file);
   }
+  require_distinct_readings(recordings);
   if (request.contact) require_contact_within(*request.contact, recordings, "contact");
   return fit_selected(call.run([&] { return select_law(recordings, options); }), std::nullopt);
 }

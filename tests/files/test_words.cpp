@@ -300,7 +300,7 @@ TEST_CASE("a path in a message, and in a command that it says to type, is never 
            {"budget '" + a + "'", "tpm fit '" + a + "' --folder fitted writes"},
            {"validate '" + a + "'", "'" + a + "' and no recording"},
            {"fit --no-draw '" + a + "' '" + a + "'", "'" + a + "' is given twice"},
-           {"fit --no-draw '" + deep + "'", "the same bytes as '" + a + "'"},
+           {"fit --no-draw '" + deep + "'", "has the readings of '" + a + "'"},
            {"fit --no-draw --contact '9 mm' '" + a + "'", "largest depth of '" + a + "', 2 mm"},
            {"data show '" + deep + "/none'", "tpm: " + deep + "/none: is neither"}}) {
     CAPTURE(arguments);

@@ -153,7 +153,7 @@ TEST_CASE("Groups that differ by their depths are refused, copies are no second 
     CHECK(twice.code == 3);
   }
   CHECK_THAT(test::run_in(folder, "fit a --laws linear-1 --no-draw").said,
-             Contains("the same bytes as 'a/liver1.csv'"));
+             Contains("has the readings of 'a/liver1.csv'"));
   CHECK_THAT(test::run_in(folder, "fit a b").said, Contains("--compare"));
   CHECK_THAT(test::run_in(folder, "fit a --compare").said, Contains("two folders of recordings"));
 }

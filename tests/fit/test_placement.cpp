@@ -176,6 +176,27 @@ TEST_CASE("a drift after withdrawal is read there, too", "[placement]") {
   CHECK(rests.drift->sd < 5e-6);
 }
 
+TEST_CASE("a bonded specimen that recovers after withdrawal tells no drift there", "[placement]") {
+  PlacedTest test;
+  test.rest_s = 15.0;
+  test.hold_s = 23.0;
+  test.after_s = 18.0;
+  test.drift_N_per_s = 3e-4;
+  Random random(17);
+  Recording r = test::measured(test, test::placed(test), random);
+  const double withdrawn_s = test.rest_s + 2.0 * test.ramp_s + test.hold_s;
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    const double since = r.time_s[i] - withdrawn_s;
+    if (since >= 0.0) r.response[i] -= 0.04 * std::exp(-since / 2.0);
+  }
+  const RestReadings rests = read_rests(prepare_recording("bonded.csv", r));
+  CHECK(rests.before >= 290);
+  CHECK(rests.after == 0);
+  REQUIRE(rests.drift);
+  CHECK_THAT(rests.drift->value, WithinAbs(3e-4, 4.0 * rests.drift->sd));
+  CHECK(rests.drift->sd < 1e-5);
+}
+
 TEST_CASE("a placement that is remembered is the one that is measured", "[placement]") {
   PlacedTest test;
   const PreparedRecording recording = test::prepared(test, 12);

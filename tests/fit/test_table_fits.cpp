@@ -150,6 +150,24 @@ TEST_CASE("a pipe is read, and what cannot be fitted says what to type", "[table
   CHECK_THAT(only.said, Contains("only a hold") && !Contains("--negate"));
 }
 
+TEST_CASE("readings that are given twice are refused, however the files are written", "[tables]") {
+  const test::TempFolder folder;
+  std::string one = "Time (s),Depth (mm),Force (N)\n", copy = "Zeit [s];Weg [um];Kraft [mN]\n";
+  for (int i = 0; i <= 60; ++i) {
+    const double t = 0.1 * i;
+    const double depth = 2.0 * std::clamp(t - 1.0, 0.0, 2.0);
+    const long force_mN = std::lround(1e3 * force_at(t)) + (i * 7919) % 3;
+    one += fmt::format("{:.1f},{:.3f},{:.3f}\n", t, depth, 1e-3 * static_cast<double>(force_mN));
+    copy += fmt::format("{:.1f};{:.0f};{}\n", t, 1e3 * depth, force_mN);
+  }
+  write_file(folder / "one.csv", one);
+  write_file(folder / "copy.csv", copy);
+  const test::ProgramRun twice =
+      test::run_in(folder, "fit one.csv copy.csv --laws linear-1 --no-draw");
+  CHECK(twice.code == 3);
+  CHECK_THAT(twice.said, Contains("copy.csv: has the readings of 'one.csv'"));
+}
+
 // What fits make of tables that are read rightly, and what they say of it. An expected failure is
 // what a fit does not do yet.
 

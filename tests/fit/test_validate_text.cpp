@@ -17,6 +17,27 @@ using test::quiet_law;
 using test::quiet_recording;
 using test::request_for;
 
+TEST_CASE("a rest within the tissue is not called no rest", "[validate]") {
+  Validation v = validate(request_for(quiet_law(), quiet_recording(1.0)));
+  ValidationPlacement& placement = v.recordings.front().placement;
+  REQUIRE(placement.zero_readings > 0);
+  CHECK_FALSE(placement.rest_in_contact);
+  placement.zero_readings = 0;
+  placement.zero_known = false;
+  const auto in_one_line = [&v] {
+    std::string text;
+    for (const char c : to_terminal_text(v)) {
+      const bool blank = c == ' ' || c == '\n';
+      if (!blank || !text.ends_with(' ')) text += blank ? ' ' : c;
+    }
+    return text;
+  };
+  CHECK_THAT(in_one_line(), Contains("nothing before contact tells the zero"));
+  placement.rest_in_contact = true;
+  CHECK_THAT(in_one_line(), Contains("contact lies above the surface at rest") &&
+                                !Contains("nothing before contact"));
+}
+
 TEST_CASE("the text takes 25 lines at most and ends in the verdict", "[validate]") {
   const LawFile law = quiet_law();
   const auto lines_of = [](const Validation& v) {

@@ -7,6 +7,7 @@
 #include "tpm/fit/select/placement_parameters.hpp"
 #include "tpm/fit/select/rows_left_out.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/select/specimens.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/fit.hpp"
 
@@ -77,6 +78,7 @@ std::vector<PreparedRecording> prepared_recordings(const std::vector<std::filesy
     warn_of_rows_left_out(recordings.back(), read.findings);
     take_instrument(recordings.back(), file);
   }
+  require_distinct_readings(recordings);
   if (request.contact) require_contact_within(*request.contact, recordings, "contact");
   return recordings;
 }

@@ -97,6 +97,35 @@ RestSamples without_outliers(RestSamples rest) {
   return kept;
 }
 
+/// Spread of readings about the straight line of least squares through them.
+double spread_about_line(std::span<const double> time_s, std::span<const double> reading) {
+  Eigen::MatrixXd line(static_cast<Eigen::Index>(reading.size()), 2);
+  Eigen::VectorXd y(line.rows());
+  for (std::size_t i = 0; i < reading.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    line.row(row) << 1.0, time_s[i] - time_s.front();
+    y[row] = reading[i] - reading.front();
+  }
+  const Eigen::VectorXd off = (y - line * line.colPivHouseholderQr().solve(y)).cwiseAbs();
+  return kOfMedian * median({off.begin(), off.end()});  // robust
+}
+
+/// Without the readings after withdrawal where they move on by much more than the noise of the rest
+/// before contact: a specimen that is bonded to the probe recovers there.
+RestSamples without_recovery(RestSamples rest, double rounding) {
+  constexpr std::size_t kEnough = 20;  // samples that tell the noise
+  constexpr double kAlike = 4.0;       // in spread
+  if (rest.before < kEnough || rest.after < kFewestForSlope) return rest;
+  const std::span<const double> time = rest.time_s, reading = rest.reading;
+  const double before = spread_about_line(time.first(rest.before), reading.first(rest.before));
+  const double after = spread_about_line(time.subspan(rest.before), reading.subspan(rest.before));
+  if (after <= kAlike * std::max(before, rounding)) return rest;
+  rest.time_s.resize(rest.before);
+  rest.reading.resize(rest.before);
+  rest.after = 0;
+  return rest;
+}
+
 /// Means of blocks, where there are many samples.
 RestSamples averaged(RestSamples rest) {
   const std::size_t n = rest.reading.size();
@@ -270,11 +299,11 @@ std::size_t samples_before_contact(const PreparedRecording& recording) {
 RestReadings read_rests(const PreparedRecording& recording) {
   constexpr double kShort = 100.0;  // samples, below which a longer hold tells the noise
   RestReadings result;
-  const RestSamples all = rest_samples(recording);
+  const double rounding = rounding_sd(recording);
+  const RestSamples all = without_recovery(rest_samples(recording), rounding);
   result.before = all.before;
   result.after = all.after;
   if (all.reading.empty() || (all.before == 0 && all.after < kFewestForSlope)) return result;
-  const double rounding = rounding_sd(recording);
   const RestSamples rest = averaged(without_outliers(all));
   const auto n = static_cast<double>(rest.reading.size());
   const double level = middle_of_rest(rest.reading);

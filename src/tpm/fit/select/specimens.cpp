@@ -11,6 +11,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/work/give_up.hpp"
@@ -165,15 +166,16 @@ bool is_of_recording(const ParameterResult& p) {
   return p.nuisance && p.parameter.name != "slack_length";
 }
 
-void require_distinct_files(std::span<const PreparedRecording> recordings) {
-  for (std::size_t i = 0; i < recordings.size(); ++i) {
-    const std::string& sum = recordings[i].recording.header.sha256;
-    if (sum.empty()) continue;
-    for (std::size_t k = 0; k < i; ++k) {
-      if (recordings[k].recording.header.sha256 != sum) continue;
-      throw bad_input(recordings[i].name, fmt::format("the same bytes as '{}'", recordings[k].name),
+void require_distinct_readings(std::span<const PreparedRecording> recordings) {
+  std::vector<std::string> seen;
+  for (const PreparedRecording& r : recordings) {
+    std::string numbers = samples_sha256(r.recording);
+    if (const auto same = std::ranges::find(seen, numbers); same != seen.end()) {
+      const auto place = static_cast<std::size_t>(same - seen.begin());
+      throw bad_input(r.name, fmt::format("has the readings of '{}'", recordings[place].name),
                       "each recording once: a copy is no second specimen");
     }
+    seen.push_back(std::move(numbers));
   }
 }
 
@@ -238,7 +240,7 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
 
 SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
                               const std::optional<LawSpec>& law, SelectionOptions options) {
-  require_distinct_files(recordings);
+  require_distinct_readings(recordings);
   SpecimenStudy study;
   if (!options.setup.reference) options.setup.reference = common_reference(recordings);
   if (law) {

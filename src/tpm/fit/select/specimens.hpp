@@ -80,8 +80,9 @@ struct ParameterEstimates {
 /// True if a fit's parameter belongs to the recording (contact, offset), not to the specimen.
 [[nodiscard]] bool is_of_recording(const ParameterResult& p);
 
-/// Two files with the same bytes are one measurement. Throws Error(bad_input) naming both.
-void require_distinct_files(std::span<const PreparedRecording> recordings);
+/// Two files with the same readings (samples_sha256) are one measurement, however they are named
+/// and written. Throws Error(bad_input) naming both.
+void require_distinct_readings(std::span<const PreparedRecording> recordings);
 
 [[nodiscard]] Json to_json(const SpecimenStudy& study);
 [[nodiscard]] std::string to_terminal_text(const SpecimenStudy& study);

@@ -274,6 +274,8 @@ class HeldPlacement {
   ValidationPlacement finished() {
     p_.contact_u = std::hypot(scatter_.of(r_.time_s, p_.contact_by_reading), p_.contact_u_sampled);
     p_.zero_u = scatter_.of(r_.time_s, p_.zero_by_reading);
+    p_.rest_in_contact = p_.zero_readings == 0 && !p_.zero_known && parts_.ramp_first > 0 &&
+                         r_.drive[parts_.ramp_first] > p_.contact;
     return p_;
   }
 

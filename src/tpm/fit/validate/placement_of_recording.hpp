@@ -47,6 +47,7 @@ struct ValidationPlacement {
   Eigen::RowVectorXd contact_by_law, zero_by_law;       ///< one a coordinate of the law
   std::size_t zero_readings = 0;  ///< before contact; 0: the recording does not tell the zero
   bool zero_known = false;        ///< it is 0 by definition
+  bool rest_in_contact = false;   ///< contact lies above the rest, which then tells no zero
   double contact_u = 0.0, zero_u = 0.0;  ///< standard uncertainties, SI
   /// The part of contact_u that no reading gives: contact by a threshold is the sample that passes
   /// it, up to one step of the drive too late, so rectangular about it.

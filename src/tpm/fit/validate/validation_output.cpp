@@ -114,8 +114,11 @@ std::string placement_text(const RecordingComparison& r, const Unit& unit, Dimen
       p.contact_words);
   if (p.zero_known) return text + "; the force there is 0";
   if (p.zero_readings == 0) {
-    return text + (r.creep ? "; nothing before the load tells the reading without one"
-                           : "; nothing before contact tells the zero of the force");
+    if (r.creep) return text + "; nothing before the load tells the reading without one";
+    return text + (p.rest_in_contact
+                       ? "; contact lies above the surface at rest, so the rest tells no zero of "
+                         "the force"
+                       : "; nothing before contact tells the zero of the force");
   }
   text += fmt::format("; zero {}, u {}, from {} readings", with_unit(number(p.zero, unit), unit),
                       with_unit(number(p.zero_u, unit, 2), unit), p.zero_readings);
