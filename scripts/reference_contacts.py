@@ -123,7 +123,7 @@ class Network:
             matrix = self.stiffness(slope, pull, unit, length, basis)
             change = linalg.splu(matrix).solve(left)
             x = x + (basis @ change).reshape(-1, 3)
-            if np.linalg.norm(change) < 1e-16:
+            if np.linalg.norm(change) < 1e-15 * np.linalg.norm(x):  # rounding of the positions
                 break
         else:
             raise SystemExit("reference: Newton's method does not converge")

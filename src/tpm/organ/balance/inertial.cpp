@@ -134,6 +134,7 @@ class MotionRun {
     begin_s_ = from.time_s;
     impact_work_ = from.impact_work_J;
     stored_at_start_ = from.stored_at_start_J;
+    settled_s_ = from.settled_s;
   }
 
   /// Where a load or a depth held for ever has brought the tissue.
@@ -200,20 +201,25 @@ class MotionRun {
   void step_towards(double time_s, double stop_s) {
     using Reached = InertialIntegration::Reached;
     const Reached reached = integration_->step_towards(time_s);
-    show_step();
     const double now_s = integration_->time_s();
     const bool strikes =
         reached == Reached::meeting ||
         (reached == Reached::target && equation_.meets(now_s, integration_->state()));
-    if (!strikes) return;
+    // Where a tool meets a sphere, a dashpot would push by the speed that the impact takes away.
+    if (!strikes) return show_step();
     const ToolImpact impact = integration_->strike(now_s);
     integration_->spend(impact.work_J, impact.lost_J);
     const double of_probe = tissue_.depth_driven() ? impact.on_tissue_N_s : 0.0;
     if (impact.on_tissue_N_s != 0.0) {
       result_.impacts.push_back({now_s, of_probe, impact.on_tissue_N_s});
     }
+    settle_after(now_s);
     if (now_s < stop_s) integration_->restart(now_s, stop_s);
     begin_smooth();
+  }
+
+  void settle_after(double time_s) {
+    settled_s_ = std::max(settled_s_, time_s + equation_.settling_time_s());
   }
 
   void begin_smooth() {
@@ -245,6 +251,7 @@ class MotionRun {
     // Spheres that the tool touches are taken along as it gains speed, so that nothing is lost.
     const ToolImpact impact = integration_->strike(time_s);
     impact_work_ += impact.work_J - impact.lost_J;
+    if (impact.on_tissue_N_s != 0.0) settle_after(time_s);
     const double on_driven_spheres = equation_.driven_sphere_mass_kg() * (speed - speed_before);
     result_.impacts.push_back(
         {time_s, impulse + impact.on_tissue_N_s, on_driven_spheres + impact.on_tissue_N_s});
@@ -266,7 +273,14 @@ class MotionRun {
       beside.push_back(equation_.response(time_s, state, g));
     }
     const TissueMotion& now = equation_.unpack(time_s, state);
-    to({time_s, imposed, response, now.position, now.viscous, {}, beside},
+    to({.time_s = time_s,
+        .imposed = imposed,
+        .response = response,
+        .position = now.position,
+        .viscous = now.viscous,
+        .energy = {},
+        .beside = beside,
+        .settling = time_s < settled_s_},
        equation_.contact_pushes_N(time_s, state));
   }
 
@@ -287,9 +301,12 @@ class MotionRun {
     result_.position = last.position;
     result_.velocity = last.velocity;
     result_.viscous = last.viscous;
-    result_.end = {end, integration_->state(),
+    result_.end = {end,
+                   integration_->state(),
                    options_.energy ? integration_->spent_J() : Eigen::Vector4d::Zero(),
-                   impact_work_, stored_at_start_};
+                   impact_work_,
+                   stored_at_start_,
+                   settled_s_};
   }
 
   const InertialOptions& options_;
@@ -307,6 +324,7 @@ class MotionRun {
   double begin_s_ = -std::numeric_limits<double>::infinity();  ///< where an earlier run has ended
   double stored_at_start_ = 0.0;
   double impact_work_ = 0.0;
+  double settled_s_ = std::numeric_limits<double>::lowest();
   InertialRun result_;
 };
 

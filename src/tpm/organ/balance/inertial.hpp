@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <optional>
 
 #include "tpm/organ/balance/quasistatic.hpp"
@@ -83,6 +84,8 @@ struct InertialState {
   Eigen::Vector4d spent_J = Eigen::Vector4d::Zero();
   double impact_work_J = 0.0;
   double stored_at_start_J = 0.0;
+  /// Contacts that tools have struck have settled by then.
+  double settled_s = std::numeric_limits<double>::lowest();
 };
 
 /// Gets the state at every asked time in turn (no energies), and what each contact with a tool

@@ -1,5 +1,6 @@
 #include "tpm/organ/balance/inertial_equation.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -27,16 +28,21 @@ RelaxationFactor relaxation_factor_over(const BondSystem& bonds, double gamma) {
 
 constexpr double kTouching_m = 1e-14;  // a gap that is none: above the rounding of positions
 
+/// 1/m of a sphere and a tool that a spring joins, 1/kg: of those that move.
+double inverse_mass_per_kg(const DrivenTissue& tissue, const Inertia& inertia,
+                           const ToolContact& contact) {
+  const auto moves = [&](std::uint32_t column) {
+    return tissue.constraints().projector(column).isZero(0.0) ? 0.0 : 1.0 / inertia.mass_kg[column];
+  };
+  return moves(contact.sphere) + moves(contact.tool);
+}
+
 /// c of each contact.
 Eigen::VectorXd contact_dashpots(const DrivenTissue& tissue, const Inertia& inertia) {
   const auto& contacts = tissue.bonds().contacts();
   Eigen::VectorXd c(std::ssize(contacts));
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const auto moves = [&](std::uint32_t column) {
-      return tissue.constraints().projector(column).isZero(0.0) ? 0.0
-                                                                : 1.0 / inertia.mass_kg[column];
-    };
-    const double per_mass = moves(contacts[i].sphere) + moves(contacts[i].tool);
+    const double per_mass = inverse_mass_per_kg(tissue, inertia, contacts[i]);
     c[static_cast<Eigen::Index>(i)] = per_mass > 0.0
                                           ? 2.0 * inertia.contact_damping_ratio *
                                                 std::sqrt(contacts[i].stiffness_N_per_m / per_mass)
@@ -297,6 +303,17 @@ InertialEquation::Vector InertialEquation::contact_pushes_N(double time_s,
                 contact_dashpot_N_s_m_[row] * measured.rate_m_s;
   }
   return push;
+}
+
+double InertialEquation::settling_time_s() const {
+  constexpr double kSettled = 20.0;  // (1 + 20) exp(-20) = 4e-8
+  double longest_s = 0.0;
+  for (const ToolContact& contact : tissue_.bonds().contacts()) {
+    const double per_mass = inverse_mass_per_kg(tissue_, inertia_, contact);
+    if (!(per_mass > 0.0)) continue;
+    longest_s = std::max(longest_s, kSettled / std::sqrt(contact.stiffness_N_per_m * per_mass));
+  }
+  return longest_s;
 }
 
 ToolImpact InertialEquation::strike(double time_s, Eigen::Ref<Vector> state) {

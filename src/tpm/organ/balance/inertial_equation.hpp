@@ -93,6 +93,10 @@ class InertialEquation {
   /// The inelastic impact of all that touches (inelastic_impact): changes velocities of the state.
   [[nodiscard]] ToolImpact strike(double time_s, Eigen::Ref<Vector> state);
 
+  /// Time that the slowest contact takes to settle after an impact, s: kSettled radians of its
+  /// sphere and tool on its spring. Critically damped, 1e-7 of a transient are left.
+  [[nodiscard]] double settling_time_s() const;
+
   /// Factorises 1 - gamma times the Jacobian with the velocities and m_j eliminated: on the free
   /// coordinates M (1 + gamma alpha) + gamma C + gamma^2 K, where of y a share sum_j gamma_j
   /// (gamma/tau_j)/(1 + gamma/tau_j) follows in K. The turning of the bonds' dashpots is left out

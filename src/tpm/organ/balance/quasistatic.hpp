@@ -79,7 +79,10 @@ struct QuasiStaticState {
   Eigen::MatrixXd viscous;                  ///< m_j by (bond, branch), m; see BondSystem
   std::optional<QuasiStaticEnergy> energy;  ///< if asked for; until here
   std::vector<double> beside = {};          ///< responses of the other groups (Loading)
-  bool between = false;  ///< an extreme of a response that was not asked for
+  bool between = false;                     ///< an extreme of a response that was not asked for
+  /// True if spheres have mass and a tool has just struck one: contact forces are still those of
+  /// the contact's own vibration.
+  bool settling = false;
 };
 
 /// Gets the state at every asked time, in the order of time. What it throws ends the run.

@@ -136,7 +136,7 @@ Validity read_validity(const ListReader& file) {
 void write_motion(Hdf5Writer& file, const InertialState& s, const InertialEnergy& e) {
   file.numbers("/motion/state", {s.motion.begin(), s.motion.end()});
   file.numbers("/motion/scalars", {s.time_s, s.spent_J[0], s.spent_J[1], s.spent_J[2], s.spent_J[3],
-                                   s.impact_work_J, s.stored_at_start_J});
+                                   s.impact_work_J, s.stored_at_start_J, s.settled_s});
   file.numbers("/motion/energy",
                {e.work, e.stored, e.kinetic, e.bond_heat, e.damping_heat, e.contact_heat});
 }
@@ -170,14 +170,15 @@ std::vector<Eigen::VectorXd> read_pushes(const ListReader& file, std::size_t out
 
 void read_motion(const ListReader& file, Checkpoint& checkpoint) {
   const std::vector<double> state = file.list("/motion/state", 0);
-  const std::vector<double> s = file.list("/motion/scalars", 7);
+  const std::vector<double> s = file.list("/motion/scalars", 8);
   const std::vector<double> e = file.list("/motion/energy", 6);
   checkpoint.motion = InertialState{
       s.at(0),
       Eigen::Map<const Eigen::VectorXd>(state.data(), static_cast<Eigen::Index>(state.size())),
       {s.at(1), s.at(2), s.at(3), s.at(4)},
       s.at(5),
-      s.at(6)};
+      s.at(6),
+      s.at(7)};
   checkpoint.record.inertial_energy =
       InertialEnergy{e.at(0), e.at(1), e.at(2), e.at(3), e.at(4), e.at(5)};
   const std::vector<double> impacts = file.list("/motion/impacts", 3);
@@ -215,10 +216,10 @@ void write_checkpoint(const fs::path& path, const std::string& identity,
   std::vector<double> curve, beside;
   for (const CurvePoint& p : record.curve) {
     beside.insert(beside.end(), p.beside.begin(), p.beside.end());
-    curve.insert(
-        curve.end(),
-        {p.time_s, p.imposed, p.response, p.energy.work_J, p.energy.dissipated_J, p.energy.stored_J,
-         static_cast<double>(p.touching), p.overlap_m, p.force_on_tissue_N, p.between ? 1.0 : 0.0});
+    curve.insert(curve.end(),
+                 {p.time_s, p.imposed, p.response, p.energy.work_J, p.energy.dissipated_J,
+                  p.energy.stored_J, static_cast<double>(p.touching), p.overlap_m,
+                  p.force_on_tissue_N, p.between ? 1.0 : 0.0, p.settling ? 1.0 : 0.0});
   }
   file.numbers("/curve", curve);
   file.numbers("/curve_beside", beside);
@@ -256,7 +257,7 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   const std::size_t bonds = lists.whole(lists.list("/bonds", 0).front(), "the bonds");
   const std::size_t branches = lists.whole(lists.list("/branches", 0).front(), "the branches");
   Checkpoint checkpoint;
-  constexpr std::size_t kColumns = 10;
+  constexpr std::size_t kColumns = 11;
   const std::vector<double> curve = lists.list("/curve", kColumns);
   const std::vector<double> beside = lists.list("/curve_beside", 1);
   const std::size_t points = curve.size() / kColumns;
@@ -272,7 +273,8 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
                                        p[7],
                                        p[8],
                                        {own, own + static_cast<std::ptrdiff_t>(groups)},
-                                       p[9] != 0.0});
+                                       p[9] != 0.0,
+                                       p[10] != 0.0});
   }
   checkpoint.record.outputs = lists.states("/outputs", spheres, bonds, branches);
   checkpoint.record.validity = read_validity(lists);

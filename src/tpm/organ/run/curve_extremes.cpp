@@ -61,6 +61,7 @@ CurvePoint vertex(const CurvePoint& before, const CurvePoint& middle, const Curv
 }  // namespace
 
 void CurveExtremes::see(const CurvePoint& point) {
+  if (!counts(point)) return;
   largest_.resize(quantities(point), 0.0);
   for (std::size_t i = 0; i < largest_.size(); ++i) {
     largest_[i] = std::max(largest_[i], std::abs(quantity(point, i)));
@@ -72,6 +73,7 @@ bool CurveExtremes::exceeds(double value, std::size_t quantity) const {
 }
 
 bool CurveExtremes::exceeded_by(const CurvePoint& point) const {
+  if (!counts(point)) return false;
   for (std::size_t i = 0; i < quantities(point); ++i) {
     if (exceeds(quantity(point, i), i)) return true;
   }
@@ -79,6 +81,7 @@ bool CurveExtremes::exceeded_by(const CurvePoint& point) const {
 }
 
 std::vector<CurvePoint> CurveExtremes::step(const CurvePoint& point) {
+  if (!counts(point)) return corner();
   std::vector<CurvePoint> found;
   for (std::size_t i = 0; i < quantities(point) && !steps_.empty(); ++i) {
     const CurvePoint& middle = steps_.back();

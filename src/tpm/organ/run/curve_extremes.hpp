@@ -8,7 +8,8 @@ namespace tpm::organ {
 /// Finds the extremes of a curve between its points from the steps of an integrator: the vertex of
 /// the parabola through three steps, and the ends of a smooth stretch. Only what exceeds all points
 /// of the curve is an extreme, so that the largest value does not depend on where the points are.
-/// Each response and the force on the tissue are watched.
+/// Each response and the force on the tissue are watched. Contacts that settle after an impact end
+/// a smooth stretch; none of their points is an extreme.
 class CurveExtremes {
  public:
   /// Takes a point of the curve into account.

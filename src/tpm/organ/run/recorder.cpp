@@ -138,6 +138,7 @@ CurvePoint Recorder::point_of(const QuasiStaticState& state,
                                               state.imposed, state.response);
   point.beside = state.beside;
   point.between = state.between;
+  point.settling = state.settling;
   return point;
 }
 

@@ -43,7 +43,14 @@ struct CurvePoint {
   double force_on_tissue_N = 0.0;   ///< force_on_tissue_N()
   std::vector<double> beside = {};  ///< responses of contacts with protocols of their own, in turn
   bool between = false;             ///< an extreme between the watched times
+  bool settling = false;            ///< a contact has just been struck (QuasiStaticState)
 };
+
+/// True if a point counts for the largest response: the force of a contact that settles after an
+/// impact depends on the contact's stiffness, which is none of the tissue.
+[[nodiscard]] inline bool counts(const CurvePoint& point) {
+  return !point.settling;
+}
 
 /// Parts of a run; each begins afresh, and a checkpoint can be written after it.
 inline constexpr std::size_t kRunParts = 16;

@@ -119,7 +119,7 @@ void write_motion(const SimulationRun& run, Hdf5Writer& file) {
 
 void write_curve(const ExperimentScene& scene, const SimulationRecord& record, Hdf5Writer& file) {
   std::vector<double> time, imposed, response, work, heat, stored, overlap, on_tissue;
-  std::vector<std::int32_t> touching;
+  std::vector<std::int32_t> touching, settling;
   for (const CurvePoint& p : record.curve) {
     time.push_back(p.time_s);
     imposed.push_back(p.imposed);
@@ -129,6 +129,7 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
     stored.push_back(p.energy.stored_J);
     touching.push_back(p.touching);
     overlap.push_back(p.overlap_m);
+    settling.push_back(p.settling ? 1 : 0);
     on_tissue.push_back(p.force_on_tissue_N);
   }
   const bool depth = scene.protocol.drive() == Drive::displacement;
@@ -141,6 +142,12 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
   }
   if (scene.formulation.masses) {
     if (!depth) file.numbers("/curve/force_on_tissue_N", on_tissue);
+    if (tool_count(scene) > 0) {
+      file.integers("/curve/settling", settling, 1);
+      file.attribute("/curve/settling", "meaning",
+                     "1: a tool has just struck a sphere, and forces are still those of the "
+                     "contact's vibration; not counted for the largest response");
+    }
     return;
   }
   file.numbers("/curve/work_J", work);

@@ -49,8 +49,10 @@ SimulationRun run_with_mass(const ExperimentScene& scene, const RunNetwork& netw
 }
 
 double largest_response(const std::vector<CurvePoint>& curve) {
-  double largest = 0.0;
-  for (const CurvePoint& p : curve) largest = std::max(largest, std::abs(p.response));
+  double largest = std::abs(curve.back().response);
+  for (const CurvePoint& p : curve) {
+    if (counts(p)) largest = std::max(largest, std::abs(p.response));
+  }
   return largest;
 }
 
@@ -75,7 +77,9 @@ ContactCheck checked_contacts(const ExperimentScene& scene, const RunNetwork& ne
   double over_time = 0.0, before = 0.0;  // trapezoidal rule
   for (std::size_t i = 0; i < curve.size(); ++i) {
     const double apart = std::abs(curve[i].response - other[i].response);
-    check.at_one_time = std::max(check.at_one_time, apart);
+    if (counts(curve[i]) && counts(other[i])) {
+      check.at_one_time = std::max(check.at_one_time, apart);
+    }
     if (i > 0) over_time += 0.5 * (apart + before) * (curve[i].time_s - curve[i - 1].time_s);
     before = apart;
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tpm/base/sized_unit.hpp"
@@ -26,12 +27,16 @@ bool by_depth(const ExperimentScene& scene) {
 }
 
 /// The first point of the largest response; what differs by less than the tolerance is the same.
+/// The end counts always.
 const CurvePoint& largest(const SimulationRecord& record, double tolerance) {
-  double most = 0.0;
-  for (const CurvePoint& p : record.curve) most = std::max(most, std::abs(p.response));
-  return *std::find_if(record.curve.begin(), record.curve.end(), [&](const CurvePoint& p) {
-    return std::abs(p.response) >= (1.0 - tolerance) * most;
+  double most = std::abs(record.curve.back().response);
+  for (const CurvePoint& p : record.curve) {
+    if (counts(p)) most = std::max(most, std::abs(p.response));
+  }
+  const auto first = std::ranges::find_if(record.curve, [&](const CurvePoint& p) {
+    return counts(p) && std::abs(p.response) >= (1.0 - tolerance) * most;
   });
+  return first == record.curve.end() ? record.curve.back() : *first;
 }
 
 /// The impact that the tissue feels most; none if there is none.
@@ -43,7 +48,9 @@ const ProbeImpact* largest_impact(const std::vector<ProbeImpact>& impacts) {
 
 /// The point of the largest force on the tissue.
 const CurvePoint& hardest(const SimulationRecord& record) {
-  return *std::ranges::max_element(record.curve, {}, &CurvePoint::force_on_tissue_N);
+  return *std::ranges::max_element(record.curve, {}, [](const CurvePoint& p) {
+    return counts(p) ? p.force_on_tissue_N : -std::numeric_limits<double>::infinity();
+  });
 }
 
 Json validity_json(const Validity& validity, bool depth_limits) {
@@ -127,7 +134,9 @@ std::optional<OwnCourse> own_course(const ExperimentScene& scene, const Simulati
   OwnCourse course;
   course.depth = protocol->drive() == Drive::displacement;
   for (const CurvePoint& p : run.record.curve) {
-    if (std::abs(p.beside[index]) > std::abs(course.largest)) course.largest = p.beside[index];
+    if (counts(p) && std::abs(p.beside[index]) > std::abs(course.largest)) {
+      course.largest = p.beside[index];
+    }
   }
   course.last_imposed = value_at(*protocol, run.record.curve.back().time_s);
   course.last = run.record.curve.back().beside[index];
