@@ -22,9 +22,7 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <limits.h>
-#include <pthread.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,16 +40,11 @@
 #include <new>
 #include <utility>
 
-// NOLINTBEGIN(bugprone-reserved-identifier): the C library's own
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* block, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-}
-// NOLINTEND(bugprone-reserved-identifier)
+#include "fault_at.hpp"
 
 namespace {
+
+using fault_at::next;
 
 enum class Call {
   none,
@@ -218,23 +211,12 @@ bool fails_on(Call call, const char* name, int file) {
   return true;
 }
 
-bool no_memory() {
-  if (!watches(Call::memory) || !fails("memory", "")) return false;
-  errno = ENOMEM;
-  return true;
-}
-
 void note_change(const char* name, const char* path) {
   (void)fails_on(Call::change, name, path);
 }
 
 void note_change(const char* name, int file) {
   (void)fails_on(Call::change, name, file);
-}
-
-template <class Function>
-Function next(const char* name) {
-  return reinterpret_cast<Function>(dlsym(RTLD_NEXT, name));
 }
 
 /// How many bytes of a write are to be written: all, half of them, or -1 for none and an error.
@@ -317,6 +299,24 @@ __attribute__((destructor)) void end_counting() {
 }
 
 }  // namespace
+
+namespace fault_at {
+
+bool memory_fails() {
+  if (!watches(Call::memory) || !fails("memory", "")) return false;
+  errno = ENOMEM;
+  return true;
+}
+
+bool thread_fails() {
+  return watches(Call::thread) && fails("thread", "");
+}
+
+int process_error(const char* name, const char* program) {
+  return watches(Call::process) && fails(name, program) ? fault.error_number : 0;
+}
+
+}  // namespace fault_at
 
 // NOLINTBEGIN(bugprone-reserved-identifier): names of the C library, taken over
 extern "C" {
@@ -489,57 +489,6 @@ int close(int file) {
     }
   }
   return static_cast<int>(syscall(SYS_close, file));
-}
-
-void* malloc(std::size_t size) {
-  return no_memory() ? nullptr : __libc_malloc(size);
-}
-
-void* calloc(std::size_t count, std::size_t size) {
-  return no_memory() ? nullptr : __libc_calloc(count, size);
-}
-
-void* realloc(void* block, std::size_t size) {
-  return no_memory() ? nullptr : __libc_realloc(block, size);
-}
-
-void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  return no_memory() ? nullptr : __libc_memalign(alignment, size);
-}
-
-void* memalign(std::size_t alignment, std::size_t size) {
-  return no_memory() ? nullptr : __libc_memalign(alignment, size);
-}
-
-int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
-  if (no_memory()) return ENOMEM;
-  *block = __libc_memalign(alignment, size);
-  return *block == nullptr ? ENOMEM : 0;
-}
-
-pid_t fork() {
-  using Fork = pid_t (*)();
-  if (watches(Call::process) && fails("fork", "")) {
-    errno = fault.error_number;
-    return -1;
-  }
-  return next<Fork>("fork")();
-}
-
-int posix_spawnp(pid_t* child, const char* program, const posix_spawn_file_actions_t* actions,
-                 const posix_spawnattr_t* attributes, char* const arguments[],
-                 char* const environment[]) {
-  using Spawn = int (*)(pid_t*, const char*, const posix_spawn_file_actions_t*,
-                        const posix_spawnattr_t*, char* const[], char* const[]);
-  if (watches(Call::process) && fails("posix_spawnp", program)) return fault.error_number;
-  return next<Spawn>("posix_spawnp")(child, program, actions, attributes, arguments, environment);
-}
-
-int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*run)(void*),
-                   void* argument) {
-  using Create = int (*)(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*);
-  if (watches(Call::thread) && fails("thread", "")) return EAGAIN;
-  return next<Create>("pthread_create")(thread, attributes, run, argument);
 }
 
 }  // extern "C"

@@ -6,6 +6,7 @@
 #include <memory>
 #include <thread>
 
+#include "grip_presses.hpp"
 #include "inverse_clients.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/serve/simulated_hand.hpp"
@@ -71,9 +72,9 @@ TEST_CASE("Buttons of the simulated grip are those that a client presses, until 
   const ServedGrip served;
   const auto reader = served.client();
   auto presser = served.client();
-  CHECK(grip_after(*presser, press_message(0b101U)).buttons == 0b101U);
+  CHECK(grip_after(*presser, test::press_message(0b101U)).buttons == 0b101U);
   CHECK(grip_after(*reader, "{}").buttons == 0b101U);
-  CHECK(grip_after(*presser, press_message(0b010U)).buttons == 0b010U);
+  CHECK(grip_after(*presser, test::press_message(0b010U)).buttons == 0b010U);
   presser.reset();
   std::uint32_t buttons = 0b010U;
   for (int i = 0; i < 6000 && buttons != 0; ++i) {

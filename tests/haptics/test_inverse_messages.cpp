@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "grip_presses.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/inverse/messages.hpp"
 #include "tpmkit/error.hpp"
@@ -118,8 +119,8 @@ TEST_CASE("Forces of one message add up, and other commands are read") {
   CHECK(neutral.damping == 0.0);
   CHECK(neutral.preset == kCentredPreset);
   CHECK_FALSE(parse_command("{}", "a").force_N);
-  CHECK(parse_command(press_message(0b110U), "a").buttons == 0b110U);
-  CHECK(parse_command(press_message(0), "a").buttons == 0U);
+  CHECK(parse_command(test::press_message(0b110U), "a").buttons == 0b110U);
+  CHECK(parse_command(test::press_message(0), "a").buttons == 0U);
   // Another grip, or a command that is none here, presses nothing.
   for (const char* other :
        {R"({"wireless_verse_grip":[{"device_id":"61548","commands":{"set_buttons":{"a":true}}}]})",

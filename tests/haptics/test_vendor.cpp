@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <thread>
 
 #include "hil_scenes.hpp"
@@ -19,49 +18,12 @@
 #include "tpm/haptics/session/recording.hpp"
 #include "tpm/haptics/session/recording_export.hpp"
 #include "tpm/haptics/session/session_run.hpp"
-#include "tpmkit/error.hpp"
+#include "vendor_script.hpp"
 
 namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::Contains;
-
-/// A script for the stand-in library, for as long as this lives.
-class Script {
- public:
-  explicit Script(const std::string& lines) {
-    write_file(folder_ / "script", lines + "events " + (folder_ / "events") + "\n");
-    (void)setenv("TPM_STAND_IN_SCRIPT", (folder_ / "script").c_str(), 1);
-  }
-  ~Script() { (void)unsetenv("TPM_STAND_IN_SCRIPT"); }
-  Script(const Script&) = delete;
-  Script& operator=(const Script&) = delete;
-
-  [[nodiscard]] bool happened(const std::string& event) const {
-    std::ifstream events(folder_ / "events");
-    std::string name;
-    long long time = 0;
-    while (events >> name >> time) {
-      if (name == event) return true;
-    }
-    return false;
-  }
-  [[nodiscard]] std::string file(const char* name) const { return folder_ / name; }
-
- private:
-  test::TempFolder folder_;
-};
-
-std::string message_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    CHECK(error.code() == ExitCode::environment);
-    return error.what();
-  }
-  FAIL("nothing was refused");
-  return {};
-}
 
 DeviceChoice stand_in() {
   DeviceChoice choice;
@@ -95,36 +57,27 @@ std::string operator_lines(const HilSession& session, const test::TempFolder& fo
 
 TEST_CASE("A missing library is told with all that was tried") {
   (void)setenv("FDSDK", "/no/sdk", 1);
-  const std::string message = message_of([] { ForceDimension device(""); });
+  const std::string message = test::vendor_message_of([] { ForceDimension device(""); });
   (void)unsetenv("FDSDK");
   CHECK_THAT(message, Contains("/no/sdk/lib/release/lin-x86_64-gcc/libdrd.so.3"));
   CHECK_THAT(message, Contains("libdhd.so.3") && Contains("--dhd-library"));
-  CHECK_THAT(message_of([] { ForceDimension device("/no/such.so"); }), Contains("/no/such.so"));
+  CHECK_THAT(test::vendor_message_of([] { ForceDimension device("/no/such.so"); }),
+             Contains("/no/such.so"));
 }
 
 TEST_CASE("A library without a symbol, or of another version, is refused by name") {
-  const Script script("");
-  CHECK_THAT(message_of([] { ForceDimension device(TPM_STAND_IN_DHD_WITHOUT_A_SYMBOL); }),
-             Contains("has no drdStop;"));
-  const Script old("version 2\n");
-  CHECK_THAT(message_of([] { ForceDimension device(TPM_STAND_IN_DHD); }),
+  const test::VendorScript script("");
+  CHECK_THAT(
+      test::vendor_message_of([] { ForceDimension device(TPM_STAND_IN_DHD_WITHOUT_A_SYMBOL); }),
+      Contains("has no drdStop;"));
+  const test::VendorScript old("version 2\n");
+  CHECK_THAT(test::vendor_message_of([] { ForceDimension device(TPM_STAND_IN_DHD); }),
              Contains("is version 2.14.0.0"));
-}
-
-TEST_CASE("No device, and a device of another type, are told") {
-  {
-    const Script none("devices 0\n");
-    CHECK_THAT(message_of([] { (void)ForceDimension(TPM_STAND_IN_DHD).open(); }),
-               Contains("no device found"));
-  }
-  const Script other("type 33\n");
-  CHECK_THAT(message_of([] { (void)ForceDimension(TPM_STAND_IN_DHD).open(); }),
-             Contains("of type 33"));
 }
 
 TEST_CASE("The device says what it is; a link behind which a simulator may be is no hardware") {
   const auto identity = [](const std::string& lines) {
-    const Script script(lines);
+    const test::VendorScript script(lines);
     ForceDimension device(TPM_STAND_IN_DHD);
     return device.open();
   };
@@ -144,12 +97,13 @@ TEST_CASE("The device says what it is; a link behind which a simulator may be is
 }
 
 TEST_CASE("A device that is not initialised does not move unasked") {
-  const Script script("initialised 0\n");
+  const test::VendorScript script("initialised 0\n");
   DevicePreparation preparation;
   {
     ForceDimension device(TPM_STAND_IN_DHD);
     (void)device.open();
-    CHECK_THAT(message_of([&] { device.prepare(preparation); }), Contains("--may-move"));
+    CHECK_THAT(test::vendor_message_of([&] { device.prepare(preparation); }),
+               Contains("--may-move"));
   }
   CHECK_FALSE(script.happened("moved"));
   preparation.may_move = true;
@@ -160,14 +114,14 @@ TEST_CASE("A device that is not initialised does not move unasked") {
 }
 
 TEST_CASE("An initialisation that moves the device ends when it is interrupted, motors off") {
-  const Script script("initialised 0\ninit_ms 20000\n");
+  const test::VendorScript script("initialised 0\ninit_ms 20000\n");
   const auto start = std::chrono::steady_clock::now();
   DevicePreparation preparation;
   preparation.may_move = true;
   preparation.interrupted = [&] { return script.happened("moved"); };
   ForceDimension device(TPM_STAND_IN_DHD);
   (void)device.open();
-  CHECK_THAT(message_of([&] { device.prepare(preparation); }),
+  CHECK_THAT(test::vendor_message_of([&] { device.prepare(preparation); }),
              Contains("the initialisation was interrupted; the motors are off"));
   CHECK(script.happened("drd_stop"));
   CHECK(script.happened("stop"));
@@ -177,14 +131,15 @@ TEST_CASE("An initialisation that moves the device ends when it is interrupted, 
 }
 
 TEST_CASE("An initialisation that does not end when told so is left behind") {
-  const Script script("initialised 0\ninit_ms 4000\nstubborn 1\n");
+  const test::VendorScript script("initialised 0\ninit_ms 4000\nstubborn 1\n");
   DevicePreparation preparation;
   preparation.may_move = true;
   preparation.interrupted = [&] { return script.happened("moved"); };
   {
     ForceDimension device(TPM_STAND_IN_DHD);
     (void)device.open();
-    CHECK_THAT(message_of([&] { device.prepare(preparation); }), Contains("does not end"));
+    CHECK_THAT(test::vendor_message_of([&] { device.prepare(preparation); }),
+               Contains("does not end"));
     CHECK(script.happened("drd_stop"));
     CHECK(script.happened("forces_off"));
   }
@@ -199,20 +154,20 @@ TEST_CASE("A session that cannot be prepared leaves no recording, and the next o
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
   {
-    const Script script(operator_lines(session, folder) + "initialised 0\n");
+    const test::VendorScript script(operator_lines(session, folder) + "initialised 0\n");
     SessionRunOptions options;
     options.recording = folder / "r";
     CHECK_THROWS_WITH(run_session(session, stand_in(), options), Contains("--may-move"));
     CHECK_FALSE(std::filesystem::exists(folder / "r"));
   }
-  const Script script(operator_lines(session, folder));
+  const test::VendorScript script(operator_lines(session, folder));
   CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
 }
 
 TEST_CASE("A file that was measured on another device, or on a simulated one, is refused") {
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
-  const Script script(operator_lines(session, folder));
+  const test::VendorScript script(operator_lines(session, folder));
   DeviceChoice device = stand_in();
   const auto said_of = [&](const char* key, const Json& value) {
     Json file = read_json(stand_in().file);
@@ -221,7 +176,7 @@ TEST_CASE("A file that was measured on another device, or on a simulated one, is
     write_file(device.file, to_text(file));
     SessionRunOptions options;
     options.recording = folder / "r";
-    return message_of([&] { (void)run_session(session, device, options); });
+    return test::vendor_message_of([&] { (void)run_session(session, device, options); });
   };
   CHECK_THAT(said_of("/serial", "1"), Contains("device.json: key /serial: was measured on the "
                                                "device '1', and this is '4711'"));
@@ -243,7 +198,7 @@ TEST_CASE("A file in which nothing was measured is for any device of its kind") 
   json.erase("creep");
   const HilSession session = test::parsed(json);
   const test::TempFolder folder;
-  const Script script(operator_lines(session, folder));
+  const test::VendorScript script(operator_lines(session, folder));
   DeviceChoice device = stand_in();
   device.file = folder / "device.json";
   write_file(device.file, R"({"device": "omega7", "name": "any Omega", "limits": {"force_N": 8},
@@ -255,17 +210,18 @@ TEST_CASE("The device is told the session's limit of the force") {
   const HilSession session =
       test::parsed(test::with(test::short_session(), "/limits/force", "3 N"));
   const test::TempFolder folder;
-  const Script script(operator_lines(session, folder));
+  const test::VendorScript script(operator_lines(session, folder));
   (void)ran(session, stand_in(), folder / "r");
   CHECK(script.happened("max_force_3000"));
 }
 
 TEST_CASE("Without libdrd nobody can tell whether a device is initialised") {
-  const Script script("");
+  const test::VendorScript script("");
   DevicePreparation preparation;
   ForceDimension device(TPM_STAND_IN_DHD_WITHOUT_DRD);
   (void)device.open();
-  CHECK_THAT(message_of([&] { device.prepare(preparation); }), Contains("cannot tell"));
+  CHECK_THAT(test::vendor_message_of([&] { device.prepare(preparation); }),
+             Contains("cannot tell"));
   preparation.take_as_ready = true;
   device.prepare(preparation);
 }
@@ -274,7 +230,7 @@ TEST_CASE("A session through the library gives the forces of the simulated devic
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
   const Ran direct = ran(session, {}, folder / "direct");
-  const Script script(operator_lines(session, folder) + "period 0.001\n");
+  const test::VendorScript script(operator_lines(session, folder) + "period 0.001\n");
   const Ran loaded = ran(session, stand_in(), folder / "loaded");
   CHECK(loaded.run.outcome.cause == StopCause::finished);
   CHECK(direct.recording.simulated());
@@ -297,15 +253,16 @@ TEST_CASE("A session through the library gives the forces of the simulated devic
 TEST_CASE("An older status with 16 entries is read") {
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
-  const Script script(operator_lines(session, folder) + "entries 16\n");
+  const test::VendorScript script(operator_lines(session, folder) + "entries 16\n");
   CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
 }
 
 TEST_CASE("Time guards and saturation are counted and the session goes on") {
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
-  const Script script(operator_lines(session, folder) +
-                      "fault time_guard 350 18\nfault time_guard 750 3\nfault saturated 450 7\n");
+  const test::VendorScript script(
+      operator_lines(session, folder) +
+      "fault time_guard 350 18\nfault time_guard 750 3\nfault saturated 450 7\n");
   const Ran r = ran(session, stand_in(), folder / "r");
   CHECK(r.run.outcome.cause == StopCause::finished);
   CHECK(r.run.outcome.counts.time_guards == 21);
@@ -319,7 +276,7 @@ TEST_CASE("Time guards and saturation are counted and the session goes on") {
 TEST_CASE("Positions of earlier calls for more than 20 ms end the session") {
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
-  const Script script(operator_lines(session, folder) + "fault time_guard 350 400\n");
+  const test::VendorScript script(operator_lines(session, folder) + "fault time_guard 350 400\n");
   const Ran r = ran(session, stand_in(), folder / "r");
   CHECK(r.run.outcome.cause == StopCause::communication);
   CHECK(r.run.outcome.counts.time_guards == 21);
@@ -343,8 +300,8 @@ TEST_CASE("Each fault ends in a safe stop within 10 ms of session, with its caus
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
   constexpr std::uint64_t kAt = 1777;
-  const Script script(operator_lines(session, folder) + "fault " + fault.fault + " " +
-                      std::to_string(kAt + kWaitedCycles) + " 1\n");
+  const test::VendorScript script(operator_lines(session, folder) + "fault " + fault.fault + " " +
+                                  std::to_string(kAt + kWaitedCycles) + " 1\n");
   const Ran r = ran(session, stand_in(), folder / "r");
   CHECK(script.happened(fault.event));
   CHECK(r.run.outcome.cause == fault.cause);
@@ -359,67 +316,8 @@ TEST_CASE("Each fault ends in a safe stop within 10 ms of session, with its caus
   CHECK(script.happened("forces_off"));
 }
 
-TEST_CASE("Of several devices one is chosen by its kind, its serial number or its index") {
-  const Script script("types 63 35 37 60\n");
-  const auto opened = [](const char* kind, DeviceSelection which) {
-    ForceDimension device(TPM_STAND_IN_DHD, kind, which);
-    return device.open();
-  };
-  CHECK(opened("omega7", {.serial = 4713, .index = std::nullopt}).serial == "4713");
-  CHECK(opened("omega7", {.serial = std::nullopt, .index = 1}).serial == "4712");
-  CHECK(opened("falcon", {}).serial == "4714");
-  const DeviceIdentity delta = opened("delta3", {});
-  CHECK(delta.kind == "delta3");
-  REQUIRE(delta.assumptions.size() == 7);  // and where each of six limits comes from
-  CHECK_THAT(delta.assumptions.front(), Contains("never tried with delta.3"));
-  CHECK_THAT(delta.assumptions[1], Contains("force_N: assumed: that of the Omega.7"));
-  CHECK_THAT(message_of([&] { (void)opened("omega7", {}); }), Contains("2 devices are 'omega.7'") &&
-                                                                  Contains("serial 4713") &&
-                                                                  Contains("--serial NUMBER"));
-  CHECK_THAT(message_of([&] { (void)opened("sigma7", {}); }), Contains("0 devices are 'sigma.7'"));
-  CHECK_THAT(message_of([&] { (void)opened("omega7", {.serial = 99, .index = std::nullopt}); }),
-             Contains("0 devices are of serial 99"));
-  CHECK_THAT(message_of([&] { (void)opened("omega7", {.serial = std::nullopt, .index = 4}); }),
-             Contains("--index 0 to 3"));
-  CHECK_THAT(message_of([&] { (void)opened("omega7", {.serial = std::nullopt, .index = 0}); }),
-             Contains("type 63") && Contains("--device delta3"));
-  const auto seen = seen_devices(TPM_STAND_IN_DHD);
-  REQUIRE(seen.size() == 4);
-  CHECK(seen[3].kind == "falcon");
-  CHECK(seen[3].serial == 4714);
-  CHECK_FALSE(seen[3].simulated);
-}
-
-TEST_CASE("The list of devices marks one behind a link on which a simulator may be") {
-  const test::TempFolder folder;
-  const auto listed = [&](const char* format) {
-    const std::string line = "'" TPM_TEST_PROGRAM "' hil devices --dhd-library '" TPM_STAND_IN_DHD
-                             "' --format " +
-                             std::string(format) + " > '" + (folder / "listed") + "'";
-    REQUIRE(std::system(line.c_str()) == 0);
-    return read_file(folder / "listed");
-  };
-  const auto marked = [&] {
-    const Json answer = Json::parse(listed("json"));
-    return answer.at("force_dimension").at("devices")[0].at("simulated_device").get<bool>();
-  };
-  for (const char* mode : {"3", "4"}) {
-    CAPTURE(mode);
-    const Script script(std::string("com_mode ") + mode + "\n");
-    CHECK_THAT(listed("text"), Contains("omega.7, SIMULATED DEVICE, serial 4711: --device omega7"));
-    CHECK(marked());
-  }
-  // A link that nobody knows may lead to motors.
-  for (const char* mode : {"0", "1", "9"}) {
-    CAPTURE(mode);
-    const Script script(std::string("com_mode ") + mode + "\n");
-    CHECK_THAT(listed("text"), Contains("omega.7, serial 4711: --device omega7"));
-    CHECK_FALSE(marked());
-  }
-}
-
 TEST_CASE("A session that asks for more than a device can take is refused") {
-  const Script script("type 60\n");
+  const test::VendorScript script("type 60\n");
   DeviceChoice falcon = stand_in();
   falcon.kind = "falcon";
   falcon.file.clear();
@@ -433,7 +331,8 @@ TEST_CASE("Gripper, buttons and what was noted stand in the recording") {
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
   {
-    const Script script(operator_lines(session, folder) + "gripper 0.0125\nbuttons 3\n");
+    const test::VendorScript script(operator_lines(session, folder) +
+                                    "gripper 0.0125\nbuttons 3\n");
     SessionRunOptions options;
     options.recording = folder / "r";
     options.notes = {"2026-11-23", "op-1", "s 7"};
@@ -448,7 +347,7 @@ TEST_CASE("Gripper, buttons and what was noted stand in the recording") {
     CHECK(file.attribute("/", "operator_code") == "op-1");
     CHECK(file.numbers("/rows/gripper_m").at(500) == static_cast<double>(0.0125F));
   }
-  const Script script(operator_lines(session, folder));
+  const test::VendorScript script(operator_lines(session, folder));
   const Ran r = ran(session, stand_in(), folder / "without");
   CHECK_FALSE(script.happened("gripper_force_0"));
   CHECK(std::isnan(r.recording.rows.at(500).gripper_m));
@@ -462,15 +361,15 @@ TEST_CASE("The device is told how it stands, and what cannot be told is refused"
                                   {{"effector_mass_kg", 0.12}, {"base_angle_x", "30 deg"}});
   const HilSession session = test::parsed(mounted);
   {
-    const Script script(operator_lines(session, folder));
+    const test::VendorScript script(operator_lines(session, folder));
     (void)ran(session, stand_in(), folder / "r");
     CHECK(script.happened("effector_mass_120"));
     CHECK(script.happened("base_angle_x_524"));
   }
   const HilSession other =
       test::parsed(test::with(test::short_session(), "/mounting", {{"base_angle_z", "1 rad"}}));
-  const Script script(operator_lines(other, folder));
-  CHECK_THAT(message_of([&] { (void)ran(other, stand_in(), folder / "z"); }),
+  const test::VendorScript script(operator_lines(other, folder));
+  CHECK_THAT(test::vendor_message_of([&] { (void)ran(other, stand_in(), folder / "z"); }),
              Contains("has no dhdSetBaseAngleZRad"));
   CHECK_FALSE(std::filesystem::exists(folder / "z"));
 }
@@ -481,10 +380,10 @@ TEST_CASE("A session that waits for a word begins with a button, and not without
       test::with(test::short_session(), "/start", {{"confirm", true}, {"limit", "2 s"}});
   const HilSession session = test::parsed(asked);
   {
-    const Script script(operator_lines(session, folder) + "buttons 1\n");
+    const test::VendorScript script(operator_lines(session, folder) + "buttons 1\n");
     CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
   }
-  const Script script(operator_lines(session, folder));
+  const test::VendorScript script(operator_lines(session, folder));
   CHECK(ran(session, stand_in(), folder / "s").run.outcome.cause == StopCause::not_in_place);
   CHECK(ran(session, {}, folder / "simulated").run.outcome.cause == StopCause::finished);
 }
@@ -493,7 +392,7 @@ TEST_CASE("The whole way is walked through a library, and said not to be without
   const test::TempFolder folder;
   write_file(folder / "session.json", to_text(test::short_session()));
   const HilSession session = test::parsed(test::short_session());
-  const Script script(operator_lines(session, folder) + "initialised 0\n");
+  const test::VendorScript script(operator_lines(session, folder) + "initialised 0\n");
   const std::string build = std::filesystem::path(TPM_TEST_PROGRAM).parent_path();
   const auto walked = [&](const std::string& arguments) {
     const std::string line = "TPM_BUILD='" + build + "' TPM_SESSION='" + (folder / "session.json") +
@@ -520,7 +419,7 @@ TEST_CASE("The whole way is walked through a library, and said not to be without
 TEST_CASE("A recording of the stand-in behind a network is labelled as simulated") {
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
-  const Script script(operator_lines(session, folder) + "com_mode 4\n");
+  const test::VendorScript script(operator_lines(session, folder) + "com_mode 4\n");
   const Ran r = ran(session, stand_in(), folder / "r");
   CHECK(r.recording.simulated());
   CHECK_THAT(device_line(r.recording), Contains("SIMULATED DEVICE"));

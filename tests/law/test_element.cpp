@@ -166,13 +166,13 @@ TEST_CASE("creep with frozen lambda1 is Eq. 14 with its limits") {
 TEST_CASE("creep with the true lambda1 ends where the springs balance the load") {
   TpmParameters paper;
   // Ends of creep (docs/theory.md): 10.59 mm at 0.98 N, 2.56 mm at 0.196 N
-  CHECK_THAT(CreepUnderConstantLoad(paper, 0.98).final_depth_m(),
+  CHECK_THAT(CreepUnderConstantLoad(paper, 0.98).depth_m(INFINITY),
              test::expected("paper.creep_end_at_0.98_N"));
-  CHECK_THAT(CreepUnderConstantLoad(paper, 0.196).final_depth_m(),
+  CHECK_THAT(CreepUnderConstantLoad(paper, 0.196).depth_m(INFINITY),
              test::expected("paper.creep_end_at_0.196_N"));
   const CreepUnderConstantLoad creep_(paper, 0.98);
   CHECK_THAT(creep_.depth_m(0.0), WithinRel(creep_.instantaneous_depth_m(), 1e-15));
-  CHECK_THAT(creep_.depth_m(1e9), WithinRel(creep_.final_depth_m(), 1e-15));
+  CHECK_THAT(creep_.depth_m(1e9), WithinRel(creep_.depth_m(INFINITY), 1e-15));
   CHECK_THAT(CreepUnderConstantLoad(paper, -0.98).depth_m(1e-4),
              WithinRel(-creep_.depth_m(1e-4), 1e-15));
 }

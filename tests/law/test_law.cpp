@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "law_answers.hpp"
+#include "random_laws.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/law/element/closed_form.hpp"
-#include "tpm/law/imposed_depth.hpp"
 #include "tpm/law/kelvin_chain.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
@@ -22,41 +22,6 @@ using test::evenly;
 
 namespace {
 
-const std::vector<std::string> kLaws{
-    "linear",           "linear-1",          "linear-2",        "linear-3-elastic",
-    "linear-1-elastic", "linear-2-relaxing", "hertz-1",         "power-2",
-    "linear-2-fluid",   "power-1-elastic",   "linear-2-series", "power-1-elastic-series"};
-
-/// Plausible parameters of any law: stiffnesses of tens of N/m, times around a second.
-std::vector<double> random_parameters(const LawModel& law, Random& random) {
-  std::vector<double> values;
-  for (const LawParameter& p : law.law_parameters()) {
-    const double u = random.uniform();
-    if (p.dimension == Dimension::stiffness) {
-      values.push_back(10.0 * std::pow(10.0, u));
-    } else if (p.dimension == Dimension::time) {
-      values.push_back(0.05 * std::pow(100.0, u));
-    } else if (p.name == "exponent") {
-      values.push_back(1.2 + u);
-    } else if (p.name == "alpha") {
-      values.push_back(0.3 + 0.6 * u);
-    } else if (p.name == "tension_share") {
-      values.push_back(0.1 + 0.8 * u);
-    } else if (p.name == "spacing") {
-      values.push_back(0.01 + 0.02 * u);
-    } else if (p.name == "contact") {
-      values.push_back(2e-4 * u);
-    } else {
-      values.push_back(0.01 * u);
-    }
-  }
-  return values;
-}
-
-double largest_difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-  return (a - b).cwiseAbs().maxCoeff();
-}
-
 Eigen::VectorXd coefficients(const Prony& law) {
   const auto n = static_cast<Eigen::Index>(law.k.size());
   Eigen::VectorXd all(2 * n + 1);
@@ -68,7 +33,7 @@ Eigen::VectorXd coefficients(const Prony& law) {
 }  // namespace
 
 TEST_CASE("names of laws go there and back", "[law]") {
-  for (const std::string& name : kLaws) {
+  for (const std::string& name : test::kLaws) {
     CHECK(law_name(parse_law_name(name, "test")) == name);
   }
   for (const char* name : {"power-fkelvin_voigt", "linear-9", "hertz-12", "linear-40-fluid"}) {
@@ -115,13 +80,13 @@ TEST_CASE("the law linear-1-elastic is the paper's element", "[law]") {
     const auto times = evenly(0.0, 33.0, 50);
     const auto expected = element.respond(ramp, times, vector, Want::values).value;
     const auto answer = law.respond(ramp, times, values, Want::values).value;
-    CHECK(largest_difference(answer, expected) < 1e-12 * expected.maxCoeff());
+    CHECK(test::largest_difference(answer, expected) < 1e-12 * expected.maxCoeff());
 
     const Protocol load = creep(0.5, 100.0);
     const std::vector<double> creep_times{0.0, 0.01, 0.1, 1.0, 10.0, 100.0};
     const auto depth = element.respond(load, creep_times, vector, Want::values).value;
     const auto crept = law.respond(load, creep_times, values, Want::values).value;
-    CHECK(largest_difference(crept, depth) < 2e-9 * depth.maxCoeff());
+    CHECK(test::largest_difference(crept, depth) < 2e-9 * depth.maxCoeff());
   }
 }
 
@@ -135,16 +100,16 @@ TEST_CASE("sensitivities of every law agree with differences", "[law][heavy]") {
   const Protocol growing(Drive::displacement,
                          {{0.0, 0.0}, {0.7, 2e-3}, {1.5, 2e-3}, {2.0, 3e-3}, {6.0, 3e-3}});
   const Protocol more_load(Drive::force, {{0.0, 0.0}, {0.5, 0.08}, {2.0, 0.08}, {5.0, 0.2}});
-  for (const std::string& name : kLaws) {
+  for (const std::string& name : test::kLaws) {
     const bool hertz = parse_law_name(name, "test").kernel == Kernel::hertz;
     const LawModel law(parse_law_name(name, "test"));
-    const auto values = random_parameters(law, random);
+    const auto values = test::random_parameters(law, random);
     for (const Protocol* protocol :
          {hertz ? &growing : &push, hertz ? &more_load : &std::as_const(load)}) {
       const auto times = evenly(0.35, 4.9, 14);
       const Response r = law.respond(*protocol, times, values, Want::values_and_sensitivity);
-      CHECK(largest_difference(r.value,
-                               law.respond(*protocol, times, values, Want::values).value) == 0.0);
+      CHECK(test::largest_difference(
+                r.value, law.respond(*protocol, times, values, Want::values).value) == 0.0);
       for (std::size_t j = 0; j < values.size(); ++j) {
         const double width = law.law_parameters()[j].name == "offset" ? 0.01 : std::abs(values[j]);
         const double step = 1e-4 * width;
@@ -158,8 +123,8 @@ TEST_CASE("sensitivities of every law agree with differences", "[law][heavy]") {
         const double scale = r.value.cwiseAbs().maxCoeff() / width;
         INFO(name << ", " << law.law_parameters()[j].name
                   << (protocol->drive() == Drive::force ? ", force" : ", displacement"));
-        CHECK(largest_difference(r.sensitivity.col(static_cast<Eigen::Index>(j)), difference) <
-              2e-5 * scale);
+        CHECK(test::largest_difference(r.sensitivity.col(static_cast<Eigen::Index>(j)),
+                                       difference) < 2e-5 * scale);
       }
     }
   }
@@ -368,7 +333,7 @@ TEST_CASE("a probe that retracts leaves the tissue, which recovers and is met ag
   for (const char* name : {"linear-1", "power-2", "linear-1-elastic"}) {
     const LawModel law(parse_law_name(name, "test"));
     Random random(8);
-    auto values = random_parameters(law, random);
+    auto values = test::random_parameters(law, random);
     values[law.index("contact")] = 0.0;
     values[law.index("offset")] = 0.003;
     const auto protocol = [](int pieces) {
@@ -392,7 +357,7 @@ TEST_CASE("a probe that retracts leaves the tissue, which recovers and is met ag
     INFO(name);
     CHECK(coarse.value[1] == values[law.index("offset")]);  // away: nothing but the zero error
     CHECK(coarse.value[4] > 0.5 * coarse.value[0]);
-    CHECK(largest_difference(coarse.value, fine.value) < 1e-4 * coarse.value.maxCoeff());
+    CHECK(test::largest_difference(coarse.value, fine.value) < 1e-4 * coarse.value.maxCoeff());
     // Never tensile.
     const auto all = law.respond(protocol(200), evenly(0.0, 3.1, 700), values, Want::values).value;
     CHECK(all.minCoeff() >= values[law.index("offset")] - 1e-15);
@@ -407,7 +372,7 @@ TEST_CASE("a probe that retracts leaves the tissue, which recovers and is met ag
                                      law.respond(protocol(200), times, down, Want::values).value) /
                                     (2.0 * step);
       const Eigen::VectorXd analytic = coarse.sensitivity.col(static_cast<Eigen::Index>(j));
-      CHECK(largest_difference(slope, analytic) < 1e-3 * coarse.value.maxCoeff() / values[j]);
+      CHECK(test::largest_difference(slope, analytic) < 1e-3 * coarse.value.maxCoeff() / values[j]);
     }
   }
 }
@@ -443,71 +408,4 @@ TEST_CASE("parameters out of range are refused by name", "[law]") {
                       Catch::Contains(law.law_parameters()[place].name));
   }
   CHECK_THROWS_AS(law.respond(ramp, times, {good.data(), 3}, Want::values), Error);
-}
-
-namespace {
-
-/// A ramp from below the surface to a hold with a trembling drive, as machines record it.
-/// @param jitter of the sampling times, relative to the step
-Protocol trembling_hold(double jitter, std::vector<double>& times) {
-  Random random(7);
-  std::vector<Knot> knots;
-  for (int i = 0; i <= 400; ++i) {
-    const double time = 0.05 * (i + (i > 0 ? jitter * (random.uniform() - 0.5) : 0.0));
-    const double depth = std::min(-1e-4 + 1.5e-3 * time, 4e-3);
-    const double tremble = depth < 4e-3 ? 0.0 : 1e-6 * (random.uniform() - 0.5);
-    knots.push_back({time, depth + tremble});
-    times.push_back(time);
-  }
-  Protocol protocol(Drive::displacement, std::move(knots));
-  protocol.set_equilibrium_at_start(true);
-  return protocol;
-}
-
-}  // namespace
-
-TEST_CASE("the quick way through a recording answers what the general one does", "[law]") {
-  Random random(19);
-  for (const double jitter : {0.0, 2e-6, 1e-3}) {
-    std::vector<double> times;
-    const Protocol protocol = trembling_hold(jitter, times);
-    const std::vector<double> reversed(times.rbegin(), times.rend());  // is answered step by step
-    for (const std::string& name : kLaws) {
-      const LawModel law(parse_law_name(name, "test"));
-      const auto values = random_parameters(law, random);
-      const Response quick = law.respond(protocol, times, values, Want::values_and_sensitivity);
-      const Response general =
-          law.respond(protocol, reversed, values, Want::values_and_sensitivity);
-      const double peak = general.value.cwiseAbs().maxCoeff();
-      INFO(name << ", jitter " << jitter);
-      CHECK(largest_difference(quick.value, general.value.reverse()) < 1e-9 * peak);
-      for (Eigen::Index j = 0; j < quick.sensitivity.cols(); ++j) {
-        const Eigen::VectorXd slopes = general.sensitivity.col(j).reverse();
-        CHECK(largest_difference(quick.sensitivity.col(j), slopes) <
-              (jitter > 0.0 ? 1e-5 : 1e-7) * slopes.cwiseAbs().maxCoeff());
-      }
-      if (jitter > 0.0) continue;
-      CHECK(largest_difference(law.respond(protocol, times, values, Want::values).value,
-                               quick.value) == 0.0);
-    }
-  }
-}
-
-TEST_CASE("between near depths a kernel follows from its values and slopes at both", "[law]") {
-  for (const KernelShape& kernel : {KernelShape(Kernel::hertz, 1e-3, 1.5, std::nullopt, 1.0),
-                                    KernelShape(Kernel::power, 1e-3, 6.0, std::nullopt, 1.0),
-                                    KernelShape(Kernel::linear, 1e-3, 1.0, 0.8, 2e-3)}) {
-    for (const double u : {1e-5, 1e-3, 7e-3}) {
-      const double change = kCubicPart * u;
-      const KernelShape::Jet a = kernel.jet(u);
-      const KernelShape::Jet b = kernel.jet(u + change);
-      const KernelBetween between =
-          kernel_between(change, a.values.value, a.tangent.slope, b.values.value, b.tangent.slope);
-      for (std::size_t i = 0; i < 3; ++i) {
-        const auto exact = kernel.at(u + 0.25 * static_cast<double>(i + 1) * change);
-        CHECK_THAT(between.value[i], WithinRel(exact.value, 1e-10));
-        CHECK_THAT(between.slope[i], WithinRel(exact.slope, 3e-8));
-      }
-    }
-  }
 }

@@ -291,9 +291,10 @@ Answer searched_answer(const Problem& p) {
   const std::vector<FitParameter> parameters = searched_parameters(fit.config);
   const std::unique_ptr<ExperimentResiduals> same = function.copy();
   std::vector<std::size_t> left_out;
+  const std::vector<bool>& outlier = fit.recordings.at(0).outlier;
   for (const Experiment& e : function.experiments()) {
     for (std::size_t k = 0; k < e.data.size(); ++k) {
-      if (fit.recordings.at(0).is_outlier(k)) left_out.push_back(e.data[k]);
+      if (k < outlier.size() && outlier[k]) left_out.push_back(e.data[k]);
     }
   }
   if (!left_out.empty()) same->leave_out(left_out);

@@ -168,7 +168,7 @@ inline double left_without_noise(AdequacyTrial trial) {
   double squares = 0.0;
   int count = 0;
   for (std::size_t i = 0; i < r.observed.size(); ++i) {
-    if (!r.fitted[i] && !r.is_outlier(i)) continue;
+    if (!r.fitted[i] && !(i < r.outlier.size() && r.outlier[i])) continue;
     squares += std::pow(r.observed[i] - r.predicted[i], 2);
     ++count;
   }

@@ -112,7 +112,6 @@ struct RecordingFit {
   std::size_t not_predicted = 0;      ///< samples outside whose `predicted` is NaN
   /// Prediction band, where one new sample falls, SI; empty if the covariance is not of full rank.
   std::vector<double> lower, upper;
-  [[nodiscard]] bool is_outlier(std::size_t i) const { return i < outlier.size() && outlier[i]; }
   [[nodiscard]] bool is_censored(std::size_t i) const { return i < censored.size() && censored[i]; }
   std::optional<double> share_inside;      ///< of the fitted samples, within that band
   std::optional<Correlation> correlation;  ///< of the fitted samples' residuals

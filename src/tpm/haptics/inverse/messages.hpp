@@ -130,8 +130,6 @@ struct InverseEvent {
                                         std::string_view profile = {});
 /// Makes neutral what a session may set: force gate and damping 0, the origin by kCentredPreset.
 [[nodiscard]] std::string neutral_message(std::string_view device_id, std::string_view profile);
-/// Presses buttons of the simulated grip of tpm hil serve.
-[[nodiscard]] std::string press_message(std::uint32_t buttons);
 /// Asks for a state and commands nothing.
 [[nodiscard]] std::string probe_message(std::string_view device_id);
 

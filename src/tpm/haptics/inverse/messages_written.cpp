@@ -98,11 +98,6 @@ std::string neutral_message(std::string_view device_id, std::string_view profile
                      vector_text(Eigen::Vector3d::Zero()));
 }
 
-std::string press_message(std::uint32_t buttons) {
-  return fmt::format(R"({{"{}":[{{"device_id":"{}","commands":{{"{}":{}}}}}]}})", key::grips[0],
-                     kSimulatedGrip, key::set_buttons, pressed_text(buttons));
-}
-
 std::string probe_message(std::string_view device_id) {
   return fmt::format(R"({{"inverse3":[{{"device_id":{},"commands":{{"probe_position":{{}}}}}}]}})",
                      json_text(device_id));

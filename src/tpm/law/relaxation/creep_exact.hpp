@@ -24,7 +24,6 @@ class CreepUnderConstantLoad {
   [[nodiscard]] TpmVector depth_sensitivity(double time_s) const;
 
   [[nodiscard]] double instantaneous_depth_m() const { return sign_ * start_; }
-  [[nodiscard]] double final_depth_m() const { return sign_ * final_; }
 
  private:
   [[nodiscard]] double remaining_log(double time_s) const;
