@@ -255,20 +255,27 @@ class Finder {
     return start;
   }
 
-  /// True if noise alone makes readings look constant: the means of their halves are apart.
-  [[nodiscard]] bool rises_within_noise(std::size_t first, std::size_t last) const {
+  /// True if noise alone makes readings look constant: the means of their halves are apart, or not
+  /// clearly less so than those of a force that rises on as it did from contact to them.
+  [[nodiscard]] bool rises_within_noise(const Phase& phase, std::size_t first) const {
     constexpr double kSure = 4.0, kConstant = 0.02;  // standard deviations; of the level
-    const std::size_t half = (last - first + 1) / 2;
+    const std::size_t last = phase.last, half = (last - first + 1) / 2;
     if (half < 2) return false;
-    const auto mean_from = [&](std::size_t begin) {
+    const auto mean_from = [half](const std::vector<double>& values, std::size_t begin) {
       double sum = 0.0;
-      for (std::size_t i = begin; i < begin + half; ++i) sum += response_[i];
+      for (std::size_t i = begin; i < begin + half; ++i) sum += values[i];
       return sum / static_cast<double>(half);
     };
-    const double early = mean_from(first), late = mean_from(last + 1 - half);
+    const double late = mean_from(response_, last + 1 - half);
+    const double rise = late - mean_from(response_, first);
     const double unsure =
         kSure * found_.noise_sd_estimate * std::sqrt(2.0 / static_cast<double>(half));
-    return late - early > std::max(unsure, kConstant * std::abs(late));
+    if (rise > std::max(unsure, kConstant * std::abs(late))) return true;
+    const std::size_t begin = std::max(phase.first, found_.contact_index);
+    if (begin >= first) return false;  // loaded at once
+    const double apart_s = mean_from(time_, last + 1 - half) - mean_from(time_, first);
+    const double rise_on = (late - found_.floor_response) / (time_[first] - time_[begin]) * apart_s;
+    return rise_on - rise <= unsure && found_.noise_sd_estimate > 0.0;
   }
 
   /// A force that stays constant while the depth grows was held by the machine.
@@ -282,7 +289,7 @@ class Finder {
       const std::size_t start = start_of_constant_response(phase);
       const double part =
           (time_[phase.last] - time_[start]) / (time_[phase.last] - time_[phase.first]);
-      if (part > kLeastPart && !rises_within_noise(start, phase.last)) {
+      if (part > kLeastPart && !rises_within_noise(phase, start)) {
         relabel(start, phase.last, PhaseKind::creep);
       }
     }
