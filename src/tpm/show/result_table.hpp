@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/show/document.hpp"
 #include "tpm/show/table_document.hpp"
@@ -45,7 +46,7 @@ template <class Row>
 struct ResultColumn {
   /// @param name in JSON and CSV, with the SI unit; empty: in neither
   /// @param kept significant digits there; 0: all
-  ResultColumn(std::string name, ResultMember<Row> of, int kept = 6)
+  ResultColumn(std::string name, ResultMember<Row> of, int kept = kResultDigits)
       : key(std::move(name)), member(std::move(of)), digits(kept) {}
   /// JSON leaves out a value that is null or an empty text.
   ResultColumn& or_left_out() {
@@ -79,7 +80,7 @@ struct ResultColumn {
 
   std::string key;
   ResultMember<Row> member;
-  int digits = 6;
+  int digits = kResultDigits;
   bool left_out = false, is_shown = false;
   std::string heading{};
   int width = 0;

@@ -9,8 +9,6 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kStoredDigits6 = 6;
-
 Json thresholds() {
   const auto entry = [](const char* of, double share, const char* source) {
     return Json{{"of", of}, {"share", share}, {"source", source}};
@@ -33,7 +31,7 @@ std::string in_percent(double part) {
 }  // namespace
 
 Json to_json(const ErrorBudget& b) {
-  const auto stored = [](double value) { return rounded(value, kStoredDigits6); };
+  const auto stored = [](double value) { return rounded(value); };
   Json stages = Json::array(), lines = Json::array();
   for (const BudgetStage& stage : b.stages) {
     const Json force = array_json(stage.force_N, stored);
