@@ -12,9 +12,12 @@ namespace tpm::base {
 /// and "nan".
 [[nodiscard]] std::string significant(double value, int digits);
 
+/// Significant digits of the numbers of results in JSON and CSV, where no other number is given.
+inline constexpr int kResultDigits = 6;
+
 /// The double nearest to `value` written with `digits` significant digits: what results store so
 /// that they agree between machines, whose last bits differ. Non-finite values stay as they are.
-[[nodiscard]] double rounded(double value, int digits);
+[[nodiscard]] double rounded(double value, int digits = kResultDigits);
 
 /// `decimals` digits after the point.
 [[nodiscard]] std::string fixed(double value, int decimals);

@@ -6,6 +6,8 @@
 #include <set>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/other_kind.hpp"
 #include "tpmkit/error.hpp"
@@ -46,6 +48,14 @@ void require_finite(const Json& value, const std::string& key) {
 }
 
 }  // namespace
+
+Json or_null(double value) {
+  return std::isfinite(value) ? Json(rounded(value)) : Json(nullptr);
+}
+
+Json or_null(const std::optional<double>& value) {
+  return value ? Json(rounded(*value)) : Json(nullptr);
+}
 
 Json parse_json(std::string_view text, std::string_view where) {
   DuplicateKeys watcher;

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -17,6 +18,11 @@ template <class Items, class Convert>
   for (const auto& item : items) array.push_back(std::invoke(convert, item));
   return array;
 }
+
+/// A number of a result with kResultDigits; null if it is not finite.
+[[nodiscard]] Json or_null(double value);
+/// A number of a result that need not be there; null if it is not.
+[[nodiscard]] Json or_null(const std::optional<double>& value);
 
 /// Strict JSON: duplicate keys, numbers that overflow and anything after the value are errors
 /// (Error(bad_input) with file, line and column), which nlohmann-json alone lets pass.

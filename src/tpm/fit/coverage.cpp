@@ -101,9 +101,9 @@ Json to_json(const CoverageResult& result) {
   j["parameters"] = array_json(result.parameters, [&](const ParameterCoverage& p) {
     return Json{{"name", p.name},
                 {"covered", p.covered},
-                {"coverage", rounded(static_cast<double>(p.covered) / result.sets, 6)},
+                {"coverage", rounded(static_cast<double>(p.covered) / result.sets)},
                 {"open_intervals", p.one_sided},
-                {"binomial_p_value", rounded(p.p_value, 6)}};
+                {"binomial_p_value", rounded(p.p_value)}};
   });
   return j;
 }

@@ -31,17 +31,13 @@ std::string_view kind_name(Series::Kind kind) {
   return word_for(kNames, kind);
 }
 
-/// More than a drawing shows, and the same on every machine.
-constexpr int kFigureDigits = 6;
-
 Json numbers(const std::vector<double>& values) {
-  return array_json(values, [](double v) { return rounded(v, kFigureDigits); });
+  return array_json(values, [](double v) { return rounded(v); });
 }
 
 /// Of a map of colours, with null where there is nothing.
 Json numbers_or_null(const std::vector<double>& values) {
-  return array_json(
-      values, [](double v) { return std::isnan(v) ? Json() : Json(rounded(v, kFigureDigits)); });
+  return array_json(values, [](double v) { return std::isnan(v) ? Json() : Json(rounded(v)); });
 }
 
 /// The arrays that a kind needs are as long as each other.
@@ -80,8 +76,8 @@ void require_drawable(const Series& s, const std::string& where) {
 
 Json axis_json(const Axis& axis) {
   Json json{{"quantity", axis.quantity}, {"unit", axis.unit}, {"logarithmic", axis.logarithmic}};
-  if (axis.lower) json["lower"] = rounded(*axis.lower, kFigureDigits);
-  if (axis.upper) json["upper"] = rounded(*axis.upper, kFigureDigits);
+  if (axis.lower) json["lower"] = rounded(*axis.lower);
+  if (axis.upper) json["upper"] = rounded(*axis.upper);
   if (!axis.names.empty()) json["names"] = axis.names;
   return json;
 }

@@ -5,18 +5,12 @@
 #include <map>
 #include <vector>
 
-#include "tpm/show/table_document.hpp"
+#include "tpm/show/result_table.hpp"
 
 namespace tpm::show {
 namespace {
 
 using FlatRow = std::map<std::string, std::string>;
-
-std::string scalar_cell(const Json& value) {
-  if (value.is_null()) return {};
-  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-  return value.is_string() ? value.get<std::string>() : value.dump();
-}
 
 /// Two limits under a key that says so.
 bool is_interval(std::string_view key, const Json& value) {
@@ -74,15 +68,13 @@ class FlatTable {
         const bool plain = std::ranges::none_of(value, &Json::is_structured);
         if (!plain || value.empty()) continue;
         if (is_interval(key, value)) {
-          set(column + "_lower", scalar_cell(value[0]), row);
-          set(column + "_upper", scalar_cell(value[1]), row);
+          set(column + "_lower", csv_cell(value[0], 0), row);
+          set(column + "_upper", csv_cell(value[1], 0), row);
           continue;
         }
-        std::string cell;
-        for (const Json& v : value) cell += (cell.empty() ? "" : " ") + scalar_cell(v);
-        set(column, std::move(cell), row);
+        set(column, csv_cell(value, 0), row);
       } else {
-        set(column, scalar_cell(value), row);
+        set(column, csv_cell(value, 0), row);
       }
     }
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/show/document.hpp"
 #include "tpm/show/table_document.hpp"
@@ -45,17 +46,17 @@ template <class Row>
 struct ResultColumn {
   /// @param name in JSON and CSV, with the SI unit; empty: in neither
   /// @param kept significant digits there; 0: all
-  ResultColumn(std::string name, ResultMember<Row> of, int kept = 6)
+  ResultColumn(std::string name, ResultMember<Row> of, int kept = kResultDigits)
       : key(std::move(name)), member(std::move(of)), digits(kept) {}
-  /// JSON leaves out a value that is null or an empty text.
+  /// Leaves the member out of JSON where it is null or an empty text.
   ResultColumn& or_left_out() {
     left_out = true;
     return *this;
   }
-  /// Has people see the column too.
-  /// @param title with the unit shown
+  /// Shows the column on terminals and pages, too.
+  /// @param title heading, with the unit
   /// @param least width on a terminal; positive: aligned to the right
-  /// @param si value of the unit shown, with so many significant digits
+  /// @param si SI value of the unit
   ResultColumn& shown(std::string title, int least = 0, double si = 1.0, int significant = 4) {
     heading = std::move(title);
     width = least;
@@ -64,14 +65,14 @@ struct ResultColumn {
     is_shown = true;
     return *this;
   }
-  /// Is seen of a number in place of its digits.
+  /// Shows a number as this text; "-" where it is null.
   ResultColumn& as(std::string (*text)(double)) {
     return in_words([of = member, text](const Row& row) {
       const Json value = of(row);
       return Cell{value.is_null() ? "-" : text(value.template get<double>())};
     });
   }
-  /// Is seen in place of the member.
+  /// Shows this cell in place of the member.
   ResultColumn& in_words(std::function<Cell(const Row&)> text) {
     words = std::move(text);
     return *this;
@@ -79,7 +80,7 @@ struct ResultColumn {
 
   std::string key;
   ResultMember<Row> member;
-  int digits = 6;
+  int digits = kResultDigits;
   bool left_out = false, is_shown = false;
   std::string heading{};
   int width = 0;

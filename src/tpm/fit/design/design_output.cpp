@@ -12,30 +12,19 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kDesignDigits = 6;
-
-/// null for what is not finite: an unknown parameter has an infinite error.
-Json finite_json(double value) {
-  return std::isfinite(value) ? Json(rounded(value, kDesignDigits)) : Json(nullptr);
-}
-
-Json finite_json(const std::optional<double>& value) {
-  return value ? finite_json(*value) : Json(nullptr);
-}
-
 Json to_json(const PlannedExperiment& e) {
   Json j;
   if (e.kind == PlannedExperiment::Kind::creep) {
-    j = {{"kind", "creep"}, {"load_N", finite_json(e.load_N)}};
+    j = {{"kind", "creep"}, {"load_N", or_null(e.load_N)}};
   } else {
     j = {{"kind", "ramp_hold"},
-         {"depth_m", finite_json(e.depth_m)},
-         {"rate_m_per_s", finite_json(e.rate_m_per_s)}};
+         {"depth_m", or_null(e.depth_m)},
+         {"rate_m_per_s", or_null(e.rate_m_per_s)}};
   }
-  j["hold_s"] = finite_json(e.hold_s);
-  j["interval_s"] = finite_json(e.interval_s);
+  j["hold_s"] = or_null(e.hold_s);
+  j["interval_s"] = or_null(e.interval_s);
   j["repeats"] = e.repeats;
-  j["total_time_s"] = finite_json(e.total_s());
+  j["total_time_s"] = or_null(e.total_s());
   return j;
 }
 
@@ -45,28 +34,28 @@ Json to_json(const Expectation& expected, const DesignProblem& problem) {
     const ExpectedParameter& p = expected.parameters[i];
     list.push_back({{"name", p.name},
                     {"unit", si_symbol(problem.parameter(i).unit.dimension)},
-                    {"value", finite_json(p.value)},
-                    {"relative_standard_error", finite_json(p.relative_error)},
-                    {"lower", finite_json(p.lower)},
-                    {"upper", finite_json(p.upper)},
+                    {"value", or_null(p.value)},
+                    {"relative_standard_error", or_null(p.relative_error)},
+                    {"lower", or_null(p.lower.value_or(NAN))},
+                    {"upper", or_null(p.upper.value_or(NAN))},
                     {"identified", p.identified},
                     {"rival", p.rival},
-                    {"rival_correlation", finite_json(p.rival_correlation)}});
+                    {"rival_correlation", or_null(p.rival_correlation)}});
   }
-  return {{"score", finite_json(expected.score)},
-          {"effective_samples", finite_json(expected.effective_samples)},
+  return {{"score", or_null(expected.score)},
+          {"effective_samples", or_null(expected.effective_samples)},
           {"parameters", std::move(list)}};
 }
 
 Json to_json(const DesignCheck& check) {
   Json list = array_json(check.parameters, [](const CheckedParameter& p) {
     return Json{{"name", p.name},
-                {"predicted_theta_sd", finite_json(p.predicted)},
-                {"observed_theta_sd", finite_json(p.observed)},
-                {"ratio", finite_json(p.ratio)},
-                {"ratio_error", finite_json(p.ratio_error)},
-                {"bias_in_predicted_sd", finite_json(p.bias)},
-                {"bias_error", finite_json(p.bias_error)},
+                {"predicted_theta_sd", or_null(p.predicted)},
+                {"observed_theta_sd", or_null(p.observed)},
+                {"ratio", or_null(p.ratio)},
+                {"ratio_error", or_null(p.ratio_error)},
+                {"bias_in_predicted_sd", or_null(p.bias)},
+                {"bias_error", or_null(p.bias_error)},
                 {"covered", p.covered},
                 {"agrees", p.agrees}};
   });
@@ -147,8 +136,8 @@ Json to_json(const DesignResult& result, const DesignCheck* check, std::size_t t
   for (std::size_t i = 0; i < std::min(top, result.ranked.size()); ++i) {
     const DesignCandidate& c = result.ranked[i];
     list.push_back({{"experiment", to_json(c.experiment)},
-                    {"samples", finite_json(c.one.samples)},
-                    {"peak_depth_m", finite_json(c.one.peak_depth_m)},
+                    {"samples", or_null(c.one.samples)},
+                    {"peak_depth_m", or_null(c.one.peak_depth_m)},
                     {"expected", to_json(c.expected, problem)}});
   }
   j["ranked"] = std::move(list);

@@ -263,7 +263,7 @@ Json to_json(const RecoveryResult& r) {
     list.push_back({{"name", p.name},
                     {"true_SI", r.true_values[model.index(p.name)]},
                     {"covered", p.covered},
-                    {"binomial_p_value", rounded(p.p_value, 6)}});
+                    {"binomial_p_value", rounded(p.p_value)}});
   }
   j["parameters"] = std::move(list);
   return j;

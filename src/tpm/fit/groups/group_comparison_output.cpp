@@ -13,8 +13,6 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kDigits = 6;  // of JSON and CSV
-
 bool is_ratio(const ComparedQuantity& q) {
   return q.parameter.scale == Scale::log;
 }
@@ -29,9 +27,9 @@ Json typical_json(const ComparedQuantity& q, std::size_t group, const std::strin
   if (!q.typical[group]) return j;
   const RandomEffects& e = *q.typical[group];
   j["specimens"] = e.specimens;
-  j["typical_SI"] = rounded(q.parameter.natural(e.mean), kDigits);
-  j["interval_SI"] = {rounded(q.parameter.natural(e.interval.lower), kDigits),
-                      rounded(q.parameter.natural(e.interval.upper), kDigits)};
+  j["typical_SI"] = rounded(q.parameter.natural(e.mean));
+  j["interval_SI"] = {rounded(q.parameter.natural(e.interval.lower)),
+                      rounded(q.parameter.natural(e.interval.upper))};
   return j;
 }
 
@@ -45,14 +43,14 @@ Json quantity_json(const GroupComparison& c, const ComparedQuantity& q) {
   }
   const GroupDifference& d = *q.difference;
   const std::string key = is_ratio(q) ? "ratio" : "difference_SI";
-  j[key] = rounded(shown_difference(q, d.difference), kDigits);
+  j[key] = rounded(shown_difference(q, d.difference));
   j[is_ratio(q) ? "ratio_interval" : "difference_interval_SI"] = {
-      rounded(shown_difference(q, d.interval.lower), kDigits),
-      rounded(shown_difference(q, d.interval.upper), kDigits)};
-  j["p_value"] = rounded(d.p_value, kDigits);
+      rounded(shown_difference(q, d.interval.lower)),
+      rounded(shown_difference(q, d.interval.upper))};
+  j["p_value"] = rounded(d.p_value);
   j["degrees_of_freedom"] = d.degrees;
   j[is_ratio(q) ? "between_specimens_sd_of_log" : "between_specimens_sd_SI"] =
-      rounded(std::sqrt(d.tau_squared), kDigits);
+      rounded(std::sqrt(d.tau_squared));
   return j;
 }
 
@@ -132,7 +130,7 @@ Json to_json(const GroupComparison& c) {
   Json j{{"conclusion", conclusion(c)}, {"confidence_level", c.study.level}};
   j["parameters"] = array_json(c.parameters, [&](const ComparedQuantity& q) {
     Json entry = quantity_json(c, q);
-    if (q.difference) entry["p_value_holm"] = rounded(q.p_holm, kDigits);
+    if (q.difference) entry["p_value_holm"] = rounded(q.p_holm);
     return entry;
   });
   if (!c.moduli.empty()) {

@@ -12,22 +12,17 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kStoredDigits = 6;
 constexpr std::size_t kMostStored = 400;  // samples in the JSON
-
-Json finite(double value) {
-  return std::isfinite(value) ? Json(rounded(value, kStoredDigits)) : Json();
-}
 
 Json sample_parameters_json(const IdentifiedSample& sample, const LawSpec& law) {
   const std::vector<LawParameter> table = law_parameters(law);
   return array_json(sample.estimate.parameters, [&](const SequentialParameter& p) {
     Json entry{{"name", law_key(table[p.place])},
-               {"estimate", finite(p.estimate)},
-               {"lower", finite(p.at_bound ? NAN : p.lower)},
-               {"upper", finite(p.at_bound ? NAN : p.upper)},
-               {"relative_half_width", finite(p.relative_half_width())},
-               {"degrees_of_freedom", finite(p.degrees_of_freedom)}};
+               {"estimate", or_null(p.estimate)},
+               {"lower", or_null(p.at_bound ? NAN : p.lower)},
+               {"upper", or_null(p.at_bound ? NAN : p.upper)},
+               {"relative_half_width", or_null(p.relative_half_width())},
+               {"degrees_of_freedom", or_null(p.degrees_of_freedom)}};
     if (p.nuisance) entry["nuisance"] = true;
     if (p.at_bound) entry["at_bound"] = true;
     return entry;
@@ -39,10 +34,10 @@ Json sample_json(const Identification& id, const IdentifiedSample& sample) {
   Json json{{"time_s", sample.time_s},
             {"samples", sample.estimate.samples},
             {"law", law_name(law)},
-            {"lag_1_correlation", finite(sample.estimate.phi)},
-            {"widest_relative_half_width", finite(sample.estimate.widest_relative_half_width())}};
+            {"lag_1_correlation", or_null(sample.estimate.phi)},
+            {"widest_relative_half_width", or_null(sample.estimate.widest_relative_half_width())}};
   json[law.response == Quantity::stress ? "noise_sd_Pa" : "noise_sd_N"] =
-      finite(sample.estimate.sigma);
+      or_null(sample.estimate.sigma);
   json["parameters"] = sample_parameters_json(sample, law);
   return json;
 }

@@ -49,7 +49,7 @@ double stiffness_of_spacing(const Network& network) {
 /// scene's spacing on.
 void require_refinement(const Network& scene, const Network& finer) {
   const double ratio = finer.organ.spacing / scene.organ.spacing;
-  const auto millimetres = [](double x_m) { return shortest(rounded(1e3 * x_m, 6)) + " mm"; };
+  const auto millimetres = [](double x_m) { return shortest(rounded(1e3 * x_m)) + " mm"; };
   if (!(ratio < 1.0)) {
     throw bad_input("budget of an organ",
                     fmt::format("the finer scene has the spacing {}, the scene {}",

@@ -2,9 +2,6 @@
 // What a budget says: JSON, terminal, CSV.
 #include <fmt/format.h>
 
-#include <array>
-#include <string_view>
-
 #include "tpm/base/text.hpp"
 #include "tpm/fit/predict/error_budget.hpp"
 #include "tpm/plan/perception.hpp"
@@ -12,25 +9,20 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kStoredDigits6 = 6;
-
-/// A just noticeable difference, as a share.
-struct NoticeableShare {
-  std::string_view of;
-  double share;
-  std::string_view source;
-};
-
-constexpr auto kNoticeableShares = std::to_array<NoticeableShare>(
-    {{"force between thumb and finger", kForceJnd, "Pang, Tan, Durlach 1991"},
-     {"stiffness of silicone that is touched", kStiffnessTouched,
-      "Bergmann Tiest, Kappers 2009, doi 10.1109/TOH.2009.16"},
-     {"stiffness through a tool", kStiffnessThroughTool,
-      "Bergmann Tiest, Kappers 2009: more than trebled"},
-     {"viscosity by forced choice", kViscosityJnd,
-      "Jones, Hunter, Lafontaine, Perception 26 (1997) 1571"},
-     {"viscosity by adjustment", kViscosityAdjusted,
-      "Jones, Hunter, Lafontaine, Perception 26 (1997) 1571"}});
+Json thresholds() {
+  const auto entry = [](const char* of, double share, const char* source) {
+    return Json{{"of", of}, {"share", share}, {"source", source}};
+  };
+  return Json::array({entry("force between thumb and finger", kForceJnd, "Pang, Tan, Durlach 1991"),
+                      entry("stiffness of silicone that is touched", kStiffnessTouched,
+                            "Bergmann Tiest, Kappers 2009, doi 10.1109/TOH.2009.16"),
+                      entry("stiffness through a tool", kStiffnessThroughTool,
+                            "Bergmann Tiest, Kappers 2009: more than trebled"),
+                      entry("viscosity by forced choice", kViscosityJnd,
+                            "Jones, Hunter, Lafontaine, Perception 26 (1997) 1571"),
+                      entry("viscosity by adjustment", kViscosityAdjusted,
+                            "Jones, Hunter, Lafontaine, Perception 26 (1997) 1571")});
+}
 
 std::string in_percent(double part) {
   return significant(100.0 * part, 3);
@@ -39,7 +31,7 @@ std::string in_percent(double part) {
 }  // namespace
 
 Json to_json(const ErrorBudget& b) {
-  const auto stored = [](double value) { return rounded(value, kStoredDigits6); };
+  const auto stored = [](double value) { return rounded(value); };
   Json stages = Json::array(), lines = Json::array();
   for (const BudgetStage& stage : b.stages) {
     const Json force = array_json(stage.force_N, stored);
@@ -73,9 +65,7 @@ Json to_json(const ErrorBudget& b) {
   json["combined"] = stored(b.combined);
   json["data_part"] = stored(b.data_part);
   json["computed_part"] = stored(b.computed_part);
-  json["thresholds"] = array_json(kNoticeableShares, [](const NoticeableShare& t) {
-    return Json{{"of", t.of}, {"share", t.share}, {"source", t.source}};
-  });
+  json["thresholds"] = thresholds();
   json["sentences"] = b.sentences;
   json["flags"] = b.flags;
   json["time_s"] = b.time_s;
@@ -110,8 +100,9 @@ std::string to_terminal_text(const ErrorBudget& b) {
                       in_percent(b.combined));
   for (const std::string& sentence : b.sentences) text += sentence + "\n";
   text += "\njust noticeable differences:";
-  for (const NoticeableShare& t : kNoticeableShares) {
-    text += fmt::format("\n  {:>4} %  {} ({})", in_percent(t.share), t.of, t.source);
+  for (const Json& t : thresholds()) {
+    text += fmt::format("\n  {:>4} %  {} ({})", in_percent(t.at("share").get<double>()),
+                        t.at("of").get<std::string>(), t.at("source").get<std::string>());
   }
   text += "\n";
   for (const std::string& flag : b.flags) text += fmt::format("! {}\n", flag);

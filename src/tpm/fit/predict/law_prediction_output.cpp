@@ -13,16 +13,13 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kStored = 6;  // significant digits
-
 std::string unit_suffix(Dimension dimension) {
   const std::string unit(si_symbol(dimension));
   return unit.empty() ? "" : "_" + unit;
 }
 
 Json numbers(const std::vector<double>& values) {
-  return array_json(values,
-                    [](double v) { return std::isfinite(v) ? Json(rounded(v, kStored)) : Json(); });
+  return array_json(values, [](double v) { return or_null(v); });
 }
 
 std::string drive_key(const LawPrediction& p) {
@@ -35,12 +32,12 @@ std::string drive_key(const LawPrediction& p) {
 Json comparison_json(const PredictionComparison& c, double peak, const std::string& suffix) {
   Json json{{"samples", c.samples}};
   if (c.samples == 0) return json;
-  json["rms" + suffix] = rounded(c.rms, kStored);
-  json["largest" + suffix] = rounded(c.largest, kStored);
-  json["rms_over_peak"] = rounded(c.rms / peak, kStored);
-  json["largest_over_peak"] = rounded(c.largest / peak, kStored);
+  json["rms" + suffix] = rounded(c.rms);
+  json["largest" + suffix] = rounded(c.largest);
+  json["rms_over_peak"] = rounded(c.rms / peak);
+  json["largest_over_peak"] = rounded(c.largest / peak);
   if (c.share_in_reading_band) {
-    json["share_in_reading_band"] = rounded(*c.share_in_reading_band, kStored);
+    json["share_in_reading_band"] = rounded(*c.share_in_reading_band);
   }
   return json;
 }
@@ -76,13 +73,13 @@ Json to_json(const LawPrediction& p) {
   const std::string suffix = unit_suffix(dimension);
   Json json{{"law", law_name(p.spec)},
             {"level", p.level},
-            {"quantile_of_the_standard_error", rounded(p.quantile, kStored)},
+            {"quantile_of_the_standard_error", rounded(p.quantile)},
             {"bands_from", p.samples > 0 ? "samples" : "derivatives"},
             {"placement", placement_name(p.placement)}};
   if (p.organ_spheres > 0) json["organ_spheres"] = p.organ_spheres;
   if (p.samples > 0) json["samples"] = p.samples;
-  json["contact" + unit_suffix(quantity_dimension(p.spec.drive))] = rounded(p.contact, kStored);
-  json["offset" + unit_suffix(quantity_dimension(p.spec.response))] = rounded(p.offset, kStored);
+  json["contact" + unit_suffix(quantity_dimension(p.spec.drive))] = rounded(p.contact);
+  json["offset" + unit_suffix(quantity_dimension(p.spec.response))] = rounded(p.offset);
   json["time_s"] = numbers(p.time_s);
   json[drive_key(p)] = numbers(p.imposed);
   json["mean" + suffix] = numbers(p.response);
@@ -95,7 +92,7 @@ Json to_json(const LawPrediction& p) {
   if (p.recording) {
     const PredictedRecording& r = *p.recording;
     json["recording"] = {{"name", r.name},
-                         {"peak" + suffix, rounded(r.peak, kStored)},
+                         {"peak" + suffix, rounded(r.peak)},
                          {"observed" + suffix, numbers(r.observed)},
                          {"fitted", comparison_json(r.fitted, r.peak, suffix)},
                          {"not_fitted", comparison_json(r.held_out, r.peak, suffix)},

@@ -121,7 +121,7 @@ Json variants_json(const FitStudy& study) {
 
 Json held_out_json(const FitStudy& study) {
   return Json{{"held_out", array_json(study.held_out, [](const HeldOutFit& h) {
-                 return Json{{"depth_m", rounded(h.depth_m, 6)}, {"fit", to_json(h.result)}};
+                 return Json{{"depth_m", rounded(h.depth_m)}, {"fit", to_json(h.result)}};
                })}};
 }
 

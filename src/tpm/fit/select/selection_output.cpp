@@ -8,17 +8,13 @@
 namespace tpm::fit {
 namespace {
 
-double kept_digits(double value) {
-  return rounded(value, 6);
-}
-
 Json held_out_json(const Candidate& c) {
   return array_json(c.held_out, [](const HeldOut& h) {
     return Json{{"what", h.what},
-                {"rms_SI", kept_digits(h.rms)},
-                {"rms_over_peak", kept_digits(h.rms_over_peak)},
-                {"rms_over_sd", kept_digits(h.rms_standardised)},
-                {"rms_if_fitted_SI", kept_digits(h.rms_if_fitted)}};
+                {"rms_SI", rounded(h.rms)},
+                {"rms_over_peak", rounded(h.rms_over_peak)},
+                {"rms_over_sd", rounded(h.rms_standardised)},
+                {"rms_if_fitted_SI", rounded(h.rms_if_fitted)}};
   });
 }
 
@@ -29,9 +25,9 @@ Json candidate_json(const Candidate& c) {
     return j;
   }
   j["parameters_estimated"] = c.parameters - 1;
-  j["rms_over_peak"] = kept_digits(c.rms_over_peak);
-  j["delta_bic"] = kept_digits(c.delta_bic);
-  j["delta_aicc"] = kept_digits(c.delta_aicc);
+  j["rms_over_peak"] = rounded(c.rms_over_peak);
+  j["delta_bic"] = rounded(c.delta_bic);
+  j["delta_aicc"] = rounded(c.delta_aicc);
   j["identified"] = c.identified;
   j["reason"] = c.reason;
   if (!c.special.empty()) j["special_case"] = c.special;
@@ -54,14 +50,13 @@ Json to_json(const Selection& s) {
          {"lowest_bic", law_name(s.candidates[s.best_bic].law)},
          {"margin_bic", s.margin},
          {"samples", s.samples},
-         {"effective_readings", kept_digits(s.effective_count)}};
+         {"effective_readings", rounded(s.effective_count)}};
   if (s.drift) {
     j["drift_or_slow_branch"] = {
         {"separable", false},
-        {"k_inf_without_drift_SI", kept_digits(s.drift->k_inf)},
-        {"k_inf_with_drift_SI",
-         s.drift->drifting ? Json(kept_digits(*s.drift->drifting)) : Json(nullptr)},
-        {"drift_SI_per_s", array_json(s.drift->drift_per_s, kept_digits)}};
+        {"k_inf_without_drift_SI", rounded(s.drift->k_inf)},
+        {"k_inf_with_drift_SI", or_null(s.drift->drifting)},
+        {"drift_SI_per_s", array_json(s.drift->drift_per_s, [](double v) { return rounded(v); })}};
   }
   Json laws = array_json(s.candidates, candidate_json);
   j["laws"] = std::move(laws);
@@ -74,7 +69,7 @@ Json to_json(const Selection& s) {
   if (s.preferred) {
     const Candidate& best = s.candidates[*s.preferred];
     j["preferred"] = {{"law", law_name(best.law)},
-                      {"ahead_in_bic", kept_digits(s.candidates[s.recommended].delta_bic)},
+                      {"ahead_in_bic", rounded(s.candidates[s.recommended].delta_bic)},
                       {"not_identified_because", best.reason},
                       {"fit", to_json(best.fit)}};
   }

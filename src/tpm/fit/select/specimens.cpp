@@ -262,7 +262,7 @@ SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
 
 Json to_json(const SpecimenStudy& study) {
   Json j{{"law", law_name(study.law)}, {"why", study.why}};
-  j[si_key(study.law.drive, "reference")] = rounded(study.law.reference, 6);
+  j[si_key(study.law.drive, "reference")] = rounded(study.law.reference);
   j["coefficients_depend_on_reference"] = depends_on_reference(study.law);
   j["recordings"] = array_json(study.rows, [](const SpecimenRow& row) {
     Json entry{{"recording", row.name}, {"fitted", row.fit.has_value()}};
@@ -284,10 +284,10 @@ Json to_json(const SpecimenStudy& study) {
     const RandomEffects& e = p.effects;
     Json entry{{"name", p.parameter.name},
                {"unit", si_symbol(p.parameter.unit.dimension)},
-               {"typical_SI", rounded(p.parameter.natural(e.mean), 6)},
+               {"typical_SI", rounded(p.parameter.natural(e.mean))},
                {"interval_SI",
-                {rounded(p.parameter.natural(e.interval.lower), 6),
-                 rounded(p.parameter.natural(e.interval.upper), 6)}},
+                {rounded(p.parameter.natural(e.interval.lower)),
+                 rounded(p.parameter.natural(e.interval.upper))}},
                {"confidence_level", study.level},
                {"specimens", e.specimens},
                {"left_out", p.left_out},
@@ -299,16 +299,16 @@ Json to_json(const SpecimenStudy& study) {
     const auto sd_key = [&](const char* between) {
       return fmt::format("between_{}_sd_{}", between, of);
     };
-    if (e.tau_squared) entry[sd_key("specimens")] = rounded(std::sqrt(*e.tau_squared), 6);
-    if (e.i_squared) entry["i_squared"] = rounded(*e.i_squared, 6);
-    if (e.q_p_value) entry["spread_p_value"] = rounded(*e.q_p_value, 6);
+    if (e.tau_squared) entry[sd_key("specimens")] = rounded(std::sqrt(*e.tau_squared));
+    if (e.i_squared) entry["i_squared"] = rounded(*e.i_squared);
+    if (e.q_p_value) entry["spread_p_value"] = rounded(*e.q_p_value);
     if (e.repeat_variance) {
-      entry[sd_key("repeats")] = rounded(std::sqrt(*e.repeat_variance), 6);
+      entry[sd_key("repeats")] = rounded(std::sqrt(*e.repeat_variance));
       entry["repeat_degrees_of_freedom"] = e.repeat_degrees;
     }
     if (e.new_specimen) {
-      entry["new_specimen_SI"] = {rounded(p.parameter.natural(e.new_specimen->lower), 6),
-                                  rounded(p.parameter.natural(e.new_specimen->upper), 6)};
+      entry["new_specimen_SI"] = {rounded(p.parameter.natural(e.new_specimen->lower)),
+                                  rounded(p.parameter.natural(e.new_specimen->upper))};
     }
     pooled.push_back(std::move(entry));
   }

@@ -12,8 +12,6 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kKept = 6;  // significant digits in JSON
-
 /// Largest depth above contact among the fitted samples.
 std::optional<double> fitted_depth(const FitResult& fit) {
   const std::vector<LawParameter> table = law_parameters(fit.config.law.value());
@@ -194,17 +192,14 @@ YoungModuli pooled_moduli(const SpecimenStudy& study, const ContactGeometry& geo
 }
 
 Json to_json(const YoungModuli& moduli) {
-  const auto number = [](const std::optional<double>& value) {
-    return value ? Json(rounded(*value, kKept)) : Json(nullptr);
-  };
   Json list = Json::array();
   for (const YoungModulus& m : moduli.moduli) {
     list.push_back({{"name", m.name},
                     {"of", m.of},
                     {"unit", m.unit},
-                    {"estimate_SI", rounded(m.estimate, kKept)},
-                    {"standard_error_SI", number(m.standard_error)},
-                    {"interval_SI", {number(m.lower), number(m.upper)}},
+                    {"estimate_SI", rounded(m.estimate)},
+                    {"standard_error_SI", or_null(m.standard_error)},
+                    {"interval_SI", {or_null(m.lower), or_null(m.upper)}},
                     {"interval_from", m.basis},
                     {"verdict", m.verdict}});
   }
@@ -212,7 +207,7 @@ Json to_json(const YoungModuli& moduli) {
           {"poisson_ratio", moduli.poisson_ratio},
           {"poisson_ratio_provenance", moduli.poisson_assumed ? "assumed" : "given"},
           {"confidence_level", moduli.level},
-          {"depth_reference_m", rounded(moduli.reference_m, kKept)},
+          {"depth_reference_m", rounded(moduli.reference_m)},
           {"moduli", std::move(list)},
           {"warnings", moduli.warnings}};
 }

@@ -13,10 +13,8 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kCells = 6;  // significant digits, as in JSON
-
 std::string cell(double value) {
-  return std::isfinite(value) ? significant(value, kCells) : std::string();
+  return std::isfinite(value) ? significant(value, kResultDigits) : std::string();
 }
 
 std::string cell(const std::optional<double>& value) {
@@ -28,7 +26,7 @@ Json with_conditions(Json rows, double level, const std::optional<LawSpec>& law)
   for (Json& row : rows) {
     row["confidence_level"] = level;
     if (law && depends_on_reference(*law)) {
-      row[si_key(law->drive, "reference")] = rounded(law->reference, kCells);
+      row[si_key(law->drive, "reference")] = rounded(law->reference);
     }
   }
   return rows;

@@ -14,17 +14,6 @@
 namespace tpm::fit {
 namespace {
 
-/// Result numbers carry this many significant digits.
-constexpr int kDigits = 6;
-
-Json number(double value) {
-  return rounded(value, kDigits);
-}
-
-Json optional_number(const std::optional<double>& value) {
-  return value ? number(*value) : Json(nullptr);
-}
-
 /// "eta1_Pa_s": a key that says the unit of its SI value.
 std::string si_key(std::string_view name, Dimension dimension) {
   std::string unit(si_symbol(dimension));
@@ -45,17 +34,17 @@ Json parameter_values(const FitResult& result, const std::vector<double>& natura
   Json values = Json::object();
   for (std::size_t i = 0; i < natural.size(); ++i) {
     const FitParameter& p = result.parameters[i].parameter;
-    values[si_key(p.name, p.unit.dimension)] = number(natural[i]);
+    values[si_key(p.name, p.unit.dimension)] = rounded(natural[i]);
   }
   return values;
 }
 
 Json pair_json(double lower, double upper) {
-  return {number(lower), number(upper)};
+  return {rounded(lower), rounded(upper)};
 }
 
 Json bootstrap_json(const BootstrapParameter& b) {
-  Json j{{"standard_error_SI", number(b.standard_error)}, {"bias_SI", number(b.bias)}};
+  Json j{{"standard_error_SI", rounded(b.standard_error)}, {"bias_SI", rounded(b.bias)}};
   j["percentile_interval_SI"] = pair_json(b.percentile.lower, b.percentile.upper);
   j["bca_interval_SI"] = b.bca ? pair_json(b.bca->lower, b.bca->upper) : Json(nullptr);
   return j;
@@ -71,9 +60,9 @@ Json bootstrap_json(const BootstrapResult& b) {
 }
 
 Json correlation_json(const Correlation& c) {
-  return {{"lag_1", number(c.lag1)},
+  return {{"lag_1", rounded(c.lag1)},
           {"samples", c.count},
-          {"effective_samples", number(c.effective_count)},
+          {"effective_samples", rounded(c.effective_count)},
           {"significant", c.significant},
           {"summary", c.summary}};
 }
@@ -82,7 +71,7 @@ Json conditions_json(const ParameterResult& p) {
   return array_json(p.conditional_on, [](const Condition& c) {
     return Json{{"parameter", c.parameter},
                 {"bound", c.upper ? "upper" : "lower"},
-                {"bound_SI", number(c.value)},
+                {"bound_SI", rounded(c.value)},
                 {"at_estimate", c.at_estimate}};
   });
 }
@@ -90,28 +79,28 @@ Json conditions_json(const ParameterResult& p) {
 Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimated) {
   Json j{{"name", p.parameter.name}, {"SI_unit", si_unit(p.parameter)}};
   j["scale"] = scale_name(p.parameter.scale);
-  j["bounds_SI"] = {number(p.parameter.lower), number(p.parameter.upper)};
-  j["estimate_SI"] = number(p.estimate);
-  j["standard_error_SI"] = optional_number(p.standard_error);
-  j["interval_SI"] = {optional_number(p.lower), optional_number(p.upper)};
+  j["bounds_SI"] = {rounded(p.parameter.lower), rounded(p.parameter.upper)};
+  j["estimate_SI"] = rounded(p.estimate);
+  j["standard_error_SI"] = or_null(p.standard_error);
+  j["interval_SI"] = {or_null(p.lower), or_null(p.upper)};
   j["interval_connected"] = p.profile.connected;
   j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
   j["verdict"] = verdict_text(p);
   if (!p.not_separable.empty()) j["not_separable"] = p.not_separable;
   if (p.with_drift) {
     j["with_drift_SI"] = {
-        {"estimate", number(p.with_drift->estimate)},
-        {"interval", {optional_number(p.with_drift->lower), optional_number(p.with_drift->upper)}}};
+        {"estimate", rounded(p.with_drift->estimate)},
+        {"interval", {or_null(p.with_drift->lower), or_null(p.with_drift->upper)}}};
   }
   if (!p.unconfirmed.empty()) j["unconfirmed"] = p.unconfirmed;
   if (estimated.prior) {
-    j["prior_SI"] = {{"mean", number(estimated.prior->mean)},
-                     {"sd", number(estimated.prior->sd)},
+    j["prior_SI"] = {{"mean", rounded(estimated.prior->mean)},
+                     {"sd", rounded(estimated.prior->sd)},
                      {"from", estimated.prior->from}};
   }
-  if (estimated.drift) j["drift_origin_s"] = number(estimated.drift->origin_s);
+  if (estimated.drift) j["drift_origin_s"] = rounded(estimated.drift->origin_s);
   if (estimated.rise) {
-    j["rise_between_s"] = {number(estimated.rise->begin_s), number(estimated.rise->end_s)};
+    j["rise_between_s"] = {rounded(estimated.rise->begin_s), rounded(estimated.rise->end_s)};
   }
   if (p.nuisance) j["nuisance"] = true;
   if (p.only_if_described) j["only_if_described"] = true;
@@ -121,7 +110,7 @@ Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimate
   if (!p.conditional_on.empty()) j["conditional_on"] = conditions_json(p);
   j["summary"] = p.summary;
   j["profile_SI_and_deviance"] = array_json(p.profile.points, [](const ProfilePoint& point) {
-    return Json{number(point.natural), number(point.deviance)};
+    return Json{rounded(point.natural), rounded(point.deviance)};
   });
   Json failed = Json::array();
   if (has_failed(p.profile.below)) failed.push_back("lower");
@@ -138,7 +127,7 @@ Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimate
 
 Json minima_json(const FitResult& result) {
   return array_json(result.minima, [&](const DistinctMinimum& m) {
-    Json j{{"deviance", number(m.minimum.deviance)}, {"starts", m.starts}};
+    Json j{{"deviance", rounded(m.minimum.deviance)}, {"starts", m.starts}};
     j["converged"] = m.minimum.converged;
     j["parameters"] = parameter_values(result, m.minimum.natural);
     j["lowest"] = parameter_values(result, m.low);
@@ -156,7 +145,8 @@ Json linearised_json(const FitResult& result) {
   const auto decimals = [](double r) { return std::round(r * 1e6) / 1e6 + 0.0; };
   j["correlation"] = array_json(c.correlation.rowwise(),
                                 [&](const auto& row) { return array_json(row, decimals); });
-  j["singular_values_of_scaled_jacobian"] = array_json(c.singular_values, number);
+  j["singular_values_of_scaled_jacobian"] =
+      array_json(c.singular_values, [](double v) { return rounded(v); });
   j["weakest_direction"] = result.weakest_words;
   return j;
 }
@@ -168,20 +158,20 @@ Json data_json(const FitResult& result) {
     };
     Json j{{"dataset", result.config.data[d.datum.choice].dataset}, {"label", d.datum.label}};
     j["quantity"] = quantity_name(d.datum.quantity);
-    if (d.datum.frequency_Hz) j["frequency_Hz"] = number(*d.datum.frequency_Hz);
+    if (d.datum.frequency_Hz) j["frequency_Hz"] = rounded(*d.datum.frequency_Hz);
     j["provenance"] = provenance_name(d.datum.provenance);
     j["role"] = d.datum.held_out ? "held_out" : "fitted";
-    if (d.datum.value) j[key("observed")] = number(*d.datum.value);
-    if (d.datum.lower) j[key("band")] = {number(*d.datum.lower), number(*d.datum.upper)};
-    j[key("predicted")] = number(d.predicted);
-    if (d.predicted_sd) j[key("predicted_sd")] = number(*d.predicted_sd);
+    if (d.datum.value) j[key("observed")] = rounded(*d.datum.value);
+    if (d.datum.lower) j[key("band")] = {rounded(*d.datum.lower), rounded(*d.datum.upper)};
+    j[key("predicted")] = rounded(d.predicted);
+    if (d.predicted_sd) j[key("predicted_sd")] = rounded(*d.predicted_sd);
     if (d.confidence) {
       j[key("confidence_band")] = pair_json(d.confidence->lower, d.confidence->upper);
     }
     if (d.prediction) {
       j[key("prediction_band")] = pair_json(d.prediction->lower, d.prediction->upper);
     }
-    j["standardised_residual"] = number(d.standardised);
+    j["standardised_residual"] = rounded(d.standardised);
     return j;
   });
 }
@@ -195,10 +185,10 @@ Json recordings_json(const FitResult& result) {
     j["provenance"] = provenance_name(r.provenance);
     j["samples"] = r.time_s.size();
     j["samples_fitted"] = fitted;
-    j[tpm::si_key(r.response_quantity, "peak")] = number(r.peak);
-    j[tpm::si_key(r.response_quantity, "rms_residual")] = number(r.rms_residual);
+    j[tpm::si_key(r.response_quantity, "peak")] = rounded(r.peak);
+    j[tpm::si_key(r.response_quantity, "rms_residual")] = rounded(r.rms_residual);
     if (r.rms_outside) {
-      j[tpm::si_key(r.response_quantity, "rms_residual_outside")] = number(*r.rms_outside);
+      j[tpm::si_key(r.response_quantity, "rms_residual_outside")] = rounded(*r.rms_outside);
     }
     if (const auto count = std::count(r.censored.begin(), r.censored.end(), true); count > 0) {
       j["samples_censored"] = count;
@@ -207,7 +197,7 @@ Json recordings_json(const FitResult& result) {
       j["outliers_left_out"] = count;
     }
     if (r.not_predicted > 0) j["samples_not_predicted"] = r.not_predicted;
-    j["share_inside_prediction_band"] = optional_number(r.share_inside);
+    j["share_inside_prediction_band"] = or_null(r.share_inside);
     if (r.correlation) j["correlation"] = correlation_json(*r.correlation);
     return j;
   });
@@ -215,9 +205,9 @@ Json recordings_json(const FitResult& result) {
 
 Json hypotheses_json(const FitResult& result) {
   return array_json(result.hypotheses, [&](const HypothesisResult& h) {
-    Json j{{"name", h.hypothesis.name}, {"deviance", number(h.minimum.deviance)}};
-    j["rise"] = number(h.rise);
-    j["p_value"] = number(h.p_value);
+    Json j{{"name", h.hypothesis.name}, {"deviance", rounded(h.minimum.deviance)}};
+    j["rise"] = rounded(h.rise);
+    j["p_value"] = rounded(h.p_value);
     j["excluded"] = h.excluded;
     j["parameters"] = parameter_values(result, h.minimum.natural);
     j["summary"] = h.summary;
@@ -229,34 +219,34 @@ Json assumptions_json(const FitConfig& config) {
   return array_json(config.data, [&](const DataChoice& d) {
     Json j{{"dataset", d.dataset}, {"protocol", protocol_kind_name(d.protocol.kind)}};
     if (d.protocol.kind == ProtocolChoice::Kind::ramp_hold) {
-      j["rate_m_per_s"] = number(d.protocol.rate_m_per_s);
+      j["rate_m_per_s"] = rounded(d.protocol.rate_m_per_s);
       if (d.protocol.rate_provenance) {
         j["rate_provenance"] = provenance_name(*d.protocol.rate_provenance);
       }
     }
     if (d.protocol.operating_depth) {
       const Dimension depth = quantity_dimension(config.law.value().drive);
-      j[si_key("operating_depth", depth)] = number(*d.protocol.operating_depth);
+      j[si_key("operating_depth", depth)] = rounded(*d.protocol.operating_depth);
     }
     if (d.stiffness_per_modulus_m) {
-      j["stiffness_per_modulus_m"] = number(*d.stiffness_per_modulus_m);
+      j["stiffness_per_modulus_m"] = rounded(*d.stiffness_per_modulus_m);
     }
     j["noise"] = noise_kind_name(d.noise.kind);
     if (d.noise.shape != ErrorShape::normal) {
       j["noise_distribution"] = error_shape_name(d.noise.shape);
     }
     if (d.noise.shape == ErrorShape::student_t) {
-      j["noise_degrees_of_freedom"] = number(d.noise.degrees_of_freedom);
+      j["noise_degrees_of_freedom"] = rounded(d.noise.degrees_of_freedom);
     }
     if (!d.sigma_b.empty()) {
       j["noise_relative_parameter"] = d.sigma_b;
     } else if (uses_relative(d.noise.kind)) {
-      j["noise_relative"] = number(d.noise.relative);
+      j["noise_relative"] = rounded(d.noise.relative);
     }
     if (!d.sigma_a.empty()) {
       j["noise_absolute_parameter"] = d.sigma_a;
     } else if (d.noise.absolute > 0.0) {
-      j["noise_absolute_SI"] = number(d.noise.absolute);
+      j["noise_absolute_SI"] = rounded(d.noise.absolute);
     }
     j["noise_scale"] = d.noise.scale_known ? "known" : "estimated";
     return j;
@@ -270,11 +260,11 @@ namespace {
 /// -2 ln L and the criteria; null where there is no likelihood.
 void add_likelihood(Json& j, const std::optional<Likelihood>& likelihood) {
   const auto value = [&](double Likelihood::*member) {
-    return likelihood ? number((*likelihood).*member) : Json(nullptr);
+    return likelihood ? Json(rounded((*likelihood).*member)) : Json(nullptr);
   };
   j["minus_two_log_likelihood"] = value(&Likelihood::minus_two_log);
   j["AIC"] = value(&Likelihood::aic);
-  j["AICc"] = likelihood ? optional_number(likelihood->aicc) : Json(nullptr);
+  j["AICc"] = likelihood ? or_null(likelihood->aicc) : Json(nullptr);
   j["BIC"] = value(&Likelihood::bic);
   if (likelihood) j["parameters_counted"] = likelihood->parameters;
 }
@@ -286,31 +276,31 @@ Json to_json(const FitResult& result) {
          {"model", result.config.law ? law_name(*result.config.law) : result.config.model}};
   if (result.config.law) {
     const LawSpec& law = *result.config.law;
-    j[tpm::si_key(law.drive, "reference")] = number(law.reference);
+    j[tpm::si_key(law.drive, "reference")] = rounded(law.reference);
     j["coefficients_depend_on_reference"] = depends_on_reference(law);
   }
   j["choices"] = assumptions_json(result.config);
   j["values_fitted"] = result.value_count;
   j["bands_fitted"] = result.band_count;
-  j["chi_square"] = number(result.chi_square);
-  j["deviance"] = number(result.best.deviance);
+  j["chi_square"] = rounded(result.chi_square);
+  j["deviance"] = rounded(result.best.deviance);
   j["degrees_of_freedom"] = result.degrees_of_freedom;
-  j["chi_square_p_value"] = optional_number(result.chi_square_p);
-  j["variance_factor"] = number(result.variance_factor);
+  j["chi_square_p_value"] = or_null(result.chi_square_p);
+  j["variance_factor"] = rounded(result.variance_factor);
   add_likelihood(j, result.likelihood);
   if (result.correlation) {
     j["residual_correlation"] = correlation_json(*result.correlation);
-    j["residual_correlation"]["inflation"] = number(result.inflation);
+    j["residual_correlation"]["inflation"] = rounded(result.inflation);
     if (result.noise) {
       const NoiseOfEstimates& noise = *result.noise;
-      j["noise_of_estimates"] = {{"phi", number(noise.phi)},
-                                 {"step_s", number(noise.step_s)},
-                                 {"beyond", number(noise.beyond)},
+      j["noise_of_estimates"] = {{"phi", rounded(noise.phi)},
+                                 {"step_s", rounded(noise.step_s)},
+                                 {"beyond", rounded(noise.beyond)},
                                  {"summary", noise.summary}};
       j["noise_of_estimates"]["parameters"] = array_json(noise.of, [&](const NoiseOfEstimate& e) {
-        return Json{{"degrees_of_freedom", number(e.degrees)},
+        return Json{{"degrees_of_freedom", rounded(e.degrees)},
                     {"bias_of_rounding_in_standard_errors",
-                     e.variance_ratio > 0.0 ? number(e.bias / std::sqrt(e.variance_ratio))
+                     e.variance_ratio > 0.0 ? Json(rounded(e.bias / std::sqrt(e.variance_ratio)))
                                             : Json(nullptr)}};
       });
     }
@@ -328,7 +318,8 @@ Json to_json(const FitResult& result) {
   j["starts"] = {{"run", result.starts_run},       {"looked_at", starts_looked_at(result)},
                  {"failed", result.starts_failed}, {"agreeing_to_5_digits", result.starts_agreeing},
                  {"seed", result.config.seed},     {"summary", result.waterfall.summary}};
-  j["starts"]["end_deviances"] = array_json(result.waterfall.deviances, number);
+  j["starts"]["end_deviances"] =
+      array_json(result.waterfall.deviances, [](double v) { return rounded(v); });
   if (result.bootstrap) j["bootstrap"] = bootstrap_json(*result.bootstrap);
   j["minima"] = minima_json(result);
   j["hypotheses"] = hypotheses_json(result);

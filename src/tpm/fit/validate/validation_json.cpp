@@ -11,51 +11,45 @@
 namespace tpm::fit {
 namespace {
 
-constexpr int kStoredDigits = 6;
-
-double stored(double value) {
-  return rounded(value, kStoredDigits);
-}
-
 void put_error(Json& j, const ErrorWithUncertainty& e) {
-  j["E"] = stored(e.error);
-  j["u_val"] = stored(e.u_val);
-  if (std::isfinite(e.degrees)) j["degrees_of_freedom"] = stored(e.degrees);
-  j["k"] = stored(e.coverage);
-  j["U"] = stored(e.expanded());
+  j["E"] = rounded(e.error);
+  j["u_val"] = rounded(e.u_val);
+  if (std::isfinite(e.degrees)) j["degrees_of_freedom"] = rounded(e.degrees);
+  j["k"] = rounded(e.coverage);
+  j["U"] = rounded(e.expanded());
 }
 
 Json quantity_json(const QuantityComparison& q) {
   Json j{{"quantity", q.name},
          {"unit", q.unit.symbol},
-         {"S", stored(q.simulated)},
-         {"D", stored(q.measured)}};
+         {"S", rounded(q.simulated)},
+         {"D", rounded(q.measured)}};
   put_error(j, q.e);
-  j["u_num"] = stored(q.u_num);
-  j["u_input"] = stored(q.u_input);
-  j["u_D"] = stored(q.u_D);
+  j["u_num"] = rounded(q.u_num);
+  j["u_input"] = rounded(q.u_input);
+  j["u_D"] = rounded(q.u_D);
   j["parts"] = array_json(q.parts, [](const UncertaintyPart& part) {
-    return Json{{"name", part.name}, {"u", stored(part.u)}};
+    return Json{{"name", part.name}, {"u", rounded(part.u)}};
   });
   j["numerical"] = array_json(q.numerical, [](const UncertaintyPart& part) {
-    return Json{{"name", part.name}, {"u", stored(part.u)}};
+    return Json{{"name", part.name}, {"u", rounded(part.u)}};
   });
-  if (q.limit) j["R"] = stored(*q.limit);
+  if (q.limit) j["R"] = rounded(*q.limit);
   j["verdict"] = verdict_key(q.verdict);
-  j["p_value"] = stored(q.p_value);
+  j["p_value"] = rounded(q.p_value);
   j["rejected_by_holm"] = q.rejected;
   if (!q.remark.empty()) j["remark"] = q.remark;
   return j;
 }
 
 Json applicability_json(const Applicability& a) {
-  Json j{{"depth_SI", stored(a.depth)},
-         {"duration_s", stored(a.duration_s)},
-         {"rate_SI_per_s", stored(a.rate)}};
-  if (a.fitted_depth) j["calibration_depth_SI"] = stored(*a.fitted_depth);
-  if (a.fitted_duration_s) j["calibration_duration_s"] = stored(*a.fitted_duration_s);
-  if (a.slowest) j["calibration_slowest_SI_per_s"] = stored(*a.slowest);
-  if (a.fastest) j["calibration_fastest_SI_per_s"] = stored(*a.fastest);
+  Json j{{"depth_SI", rounded(a.depth)},
+         {"duration_s", rounded(a.duration_s)},
+         {"rate_SI_per_s", rounded(a.rate)}};
+  if (a.fitted_depth) j["calibration_depth_SI"] = rounded(*a.fitted_depth);
+  if (a.fitted_duration_s) j["calibration_duration_s"] = rounded(*a.fitted_duration_s);
+  if (a.slowest) j["calibration_slowest_SI_per_s"] = rounded(*a.slowest);
+  if (a.fastest) j["calibration_fastest_SI_per_s"] = rounded(*a.fastest);
   j["outside"] = a.outside;
   j["unknown"] = a.unknown;
   return j;
@@ -66,59 +60,59 @@ Json recording_json(const RecordingComparison& r, const Applicability& a, const 
   if (r.creep) j["load_imposed"] = true;
   if (!r.pick.empty()) j["pick"] = r.pick;
   if (!r.fillings.empty()) j["u_num_of_spheres"] = r.fillings;
-  Json part{{"from_s", stored(r.part.from_s)},
-            {"corner_s", stored(r.part.corner_s)},
-            {"to_s", stored(r.part.to_s)},
-            {"depth_SI", stored(r.part.depth)},
-            {"depth_of_all_SI", stored(r.part.depth_of_all)},
-            {"hold_s", stored(r.part.hold_s)},
-            {"loaded_s", stored(r.part.loaded_s)},
-            {"left_out_s", stored(r.part.left_out_s)},
+  Json part{{"from_s", rounded(r.part.from_s)},
+            {"corner_s", rounded(r.part.corner_s)},
+            {"to_s", rounded(r.part.to_s)},
+            {"depth_SI", rounded(r.part.depth)},
+            {"depth_of_all_SI", rounded(r.part.depth_of_all)},
+            {"hold_s", rounded(r.part.hold_s)},
+            {"loaded_s", rounded(r.part.loaded_s)},
+            {"left_out_s", rounded(r.part.left_out_s)},
             {"whole", r.part.whole()},
             {"summary", part_words(r, law)}};
   if (r.part.hold_asked_s) {
-    part["hold_asked_s"] = stored(*r.part.hold_asked_s);
+    part["hold_asked_s"] = rounded(*r.part.hold_asked_s);
   }
   j["compared"] = std::move(part);
   j["quantities"] = array_json(r.quantities, quantity_json);
   j["not_compared"] = r.without;
   Json joint{{"rank", r.joint.rank}};
   if (r.joint.rank > 0) {
-    joint["T_squared"] = stored(r.joint.t_squared);
-    joint["F"] = stored(r.joint.f);
-    joint["p_value"] = stored(r.joint.p_value);
-    if (std::isfinite(r.joint.degrees)) joint["degrees_of_freedom"] = stored(r.joint.degrees);
+    joint["T_squared"] = rounded(r.joint.t_squared);
+    joint["F"] = rounded(r.joint.f);
+    joint["p_value"] = rounded(r.joint.p_value);
+    if (std::isfinite(r.joint.degrees)) joint["degrees_of_freedom"] = rounded(r.joint.degrees);
   }
   joint["dependent"] = r.joint.dependent;
   if (!r.joint.unknown.empty()) joint["without"] = r.joint.unknown;
   j["together"] = joint;
   j["curve"] = {{"samples", r.curve.samples},
-                {"mean_square_E", stored(r.curve.mean_square_error)},
-                {"mean_square_u", stored(r.curve.mean_square_u)},
-                {"chi_squared", stored(r.curve.chi_squared)}};
+                {"mean_square_E", rounded(r.curve.mean_square_error)},
+                {"mean_square_u", rounded(r.curve.mean_square_u)},
+                {"chi_squared", rounded(r.curve.chi_squared)}};
   const ValidationPlacement& p = r.placement;
-  Json placement{{"contact", stored(p.contact)},    {"contact_u", stored(p.contact_u)},
-                 {"contact_from", p.contact_words}, {"zero", stored(p.zero)},
-                 {"zero_u", stored(p.zero_u)},      {"zero_readings", p.zero_readings}};
+  Json placement{{"contact", rounded(p.contact)},   {"contact_u", rounded(p.contact_u)},
+                 {"contact_from", p.contact_words}, {"zero", rounded(p.zero)},
+                 {"zero_u", rounded(p.zero_u)},     {"zero_readings", p.zero_readings}};
   if (p.drift) {
-    placement["zero_drift_per_s"] = stored(p.drift->per_s);
-    placement["zero_drift_u_per_s"] = stored(p.drift->u_per_s);
+    placement["zero_drift_per_s"] = rounded(p.drift->per_s);
+    placement["zero_drift_u_per_s"] = rounded(p.drift->u_per_s);
   }
-  if (p.onset) placement["onset"] = stored(*p.onset);
-  if (p.onset_u) placement["onset_u"] = stored(*p.onset_u);
-  if (p.contact_moved) placement["contact_moved_in_u"] = stored(*p.contact_moved);
-  if (p.zero_moved) placement["zero_moved_in_u"] = stored(*p.zero_moved);
+  if (p.onset) placement["onset"] = rounded(*p.onset);
+  if (p.onset_u) placement["onset_u"] = rounded(*p.onset_u);
+  if (p.contact_moved) placement["contact_moved_in_u"] = rounded(*p.contact_moved);
+  if (p.zero_moved) placement["zero_moved_in_u"] = rounded(*p.zero_moved);
   j["placement"] = placement;
-  j["scatter"] = {{"sigma", stored(r.scatter.sigma)},
-                  {"phi", stored(r.scatter.phi)},
-                  {"degrees_of_freedom", stored(r.scatter.degrees)},
+  j["scatter"] = {{"sigma", rounded(r.scatter.sigma)},
+                  {"phi", rounded(r.scatter.phi)},
+                  {"degrees_of_freedom", rounded(r.scatter.degrees)},
                   {"from", r.scatter.told_by}};
   if (!r.rises.empty()) {
     j["unseen_rises"] = array_json(r.rises, [](const UnseenRise& rise) {
-      return Json{{"begin_s", stored(rise.begin_s)},
-                  {"end_s", stored(rise.end_s)},
-                  {"delay_s", stored(rise.expected().delay_s)},
-                  {"u_s", stored(rise.u_s())}};
+      return Json{{"begin_s", rounded(rise.begin_s)},
+                  {"end_s", rounded(rise.end_s)},
+                  {"delay_s", rounded(rise.expected().delay_s)},
+                  {"u_s", rounded(rise.u_s())}};
     });
   }
   if (r.instrument) j["instrument"] = r.instrument->stated;
@@ -135,25 +129,25 @@ Json pooled_json(const PooledQuantity& p) {
          {"recordings", p.recordings},
          {"share_of_S", p.relative}};
   if (!p.relative) {
-    j["S"] = stored(p.simulated);
-    j["D"] = stored(p.measured);
+    j["S"] = rounded(p.simulated);
+    j["D"] = rounded(p.measured);
   }
   put_error(j, p.e);
-  j["u_shared"] = stored(p.u_shared);
-  j["sd_between"] = stored(p.between);
-  if (p.limit) j["R"] = stored(*p.limit);
+  j["u_shared"] = rounded(p.u_shared);
+  j["sd_between"] = rounded(p.between);
+  if (p.limit) j["R"] = rounded(*p.limit);
   if (p.limit_at) j["R_at"] = *p.limit_at;
   j["verdict"] = verdict_key(p.verdict);
-  j["p_value"] = stored(p.p_value);
+  j["p_value"] = rounded(p.p_value);
   j["rejected_by_holm"] = p.rejected;
   if (!p.remark.empty()) j["remark"] = p.remark;
   if (p.area) {
-    Json area{{"area", stored(p.area->area)},
-              {"mean_of_draws", stored(p.area->null_mean)},
-              {"upper_95_of_draws", stored(p.area->null_95)},
-              {"p_value", stored(p.area->p_value)}};
-    if (p.area->lower) area["lower"] = stored(*p.area->lower);
-    if (p.area->upper) area["upper"] = stored(*p.area->upper);
+    Json area{{"area", rounded(p.area->area)},
+              {"mean_of_draws", rounded(p.area->null_mean)},
+              {"upper_95_of_draws", rounded(p.area->null_95)},
+              {"p_value", rounded(p.area->p_value)}};
+    if (p.area->lower) area["lower"] = rounded(*p.area->lower);
+    if (p.area->upper) area["upper"] = rounded(*p.area->upper);
     if (p.area_at) area["at"] = *p.area_at;
     j["area_metric"] = area;
   }
@@ -176,8 +170,8 @@ Json to_json(const Validation& v) {
     j["session"] = v.session;
     j["rendering"] = array_json(v.rendering, [&v](const RenderingError& e) {
       return Json{{"quantity", quantity_words(e.quantity, v.spec.drive, v.spec.response)},
-                  {"mean", stored(e.mean)},
-                  {"limit", stored(e.limit)},
+                  {"mean", rounded(e.mean)},
+                  {"limit", rounded(e.limit)},
                   {"presses", e.presses}};
     });
   }
@@ -191,8 +185,8 @@ Json to_json(const Validation& v) {
                                        : quantity_words(s.quantity, law.drive, law.response)},
                   {"load_imposed", s.creep},
                   {"recordings", s.recordings},
-                  {"tau_share_of_S", stored(s.tau())},
-                  {"tau_share_of_S_at_most", stored(s.tau_at_most())},
+                  {"tau_share_of_S", rounded(s.tau())},
+                  {"tau_share_of_S_at_most", rounded(s.tau_at_most())},
                   {"degrees_of_freedom", s.degrees()}};
     });
   }

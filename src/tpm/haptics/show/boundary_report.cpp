@@ -11,7 +11,6 @@
 namespace tpm::haptics {
 namespace {
 
-constexpr int kBoundaryDigits = 6;
 const Axis kRate{"rate", "Hz", true};
 
 constexpr auto kRuleWords =
@@ -19,18 +18,14 @@ constexpr auto kRuleWords =
                                       {ElementRule::forward_euler, "TPM, forward Euler"},
                                       {ElementRule::mass_spring, "MSM"}});
 
-Json number_or_null(double value) {
-  return std::isfinite(value) ? Json(rounded(value, kBoundaryDigits)) : Json(nullptr);
-}
-
 Json points_json(const std::vector<BoundaryPoint>& points, const char* measured,
                  const char* predicted) {
   return array_json(points, [&](const BoundaryPoint& p) {
-    return Json{{"rate_Hz", rounded(p.rate_Hz, kBoundaryDigits)},
-                {"delay_s", rounded(p.delay_periods / p.rate_Hz, kBoundaryDigits)},
-                {"damping_N_s_per_m", rounded(p.damping_N_s_per_m, kBoundaryDigits)},
-                {measured, number_or_null(p.measured)},
-                {predicted, number_or_null(p.predicted)}};
+    return Json{{"rate_Hz", rounded(p.rate_Hz)},
+                {"delay_s", rounded(p.delay_periods / p.rate_Hz)},
+                {"damping_N_s_per_m", rounded(p.damping_N_s_per_m)},
+                {measured, or_null(p.measured)},
+                {predicted, or_null(p.predicted)}};
   });
 }
 
@@ -139,13 +134,13 @@ Json impacts_json(const BoundaryStudy& study) {
     Json json{{"delay_periods", p.delay_periods},
               {"speed_m_per_s", p.speed_m_per_s},
               {"share_of_linear_boundary", p.share},
-              {"stiffness_N_per_m", rounded(p.stiffness_N_per_m, kBoundaryDigits)}};
+              {"stiffness_N_per_m", rounded(p.stiffness_N_per_m)}};
     Json by_limit = Json::object();
     for (const RiseLimit limit : kRiseLimits) {
       const auto which = static_cast<std::size_t>(limit);
       by_limit[std::string(to_string(limit))] = {
           {"comes_to_rest", p.rests[which]},
-          {"delivered_to_hand_J", number_or_null(p.delivered_J[which])}};
+          {"delivered_to_hand_J", or_null(p.delivered_J[which])}};
     }
     json["by_limit_of_rise"] = std::move(by_limit);
     return json;
@@ -258,14 +253,14 @@ Figure impact_figure(const BoundaryStudy& study) {
 Json boundary_json(const BoundaryStudy& study) {
   const Json rules = array_json(study.rules, [](const RulePoint& p) {
     return Json{{"rule", word_for(kRuleWords, p.rule)},
-                {"relaxation_time_s", rounded(p.relaxation_time_s, kBoundaryDigits)},
-                {"measured_N_s_per_m", number_or_null(p.measured_N_s_per_m)},
-                {"predicted_N_s_per_m", number_or_null(p.predicted_N_s_per_m)}};
+                {"relaxation_time_s", rounded(p.relaxation_time_s)},
+                {"measured_N_s_per_m", or_null(p.measured_N_s_per_m)},
+                {"predicted_N_s_per_m", or_null(p.predicted_N_s_per_m)}};
   });
   return {{"simulated_device", true},
           {"assumptions", assumptions_of(study.plant)},
-          {"relaxation_time_s", rounded(study.relaxation_time_s, kBoundaryDigits)},
-          {"stiffness_N_per_m", rounded(study.stiffness_N_per_m, kBoundaryDigits)},
+          {"relaxation_time_s", rounded(study.relaxation_time_s)},
+          {"stiffness_N_per_m", rounded(study.stiffness_N_per_m)},
           {"passive", points_json(study.passive, "measured_N_per_m", "predicted_N_per_m")},
           {"stable", points_json(study.stable, "measured_N_per_m", "predicted_N_per_m")},
           {"rules", rules},
@@ -273,8 +268,8 @@ Json boundary_json(const BoundaryStudy& study) {
           {"shortest_exact", points_json(study.shortest_exact, "measured_s", "predicted_s")},
           {"impacts", impacts_json(study)},
           {"device_corners", corner_table().list(study.corners)},
-          {"worst_passive", rounded(worst_difference(study.passive), kBoundaryDigits)},
-          {"worst_stable", rounded(worst_difference(study.stable), kBoundaryDigits)}};
+          {"worst_passive", rounded(worst_difference(study.passive))},
+          {"worst_stable", rounded(worst_difference(study.stable))}};
 }
 
 std::string boundary_text(const BoundaryStudy& study) {

@@ -17,8 +17,6 @@
 namespace tpm::haptics {
 namespace {
 
-constexpr int kHilDigits = 6;
-
 std::string us(double seconds) {
   const double value = 1e6 * seconds;
   return value < 1000.0 ? significant(value, 3) : fmt::format("{:.0f}", value);
@@ -43,10 +41,10 @@ std::string times_text(const char* what, const TimeHistogram& times) {
 /// Null if nothing was counted: the first cycle hung.
 Json times_json(const TimeHistogram& times) {
   if (times.count() == 0) return {};
-  return {{"p50_s", rounded(times.quantile_s(0.5), kHilDigits)},
-          {"p99_s", rounded(times.quantile_s(0.99), kHilDigits)},
-          {"p999_s", rounded(times.quantile_s(0.999), kHilDigits)},
-          {"max_s", rounded(times.max_s(), kHilDigits)}};
+  return {{"p50_s", rounded(times.quantile_s(0.5))},
+          {"p99_s", rounded(times.quantile_s(0.99))},
+          {"p999_s", rounded(times.quantile_s(0.999))},
+          {"max_s", rounded(times.max_s())}};
 }
 
 /// Counts in bins that double in width: up to 1 us, 2 us, 4 us, ...
@@ -79,14 +77,11 @@ std::string extrapolation_of(const JitterCheck& check) {
 }
 
 Json stalls_json(const JitterCheck& check) {
-  const auto or_null = [](const std::optional<double>& value) {
-    return value ? Json(rounded(*value, kHilDigits)) : Json();
-  };
   const TimeHistogram& late = check.outcome.woke_late;
   const bool counted = late.count() > 0;
   return {{"beyond_watchdog", counted ? Json(stalls_beyond_watchdog(check)) : Json()},
-          {"p9999_s", counted ? Json(rounded(late.quantile_s(0.9999), kHilDigits)) : Json()},
-          {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
+          {"p9999_s", counted ? or_null(late.quantile_s(0.9999)) : Json()},
+          {"watchdog_s", rounded(check.watchdog_s)},
           {"once_an_hour_extrapolated_s", or_null(once_an_hour_s(check))},
           {"extrapolation", extrapolation_of(check)},
           {"upper_95_per_s", or_null(most_stalls_per_s(check))},
@@ -138,9 +133,9 @@ std::string session_verdict_text(const SessionVerdict& session) {
 
 Json fidelity_json(const ForceFidelity& f) {
   return {{"instants", f.instants},
-          {"rms_N", rounded(f.rms_N, kHilDigits)},
-          {"max_N", rounded(f.max_N, kHilDigits)},
-          {"peak_N", rounded(f.peak_N, kHilDigits)}};
+          {"rms_N", rounded(f.rms_N)},
+          {"max_N", rounded(f.max_N)},
+          {"peak_N", rounded(f.peak_N)}};
 }
 
 std::string share(double part_N, double peak_N) {
@@ -196,14 +191,14 @@ Json check_json(const JitterCheck& check) {
   const ServoOutcome& o = check.outcome;
   Json bins = Json::array();
   for (const auto& [edge, count] : octaves(o.woke_late)) {
-    bins.push_back({{"up_to_s", rounded(edge, kHilDigits)}, {"cycles", count}});
+    bins.push_back({{"up_to_s", rounded(edge)}, {"cycles", count}});
   }
   return {{"simulated_device", !check.device.hardware},
           {"device", to_json(check.device)},
           {"host", host_line()},
           {"scheduling", o.scheduling},
-          {"rate_Hz", rounded(check.rate_Hz, kHilDigits)},
-          {"duration_s", rounded(check.duration_s, kHilDigits)},
+          {"rate_Hz", rounded(check.rate_Hz)},
+          {"duration_s", rounded(check.duration_s)},
           {"cycles", o.cycles},
           {"late_cycles", o.counts.late},
           {"missed_periods", o.counts.missed},
@@ -220,8 +215,8 @@ Json check_json(const JitterCheck& check) {
           {"device_findings", to_json(check.findings)},
           {"most_consecutive_missed", o.counts.most_consecutive_missed},
           {"most_late_of_1000", o.counts.most_late},
-          {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
-          {"cycle_timeout_s", rounded(check.cycle_timeout_s, kHilDigits)},
+          {"watchdog_s", rounded(check.watchdog_s)},
+          {"cycle_timeout_s", rounded(check.cycle_timeout_s)},
           {"timing_kept", check.timing_kept},
           {"timing", check.timing},
           {"advice", check.advice},
@@ -269,10 +264,10 @@ Json run_json(const HilSession& session, const SessionRun& run) {
           {"rendering", to_json(run.rendering)},
           {"stands_for", run.on_hardware ? Json(run.hardware_kind) : Json()},
           {"rendering_on_hardware", on_hardware_json(run.on_hardware)},
-          {"rate_Hz", rounded(1.0 / session.servo.period_s, kHilDigits)},
-          {"duration_s", rounded(session.duration_s(), kHilDigits)},
+          {"rate_Hz", rounded(1.0 / session.servo.period_s)},
+          {"duration_s", rounded(session.duration_s())},
           {"phases", session.phases.size()},
-          {"largest_force_N", rounded(run.largest_force_N, kHilDigits)},
+          {"largest_force_N", rounded(run.largest_force_N)},
           {"perceptible", run.largest_force_N >= kLeastFeltForce_N},
           {"time", run.outcome.real_time ? "real" : "virtual"},
           {"outcome", outcome}};
@@ -312,37 +307,36 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
   for (const CrossCheck& o : v.others) {
     Json json = fidelity_json(o.commanded);
     json["name"] = o.name;
-    json["start_s"] = rounded(o.start_s, kHilDigits);
-    json["end_s"] = rounded(o.end_s, kHilDigits);
-    json["apart_from_reference_N"] = rounded(o.apart_N, kHilDigits);
+    json["start_s"] = rounded(o.start_s);
+    json["end_s"] = rounded(o.end_s);
+    json["apart_from_reference_N"] = rounded(o.apart_N);
     others.push_back(std::move(json));
   }
   std::vector<std::string> notes = recording_remarks(recording);
   notes.insert(notes.end(), v.notes.begin(), v.notes.end());
-  return {
-      {"simulated_device", recording.simulated()},
-      {"recording", recording.name},
-      {"device", recording.header.at("device")},
-      {"model", recording.header.at("model")},
-      {"reference", v.reference},
-      {"whole", v.whole},
-      {"damaged_rows", recording.damaged},
-      {"end", recording.cause()},
-      {"end_detail", recording.ended.detail},
-      {"device_findings", to_json(recording.ended.device_findings)},
-      {"without_equilibrium", v.without_equilibrium},
-      {"notes", notes},
-      {"end_s", rounded(v.end_s, kHilDigits)},
-      {"asked_s", rounded(recording.session.duration_s(), kHilDigits)},
-      {"knots", v.knots},
-      {"motion_tolerance_m", v.motion_tolerance_m},
-      {"motion_error_N", v.motion_error_N ? Json(rounded(*v.motion_error_N, kHilDigits)) : Json()},
-      {"reference_error_N", rounded(v.reference_error_N, kHilDigits)},
-      {"model_error_N", rounded(v.model_error_N, kHilDigits)},
-      {"all", fidelity_json(v.all)},
-      {"phases", phase_table(v).list(v.phases)},
-      {"others", others},
-      {"experiment", experiment_table(v).list(v.experiment)}};
+  return {{"simulated_device", recording.simulated()},
+          {"recording", recording.name},
+          {"device", recording.header.at("device")},
+          {"model", recording.header.at("model")},
+          {"reference", v.reference},
+          {"whole", v.whole},
+          {"damaged_rows", recording.damaged},
+          {"end", recording.cause()},
+          {"end_detail", recording.ended.detail},
+          {"device_findings", to_json(recording.ended.device_findings)},
+          {"without_equilibrium", v.without_equilibrium},
+          {"notes", notes},
+          {"end_s", rounded(v.end_s)},
+          {"asked_s", rounded(recording.session.duration_s())},
+          {"knots", v.knots},
+          {"motion_tolerance_m", v.motion_tolerance_m},
+          {"motion_error_N", or_null(v.motion_error_N)},
+          {"reference_error_N", rounded(v.reference_error_N)},
+          {"model_error_N", rounded(v.model_error_N)},
+          {"all", fidelity_json(v.all)},
+          {"phases", phase_table(v).list(v.phases)},
+          {"others", others},
+          {"experiment", experiment_table(v).list(v.experiment)}};
 }
 
 std::string motion_cost(const Verification& v, double per_newton, std::string_view unit) {

@@ -54,12 +54,9 @@ std::vector<Figure> all_figures(const PaperReport& report) {
   return figures;
 }
 
-/// Results carry 6 significant digits, so that machines whose last bits differ write the same.
-constexpr int kPaperDigits = 6;
-
 void round_numbers(Json& value) {
   if (value.is_number_float()) {
-    value = rounded(value.get<double>(), kPaperDigits);
+    value = rounded(value.get<double>());
   } else if (value.is_structured()) {
     for (auto& item : value) round_numbers(item);
   }

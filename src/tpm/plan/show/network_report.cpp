@@ -8,12 +8,8 @@
 namespace tpm::plan {
 namespace {
 
-constexpr int kNetworkDigits = 6;
-
 Json spread_json(const Spread& s) {
-  return {{"min", rounded(s.min, kNetworkDigits)},
-          {"mean", rounded(s.mean, kNetworkDigits)},
-          {"max", rounded(s.max, kNetworkDigits)}};
+  return {{"min", rounded(s.min)}, {"mean", rounded(s.mean)}, {"max", rounded(s.max)}};
 }
 
 std::string spread_words(const Spread& s) {
@@ -34,11 +30,11 @@ Json layer_json(const NetworkInspection& inspection, std::size_t k) {
 
 Json moduli_json(const std::optional<EffectiveModuli>& moduli) {
   if (!moduli) return nullptr;
-  return {{"E_Pa", rounded(moduli->mean_young_Pa(), kNetworkDigits)},
-          {"E_least_Pa", rounded(moduli->young_Pa.minCoeff(), kNetworkDigits)},
-          {"E_most_Pa", rounded(moduli->young_Pa.maxCoeff(), kNetworkDigits)},
-          {"nu", rounded(moduli->poisson, kNetworkDigits)},
-          {"anisotropy", rounded(moduli->anisotropy, kNetworkDigits)},
+  return {{"E_Pa", rounded(moduli->mean_young_Pa())},
+          {"E_least_Pa", rounded(moduli->young_Pa.minCoeff())},
+          {"E_most_Pa", rounded(moduli->young_Pa.maxCoeff())},
+          {"nu", rounded(moduli->poisson)},
+          {"anisotropy", rounded(moduli->anisotropy)},
           {"spheres", moduli->spheres}};
 }
 
@@ -72,8 +68,8 @@ Json network_json(const Tissue& tissue, const NetworkInspection& inspection) {
   const Organ& organ = tissue.network.organ;
   Json json{{"title", tissue.title},
             {"spheres", organ.size()},
-            {"spacing_m", rounded(organ.spacing, kNetworkDigits)},
-            {"radius_m", rounded(organ.radius, kNetworkDigits)},
+            {"spacing_m", rounded(organ.spacing)},
+            {"radius_m", rounded(organ.radius)},
             {"radial_bonds", inspection.radial_bonds},
             {"lateral_bonds", inspection.lateral_bonds},
             {"anchored_spheres", tissue.anchors.size()},
@@ -153,7 +149,7 @@ Json network_picture(const Tissue& tissue) {
   json["position_m"] = array_json(organ.position.colwise(),
                                   [](const auto& p) { return array_json(p, std::identity()); });
   json["normal"] = array_json(organ.normal.colwise(), [](const auto& n) {
-    return array_json(n, [](double v) { return rounded(v, kNetworkDigits); });
+    return array_json(n, [](double v) { return rounded(v); });
   });
   json["bonds"] = array_json(tissue.network.bonds, [](const Bond& bond) {
     return Json{bond.a, bond.b, bond.kind == BondKind::radial ? 0 : 1};

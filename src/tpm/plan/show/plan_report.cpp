@@ -15,12 +15,7 @@
 namespace tpm::plan {
 namespace {
 
-constexpr int kPlanDigits = 6;
 constexpr double kMostMargin = 1000.0;
-
-Json number(const std::optional<double>& value) {
-  return value ? Json(rounded(*value, kPlanDigits)) : Json(nullptr);
-}
 
 std::string share_text(double share) {
   constexpr double kMostShare = 10.0;  // beyond, the figure says nothing
@@ -87,7 +82,7 @@ const ResultTable<TriedSpheres>& tried_spheres() {
 Json relevance_json(const Plan& plan) {
   return array_json(plan.relevance, [](const PlanRelevance& r) {
     return Json{{"part", r.part},
-                {"error", number(r.error)},
+                {"error", or_null(r.error)},
                 {"estimated", r.estimated},
                 {"matters", r.matters},
                 {"note", r.note}};
@@ -116,8 +111,8 @@ std::string change_text(const PlanChange& c) {
 Json changes_json(const Plan& plan) {
   return array_json(plan.changes, [](const PlanChange& c) {
     return Json{{"change", c.change},
-                {"factor", number(c.factor)},
-                {"survived", rounded(c.survived, kPlanDigits)},
+                {"factor", or_null(c.factor)},
+                {"survived", rounded(c.survived)},
                 {"breaks", c.factor ? Json(c.breaks) : Json(nullptr)}};
   });
 }
@@ -274,9 +269,9 @@ Json spheres_json(const SpheresPlan& plan) {
   return {{"tolerance", plan.request.tolerance},
           {"most", plan.request.most},
           {"spheres", plan.choice ? Json(plan.chosen().filling.spheres) : Json(nullptr)},
-          {"claimed_error", plan.choice ? number(plan.chosen().claimed_error) : Json(nullptr)},
-          {"limit_peak", rounded(plan.limit_peak, kPlanDigits)},
-          {"limit_uncertainty", rounded(plan.limit_uncertainty, kPlanDigits)},
+          {"claimed_error", plan.choice ? or_null(plan.chosen().claimed_error) : Json(nullptr)},
+          {"limit_peak", rounded(plan.limit_peak)},
+          {"limit_uncertainty", rounded(plan.limit_uncertainty)},
           {"tried", tried_spheres().list(plan.tried)}};
 }
 
@@ -309,7 +304,7 @@ std::string offline_text(const Plan& plan) {
 }
 
 Json expected_plan_json(const ExpectedPlanWork& work) {
-  return {{"first_run_s", rounded(work.first_run_s, kPlanDigits)},
+  return {{"first_run_s", rounded(work.first_run_s)},
           {"reference_s", rounded(work.reference_s, 2)},
           {"all_s", work.all_s ? Json(rounded(*work.all_s, 2)) : Json(nullptr)}};
 }
@@ -359,34 +354,34 @@ Json plan_json(const Plan& plan) {
             {"version", version()},
             {"spheres", plan.spheres},
             {"bonds", plan.bonds},
-            {"duration_s", rounded(plan.duration_s, kPlanDigits)},
+            {"duration_s", rounded(plan.duration_s)},
             {"tolerance", request.tolerance},
             {"tolerance_source",
              request.tolerance_source.empty() ? Json(nullptr) : Json(request.tolerance_source)},
             {"output", request.measure.output == PlanOutput::field ? "field" : "force"},
-            {"rate_Hz", number(request.budget.rate_Hz)},
-            {"wall_s_per_s", number(request.budget.wall_s_per_s)},
+            {"rate_Hz", or_null(request.budget.rate_Hz)},
+            {"wall_s_per_s", or_null(request.budget.wall_s_per_s)},
             {"costs", request.costs.source},
             {"response", plan.by_depth ? "force_N" : "depth_m"}};
   json["claim"] = claim_json(plan);
   json["choice"] = plan.choice ? frontier(plan).object(plan.chosen()) : Json(nullptr);
-  json["margin"] = plan.choice ? Json(rounded(margin(plan), kPlanDigits)) : Json(nullptr);
+  json["margin"] = plan.choice ? or_null(margin(plan)) : Json(nullptr);
   const auto offline = run_offline(plan);
-  json["network_offline_s"] = offline ? Json(rounded(offline->second, kPlanDigits)) : Json(nullptr);
+  json["network_offline_s"] = offline ? or_null(offline->second) : Json(nullptr);
   json["without_budget"] = plan.without_budget
                                ? frontier(plan).object(plan.candidates[*plan.without_budget])
                                : Json(nullptr);
   json["needs_full_model"] = plan.needs_full;
   json["masses_matter"] = masses_matter_json(plan);
-  json["masses_left_out"] = number(plan.masses_left_out);
+  json["masses_left_out"] = or_null(plan.masses_left_out);
   json["reference"] = {{"method", plan.reference.method},
                        {"cross_check", plan.reference.cross_check},
                        {"difference", rounded(plan.reference.difference, 2)},
-                       {"peak", rounded(plan.reference.peak, kPlanDigits)}};
-  json["work"] = {{"first_run_s", rounded(plan.work.first_run_s, kPlanDigits)},
-                  {"reference_run_s", rounded(plan.work.reference_run_s, kPlanDigits)},
-                  {"reference_s", rounded(plan.work.reference_s, kPlanDigits)},
-                  {"all_s", rounded(plan.work.all_s, kPlanDigits)}};
+                       {"peak", rounded(plan.reference.peak)}};
+  json["work"] = {{"first_run_s", rounded(plan.work.first_run_s)},
+                  {"reference_run_s", rounded(plan.work.reference_run_s)},
+                  {"reference_s", rounded(plan.work.reference_s)},
+                  {"all_s", rounded(plan.work.all_s)}};
   json["frontier"] = frontier(plan).list(plan.candidates);
   json["relevance"] = relevance_json(plan);
   json["changes"] = changes_json(plan);

@@ -134,9 +134,9 @@ Json convergence_json(const std::vector<SweepConvergence>& all) {
       const GridConvergence& g = c.threes[k];
       const bool limit = g.behaviour == Behaviour::monotone;
       Json entry{{"finest_size", c.size[k + 2]}, {"behaviour", to_string(g.behaviour)}};
-      entry["order"] = limit ? Json(rounded(g.order, 6)) : Json();
+      entry["order"] = limit ? Json(rounded(g.order)) : Json();
       entry["extrapolated"] = limit ? Json(rounded(g.extrapolated, 12)) : Json();
-      entry["index"] = limit ? Json(rounded(g.index, 6)) : Json();
+      entry["index"] = limit ? Json(rounded(g.index)) : Json();
       threes.push_back(std::move(entry));
     }
     return Json{{"variable", c.variable},   {"unit", c.unit},

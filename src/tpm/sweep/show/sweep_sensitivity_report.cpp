@@ -55,8 +55,7 @@ std::string sensitivity_text(const std::vector<SweepSensitivity>& all) {
 
 Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
   const auto numbers = [](const IndexEstimate& e) {
-    return Json{
-        {"value", rounded(e.value, 6)}, {"low", rounded(e.low, 6)}, {"high", rounded(e.high, 6)}};
+    return Json{{"value", rounded(e.value)}, {"low", rounded(e.low)}, {"high", rounded(e.high)}};
   };
   Json list = array_json(all, [&](const SweepSensitivity& s) {
     Json inputs = Json::array();
@@ -66,8 +65,8 @@ Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
                         {"total", numbers(s.indices.inputs[i].total)}});
     }
     return Json{{"variable", s.variable},
-                {"mean", rounded(s.indices.mean, 6)},
-                {"standard_deviation", rounded(s.indices.standard_deviation, 6)},
+                {"mean", rounded(s.indices.mean)},
+                {"standard_deviation", rounded(s.indices.standard_deviation)},
                 {"level", s.indices.level},
                 {"points", s.design.points},
                 {"replicates", s.design.replicates},
