@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "creep_recordings.hpp"
 #include "placed_recordings.hpp"
 #include "tpm/fit/select/selection.hpp"
 
@@ -9,6 +10,7 @@ using namespace tpm;
 using namespace tpm::base;
 using namespace tpm::fit;
 using Catch::Matchers::Contains;
+using tpm::test::CreepTrial;
 using tpm::test::PlacedTest;
 
 TEST_CASE("the samples after a step are left out, as long as they ring", "[placement]") {
@@ -65,6 +67,42 @@ TEST_CASE("the tail of what rings or starts up after a step biases no interval",
     INFO(p.summary);
     CHECK(p.lower.value() < truth);
     CHECK(p.upper.value() > truth);
+  }
+}
+
+TEST_CASE("the rest before a step that was not sampled tells the zero", "[placement]") {
+  // 2 kPa beside 3 kPa that relax in 5 s: a step of the strain, or of the stress.
+  const bool creeps = GENERATE(false, true);
+  CreepTrial trial{.rest_s = 4.05, .ramp_s = 0.04, .noise = 2e-5, .strain_zero = 1.5e-3};
+  Recording r = test::creep_recording_of(trial);
+  Random random(19);
+  for (std::size_t i = 0; i < r.time_s.size() && !creeps; ++i) {
+    const double since = r.time_s[i] - 4.07;
+    r.drive[i] = since > 0.0 ? 0.02 : 0.0;
+    r.response[i] = 3.0 + 0.1 * random.normal();
+    if (since > 0.0) r.response[i] += 0.02 * (2000.0 + 3000.0 * std::exp(-since / 5.0));
+  }
+  const std::vector<PreparedRecording> one{prepare_recording("step.csv", r)};
+  REQUIRE(one.front().load_imposed == creeps);
+  REQUIRE(one.front().from_s > 4.1);
+  const auto before = level_before_load(one.front());
+  REQUIRE(before);
+  CHECK(before->samples >= 40);
+  CHECK_THAT(before->level.value,
+             Catch::Matchers::WithinAbs(creeps ? 1.5e-3 : 3.0, 4.0 * before->level.sd));
+  const Selection s = select_law(one, {});
+  const FitResult& fit = s.candidates[s.recommended].fit;
+  CHECK(law_name(fit.config.law.value()) == "linear-1");
+  for (const ParameterResult& p : fit.parameters) {
+    const double truth = p.parameter.name == "k_inf"  ? 2000.0
+                         : p.parameter.name == "k1"   ? 3000.0
+                         : p.parameter.name == "tau1" ? 5.0
+                                                      : 0.0;
+    if (truth == 0.0) continue;
+    INFO(p.summary);
+    CHECK(p.lower.value() < truth);
+    CHECK(p.upper.value() > truth);
+    CHECK(*p.upper - *p.lower < 0.2 * truth);
   }
 }
 

@@ -21,6 +21,17 @@ inline std::string ramp_recording() {
   return text;
 }
 
+/// The same 1 s later, with a cell that starts far off.
+inline std::string recording_with_start_up() {
+  std::string text = "time [s],depth [mm],force [N]\n";
+  for (int i = 0; i <= 50; ++i) {
+    const double depth = std::min(0.1 * std::max(i - 10, 0), 2.0);
+    text += fmt::format("{:.1f},{:.1f},{:.4f}\n", 0.1 * i, depth,
+                        i < 3 ? 9.99 : 0.01 * depth + 1e-4 * (i % 3));
+  }
+  return text;
+}
+
 /// A stress that is ramped and held while the strain goes on, under noise.
 inline std::string creep_recording() {
   std::string text = "time [s],strain [%],stress [Pa]\n";
@@ -77,6 +88,15 @@ inline std::vector<ErrorCase> placement_error_cases() {
        "-o {}/out",
        with_files({{"law.json", law}})},
       {type, "creep identified sample by sample", "identify {}/c.csv -o {}/out", files},
+      {type, "force cell that starts far off", "fit {}/s.csv --no-draw -o {}/out",
+       with_files({{"s.csv", recording_with_start_up()}})},
+      {type, "two columns that may be the depth", "fit {}/g.csv --no-draw -o {}/out",
+       with_files(
+           {{"g.csv", "time [s],gap [mm],force [N],sensor [mm]\n0,0,0,0\n1,1,1,2\n2,2,2,3\n"}})},
+      {type, "force in grams", "fit {}/g.csv --no-draw -o {}/out",
+       with_files({{"g.csv", "time [s],depth [mm],force [g]\n0,0,0\n1,1,1\n2,2,2\n"}})},
+      {type, "the same readings twice", "fit {}/r.csv {}/q.csv --no-draw -o {}/out",
+       with_files({{"r.csv", ramp_recording()}, {"q.csv", ramp_recording()}})},
   };
 }
 

@@ -9,6 +9,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/autoregressive.hpp"
+#include "tpm/fit/likelihood/load_imposed.hpp"
 
 namespace tpm::fit {
 namespace {
@@ -331,6 +332,34 @@ RestReadings read_rests(const PreparedRecording& recording) {
     result.drift = Measured{0.0, std::sqrt(12.0) * rounding / length};
   }
   return result;
+}
+
+std::optional<LevelBeforeLoad> level_before_load(const PreparedRecording& r) {
+  constexpr double kUnloaded = 1e-3;  // of the range of the drive
+  const Recording& recording = r.recording;
+  const std::vector<Phase>& phases = r.phases.phases;
+  if (law_drive(recording) != Quantity::strain || phases.size() < 2 ||
+      phases.front().kind != PhaseKind::hold) {
+    return std::nullopt;
+  }
+  const std::size_t count = phases.front().last + 1;
+  if (count < kFewestForNoise || r.from_s <= recording.time_s[count - 1]) return std::nullopt;
+  const auto first = [count](const std::vector<double>& values) {
+    return std::vector<double>(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count));
+  };
+  const auto [low, high] = std::ranges::minmax_element(recording.drive);
+  const double still = std::max(kUnloaded * (*high - *low), 4.0 * r.phases.drive_jitter_sd);
+  if (std::abs(middle_of_rest(first(recording.drive))) > still) return std::nullopt;
+  const RestSamples rest{first(recording.time_s), first(recording.response), count, 0};
+  const double level = middle_of_rest(rest.reading), rounding = rounding_sd(r);
+  double squares = 0.0;
+  for (const double v : rest.reading) squares += (v - level) * (v - level);
+  const auto n = static_cast<double>(count);
+  if (squares <= n * rounding * rounding * 1e-6) return LevelBeforeLoad{{level, rounding}, count};
+  RestReadings readings;
+  fit_rests(averaged(without_outliers(rest)),
+            squares < n * 4.0 * rounding * rounding ? rounding : 0.0, std::nullopt, readings);
+  return LevelBeforeLoad{readings.zero.value(), count};
 }
 
 DriftFinding drift_finding(const PreparedRecording& r, const RestReadings& rests) {

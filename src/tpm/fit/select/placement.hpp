@@ -40,6 +40,16 @@ struct RestReadings {
 /// standard deviation of Student's t. A rest of more than 1,000 samples is averaged in blocks.
 [[nodiscard]] RestReadings read_rests(const PreparedRecording& recording);
 
+/// The level of the readings while the strain, or the stress that is imposed, rests at 0 before it
+/// first moves: the offset of the response, or the zero of the strain. None for an indentation,
+/// whose probe may not touch, for a length, whose specimen may be slack, for fewer than four such
+/// samples, and where the fit begins among them.
+struct LevelBeforeLoad {
+  Measured level;
+  std::size_t samples = 0;
+};
+[[nodiscard]] std::optional<LevelBeforeLoad> level_before_load(const PreparedRecording& recording);
+
 /// RestReadings::before alone, which costs little.
 [[nodiscard]] std::size_t samples_before_contact(const PreparedRecording& recording);
 

@@ -184,20 +184,33 @@ void hold_zero_of_load(FitConfig& config, const LawModel& model, const PreparedR
       {{model.index("offset"), std::move(scope)}});
 }
 
+/// What the rest before the load tells of the parameter that was added last, where the fit begins
+/// behind it.
+void take_level_before_load(FitConfig& config, const PreparedRecording& r) {
+  const auto before = level_before_load(r);
+  if (!before) return;
+  EstimatedParameter& p = config.parameters.back();
+  p.prior = Prior{before->level.value, before->level.sd,
+                  fmt::format("{} samples before the load", before->samples)};
+  p.fit.start = std::clamp(before->level.value, p.fit.lower, p.fit.upper);
+}
+
 /// Zero and contact of recordings that are no indentations, and of creep: nothing is measured
 /// beforehand but the force before it rises.
 void add_free_placement(FitConfig& config, const LawModel& model, const PreparedRecording& r,
                         std::size_t i, std::vector<std::size_t> scope, std::string offset,
-                        Nuisance nuisance) {
+                        const SetupOptions& options) {
   const LawSpec& law = model.spec();
   if (r.load_imposed) {
     add_automatic(config, strain_zero_bounds(law, r, std::move(offset)),
                   {{model.index("contact"), scope}});
+    if (options.measured) take_level_before_load(config, r);
     return;
   }
   add_automatic(config, offset_bounds(law, r, std::move(offset)), {{model.index("offset"), scope}});
+  if (options.measured) take_level_before_load(config, r);
   // The slack length belongs to the specimen.
-  const bool slack = is_stretch(law) && i == 0 && nuisance != Nuisance::offset;
+  const bool slack = is_stretch(law) && i == 0 && options.nuisance != Nuisance::offset;
   if (slack) add_automatic(config, slack_length_bounds(law, r), {{model.index("contact"), {}}});
 }
 
@@ -274,7 +287,7 @@ void add_placement(FitConfig& config, const LawModel& model,
                                : r.load_imposed ? "strain_zero"
                                                 : "offset",
                                r),
-                         options.nuisance);
+                         options);
       continue;
     }
     const MeasuredPlacement placement = !options.measured ? MeasuredPlacement{}

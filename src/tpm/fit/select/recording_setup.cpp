@@ -84,7 +84,7 @@ std::size_t samples_of_still_drive(const PreparedRecording& r) {
 /// cell that was switched on or tared, and not a response that is counted the other way.
 void require_no_start_up(const PreparedRecording& r, std::span<const double> response) {
   constexpr std::size_t kFewest = 8;
-  constexpr double kFarOff = 20.0;  // standard deviations of the noise
+  constexpr double kSpoilt = 20.0;  // standard deviations of the noise
   const std::size_t resting = samples_of_still_drive(r);
   if (resting < kFewest || resting >= response.size()) return;
   const std::span<const double> rest = response.first(resting);
@@ -92,7 +92,7 @@ void require_no_start_up(const PreparedRecording& r, std::span<const double> res
   if (falls_instead(response, level, r.phases.noise_sd_estimate)) return;
   std::size_t settled = 0;
   for (std::size_t i = 0; i < resting / 2; ++i) {
-    if (std::abs(rest[i] - level) > kFarOff * r.phases.noise_sd_estimate) settled = i + 1;
+    if (std::abs(rest[i] - level) > kSpoilt * r.phases.noise_sd_estimate) settled = i + 1;
   }
   if (settled == 0) return;
   throw bad_input(
