@@ -1,12 +1,12 @@
 // Fractional laws: the Mittag-Leffler function against a table in 25 digits, the exponential sums
 // against it, weights against high-precision arithmetic, histories against exact superposition.
 #include <algorithm>
-#include <boost/multiprecision/cpp_bin_float.hpp>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
 #include <sstream>
 
+#include "exact_weights.hpp"
 #include "expected_values.hpp"
 #include "fractional_reference.hpp"
 #include "tpm/base/random.hpp"
@@ -21,7 +21,6 @@ using namespace tpm::law;
 using namespace tpm::files;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
-using Quad = boost::multiprecision::cpp_bin_float_100;
 
 namespace {
 
@@ -47,20 +46,6 @@ FractionalWeights richardson(const FractionalWeights& fine, const FractionalWeig
 double distance(const FractionalWeights& a, const FractionalWeights& b, double time) {
   return std::max({(a.weight - b.weight).cwiseAbs().maxCoeff(), std::abs(a.constant - b.constant),
                    std::abs(a.dashpot_s - b.dashpot_s) / time});
-}
-
-/// The formula of CardinalWeight in 100 digits and real numbers.
-Quad cardinal_weight(const Quad& alpha, const Quad& x, const Quad& h) {
-  const auto& pi = boost::math::constants::pi<Quad>();
-  const Quad b = pi * (1 - alpha);
-  const Quad residue = exp(-pi * b / (alpha * h));
-  const Quad S = sinh(alpha * x);
-  const Quad C = cosh(alpha * x);
-  const Quad D = S * S + sin(b) * sin(b);
-  const Quad turn = pi * x / h;
-  return h / (2 * pi) *
-         (sin(b) / (C - cos(b)) +
-          2 * residue * (sin(turn) * S * cos(b) - cos(turn) * C * sin(b)) / D);
 }
 
 }  // namespace
@@ -199,17 +184,13 @@ TEST_CASE("cardinal weights agree with their formula in 100 digits, near and far
       const CardinalWeight weight(alpha, phase, h);
       for (const long m : {-60L, -7L, -1L, 0L, 1L, 2L, 9L, 100L}) {
         if (alpha == 1.0 && m == 0 && phase == 0.0) continue;  // 0/0 as written
-        const Quad x = Quad(h) * (m + Quad(phase));
-        const Quad e("1e-25");
-        const auto at = [&](const Quad& da, const Quad& dx) {
-          return cardinal_weight(alpha + da, x + dx, h);
-        };
         const SpectralValue w = weight.at(m);
-        const auto d_alpha = static_cast<double>((at(e, 0) - at(-e, 0)) / (2 * e));
-        const auto d_x = static_cast<double>((at(0, e) - at(0, -e)) / (2 * e));
-        worst = std::max(worst, std::abs(w.value - static_cast<double>(at(0, 0))));
-        worst_slope = std::max({worst_slope, std::abs(w.d_x - d_x) / std::max(1.0, std::abs(d_x)),
-                                std::abs(w.d_alpha - d_alpha) / std::max(1.0, std::abs(d_alpha))});
+        const test::ExactWeight exact = test::exact_cardinal_weight(alpha, m, phase, h);
+        const auto off = [](double got, double slope) {
+          return std::abs(got - slope) / std::max(1.0, std::abs(slope));
+        };
+        worst = std::max(worst, std::abs(w.value - exact.value));
+        worst_slope = std::max({worst_slope, off(w.d_x, exact.d_x), off(w.d_alpha, exact.d_alpha)});
       }
     }
   }

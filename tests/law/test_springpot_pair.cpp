@@ -1,10 +1,10 @@
 // Two spring-pots in series as a sum of exponentials: weights against their formula in 100 digits,
 // sums against the Mittag-Leffler function of free orders, limits, derivatives.
 #include <algorithm>
-#include <boost/multiprecision/cpp_bin_float.hpp>
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "exact_weights.hpp"
 #include "fractional_reference.hpp"
 #include "tpm/law/relaxation/cardinal_weight.hpp"
 #include "tpm/law/relaxation/springpot_pair.hpp"
@@ -13,7 +13,6 @@ using namespace tpm;
 using namespace tpm::law;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
-using Digits100 = boost::multiprecision::cpp_bin_float_100;
 
 namespace {
 
@@ -39,23 +38,6 @@ double pair_mean(const Orders& o, double t) {
   return std::pow(t, -low) * mittag_leffler_with_slopes(d, 2.0 - low, std::pow(t, d)).value;
 }
 
-/// The formula of PairWeight in 100 digits and real numbers; alpha > beta.
-Digits100 pair_weight(const Digits100& alpha, const Digits100& beta, const Digits100& x,
-                      const Digits100& h) {
-  const auto& pi = boost::math::constants::pi<Digits100>();
-  const Digits100 d = alpha - beta;
-  const Digits100 density = (exp(beta * x) * sin(pi * alpha) + exp(alpha * x) * sin(pi * beta)) /
-                            (2 * pi * (cosh(d * x) + cos(pi * d)));
-  // Re of exp(i p)/sinh(v), v = -d x + i b
-  const Digits100 b = pi * (1 - d);
-  const Digits100 p = pi * ((alpha + beta) / (2 * d) - x / h);
-  const Digits100 re = -sinh(d * x) * cos(b);
-  const Digits100 im = cosh(d * x) * sin(b);
-  const Digits100 residue =
-      exp(-pi * b / (d * h)) * (cos(p) * re + sin(p) * im) / (re * re + im * im);
-  return h * density - h / pi * residue;
-}
-
 FractionalWeights by_beta(const FractionalWeights& w) {
   return weights_of(w.d_weight_d_beta, w.d_constant_d_beta, w.d_dashpot_d_beta_s);
 }
@@ -78,21 +60,16 @@ TEST_CASE("weights of two spring-pots agree with their formula in 100 digits", "
       const PairWeight weight(o.alpha, o.beta, phase, h);
       for (const long m : {-60L, -7L, -1L, 0L, 1L, 2L, 9L, 60L}) {
         if (o.alpha == 1.0 && o.beta == 0.0 && m == 0 && phase == 0.0) continue;  // 0/0 as written
-        const Digits100 x = Digits100(h) * (m + Digits100(phase));
-        const Digits100 e("1e-25");
-        const auto at = [&](const Digits100& da, const Digits100& db, const Digits100& dx) {
-          return pair_weight(o.alpha + da, o.beta + db, x + dx, h);
-        };
         const PairValue w = weight.at(m);
-        const double scale = 1.0 + std::exp(static_cast<double>(x) * (x > 0 ? o.beta : o.alpha));
-        const auto off = [&](double got, const Digits100& up, const Digits100& down) {
-          const auto exact = static_cast<double>((up - down) / (2 * e));
-          return std::abs(got - exact) / std::max(scale, std::abs(exact));
+        const test::ExactWeight exact = test::exact_pair_weight(o.alpha, o.beta, m, phase, h);
+        const double x = h * (static_cast<double>(m) + phase);
+        const double scale = 1.0 + std::exp(x * (x > 0.0 ? o.beta : o.alpha));
+        const auto off = [scale](double got, double slope) {
+          return std::abs(got - slope) / std::max(scale, std::abs(slope));
         };
-        worst = std::max(worst, std::abs(w.value - static_cast<double>(at(0, 0, 0))) / scale);
-        worst_slope = std::max({worst_slope, off(w.d_alpha, at(e, 0, 0), at(-e, 0, 0)),
-                                off(w.d_beta, at(0, e, 0), at(0, -e, 0)),
-                                off(w.d_x, at(0, 0, e), at(0, 0, -e))});
+        worst = std::max(worst, std::abs(w.value - exact.value) / scale);
+        worst_slope = std::max({worst_slope, off(w.d_alpha, exact.d_alpha),
+                                off(w.d_beta, exact.d_beta), off(w.d_x, exact.d_x)});
       }
     }
   }

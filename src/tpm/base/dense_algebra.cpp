@@ -17,6 +17,10 @@ SymmetricModes symmetric_modes(const Eigen::Ref<const MatrixXd>& a) {
   return {modes.eigenvalues(), modes.eigenvectors()};
 }
 
+VectorXd ordered_eigenvalues(const Eigen::Ref<const MatrixXd>& a) {
+  return Eigen::SelfAdjointEigenSolver<MatrixXd>(a, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
 SymmetricModes symmetric_modes(const Eigen::Ref<const MatrixXd>& a,
                                const Eigen::Ref<const MatrixXd>& b) {
   const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> modes(a, b);

@@ -22,6 +22,9 @@ struct SymmetricModes {
 /// Of a symmetric tridiagonal matrix. @param beside size one less than diagonal's
 [[nodiscard]] SymmetricModes tridiagonal_modes(const Eigen::VectorXd& diagonal,
                                                const Eigen::VectorXd& beside);
+/// Eigenvalues of a symmetric matrix in ascending order, without vectors. The lower triangle is
+/// read.
+[[nodiscard]] Eigen::VectorXd ordered_eigenvalues(const Eigen::Ref<const Eigen::MatrixXd>& a);
 /// Eigenvalues in ascending order, by the closed form for 3 x 3.
 [[nodiscard]] Eigen::Vector3d symmetric_eigenvalues(const Eigen::Matrix3d& a);
 /// The largest magnitude of an eigenvalue of a square matrix.

@@ -67,7 +67,7 @@ void require_covariance(const Eigen::MatrixXd& matrix, std::string_view where) {
   if ((scaled - scaled.transpose()).cwiseAbs().maxCoeff() > kRounding) {
     throw bad_input(where, "is not symmetric", "a covariance");
   }
-  if (symmetric_modes(scaled).values.minCoeff() < -kRounding) {
+  if (ordered_eigenvalues(scaled).minCoeff() < -kRounding) {
     throw bad_input(where, "has a negative eigenvalue", "a covariance, positive semidefinite");
   }
 }
