@@ -202,11 +202,11 @@ class MotionRun {
     using Reached = InertialIntegration::Reached;
     const Reached reached = integration_->step_towards(time_s);
     const double now_s = integration_->time_s();
-    const bool strikes =
-        reached == Reached::meeting ||
-        (reached == Reached::target && equation_.meets(now_s, integration_->state()));
+    const bool meets = equation_.meets(now_s, integration_->state());
+    const bool strikes = reached == Reached::meeting || (reached == Reached::target && meets);
     // Where a tool meets a sphere, a dashpot would push by the speed that the impact takes away.
-    if (!strikes) return show_step();
+    if (!strikes && !meets) show_step();
+    if (!strikes) return;
     const ToolImpact impact = integration_->strike(now_s);
     integration_->spend(impact.work_J, impact.lost_J);
     const double of_probe = tissue_.depth_driven() ? impact.on_tissue_N_s : 0.0;
