@@ -2,7 +2,7 @@
 # comes from the archives of the rooms (TPM_FUZZ_ARCHIVES). What is in both is taken from here, because it stands first.
 set(readers_base error text units)
 set(readers_files check_sum checksum contained delimited document_place file file_roles json number_style origin_mark
-    other_kind row_log separator zip_archive)
+    other_kind row_log separator unit_words zip_archive)
 set(readers_files_keys file_kind form types)
 set(readers_files_hdf5 hdf5_contents hdf5_driver hdf5_handle hdf5_reader)
 set(readers_files_import assemble cantilever clock_text column_choice contact description file_kind header_words import

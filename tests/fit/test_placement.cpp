@@ -474,32 +474,3 @@ TEST_CASE("a stiffness that is not told from a drift is not pooled as if it were
     CHECK(entry.at("identified").get<bool>() == (entry.at("name") != "k_inf"));
   }
 }
-
-TEST_CASE("a drive that overshoots before it is held is fitted to the end of the hold",
-          "[placement]") {
-  PlacedTest test;
-  Recording r = test::placed(test);
-  const double end_s = test.rest_s + test.ramp_s;
-  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-    const double since = r.time_s[i] - end_s;
-    if (since > 0.0) r.drive[i] += 3e-4 * std::exp(-since / 0.2) * std::sin(20.0 * since);
-  }
-  const LawSpec spec = test::spec_of(test);
-  std::vector<double> values = test.material;
-  values.resize(law_parameters(spec).size(), 0.0);
-  Protocol history = measured_history(Drive::displacement, r.time_s, r.drive);
-  history.set_equilibrium_at_start(true);
-  const Eigen::VectorXd force =
-      LawModel(spec).respond(history, r.time_s, values, Want::values).value;
-  Random random(17);
-  for (std::size_t i = 0; i < r.response.size(); ++i) {
-    r.response[i] = force[static_cast<Eigen::Index>(i)] + test.noise_N * random.normal();
-  }
-  const PreparedRecording recording = prepare_recording("overshoot.csv", r);
-  CHECK(recording.to_s == r.time_s.back());
-  // A drive that falls further is unloaded, and so is one that never stops to fall.
-  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-    if (r.time_s[i] > end_s + 5.0) r.drive[i] = 3e-3;
-  }
-  CHECK(prepare_recording("unloaded.csv", r).to_s < end_s + 6.0);
-}

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "organ_scene.hpp"
-#include "tpm/organ/balance/material_directions.hpp"
+#include "tpm/organ/scene/material_directions.hpp"
 #include "tpm/organ/scene/organ_model.hpp"
 #include "tpm/organ/scene/scene.hpp"
 #include "written_out_scene.hpp"

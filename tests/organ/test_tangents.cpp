@@ -4,8 +4,8 @@
 
 #include "organ_scene.hpp"
 #include "star_network.hpp"
-#include "tpm/organ/balance/material_directions.hpp"
 #include "tpm/organ/body/liver.hpp"
+#include "tpm/organ/scene/material_directions.hpp"
 #include "tpmkit/model.hpp"
 
 using namespace tpm;

@@ -9,8 +9,8 @@ namespace tpm::show {
 
 /// A table of a JSON answer as CSV: the same numbers under the same keys, which carry the unit.
 /// One line for each row; the keys of an object within a row follow its own with an underscore
-/// (`experiment_depth_m`), and a list of numbers or words fills one cell, separated by spaces; but the
-/// limits of an interval, band or bounds are two columns, `interval_SI_lower` and `_upper`.
+/// (`experiment_depth_m`), and a list of numbers or words fills one cell, separated by spaces; but
+/// the limits of an interval, band or bounds are two columns, `interval_SI_lower` and `_upper`.
 /// Lists of objects are left out, except `spread`: each of its elements has a line of its own, with
 /// the rest of the row repeated. A row without a key leaves its cell empty, as does null.
 /// @param rows a list of objects

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "tpm/files/import/refused_words.hpp"
-#include "tpm/files/import/unit_words.hpp"
+#include "tpm/files/unit_words.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::files {

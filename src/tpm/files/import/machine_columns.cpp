@@ -4,7 +4,7 @@
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
-#include "tpm/files/import/unit_words.hpp"
+#include "tpm/files/unit_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {

@@ -6,7 +6,7 @@
 #include <array>
 #include <cctype>
 
-#include "tpm/files/import/unit_words.hpp"
+#include "tpm/files/unit_words.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {

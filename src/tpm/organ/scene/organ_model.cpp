@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "tpm/base/text.hpp"
-#include "tpm/organ/balance/material_directions.hpp"
+#include "tpm/organ/scene/material_directions.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -1,4 +1,4 @@
-#include "tpm/organ/balance/material_directions.hpp"
+#include "tpm/organ/scene/material_directions.hpp"
 
 #include <cmath>
 

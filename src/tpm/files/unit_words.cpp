@@ -1,4 +1,4 @@
-#include "tpm/files/import/unit_words.hpp"
+#include "tpm/files/unit_words.hpp"
 
 #include <algorithm>
 #include <array>
