@@ -136,7 +136,7 @@ TEST_CASE("what a contact does as it settles is no extreme") {
     point.settling = settling;
     return extremes.step(point);
   };
-  extremes.see({.time_s = 0.0});
+  extremes.see(CurvePoint());
   CHECK(step(0.0, 0.0, false).empty());
   CHECK(step(1.0, 1.0, false).empty());
   // The stretch ends at its last step.
