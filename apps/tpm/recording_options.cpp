@@ -121,7 +121,7 @@ PreparedRecording prepared(const std::string& name, RecordingFile file,
     phases.contact_response =
         option_quantity(options.contact_response, Dimension::force, "--contact-force");
   }
-  require_drive_column(file, name);
+  require_time_and_drive(file, name);
   std::string read_as = columns_words(file.findings);
   PreparedRecording recording = prepare_recording(name, std::move(file.recording), phases);
   recording.import = import_options(options);

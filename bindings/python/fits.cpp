@@ -244,7 +244,7 @@ Fit fit_files(const FitRequest& request) {
       throw Error(ExitCode::usage, "fit", "'" + file + "' is given twice", "each recording once");
     }
     RecordingFile read = read_recording_file(file, request.import);
-    require_drive_column(read, file);
+    require_time_and_drive(read, file);
     recordings.push_back(prepare_recording(file, std::move(read.recording), phases));
     recordings.back().import = request.import;
     warn_of_rows_left_out(recordings.back(), read.findings);

@@ -355,17 +355,23 @@ TEST_CASE("units are read as machines write them, and weights ask for the force 
              Contains("--unit \"Load=lbf\""));
 }
 
-TEST_CASE("a column of another title is the drive if nothing else can be") {
+TEST_CASE("a column of another title is time, drive or force if nothing else can be") {
   const Reader read;
   const auto table = [](const std::string& titles) {
     return titles + "\n0,0,0,5\n1,1,1,5\n2,1,0.5,5\n";
   };
   CHECK_THAT(read(table("Time (s),Kolbenweg (mm),Load (N),Width (mm)")).recording.drive.at(1),
              WithinRel(1e-3, 1e-12));
+  CHECK_THAT(read(table("Messzeit (s),Depth (mm),Load (N),Width (mm)")).recording.time_s.at(2),
+             WithinRel(2.0, 1e-12));
+  CHECK_THAT(read(table("Time (s),Depth (mm),FN (mN),Note")).recording.response.at(1),
+             WithinRel(1e-3, 1e-12));
+  CHECK_THROWS_WITH(require_time_and_drive(read(table("n,Depth (mm),Load (N),Note")), "t.csv"),
+                    Contains("--time with one of column 1 'n', column 4 'Note'"));
   // Two columns of lengths: neither is taken, and both are listed.
   const RecordingFile two = read(table("Time (s),Gap (mm),Load (N),Sensor (mm)"));
   CHECK(two.recording.drive.empty());
-  CHECK_THROWS_WITH(require_drive_column(two, "two.csv"),
+  CHECK_THROWS_WITH(require_time_and_drive(two, "two.csv"),
                     Contains("--drive with one of column 2 'Gap', column 4 'Sensor'"));
   // A gap beside a strain is not what was imposed.
   CHECK(read(table("Time (s),Strain [-],Stress (Pa),Gap (mm)")).recording.drive_quantity ==

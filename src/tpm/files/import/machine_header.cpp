@@ -216,29 +216,34 @@ bool is_size_of_specimen(std::string_view name) {
       kSizes, [&small](std::string_view size) { return small.find(size) != std::string::npos; });
 }
 
-/// Beside a time and a response that are known by their titles, the only other column in a unit of
-/// length is what was imposed, whatever its title.
-void recognize_lone_length(std::vector<MachineColumn>& columns) {
-  const auto has = [&columns](ColumnRole role) {
-    return std::ranges::any_of(columns, [role](const MachineColumn& column) {
-      return column.meaning && column.meaning->role == role;
+/// Of time, drive and response two are known by their titles: the only other column in a unit of
+/// the third is that, whatever its title.
+void recognize_lone_column(std::vector<MachineColumn>& columns) {
+  constexpr int kLast = 9;  // behind every title
+  constexpr Recognized kLoneTime{ColumnRole::time, Quantity::time, kLast};
+  constexpr Recognized kLoneDrive{ColumnRole::drive, Quantity::indentation_depth, kLast};
+  constexpr Recognized kLoneForce{ColumnRole::response, Quantity::contact_force, kLast};
+  const auto has = [&columns](std::initializer_list<ColumnRole> roles) {
+    return std::ranges::any_of(columns, [roles](const MachineColumn& column) {
+      return column.meaning && std::ranges::find(roles, column.meaning->role) != roles.end();
     });
   };
-  if (!has(ColumnRole::time) || !has(ColumnRole::response)) return;
-  if (has(ColumnRole::drive) || has(ColumnRole::height) || has(ColumnRole::deflection)) return;
+  const bool timed = has({ColumnRole::time});
+  const bool driven = has({ColumnRole::drive, ColumnRole::height});
+  const bool answered = has({ColumnRole::response, ColumnRole::deflection});
+  if (timed + driven + answered != 2) return;
+  const Recognized& third = !timed ? kLoneTime : !driven ? kLoneDrive : kLoneForce;
+  const Dimension dimension = !timed    ? Dimension::time
+                              : !driven ? Dimension::length
+                                        : Dimension::force;
   MachineColumn* lone = nullptr;
   for (MachineColumn& column : columns) {
     if (column.meaning || column.refused || is_size_of_specimen(column.name)) continue;
-    if (!is_unit(column.unit) || parse_unit(column.unit, {}).dimension != Dimension::length) {
-      continue;
-    }
+    if (!is_unit(column.unit) || parse_unit(column.unit, {}).dimension != dimension) continue;
     if (lone != nullptr) return;
     lone = &column;
   }
-  constexpr int kLast = 9;  // behind every title
-  if (lone != nullptr) {
-    lone->meaning = Recognized{ColumnRole::drive, Quantity::indentation_depth, kLast};
-  }
+  if (lone != nullptr) lone->meaning = third;
 }
 
 /// "T" is a time only where its unit says so or where nothing contradicts: it may be a temperature.
@@ -306,7 +311,7 @@ void describe_columns(const DelimitedTable& table, const SampleBlock& block, Mac
     recognize_by_unit(column, timed);
     doubt_unit(column);
   }
-  recognize_lone_length(header.columns);
+  recognize_lone_column(header.columns);
   header.rows = block.first;
   header.block = block;
 }

@@ -174,14 +174,16 @@ MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& optio
   return result;
 }
 
-void require_drive_column(const RecordingFile& read, const std::string& file) {
+void require_time_and_drive(const RecordingFile& read, const std::string& file) {
   const Recording& recording = read.recording;
+  const bool timed = !recording.time_s.empty();
   const bool driven = !recording.drive.empty() || is_step_response(recording.response_quantity);
-  if (driven || recording.time_s.empty()) return;
   const auto others = std::ranges::find(read.findings, "not used", &ImportFinding::what);
-  if (others == read.findings.end()) return;
-  throw bad_input(file, "no column is recognised as a depth, displacement, strain or length",
-                  fmt::format("--drive with one of {}", others->value));
+  if (timed == driven || others == read.findings.end()) return;
+  throw bad_input(file,
+                  timed ? "no column is recognised as a depth, displacement, strain or length"
+                        : "no column is recognised as time",
+                  fmt::format("{} with one of {}", timed ? "--drive" : "--time", others->value));
 }
 
 RecordingFile read_recording_file(const fs::path& path, const ImportOptions& options) {

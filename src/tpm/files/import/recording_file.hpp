@@ -28,9 +28,9 @@ namespace tpm::files {
 [[nodiscard]] RecordingFile read_recording_file(const std::filesystem::path& path,
                                                 const ImportOptions& options = {});
 
-/// Refuses a table with a time and a response of which no column is recognised as the drive:
-/// Error(bad_input) lists the columns that may be it.
-void require_drive_column(const RecordingFile& read, const std::string& file);
+/// Refuses a table with a response and either a time or a drive, of which no column is recognised
+/// as the other: Error(bad_input) lists the columns that may be it.
+void require_time_and_drive(const RecordingFile& read, const std::string& file);
 
 /// A spectrum read into memory, and what was understood of its file.
 struct SpectrumFile {

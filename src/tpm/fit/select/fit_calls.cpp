@@ -72,7 +72,7 @@ std::vector<PreparedRecording> prepared_recordings(const std::vector<std::filesy
   std::vector<PreparedRecording> recordings;
   for (const std::filesystem::path& file : files) {
     RecordingFile read = read_recording_file(file, import);
-    require_drive_column(read, file.string());
+    require_time_and_drive(read, file.string());
     recordings.push_back(prepare_recording(file.string(), std::move(read.recording), phases));
     recordings.back().import = import;
     warn_of_rows_left_out(recordings.back(), read.findings);
