@@ -151,6 +151,7 @@ def meshes(contacts, steps):
         growth = 1.0 + 3.0 / steps
         h = growth ** np.arange(steps)
         times += (begin + (end - begin) * np.cumsum(h) / h.sum()).tolist()
+        times[-1] = end  # rounding must not leave the protocol
     return np.array(times)
 
 

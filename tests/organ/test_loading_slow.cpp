@@ -1,9 +1,11 @@
 // Several contacts and loads that stay, against an independent solver in numpy and scipy that reads
 // the file of the network alone.
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <fstream>
 
 #include "python_reference.hpp"
+#include "tpm/files/file.hpp"
 #include "tpm/organ/run/simulation.hpp"
 #include "tpm/organ/scene/network_file.hpp"
 
@@ -101,7 +103,33 @@ Json scene_with(const std::string& changes) {
   return json;
 }
 
+/// A shipped scene with spheres in place of its tools, which the reference does not know.
+Json shipped_with_spheres(const std::string& name) {
+  Json scene =
+      parse_json(read_file(std::filesystem::path(TPM_TEST_SOURCE_DIR) / "configs" / name), name);
+  for (Json& contact : scene["contacts"]) {
+    contact["kind"] = "sphere";
+    contact.erase("radius");
+  }
+  return scene;
+}
+
 }  // namespace
+
+TEST_CASE(
+    "an independent solver finds the forces of two spheres of the liver in different motion") {
+  Json scene = shipped_with_spheres("two_indenters.json");
+  // A sine has too many corners for the reference.
+  scene["contacts"][1]["protocol"] = parse_json(R"({"kind": "knots", "knots": [
+    {"time": "0 s", "depth": "0 mm"}, {"time": "1 s", "depth": "4 mm"},
+    {"time": "2 s", "depth": "1 mm"}, {"time": "4 s", "depth": "3 mm"}]})",
+                                                "sine");
+  check_against_reference(scene, "liver");
+}
+
+TEST_CASE("an independent solver finds the force on a liver that sags") {
+  check_against_reference(shipped_with_spheres("sagging_liver.json"), "sagging_liver");
+}
 
 TEST_CASE("an independent solver finds the forces of two spheres in different motion") {
   check_against_reference(scene_with(R"({"contacts": [
