@@ -256,7 +256,7 @@ class Finder {
   }
 
   /// True if noise alone makes readings look constant: the means of their halves are apart, or not
-  /// clearly less so than those of a force that rises on as it did from contact to them.
+  /// clearly less so than those of a force that rises evenly from contact on.
   [[nodiscard]] bool rises_within_noise(const Phase& phase, std::size_t first) const {
     constexpr double kSure = 4.0, kConstant = 0.02;  // standard deviations; of the level
     const std::size_t last = phase.last, half = (last - first + 1) / 2;
@@ -273,8 +273,9 @@ class Finder {
     if (rise > std::max(unsure, kConstant * std::abs(late))) return true;
     const std::size_t begin = std::max(phase.first, found_.contact_index);
     if (begin >= first) return false;  // loaded at once
-    const double apart_s = mean_from(time_, last + 1 - half) - mean_from(time_, first);
-    const double rise_on = (late - found_.floor_response) / (time_[first] - time_[begin]) * apart_s;
+    const double late_s = mean_from(time_, last + 1 - half);
+    const double apart_s = late_s - mean_from(time_, first);
+    const double rise_on = (late - found_.floor_response) / (late_s - time_[begin]) * apart_s;
     return rise_on - rise <= unsure && found_.noise_sd_estimate > 0.0;
   }
 

@@ -2,6 +2,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -27,7 +28,11 @@ class ClaimReader {
   [[nodiscard]] const V& needed(std::optional<V> Claim::*member) const {
     if (const std::optional<V>& value = claim_.*member) return *value;
     Claim only;
-    only.*member = V{};
+    if constexpr (std::is_same_v<V, std::string>) {
+      (only.*member).emplace("a text");  // an empty one would not be written
+    } else {
+      (only.*member).emplace();
+    }
     refuse_without(claim_key(only));
   }
   /// Of the printed number; of a plain one if the claim says none.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <set>
+#include <stdexcept>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
@@ -284,12 +285,10 @@ const PrintedTable& ClaimSet::table(std::string_view id, std::string_view at) co
 }
 
 std::string claim_key(const Claim& only) {
-  const auto& keys = claim_block().keys();
-  return std::ranges::find_if(keys,
-                              [&](const Key<Claim>& one) {
-                                return !one.form.required && !one.write(only).is_null();
-                              })
-      ->form.name;
+  for (const Key<Claim>& one : claim_block().keys()) {
+    if (!one.form.required && !one.write(only).is_null()) return one.form.name;
+  }
+  throw std::logic_error("no key of a claim is written from this member");
 }
 
 std::filesystem::path paper_claims_path() {
