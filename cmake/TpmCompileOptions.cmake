@@ -55,8 +55,8 @@ if(TPM_FAST_LINKER)
 endif()
 
 # Files of one target are compiled together, some at a time: most of the compiler's time goes into headers
-# that they share. So names in unnamed namespaces are unique within a folder of src and of tests.
-option(TPM_TOGETHER "Compile the files of one folder together (unity build)" OFF)
+# that they share. So names in unnamed namespaces are unique within a room of src and a folder of tests.
+option(TPM_TOGETHER "Compile the files of one room together (unity build)" OFF)
 function(tpm_compile_together target at_a_time)
   if(TPM_TOGETHER)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE BATCH UNITY_BUILD_BATCH_SIZE ${at_a_time})

@@ -71,7 +71,8 @@ std::vector<Protocol> loads() {
   return {step, ramps, preloaded};
 }
 
-const std::vector<double> kTimes{0.0, 1e-3, 0.02, 0.3, 0.5, 1.7, 2.0, 2.001, 5.0, 6.0, 13.3, 20.0};
+const std::vector<double> kLoadTimes{0.0, 1e-3,  0.02, 0.3, 0.5,  1.7,
+                                     2.0, 2.001, 5.0,  6.0, 13.3, 20.0};
 
 }  // namespace
 
@@ -85,9 +86,9 @@ TEST_CASE("A law under a load in closed form agrees with the stepped path", "[la
     for (const Protocol& load : loads()) {
       if (load.equilibrium_at_start() && !law.spec().solid) continue;
       INFO(name << ", " << load.knots().size() << " knots");
-      const Response r = law.respond(load, kTimes, values, Want::values_and_sensitivity);
+      const Response r = law.respond(load, kLoadTimes, values, Want::values_and_sensitivity);
       const Response s =
-          stepped.law.respond(load, kTimes, stepped.values, Want::values_and_sensitivity);
+          stepped.law.respond(load, kLoadTimes, stepped.values, Want::values_and_sensitivity);
       Eigen::Index predicted = 0;
       for (Eigen::Index i = 0; i < r.value.size(); ++i) {
         REQUIRE(std::isnan(r.value[i]) == std::isnan(s.value[i]));
@@ -112,8 +113,8 @@ TEST_CASE("A law under a load in closed form agrees with the stepped path", "[la
         std::vector<double> less = values;
         more[j] += kStep_N;
         less[j] -= kStep_N;
-        const Eigen::VectorXd slope = (law.respond(load, kTimes, more, Want::values).value -
-                                       law.respond(load, kTimes, less, Want::values).value) /
+        const Eigen::VectorXd slope = (law.respond(load, kLoadTimes, more, Want::values).value -
+                                       law.respond(load, kLoadTimes, less, Want::values).value) /
                                       (2.0 * kStep_N);
         CHECK((a - slope).cwiseAbs().maxCoeff() <= 1e-6 * slope.cwiseAbs().maxCoeff());
       }
@@ -161,7 +162,7 @@ TEST_CASE("Under a load branches may have equal times or no stiffness", "[law]")
   const LawModel one(parse_law_name("power-1", "test"));
   const Protocol load = loads()[1];
   const auto at = [&](const LawModel& law, const std::vector<double>& values) {
-    return law.respond(load, kTimes, values, Want::values_and_sensitivity);
+    return law.respond(load, kLoadTimes, values, Want::values_and_sensitivity);
   };
   const Eigen::VectorXd alone = at(one, {40.0, 60.0, 2.0, 1.7, 0.0, 0.0}).value;
   const std::vector<double> equal{40.0, 25.0, 35.0, 2.0, 2.0, 1.7, 0.0, 0.0};
@@ -200,8 +201,8 @@ TEST_CASE("Relaxing tension under a load: the kernel of the depth is that of the
   const std::vector<double> with{
       40.0, 60.0, 25.0, 0.3, 5.0, kShare, std::numeric_limits<double>::infinity(), 0.0, 0.0};
   for (const Protocol& load : loads()) {
-    const Eigen::VectorXd v = linear.respond(load, kTimes, values, Want::values).value;
-    const Eigen::VectorXd u = relaxing.respond(load, kTimes, with, Want::values).value;
+    const Eigen::VectorXd v = linear.respond(load, kLoadTimes, values, Want::values).value;
+    const Eigen::VectorXd u = relaxing.respond(load, kLoadTimes, with, Want::values).value;
     const double reference = relaxing.spec().reference;
     for (Eigen::Index i = 0; i < v.size(); ++i) {
       const double kernel = (1.0 - kShare) * u[i] + kShare * u[i] * std::pow(u[i] / reference, 2);

@@ -17,15 +17,15 @@ struct PrefixedUnit {
 };
 
 // Those that parse_unit() reads.
-constexpr auto kPrefixes = std::to_array<PrefixedUnit>({{"f", 1e-15},
-                                                        {"p", 1e-12},
-                                                        {"n", 1e-9},
-                                                        {"u", 1e-6},
-                                                        {"m", 1e-3},
-                                                        {"", 1.0},
-                                                        {"k", 1e3},
-                                                        {"M", 1e6},
-                                                        {"G", 1e9}});
+constexpr auto kSizedPrefixes = std::to_array<PrefixedUnit>({{"f", 1e-15},
+                                                             {"p", 1e-12},
+                                                             {"n", 1e-9},
+                                                             {"u", 1e-6},
+                                                             {"m", 1e-3},
+                                                             {"", 1.0},
+                                                             {"k", 1e3},
+                                                             {"M", 1e6},
+                                                             {"G", 1e9}});
 
 /// Nobody says kiloseconds or megametres, and a prefix of a square counts twice.
 double largest_factor(Dimension dimension) {
@@ -69,8 +69,8 @@ Unit sized_unit(const Unit& usual, double si) {
   if (most == 0.0 || !is_unit(changing)) return usual;
   if (parse_unit(changing, {}).dimension != usual.dimension) return usual;
   const std::string_view symbol = si_symbol(usual.dimension);
-  const PrefixedUnit* chosen = &kPrefixes.front();
-  for (const PrefixedUnit& unit : kPrefixes) {
+  const PrefixedUnit* chosen = &kSizedPrefixes.front();
+  for (const PrefixedUnit& unit : kSizedPrefixes) {
     // A value that rounds up to the next prefix is written with that one.
     if (unit.factor <= most && size * (1.0 + 5e-5) >= unit.factor) chosen = &unit;
   }

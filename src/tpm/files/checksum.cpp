@@ -31,7 +31,7 @@ struct CheckSum {
   std::uint32_t nothing;
 };
 
-constexpr std::uint64_t kStretch = std::uint64_t{1} << 22U;
+constexpr std::uint64_t kReadAtOnce = std::uint64_t{1} << 22U;
 
 /// Of a stretch of a file.
 std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::uint64_t to) {
@@ -49,15 +49,15 @@ std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::u
 
 /// Of the first bytes of a file, by all threads; nothing if they cannot be read.
 std::optional<std::uint32_t> crc_of(int file, std::uint64_t size) {
-  std::vector<std::optional<std::uint32_t>> parts((size + kStretch - 1) / kStretch);
-  const auto end_of = [&](std::size_t i) { return std::min(size, (i + 1) * kStretch); };
+  std::vector<std::optional<std::uint32_t>> parts((size + kReadAtOnce - 1) / kReadAtOnce);
+  const auto end_of = [&](std::size_t i) { return std::min(size, (i + 1) * kReadAtOnce); };
   for_each_in_parallel(parts.size(), [&](std::size_t i) {
-    parts[i] = crc_of_stretch(file, i * kStretch, end_of(i));
+    parts[i] = crc_of_stretch(file, i * kReadAtOnce, end_of(i));
   });
   std::uint32_t whole = 0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (!parts[i]) return std::nullopt;
-    whole = joined_check_sum(whole, *parts[i], end_of(i) - i * kStretch);
+    whole = joined_check_sum(whole, *parts[i], end_of(i) - i * kReadAtOnce);
   }
   return whole;
 }

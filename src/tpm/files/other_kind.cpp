@@ -60,7 +60,7 @@ constexpr std::string_view kTable = "a table of samples";
 struct FirstBytes {
   std::string_view bytes, called;
 };
-constexpr auto kFirstBytes = std::to_array<FirstBytes>({
+constexpr auto kOtherFiles = std::to_array<FirstBytes>({
     {"TPMROWS1", "the recording of a session (.tpmrec)"},
     {"\x89HDF", "an HDF5 file, such as a result of tpm simulate"},
     {"<!DOCTYPE html", "a web page"},
@@ -115,7 +115,7 @@ void require_not_other_kind(const Json& document, std::string_view kind, std::st
 std::optional<std::string_view> kind_without_json(std::string_view bytes) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (bytes.starts_with(kByteOrderMark)) bytes.remove_prefix(kByteOrderMark.size());
-  for (const FirstBytes& first : kFirstBytes) {
+  for (const FirstBytes& first : kOtherFiles) {
     if (bytes.starts_with(first.bytes)) return first.called;
   }
   const std::size_t begin = bytes.find_first_not_of(" \t\r\n");

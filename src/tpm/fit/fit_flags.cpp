@@ -14,20 +14,20 @@ namespace tpm::fit {
 namespace {
 
 /// Fitted values further from the model than noise goes, in standard deviations.
-constexpr double kFarOff = 8.0;
+constexpr double kOutlying = 8.0;
 
 void flag_outliers(FitResult& result, const ExperimentResiduals& function) {
   const double unit = std::sqrt(result.variance_factor);
   const Eigen::VectorXd answer = function.predict(result.best.natural, nullptr);
   int count = 0;
   std::string worst;
-  double worst_z = kFarOff * unit;
+  double worst_z = kOutlying * unit;
   for (std::size_t i = 0; i < function.data().size(); ++i) {
     const FitDatum& d = function.data()[i];
     if (!d.value || d.held_out) continue;
     const double z = std::abs(
         function.standardised(i, answer[static_cast<Eigen::Index>(i)], result.best.natural));
-    if (!(z > kFarOff * unit) || !(unit > 0.0)) continue;
+    if (!(z > kOutlying * unit) || !(unit > 0.0)) continue;
     ++count;
     if (z < worst_z) continue;
     worst_z = z;
@@ -38,7 +38,7 @@ void flag_outliers(FitResult& result, const ExperimentResiduals& function) {
       "{} of {} values {} more than {} standard deviations from the model, the furthest "
       "{} ({} standard deviations): errors in the data, or noise with wider tails "
       "(distribution 'student_t')",
-      count, result.value_count, count == 1 ? "lies" : "lie", kFarOff, worst,
+      count, result.value_count, count == 1 ? "lies" : "lie", kOutlying, worst,
       significant(worst_z / unit, 3)));
 }
 

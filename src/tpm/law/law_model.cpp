@@ -182,8 +182,8 @@ struct Answer {
 };
 
 Answer not_predicted(int parameters) {
-  constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
-  return {kNothing, Slopes::Constant(parameters, kNothing)};
+  constexpr double kUnpredicted = std::numeric_limits<double>::quiet_NaN();
+  return {kUnpredicted, Slopes::Constant(parameters, kNothing)};
 }
 
 /// The answer of a contact that stands at one of the stops.

@@ -20,8 +20,8 @@ struct MapPlan {
   std::function<LinearElement(double x)> linear;
 };
 
-constexpr double kDepth_m = 0.004;
-constexpr double kTau_s = 0.1;
+constexpr double kMapDepth_m = 0.004;
+constexpr double kMapTau_s = 0.1;
 constexpr double kDrag_per_s = 20.0;
 
 MapPlan over_relaxation_time(int along) {
@@ -32,7 +32,7 @@ MapPlan over_relaxation_time(int along) {
           evenly_in_log(1e-4, 1e2, along),
           evenly_in_log(1e-5, 1e3, along),
           [](double tau, double h) {
-            return massless_problem(paper_element(tau), step_and_hold(kDepth_m, kStudySteps * h),
+            return massless_problem(paper_element(tau), step_and_hold(kMapDepth_m, kStudySteps * h),
                                     h);
           },
           [](double tau) {
@@ -60,15 +60,15 @@ MapPlan over_load_rate(int along) {
             const double rises = kLoad_N / rate;
             const double ends = rises + kStudySteps * h;
             return massless_problem(
-                without_tension(kTau_s),
+                without_tension(kMapTau_s),
                 Protocol(Drive::force, {{0.0, 0.0}, {rises, kLoad_N}, {ends, kLoad_N}}), h);
           },
-          [](double) { return linear_element(without_tension(kTau_s), 0.0); }};
+          [](double) { return linear_element(without_tension(kMapTau_s), 0.0); }};
 }
 
 MapPlan over_depth(int along) {
   const auto load = [](double depth) {
-    const BondElement p = paper_element(kTau_s);
+    const BondElement p = paper_element(kMapTau_s);
     return p.modulus_to_stiffness_m() * (p.equilibrium_Pa * depth + p.tension().value(depth));
   };
   return {"depth",
@@ -78,9 +78,10 @@ MapPlan over_depth(int along) {
           evenly_in_log(1e-3, 4e-2, along),
           evenly_in_log(1e-3, 1e3, along),
           [load](double depth, double h) {
-            return massless_problem(paper_element(kTau_s), creep(load(depth), kStudySteps * h), h);
+            return massless_problem(paper_element(kMapTau_s), creep(load(depth), kStudySteps * h),
+                                    h);
           },
-          [](double depth) { return linear_element(paper_element(kTau_s), depth); }};
+          [](double depth) { return linear_element(paper_element(kMapTau_s), depth); }};
 }
 
 /// A sphere of an element without tension, under a load that leads to 4 mm.
@@ -98,7 +99,7 @@ MapPlan in_motion(std::string id, std::string quantity, std::string unit, std::s
                linear};
   plan.build = [linear = std::move(linear), material = std::move(material)](double at, double h) {
     const LinearElement e = linear(at);
-    const double load = kDepth_m * (e.stiffness_N_per_m - e.relaxing_N_per_m);
+    const double load = kMapDepth_m * (e.stiffness_N_per_m - e.relaxing_N_per_m);
     return problem_with_mass(material(at), e.mass_kg, e.drag_per_s, load, kStudySteps * h, h);
   };
   return plan;
@@ -113,7 +114,7 @@ LinearElement sphere(const BondElement& p, double mass_kg, double drag_per_s) {
 
 MapPlan over_stiffness(int along) {
   const auto material = [](double modulus) {
-    BondElement p = without_tension(kTau_s);
+    BondElement p = without_tension(kMapTau_s);
     p.equilibrium_Pa = p.branches.front().modulus_Pa = 0.5 * modulus;
     return p;
   };
@@ -129,8 +130,8 @@ MapPlan over_mass(int along) {
       "mass", "mass", "kg",
       "E1 = E2 = 12 kPa, drag 20 1/s, tau = 0.1 s, a load in a step and held that leads to 4 mm",
       evenly_in_log(1e-8, 1e1, along),
-      [](double x) { return sphere(without_tension(kTau_s), x, kDrag_per_s); },
-      [](double) { return without_tension(kTau_s); });
+      [](double x) { return sphere(without_tension(kMapTau_s), x, kDrag_per_s); },
+      [](double) { return without_tension(kMapTau_s); });
 }
 
 MapPlan over_damping(int along) {
@@ -139,8 +140,8 @@ MapPlan over_damping(int along) {
       "sphere of 4.4 g, E1 = E2 = 12 kPa, tau = 0.1 s, a load in a step and held that leads to 4 "
       "mm",
       evenly_in_log(1e-1, 1e6, along),
-      [](double x) { return sphere(without_tension(kTau_s), kSphereMass_kg, x); },
-      [](double) { return without_tension(kTau_s); });
+      [](double x) { return sphere(without_tension(kMapTau_s), kSphereMass_kg, x); },
+      [](double) { return without_tension(kMapTau_s); });
 }
 
 void add_limits(StabilityMap& map, const MapPlan& plan) {

@@ -22,7 +22,7 @@ namespace {
 // A standard linear solid.
 constexpr double kLasting = 80.0, kRelaxing = 120.0;  // N/m
 constexpr double kTau_s = 2.0;
-constexpr double kDepth_m = 4e-3, kRate = 2e-3;  // m, m/s
+constexpr double kCheckDepth_m = 4e-3, kRate = 2e-3;  // m, m/s
 
 const char* const kRelativeError = "relative error";
 
@@ -64,7 +64,7 @@ double after_ramp(double time_s, double ramp_s, double tau_s) {
 }
 
 double solid_under_ramp(double time_s) {
-  constexpr double kRamp_s = kDepth_m / kRate;
+  constexpr double kRamp_s = kCheckDepth_m / kRate;
   return kLasting * kRate * std::min(time_s, kRamp_s) +
          kRelaxing * kRate * after_ramp(time_s, kRamp_s, kTau_s);
 }
@@ -86,12 +86,12 @@ std::vector<VerificationCheck> law_checks() {
   checks.push_back(
       law_check("standard linear solid, ramp and hold of a depth",
                 "F = v (k_inf t + k1 tau (1 - exp(-t/tau))), then relaxing; Tschoegl (1989)", 1e-12,
-                "linear-1", {kLasting, kRelaxing, kTau_s}, ramp_and_hold(kDepth_m, kRate, 8.0),
+                "linear-1", {kLasting, kRelaxing, kTau_s}, ramp_and_hold(kCheckDepth_m, kRate, 8.0),
                 times_to(10.0, 40), solid_under_ramp));
   checks.push_back(law_check(
       "standard linear solid, step of a depth", "F = d (k_inf + k1 exp(-t/tau))", 1e-12, "linear-1",
-      {kLasting, kRelaxing, kTau_s}, step_and_hold(kDepth_m, 10.0), times_to(10.0, 40),
-      [](double t) { return kDepth_m * (kLasting + kRelaxing * std::exp(-t / kTau_s)); }));
+      {kLasting, kRelaxing, kTau_s}, step_and_hold(kCheckDepth_m, 10.0), times_to(10.0, 40),
+      [](double t) { return kCheckDepth_m * (kLasting + kRelaxing * std::exp(-t / kTau_s)); }));
   checks.push_back(
       law_check("standard linear solid, creep",
                 "u = F (1/k_inf - (1/k_inf - 1/k0) exp(-t/T)), T = tau k0/k_inf; Tschoegl (1989)",
@@ -101,27 +101,28 @@ std::vector<VerificationCheck> law_checks() {
                   const double retarded = std::exp(-t * kLasting / (kTau_s * kAll));
                   return 0.3 * (1.0 / kLasting - (1.0 / kLasting - 1.0 / kAll) * retarded);
                 }));
-  checks.push_back(law_check(
-      "spring-pot of order 0.3, ramp of a depth", "F = v k t^0.7/Gamma(1.7); Mainardi (2010)", 1e-8,
-      "linear-fspringpot", {kRelaxing, 0.3}, ramp_and_hold(kDepth_m, kRate, 0.0), times_to(2.0, 40),
-      [](double t) { return kRate * kRelaxing * std::pow(t, 0.7) / std::tgamma(1.7); }));
+  checks.push_back(
+      law_check("spring-pot of order 0.3, ramp of a depth",
+                "F = v k t^0.7/Gamma(1.7); Mainardi (2010)", 1e-8, "linear-fspringpot",
+                {kRelaxing, 0.3}, ramp_and_hold(kCheckDepth_m, kRate, 0.0), times_to(2.0, 40),
+                [](double t) { return kRate * kRelaxing * std::pow(t, 0.7) / std::tgamma(1.7); }));
   checks.push_back(law_check("fractional Zener solid of order 1/2, step of a depth",
                              "G = k_inf + k1 exp(t/tau) erfc(sqrt(t/tau)), E_1/2 of Mittag-Leffler",
                              1e-9, "linear-fzener", {kLasting, kRelaxing, kTau_s, 0.5},
-                             step_and_hold(kDepth_m, 10.0), times_to(10.0, 40), [](double t) {
+                             step_and_hold(kCheckDepth_m, 10.0), times_to(10.0, 40), [](double t) {
                                const double x = t / kTau_s;
-                               return kDepth_m * (kLasting + kRelaxing * std::exp(x) *
-                                                                 std::erfc(std::sqrt(x)));
+                               return kCheckDepth_m * (kLasting + kRelaxing * std::exp(x) *
+                                                                      std::erfc(std::sqrt(x)));
                              }));
-  checks.push_back(law_check("Hertz contact of a standard linear solid, ramp of a depth",
-                             "Lee and Radok (1960): integral of G(t - s) d(s^(3/2)), a series",
-                             1e-9, "hertz-1", {kLasting, kRelaxing, kTau_s},
-                             ramp_and_hold(kDepth_m, kRate, 0.0), times_to(2.0, 40), [](double t) {
-                               constexpr double kReference_m = 1e-3;  // LawSpec::reference
-                               const double scale = std::pow(kRate, 1.5) / std::sqrt(kReference_m);
-                               return scale * (kLasting * std::pow(t, 1.5) +
-                                               kRelaxing * hertz_memory(t, kTau_s));
-                             }));
+  checks.push_back(law_check(
+      "Hertz contact of a standard linear solid, ramp of a depth",
+      "Lee and Radok (1960): integral of G(t - s) d(s^(3/2)), a series", 1e-9, "hertz-1",
+      {kLasting, kRelaxing, kTau_s}, ramp_and_hold(kCheckDepth_m, kRate, 0.0), times_to(2.0, 40),
+      [](double t) {
+        constexpr double kReference_m = 1e-3;  // LawSpec::reference
+        const double scale = std::pow(kRate, 1.5) / std::sqrt(kReference_m);
+        return scale * (kLasting * std::pow(t, 1.5) + kRelaxing * hertz_memory(t, kTau_s));
+      }));
   return checks;
 }
 
@@ -217,29 +218,30 @@ VerificationCheck chain_check() {
 
 /// Force of a step by the paper's Eq. 11, with Eq. 2 for the tension.
 VerificationCheck paper_step_check() {
-  return {"the paper's element, step of a depth",
-          kRelativeError,
-          "Bao et al. (2013), Eqs. 2 and 11",
-          0.0,
-          1e-12,
-          [](double flaw) {
-            const TpmParameters p = TpmParameters{}.with_relaxation_time(kTau_s);
-            const std::vector<double> times = times_to(10.0, 40);
-            TpmParameters wrong = p;
-            wrong.E2_Pa *= 1.0 + flaw;
-            return relative_difference(
-                make_closed_form()
-                    ->respond(step_and_hold(kDepth_m, 10.0), times, to_vector(wrong), Want::values)
-                    .value,
-                values_at(times, [&](double t) {
-                  const double lambda1 =
-                      2.0 * p.Eprime_Pa * (1.0 - std::cos(std::atan(kDepth_m / p.spacing_m)));
-                  const double both = p.E1_Pa + p.E2_Pa;
-                  const double relaxed = 1.0 - std::exp(-t * both / p.eta1_Pa_s);
-                  return (p.E2_Pa + lambda1 - p.E2_Pa * p.E2_Pa / both * relaxed) * kDepth_m *
-                         p.A0_m2 / p.l0_m;
-                }));
-          }};
+  return {
+      "the paper's element, step of a depth",
+      kRelativeError,
+      "Bao et al. (2013), Eqs. 2 and 11",
+      0.0,
+      1e-12,
+      [](double flaw) {
+        const TpmParameters p = TpmParameters{}.with_relaxation_time(kTau_s);
+        const std::vector<double> times = times_to(10.0, 40);
+        TpmParameters wrong = p;
+        wrong.E2_Pa *= 1.0 + flaw;
+        return relative_difference(
+            make_closed_form()
+                ->respond(step_and_hold(kCheckDepth_m, 10.0), times, to_vector(wrong), Want::values)
+                .value,
+            values_at(times, [&](double t) {
+              const double lambda1 =
+                  2.0 * p.Eprime_Pa * (1.0 - std::cos(std::atan(kCheckDepth_m / p.spacing_m)));
+              const double both = p.E1_Pa + p.E2_Pa;
+              const double relaxed = 1.0 - std::exp(-t * both / p.eta1_Pa_s);
+              return (p.E2_Pa + lambda1 - p.E2_Pa * p.E2_Pa / both * relaxed) * kCheckDepth_m *
+                     p.A0_m2 / p.l0_m;
+            }));
+      }};
 }
 
 /// Forces of a contact that is stepped at 1 kHz through a ramp and hold along +z.
@@ -265,7 +267,7 @@ std::vector<VerificationCheck> servo_checks() {
         law.spec = parse_law_name("linear-1", "verification");
         law.values = {kLasting * (1.0 + flaw), kRelaxing, kTau_s, 0.0, 0.0};
         LawContact contact(law, {});
-        return relative_difference(stepped(contact, kDepth_m, kRate, 4000),
+        return relative_difference(stepped(contact, kCheckDepth_m, kRate, 4000),
                                    values_at(ticks(), solid_under_ramp));
       }};
   VerificationCheck of_element{
@@ -278,13 +280,13 @@ std::vector<VerificationCheck> servo_checks() {
         const BondElement p = paper_element(kTau_s);
         ElementContact contact(flawed(p, flaw), 1e-3);
         const Eigen::VectorXd expected = values_at(ticks(), [&](double t) {
-          const double e = std::min(kDepth_m, kRate * t);
+          const double e = std::min(kCheckDepth_m, kRate * t);
           const double tension = 2.0 * p.lateral_Pa * (1.0 - std::cos(std::atan(e / p.spacing_m)));
           return ((p.equilibrium_Pa + tension) * e +
-                  p.relaxing_Pa() * kRate * after_ramp(t, kDepth_m / kRate, kTau_s)) *
+                  p.relaxing_Pa() * kRate * after_ramp(t, kCheckDepth_m / kRate, kTau_s)) *
                  p.A0_m2 / p.l0_m;
         });
-        return relative_difference(stepped(contact, kDepth_m, kRate, 4000), expected);
+        return relative_difference(stepped(contact, kCheckDepth_m, kRate, 4000), expected);
       }};
   return {std::move(of_law), std::move(of_element)};
 }

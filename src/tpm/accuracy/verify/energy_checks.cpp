@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kStarTau_s = 0.1, kPushed_m = 4e-3, kSpeed = 0.02;  // s, m, m/s
 constexpr double kRampEnd_s = kPushed_m / kSpeed;
-const char* const kBalance = "(stored + dissipated - work)/work";
+const char* const kEnergyBalance = "(stored + dissipated - work)/work";
 
 Protocol pushed_and_held() {
   return ramp_and_hold(kPushed_m, kSpeed, 0.4);
@@ -91,7 +91,7 @@ double heat_by_formula(const BondElement& p) {
 
 VerificationCheck organ_balance_check() {
   return {"quasi-static network of 24 spheres, ramp and hold of a depth",
-          kBalance,
+          kEnergyBalance,
           "work: forces of CVODE (BDF) at a tolerance of 1e-8, Gauss quadrature",
           0.0,
           1e-4,
@@ -119,7 +119,7 @@ VerificationCheck organ_balance_check() {
 /// A sphere with mass under a load: the load's work is the load times the depth of the closed form.
 VerificationCheck inertial_balance_check() {
   return {"inertial network, one sphere with mass under a load",
-          kBalance,
+          kEnergyBalance,
           "work: load times depth, by the modes of the equation of motion",
           0.0,
           1e-5,

@@ -24,20 +24,20 @@ struct NumberKey {
   const char* example;
 };
 
-constexpr NumberKey kDepth{"depth",
-                           Dimension::length,
-                           kAboveZero,
-                           &ProtocolBlock::depth_m,
-                           &ProtocolLists::depths_m,
-                           "how deep the tissue is indented",
-                           "8 mm"};
-constexpr NumberKey kRate{"rate",
-                          Dimension::speed,
-                          kAboveZero,
-                          &ProtocolBlock::rate_m_per_s,
-                          &ProtocolLists::rates_m_per_s,
-                          "speed of the ramp",
-                          "4 mm/s"};
+constexpr NumberKey kDepthOfPush{"depth",
+                                 Dimension::length,
+                                 kAboveZero,
+                                 &ProtocolBlock::depth_m,
+                                 &ProtocolLists::depths_m,
+                                 "how deep the tissue is indented",
+                                 "8 mm"};
+constexpr NumberKey kRateOfPush{"rate",
+                                Dimension::speed,
+                                kAboveZero,
+                                &ProtocolBlock::rate_m_per_s,
+                                &ProtocolLists::rates_m_per_s,
+                                "speed of the ramp",
+                                "4 mm/s"};
 constexpr NumberKey kHold{"hold",
                           Dimension::time,
                           kZeroOrMore,
@@ -66,9 +66,9 @@ constexpr NumberKey kDuration{"duration",
 std::vector<NumberKey> numbers_of(ProtocolKind kind) {
   switch (kind) {
     case ProtocolKind::ramp_hold:
-      return {kDepth, kRate, kHold};
+      return {kDepthOfPush, kRateOfPush, kHold};
     case ProtocolKind::step_hold:
-      return {kDepth, kStepHold};
+      return {kDepthOfPush, kStepHold};
     case ProtocolKind::creep:
       return {kLoad, kDuration};
     case ProtocolKind::knots:

@@ -9,7 +9,7 @@ namespace {
 constexpr std::string_view kAsked = "is what was asked for, not what was measured";
 constexpr std::string_view kLimit = "is a limit or a summary, not a reading of each sample";
 constexpr std::string_view kError = "is a deviation, not what was measured";
-constexpr std::string_view kRate = "is a rate, not the quantity itself";
+constexpr std::string_view kIsRate = "is a rate, not the quantity itself";
 constexpr std::string_view kOther = "is another quantity";
 
 struct RefusingWord {
@@ -110,15 +110,15 @@ constexpr auto kRefusing = std::to_array<RefusingWord>({
     {"ecart", kError},
     {"errore", kError},
     // Rates.
-    {"rate", kRate},
-    {"speed", kRate},
-    {"velocity", kRate},
-    {"geschwindigkeit", kRate},
-    {"vitesse", kRate},
-    {"velocidad", kRate},
-    {"velocita", kRate},
-    {"acceleration", kRate},
-    {"beschleunigung", kRate},
+    {"rate", kIsRate},
+    {"speed", kIsRate},
+    {"velocity", kIsRate},
+    {"geschwindigkeit", kIsRate},
+    {"vitesse", kIsRate},
+    {"velocidad", kIsRate},
+    {"velocita", kIsRate},
+    {"acceleration", kIsRate},
+    {"beschleunigung", kIsRate},
     // Other quantities.
     {"viscosity", kOther},
     {"viskositat", kOther},
@@ -156,7 +156,7 @@ constexpr auto kJoinedStarts = std::to_array<RefusingWord>({
 constexpr auto kJoinedEnds = std::to_array<RefusingWord>({
     {"sollwert", kAsked},
     {"vorgabe", kAsked},
-    {"geschwindigkeit", kRate},
+    {"geschwindigkeit", kIsRate},
     {"temperatur", kOther},
     {"grenze", kLimit},
     {"fehler", kError},

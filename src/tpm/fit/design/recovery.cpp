@@ -16,8 +16,8 @@
 namespace tpm::fit {
 namespace {
 
-constexpr double kRequired = 0.95;  // of the trials: the right law, and none that is larger
-constexpr double kLevel = 0.95;     // of the intervals
+constexpr double kRequired = 0.95;       // of the trials: the right law, and none that is larger
+constexpr double kIntervalLevel = 0.95;  // of the intervals
 
 /// Appends moments from `from_s` (left out) to `to_s`, which is always one of them.
 void append_times(std::vector<double>& times, double from_s, double to_s, double interval_s) {
@@ -131,7 +131,7 @@ void count_intervals(const ExperimentResiduals& function, const Trials& trials,
   constexpr double kDeeper = 1e-3;
   if (least < fit.best.deviance * (1.0 - kDeeper / fit.value_count)) ++result.missed;
   Threshold threshold = threshold_of(fit);
-  threshold.level = kLevel;
+  threshold.level = kIntervalLevel;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     for (ParameterCoverage& coverage : result.parameters) {
       const bool held = deviance[i] - least <= threshold.rise_of(i, least);
@@ -238,7 +238,7 @@ RecoveryResult recover(const LawSpec& law, std::span<const double> true_values,
     progress.advance();
   }
   for (ParameterCoverage& p : result.parameters) {
-    p.p_value = binomial_test(p.covered, result.trials, kLevel);
+    p.p_value = binomial_test(p.covered, result.trials, kIntervalLevel);
   }
   return result;
 }

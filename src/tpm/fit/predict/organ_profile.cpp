@@ -11,11 +11,11 @@ namespace {
 constexpr double kEnough = 1e-3;       // of the threshold: a step that promises less is not taken
 constexpr double kLimitWithin = 5e-3;  // of the square root of the threshold
 constexpr double kDeeper = 1e-3;       // of the threshold, below the minimum
-constexpr int kMostSteps = 15;         // of one constrained fit
+constexpr int kMostProfileSteps = 15;  // of one constrained fit
 constexpr int kMostPoints = 16;        // on one side
 constexpr int kMostRetreats = 6;       // from where the model ends
-constexpr double kFirstDamping = 1e-3;
-constexpr double kMostDamping = 1e6;
+constexpr double kFirstProfileDamping = 1e-3;
+constexpr double kMostProfileDamping = 1e6;
 
 class ShortWalk {
  public:
@@ -157,16 +157,16 @@ class ShortWalk {
     here.natural[index_] = std::clamp(p.natural(theta), p.lower, p.upper);
     if (!here.evaluate(function_, parameters_)) return std::nullopt;
     double damping = 0.0;
-    for (int i = 0; i < kMostSteps && damping <= kMostDamping; ++i) {
+    for (int i = 0; i < kMostProfileSteps && damping <= kMostProfileDamping; ++i) {
       KnownPoint next = step_from(here, damping);
       const double promised =
           here.cost() - (here.residual + here.jacobian * (next.theta - here.theta)).squaredNorm();
-      if (promised <= kEnough * rise_ && damping <= kFirstDamping) break;
+      if (promised <= kEnough * rise_ && damping <= kFirstProfileDamping) break;
       if (next.evaluate(function_, parameters_) && next.cost() < here.cost()) {
         here = std::move(next);
-        damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
+        damping = damping > kFirstProfileDamping ? 0.1 * damping : 0.0;
       } else {
-        damping = std::max(10.0 * damping, kFirstDamping);
+        damping = std::max(10.0 * damping, kFirstProfileDamping);
       }
     }
     return here;

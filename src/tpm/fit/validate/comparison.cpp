@@ -23,7 +23,7 @@
 namespace tpm::fit {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kAllDegrees = std::numeric_limits<double>::infinity();
 // Of the value: the closed forms err by less (LawModel).
 constexpr double kNumericalError = 1e-9;
 constexpr const char* kFilling = "the place of the spheres";
@@ -45,7 +45,7 @@ class Comparer {
         result_(begun(prepared_, options)),
         along_(law, prepared_, options.organ, options.motion.knots,
                mapped<DelayedRise>(result_.rises, &UnseenRise::expected)),
-        degrees_of_law_(law.uncertainty->degrees_of_freedom.value_or(kInfinity)) {}
+        degrees_of_law_(law.uncertainty->degrees_of_freedom.value_or(kAllDegrees)) {}
 
   RecordingComparison compare() {
     result_.sha256 = r_.header.sha256;
@@ -118,7 +118,7 @@ class Comparer {
   void set_numerical(QuantityComparison& q, Functional& s) const {
     CombinedUncertainty sum;
     const auto add = [&](const std::string& name, double u) {
-      sum.add(u, kInfinity);
+      sum.add(u, kAllDegrees);
       q.parts.push_back({name, u});
       q.numerical.push_back({name, u});
     };
@@ -272,13 +272,13 @@ class Comparer {
     CombinedUncertainty sum;
     sum.add(u_readings, result_.scatter.degrees);
     sum.add(q.u_input, degrees_of_law_);
-    sum.add(of_numbers, kInfinity);
+    sum.add(of_numbers, kAllDegrees);
     sum.add(by_filling, static_cast<double>(std::max<Eigen::Index>(q.of_filling.size() - 1, 1)));
-    sum.add(own_instrument, kInfinity);
-    sum.add(stated, kInfinity);
+    sum.add(own_instrument, kAllDegrees);
+    sum.add(stated, kAllDegrees);
     const double shared = q.shared.norm();
-    sum.add(std::sqrt(std::max(shared * shared - q.u_input * q.u_input, 0.0)), kInfinity);
-    sum.add(std::abs(q.of_probe), kInfinity);
+    sum.add(std::sqrt(std::max(shared * shared - q.u_input * q.u_input, 0.0)), kAllDegrees);
+    sum.add(std::abs(q.of_probe), kAllDegrees);
     const double of_population = std::hypot(specimen, q.of_mean * specimen);
     if (q.specimen_degrees > 0) {
       sum.add_difference(of_population, std::hypot(1.0, q.of_mean) * q.specimen_with_own,
@@ -377,7 +377,7 @@ class Comparer {
       error[i] = quantity(i).e.error;
     }
     Eigen::MatrixXd covariance = result_.scatter.covariance(r_.time_s, weights);
-    double degrees = kInfinity;
+    double degrees = kAllDegrees;
     for (Eigen::Index i = 0; i < count; ++i) {
       const QuantityComparison& a = quantity(i);
       degrees = std::min(degrees, a.e.degrees);

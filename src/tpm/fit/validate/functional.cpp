@@ -26,13 +26,13 @@ constexpr double kLocalPart = 0.025;  // of the ramp or the hold, on each side o
 constexpr std::size_t kFewestOfHold = 10;
 
 /// Samples [first, last], both included, of one window.
-struct Stretch {
+struct Section {
   std::size_t first, last;
   [[nodiscard]] std::size_t count() const { return last - first + 1; }
 };
 
 void add_line(Functional& f, const Eigen::VectorXd& curve, std::span<const double> x,
-              const Stretch& part, double at, double factor = 1.0) {
+              const Section& part, double at, double factor = 1.0) {
   const Eigen::VectorXd w = line_weights(x.subspan(part.first, part.count()), at);
   const auto first = static_cast<Eigen::Index>(part.first);
   f.weight.segment(first, w.size()) += factor * w;
@@ -44,8 +44,8 @@ Functional nothing(const Eigen::VectorXd& curve) {
 }
 
 /// The samples within a distance of a place, at least kFewestOfLine if the range has them.
-Stretch around(std::span<const double> x, const Stretch& range, double at, double distance) {
-  Stretch part = range;
+Section around(std::span<const double> x, const Section& range, double at, double distance) {
+  Section part = range;
   while (part.count() > kFewestOfLine && x[part.first] < at - distance) ++part.first;
   while (part.count() > kFewestOfLine && x[part.last] > at + distance) --part.last;
   return part;
@@ -55,12 +55,12 @@ Functional peak_of(const RecordingParts& parts, std::span<const double> t,
                    const Eigen::VectorXd& curve) {
   Functional f = nothing(curve);
   if (!parts.has_hold()) {
-    const Stretch ramp{parts.ramp_first, parts.ramp_last};
+    const Section ramp{parts.ramp_first, parts.ramp_last};
     const double length = kEndPart * (t[parts.ramp_last] - t[parts.ramp_first]);
     add_line(f, curve, t, around(t, ramp, parts.corner_s, length), parts.corner_s);
     return f;
   }
-  Stretch part{*parts.hold_first, *parts.hold_last};
+  Section part{*parts.hold_first, *parts.hold_last};
   const double length = std::min(kPeakPart * (t[part.last] - parts.corner_s),
                                  t[parts.ramp_last] - t[parts.ramp_first]);
   while (part.count() > kFewestOfLine && t[part.last] > parts.corner_s + length) --part.last;
@@ -69,8 +69,8 @@ Functional peak_of(const RecordingParts& parts, std::span<const double> t,
 }
 
 /// The last tenth of the hold.
-Stretch end_window(const RecordingParts& parts, std::span<const double> t) {
-  Stretch part{*parts.hold_first, *parts.hold_last};
+Section end_window(const RecordingParts& parts, std::span<const double> t) {
+  Section part{*parts.hold_first, *parts.hold_last};
   const double from = t[part.last] - kEndPart * (t[part.last] - parts.corner_s);
   while (part.count() > 1 && t[part.first] < from) ++part.first;
   return part;
@@ -78,7 +78,7 @@ Stretch end_window(const RecordingParts& parts, std::span<const double> t) {
 
 Functional end_of(const RecordingParts& parts, std::span<const double> t,
                   const Eigen::VectorXd& curve) {
-  const Stretch part = end_window(parts, t);
+  const Section part = end_window(parts, t);
   Functional f = nothing(curve);
   const auto first = static_cast<Eigen::Index>(part.first);
   const auto count = static_cast<Eigen::Index>(part.count());
@@ -89,7 +89,7 @@ Functional end_of(const RecordingParts& parts, std::span<const double> t,
 
 std::optional<Functional> rate_of(const RecordingParts& parts, std::span<const double> t,
                                   const Eigen::VectorXd& curve) {
-  const Stretch part = end_window(parts, t);
+  const Section part = end_window(parts, t);
   constexpr std::size_t kFewestOfRate = 3;
   if (part.count() < kFewestOfRate) return std::nullopt;
   Functional f = nothing(curve);
@@ -107,12 +107,12 @@ std::optional<Functional> ratio_of(const Functional& peak, const Functional& end
 }
 
 /// The window about a time of the hold, which is longer where the response is slower.
-Stretch local_window(const RecordingParts& parts, std::span<const double> t, double at) {
+Section local_window(const RecordingParts& parts, std::span<const double> t, double at) {
   constexpr double kPartOfTime = 0.2;
   return around(t, {*parts.hold_first, *parts.hold_last}, at, kPartOfTime * (at - parts.corner_s));
 }
 
-Functional line_in(const Stretch& window, std::span<const double> t, double at,
+Functional line_in(const Section& window, std::span<const double> t, double at,
                    const Eigen::VectorXd& curve) {
   Functional f = nothing(curve);
   add_line(f, curve, t, window, at);
@@ -133,7 +133,7 @@ std::optional<Functional> half_time_of(const RecordingParts& parts, std::span<co
     (sign * (f.value - level) > 0.0 ? early : late) = middle;
   }
   const double at = 0.5 * (early + late);
-  const Stretch window = local_window(parts, t, at);
+  const Section window = local_window(parts, t, at);
   const Functional here = line_in(window, t, at, curve);
   const double slope = line_in(window, t, at + 1.0, curve).value - here.value;  // a line: per s
   if (!(sign * slope < 0.0)) return std::nullopt;
@@ -159,7 +159,7 @@ std::optional<Functional> at_time(double at, const RecordingParts& parts, std::s
                                   const Eigen::VectorXd& curve) {
   if (at < t.front() || at > t.back()) return std::nullopt;
   // A line does not reach over a corner.
-  Stretch range{0, t.size() - 1};
+  Section range{0, t.size() - 1};
   if (at <= t[parts.ramp_first]) {
     range.last = std::max<std::size_t>(parts.ramp_first, 1);
   } else if (at < parts.corner_s || !parts.has_hold()) {
@@ -179,7 +179,7 @@ std::optional<Functional> at_time(double at, const RecordingParts& parts, std::s
 std::optional<Functional> at_depth(double at, double contact, const RecordingParts& parts,
                                    const Recording& r, const Eigen::VectorXd& curve) {
   const double place = contact + at;
-  const Stretch ramp{parts.ramp_first, parts.ramp_last};
+  const Section ramp{parts.ramp_first, parts.ramp_last};
   if (place < r.drive[ramp.first] || place > r.drive[ramp.last]) return std::nullopt;
   const double length = kLocalPart * (r.drive[ramp.last] - r.drive[ramp.first]);
   Functional f = nothing(curve);

@@ -18,7 +18,7 @@ namespace tpm::fit {
 namespace {
 
 constexpr std::size_t kFewestReadings = 10;
-constexpr std::size_t kMostReadings = 20'000;  // more tell sigma no better than anyone needs
+constexpr std::size_t kMostOfScatter = 20'000;  // more tell sigma no better than anyone needs
 
 /// What a curve without noise may be made of, over [0, 1]: exponentials that decay, times a factor
 /// of two apart, or powers.
@@ -188,7 +188,7 @@ ReadingScatter scatter_of(const PreparedRecording& recording, const RecordingPar
   } else {
     scatter.told_by = "the ramp";
   }
-  if (last - first + 1 > kMostReadings) first = last + 1 - kMostReadings;
+  if (last - first + 1 > kMostOfScatter) first = last + 1 - kMostOfScatter;
   const std::size_t n = last - first + 1;
   if (n < kFewestReadings) {
     throw bad_input(fmt::format("recording '{}'", recording.name),

@@ -30,7 +30,7 @@ constexpr auto kVerdicts = std::to_array<VerdictWord>({
     {ModelVerdict::seen, "seen", "a model error"},
     {ModelVerdict::residual, "calibration_residual", "calibration residual"},
 });
-constexpr double kLevel = 0.95;
+constexpr double kVerdictLevel = 0.95;
 constexpr double kManyDegrees = 1e7;  // no different from infinitely many
 
 }  // namespace
@@ -103,7 +103,7 @@ bool CombinedUncertainty::untold() const {
 }
 
 double coverage_factor(double degrees) {
-  const double p = 0.5 + 0.5 * kLevel;
+  const double p = 0.5 + 0.5 * kVerdictLevel;
   return degrees < kManyDegrees ? student_quantile(p, degrees) : normal_quantile(p);
 }
 

@@ -9,7 +9,7 @@
 namespace tpm {
 namespace {
 
-constexpr double kNothing = 1e-14;  // of a bond's stiffness: below, a branch is rounding
+constexpr double kRoundingShare = 1e-14;  // of a bond's stiffness: below, a branch is rounding
 
 /// Relaxation times that differ by rounding alone are one.
 bool same_time(double a, double b) {
@@ -161,7 +161,7 @@ BondLaw BondLaw::scaled(double factor) const {
 }
 
 void BondLaw::tidy() {
-  const double least = kNothing * instantaneous_N_per_m();
+  const double least = kRoundingShare * instantaneous_N_per_m();
   std::vector<Spring> kept_springs;
   for (const Spring& spring : springs) {
     if (!(spring.stiffness_N_per_m > least)) continue;

@@ -19,7 +19,7 @@ constexpr double kFittedPerDecade = 40.0, kComparedPerDecade = 97.0;
 constexpr int kMostPerDecade = 12;
 constexpr double kBeyond = 10.0;  // times outside of the window, as factors
 constexpr double kSumWeight = 1e3;
-constexpr double kNothing = 1e-3;  // of the error: a share that is rounding
+constexpr double kBranchShare = 1e-3;  // of the error: a share that is rounding
 
 double relaxation(double alpha, double tau_s, double t_s) {
   return mittag_leffler(alpha, 1.0, std::pow(t_s / tau_s, alpha));
@@ -67,7 +67,7 @@ FractionalBranches fitted(double alpha, double tau_s, const FractionalWindow& wi
   a.row(rows).setConstant(kSumWeight);
   b[rows] = kSumWeight;
   Eigen::VectorXd share = nonnegative_least_squares(a, b);
-  for (double& s : share) s = s > kNothing * window.error ? s : 0.0;
+  for (double& s : share) s = s > kBranchShare * window.error ? s : 0.0;
   const double sum = share.sum();
   FractionalBranches found;
   found.constant = share[columns] / sum;

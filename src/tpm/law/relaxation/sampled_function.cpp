@@ -10,16 +10,16 @@
 namespace tpm::law {
 namespace {
 
-constexpr std::size_t kNodes = 16;
+constexpr std::size_t kSampleNodes = 16;
 constexpr std::size_t kWorth = 2;  // times the nodes: fewer places are not worth a polynomial
 
 /// Chebyshev nodes of the unit stretch, rising, each `stride`-th of them.
 std::vector<double> unit_nodes(std::size_t stride) {
   std::vector<double> nodes;
-  nodes.reserve(kNodes / stride);
-  for (std::size_t i = 0; i < kNodes; i += stride) {
-    nodes.push_back(0.5 -
-                    0.5 * std::cos(std::numbers::pi * (static_cast<double>(i) + 0.5) / kNodes));
+  nodes.reserve(kSampleNodes / stride);
+  for (std::size_t i = 0; i < kSampleNodes; i += stride) {
+    nodes.push_back(
+        0.5 - 0.5 * std::cos(std::numbers::pi * (static_cast<double>(i) + 0.5) / kSampleNodes));
   }
   return nodes;
 }
@@ -58,7 +58,7 @@ class Sampling {
   /// Answers the places from `first` to before `last`.
   void fill(std::size_t first, std::size_t last) {
     const std::span<const double> here = places_.subspan(first, last - first);
-    const std::size_t worth = kWorth * std::max(kNodes, together_);
+    const std::size_t worth = kWorth * std::max(kSampleNodes, together_);
     const double middle = here.empty() ? 0.0 : 0.5 * (here.front() + here.back());
     if (here.size() < worth || !(here.front() < middle && middle < here.back())) {
       rows(first, last) = values_at(here);
@@ -77,8 +77,8 @@ class Sampling {
     std::vector<double> nodes = fine.nodes();
     for (double& node : nodes) node = from + length * node;
     const Eigen::MatrixXd values = values_at(nodes);
-    const Eigen::MatrixXd other_values = values(Eigen::seqN(0, kNodes / 2, 2), Eigen::all);
-    for (std::size_t i = 1; i < kNodes; i += 2) {
+    const Eigen::MatrixXd other_values = values(Eigen::seqN(0, kSampleNodes / 2, 2), Eigen::all);
+    for (std::size_t i = 1; i < kSampleNodes; i += 2) {
       const Eigen::RowVectorXd apart = coarse.at(fine.nodes()[i]).transpose() * other_values -
                                        values.row(static_cast<Eigen::Index>(i));
       if (!(apart.array().abs() <= allowed_.array()).all()) return false;

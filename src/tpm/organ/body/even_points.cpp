@@ -17,7 +17,7 @@ namespace {
 
 /// In spacings, of the repulsion: just above 1, so that it ends where all keep their distance.
 constexpr double kReach = 1.05;
-constexpr double kRounding = 1e-6;  // of a spacing, of a point on the surface
+constexpr double kOnSurface = 1e-6;  // of a spacing, of a point on the surface
 constexpr std::size_t kMost = 1'000'000;
 const Eigen::Vector3d kAnyDirection{0.6, 0.48, 0.64};
 const double kCell = std::sqrt(3.0) / 2.0;  // area of a point of a triangular lattice of spacing 1
@@ -48,7 +48,7 @@ void repel(const Surface& surface, double spacing, double step, NearPairs& near,
   }
   for_each_in_parallel(points.cols(), [&](Eigen::Index i) {
     // The point was on the surface, so that this is no farther away than it was pushed.
-    const double within = push.col(i).norm() + kRounding * spacing;
+    const double within = push.col(i).norm() + kOnSurface * spacing;
     points.col(i) = surface.nearest_position(points.col(i) + push.col(i), within);
   });
 }

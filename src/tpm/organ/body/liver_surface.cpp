@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 
 constexpr int kSubdivisions = 5;
 // Of the farthest reach: a bracket with one crossing, and the error of its estimate.
-constexpr double kNear = 1.0 / 256.0;
+constexpr double kNearSurface = 1.0 / 256.0;
 constexpr double kClose = 2e-12;
 constexpr int kMostEstimates = 60;
 
@@ -202,9 +202,9 @@ double reach_along(const LiverFunction& liver, const Vector3d& direction, double
         between <= known.inside || (between < known.outside && value(between) < 0.0);
     (is_inside ? at.inside : at.outside) = between;
   };
-  Bracket known{about - kNear * farthest, about + kNear * farthest};
+  Bracket known{about - kNearSurface * farthest, about + kNearSurface * farthest};
   if (!is_within(known)) {
-    while (at.width() > kNear * farthest) halve(at);
+    while (at.width() > kNearSurface * farthest) halve(at);
     known = at;
   }
   const double closer = estimated_reach(value, known, 0.1 * kClose * farthest);

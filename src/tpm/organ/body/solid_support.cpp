@@ -14,9 +14,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kApart = 0.62;   // least distance of an added sphere from all others, in spacings
-constexpr double kEnough = 0.8;   // farther from the others than this is no better
-constexpr double kNearest = 0.5;  // of an added sphere to the surface, in spacings
+constexpr double kApart = 0.62;  // least distance of an added sphere from all others, in spacings
+constexpr double kEnough = 0.8;  // farther from the others than this is no better
+constexpr double kLeastDistance = 0.5;  // of an added sphere to the surface, in spacings
 constexpr std::array<double, 4> kDepths{0.8, 0.9, 0.7, 1.0};  // below its sphere, the best first
 constexpr std::array<double, 3> kAslant{0.0, 0.3, 0.6};       // beside it
 constexpr int kTurns = 8;
@@ -138,7 +138,7 @@ class Below {
           if (distance <= kApart * (1.0 + 1e-9)) continue;
           const double found = value(place, distance);
           if (found <= largest * (1.0 + 1e-9)) continue;  // a later one must be better
-          if (-surface_.signed_distance(place) < kNearest * spacing_) continue;
+          if (-surface_.signed_distance(place) < kLeastDistance * spacing_) continue;
           largest = found;
           best = place;
         }

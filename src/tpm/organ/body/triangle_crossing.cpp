@@ -18,13 +18,13 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Corners = std::array<Vector3d, 3>;
 
-constexpr double kZero = 1e-12;
+constexpr double kCrossRounding = 1e-12;
 
 double turn(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   const Vector2d u = b - a;
   const Vector2d v = c - a;
   const double cross = u.x() * v.y() - u.y() * v.x();
-  return std::abs(cross) <= kZero * (u.norm() * v.norm()) ? 0.0 : cross;
+  return std::abs(cross) <= kCrossRounding * (u.norm() * v.norm()) ? 0.0 : cross;
 }
 
 bool segments_meet(const Vector2d& p, const Vector2d& q, const Vector2d& a, const Vector2d& b) {
@@ -71,7 +71,7 @@ bool segment_meets(const Vector3d& start, const Vector3d& end, const Corners& tr
                                 (triangle[2] - triangle[0]).norm(), (end - start).norm()});
   const auto height = [&](const Vector3d& p) {
     const double value = normal.dot(p - triangle[0]);
-    return std::abs(value) <= kZero * normal.norm() * size ? 0.0 : value;
+    return std::abs(value) <= kCrossRounding * normal.norm() * size ? 0.0 : value;
   };
   const double from = height(start);
   const double to = height(end);
@@ -85,7 +85,7 @@ bool segment_meets(const Vector3d& start, const Vector3d& end, const Corners& tr
     least = std::min(least, side);
     most = std::max(most, side);
   }
-  const double tolerance = kZero * along.norm() * size * size;
+  const double tolerance = kCrossRounding * along.norm() * size * size;
   return least >= -tolerance || most <= tolerance;
 }
 
@@ -107,7 +107,7 @@ std::array<bool, 3> shared_corners(const TriangleMesh& mesh, int a, int b) {
 bool folded(const TriangleMesh& mesh, int a, int b) {
   const Vector3d first = mesh.area_vector(a).normalized();
   const Vector3d second = mesh.area_vector(b).normalized();
-  return first.cross(second).norm() <= kZero && first.dot(second) < 0.0;
+  return first.cross(second).norm() <= kCrossRounding && first.dot(second) < 0.0;
 }
 
 /// Does an edge of `a` without a corner in `b` meet `b`?

@@ -88,7 +88,7 @@ bool in_one_layer(const Organ& organ, const NeighbourPair& pair) {
 
 /// The local spacing of every sphere, m, as build_network describes it.
 std::vector<double> local_spacings(const Organ& organ, std::span<const NeighbourPair> pairs) {
-  constexpr std::size_t kNearest = 6;  // neighbours in a triangular lattice
+  constexpr std::size_t kLatticeNeighbours = 6;  // neighbours in a triangular lattice
   std::vector<std::vector<double>> distances(organ.size());
   for (const NeighbourPair& pair : pairs) {
     if (!in_one_layer(organ, pair)) continue;
@@ -99,9 +99,9 @@ std::vector<double> local_spacings(const Organ& organ, std::span<const Neighbour
   std::vector<double> spacing(organ.size(), organ.spacing);
   for (std::size_t i = 0; i < organ.size(); ++i) {
     std::vector<double>& d = distances[i];
-    if (d.size() < kNearest) continue;
+    if (d.size() < kLatticeNeighbours) continue;
     std::sort(d.begin(), d.end());
-    const double mean = std::accumulate(d.begin(), d.begin() + kNearest, 0.0) / kNearest;
+    const double mean = std::accumulate(d.begin(), d.begin() + kLatticeNeighbours, 0.0) / kNearest;
     spacing[i] = std::min(mean, organ.spacing);
   }
   return spacing;

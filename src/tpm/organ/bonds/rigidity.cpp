@@ -15,7 +15,7 @@
 namespace tpm::organ {
 namespace {
 
-constexpr double kZero = 1e-9;          // of the mean diagonal
+constexpr double kZeroMode = 1e-9;      // of the mean diagonal
 constexpr std::size_t kMostModes = 24;  // found one by one
 constexpr int kInverseIterations = 4;   // each gains about nine digits over what is stiff
 constexpr double kTakesPart = 0.01;     // of the largest motion in the modes
@@ -85,15 +85,16 @@ ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest
 
   ZeroEnergyModes modes;
   BlockLdlt factor(blocks.pattern());
-  if (!factor.factorise(shifted(stiffness, constraints, -kZero * size))) {
+  if (!factor.factorise(shifted(stiffness, constraints, -kZeroMode * size))) {
     throw Error(ExitCode::numerical, "network", "the stiffness at rest cannot be factorised");
   }
   modes.count = factor.negative_count();
   if (modes.count == 0) return modes;
   const auto found = static_cast<Eigen::Index>(std::min(modes.count, kMostModes));
-  modes.spheres = spheres_that_move(
-      softest(blocks.pattern(), shifted(stiffness, constraints, kZero * size), constraints, found),
-      constraints.size());
+  modes.spheres =
+      spheres_that_move(softest(blocks.pattern(), shifted(stiffness, constraints, kZeroMode * size),
+                                constraints, found),
+                        constraints.size());
   return modes;
 }
 

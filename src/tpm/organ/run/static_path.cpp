@@ -12,11 +12,11 @@
 namespace tpm::organ {
 namespace {
 
-constexpr double kLongestMove = 0.05;    // of the spacing, of the driven sphere in one stride
-constexpr double kLeastStride = 1e-4;    // of what is imposed already
-constexpr double kLeastStart = 1e-12;    // of the way, where nothing is imposed yet
-constexpr double kBalanceShare = 1e-3;   // of the tolerance, for forces left
-constexpr double kLeastBalance = 1e-13;  // of the force: below, rounding decides
+constexpr double kLongestPathMove = 0.05;    // of the spacing, of the driven sphere in one stride
+constexpr double kLeastStride = 1e-4;        // of what is imposed already
+constexpr double kLeastStart = 1e-12;        // of the way, where nothing is imposed yet
+constexpr double kBalanceShare = 1e-3;       // of the tolerance, for forces left
+constexpr double kLeastPathBalance = 1e-13;  // of the force: below, rounding decides
 
 }  // namespace
 
@@ -25,11 +25,11 @@ StaticPath::StaticPath(const BondSystem& bonds, Positions rest, double spacing_m
                        double peak, double tolerance, EquilibriumOptions equilibrium)
     : tissue_(bonds, std::move(rest), constraints, probes, drive, equilibrium),
       state_(tissue_.at_rest(0.0)),
-      longest_move_m_(kLongestMove * spacing_m) {
+      longest_move_m_(kLongestPathMove * spacing_m) {
   require_valid(probes, constraints);
   const double force =
       drive == Drive::force ? peak : std::abs(tissue_.linear_response(state_, peak));
-  tolerance_N_ = std::max(kBalanceShare * tolerance, kLeastBalance) * force;
+  tolerance_N_ = std::max(kBalanceShare * tolerance, kLeastPathBalance) * force;
 }
 
 void StaticPath::start_from(const QuasiStaticState& state) {

@@ -6,8 +6,8 @@
 namespace tpm::organ {
 namespace {
 
-constexpr int kMostNewtonSteps = 60;
-constexpr int kMostHalvings = 30;
+constexpr int kMostStepIterations = 60;
+constexpr int kMostStepHalvings = 30;
 constexpr double kShareOfDepth = 1e-12;
 constexpr double kFast = 0.05;  // what a step may leave of the force for its factor to be kept
 constexpr double kNear = 1e-5;  // of the depth: Newton's steps are not checked any more
@@ -116,7 +116,7 @@ MethodEnd ImplicitBalance::find(Positions& position, const ViscousState& viscous
       kept.used = ++balances_;
       return MethodEnd::completed;
     }
-    if (iteration == kMostNewtonSteps) return MethodEnd::newton_failed;
+    if (iteration == kMostStepIterations) return MethodEnd::newton_failed;
     if (left > kFast * left_before) known = false;
     left_before = left;
     for (bool moved = false; !moved;) {
@@ -137,7 +137,7 @@ MethodEnd ImplicitBalance::find(Positions& position, const ViscousState& viscous
       const bool near = step_.colwise().norm().maxCoeff() <= kNear * depth_m;
       double length = 1.0;
       for (int halvings = 0; !moved; ++halvings, length *= 0.5) {
-        if (halvings == kMostHalvings) return MethodEnd::newton_failed;
+        if (halvings == kMostStepHalvings) return MethodEnd::newton_failed;
         const Positions next = position + length * step_;
         const double there = potential(next, viscous_state, load, anchors);
         moved = near || there <= energy + 1e-4 * length * slope;

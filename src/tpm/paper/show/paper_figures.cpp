@@ -17,7 +17,7 @@ namespace {
 constexpr double kDepth_m = 4e-3;  // Figs. 7 and 10
 constexpr double kHold_s = 30.0;
 constexpr double kCreep_s = 300.0;
-constexpr double kForever = std::numeric_limits<double>::infinity();
+constexpr double kRelaxed = std::numeric_limits<double>::infinity();
 
 std::vector<double> evenly(double from, double to, int intervals) {
   std::vector<double> x;
@@ -96,7 +96,7 @@ Figure static_force_figure(const PaperFigureData& data) {
   for (const double mm : depth_mm) {
     const double e = mm * 1e-3;
     const double lambda1 = lambda1_Pa(p.Eprime_Pa, e, p.spacing_m);
-    relaxed.push_back(step_relaxation_force_N(p, lambda1, e, kForever));
+    relaxed.push_back(step_relaxation_force_N(p, lambda1, e, kRelaxed));
     instantaneous.push_back(step_relaxation_force_N(p, lambda1, e, 0.0));
   }
   Panel panel{"", {"indentation depth", "mm", false, 0.0, 8.4}, force_axis()};
