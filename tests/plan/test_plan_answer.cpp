@@ -41,7 +41,9 @@ Plan full_plan(bool chosen) {
   plan.changes = {{"deeper, and as much faster", 1.66, 1.64, "tolerance"},
                   {"faster", {}, 4.0, ""},
                   {"stiffer", {}, kMostChange, ""}};
-  for (int i = 0; i < 20; ++i) plan.validity.push_back(fmt::format("limit {} is passed.", i));
+  for (int i = 0; i < 20; ++i) {
+    plan.validity.push_back({fmt::format("limit_{}", i), fmt::format("limit {} is passed.", i)});
+  }
   return plan;
 }
 
@@ -57,10 +59,10 @@ TEST_CASE("the short answer of a plan has 25 lines, the pick first, and every wa
     INFO(text);
     CHECK(std::ranges::count(text, '\n') <= 25);
     const files::Json written = plan_json(plan);
-    for (const files::Json& words : written.at("warnings")) {
-      CHECK_THAT(text, Contains(words.get<std::string>()));
+    for (const files::Json& remark : written.at("remarks")) {
+      CHECK_THAT(text, Contains(remark.at("text").get<std::string>()));
     }
-    CHECK(plan_json(plan).at("warnings").size() == 21);
+    CHECK(plan_json(plan).at("remarks").size() == 21);
     CHECK_THAT(text, Contains("peak 32 uN"));
     CHECK_THAT(text, Contains("matters, in parts of the peak: layers 130 %"));
     CHECK_THAT(text, Contains("not known whether it matters: tension (not tried)"));
