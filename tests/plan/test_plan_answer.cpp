@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <limits>
 
 #include "tpm/plan/show/plan_report.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::plan;
@@ -69,6 +71,21 @@ TEST_CASE("the short answer of a plan has 25 lines, the pick first, and every wa
     if (chosen) CHECK_THAT(text, Contains("pick: model_7"));
     if (!chosen) CHECK_THAT(text, Contains("no model meets tolerance and budget"));
   }
+}
+
+TEST_CASE("a margin or an offline time that is no number is an error, not one that is absent",
+          "[plan][answer]") {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  Plan plan = full_plan(true);
+  REQUIRE(files::to_text(plan_json(plan)).find("\"margin\"") != std::string::npos);
+  plan.candidates[plan.choice.value()].verified_error = kNone;
+  CHECK_FALSE(plan_json(plan).at("margin").is_null());
+  CHECK_THROWS_AS(files::to_text(plan_json(plan)), Error);
+  plan = full_plan(true);
+  plan.candidates[3].reach = ModelReach::full;
+  CHECK(plan_json(plan).at("network_offline_s") == 4e-5);
+  plan.duration_s = kNone;
+  CHECK_FALSE(plan_json(plan).at("network_offline_s").is_null());
 }
 
 TEST_CASE("the short answer of a plan counts the candidates that it does not show",

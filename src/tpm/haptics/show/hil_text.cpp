@@ -80,7 +80,7 @@ Json stalls_json(const JitterCheck& check) {
   const TimeHistogram& late = check.outcome.woke_late;
   const bool counted = late.count() > 0;
   return {{"beyond_watchdog", counted ? Json(stalls_beyond_watchdog(check)) : Json()},
-          {"p9999_s", counted ? or_null(late.quantile_s(0.9999)) : Json()},
+          {"p9999_s", counted ? Json(rounded(late.quantile_s(0.9999))) : Json()},
           {"watchdog_s", rounded(check.watchdog_s)},
           {"once_an_hour_extrapolated_s", or_null(once_an_hour_s(check))},
           {"extrapolation", extrapolation_of(check)},

@@ -369,9 +369,9 @@ Json plan_json(const Plan& plan) {
             {"response", plan.by_depth ? "force_N" : "depth_m"}};
   json["claim"] = claim_json(plan);
   json["choice"] = plan.choice ? frontier(plan).object(plan.chosen()) : Json(nullptr);
-  json["margin"] = plan.choice ? or_null(margin(plan)) : Json(nullptr);
+  json["margin"] = plan.choice ? Json(rounded(margin(plan))) : Json(nullptr);
   const auto offline = run_offline(plan);
-  json["network_offline_s"] = offline ? or_null(offline->second) : Json(nullptr);
+  json["network_offline_s"] = offline ? Json(rounded(offline->second)) : Json(nullptr);
   json["without_budget"] = plan.without_budget
                                ? frontier(plan).object(plan.candidates[*plan.without_budget])
                                : Json(nullptr);
