@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
@@ -20,24 +19,14 @@ namespace fs = std::filesystem;
 /// Of the members that all answers have. Raised when one of them changes its meaning.
 constexpr int kShape = 1;
 
-/// Members of results that hold remarks, as one text or as a list of texts, and their code.
-constexpr std::array<std::pair<const char*, const char*>, 6> kRemarks{{{"remarks", "remark"},
-                                                                       {"warnings", "warning"},
-                                                                       {"flags", "flag"},
-                                                                       {"notes", "note"},
-                                                                       {"sentences", "sentence"},
-                                                                       {"why", "reason"}}};
-
+/// The member `remarks` of a result, which may have none.
 Json remarks_of(const Json& result) {
-  Json remarks = Json::array();
-  for (const auto& [member, code] : kRemarks) {
-    const auto found = result.find(member);
-    if (found == result.end()) continue;
-    const auto add = [&, code = code](const Json& text) {
-      if (text.is_string()) remarks.push_back({{"code", code}, {"text", text}});
-    };
-    if (!found->is_array()) add(*found);
-    if (found->is_array()) std::for_each(found->begin(), found->end(), add);
+  const Json remarks = result.value("remarks", Json::array());
+  const auto is_remark = [](const Json& one) {
+    return one.is_object() && one.size() == 2 && one.contains("code") && one.contains("text");
+  };
+  if (!remarks.is_array() || !std::ranges::all_of(remarks, is_remark)) {
+    throw std::logic_error("the remarks of a result are no list of {code, text}");
   }
   return remarks;
 }

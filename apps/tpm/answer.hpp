@@ -14,11 +14,10 @@ struct Verdict {
 };
 
 /// The answer of a command as JSON. What all answers have stands before the members of `result`
-/// (docs/json.md): `tpm`, `command`, `version`, `inputs` with SHA-256, `verdicts` and `remarks`,
-/// which are the texts of the members of `result` that hold remarks, each with a code. To be called
-/// when all inputs were read.
-/// @param result an object; a member `version` is the program's, `remarks` are texts; no other
-///               member has a name of the envelope
+/// (docs/json.md): `tpm`, `command`, `version`, `inputs` with SHA-256, `verdicts` and `remarks`. To
+/// be called when all inputs were read.
+/// @param result an object; a member `version` is the program's, `remarks` is made by
+///               remarks_json(); no other member has a name of the envelope
 [[nodiscard]] std::string answer_text(const Session& session, Json result,
                                       const std::vector<Verdict>& verdicts = {});
 

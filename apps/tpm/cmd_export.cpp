@@ -64,8 +64,8 @@ int export_law_file(const ExportTexts& texts) {
   const ExportOptions options = options_of(texts);
   const LawFile law = read_law(texts.law);
   const std::string text = export_law(law, options);
-  for (const std::string& warning : export_warnings(law, options)) {
-    tell_user("tpm: warning: {}\n", warning);
+  for (const Remark& remark : export_remarks(law, options)) {
+    tell_user("tpm: warning: {}\n", remark.text);
   }
   deliver(text, texts.output);
   return 0;

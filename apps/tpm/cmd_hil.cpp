@@ -314,8 +314,8 @@ int run_hil(const RunChoice& choice, const Session& session) {
   } else {
     say("{}wrote {}\n", run_text(hil, run), choice.output);
   }
-  for (const std::string& warning : run.rendering.warnings) {
-    tell_user("tpm: warning: {}\n", warning);
+  for (const Remark& remark : run.rendering.remarks) {
+    tell_user("tpm: warning: {}\n", remark.text);
   }
   warn_if_beyond_model(run.outcome);
   if (page) page->end(run.outcome, options.interrupted);

@@ -27,12 +27,12 @@ int export_hil(const ExportChoice& choice, const Session& session) {
                                {"whole", recording.whole()},
                                {"damaged_rows", recording.damaged},
                                {"end", recording.cause()},
-                               {"notes", recording_remarks(recording)},
+                               {"remarks", remarks_json(recording_remarks(recording))},
                                {"simulated_device", recording.simulated()}},
                           {{"recording_whole", recording.whole()}}));
   } else {
     std::string text = device_line(recording) + "\n";
-    for (const std::string& line : recording_remarks(recording)) text += line + "\n";
+    for (const Remark& remark : recording_remarks(recording)) text += remark.text + "\n";
     say("{}wrote {}: {} rows\n", text, choice.output, recording.rows.size());
   }
   return exit_code(recording.whole());

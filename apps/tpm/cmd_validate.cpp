@@ -134,7 +134,7 @@ void add_presses(ValidationRequest& request, const std::string& file) {
     request.presses.push_back(std::move(press.motion));
     request.instruments.emplace_back();
   }
-  for (std::string& words : presses.left_out) request.remarks.push_back(std::move(words));
+  std::ranges::move(presses.left_out, std::back_inserter(request.remarks));
 }
 
 /// Recordings, or the presses of sessions: not both, for a press has no zero to be found.
@@ -176,7 +176,8 @@ void add_rendering(ValidationRequest& request, const ValidateOptions& options) {
   request.remarks = presses.remarks;
   for (const RecordingComparison& r : rendered.recordings) {
     if (r.part.whole()) continue;
-    request.remarks.push_back(fmt::format("{}: {}", r.name, part_words(r, presses.law.spec)));
+    request.remarks.push_back(
+        {"part_of_press", fmt::format("{}: {}", r.name, part_words(r, presses.law.spec))});
   }
 }
 

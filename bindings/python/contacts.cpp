@@ -1,6 +1,7 @@
 // Contacts stepped from Python, and recordings of haptic sessions.
 #include "binding.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/session/loop_contact.hpp"
 #include "tpm/haptics/session/recording.hpp"
@@ -98,7 +99,7 @@ py::dict info_of(const LoopContact& contact) {
       py::arg("stable_N_per_m") = check.stable_N_per_m,
       py::arg("passive_N_per_m") = check.passive_N_per_m, py::arg("verdict") = check.verdict(),
       py::arg("passive") = check.passive(), py::arg("acceptable") = check.acceptable(),
-      py::arg("warnings") = check.warnings, py::arg("surface_m") = servo.surface_m,
+      py::arg("warnings") = remark_texts(check.remarks), py::arg("surface_m") = servo.surface_m,
       py::arg("push") = servo.push, py::arg("force_limit_N") = servo.force_limit_N,
       py::arg("spheres") = contact.spheres());
 }
@@ -129,7 +130,7 @@ py::dict session_of(const std::filesystem::path& file) {
   column("observed_J", [](const ServoRecord& r) { return r.observed_J; });
   column("busy_s", [](const ServoRecord& r) { return r.busy_s; });
   column("flags", [](const ServoRecord& r) { return r.flags; });
-  std::vector<std::string> warnings = recording_remarks(recording);
+  std::vector<std::string> warnings = remark_texts(recording_remarks(recording));
   const Json rendering = recording.header.value("rendering", Json());
   if (rendering.is_object()) {
     for (const Json& words : rendering.at("warnings")) warnings.push_back(words);

@@ -3,6 +3,7 @@
 #include <map>
 
 #include "binding.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpm/files/import/reading_options.hpp"
 #include "tpm/files/import/recording_file.hpp"
@@ -76,6 +77,16 @@ class Fit {
   [[nodiscard]] const FitResult& fit() const { return fit_; }
   [[nodiscard]] const std::optional<Selection>& selection() const { return selection_; }
 
+  /// Those of the selection, then those of the fit.
+  [[nodiscard]] py::list remarks() const {
+    std::vector<Remark> all = selection_ ? selection_->remarks : std::vector<Remark>();
+    all.insert(all.end(), fit_.remarks.begin(), fit_.remarks.end());
+    py::list list;
+    for (const Remark& one : all) {
+      list.append(py::dict(py::arg("code") = one.code, py::arg("text") = one.text));
+    }
+    return list;
+  }
   [[nodiscard]] py::list parameters() const {
     py::list rows;
     for (const ParameterResult& p : fit_.parameters) {
@@ -283,15 +294,10 @@ void bind_fits(py::module_& module) {
                                return f.fit().adequacy ? to_text(files::to_json(*f.fit().adequacy))
                                                        : std::string("null");
                              })
-      .def_property_readonly("flags", [](const Fit& f) { return f.fit().flags; })
+      .def_property_readonly("remarks", &Fit::remarks)
       .def_property_readonly("summary",
                              [](const Fit& f) {
                                return f.selection() ? f.selection()->summary
-                                                    : std::vector<std::string>();
-                             })
-      .def_property_readonly("warnings",
-                             [](const Fit& f) {
-                               return f.selection() ? f.selection()->warnings
                                                     : std::vector<std::string>();
                              })
       .def_property_readonly("correlation",

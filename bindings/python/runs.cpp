@@ -1,5 +1,6 @@
 // Scenes run and sweeps computed.
 #include "binding.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/file_roles.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
@@ -9,7 +10,7 @@
 #include "tpm/organ/scene/experiment_scene.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/plan/show/plan_report.hpp"
-#include "tpm/plan/show/simulation_report.hpp"
+#include "tpm/plan/show/simulation_remarks.hpp"
 #include "tpm/sweep/run_sweep.hpp"
 #include "tpm/sweep/sweep.hpp"
 #include "tpm/sweep/sweep_result.hpp"
@@ -52,7 +53,7 @@ py::dict answer_of(const ExperimentScene& scene, const RunNetwork& network,
   answer["formulation"] = scene.formulation.kind;
   answer["scene"] = scene.text;
   answer["error_estimate"] = run.record.error_estimate;
-  answer["warnings"] = short_answer(scene, network, run).warnings;
+  answer["warnings"] = remark_texts(simulation_remarks(run));
   if (scene.formulation.masses) return answer;
   answer["work_J"] = column([](const CurvePoint& p) { return p.energy.work_J; });
   answer["dissipated_J"] = column([](const CurvePoint& p) { return p.energy.dissipated_J; });

@@ -111,6 +111,14 @@ TEST_CASE("JSON that nlohmann-json would let pass is refused") {
   CHECK_THROWS_AS(to_text(Json{{"a", std::nan("")}}), Error);
 }
 
+TEST_CASE("remarks are written as a list of code and text, an empty one where there is none") {
+  const std::vector<Remark> remarks{{"clipping", "3 samples"}, {"no_hold", "there is no hold"}};
+  CHECK(remarks_json(remarks) == Json::parse(R"([{"code": "clipping", "text": "3 samples"},
+    {"code": "no_hold", "text": "there is no hold"}])"));
+  CHECK(remarks_json({}) == Json::array());
+  CHECK(remark_texts(remarks) == std::vector<std::string>{"3 samples", "there is no hold"});
+}
+
 TEST_CASE("SHA-256 matches the published test vector") {
   // FIPS 180-2, appendix B.1
   CHECK(sha256_hex("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");

@@ -41,5 +41,5 @@ TEST_CASE("a weak design: the warning says that the prediction does not hold") {
   const PlannedExperiment experiment{
       PlannedExperiment::Kind::ramp_hold, 2e-3, 0.5e-3, 0.0, 10.0, 0.5, 1};
   const DesignCheck check = check_design(problem, experiment, 60, 3);
-  CHECK_FALSE(check.warnings.empty());
+  CHECK_FALSE(check.remarks.empty());
 }

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "adequacy_studies.hpp"
+#include "support/remarks.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/blocks/law_export.hpp"
 #include "tpm/fit/adequacy.hpp"
@@ -71,8 +72,9 @@ TEST_CASE("a law that does not describe its recording says so first and everywhe
   REQUIRE(law.adequacy);
   CHECK(law.adequacy->is_rejected());
   CHECK(law.adequacy->summary == s.summary.front());
-  CHECK(predict_recording(law, recording, {}).flags.front() == s.summary.front());
-  CHECK(export_warnings(law, {}).front() == s.summary.front());
+  const Remark in_doubt{"law_in_doubt", s.summary.front()};
+  CHECK(predict_recording(law, recording, {}).remarks.front() == in_doubt);
+  CHECK(export_remarks(law, {}).front() == in_doubt);
 }
 
 TEST_CASE("where no law tried describes a recording, the laws that were not tried are named",
@@ -211,7 +213,7 @@ TEST_CASE("readings at the limit of a force cell are named and censored", "[adeq
                                                       : 0.0;
     if (truth > 0.0) CHECK(std::abs(p.estimate - truth) < 4.0 * p.standard_error.value());
   }
-  CHECK(std::ranges::any_of(fit.flags, [](const auto& f) { return f.starts_with("clipping"); }));
+  CHECK(test::has_remark(fit.remarks, "clipping"));
   const Json data = config_json(fit.config).at("data").front();
   CHECK(data.contains("clipped_above"));
   const LawFile law = fitted_law(fit);

@@ -66,7 +66,7 @@ std::string printed_answer(const Selection& s) {
 
 }  // namespace
 
-TEST_CASE("the short answer says the verdicts, adequacy and warnings of the JSON in 25 lines",
+TEST_CASE("the short answer says the verdicts, adequacy and remarks of the JSON in 25 lines",
           "[fit][answer]") {
   const Selection s = selected_at_scale(1.0);
   const std::string text = printed_answer(s);
@@ -75,10 +75,10 @@ TEST_CASE("the short answer says the verdicts, adequacy and warnings of the JSON
   CHECK(lines_of(text) <= 25);
   CHECK(text.find('{') == std::string::npos);
   CHECK_THAT(text, Contains(json.at("adequacy").at("summary").get<std::string>()));
-  for (const Json& words : json.at("warnings"))
-    CHECK_THAT(text, Contains(words.get<std::string>()));
-  for (const Json& words : json.at("fit").at("flags")) {
-    CHECK_THAT(text, Contains(words.get<std::string>()));
+  for (const Json& part : {json, json.at("fit")}) {
+    for (const Json& remark : part.at("remarks")) {
+      CHECK_THAT(text, Contains(remark.at("text").get<std::string>()));
+    }
   }
   for (const Json& p : json.at("fit").at("parameters")) {
     const auto at = text.find("\n" + p.at("name").get<std::string>() + " ");

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/show/recording_report.hpp"
@@ -90,7 +91,7 @@ TEST_CASE("The contact of a recording that begins in contact may lie two depths 
   CHECK(exponent.upper.value() > 2.5);
   CHECK(contact.lower.value() < -2e-3);
   CHECK(contact.upper.value() > -2e-3);
-  CHECK_THAT(fmt::format("{}", fmt::join(fit.flags, "\n")),
+  CHECK_THAT(fmt::format("{}", fmt::join(remark_texts(fit.remarks), "\n")),
              Contains("stated: no samples before contact, so its depth is an unknown"));
 }
 
@@ -100,7 +101,7 @@ TEST_CASE("Automatic bounds of the material are widened, and a note says so", "[
   REQUIRE(tau.first_bounds);
   CHECK(tau.first_bounds->upper == 0.1);
   CHECK(tau.parameter.upper > 2.0);
-  CHECK_THAT(fmt::format("{}", fmt::join(fit.flags, "\n")),
+  CHECK_THAT(std::string(test::remark_text(fit.remarks, "bounds_widened")),
              Contains("the automatic bounds of tau1 were widened from 0.01 s .. 0.1 s"));
 }
 
@@ -109,13 +110,12 @@ TEST_CASE("Bounds that could be widened by rounding alone stay, and nothing is s
   const ParameterResult& tau = named(fit, "tau1");
   CHECK(tau.at_upper_bound);
   CHECK_FALSE(tau.first_bounds);
-  CHECK_THAT(fmt::format("{}", fmt::join(fit.flags, "\n")),
-             !Contains("bounds of tau1 were widened"));
+  CHECK_FALSE(test::has_remark(fit.remarks, "bounds_widened"));
 }
 
 TEST_CASE("A widening tells the bounds apart however small it is", "[bounds]") {
   const FitResult fit = fitted_below_its_tau(WidestBounds{0.01, 0.100001});
-  CHECK_THAT(fmt::format("{}", fmt::join(fit.flags, "\n")),
+  CHECK_THAT(std::string(test::remark_text(fit.remarks, "bounds_widened")),
              Contains("tau1 were widened from 0.01 s .. 0.1 s to 0.01 s .. 0.100001 s"));
 }
 

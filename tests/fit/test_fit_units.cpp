@@ -106,7 +106,7 @@ void check_same(const FitResult& found, const FitResult& expected, const Powers&
     check_limit(p.lower, q.lower, factor, width);
     check_limit(p.upper, q.upper, factor, width);
   }
-  CHECK(found.flags.size() == expected.flags.size());
+  CHECK(found.remarks.size() == expected.remarks.size());
   CHECK(told_of_weakest(found) == told_of_weakest(expected));
 }
 

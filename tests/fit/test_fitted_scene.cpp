@@ -127,11 +127,13 @@ TEST_CASE("an organ follows a measured motion in straight pieces, nearly as it d
   for (std::size_t i = 0; i < depth.size(); ++i) {
     CHECK(fit.recordings.front().drive[i] == Approx(depth[i]).margin(1e-12));
   }
-  const auto stated = [](const std::string& flag) {
-    return flag.find("follows the 1000 samples of the motion of 'r.csv' within 0.2 % of its") !=
-           std::string::npos;
+  const auto stated = [](const Remark& remark) {
+    return remark.code == "motion_followed" &&
+           remark.text.find(
+               "follows the 1000 samples of the motion of 'r.csv' within 0.2 % of its") !=
+               std::string::npos;
   };
-  CHECK(std::count_if(fit.flags.begin(), fit.flags.end(), stated) == 1);
+  CHECK(std::ranges::count_if(fit.remarks, stated) == 1);
 }
 
 }  // namespace tpm::fit

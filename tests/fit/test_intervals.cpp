@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/confirmation.hpp"
@@ -62,11 +63,6 @@ std::vector<PreparedRecording> prepared_ramp(Recording r) {
   return {prepare_recording("ramp.csv", std::move(r))};
 }
 
-bool says_flag(const FitResult& fit, const std::string& words) {
-  return std::ranges::any_of(
-      fit.flags, [&](const std::string& f) { return f.find(words) != std::string::npos; });
-}
-
 }  // namespace
 
 TEST_CASE("correlated noise: the covariance of least squares agrees with dense matrices",
@@ -102,7 +98,7 @@ TEST_CASE("correlated noise: the covariance of least squares agrees with dense m
     CHECK(noise.of[i].degrees < 300.0);
   }
   CHECK_THAT(noise.inflation, WithinRel(r.sum() / static_cast<double>(r.rows()), 1e-9));
-  CHECK(says_flag(fit, "noise of neighbouring samples is correlated"));
+  CHECK(test::has_remark(fit.remarks, "correlated_noise"));
   CHECK(to_json(fit)["noise_of_estimates"]["parameters"].size() == fit.parameters.size());
 }
 
@@ -142,7 +138,7 @@ TEST_CASE("readings that hide their noise widen an interval by half a step", "[i
   const auto one = prepared_ramp(coarse);
   const FitResult fit = run_fit(ramp_config(one), data_sets(one));
   REQUIRE(fit.noise);
-  CHECK(says_flag(fit, "limited by resolution"));
+  CHECK(test::has_remark(fit.remarks, "limited_by_resolution"));
   // All readings of a plateau half a step off: that is the bound of its stiffness, and more.
   for (const NoiseOfEstimate& e : fit.noise->of) CHECK(e.bias > 0.0);
   const double half_of_plateau = 0.5 * step / 5e-3;
@@ -153,7 +149,8 @@ TEST_CASE("readings that hide their noise widen an interval by half a step", "[i
   Recording fine = made_ramp(0.0, 6);
   for (double& f : fine.response) f = kSigma * std::round(f / kSigma);
   const auto two = prepared_ramp(fine);
-  CHECK_FALSE(says_flag(run_fit(ramp_config(two), data_sets(two)), "limited by resolution"));
+  CHECK_FALSE(
+      test::has_remark(run_fit(ramp_config(two), data_sets(two)).remarks, "limited_by_resolution"));
 }
 
 TEST_CASE("isolated outliers are left out and said, and the law's misfit is none", "[intervals]") {
@@ -164,7 +161,8 @@ TEST_CASE("isolated outliers are left out and said, and the law's misfit is none
   r.response[121] -= 20.0 * kSigma;  // two in a row on one side would be something that lasted
   const auto one = prepared_ramp(r);
   const FitResult fit = run_fit(ramp_config(one), data_sets(one));
-  CHECK(says_flag(fit, "4 outliers"));
+  CHECK_THAT(std::string(test::remark_text(fit.remarks, "outliers_left_out")),
+             Contains("4 outliers"));
   CHECK(std::ranges::count(fit.recordings.at(0).outlier, true) == 4);
   CHECK(fit.value_count == before.value_count - 4);
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
@@ -176,7 +174,9 @@ TEST_CASE("isolated outliers are left out and said, and the law's misfit is none
   // Another law: far from the curve, but together.
   FitConfig elastic = recording_config(parse_law_name("linear", "test"), clean, {});
   elastic.profiles = false;
-  CHECK_FALSE(says_flag(run_fit(elastic, data_sets(clean)), "outlier"));
+  const FitResult of_elastic = run_fit(elastic, data_sets(clean));
+  CHECK_FALSE(test::has_remark(of_elastic.remarks, "outliers_left_out"));
+  CHECK_FALSE(test::has_remark(of_elastic.remarks, "outliers"));
 }
 
 TEST_CASE("a minimum that one start of five finds is not called identified", "[intervals]") {

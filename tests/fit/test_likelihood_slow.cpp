@@ -9,6 +9,7 @@
 
 #include "fitted_parameter.hpp"
 #include "gradient_check.hpp"
+#include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/fit.hpp"
@@ -114,11 +115,6 @@ FitConfig relaxation_with(const std::string& noise) {
   return without_profiles(parse_fit_config(j, "f.json"));
 }
 
-bool says(const std::vector<std::string>& flags, const std::string& part) {
-  return std::any_of(flags.begin(), flags.end(),
-                     [&](const std::string& flag) { return flag.find(part) != std::string::npos; });
-}
-
 const std::string kKnown = R"({"kind": "absolute", "absolute": "1 mN"})";
 
 }  // namespace
@@ -216,7 +212,8 @@ TEST_CASE("an estimated sigma is the most likely one, with an interval and a pla
              WithinRel(fit.likelihood->minus_two_log, 1e-8));
   CHECK(factor.likelihood->parameters == 4);
   CHECK_THAT(find(factor, "tau1").estimate, WithinRel(find(fit, "tau1").estimate, 1e-5));
-  CHECK(says(fit.flags, "the size of the noise is estimated from 300 values"));
+  CHECK_THAT(std::string(test::remark_text(fit.remarks, "noise_estimated")),
+             Contains("from 300 values"));
 }
 
 TEST_CASE("data sets share a noise parameter or have their own") {
@@ -255,7 +252,7 @@ TEST_CASE("correlated noise widens the intervals, and ignoring it is a choice") 
   CHECK(wider > 1.5);
   CHECK(wider < 1.5 * std::sqrt(adjusted.inflation));
   CHECK(*find(adjusted, "k1").standard_error > *find(ignored, "k1").standard_error);
-  CHECK(says(adjusted.flags, "the intervals count them so"));
+  CHECK(test::has_remark(adjusted.remarks, "correlated_residuals"));
   CHECK_THAT(to_terminal_text(adjusted), Contains("a: 400 of 400 samples fitted, rms residual"));
 }
 
@@ -415,14 +412,13 @@ TEST_CASE(
     return std::abs(std::log(find(fit, "tau1").estimate / 5.0));
   };
   const FitResult normal = run_fit(without_profiles(law_config(kKnown)), data);
-  CHECK(says(normal.flags, "1 outlier ("));
-  CHECK(says(normal.flags, "left out of the fit"));
-  CHECK(says(normal.flags, "t = 6.0"));
+  CHECK_THAT(std::string(test::remark_text(normal.remarks, "outliers_left_out")),
+             Contains("1 outlier (") && Contains("t = 6.0"));
   const FitResult wide = run_fit(
       without_profiles(
           law_config(R"({"kind": "absolute", "absolute": "1 mN", "distribution": "student_t"})")),
       data);
-  CHECK(says(wide.flags, "more than 8 standard deviations"));
+  CHECK(test::has_remark(wide.remarks, "outliers"));
   const FitResult huber =
       run_fit(without_profiles(law_config(kKnown, R"(, "loss": {"kind": "huber"})")), data);
   CAPTURE(shift(normal), shift(wide), shift(huber));

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/design/recovery.hpp"
 #include "tpm/fit/select/selection.hpp"
@@ -45,12 +46,6 @@ Recording every_kept(const Recording& r) {
     few.response.push_back(r.response[i]);
   }
   return few;
-}
-
-std::string all(const std::vector<std::string>& sentences) {
-  std::string text;
-  for (const std::string& sentence : sentences) text += sentence + "\n";
-  return text;
 }
 
 const std::vector<PreparedRecording>& whole_record() {
@@ -97,7 +92,7 @@ TEST_CASE("24,000 samples give the true values, and what every twelfth of them g
   const FitResult few = fit_of_record(thinned_record(), config_for(thinned_record()));
   REQUIRE(fit.value_count > 20'000);
   REQUIRE(few.value_count < 20'000);
-  CHECK_THAT(all(fit.flags), Contains("come from the covariance"));
+  CHECK(test::has_remark(fit.remarks, "intervals_from_covariance"));
   check_true_values(fit);
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
     const ParameterResult& p = fit.parameters[i];

@@ -135,8 +135,9 @@ TEST_CASE("A relaxation modulus that falls by more decades than an instrument re
   CHECK(law_name(chosen(s).config.law.value()) == "linear-1-fluid");
   CHECK_THAT(estimate_of(chosen(s), "k1"), WithinRel(1.0, 1e-6));
   CHECK_THAT(estimate_of(chosen(s), "tau1"), WithinRel(1.0, 1e-6));
-  REQUIRE_FALSE(s.warnings.empty());
-  CHECK(s.warnings.front().find("43 decades") != std::string::npos);
+  REQUIRE_FALSE(s.remarks.empty());
+  CHECK(s.remarks.front().code == "scatter_of_small_readings_assumed");
+  CHECK(s.remarks.front().text.find("43 decades") != std::string::npos);
   // The written configuration says the same.
   const FitConfig again = parse_fit_config(config_json(chosen(s).config), "config.json");
   CHECK_THAT(estimate_of(run_fit(again), "tau1"), WithinRel(1.0, 1e-6));

@@ -50,7 +50,7 @@ TEST_CASE("at small depths correspondence alone makes an organ answer as the law
 TEST_CASE("the written scene answers in a run as the fit says") {
   const OrganMaterial m = on_liver(two_branches(100.0));
   CHECK(m.organ.rms < m.start.rms);
-  CHECK(m.flags.empty());
+  CHECK(m.remarks.empty());
   Json scene = m.scene;
   scene["protocol"] = {
       {"kind", "ramp_hold"}, {"depth", "2 mm"}, {"rate", "2 mm/s"}, {"hold", "5 s"}};

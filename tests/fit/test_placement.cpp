@@ -293,7 +293,7 @@ TEST_CASE("pools, law files and written configurations hold both answers of a dr
                WithinRel(find(fit, name).standard_error.value(), 1e-3));
     CHECK(find(again, name).with_drift.has_value() == find(fit, name).with_drift.has_value());
   }
-  CHECK_THAT(again.flags.back(), Contains("drift or a slow branch: not separable"));
+  CHECK(again.remarks.back().code == "drift_not_separable");
 }
 
 TEST_CASE("a drift that no rest tells does not move k1 and tau1 out of their intervals",

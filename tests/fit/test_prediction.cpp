@@ -194,9 +194,11 @@ TEST_CASE("what goes beyond the fitted data is said") {
   const LawFile law = spring_law();
   const LawPrediction deep =
       predict_law(law, ramp_and_hold(8e-3, 1e-3, 30.0), std::vector{0.0, 8.0, 38.0}, {});
-  REQUIRE(deep.flags.size() == 2);
-  CHECK_THAT(deep.flags[0], Contains("8 mm deep, and the law was fitted to 4 mm"));
-  CHECK_THAT(deep.flags[1], Contains("lasts 38 s, and the law was fitted to 10 s"));
+  REQUIRE(deep.remarks.size() == 2);
+  CHECK(deep.remarks[0].code == "deeper_than_fitted");
+  CHECK_THAT(deep.remarks[0].text, Contains("8 mm deep, and the law was fitted to 4 mm"));
+  CHECK(deep.remarks[1].code == "longer_than_fitted");
+  CHECK_THAT(deep.remarks[1].text, Contains("lasts 38 s, and the law was fitted to 10 s"));
   const LawPrediction load = predict_law(law, creep(0.2, 5.0), std::vector{1.0, 5.0}, {});
   CHECK(load.reading_lower.empty());
   CHECK(load.response.front() == Approx(2e-3));

@@ -340,17 +340,19 @@ TEST_CASE("Indentations answer Young's modulus with its interval", "[rheometer]"
     }
     CHECK(all.moduli.back().name == "E_instantaneous");
     CHECK_THAT(to_terminal_text(all), Contains("Poisson's ratio 0.45 (given)") && Contains("kPa"));
-    CHECK(all.warnings.empty());
+    CHECK(all.remarks.empty());
   }
   sphere.sphere_radius_m = 0.4e-3;
   LawSpec deep = parse_law_name("hertz-1", "test");
   deep.reference = kReference;
-  CHECK_THAT(geometry_warnings(deep, sphere, 1e-3).at(0),
+  CHECK(geometry_remarks(deep, sphere, 1e-3).at(0).code == "deep_for_sphere");
+  CHECK_THAT(geometry_remarks(deep, sphere, 1e-3).at(0).text,
              Contains("the depth of 1 mm is 2.5 of the sphere's radius (0.4 mm)"));
   // What the probe travelled before contact is no depth; without a fit the reference has to do.
   deep.reference = 5e-3;
-  CHECK(geometry_warnings(deep, sphere, 0.02e-3).empty());
-  CHECK_THAT(geometry_warnings(deep, sphere, std::nullopt).at(0), Contains("the depth of 5 mm"));
+  CHECK(geometry_remarks(deep, sphere, 0.02e-3).empty());
+  CHECK_THAT(geometry_remarks(deep, sphere, std::nullopt).at(0).text,
+             Contains("the depth of 5 mm"));
   ContactGeometry both = sphere;
   both.punch_radius_m = 1e-3;
   CHECK_THROWS_AS(modulus_Pa(deep, 1.0, both), Error);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "support/remarks.hpp"
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
@@ -65,9 +66,7 @@ TEST_CASE("select returns the law behind a recording and says what the protocol 
     if (p.parameter.name == "k_inf") CHECK((*p.lower < 100.0 && 100.0 < *p.upper));
     if (p.parameter.name == "tau2") CHECK((*p.lower < 6.0 && 6.0 < *p.upper));
   }
-  bool hidden = false;
-  for (const std::string& w : s.warnings) hidden = hidden || w.find("shorter than") != w.npos;
-  CHECK(hidden);  // 0.4 s under a ramp of 2.5 s
+  CHECK(test::has_remark(s.remarks, "shorter_than_ramp"));  // 0.4 s under a ramp of 2.5 s
 }
 
 TEST_CASE("one point of a profile tells whether the interval holds a value", "[select]") {
@@ -187,8 +186,8 @@ TEST_CASE("a depth of metres is taken for a slip of the unit", "[select]") {
   options.setup.profiles = false;
   const std::vector<PreparedRecording> one{prepare_recording("slip.csv", r)};
   const Selection s = select_law(one, options);
-  REQUIRE_FALSE(s.warnings.empty());
-  CHECK_THAT(s.warnings.front(), Catch::Contains("changes by 5 m: is its unit right?"));
+  REQUIRE_FALSE(s.remarks.empty());
+  CHECK(s.remarks.front().code == "unit_doubtful");
 }
 
 namespace {
@@ -345,8 +344,7 @@ TEST_CASE("few samples are no prediction", "[select]") {
   const Selection s = selected_among(
       sampled("linear-1", {100.0, 120.0, 1.0, 0.0, 0.0}, 0.1, 2.4, 1e-3), {"linear-1"});
   CHECK(s.candidates.front().held_out.empty());
-  CHECK_THAT(s.warnings.front(), Catch::Contains("nothing was held out: the second half of the "
-                                                 "hold has fewer than 5 samples"));
+  CHECK(s.remarks.front().code == "nothing_held_out");
   CHECK(to_json(s).at("laws").at(0).at("held_out").empty());
 
   // One sample after the fitted part, at which the surface is lost and the prediction 0.

@@ -102,8 +102,8 @@ TEST_CASE("a step between two samples biases no interval, wherever it lies", "[r
   CHECK(std::ranges::any_of(s.summary, [](const std::string& words) {
     return words.find("is not known; the fit allows for it") != std::string::npos;
   }));
-  CHECK(std::ranges::none_of(s.warnings, [](const std::string& words) {
-    return words.starts_with("rise_delay");  // it is no time constant
+  CHECK(std::ranges::none_of(s.remarks, [](const Remark& remark) {
+    return remark.text.starts_with("rise_delay");  // it is no time constant
   }));
 }
 

@@ -68,7 +68,8 @@ TEST_CASE("parts of fitted data get no verdict, whatever was done to them", "[va
                               v.recordings.front().scatter.sigma));
     CHECK(v.verdict == ModelVerdict::residual);
     REQUIRE(v.remarks.size() == 1);
-    CHECK_THAT(v.remarks.front(), Contains("those of fitted.csv"));
+    CHECK(v.remarks.front().code == "copied_readings");
+    CHECK_THAT(v.remarks.front().text, Contains("those of fitted.csv"));
   };
   refused("cut", [](std::size_t i, double&, double&, double&) { return i > 20 && i < 200; });
   refused("later", [](std::size_t, double& t, double&, double&) {
@@ -152,8 +153,10 @@ TEST_CASE("the calibration's files are read as they were fitted", "[validate]") 
     CHECK_FALSE(lost.files.front().recording);
     REQUIRE(lost.remarks.size() == 1);
   }
-  CHECK_THAT(find_calibration(law, "law.json", digests, {cut}).remarks.front(),
-             Contains("other options"));
+  CHECK(find_calibration(law, "law.json", digests, {cut}).remarks.front().code ==
+        "calibration_read_differently");
+  CHECK(find_calibration(law, "law.json", digests, {fails}).remarks.front().code ==
+        "calibration_unreadable");
 }
 
 }  // namespace tpm::fit

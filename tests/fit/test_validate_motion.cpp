@@ -134,9 +134,12 @@ TEST_CASE("a quantity that is read from clipped readings is undetermined", "[val
        {QuantityKind::peak, QuantityKind::relaxation_ratio, QuantityKind::half_time}) {
     const QuantityComparison& q = of_kind(c, kind);
     CHECK(q.verdict == ModelVerdict::undetermined);
-    CHECK_THAT(q.remark, Contains("limit of the force cell"));
+    CHECK(q.remark.value().code == "clipping");
   }
   CHECK(of_kind(c, QuantityKind::end_of_hold).verdict == ModelVerdict::adequate);
+  CHECK_THAT(to_csv(v), Contains("remark") && Contains("limit of the force cell"));
+  const Json quantities = to_json(v).at("recordings").front().at("quantities");
+  CHECK(quantities.front().at("remarks").front().at("code") == "clipping");
   CHECK(v.verdict == ModelVerdict::undetermined);
   // The joint test is of what is known, which the law predicts.
   CHECK(c.joint.rank == 1);
@@ -154,11 +157,11 @@ TEST_CASE("a calibration residual does not ask for less uncertainty", "[validate
       "fitted", test::study_recording(test::study_validation(10, 0.0), noise, random));
   ValidationRequest request = request_for(quiet_law(), fitted);
   request.requirement = parse_requirement("1%", "test");
-  CHECK_FALSE(validate(request).recordings.front().quantities.front().remark.empty());
+  CHECK(validate(request).recordings.front().quantities.front().remark.value().code == kMustShrink);
   request.calibration.files.push_back({"fitted", "of the bytes", fitted, ""});
   const Validation v = validate(request);
   REQUIRE(v.verdict == ModelVerdict::residual);
-  for (const QuantityComparison& q : v.recordings.front().quantities) CHECK(q.remark.empty());
+  for (const QuantityComparison& q : v.recordings.front().quantities) CHECK_FALSE(q.remark);
 }
 
 TEST_CASE("creep and relaxation are not pooled", "[validate]") {

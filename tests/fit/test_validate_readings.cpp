@@ -99,8 +99,8 @@ TEST_CASE("an instrument is stated once, and fits and budgets take it", "[valida
   take_instrument(recording, folder / "r.csv");
   REQUIRE(recording.instrument);
   CHECK_THAT(recording.instrument->reading_floor(), WithinRel(0.012 / std::sqrt(12.0), 1e-12));
-  REQUIRE_FALSE(recording.warnings.empty());
-  CHECK_THAT(recording.warnings.back(), Contains("gain of instrument cell"));
+  REQUIRE_FALSE(recording.remarks.empty());
+  CHECK(recording.remarks.back().code == "gain_not_in_intervals");
   // No reading is known better than its step.
   CHECK_THAT(scatter_of(recording, parts_of(recording)).sigma,
              WithinRel(0.012 / std::sqrt(12.0), 1e-12));

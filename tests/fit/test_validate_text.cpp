@@ -64,11 +64,13 @@ TEST_CASE("the text takes 25 lines at most and ends in the verdict", "[validate]
     r.drive.front() = 0.01;
     ValidationRequest request = request_for(law, creep);
     request.requirement = parse_requirement("0.000001%", "test");
-    for (int i = 0; i < 8; ++i) request.remarks.push_back("something that is to be said with it");
+    for (int i = 0; i < 8; ++i) {
+      request.remarks.push_back({"said", "something that is to be said with it"});
+    }
     const Validation v = validate(request);
     CHECK(v.recordings.front().quantities.size() == 5);
     CHECK(std::ranges::all_of(v.recordings.front().quantities, [](const QuantityComparison& q) {
-      return q.verdict == ModelVerdict::undetermined || q.remark.empty();
+      return q.verdict == ModelVerdict::undetermined || !q.remark;
     }));
     (void)lines_of(v);
   }

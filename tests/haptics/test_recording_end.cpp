@@ -78,14 +78,20 @@ bool is_among(const std::vector<std::string>& lines, const std::string& words) {
   return false;
 }
 
+std::vector<std::string> texts_in(const Json& answer) {
+  std::vector<std::string> texts;
+  for (const Json& remark : answer.at("remarks")) texts.push_back(remark.at("text"));
+  return texts;
+}
+
 void check_that_all_say(const SaidOfRecording& said, const std::string& words) {
   CAPTURE(words);
   CHECK_THAT(said.text, Contains(words));
   CHECK_THAT(said.brief, Contains("! " + words));
   CHECK_THAT(said.page, Contains(words));
   CHECK_THAT(said.view, Contains(words));
-  CHECK(is_among(said.json.at("notes").get<std::vector<std::string>>(), words));
-  CHECK(is_among(said.report.at("notes").get<std::vector<std::string>>(), words));
+  CHECK(is_among(texts_in(said.json), words));
+  CHECK(is_among(texts_in(said.report), words));
   CHECK(is_among(said.exported, words));
 }
 
@@ -161,8 +167,9 @@ TEST_CASE("A session that its user stopped is whole, and a finished one has noth
   recording = read_again(recording, folder);
   CHECK(recording.whole());
   CHECK(recording_remarks(recording) ==
-        std::vector<std::string>{"the session ended early, at 1.999 s of 10.5 s: stopped by a "
-                                 "signal, such as Ctrl-C"});
+        std::vector<Remark>{{"ended_early",
+                             "the session ended early, at 1.999 s of 10.5 s: stopped by a signal, "
+                             "such as Ctrl-C"}});
   recording.rows.resize(1);
   CHECK_THROWS_WITH(verify(recording),
                     Contains("holds no motion; the session ended early, at 0 s"));
@@ -174,12 +181,12 @@ TEST_CASE("A session that never touched the tissue has nothing to compare") {
   const Verification v = verify(recording);
   CHECK(v.all.peak_N == 0.0);
   CHECK(v.all.max_N == 0.0);
-  CHECK(v.notes == std::vector<std::string>{
-                       "no contact: the tool never touched the tissue, nothing to compare"});
+  REQUIRE(v.remarks.size() == 1);
+  CHECK(v.remarks.front().code == "no_contact");
   const std::string text = verification_text(recording, v);
   CHECK_THAT(text, Contains("no contact") && !Contains("CV_"));
   const Verification touched = verify(ended_recording(folder, 2.0));
-  CHECK(touched.notes.empty());
+  CHECK(touched.remarks.empty());
 }
 
 TEST_CASE("Every cause of an end has its word in an export") {

@@ -224,16 +224,17 @@ TEST_CASE("What is unstable and accepted ends with a cause of its own, not as fi
 }
 
 TEST_CASE("A rest in which the tissue cannot recover is warned of") {
-  const auto warnings = [](const char* rest) {
+  const auto remarks = [](const char* rest) {
     Json json = test::short_session();
     json["indentations"]["rest"] = rest;
     const HilSession session = test::parsed(json);
     const LoopModel loop = make_loop_model(session);
-    return check_rendering(session, *loop.model, loop, "virtual").warnings;
+    return check_rendering(session, *loop.model, loop, "virtual").remarks;
   };
-  REQUIRE(warnings("1 s").size() == 1);  // the surface recovers in 2 s
-  CHECK_THAT(warnings("1 s").front(), Contains("a rest of 1 s is too short"));
-  CHECK(warnings("9.3 s").empty());
+  REQUIRE(remarks("1 s").size() == 1);  // the surface recovers in 2 s
+  CHECK(remarks("1 s").front().code == "rest_too_short");
+  CHECK_THAT(remarks("1 s").front().text, Contains("a rest of 1 s is too short"));
+  CHECK(remarks("9.3 s").empty());
 }
 
 // --- the start ------------------------------------------------------------------------------

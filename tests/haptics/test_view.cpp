@@ -215,9 +215,11 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
                     "SI_unit": "N/s", "verdict": "identified",
                     "profile_SI_and_deviance": [[-7e-6, 7], [-9.87e-7, 3], [5e-6, null], [6e-6, 9]]}],
     "adequacy": {"verdict": "not_described", "summary": "no law tried describes this recording"},
-    "flags": []})");
+    "remarks": []})");
   fit["title"] = title;
-  const Json answer{{"fit", fit}, {"summary", {"the simplest is linear-1"}}, {"warnings", {title}}};
+  const Json answer{{"fit", fit},
+                    {"summary", {"the simplest is linear-1"}},
+                    {"remarks", {{{"code", "a_code"}, {"text", title}}}}};
   const Json figures = Json::parse(R"({"figures": [{"title": "fit", "panels": [{
     "x": {"quantity": "time", "unit": "s"}, "y": {"quantity": "force", "unit": "N"},
     "series": [{"kind": "line", "label": "law", "x": [0, 1], "y": [1, 2]}]}]}]})");

@@ -7,6 +7,7 @@
 #include "expected_values.hpp"
 #include "law_answers.hpp"
 #include "refusal.hpp"
+#include "support/remarks.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/show/recording_report.hpp"
@@ -376,7 +377,7 @@ TEST_CASE("a fit predicts the unloading of a Hertz contact, and says where it pr
   // The unloading is predicted to the noise.
   CHECK(*fitted.rms_outside < test::allowed_error("retreat.predicted_unloading") * sigma);
   CHECK(to_json(fit)["recordings"][0]["samples_not_predicted"] == fitted.not_predicted);
-  CHECK(to_json(fit)["flags"].dump().find("not predicted") != std::string::npos);
+  CHECK(test::has_remark(fit.remarks, "not_predicted"));
   const auto words = outside_words(fit);
   REQUIRE(words.size() == 2);
   CHECK_THAT(words[0], Catch::Contains("the prediction is off") && !Catch::Contains("describe"));

@@ -169,8 +169,8 @@ TEST_CASE("bands alone: what they cannot tell is said, and that the estimates ar
   CHECK(eta1.verdict == Verdict::flat);
   CHECK_THAT(eta1.summary, Contains("is undetermined by these data"));
   CHECK(result.parameters[0].verdict == Verdict::identified);
-  REQUIRE_FALSE(result.flags.empty());
-  CHECK_THAT(result.flags.back(), Contains("the estimates are one point of it"));
+  REQUIRE_FALSE(result.remarks.empty());
+  CHECK(result.remarks.back().code == "estimates_not_unique");
   CHECK_THAT(to_terminal_text(result), Contains("4 bands, no degrees of freedom"));
 }
 

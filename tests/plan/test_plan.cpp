@@ -296,8 +296,8 @@ TEST_CASE("a claim names its quantity, and what is not claimed stands beside it"
   CHECK(std::ranges::count(said, '\n') <= 25);
   CHECK_THAT(said, Contains("planned model " + plan.chosen().name) &&
                        Contains("nothing claimed, verified error"));
-  for (const auto& words : plan_json(plan)["warnings"]) {
-    CHECK_THAT(said, Contains(words.get<std::string>()));
+  for (const auto& remark : plan_json(plan)["remarks"]) {
+    CHECK_THAT(said, Contains(remark.at("text").get<std::string>()));
   }
   const test::TempFolder folder;
   write_planned_run(plan, scene, times, answer, folder / "p.h5");

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <limits>
 
 #include "tpm/plan/show/plan_report.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::plan;
@@ -41,7 +43,9 @@ Plan full_plan(bool chosen) {
   plan.changes = {{"deeper, and as much faster", 1.66, 1.64, "tolerance"},
                   {"faster", {}, 4.0, ""},
                   {"stiffer", {}, kMostChange, ""}};
-  for (int i = 0; i < 20; ++i) plan.validity.push_back(fmt::format("limit {} is passed.", i));
+  for (int i = 0; i < 20; ++i) {
+    plan.validity.push_back({fmt::format("limit_{}", i), fmt::format("limit {} is passed.", i)});
+  }
   return plan;
 }
 
@@ -57,16 +61,31 @@ TEST_CASE("the short answer of a plan has 25 lines, the pick first, and every wa
     INFO(text);
     CHECK(std::ranges::count(text, '\n') <= 25);
     const files::Json written = plan_json(plan);
-    for (const files::Json& words : written.at("warnings")) {
-      CHECK_THAT(text, Contains(words.get<std::string>()));
+    for (const files::Json& remark : written.at("remarks")) {
+      CHECK_THAT(text, Contains(remark.at("text").get<std::string>()));
     }
-    CHECK(plan_json(plan).at("warnings").size() == 21);
+    CHECK(plan_json(plan).at("remarks").size() == 21);
     CHECK_THAT(text, Contains("peak 32 uN"));
     CHECK_THAT(text, Contains("matters, in parts of the peak: layers 130 %"));
     CHECK_THAT(text, Contains("not known whether it matters: tension (not tried)"));
     if (chosen) CHECK_THAT(text, Contains("pick: model_7"));
     if (!chosen) CHECK_THAT(text, Contains("no model meets tolerance and budget"));
   }
+}
+
+TEST_CASE("a margin or an offline time that is no number is an error, not one that is absent",
+          "[plan][answer]") {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  Plan plan = full_plan(true);
+  REQUIRE(files::to_text(plan_json(plan)).find("\"margin\"") != std::string::npos);
+  plan.candidates[plan.choice.value()].verified_error = kNone;
+  CHECK_FALSE(plan_json(plan).at("margin").is_null());
+  CHECK_THROWS_AS(files::to_text(plan_json(plan)), Error);
+  plan = full_plan(true);
+  plan.candidates[3].reach = ModelReach::full;
+  CHECK(plan_json(plan).at("network_offline_s") == 4e-5);
+  plan.duration_s = kNone;
+  CHECK_FALSE(plan_json(plan).at("network_offline_s").is_null());
 }
 
 TEST_CASE("the short answer of a plan counts the candidates that it does not show",

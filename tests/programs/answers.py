@@ -9,6 +9,7 @@ Runs each command once. SLOW are those that take minutes, wait for a client or m
 
 import hashlib
 import json
+import re
 import shlex
 import subprocess
 import sys
@@ -16,7 +17,7 @@ import tempfile
 from pathlib import Path
 
 ENVELOPE = ["tpm", "command", "version", "inputs", "verdicts", "remarks"]
-REMARKS = ("remarks", "warnings", "flags", "notes", "sentences", "why")
+FORMER = ("warnings", "flags", "notes")  # what remarks were called in some results
 PRESS = '--depth "2 mm" --rate "2 mm/s" --hold "3 s"'
 RUNS = f"""
 example recording
@@ -74,6 +75,28 @@ def with_format(command, path=""):
         yield from with_format(below, f"{path} {below['name']}".strip())
 
 
+def faults_of_remarks(part, place=""):
+    """Of the key `remarks` wherever it stands: a list of {code, text}, and no list of texts by another name."""
+    faults = []
+    if isinstance(part, list):
+        return [fault for one in part for fault in faults_of_remarks(one, place + "/-")]
+    if not isinstance(part, dict):
+        return faults
+    for key, value in part.items():
+        here = f"{place}/{key}"
+        if key == "remarks":
+            of_code = lambda one: re.fullmatch("[a-z][a-z0-9_]*", one["code"]) and one["text"]
+            if not isinstance(value, list) or not all(
+                isinstance(one, dict) and set(one) == {"code", "text"} and of_code(one) for one in value
+            ):
+                faults.append(f"{here} is no list of {{code, text}}: {value}")
+        elif key in FORMER and isinstance(value, list) and all(isinstance(one, str) for one in value):
+            faults.append(f"{here} is a list of texts: is it remarks?")
+        else:
+            faults += faults_of_remarks(value, here)
+    return faults
+
+
 def faults_of(answer, words, folder, exit_code):
     """What is wrong with the envelope of an answer."""
     if not isinstance(answer, dict):
@@ -93,13 +116,7 @@ def faults_of(answer, words, folder, exit_code):
         given = folder / word
         if given.is_file() and given.resolve() not in read and words[words.index(word) - 1] not in ("-o", "--output"):
             faults.append(f"{word} was given and is no input")
-    if any(set(one) != {"code", "text"} or not one["code"] or not one["text"] for one in answer["remarks"]):
-        faults.append("a remark without code or text")
-    texts = [one["text"] for one in answer["remarks"]]
-    for member in REMARKS[1:]:
-        held = answer.get(member, [])
-        held = [held] if isinstance(held, str) else held
-        faults += [f"{member}: '{t}' is no remark" for t in held if isinstance(t, str) and t and t not in texts]
+    faults += faults_of_remarks(answer)
     if any(set(one) != {"code", "holds"} for one in answer["verdicts"]):
         faults.append("a verdict without code or holds")
     if exit_code == 1 and all(one["holds"] for one in answer["verdicts"]):

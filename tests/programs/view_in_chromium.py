@@ -293,7 +293,8 @@ def look_at_fit(chromium, tpm, folder):
         if name == "answer":
             answer = json.loads((folder / "answer.json").read_text())
             lead = page.js("document.getElementById('lead') ? document.getElementById('lead').textContent : document.body.textContent")
-            for words in (*answer["summary"], *answer["warnings"], *answer["fit"]["flags"]):
+            remarks = [one["text"] for one in (*answer["remarks"], *answer["fit"]["remarks"])]
+            for words in (*answer["summary"], *remarks):
                 assert lead.count(words) == 1, (words, lead)
         if name == "law":
             for words in (f"{law['tau1_s']:.6g}", "std. error", "95 % interval", "N/m"):

@@ -64,6 +64,7 @@ class Tables(unittest.TestCase):
         fit = tpmkit.fit(gaps, **QUICK)
         said = [w for w in fit.warnings if "2 of 501 rows have an empty cell or NaN" in w]
         self.assertEqual(len(said), 1, fit.warnings)
+        self.assertIn({"code": "rows_left_out", "text": said[0]}, fit.remarks)
         self.assertIn(said[0], repr(fit))
         self.assertIn("left out", str(fit))
         gaps.to_csv(self.folder / "gaps.csv", index=False)

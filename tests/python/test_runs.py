@@ -171,6 +171,7 @@ class Plans(unittest.TestCase):
         chosen = plan.candidates.loc[plan.choice]
         self.assertIn(plan.adequacy["verdict"], ("adequate", "not_adequate"))
         self.assertLessEqual(str(plan).count("\n"), 25)
+        self.assertEqual([remark["text"] for remark in plan.remarks], plan.warnings)
         for words in plan.warnings:
             self.assertIn(words, str(plan))
         for words in (plan.adequacy["summary"], *plan.warnings):

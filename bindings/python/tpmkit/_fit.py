@@ -41,7 +41,7 @@ class _Inputs:
         return _OfTable(*by_file(self.table, lambda file: _core.fit([file], *self.options)))
 
 
-_VALUES = ("parameters", "recordings", "has_law", "adequacy_json", "flags", "summary", "warnings", "correlation")
+_VALUES = ("parameters", "recordings", "has_law", "adequacy_json", "remarks", "summary", "correlation")
 _TEXTS = ("answer", "text", "to_json")
 
 
@@ -233,7 +233,12 @@ class Fit:
         """What the experiment cannot tell, and what a reader must know."""
         adequacy = self.adequacy
         first = [adequacy["summary"]] if adequacy and adequacy["verdict"] != "adequate" else []
-        return first + self._core.warnings + self._core.flags
+        return first + [remark["text"] for remark in self.remarks]
+
+    @property
+    def remarks(self) -> list[dict[str, str]]:
+        """What the experiment cannot tell, and what a reader must know: `code`, which stays the same, and `text`."""
+        return self._core.remarks
 
     @property
     def data(self) -> list[pd.DataFrame]:
@@ -314,7 +319,8 @@ class Fit:
                          "lower": lower, "upper": upper, **{k: m[k] for k in ("unit", "verdict", "of")}})
         table = pd.DataFrame(rows).set_index("name")
         table[["standard_error", "lower", "upper"]] = table[["standard_error", "lower", "upper"]].astype(float)
-        table.attrs = {k: said[k] for k in ("geometry", "poisson_ratio", "poisson_ratio_provenance", "warnings")}
+        table.attrs = {k: said[k] for k in ("geometry", "poisson_ratio", "poisson_ratio_provenance")}
+        table.attrs["warnings"] = [remark["text"] for remark in said["remarks"]]
         return table
 
     def plot(self, recording: int = 0, ax: Axes | None = None) -> Axes:

@@ -49,7 +49,12 @@ class Validation:
     @property
     def warnings(self) -> list[str]:
         """What a reader must know."""
-        return list(self._document["remarks"])
+        return [remark["text"] for remark in self.remarks]
+
+    @property
+    def remarks(self) -> list[dict[str, str]]:
+        """What a reader must know: `code`, which stays the same, and `text`."""
+        return self._document["remarks"]
 
     @property
     def quantities(self) -> pd.DataFrame:
@@ -162,7 +167,7 @@ class Design:
         check = self._document["check"]
         if not check:
             return {"verdict": "not_judged", "summary": "the expected intervals were not checked by simulated repetitions"}
-        doubts = len(check["warnings"])
+        doubts = len(check["remarks"])
         return {"verdict": "not_adequate" if doubts else "adequate",
                 "summary": f"{check['data_sets']} simulated repetitions, {check['failed']} of them not fitted: "
                            + (f"{doubts} warnings" if doubts else "they confirm the expected intervals")}
@@ -171,7 +176,12 @@ class Design:
     def warnings(self) -> list[str]:
         """What was left out, and what the check of the expected intervals found against them."""
         left_out = [f"left out: {words}" for words in self._document["left_out"]]
-        return left_out + list((self._document["check"] or {}).get("warnings", []))
+        return left_out + [remark["text"] for remark in self.remarks]
+
+    @property
+    def remarks(self) -> list[dict[str, str]]:
+        """What the check found against the expected intervals: `code`, which stays the same, and `text`."""
+        return (self._document["check"] or {}).get("remarks", [])
 
     def __repr__(self) -> str:
         lines = [f"<tpmkit.Design of {len(self._document['ranked'])} candidates", f"  adequacy: {self.adequacy['summary']}"]

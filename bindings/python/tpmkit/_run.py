@@ -182,7 +182,12 @@ class Plan:
     @property
     def warnings(self) -> list[str]:
         """What a reader must know: masses that are left out, limits of validity that the scene passes."""
-        return list(self._dict["warnings"])
+        return [remark["text"] for remark in self.remarks]
+
+    @property
+    def remarks(self) -> list[dict[str, str]]:
+        """What a reader must know: `code`, which stays the same, and `text`."""
+        return self._dict["remarks"]
 
     @property
     def candidates(self) -> pd.DataFrame:

@@ -65,7 +65,7 @@ class Specimens:
             adequacy = fit.get("adequacy")
             if adequacy and adequacy["verdict"] != "adequate":
                 found.append(f"{r['recording']}: {adequacy['summary']}")
-            found += [f"{r['recording']}: {flag}" for flag in fit.get("flags", [])]
+            found += [f"{r['recording']}: {remark['text']}" for remark in fit.get("remarks", [])]
         return found
 
     @property

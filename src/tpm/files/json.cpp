@@ -49,6 +49,12 @@ void require_finite(const Json& value, const std::string& key) {
 
 }  // namespace
 
+Json remarks_json(std::span<const Remark> remarks) {
+  return array_json(remarks, [](const Remark& remark) {
+    return Json{{"code", remark.code}, {"text", remark.text}};
+  });
+}
+
 Json or_null(double value) {
   return std::isfinite(value) ? Json(rounded(value)) : Json(nullptr);
 }

@@ -3,8 +3,12 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 
 namespace tpm::files {
 
@@ -18,6 +22,9 @@ template <class Items, class Convert>
   for (const auto& item : items) array.push_back(std::invoke(convert, item));
   return array;
 }
+
+/// Remarks as every JSON has them: a list of {"code", "text"}.
+[[nodiscard]] Json remarks_json(std::span<const Remark> remarks);
 
 /// A number of a result with kResultDigits; null if it is not finite.
 [[nodiscard]] Json or_null(double value);

@@ -230,10 +230,10 @@ void mark_conditions(FitResult& result, const ResidualFunction& function) {
   for (ParameterResult& p : all) p.summary += condition_words(p, all);
   for (const ParameterResult& p : all) {
     if (p.first_bounds) {
-      result.flags.push_back(widening_words(p));
+      result.remarks.push_back({"bounds_widened", widening_words(p)});
     }
     if (p.nuisance && (p.at_lower_bound || p.at_upper_bound)) {
-      result.flags.push_back(bound_flag(result, p));
+      result.remarks.push_back({"nuisance_at_bound", bound_flag(result, p)});
     }
   }
 }

@@ -17,9 +17,9 @@ namespace tpm::fit {
 [[nodiscard]] bool widen_pressed_bounds(const FitResult& result, const FitConfig& config,
                                         std::vector<FitParameter>& parameters);
 
-/// Fills ParameterResult::nuisance and conditional_on, and says so in words and flags. What stands
-/// on a bound decides for all parameters that would move by more than a standard error if it were
-/// moved by the width of its bounds (linearised).
+/// Fills ParameterResult::nuisance and conditional_on, and says so in words and remarks. What
+/// stands on a bound decides for all parameters that would move by more than a standard error if it
+/// were moved by the width of its bounds (linearised).
 void mark_conditions(FitResult& result, const ResidualFunction& function);
 
 /// Fills ParameterResult::not_separable from the configuration, and says so in words.

@@ -248,7 +248,8 @@ FitResult fit_experiments(const ExperimentResiduals& function) {
   for (int round = 0; round <= kMostRounds; ++round) {
     std::vector<std::size_t> found = isolated_outliers(function, result.best.natural);
     if (found == outliers) {
-      if (!outliers.empty()) result.flags.push_back(outlier_words(function, outliers));
+      if (!outliers.empty())
+        result.remarks.push_back({"outliers_left_out", outlier_words(function, outliers)});
       return result;
     }
     outliers = std::move(found);

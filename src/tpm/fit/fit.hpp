@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/likelihood.hpp"
 #include "tpm/fit/likelihood/bootstrap.hpp"
@@ -142,7 +143,7 @@ struct FitResult {
   std::vector<RecordingFit> recordings;
   std::vector<std::string> data_sha256;  ///< of the files, one for each of config.data
   std::optional<LawAdequacy> adequacy;   ///< whether the law describes the data, if it was tested
-  std::vector<std::string> flags;        ///< what a reader must know (text, one line each)
+  std::vector<Remark> remarks;           ///< what a reader must know
 };
 
 /// Minimum over many starts, intervals, verdicts, hypotheses. Deterministic for a given config.

@@ -237,9 +237,10 @@ FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParamet
   } else if (profiles) {
     // With so many readings the likelihood is a parabola as far as the interval reaches.
     linear_intervals(result, parameters, threshold);
-    result.flags.push_back(
-        fmt::format("{} readings: the intervals come from the covariance, not from profiles",
-                    function.residual_count()));
+    result.remarks.push_back(
+        {"intervals_from_covariance",
+         fmt::format("{} readings: the intervals come from the covariance, not from profiles",
+                     function.residual_count())});
   }
   result.inflation = threshold.inflation;
   result.noise = threshold.noise;

@@ -258,7 +258,7 @@ Eigen::VectorXd limiting_steps(const NoiseRows& rows, double variance, double de
       .matrix();
 }
 
-std::string words_of(const NoiseOfEstimates& noise, Eigen::Index samples, bool limited) {
+std::string words_of(const NoiseOfEstimates& noise, Eigen::Index samples) {
   std::string words;
   if (noise.correlated) {
     words = fmt::format(
@@ -271,7 +271,7 @@ std::string words_of(const NoiseOfEstimates& noise, Eigen::Index samples, bool l
                            significant(noise.beyond, 3));
     }
   }
-  if (limited) {
+  if (noise.limited) {
     words += fmt::format(
         "{}limited by resolution: the noise is below half a step of the readings, and half a step "
         "is allowed for as a bias of each",
@@ -374,7 +374,8 @@ std::optional<NoiseOfEstimates> noise_of_estimates(const ExperimentResiduals& fu
     noise.of[noise.free[static_cast<std::size_t>(k)]] = {
         all(k, k) / plain[k], std::max(degrees, 1.0), bias[k] / std::sqrt(plain[k])};
   }
-  noise.summary = words_of(noise, rows->values(), limited);
+  noise.limited = limited;
+  noise.summary = words_of(noise, rows->values());
   return noise;
 }
 

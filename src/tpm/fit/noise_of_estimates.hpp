@@ -42,6 +42,7 @@ struct NoiseOfEstimates {
   std::vector<std::size_t> free;    ///< parameters that are not at a bound
   Eigen::MatrixXd covariance;       ///< of those, in natural values
   bool correlated = false;          ///< else rounding is all there is
+  bool limited = false;             ///< by the resolution of the readings
   std::string summary;              ///< one sentence
 };
 

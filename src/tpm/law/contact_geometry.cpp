@@ -87,33 +87,36 @@ std::string geometry_words(const ContactGeometry& g) {
   return {};
 }
 
-std::vector<std::string> geometry_warnings(const LawSpec& spec, const ContactGeometry& g,
-                                           std::optional<double> depth_m) {
-  std::vector<std::string> warnings;
-  if (spec.response == Quantity::stress) return warnings;
+std::vector<Remark> geometry_remarks(const LawSpec& spec, const ContactGeometry& g,
+                                     std::optional<double> depth_m) {
+  std::vector<Remark> remarks;
+  if (spec.response == Quantity::stress) return remarks;
   if (g.sphere_radius_m) {
     const double deepest = depth_m.value_or(spec.reference);
     const double share = deepest / *g.sphere_radius_m;
     if (share > kShallow) {
-      warnings.push_back(fmt::format(
-          "the depth of {} mm is {} of the sphere's radius ({} mm){}: Hertz's formula holds for "
-          "depths well below it (up to {})",
-          significant(1e3 * deepest, 3), significant(share, 3),
-          significant(1e3 * *g.sphere_radius_m, 6),
-          share >= 1.0 ? ", so the whole half sphere is under the surface" : "",
-          significant(kShallow, 2)));
+      remarks.push_back(
+          {"deep_for_sphere",
+           fmt::format("the depth of {} mm is {} of the sphere's radius ({} mm){}: Hertz's formula "
+                       "holds for "
+                       "depths well below it (up to {})",
+                       significant(1e3 * deepest, 3), significant(share, 3),
+                       significant(1e3 * *g.sphere_radius_m, 6),
+                       share >= 1.0 ? ", so the whole half sphere is under the surface" : "",
+                       significant(kShallow, 2))});
     }
   }
   const Kernel wanted = g.sphere_radius_m       ? Kernel::hertz
                         : g.cone_half_angle_rad ? Kernel::power
                                                 : Kernel::linear;
   if (g.is_given() && spec.kernel != wanted) {
-    warnings.push_back(fmt::format(
-        "the kernel of {} is not that of the probe: the moduli are right at the reference depth of "
-        "{} mm alone",
-        law_name(spec), significant(1e3 * spec.reference, 4)));
+    remarks.push_back(
+        {"kernel_not_of_probe", fmt::format("the kernel of {} is not that of the probe: the moduli "
+                                            "are right at the reference depth of "
+                                            "{} mm alone",
+                                            law_name(spec), significant(1e3 * spec.reference, 4))});
   }
-  return warnings;
+  return remarks;
 }
 
 }  // namespace tpm::law

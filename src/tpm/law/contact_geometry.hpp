@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpmkit/law.hpp"
 
 namespace tpm::law {
@@ -40,12 +42,12 @@ struct ContactGeometry {
 /// "a sphere of radius 2 mm, F = 4/3 E/(1 - nu^2) sqrt(R) u^(3/2) (Hertz)"; empty if not given.
 [[nodiscard]] std::string geometry_words(const ContactGeometry& geometry);
 
-/// Warnings for a reader of moduli of that geometry: a depth that is not small beside
+/// Remarks for a reader of moduli of that geometry: a depth that is not small beside
 /// the sphere, a kernel that is not the probe's.
 /// @param depth_m largest depth that the law was fitted to, from contact on; the law's reference
 ///   depth if it is not known
-[[nodiscard]] std::vector<std::string> geometry_warnings(const LawSpec& spec,
-                                                         const ContactGeometry& geometry,
-                                                         std::optional<double> depth_m);
+[[nodiscard]] std::vector<Remark> geometry_remarks(const LawSpec& spec,
+                                                   const ContactGeometry& geometry,
+                                                   std::optional<double> depth_m);
 
 }  // namespace tpm::law

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/plan/plan_model.hpp"
 
 namespace tpm::plan {
@@ -127,7 +128,7 @@ struct Plan {
   PlanWork work;
   std::vector<PlanRelevance> relevance;
   std::vector<PlanChange> changes;
-  std::vector<std::string> validity;  ///< limits that the scene passes
+  std::vector<Remark> validity;  ///< limits that the scene passes
 
   [[nodiscard]] const PlannedCandidate& chosen() const { return candidates.at(choice.value()); }
 };

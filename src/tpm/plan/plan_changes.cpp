@@ -42,7 +42,7 @@ class Survival {
       if (auto reason = model_.why_not(changed, request_.budget)) return reason;
       if (valid_) {
         const auto passed = passed_limits(changed);
-        if (!passed.empty()) return "validity: " + passed.front();
+        if (!passed.empty()) return "validity: " + passed.front().text;
       }
       surrogate_.scene().spent().add(model_.work_to_build(scene));
       const ModelClaim claim = model_.claim(changed, request_.budget);
@@ -140,14 +140,15 @@ class Survival {
 
 }  // namespace
 
-std::vector<std::string> passed_limits(const PlanSurrogate& surrogate) {
+std::vector<Remark> passed_limits(const PlanSurrogate& surrogate) {
   const Validity& validity = surrogate.validity();
-  std::vector<std::string> words;
+  std::vector<Remark> passed;
   for (std::size_t k = 0; k < kValidityLimits; ++k) {
     const auto limit = static_cast<ValidityLimit>(k);
-    if (validity.of(limit).first_time_s) words.emplace_back(words_of(limit));
+    if (!validity.of(limit).first_time_s) continue;
+    passed.push_back({std::string(key_of(limit)), std::string(words_of(limit))});
   }
-  return words;
+  return passed;
 }
 
 std::vector<PlanChange> plan_changes(const PlanSurrogate& surrogate, const PlanModel& model,

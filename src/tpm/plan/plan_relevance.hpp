@@ -1,4 +1,5 @@
 #pragma once
+#include "tpm/base/remark.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/plan/plan_allowance.hpp"
 
@@ -21,8 +22,8 @@ namespace tpm::plan {
                                                    const PlanRequest& request, double reference_s,
                                                    const PlanAllowance& allowance);
 
-/// Limits that the scene passes in its course, in words.
-[[nodiscard]] std::vector<std::string> passed_limits(const PlanSurrogate& surrogate);
+/// Limits that the scene passes in its course.
+[[nodiscard]] std::vector<Remark> passed_limits(const PlanSurrogate& surrogate);
 
 /// Why a model does not fit a budget; none if it does.
 [[nodiscard]] std::optional<std::string> over_budget(const PlanModel& model,

@@ -37,7 +37,7 @@ struct Exported {
   PronyTable table;
   std::optional<double> instant_Pa;
   double poisson_ratio;
-  std::vector<std::string> remarks;
+  std::vector<Remark> remarks;
 };
 
 void require_sayable(const LawFile& law, const ExportOptions& options) {
@@ -66,7 +66,7 @@ void require_terms(const PronyTable& table, ExportTarget target) {
 }
 
 /// What --relaxation-only drops, and how much of the force that is.
-void add_left_out(const LawFile& law, std::vector<std::string>& lines) {
+void add_left_out(const LawFile& law, std::vector<Remark>& remarks) {
   const LawSpec& spec = law.spec;
   const auto parameters = law_parameters(spec);
   const auto value_of = [&](std::string_view name) {
@@ -76,62 +76,75 @@ void add_left_out(const LawFile& law, std::vector<std::string>& lines) {
     return 0.0;
   };
   if (spec.kernel == Kernel::power) {
-    lines.push_back(
-        fmt::format("left out: the power kernel (exponent {}); the stiffnesses are "
-                    "secants at the reference {}",
-                    digits(value_of("exponent")), shortest(spec.reference)));
+    remarks.push_back({"kernel_left_out",
+                       fmt::format("left out: the power kernel (exponent {}); the stiffnesses are "
+                                   "secants at the reference {}",
+                                   digits(value_of("exponent")), shortest(spec.reference))});
   }
   const std::string_view unit = spec.response == Quantity::stress ? "Pa" : "N/m";
   if (spec.tension == Tension::elastic) {
-    lines.push_back(fmt::format(
-        "left out: the elastic tension, {} {} at the reference {}, in addition to the stiffnesses "
-        "above: the contact is stiffer by it than what is exported",
-        digits(value_of("k_tension")), unit, shortest(spec.reference)));
+    remarks.push_back({"elastic_tension_left_out",
+                       fmt::format("left out: the elastic tension, {} {} at the reference {}, in "
+                                   "addition to the stiffnesses "
+                                   "above: the contact is stiffer by it than what is exported",
+                                   digits(value_of("k_tension")), unit, shortest(spec.reference))});
   }
   if (spec.tension == Tension::relaxing) {
-    lines.push_back(fmt::format(
-        "left out: the shape of the tension, {} % of the stiffnesses above at the reference {}",
-        digits(100.0 * value_of("tension_share")), shortest(spec.reference)));
+    remarks.push_back(
+        {"relaxing_tension_left_out",
+         fmt::format("left out: the shape of the tension, {} % of the stiffnesses above at the "
+                     "reference {}",
+                     digits(100.0 * value_of("tension_share")), shortest(spec.reference))});
   }
 }
 
-std::vector<std::string> remarks_of(const LawFile& law, const PronyTable& table,
-                                    const ExportOptions& options, bool has_modulus) {
-  std::vector<std::string> lines{fmt::format("law {}: {}; parameters {}", law_name(law.spec),
-                                             law_words(law.spec), provenance_name(law.provenance))};
+std::vector<Remark> remarks_of(const LawFile& law, const PronyTable& table,
+                               const ExportOptions& options, bool has_modulus) {
+  std::vector<Remark> remarks{
+      {"law", fmt::format("law {}: {}; parameters {}", law_name(law.spec), law_words(law.spec),
+                          provenance_name(law.provenance))}};
   const std::string_view unit = law.spec.response == Quantity::stress ? "Pa" : "N/m";
-  lines.push_back(fmt::format("instantaneous stiffness {} {}, in the end {} {}",
-                              digits(table.instant), unit, digits(table.instant * table.long_share),
-                              unit));
+  remarks.push_back({"stiffness", fmt::format("instantaneous stiffness {} {}, in the end {} {}",
+                                              digits(table.instant), unit,
+                                              digits(table.instant * table.long_share), unit)});
   if (table.fitted) {
-    lines.push_back(fmt::format(
-        "fitted to the fractional law from {} s to {} s: largest relative "
-        "error {}; nothing is said outside",
-        shortest(table.from_s), shortest(table.to_s), significant(table.worst_relative_error, 2)));
+    remarks.push_back(
+        {"fitted_to_fractional_law",
+         fmt::format("fitted to the fractional law from {} s to {} s: largest relative "
+                     "error {}; nothing is said outside",
+                     shortest(table.from_s), shortest(table.to_s),
+                     significant(table.worst_relative_error, 2))});
   }
-  for (const std::string& warning : export_warnings(law, options)) {
-    lines.push_back("WARNING: " + warning);
+  for (const Remark& warning : export_remarks(law, options)) {
+    remarks.push_back({warning.code, "WARNING: " + warning.text});
   }
   const ContactGeometry& geometry = options.geometry;
   if (!has_modulus) {
-    lines.push_back(
-        "relative moduli only: a modulus in Pa needs the size of the probe, or of a bar");
+    remarks.push_back(
+        {"relative_moduli_only",
+         "relative moduli only: a modulus in Pa needs the size of the probe, or of a bar"});
   } else if (geometry.sphere_radius_m) {
-    lines.push_back(fmt::format(
-        "modulus from the stiffness at the reference depth {} m under a sphere of {} m (Hertz)",
-        shortest(law.spec.reference), shortest(*geometry.sphere_radius_m)));
+    remarks.push_back(
+        {"modulus_under_sphere",
+         fmt::format("modulus from the stiffness at the reference depth {} m under a sphere of {} "
+                     "m (Hertz)",
+                     shortest(law.spec.reference), shortest(*geometry.sphere_radius_m))});
   } else if (geometry.is_given() && !geometry.area_m2) {
-    lines.push_back(fmt::format("modulus from the stiffness at the reference depth {} m under {}",
-                                shortest(law.spec.reference), geometry_words(geometry)));
+    remarks.push_back(
+        {"modulus_under_probe",
+         fmt::format("modulus from the stiffness at the reference depth {} m under {}",
+                     shortest(law.spec.reference), geometry_words(geometry))});
   } else if (geometry.area_m2) {
-    lines.push_back(fmt::format("modulus from the stiffness of a bar of {} m^2 and {} m",
-                                shortest(*geometry.area_m2), shortest(*geometry.length_m)));
+    remarks.push_back(
+        {"modulus_of_bar", fmt::format("modulus from the stiffness of a bar of {} m^2 and {} m",
+                                       shortest(*geometry.area_m2), shortest(*geometry.length_m))});
   }
-  lines.push_back(
-      fmt::format("Poisson's ratio {} is assumed, and constant: bulk and shear relax "
-                  "alike",
-                  shortest(geometry.poisson_ratio)));
-  return lines;
+  remarks.push_back(
+      {"poisson_ratio_assumed",
+       fmt::format("Poisson's ratio {} is assumed, and constant: bulk and shear relax "
+                   "alike",
+                   shortest(geometry.poisson_ratio))});
+  return remarks;
 }
 
 /// A program needs a bulk modulus: 0.5 is written as a little less, with the same shear modulus,
@@ -143,16 +156,19 @@ void make_compressible(Exported& e) {
   if (e.instant_Pa) *e.instant_Pa *= (1.0 + kNearly) / (1.0 + nu);
   e.poisson_ratio = kNearly;
   e.remarks.push_back(
-      fmt::format("Poisson's ratio is written as {}: the program needs a bulk modulus; the shear "
-                  "modulus is that of {}",
-                  shortest(kNearly), shortest(nu)));
+      {"poisson_ratio_written",
+       fmt::format("Poisson's ratio is written as {}: the program needs a bulk modulus; the shear "
+                   "modulus is that of {}",
+                   shortest(kNearly), shortest(nu))});
 }
 
 /// @param before what opens a comment; no line holds "--", which XML forbids inside of one
-std::string commented(const std::vector<std::string>& lines, std::string_view before,
+std::string commented(const std::vector<Remark>& remarks, std::string_view before,
                       std::string_view after = {}) {
   std::string text;
-  for (const std::string& line : lines) text += fmt::format("{}{}{}\n", before, line, after);
+  for (const Remark& remark : remarks) {
+    text += fmt::format("{}{}{}\n", before, remark.text, after);
+  }
   return text;
 }
 
@@ -229,7 +245,7 @@ std::string json_text(const Exported& e, const LawFile& law) {
                           {"to_s", t.to_s},
                           {"worst_relative_error", rounded(t.worst_relative_error, 3)}};
   }
-  json["remarks"] = e.remarks;
+  json["remarks"] = remarks_json(e.remarks);
   return to_text(json);
 }
 
@@ -243,15 +259,16 @@ ExportTarget parse_export_target(std::string_view text, std::string_view where) 
   return parse_word(kTargets, "program", text, where);
 }
 
-std::vector<std::string> export_warnings(const LawFile& law, const ExportOptions& options) {
-  std::vector<std::string> warnings;
-  if (law.adequacy && !law.adequacy->is_adequate()) warnings.push_back(law.adequacy->summary);
-  const bool drops = law.spec.kernel == Kernel::power || law.spec.tension != Tension::none;
-  if (options.relaxation_only && drops) add_left_out(law, warnings);
-  for (std::string& warning : geometry_warnings(law.spec, options.geometry, law.fitted_to)) {
-    warnings.push_back(std::move(warning));
+std::vector<Remark> export_remarks(const LawFile& law, const ExportOptions& options) {
+  std::vector<Remark> remarks;
+  if (law.adequacy && !law.adequacy->is_adequate()) {
+    remarks.push_back({"law_in_doubt", law.adequacy->summary});
   }
-  return warnings;
+  const bool drops = law.spec.kernel == Kernel::power || law.spec.tension != Tension::none;
+  if (options.relaxation_only && drops) add_left_out(law, remarks);
+  std::ranges::move(geometry_remarks(law.spec, options.geometry, law.fitted_to),
+                    std::back_inserter(remarks));
+  return remarks;
 }
 
 std::string export_law(const LawFile& law, const ExportOptions& options) {

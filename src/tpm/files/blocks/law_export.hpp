@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/law/contact_geometry.hpp"
 #include "tpm/law/prony_table.hpp"
 #include "tpmkit/law_file.hpp"
@@ -31,9 +32,8 @@ struct ExportOptions {
 /// than the target takes, and for a fluid in FEBio.
 [[nodiscard]] std::string export_law(const LawFile& law, const ExportOptions& options);
 
-/// Warnings of all that the written material leaves out or stretches; each stands among its
+/// Remarks on all that the written material leaves out or stretches; each stands among its
 /// comments, too, and is told to the user.
-[[nodiscard]] std::vector<std::string> export_warnings(const LawFile& law,
-                                                       const ExportOptions& options);
+[[nodiscard]] std::vector<Remark> export_remarks(const LawFile& law, const ExportOptions& options);
 
 }  // namespace tpm::files

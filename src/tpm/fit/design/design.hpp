@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/files/keys/file_kind.hpp"
 #include "tpm/fit/likelihood/config.hpp"
 #include "tpm/fit/likelihood/experiment_residuals.hpp"
@@ -206,7 +207,7 @@ struct DesignCheck {
   int failed = 0;    ///< not fitted: in no spread
   int at_bound = 0;  ///< a parameter ended on its bound
   std::vector<CheckedParameter> parameters;
-  std::vector<std::string> warnings;
+  std::vector<Remark> remarks;
 };
 
 /// Simulates the experiment (and the previous ones) `sets` (>= 10) times, correlated as declared,

@@ -79,15 +79,18 @@ CheckedParameter check_of(const ExpectedParameter& expected, const FitParameter&
   return result;
 }
 
-std::string disagreement(const CheckedParameter& p) {
+Remark disagreement(const CheckedParameter& p) {
   if (!std::isfinite(p.predicted)) {
-    return fmt::format("{}: no information is predicted; nothing to compare with", p.name);
+    return {"nothing_predicted",
+            fmt::format("{}: no information is predicted; nothing to compare with", p.name)};
   }
-  return fmt::format(
-      "{}: the estimates spread {} +- {} times as far as predicted, mean error {} +- {} predicted "
-      "standard errors: the linear prediction does not hold (nonlinearity, a bound, or correlated "
-      "noise)",
-      p.name, fixed(p.ratio, 2), fixed(p.ratio_error, 2), fixed(p.bias, 2), fixed(p.bias_error, 2));
+  return {"linear_prediction_fails", fmt::format("{}: the estimates spread {} +- {} times as far "
+                                                 "as predicted, mean error {} +- {} predicted "
+                                                 "standard errors: the linear prediction does not "
+                                                 "hold (nonlinearity, a bound, or correlated "
+                                                 "noise)",
+                                                 p.name, fixed(p.ratio, 2), fixed(p.ratio_error, 2),
+                                                 fixed(p.bias, 2), fixed(p.bias_error, 2))};
 }
 
 /// What the simulated experiments alone would tell.
@@ -156,12 +159,13 @@ DesignCheck check_design(const DesignProblem& problem, const PlannedExperiment& 
   for (std::size_t i = 0; i < material; ++i) {
     check.parameters.push_back(check_of(expected.parameters[i], problem.parameter(i), errors[i]));
     if (!check.parameters.back().agrees) {
-      check.warnings.push_back(disagreement(check.parameters.back()));
+      check.remarks.push_back(disagreement(check.parameters.back()));
     }
   }
   if (check.at_bound > 0) {
-    check.warnings.push_back(fmt::format("{} of {} fits ended with a parameter on its bound",
-                                         check.at_bound, check.sets));
+    check.remarks.push_back(
+        {"fits_at_bound", fmt::format("{} of {} fits ended with a parameter on its bound",
+                                      check.at_bound, check.sets)});
   }
   return check;
 }

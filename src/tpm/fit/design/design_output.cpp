@@ -59,9 +59,12 @@ Json to_json(const DesignCheck& check) {
                 {"covered", p.covered},
                 {"agrees", p.agrees}};
   });
-  return {
-      {"seed", check.seed},         {"data_sets", check.sets},       {"failed", check.failed},
-      {"at_bound", check.at_bound}, {"parameters", std::move(list)}, {"warnings", check.warnings}};
+  return {{"seed", check.seed},
+          {"data_sets", check.sets},
+          {"failed", check.failed},
+          {"at_bound", check.at_bound},
+          {"parameters", std::move(list)},
+          {"remarks", remarks_json(check.remarks)}};
 }
 
 std::string percent(double relative) {
@@ -118,7 +121,7 @@ std::string check_words(const DesignCheck& check, double level) {
         p.name, fixed(p.ratio, 3), fixed(p.ratio_error, 3), fixed(p.bias, 2),
         fixed(p.bias_error, 2), p.covered, check.sets, 100.0 * level);
   }
-  for (const std::string& warning : check.warnings) text += fmt::format("warning: {}\n", warning);
+  for (const Remark& remark : check.remarks) text += fmt::format("warning: {}\n", remark.text);
   return text;
 }
 

@@ -158,24 +158,30 @@ Identification identify(const PreparedRecording& recording, const IdentifyOption
                     "has too few samples for any of the laws", "more samples than parameters");
   }
   if (!id.stopped) {
-    id.flags.push_back(
-        fmt::format("not stopped: the widest interval never stayed below {} % of its estimate",
-                    significant(100.0 * options.target, 3)));
+    id.remarks.push_back(
+        {"not_stopped",
+         fmt::format("not stopped: the widest interval never stayed below {} % of its estimate",
+                     significant(100.0 * options.target, 3))});
   }
   constexpr double kNearlyOne = 0.98;
   if (id.result().estimate.phi > kNearlyOne) {
-    id.flags.push_back(fmt::format(
-        "neighbouring residuals are correlated by {}: the law does not fit, or the zero drifts; "
-        "intervals take it for noise",
-        significant(id.result().estimate.phi, 4)));
+    id.remarks.push_back(
+        {"correlated_residuals", fmt::format("neighbouring residuals are correlated by {}: the law "
+                                             "does not fit, or the zero drifts; "
+                                             "intervals take it for noise",
+                                             significant(id.result().estimate.phi, 4))});
   }
   for (const SequentialParameter& p : id.result().estimate.parameters) {
     if (!p.nuisance || !p.at_bound) continue;
-    id.flags.push_back(fmt::format(
-        "{} stands on its automatic bound: the intervals hold only there", p.parameter.name));
+    id.remarks.push_back(
+        {"nuisance_at_bound",
+         fmt::format("{} stands on its automatic bound: the intervals hold only there",
+                     p.parameter.name)});
   }
   if (!id.result().estimate.identified) {
-    id.flags.push_back("a material parameter stands on a bound or is not told apart from others");
+    id.remarks.push_back(
+        {"not_identified",
+         "a material parameter stands on a bound or is not told apart from others"});
   }
   return id;
 }

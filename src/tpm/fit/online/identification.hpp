@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/online/sequential_fit.hpp"
 #include "tpmkit/law_file.hpp"
@@ -42,7 +43,7 @@ struct Identification {
   double begin_s = 0.0, end_s = 0.0;      ///< of the ramp and hold
   double peak_response = 0.0;             ///< SI
   std::size_t samples = 0;
-  std::vector<std::string> flags;
+  std::vector<Remark> remarks;
 
   /// Result of the identification: where it stopped, or its last sample.
   [[nodiscard]] const IdentifiedSample& result() const;

@@ -84,7 +84,7 @@ Json to_json(const Identification& id) {
     history.push_back(sample_json(id, id.history[i]));
   }
   json["history"] = std::move(history);
-  json["flags"] = id.flags;
+  json["remarks"] = remarks_json(id.remarks);
   return json;
 }
 
@@ -103,7 +103,7 @@ std::string to_terminal_text(const Identification& id) {
   }
   if (id.stopped) text += "\nstopped at " + sample_text(id, id.history[*id.stopped]);
   text += "\nat the end, " + sample_text(id, id.history.back());
-  for (const std::string& flag : id.flags) text += fmt::format("! {}\n", flag);
+  for (const Remark& remark : id.remarks) text += fmt::format("! {}\n", remark.text);
   return text;
 }
 

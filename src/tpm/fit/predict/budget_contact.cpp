@@ -181,7 +181,7 @@ void add_random_part(ErrorBudget& budget, const LawPrediction& p) {
         std::max(random.largest, 0.5 * (p.mean_upper[i] - p.mean_lower[i]) / budget.peak_N);
   }
   budget.random = random;
-  for (const std::string& flag : p.flags) budget.flags.push_back(flag);
+  budget.remarks.insert(budget.remarks.end(), p.remarks.begin(), p.remarks.end());
 }
 
 void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& motion,
@@ -189,7 +189,8 @@ void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& mo
   if (law.uncertainty) {
     add_random_part(budget, predict_law(law, motion, budget.time_s, random_part_options(options)));
   } else {
-    budget.flags.push_back("the law file carries no uncertainty of a fit: no random part");
+    budget.remarks.push_back(
+        {"no_random_part", "the law file carries no uncertainty of a fit: no random part"});
   }
 }
 

@@ -166,11 +166,13 @@ ErrorBudget organ_budget(const std::optional<LawFile>& law, const ExperimentScen
   budget.title = fmt::format("an organ of {} spheres", network.network().organ.position.cols());
   if (law) add_random_part(budget, at_surface(*law), scene.protocol, options);
   if (fine) {
-    budget.flags.push_back(
-        "what masses change is taken from the scene's spacing at the finer one, too");
-    budget.flags.push_back(
-        "the contact is one sphere, which is smaller at the finer spacing: the line spacing does "
-        "not vanish as the spacing does");
+    budget.remarks.push_back(
+        {"masses_from_coarse_spacing",
+         "what masses change is taken from the scene's spacing at the finer one, too"});
+    budget.remarks.push_back(
+        {"contact_depends_on_spacing",
+         "the contact is one sphere, which is smaller at the finer spacing: the line spacing does "
+         "not vanish as the spacing does"});
   }
   conclude(budget);
   return budget;

@@ -67,7 +67,7 @@ Json to_json(const ErrorBudget& b) {
   json["computed_part"] = stored(b.computed_part);
   json["thresholds"] = thresholds();
   json["sentences"] = b.sentences;
-  json["flags"] = b.flags;
+  json["remarks"] = remarks_json(b.remarks);
   json["time_s"] = b.time_s;
   json["stages"] = stages;
   return json;
@@ -105,7 +105,7 @@ std::string to_terminal_text(const ErrorBudget& b) {
                         t.at("of").get<std::string>(), t.at("source").get<std::string>());
   }
   text += "\n";
-  for (const std::string& flag : b.flags) text += fmt::format("! {}\n", flag);
+  for (const Remark& remark : b.remarks) text += fmt::format("! {}\n", remark.text);
   return text;
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpm/organ/scene/experiment_scene.hpp"
@@ -69,7 +70,7 @@ struct ErrorBudget {
                                ///< quadrature
   double computed_part = 0.0;  ///< max |sum| of the lines of computation
   std::vector<std::string> sentences;
-  std::vector<std::string> flags;
+  std::vector<Remark> remarks;
 };
 
 /// From this part of the peak on a line counts; smaller ones are named and compared with nothing.

@@ -45,9 +45,11 @@ void set_reading_band(LawPrediction& p, const LawUncertainty& u, std::span<const
     if (!sigma) {
       p.reading_lower.clear();
       p.reading_upper.clear();
-      p.flags.push_back(u.noise.kind == "per_row"
-                            ? "no band for new readings: the size of their noise stood in the data"
-                            : "no band for new readings: the fit's noise is not normal");
+      p.remarks.push_back(
+          {"no_band_for_readings",
+           u.noise.kind == "per_row"
+               ? "no band for new readings: the size of their noise stood in the data"
+               : "no band for new readings: the fit's noise is not normal"});
       return;
     }
     const double below = f - p.mean_lower[i], above = p.mean_upper[i] - f;
@@ -160,8 +162,10 @@ void set_sampled_mean_band(LawPrediction& p, const Model& model, const Protocol&
   }
   p.samples = count;
   if (draws.refused() > 0) {
-    p.flags.push_back(fmt::format("{} laws drawn were outside their physical range and drawn again",
-                                  draws.refused()));
+    p.remarks.push_back(
+        {"laws_drawn_again",
+         fmt::format("{} laws drawn were outside their physical range and drawn again",
+                     draws.refused())});
   }
 }
 
@@ -179,32 +183,37 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
     return with_unit(significant(value / unit.to_si, 3), unit);
   };
   if (law.fitted_to && deepest > 1.001 * *law.fitted_to) {
-    p.flags.push_back(fmt::format("extrapolates: {} deep, and the law was fitted to {}",
-                                  text(deepest), text(*law.fitted_to)));
+    p.remarks.push_back(
+        {"deeper_than_fitted", fmt::format("extrapolates: {} deep, and the law was fitted to {}",
+                                           text(deepest), text(*law.fitted_to))});
   }
   const double duration = p.time_s.back() - p.time_s.front();
   const double fitted = law.uncertainty->duration_s;
   if (fitted > 0.0 && duration > 1.5 * fitted && std::isfinite(duration)) {
-    p.flags.push_back(fmt::format("extrapolates: lasts {} s, and the law was fitted to {} s",
-                                  significant(duration, 3), significant(fitted, 3)));
+    p.remarks.push_back({"longer_than_fitted",
+                         fmt::format("extrapolates: lasts {} s, and the law was fitted to {} s",
+                                     significant(duration, 3), significant(fitted, 3))});
   }
   if (law.adequacy && !law.adequacy->is_adequate()) {
-    p.flags.insert(p.flags.begin(), law.adequacy->summary);
+    p.remarks.insert(p.remarks.begin(), {"law_in_doubt", law.adequacy->summary});
   }
   for (const std::string& name : law.uncertainty->at_bound) {
-    p.flags.push_back(
-        fmt::format("{} stood on a bound of the fit: its uncertainty is not in the bands", name));
+    p.remarks.push_back(
+        {"parameter_at_bound",
+         fmt::format("{} stood on a bound of the fit: its uncertainty is not in the bands", name)});
   }
   for (const std::string& name : law.uncertainty->not_separable) {
-    p.flags.push_back(fmt::format(
-        "{} was not told from a drift or a slow branch: the bands suppose that nothing drifted",
-        name));
+    p.remarks.push_back(
+        {"drift_not_separable", fmt::format("{} was not told from a drift or a slow branch: the "
+                                            "bands suppose that nothing drifted",
+                                            name)});
   }
   const auto missing = std::count_if(p.response.begin(), p.response.end(),
                                      [](double f) { return !std::isfinite(f); });
   if (missing > 0) {
-    p.flags.push_back(fmt::format("nothing is predicted at {} of {} times (docs/predict.md)",
-                                  missing, p.response.size()));
+    p.remarks.push_back(
+        {"not_predicted", fmt::format("nothing is predicted at {} of {} times (docs/predict.md)",
+                                      missing, p.response.size())});
   }
 }
 
@@ -350,7 +359,9 @@ LawPrediction predict_by(const Model& model, const LawFile& law, const Protocol&
   if (protocol.drive() == Drive::force) {  // the noise of the fit is one of forces
     p.reading_lower.clear();
     p.reading_upper.clear();
-    p.flags.push_back("no band for new readings: the fit knows the noise of forces, not of depths");
+    p.remarks.push_back(
+        {"no_band_for_readings",
+         "no band for new readings: the fit knows the noise of forces, not of depths"});
   }
   return p;
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
 #include "tpmkit/law_file.hpp"
@@ -74,7 +75,7 @@ struct LawPrediction {
   /// Band for one new reading, which scatters about the mean; empty if the noise is not known.
   std::vector<double> reading_lower, reading_upper;
   std::optional<PredictedRecording> recording;
-  std::vector<std::string> flags;  ///< what a reader must know
+  std::vector<Remark> remarks;  ///< what a reader must know
 
   [[nodiscard]] Dimension response_dimension() const;
   /// "linear-2-relaxing", or "linear-2-relaxing on an organ of 142 spheres".

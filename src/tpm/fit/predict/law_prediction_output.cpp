@@ -98,7 +98,7 @@ Json to_json(const LawPrediction& p) {
                          {"not_fitted", comparison_json(r.held_out, r.peak, suffix)},
                          {"after_the_hold", comparison_json(r.outside, r.peak, suffix)}};
   }
-  json["flags"] = p.flags;
+  json["remarks"] = remarks_json(p.remarks);
   return json;
 }
 
@@ -160,7 +160,7 @@ std::string to_terminal_text(const LawPrediction& p) {
             comparison_words("not fitted", r.held_out, r.peak) +
             comparison_words("after the hold", r.outside, r.peak);
   }
-  for (const std::string& flag : p.flags) text += fmt::format("! {}\n", flag);
+  for (const Remark& remark : p.remarks) text += fmt::format("! {}\n", remark.text);
   return text;
 }
 

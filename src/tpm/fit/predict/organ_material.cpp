@@ -218,9 +218,13 @@ Eigen::MatrixXd law_slopes(const LawFile& law, const std::vector<MaterialMotion>
 void carry_uncertainty(OrganMaterial& m, const OrganLessLaw& function, const LawFile& law,
                        const std::vector<MaterialMotion>& motions) {
   const auto natural = mapped<double>(m.parameters, &OrganMaterialParameter::value);
-  if (law.adequacy && !law.adequacy->is_adequate()) m.flags.push_back(law.adequacy->summary);
+  if (law.adequacy && !law.adequacy->is_adequate()) {
+    m.remarks.push_back({"law_in_doubt", law.adequacy->summary});
+  }
   if (!law.uncertainty) {
-    if (!m.readings) m.flags.emplace_back("the law carries no uncertainty: no intervals");
+    if (!m.readings) {
+      m.remarks.push_back({"no_uncertainty", "the law carries no uncertainty: no intervals"});
+    }
     return;
   }
   Eigen::VectorXd residual;
@@ -341,7 +345,7 @@ void fit_to_law(OrganMaterial& m, const OrganLessLaw& function,
     m.parameters.push_back(
         {parameters[i], parameters[i].start, best.natural[i], best.natural[i], {}, {}, false});
   }
-  if (!best.converged) m.flags.emplace_back("the fit ended before it converged");
+  if (!best.converged) m.remarks.push_back({"not_converged", "the fit ended before it converged"});
 }
 
 /// Goes on from there to the readings themselves.
@@ -370,11 +374,13 @@ void go_on_to_readings(OrganMaterial& m, const OrganLessLaw& function, const Org
     m.courses[i].by_organ = {found[place].estimate, found[place + 1].estimate};
     for (const std::size_t k : {place, place + 1}) {
       if (!found[k].at_lower_bound && !found[k].at_upper_bound) continue;
-      m.flags.push_back(fmt::format("{} stands on a bound of its search", found[k].parameter.name));
+      m.remarks.push_back({"parameter_at_bound", fmt::format("{} stands on a bound of its search",
+                                                             found[k].parameter.name)});
     }
   }
   if (!readings.fit.best.converged) {
-    m.flags.emplace_back("the fit to the readings ended before it converged");
+    m.remarks.push_back(
+        {"readings_not_converged", "the fit to the readings ended before it converged"});
   }
   m.level = readings.level;
   m.readings = std::move(readings);
@@ -388,7 +394,8 @@ void answer(OrganMaterial& m, const OrganLessLaw& function,
     natural.push_back(p.value);
     p.at_bound = p.parameter.at_lower(p.value) || p.parameter.at_upper(p.value);
     if (!p.at_bound) continue;
-    m.flags.push_back(fmt::format("{} stands on a bound of its search", p.parameter.name));
+    m.remarks.push_back({"parameter_at_bound",
+                         fmt::format("{} stands on a bound of its search", p.parameter.name)});
   }
   m.material = function.bonds().material(natural);
   for (std::size_t i = 0; i < motions.size(); ++i) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/likelihood/parameter.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
@@ -119,7 +120,7 @@ struct OrganMaterial {
   std::optional<ForceMismatch> law_to_recording, organ_to_recording;
   Json scene;    ///< with the fitted material
   Json session;  ///< for tpm hil run: the network stepped in every period
-  std::vector<std::string> flags;
+  std::vector<Remark> remarks;
 };
 
 /// Fits the material of an organ's bonds until its contact answers as the law does.

@@ -365,7 +365,7 @@ Json to_json(const OrganMaterial& m) {
     json["law_less_recording"] = mismatch_json(*m.law_to_recording);
     json["organ_less_recording"] = mismatch_json(*m.organ_to_recording);
   }
-  json["flags"] = m.flags;
+  json["remarks"] = remarks_json(m.remarks);
   json["fitted_law"] = with_sample_digests(files::to_json(m.fitted_law), m.samples_sha256);
   json["scene"] = m.scene;
   return json;
@@ -405,7 +405,7 @@ std::string to_terminal_text(const OrganMaterial& m) {
       "mm/s\n",
       significant(100.0 * m.organ.largest, 3), significant(100.0 * m.organ.rms, 3),
       significant(1e3 * m.organ.depth_m, 3), significant(1e3 * m.organ.rate_m_per_s, 3));
-  for (const std::string& flag : m.flags) text += "! " + flag + "\n";
+  for (const Remark& remark : m.remarks) text += "! " + remark.text + "\n";
   return text;
 }
 

@@ -274,9 +274,10 @@ OwnPlacement place_on_organ(const OrganOfLaw& organ, const PreparedRecording& re
 
 LawPrediction named(LawPrediction p, const OrganOfLaw& organ) {
   p.organ_spheres = organ.spheres();
-  p.flags.emplace_back(
-      "the band is that of the law carried over to the organ: what the organ cannot reproduce of "
-      "the law is not in it");
+  p.remarks.push_back(
+      {"organ_less_law_not_in_band",
+       "the band is that of the law carried over to the organ: what the organ cannot reproduce of "
+       "the law is not in it"});
   return p;
 }
 

@@ -98,8 +98,10 @@ void add_drift(LawPrediction& p, const FittedFile& file) {
     for (std::size_t i = 0; i < values->size(); ++i) (*values)[i] += file.drifted(p.time_s[i]);
   }
   const Unit rate = per_second(shown_unit(p.response_dimension()));
-  p.flags.push_back(fmt::format("the zero drifts by {}, as the readings at rest show; it is added",
-                                sized_text(rate, *file.drift, 4)));
+  p.remarks.push_back(
+      {"drift_added",
+       fmt::format("the zero drifts by {}, as the readings at rest show; it is added",
+                   sized_text(rate, *file.drift, 4))});
 }
 
 void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& recording) {
@@ -149,8 +151,11 @@ void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& reco
     if (!p.reading_lower.empty()) parts[part]->share_in_reading_band = 1.0 * sums[part].inside / n;
   }
   if (clipped > 0) {
-    p.flags.push_back(fmt::format(
-        "clipping: {} readings stand at a limit of the force cell and are not compared", clipped));
+    p.remarks.push_back(
+        {"clipping",
+         fmt::format(
+             "clipping: {} readings stand at a limit of the force cell and are not compared",
+             clipped)});
   }
   p.recording = std::move(own);
 }

@@ -177,7 +177,7 @@ void give_both_drift_answers(FitResult& fit, const std::vector<DataSet>& data) {
     recordings.back().to_s = choice.to_s;
   }
   const auto both = give_both_drift_answers(fit, recordings, data);
-  if (both) fit.flags.push_back(drift_words(*both, fit));
+  if (both) fit.remarks.push_back({"drift_not_separable", drift_words(*both, fit)});
 }
 
 std::string drift_words(const DriftAnswers& answers, const FitResult& fit) {

@@ -44,7 +44,7 @@ FitSummary summary_of(const FitResult& fit) {
   summary.starts_agreeing = fit.starts_agreeing;
   summary.parameters = fitted_parameters(fit);
   summary.adequacy = fit.adequacy;
-  summary.flags = fit.flags;
+  summary.flags = remark_texts(fit.remarks);
   summary.text = to_terminal_text(fit);
   summary.json = to_text(to_json(fit));
   return summary;

@@ -185,19 +185,22 @@ void find_imposed_channel(PreparedRecording& recording) {
   const std::string load(load_word(recording.recording));
   const std::string answer(answer_word(recording.recording));
   const std::string& taken = imposed ? load : answer;
-  recording.warnings.push_back(fmt::format(
-      "{}: {}; noise is {} % of the range of the {} and {} % of that of the {}. The fit "
-      "takes the {} as exact{}",
-      recording.name,
-      imposed ? fmt::format("the {} was imposed (it was held while the {} went on: creep)", load,
-                            answer)
-              : "both channels are noisy",
-      significant(100.0 * of_strain, 2), answer, significant(100.0 * of_stress, 2), load, taken,
-      both_noisy
-          ? fmt::format(": the noise of the {} makes fast branches look weaker and intervals "
-                        "too narrow",
-                        taken)
-          : fmt::format(" and compares the {}", answer)));
+  recording.remarks.push_back(
+      {imposed ? "load_imposed" : "both_channels_noisy",
+       fmt::format(
+           "{}: {}; noise is {} % of the range of the {} and {} % of that of the {}. The fit "
+           "takes the {} as exact{}",
+           recording.name,
+           imposed ? fmt::format("the {} was imposed (it was held while the {} went on: creep)",
+                                 load, answer)
+                   : "both channels are noisy",
+           significant(100.0 * of_strain, 2), answer, significant(100.0 * of_stress, 2), load,
+           taken,
+           both_noisy
+               ? fmt::format(": the noise of the {} makes fast branches look weaker and intervals "
+                             "too narrow",
+                             taken)
+               : fmt::format(" and compares the {}", answer))});
 }
 
 }  // namespace tpm::fit

@@ -7,7 +7,7 @@ namespace tpm::fit {
 /// before its phases are known: the load if it was held while the strain or depth went on under it
 /// (creep), by much more of its range or in a noisier channel. Drive and response then change
 /// places, and load_imposed is set: a fit imposes the load and compares the strain or depth.
-/// `warnings` say so, and what it biases if both channels are noisy. Throws Error(bad_input) if the
+/// `remarks` say so, and what it biases if both channels are noisy. Throws Error(bad_input) if the
 /// strain or depth relaxes under a held load: their titles are swapped.
 void find_imposed_channel(PreparedRecording& recording);
 

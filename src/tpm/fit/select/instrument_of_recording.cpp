@@ -15,10 +15,12 @@ void take_instrument(PreparedRecording& recording, const std::filesystem::path& 
                                          fmt::format("{}: instrument", file.string()));
   const auto& force = recording.instrument->force;
   if (!force || !(force->relative > 0.0)) return;
-  recording.warnings.push_back(fmt::format(
-      "the gain of instrument {} (u {} %) is not in the intervals: it moves all stiffnesses "
-      "alike; tpm validate and tpm budget count it",
-      recording.instrument->id, significant(100.0 * force->relative, 2)));
+  recording.remarks.push_back(
+      {"gain_not_in_intervals",
+       fmt::format(
+           "the gain of instrument {} (u {} %) is not in the intervals: it moves all stiffnesses "
+           "alike; tpm validate and tpm budget count it",
+           recording.instrument->id, significant(100.0 * force->relative, 2))});
 }
 
 }  // namespace tpm::fit

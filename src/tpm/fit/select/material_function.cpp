@@ -164,27 +164,31 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
 }
 
 /// What was assumed of small readings, and relaxation times that lie outside what was measured.
-std::vector<std::string> range_warnings(const FitResult& fit, const FunctionSizes& sizes) {
-  std::vector<std::string> warnings;
+std::vector<Remark> range_remarks(const FitResult& fit, const FunctionSizes& sizes) {
+  std::vector<Remark> remarks;
   if (fit.config.data.front().noise.kind == NoiseKind::combined) {
-    warnings.push_back(fmt::format(
-        "the readings span {} decades: those below {} of the largest are taken to scatter as if "
-        "they "
-        "had that size, for no instrument reads more decades at once; a column of standard "
-        "deviations says otherwise (--sd COLUMN)",
-        significant(std::log10(sizes.largest / sizes.least), 2),
-        significant(FunctionSizes::kSmallestShare, 1)));
+    remarks.push_back(
+        {"scatter_of_small_readings_assumed",
+         fmt::format(
+             "the readings span {} decades: those below {} of the largest are taken to scatter as "
+             "if "
+             "they "
+             "had that size, for no instrument reads more decades at once; a column of standard "
+             "deviations says otherwise (--sd COLUMN)",
+             significant(std::log10(sizes.largest / sizes.least), 2),
+             significant(FunctionSizes::kSmallestShare, 1))});
   }
   for (const ParameterResult& p : fit.parameters) {
     if (p.parameter.unit.dimension != Dimension::time) continue;
     const bool early = p.estimate < sizes.shortest_s;
     if (!early && p.estimate <= sizes.longest_s) continue;
-    warnings.push_back(fmt::format("{} = {} lies outside the measured range ({} s to {} s)",
-                                   p.parameter.name, in_sized_unit(p, p.estimate),
-                                   significant(sizes.shortest_s, 3),
-                                   significant(sizes.longest_s, 3)));
+    remarks.push_back(
+        {"outside_measured_range",
+         fmt::format("{} = {} lies outside the measured range ({} s to {} s)", p.parameter.name,
+                     in_sized_unit(p, p.estimate), significant(sizes.shortest_s, 3),
+                     significant(sizes.longest_s, 3))});
   }
-  return warnings;
+  return remarks;
 }
 
 std::vector<LawSpec> linear_family() {
@@ -313,7 +317,7 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   settle_choice(s, kEndlessHold, options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
   state_preferred(s);
   const Candidate& chosen = s.candidates[s.recommended];
-  s.warnings = range_warnings(chosen.fit, sizes_of_function(function));
+  s.remarks = range_remarks(chosen.fit, sizes_of_function(function));
   if (chosen.fit.adequacy) s.summary.push_back(chosen.fit.adequacy->summary);
   s.summary.push_back(fmt::format(
       "{} of {} readings; {} {} ({}): {} parameters, rms residual {} % of the largest "

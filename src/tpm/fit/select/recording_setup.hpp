@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/data/phases.hpp"
 #include "tpm/files/instrument.hpp"
 #include "tpm/fit/fit.hpp"
@@ -26,8 +27,8 @@ struct PreparedRecording {
   /// Limits of the force cell: readings that stand there are censored, SI.
   std::optional<double> clipped_above = std::nullopt, clipped_below = std::nullopt;
   bool load_imposed = false;  ///< creep: drive and response of `recording` have changed places
-  std::vector<std::string> warnings = {};  ///< what the recording cannot tell, one sentence each
-  std::string read_as = {};   ///< how its columns and units were understood, in one sentence
+  std::vector<Remark> remarks = {};  ///< what the recording cannot tell
+  std::string read_as = {};          ///< how its columns and units were understood, in one sentence
   bool contact_held = false;  ///< contact is where a stated force is passed: it is not fitted
   std::string start_up = {};  ///< what is left out after a step, in one sentence; empty: nothing
   std::optional<Instrument> instrument = std::nullopt;  ///< if it is stated (take_instrument)

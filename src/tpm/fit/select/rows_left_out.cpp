@@ -8,7 +8,8 @@ void warn_of_rows_left_out(PreparedRecording& recording,
                            const std::vector<ImportFinding>& findings) {
   for (const ImportFinding& finding : findings) {
     if (finding.what != "missing") continue;
-    recording.warnings.push_back(fmt::format("{}: {}", recording.name, finding.value));
+    recording.remarks.push_back(
+        {"rows_left_out", fmt::format("{}: {}", recording.name, finding.value)});
   }
 }
 

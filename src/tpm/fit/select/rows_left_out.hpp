@@ -6,7 +6,7 @@
 
 namespace tpm::fit {
 
-/// Adds a warning if rows of the file were left out for an empty cell or NaN.
+/// Adds a remark if rows of the file were left out for an empty cell or NaN.
 /// @param findings of the RecordingFile that the recording was read from
 void warn_of_rows_left_out(PreparedRecording& recording,
                            const std::vector<ImportFinding>& findings);

@@ -361,9 +361,11 @@ Selection select_law(std::span<const PreparedRecording> recordings,
       predicting.advance();
     }
     if (s.candidates.front().held_out.empty()) {
-      s.warnings.push_back(
-          fmt::format("nothing was held out: the second half of the hold has fewer than {} samples",
-                      kFewestPredicted));
+      s.remarks.push_back(
+          {"nothing_held_out",
+           fmt::format(
+               "nothing was held out: the second half of the hold has fewer than {} samples",
+               kFewestPredicted)});
     }
   }
   const auto with_profiles = [&](const LawSpec& law) {
@@ -373,13 +375,14 @@ Selection select_law(std::span<const PreparedRecording> recordings,
                 options.setup.profiles ? ProfiledFit(with_profiles) : nullptr);
   Candidate& chosen = s.candidates[s.recommended];
   if (options.drift_answers) s.drift = give_both_drift_answers(chosen.fit, recordings);
-  if (s.drift) chosen.fit.flags.push_back(drift_words(*s.drift, chosen.fit));
+  if (s.drift)
+    chosen.fit.remarks.push_back({"drift_not_separable", drift_words(*s.drift, chosen.fit)});
   if (options.drift_answers && s.preferred) {
     FitResult& preferred = s.candidates[*s.preferred].fit;
     const auto both = give_both_drift_answers(preferred, recordings);
-    if (both) preferred.flags.push_back(drift_words(*both, preferred));
+    if (both) preferred.remarks.push_back({"drift_not_separable", drift_words(*both, preferred)});
   }
-  std::ranges::move(protocol_warnings(chosen.fit, recordings), std::back_inserter(s.warnings));
+  std::ranges::move(protocol_remarks(chosen.fit, recordings), std::back_inserter(s.remarks));
   state_adequacy(s, recordings);
   describe(s);
   for (const PreparedRecording& r : recordings) {

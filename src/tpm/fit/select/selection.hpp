@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/likelihood/correlation.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
@@ -70,7 +71,7 @@ struct Selection {
   Correlation correlation;            ///< of the residuals that the law of least deviance leaves
   std::optional<DriftAnswers> drift;  ///< of the recommended law, if not separable
   std::vector<std::string> summary;   ///< the recommendation and its reasons
-  std::vector<std::string> warnings;  ///< what the experiment cannot tell
+  std::vector<Remark> remarks;        ///< what the experiment cannot tell
 };
 
 /// linear, hertz and power kernels with 0 to 3 branches; linear also with elastic and relaxing
@@ -172,7 +173,7 @@ void reassess(Candidate& chosen, const ProtocolSpans& spans);
 
 /// Properties of a fitted law that the protocol of a recording cannot resolve: relaxation times
 /// shorter than the ramp or the sampling, or longer than the hold.
-[[nodiscard]] std::vector<std::string> protocol_warnings(
-    const FitResult& fit, std::span<const PreparedRecording> recordings);
+[[nodiscard]] std::vector<Remark> protocol_remarks(const FitResult& fit,
+                                                   std::span<const PreparedRecording> recordings);
 
 }  // namespace tpm::fit

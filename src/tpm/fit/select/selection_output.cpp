@@ -64,7 +64,7 @@ Json to_json(const Selection& s) {
     j["adequacy"] = files::to_json(*adequacy);
   }
   j["summary"] = s.summary;
-  j["warnings"] = s.warnings;
+  j["remarks"] = remarks_json(s.remarks);
   j["fit"] = to_json(s.candidates[s.recommended].fit);
   if (s.preferred) {
     const Candidate& best = s.candidates[*s.preferred];
@@ -100,7 +100,7 @@ std::string to_terminal_text(const Selection& s) {
     for (const ParameterResult& p : best.fit.parameters) text += fmt::format("- {}\n", p.summary);
     text += "\n";
   }
-  for (const std::string& line : s.warnings) text += fmt::format("! {}\n", line);
+  for (const Remark& remark : s.remarks) text += fmt::format("! {}\n", remark.text);
   return text;
 }
 

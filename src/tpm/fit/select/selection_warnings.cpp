@@ -42,18 +42,19 @@ Outside outside_of(const RecordingFit& r) {
 }
 
 /// Depths of soft tissue are millimetres: metres come from a unit that is not the file's.
-std::vector<std::string> unit_warnings(std::span<const PreparedRecording> recordings) {
+std::vector<Remark> unit_remarks(std::span<const PreparedRecording> recordings) {
   constexpr double kDeepest_m = 0.5;
-  std::vector<std::string> warnings;
+  std::vector<Remark> remarks;
   for (const PreparedRecording& r : recordings) {
     if (r.recording.drive_quantity != Quantity::indentation_depth) continue;
     const auto [low, high] = std::ranges::minmax_element(r.recording.drive);
     if (*high - *low <= kDeepest_m) continue;
-    warnings.push_back(
-        fmt::format("{}: the depth changes by {} m: is its unit right? (--unit \"COLUMN=mm\")",
-                    r.name, significant(*high - *low, 3)));
+    remarks.push_back(
+        {"unit_doubtful",
+         fmt::format("{}: the depth changes by {} m: is its unit right? (--unit \"COLUMN=mm\")",
+                     r.name, significant(*high - *low, 3))});
   }
-  return warnings;
+  return remarks;
 }
 
 }  // namespace
@@ -109,15 +110,15 @@ ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings) {
   return spans;
 }
 
-std::vector<std::string> protocol_warnings(const FitResult& fit,
-                                           std::span<const PreparedRecording> recordings) {
-  std::vector<std::string> warnings = unit_warnings(recordings);
+std::vector<Remark> protocol_remarks(const FitResult& fit,
+                                     std::span<const PreparedRecording> recordings) {
+  std::vector<Remark> remarks = unit_remarks(recordings);
   for (const PreparedRecording& r : recordings) {
-    warnings.insert(warnings.end(), r.warnings.begin(), r.warnings.end());
+    remarks.insert(remarks.end(), r.remarks.begin(), r.remarks.end());
   }
   const auto [ramp_s, hold_s, step_s] = protocol_spans(recordings);
   if (hold_s == 0.0) {
-    warnings.emplace_back("there is no hold: relaxation is seen only through the ramp");
+    remarks.push_back({"no_hold", "there is no hold: relaxation is seen only through the ramp"});
   }
   constexpr int kDigitsOfTime = 6;  // of a rounded one: "310 s", not "3.1e+02 s"
   for (const ParameterResult& p : fit.parameters) {
@@ -125,24 +126,29 @@ std::vector<std::string> protocol_warnings(const FitResult& fit,
     const bool time = !p.nuisance && p.parameter.unit.dimension == Dimension::time;
     if (!time) continue;
     if (p.estimate < ramp_s) {
-      warnings.push_back(fmt::format(
-          "{} = {} is shorter than the shortest ramp ({} s): what relaxed during the ramp is known "
-          "only through the ramp's shape; a faster ramp would show it",
-          p.parameter.name, in_sized_unit(p, p.estimate), significant(ramp_s, 3)));
+      remarks.push_back(
+          {"shorter_than_ramp",
+           fmt::format("{} = {} is shorter than the shortest ramp ({} s): what relaxed during the "
+                       "ramp is known "
+                       "only through the ramp's shape; a faster ramp would show it",
+                       p.parameter.name, in_sized_unit(p, p.estimate), significant(ramp_s, 3))});
     }
     if (hold_s > 0.0 && p.estimate > hold_s / 3.0) {
-      warnings.push_back(fmt::format(
-          "{} = {} is long for the longest hold ({} s): no plateau is seen; hold for at least {} s",
-          p.parameter.name, in_sized_unit(p, p.estimate), significant(hold_s, 3),
-          significant(rounded(3.0 * p.estimate, 2), kDigitsOfTime)));
+      remarks.push_back(
+          {"long_for_hold",
+           fmt::format("{} = {} is long for the longest hold ({} s): no plateau is seen; hold for "
+                       "at least {} s",
+                       p.parameter.name, in_sized_unit(p, p.estimate), significant(hold_s, 3),
+                       significant(rounded(3.0 * p.estimate, 2), kDigitsOfTime))});
     }
     if (p.estimate < kLeastSamples * step_s) {
-      warnings.push_back(fmt::format(
-          "{} = {} is sampled by fewer than {} points ({} s apart): sampling cannot support it",
-          p.parameter.name, in_sized_unit(p, p.estimate), kLeastSamples, significant(step_s, 3)));
+      remarks.push_back({"undersampled", fmt::format("{} = {} is sampled by fewer than {} points "
+                                                     "({} s apart): sampling cannot support it",
+                                                     p.parameter.name, in_sized_unit(p, p.estimate),
+                                                     kLeastSamples, significant(step_s, 3))});
     }
   }
-  return warnings;
+  return remarks;
 }
 
 }  // namespace tpm::fit

@@ -128,7 +128,7 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
   row.reason = gave_up([&] {
     row.fit = run_fit(recording_config(law, one, setup), data_sets(one));
     const auto both = give_both_drift_answers(*row.fit, one);
-    if (both) row.fit->flags.push_back(drift_words(*both, *row.fit));
+    if (both) row.fit->remarks.push_back({"drift_not_separable", drift_words(*both, *row.fit)});
     state_adequacy(*row.fit, one);
     row.place = branches_by_time(law, *row.fit);
   });

@@ -132,7 +132,7 @@ YoungModuli young_moduli(const FitResult& fit, const ContactGeometry& geometry,
                   fit.config.level,
                   law.reference,
                   {},
-                  geometry_warnings(law, geometry, fitted_depth(fit))};
+                  geometry_remarks(law, geometry, fitted_depth(fit))};
   const std::vector<std::size_t> places = modulus_places(fit);
   for (const std::size_t i : places) {
     const ParameterResult& p = fit.parameters[i];
@@ -171,7 +171,7 @@ YoungModuli pooled_moduli(const SpecimenStudy& study, const ContactGeometry& geo
                   study.level,
                   study.law.reference,
                   {},
-                  geometry_warnings(study.law, geometry, deepest)};
+                  geometry_remarks(study.law, geometry, deepest)};
   for (const PooledParameter& p : study.pooled) {
     if (!is_modulus(p.parameter)) continue;
     const auto pascals = [&](double theta) { return factor * p.parameter.natural(theta); };
@@ -209,7 +209,7 @@ Json to_json(const YoungModuli& moduli) {
           {"confidence_level", moduli.level},
           {"depth_reference_m", rounded(moduli.reference_m)},
           {"moduli", std::move(list)},
-          {"warnings", moduli.warnings}};
+          {"remarks", remarks_json(moduli.remarks)}};
 }
 
 std::string to_terminal_text(const YoungModuli& moduli) {
@@ -230,7 +230,7 @@ std::string to_terminal_text(const YoungModuli& moduli) {
         m.basis == "linearised" ? "; interval from the covariance" : "",
         m.verdict.empty() ? "" : "; " + m.verdict);
   }
-  for (const std::string& warning : moduli.warnings) text += fmt::format("! {}\n", warning);
+  for (const Remark& remark : moduli.remarks) text += fmt::format("! {}\n", remark.text);
   return text;
 }
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/law/contact_geometry.hpp"
@@ -29,7 +30,7 @@ struct YoungModuli {
   double level = 0.95;
   double reference_m = 0.0;  ///< depth at which the stiffnesses are secants
   std::vector<YoungModulus> moduli;
-  std::vector<std::string> warnings;
+  std::vector<Remark> remarks;
 };
 
 /// E is a constant times the stiffness, so limits of profiles carry over as they are.

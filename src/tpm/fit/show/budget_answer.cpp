@@ -50,7 +50,7 @@ ShortAnswer short_answer(const ErrorBudget& b) {
                   share_of_peak(kForceJnd), share_of_peak(plan::kStiffnessTouched),
                   share_of_peak(kStiffnessThroughTool)));
   for (std::string& line : answer.limits) line.erase(line.find_last_not_of(' ') + 1);
-  answer.warnings = b.flags;
+  answer.warnings = remark_texts(b.remarks);
   return answer;
 }
 

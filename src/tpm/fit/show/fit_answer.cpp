@@ -181,7 +181,7 @@ ShortAnswer short_answer(const FitResult& fit) {
   answer.limits.push_back(std::move(search));
   if (fit.bootstrap) answer.limits.push_back(fit.bootstrap->summary);
   if (!fit.weakest_words.empty()) answer.limits.push_back("limit: " + fit.weakest_words);
-  answer.warnings = fit.flags;
+  answer.warnings = remark_texts(fit.remarks);
   return answer;
 }
 
@@ -192,10 +192,10 @@ ShortAnswer short_answer(const Selection& s) {
   if (fit.adequacy && !contains(s.summary, fit.adequacy->summary)) {
     answer.conclusion.insert(answer.conclusion.begin(), fit.adequacy->summary);
   }
-  answer.warnings = s.warnings;
+  answer.warnings = remark_texts(s.remarks);
   const std::vector<std::string> outside = outside_words(fit);
   answer.warnings.insert(answer.warnings.end(), outside.begin(), outside.end());
-  answer.warnings.insert(answer.warnings.end(), fit.flags.begin(), fit.flags.end());
+  for (const Remark& remark : fit.remarks) answer.warnings.push_back(remark.text);
   return answer;
 }
 
@@ -312,7 +312,7 @@ void add_moduli(ShortAnswer& answer, const YoungModuli& moduli) {
   answer.limits.push_back(fmt::format("Young's moduli under {}; Poisson's ratio {} ({})",
                                       moduli.geometry, shortest(moduli.poisson_ratio),
                                       moduli.poisson_assumed ? "assumed" : "given"));
-  answer.warnings.insert(answer.warnings.end(), moduli.warnings.begin(), moduli.warnings.end());
+  for (const Remark& remark : moduli.remarks) answer.warnings.push_back(remark.text);
 }
 
 }  // namespace tpm::fit

@@ -123,7 +123,7 @@ std::string moduli_csv(const YoungModuli& moduli) {
   Json all = to_json(moduli);
   Json rows = std::move(all["moduli"]);
   all.erase("moduli");
-  all.erase("warnings");
+  all.erase("remarks");
   for (Json& row : rows) row.update(all);
   return json_table_csv(rows);
 }

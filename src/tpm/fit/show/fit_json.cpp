@@ -326,7 +326,7 @@ Json to_json(const FitResult& result) {
   j["data"] = data_json(result);
   j["recordings"] = recordings_json(result);
   if (result.adequacy) j["adequacy"] = files::to_json(*result.adequacy);
-  j["flags"] = result.flags;
+  j["remarks"] = remarks_json(result.remarks);
   return j;
 }
 

@@ -170,7 +170,7 @@ std::string to_terminal_text(const FitResult& result) {
   } else {
     text += fmt::format("{} readings; --format json lists them\n", result.data.size());
   }
-  for (const std::string& flag : result.flags) text += "note: " + flag + "\n";
+  for (const Remark& remark : result.remarks) text += "note: " + remark.text + "\n";
   for (const std::string& prior : prior_words(result, false)) text += "note: " + prior + "\n";
   return text;
 }

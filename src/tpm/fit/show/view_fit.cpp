@@ -243,11 +243,10 @@ void add_conclusion(ViewPage& page, const Json& answer, const Json& fit) {
   for (const Json& words : answer.value("summary", Json::array())) {
     add(words.get<std::string>(), false);
   }
-  for (const Json& warning : answer.value("warnings", Json::array())) {
-    add("warning: " + warning.get<std::string>(), false);
-  }
-  for (const Json& flag : fit.value("flags", Json::array())) {
-    add("warning: " + flag.get<std::string>(), false);
+  for (const Json* part : {&answer, &fit}) {
+    for (const Json& remark : part->value("remarks", Json::array())) {
+      add("warning: " + remark.at("text").get<std::string>(), false);
+    }
   }
 }
 

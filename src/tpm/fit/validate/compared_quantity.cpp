@@ -93,9 +93,8 @@ void judge_quantities(RecordingComparison& r, const std::optional<Requirement>& 
       q.p_value = 1.0;
       r.joint.unknown.push_back(q.name);
     } else if (q.verdict == ModelVerdict::undetermined && !r.calibration) {
-      q.remark =
-          what_must_shrink(q.e, *q.limit, q.parts,
-                           scaled_unit(q.unit, std::max(std::abs(q.measured), q.e.expanded())));
+      q.remark = shrink_remark(q.e, *q.limit, q.parts,
+                               scaled_unit(q.unit, std::max(std::abs(q.measured), q.e.expanded())));
     }
     if (r.calibration) q.verdict = ModelVerdict::residual;
     p_values.push_back(q.verdict == ModelVerdict::no_requirement ? 1.0 : q.p_value);

@@ -212,7 +212,7 @@ class Comparer {
       return;
     }
     if ((d->weight.array() != 0.0 && clipped_.array()).any()) {
-      q.remark = "read from readings that stand at a limit of the force cell";
+      q.remark = {"clipping", "read from readings that stand at a limit of the force cell"};
       q.unknown = true;
     }
     result_.quantities.push_back(std::move(q));
@@ -251,8 +251,9 @@ class Comparer {
         stated_zero = std::abs(by_zero) * *options_.instrument->zero;
         q.parts.push_back({zero_name(), stated_zero});
       } else {
-        q.remark = fmt::format("depends on {}, which nothing before {} and no instrument tells",
-                               zero_name(), result_.creep ? "the load" : "contact");
+        q.remark = {"zero_not_known",
+                    fmt::format("depends on {}, which nothing before {} and no instrument tells",
+                                zero_name(), result_.creep ? "the load" : "contact")};
         q.unknown = true;
       }
     }
@@ -285,8 +286,9 @@ class Comparer {
                          q.specimen_degrees);
     }
     if (q.specimen_degrees > 0 && sum.untold()) {
-      q.remark =
-          "the spread between specimens is not known: the calibration's own uncertainty hides it";
+      q.remark = {
+          "spread_hidden",
+          "the spread between specimens is not known: the calibration's own uncertainty hides it"};
       q.unknown = true;
     }
     q.u_input = std::hypot(shared, q.of_probe, of_population);
@@ -335,9 +337,10 @@ class Comparer {
       return own.quantity == q.quantity && own.creep == result_.creep;
     });
     if (found == options_.specimens->end()) {
-      q.remark =
+      q.remark = {
+          "spread_not_known",
           "the spread between specimens is not known: fewer than two recordings of the calibration "
-          "have it";
+          "have it"};
       q.unknown = true;
       return;
     }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/files/instrument.hpp"
 #include "tpm/fit/predict/other_fillings.hpp"
 #include "tpm/fit/select/unseen_rises.hpp"
@@ -29,8 +30,9 @@ struct QuantityComparison {
   ModelVerdict verdict = ModelVerdict::not_seen;
   double p_value = 1.0;   ///< before Holm
   bool rejected = false;  ///< beyond R (or 0) after Holm over the recording's quantities
-  std::string remark;     ///< what must shrink, or why there is no verdict
-  bool unknown = false;   ///< a part of u_val is not known: the remark says which
+  /// What must shrink, or why there is no verdict.
+  std::optional<Remark> remark;
+  bool unknown = false;  ///< a part of u_val is not known: the remark says which
   /// Root of the covariance of what recordings of one calibration share (law, common instrument):
   /// one a direction; its norm is part of u_val.
   Eigen::RowVectorXd shared;

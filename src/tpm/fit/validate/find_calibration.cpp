@@ -33,19 +33,22 @@ using WayToRead = std::function<PreparedRecording(const std::string&)>;
 std::optional<PreparedRecording> as_it_was_fitted(const std::string& file,
                                                   const std::string& numbers,
                                                   const std::vector<WayToRead>& ways,
-                                                  std::string& trouble) {
+                                                  Remark& trouble) {
   for (const WayToRead& read : ways) {
     try {
       PreparedRecording recording = read(file);
       if (numbers.empty() || samples_sha256(recording.recording) == numbers) {
-        trouble.clear();
+        trouble = {};
         return recording;
       }
-      trouble = fmt::format("the calibration's {} was fitted with other options of reading", file);
+      trouble = {
+          "calibration_read_differently",
+          fmt::format("the calibration's {} was fitted with other options of reading", file)};
     } catch (const Error& error) {
       if (error.code() != ExitCode::bad_input && error.code() != ExitCode::usage) throw;
-      if (trouble.empty()) {
-        trouble = fmt::format("the calibration's file was not read: {}", error.what());
+      if (trouble.text.empty()) {
+        trouble = {"calibration_unreadable",
+                   fmt::format("the calibration's file was not read: {}", error.what())};
       }
     }
   }
@@ -67,12 +70,13 @@ CalibrationData find_calibration(const LawFile& law, const fs::path& law_file,
         fitted.sha256.empty() ? std::nullopt : found_file(fitted.name, fitted.sha256, law_file);
     if (!path) {
       data.remarks.push_back(
-          fmt::format("the calibration's {} was not found with its SHA-256", fitted.name));
+          {"calibration_not_found",
+           fmt::format("the calibration's {} was not found with its SHA-256", fitted.name)});
       one = false;
     } else {
-      std::string trouble;
+      Remark trouble;
       file.recording = as_it_was_fitted(path->string(), file.samples_sha256, ways, trouble);
-      if (!trouble.empty()) data.remarks.push_back(trouble);
+      if (!trouble.text.empty()) data.remarks.push_back(trouble);
       const auto block = instrument_beside(*path);
       std::optional<Instrument> instrument;
       if (block) {

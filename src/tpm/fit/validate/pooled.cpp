@@ -196,13 +196,14 @@ void judge_pooled(PooledQuantity& pooled, const std::vector<Member>& members,
   if (options.requirement && !pooled.limit) pooled.verdict = ModelVerdict::no_requirement;
   if (unknown != members.end()) {
     pooled.verdict = ModelVerdict::undetermined;
-    pooled.remark = fmt::format("{} ({})", unknown->quantity->remark, unknown->recording->name);
+    const Remark& why = unknown->quantity->remark.value();
+    pooled.remark = {why.code, fmt::format("{} ({})", why.text, unknown->recording->name)};
     pooled.unknown = true;
     pooled.p_value = 1.0;
   } else if (pooled.verdict == ModelVerdict::undetermined) {
     const double own = std::sqrt(
         std::max(pooled.e.u_val * pooled.e.u_val - pooled.u_shared * pooled.u_shared, 0.0));
-    pooled.remark = what_must_shrink(
+    pooled.remark = shrink_remark(
         pooled.e, *pooled.limit,
         {{"what all recordings share (the law, the instrument, an organ's spheres)",
           pooled.u_shared},

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/fit/validate/area_metric.hpp"
 #include "tpm/fit/validate/comparison.hpp"
 
@@ -28,7 +29,7 @@ struct PooledQuantity {
   ModelVerdict verdict = ModelVerdict::not_seen;
   double p_value = 1.0;
   bool rejected = false;
-  std::string remark;
+  std::optional<Remark> remark;
   bool unknown = false;  ///< a part of u_val of a recording is not known: the remark says which
   /// In the unit of the quantity; of `relative` standardised, or at the protocol that was named.
   std::optional<AreaMetric> area;

@@ -157,4 +157,11 @@ std::string what_must_shrink(const ErrorWithUncertainty& e, double limit,
   return words;
 }
 
+std::optional<Remark> shrink_remark(const ErrorWithUncertainty& e, double limit,
+                                    std::vector<UncertaintyPart> parts, const Unit& unit) {
+  std::string words = what_must_shrink(e, limit, std::move(parts), unit);
+  if (words.empty()) return std::nullopt;
+  return Remark{kMustShrink, std::move(words)};
+}
+
 }  // namespace tpm::fit

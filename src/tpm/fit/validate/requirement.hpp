@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::fit {
@@ -90,5 +91,12 @@ class CombinedUncertainty {
 /// @param unit in which numbers are shown
 [[nodiscard]] std::string what_must_shrink(const ErrorWithUncertainty& e, double limit,
                                            std::vector<UncertaintyPart> parts, const Unit& unit);
+
+/// Code of the remark that says which part of u_val must shrink.
+inline constexpr const char* kMustShrink = "must_shrink";
+/// what_must_shrink() as a remark; none where it is empty.
+[[nodiscard]] std::optional<Remark> shrink_remark(const ErrorWithUncertainty& e, double limit,
+                                                  std::vector<UncertaintyPart> parts,
+                                                  const Unit& unit);
 
 }  // namespace tpm::fit

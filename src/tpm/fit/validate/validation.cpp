@@ -162,9 +162,11 @@ void add_unseen_spread(Validation& v) {
   }
   if (names.empty()) return;
   v.remarks.push_back(
-      fmt::format("no spread between the {} recordings of the calibration is seen in {}: one of {} "
-                  "% of S is not excluded",
-                  recordings, names, significant(100.0 * at_most, 2)));
+      {"spread_not_excluded",
+       fmt::format(
+           "no spread between the {} recordings of the calibration is seen in {}: one of {} "
+           "% of S is not excluded",
+           recordings, names, significant(100.0 * at_most, 2))});
 }
 
 std::vector<SpecimenSpread> spread_of_calibration(const ValidationRequest& request,
@@ -354,7 +356,7 @@ Validation validate(const ValidationRequest& request) {
                    request.calibration.remarks.end());
   add_unseen_spread(v);
   if (const std::string words = threshold_words(request); !words.empty())
-    v.remarks.push_back(words);
+    v.remarks.push_back({"contact_by_threshold", words});
   const std::optional<OtherFillings> fillings =
       request.organ ? std::optional(other_fillings(*request.organ)) : std::nullopt;
   std::vector<RecordingComparison> unseen;
@@ -384,17 +386,17 @@ Validation validate(const ValidationRequest& request) {
     if (!options.calibration_data) {
       const std::string copied = copy_words(request, recording, comparison);
       if (!copied.empty()) {
-        v.remarks.push_back(copied);
+        v.remarks.push_back({"copied_readings", copied});
         options.calibration_data = true;
         comparison = compare_with_recording(law, recording, options);
       }
     }
     if (const std::string words = unit_words(comparison); !words.empty())
-      v.remarks.push_back(words);
+      v.remarks.push_back({"unit_doubtful", words});
     if (const std::string words =
             probe_difference_words(options.instrument, options.calibration_instrument);
         !words.empty()) {
-      v.remarks.push_back(fmt::format("{}: {}", recording.name, words));
+      v.remarks.push_back({"probes_differ", fmt::format("{}: {}", recording.name, words)});
     }
     Applicability motion = motion_of(recording, comparison.parts,
                                      comparison.creep ? 0.0 : comparison.placement.contact);
@@ -414,7 +416,8 @@ Validation validate(const ValidationRequest& request) {
     });
     if (!of_law) continue;
     v.remarks.push_back(
-        fmt::format("{} stood on a bound of the fit: its uncertainty is not in u_input", name));
+        {"parameter_at_bound",
+         fmt::format("{} stood on a bound of the fit: its uncertainty is not in u_input", name)});
   }
   require_fitting_unit(v, request.requirement);
   if (unseen.empty()) {
@@ -429,9 +432,11 @@ Validation validate(const ValidationRequest& request) {
   const auto limited_at = [](const PooledQuantity& p) { return p.limit_at.value_or(""); };
   for (const std::string& name : each_once(v.pooled, limited_at)) {
     if (name.empty()) continue;
-    v.remarks.push_back(fmt::format(
-        "the protocols differ: R is {} at {}, whose S is the largest, as a share of that S",
-        v.requirement, name));
+    v.remarks.push_back(
+        {"protocols_differ",
+         fmt::format(
+             "the protocols differ: R is {} at {}, whose S is the largest, as a share of that S",
+             v.requirement, name)});
   }
   v.verdict = unseen.size() > 1 ? judge_together(v, unseen) : unseen.front().verdict;
   return v;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/validate/pooled.hpp"
 
@@ -20,7 +21,7 @@ struct CalibrationData {
   };
   std::vector<File> files;
   std::optional<Instrument> instrument;  ///< of all of them
-  std::vector<std::string> remarks;      ///< what is not known, and why
+  std::vector<Remark> remarks;           ///< what is not known, and why
 };
 
 /// Looks for the files that a law names, beside the law and in the current folder; a file counts if
@@ -54,8 +55,8 @@ struct ValidationRequest {
   PickAnswer pick = nullptr;                ///< answers in place of the organ
   /// The recordings are presses of a session: what it knows of each. Empty: they are none.
   std::vector<SessionMotion> presses;
-  std::vector<std::string> remarks;  ///< what is to be said with the result, one sentence each
-  std::string session;               ///< file whose rendering is part of S; empty: none
+  std::vector<Remark> remarks;  ///< what is to be said with the result
+  std::string session;          ///< file whose rendering is part of S; empty: none
   std::vector<RenderingError> rendering;
 };
 
@@ -76,7 +77,7 @@ struct Validation {
   std::vector<QuantityComparison> alone;     ///< of several recordings, what only one of them has
   std::vector<CalibrationData::File> calibration;
   ModelVerdict verdict = ModelVerdict::not_seen;
-  std::vector<std::string> remarks;
+  std::vector<Remark> remarks;
 
   /// Exit code of a program that asked: no only where a requirement is not shown to be met.
   [[nodiscard]] bool answers_yes() const {

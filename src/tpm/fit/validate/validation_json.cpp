@@ -11,6 +11,10 @@
 namespace tpm::fit {
 namespace {
 
+Json remark_list(const std::optional<Remark>& remark) {
+  return remark ? remarks_json(std::span(&*remark, 1)) : Json::array();
+}
+
 void put_error(Json& j, const ErrorWithUncertainty& e) {
   j["E"] = rounded(e.error);
   j["u_val"] = rounded(e.u_val);
@@ -38,7 +42,7 @@ Json quantity_json(const QuantityComparison& q) {
   j["verdict"] = verdict_key(q.verdict);
   j["p_value"] = rounded(q.p_value);
   j["rejected_by_holm"] = q.rejected;
-  if (!q.remark.empty()) j["remark"] = q.remark;
+  j["remarks"] = remark_list(q.remark);
   return j;
 }
 
@@ -140,7 +144,7 @@ Json pooled_json(const PooledQuantity& p) {
   j["verdict"] = verdict_key(p.verdict);
   j["p_value"] = rounded(p.p_value);
   j["rejected_by_holm"] = p.rejected;
-  if (!p.remark.empty()) j["remark"] = p.remark;
+  j["remarks"] = remark_list(p.remark);
   if (p.area) {
     Json area{{"area", rounded(p.area->area)},
               {"mean_of_draws", rounded(p.area->null_mean)},
@@ -196,7 +200,7 @@ Json to_json(const Validation& v) {
   }
   if (!v.pooled.empty()) j["pooled"] = array_json(v.pooled, pooled_json);
   if (!v.alone.empty()) j["in_one_only"] = array_json(v.alone, quantity_json);
-  j["remarks"] = v.remarks;
+  j["remarks"] = remarks_json(v.remarks);
   j["verdict"] = verdict_key(v.verdict);
   j["summary"] = conclusion_words(v);
   return j;
@@ -207,7 +211,10 @@ std::string to_csv(const Validation& v) {
   Json rows = Json::array();
   const auto add = [&rows](const Json& recording, const Json& quantity) {
     Json& row = rows.emplace_back(Json{{"recording", recording}});
-    row.update(quantity);
+    for (const auto& [key, value] : quantity.items()) {
+      if (key != "remarks") row[key] = value;
+      if (key == "remarks" && !value.empty()) row["remark"] = value.front().at("text");
+    }
   };
   const auto add_verdict = [&](const Json& recording, const Json& verdict) {
     add(recording, Json{{"quantity", "all quantities"}, {"verdict", verdict}});

@@ -251,20 +251,14 @@ void add_header(BriefText& text, const Validation& v) {
 }
 
 void add_remarks(BriefText& text, const RecordingComparison& r) {
-  const std::vector<std::string> remarks =
-      each_once(r.quantities, [](const QuantityComparison& q) { return q.remark; });
-  for (const std::string& remark : remarks) {
-    if (remark.empty()) continue;
-    bool shrink = false;
+  for (const auto& remark : each_once(r.quantities, &QuantityComparison::remark)) {
+    if (!remark) continue;
     std::vector<std::string> names;  // several may say the same
     for (const QuantityComparison& q : r.quantities) {
-      if (q.remark != remark) continue;
-      names.push_back(q.name);
-      shrink = q.limit && q.verdict == ModelVerdict::undetermined &&
-               q.remark.find(" from u = ") != std::string::npos;
+      if (q.remark == remark) names.push_back(q.name);
     }
-    text.add_line(shrink ? "must shrink" : "undetermined",
-                  fmt::format("{}: {}", fmt::join(names, ", "), remark), Rank::remark);
+    text.add_line(remark->code == kMustShrink ? "must shrink" : "undetermined",
+                  fmt::format("{}: {}", fmt::join(names, ", "), remark->text), Rank::remark);
   }
   for (const std::string& words : r.without) text.add_line("not compared", words, Rank::remark);
 }
@@ -329,9 +323,9 @@ void add_pooled(BriefText& text, const Validation& v) {
   add_table(text, std::move(section), Rank::quantity, "quantities");
   bool remarked = false;
   for (const PooledQuantity& p : v.pooled) {
-    if (p.remark.empty()) continue;
+    if (!p.remark) continue;
     text.add_line(p.unknown ? "undetermined" : "must shrink",
-                  fmt::format("{}: {}", p.name, p.remark), Rank::remark);
+                  fmt::format("{}: {}", p.name, p.remark->text), Rank::remark);
     remarked = true;
   }
   if (remarked) text.add("\n", Rank::always);
@@ -491,7 +485,7 @@ std::string to_terminal_text(const Validation& v) {
     if (!words.empty()) text.add_line("u_num", words, Rank::detail);
   }
   text.add_line("u_input", "from " + v.u_input_from, Rank::detail);
-  for (const std::string& remark : v.remarks) text.add_line("note", remark, Rank::context);
+  for (const Remark& remark : v.remarks) text.add_line("note", remark.text, Rank::context);
   text.add_line("verdict", conclusion_words(v), Rank::always);
   return text.text();
 }

@@ -256,18 +256,20 @@ std::string early_end_line(const HilRecording& recording) {
                                               closing.device_error, closing.device_error_text));
 }
 
-std::vector<std::string> recording_remarks(const HilRecording& recording) {
-  std::vector<std::string> remarks;
-  for (std::string line : {damage_line(recording), early_end_line(recording)}) {
-    if (!line.empty()) remarks.push_back(std::move(line));
-  }
+std::vector<Remark> recording_remarks(const HilRecording& recording) {
+  std::vector<Remark> remarks;
+  const auto add = [&](const char* code, std::string line) {
+    if (!line.empty()) remarks.push_back({code, std::move(line)});
+  };
+  add(recording.damaged > 0 ? "damaged" : "cut_off", damage_line(recording));
+  add("ended_early", early_end_line(recording));
   if (!recording.closed) return remarks;
   if (const auto dropped = recording.ended.dropped_records; dropped > 0) {
-    remarks.push_back(
+    add("rows_dropped",
         fmt::format("{} rows found no room while the session ran, and are missing", dropped));
   }
   for (const DeviceFinding& finding : recording.ended.device_findings) {
-    remarks.push_back("the device noticed: " + finding.text);
+    add("device_finding", "the device noticed: " + finding.text);
   }
   return remarks;
 }

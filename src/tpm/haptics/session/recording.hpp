@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/haptics/session/recording_keys.hpp"
 #include "tpm/haptics/session/session.hpp"
 #include "tpmkit/servo_loop.hpp"
@@ -63,7 +64,7 @@ struct HilRecording {
 
 /// Reservations about the numbers of a recording, one line each: missing parts, an early end, rows
 /// that found no room, findings of the device.
-[[nodiscard]] std::vector<std::string> recording_remarks(const HilRecording& recording);
+[[nodiscard]] std::vector<Remark> recording_remarks(const HilRecording& recording);
 
 /// "SIMULATED DEVICE" in words that suit the recording, or what the hardware is.
 [[nodiscard]] std::string device_line(const HilRecording& recording);

@@ -192,7 +192,7 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
   }
   writer.texts("/causes", causes);
   if (const auto remarks = recording_remarks(recording); !remarks.empty()) {
-    writer.texts("/remarks", remarks);
+    writer.texts("/remarks", remark_texts(remarks));
   }
   // Texts of any length: an attribute holds 64 KB at most.
   writer.texts("/header_json", {to_text(recording.header)});

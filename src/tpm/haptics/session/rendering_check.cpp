@@ -131,12 +131,16 @@ void warn_of_rests(RenderingCheck& check, const HilSession& session) {
     if (shortest_s == 0.0 || length_s < shortest_s) shortest_s = length_s;
   }
   if (shortest_s == 0.0 || shortest_s >= needed_s) return;
-  check.warnings.push_back(fmt::format(
-      "a rest of {} s is too short: the surface recovers with a time constant of {} s, so that {} "
-      "% of what is left of an indentation is still there at the next one, whose force is smaller "
-      "by that; {} s leave 1 %",
-      significant(shortest_s, 3), significant(check.recovery_s, 3),
-      significant(100.0 * std::exp(-shortest_s / check.recovery_s), 2), significant(needed_s, 3)));
+  check.remarks.push_back(
+      {"rest_too_short",
+       fmt::format("a rest of {} s is too short: the surface recovers with a time constant of {} "
+                   "s, so that {} "
+                   "% of what is left of an indentation is still there at the next one, whose "
+                   "force is smaller "
+                   "by that; {} s leave 1 %",
+                   significant(shortest_s, 3), significant(check.recovery_s, 3),
+                   significant(100.0 * std::exp(-shortest_s / check.recovery_s), 2),
+                   significant(needed_s, 3))});
 }
 
 /// Stiffness, delay and friction that count.
@@ -218,7 +222,7 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
   const bool own = limits.hardware() || limits.simulated;
   RenderingCheck check;
   if (session.law && session.law->adequacy && !session.law->adequacy->is_adequate()) {
-    check.warnings.push_back("law: " + session.law->adequacy->summary);
+    check.remarks.push_back({"law_in_doubt", "law: " + session.law->adequacy->summary});
   }
   check.rate_Hz = 1.0 / session.servo.period_s;
   count_device(check, session, limits);
@@ -280,10 +284,17 @@ Json to_json(const RenderingCheck& check) {
             {"device_boundary_N_per_m", rounded(check.largest_N_per_m, kDigits)},
             {"hands_boundary_N_per_m", rounded(check.hands_N_per_m, kDigits)},
             {"stable_hands", check.stable_hands},
-            {"warnings", check.warnings}};
+            {"remarks", remarks_json(check.remarks)}};
   if (check.delay_at_start_s) {
     json["delay_at_start_s"] = rounded(*check.delay_at_start_s, kDigits);
   }
+  return json;
+}
+
+Json recorded_json(const RenderingCheck& check) {
+  Json json = to_json(check);
+  json.erase("remarks");
+  json["warnings"] = remark_texts(check.remarks);
   return json;
 }
 

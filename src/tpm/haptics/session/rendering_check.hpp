@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/haptics/session/session.hpp"
 
 namespace tpm::haptics {
@@ -33,7 +34,7 @@ struct RenderingCheck {
   double recovery_s = 0.0;       ///< time constant in which a free surface recovers
   double encoder_step_m = 0.0;   ///< of the device, known or assumed
   double rise_N = 0.0;           ///< by which the session lets a force rise within a period
-  std::vector<std::string> warnings;
+  std::vector<Remark> remarks;
 
   [[nodiscard]] bool passive() const { return stiffness_N_per_m <= passive_N_per_m; }
   /// The linear loop grows.
@@ -90,5 +91,7 @@ struct RenderingCheck {
                                              const LoopModel& loop, std::string_view kind);
 
 [[nodiscard]] Json to_json(const RenderingCheck& check);
+/// The same for the header of a recording, whose key `warnings` has the texts of the remarks.
+[[nodiscard]] Json recorded_json(const RenderingCheck& check);
 
 }  // namespace tpm::haptics

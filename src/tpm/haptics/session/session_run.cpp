@@ -218,7 +218,7 @@ SessionRun run_admitted(AdmittedSession admitted, const HilSession& session,
     notices.look();
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time,
-                                              options.notes, to_json(run.rendering))),
+                                              options.notes, recorded_json(run.rendering))),
                      sizeof(ServoRecord), RowLogWriter::Name::later);
     const ServoSettings servo =
         loop_settings(session, run.model, run.rendering, choice.kind != "replay");

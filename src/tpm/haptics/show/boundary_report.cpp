@@ -140,7 +140,7 @@ Json impacts_json(const BoundaryStudy& study) {
       const auto which = static_cast<std::size_t>(limit);
       by_limit[std::string(to_string(limit))] = {
           {"comes_to_rest", p.rests[which]},
-          {"delivered_to_hand_J", or_null(p.delivered_J[which])}};
+          {"delivered_to_hand_J", rounded(p.delivered_J[which])}};
     }
     json["by_limit_of_rise"] = std::move(by_limit);
     return json;

@@ -153,7 +153,7 @@ void add_glance(Document& d, const HilRecording& r, const Verification& v,
                 const RecordingSummary& s) {
   d.heading(2, "Safe, faithful, like the experiment?");
   std::vector<Cell> lines;
-  for (std::string& line : recording_remarks(r)) lines.push_back({std::move(line), Tone::bad});
+  for (Remark& remark : recording_remarks(r)) lines.push_back({std::move(remark.text), Tone::bad});
   if (s.cause == to_string(StopCause::finished)) {
     lines.push_back({"the session came to its end", Tone::good});
   }
@@ -250,7 +250,7 @@ void add_fidelity(Document& d, const Verification& v) {
                      o.name, significant(o.start_s, 4), significant(o.end_s, 4),
                      mN(o.commanded.rms_N), mN(o.commanded.max_N), mN(o.apart_N))});
   }
-  for (const std::string& note : v.notes) others.push_back({note, Tone::bad});
+  for (const Remark& remark : v.remarks) others.push_back({remark.text, Tone::bad});
   if (!others.empty()) d.bullets(std::move(others));
   d.table(phase_table(v).page("Force error by phase; depth: how well the operator followed, rms",
                               v.phases));

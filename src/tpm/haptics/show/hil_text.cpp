@@ -80,7 +80,7 @@ Json stalls_json(const JitterCheck& check) {
   const TimeHistogram& late = check.outcome.woke_late;
   const bool counted = late.count() > 0;
   return {{"beyond_watchdog", counted ? Json(stalls_beyond_watchdog(check)) : Json()},
-          {"p9999_s", counted ? or_null(late.quantile_s(0.9999)) : Json()},
+          {"p9999_s", counted ? Json(rounded(late.quantile_s(0.9999))) : Json()},
           {"watchdog_s", rounded(check.watchdog_s)},
           {"once_an_hour_extrapolated_s", or_null(once_an_hour_s(check))},
           {"extrapolation", extrapolation_of(check)},
@@ -312,8 +312,6 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
     json["apart_from_reference_N"] = rounded(o.apart_N);
     others.push_back(std::move(json));
   }
-  std::vector<std::string> notes = recording_remarks(recording);
-  notes.insert(notes.end(), v.notes.begin(), v.notes.end());
   return {{"simulated_device", recording.simulated()},
           {"recording", recording.name},
           {"device", recording.header.at("device")},
@@ -325,7 +323,7 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
           {"end_detail", recording.ended.detail},
           {"device_findings", to_json(recording.ended.device_findings)},
           {"without_equilibrium", v.without_equilibrium},
-          {"notes", notes},
+          {"remarks", remarks_json(all_remarks(recording, v))},
           {"end_s", rounded(v.end_s)},
           {"asked_s", rounded(recording.session.duration_s())},
           {"knots", v.knots},
@@ -362,8 +360,7 @@ std::string verification_text(const HilRecording& recording, const Verification&
   text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}   peak {} N\n", "all", v.phases.size(),
                       significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
                       share(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4));
-  for (const std::string& line : recording_remarks(recording)) text += "note: " + line + "\n";
-  for (const std::string& note : v.notes) text += "note: " + note + "\n";
+  for (const Remark& remark : all_remarks(recording, v)) text += "note: " + remark.text + "\n";
   for (const CrossCheck& o : v.others) {
     text += fmt::format("beside: {}, {} to {} s: rms {} mN, max {} mN; {} mN from the reference\n",
                         o.name, significant(o.start_s, 4), significant(o.end_s, 4),
@@ -429,8 +426,7 @@ ShortAnswer short_answer(const HilRecording& recording, const Verification& v) {
                     percent_text(100.0 * (worst.commanded_N / worst.measured_N - 1.0), 1)));
     answer.limits.push_back("because " + cause_of_difference(worst, v.material));
   }
-  answer.warnings = recording_remarks(recording);
-  answer.warnings.insert(answer.warnings.end(), v.notes.begin(), v.notes.end());
+  answer.warnings = remark_texts(all_remarks(recording, v));
   return answer;
 }
 

@@ -203,7 +203,7 @@ void add_session_facts(const HilRecording& recording, ViewPage& page) {
   page.fact("operator", header.notes.operator_code);
   page.fact("subject", header.notes.subject_code);
   page.fact("end", recording.cause());
-  for (const std::string& line : recording_remarks(recording)) page.fact("note", line);
+  for (const Remark& remark : recording_remarks(recording)) page.fact("note", remark.text);
   const std::size_t waiting = recording.rows.size() - shown_rows(recording).size();
   if (waiting > 0) page.fact("before the session", fmt::format("{} cycles, not shown", waiting));
 }

@@ -58,8 +58,6 @@ SessionSummary Session::run(const std::shared_ptr<HapticDevice>& device,
 SessionCheck verify_session(const std::filesystem::path& recording) {
   const HilRecording read = read_recording(recording);
   const Verification check = verify(read);
-  std::vector<std::string> notes = recording_remarks(read);
-  notes.insert(notes.end(), check.notes.begin(), check.notes.end());
   return {.reference = check.reference,
           .instants = check.all.instants,
           .rms_N = check.all.rms_N,
@@ -67,7 +65,7 @@ SessionCheck verify_session(const std::filesystem::path& recording) {
           .peak_N = check.all.peak_N,
           .reference_error_N = check.reference_error_N,
           .whole = check.whole,
-          .notes = std::move(notes)};
+          .notes = remark_texts(all_remarks(read, check))};
 }
 
 }  // namespace tpm::haptics

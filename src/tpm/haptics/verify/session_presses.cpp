@@ -78,9 +78,9 @@ class PressReader {
     const double asked_s = session_.phases[of.last].end_s - begin_s(of.first);
     const double made_s = static_cast<double>(count) * session_.servo.period_s;
     if (made_s < kWhole * asked_s) {
-      presses_.left_out.push_back(fmt::format("{} is not compared: {} s of its {} s were recorded",
-                                              name, significant(made_s, 3),
-                                              significant(asked_s, 3)));
+      presses_.left_out.push_back(
+          {"press_left_out", fmt::format("{} is not compared: {} s of its {} s were recorded", name,
+                                         significant(made_s, 3), significant(asked_s, 3))});
       return;
     }
     const std::size_t stride = std::max<std::size_t>(count / kEnoughRows, 1);

@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/fit/validate/comparison.hpp"
 #include "tpm/haptics/session/recording.hpp"
 
@@ -15,8 +16,8 @@ struct SessionPress {
 };
 
 struct SessionPresses {
-  std::vector<SessionPress> made;     ///< to their end
-  std::vector<std::string> left_out;  ///< those that were not, and why; one sentence each
+  std::vector<SessionPress> made;  ///< to their end
+  std::vector<Remark> left_out;    ///< those that were not, and why
 };
 
 /// All presses that a session asked for; of longer ones every few rows, at least 2,000. Throws

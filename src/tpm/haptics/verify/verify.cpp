@@ -37,7 +37,7 @@ RowList moved_rows(const HilRecording& recording) {
   }
   if (rows.size() < 2) {
     std::string what = "holds no motion";
-    for (const std::string& line : recording_remarks(recording)) what += "; " + line;
+    for (const Remark& remark : recording_remarks(recording)) what += "; " + remark.text;
     throw bad_input(recording.name, what, "a session of at least two cycles");
   }
   return rows;
@@ -115,7 +115,7 @@ void ask(Verification& v, const std::string& what, const std::function<void()>& 
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical) throw;
     v.others.resize(others);
-    v.notes.push_back(what + " is missing: " + error.what());
+    v.remarks.push_back({"cross_check_missing", what + " is missing: " + error.what()});
   }
 }
 
@@ -130,17 +130,24 @@ void leave_out_what_has_no_reference(Verification& v) {
   }
   v.without_equilibrium = v.reference_N.size() - kept;
   if (v.without_equilibrium == 0) return;
-  v.notes.push_back(
-      fmt::format("no equilibrium of the reference at {} of {} instants, which are left "
-                  "out; what follows them rests on a motion straight across",
-                  v.without_equilibrium, v.reference_N.size()));
+  v.remarks.push_back(
+      {"no_equilibrium",
+       fmt::format("no equilibrium of the reference at {} of {} instants, which are left "
+                   "out; what follows them rests on a motion straight across",
+                   v.without_equilibrium, v.reference_N.size())});
   if (2 * kept < v.reference_N.size()) {
-    throw Error(ExitCode::numerical, v.reference, v.notes.back(),
+    throw Error(ExitCode::numerical, v.reference, v.remarks.back().text,
                 "a motion that the tissue can bear");
   }
   for (auto* column : {&v.time_s, &v.reference_N, &v.commanded_N, &v.depth_m, &v.error_N}) {
     column->resize(kept);
   }
+}
+
+std::vector<Remark> all_remarks(const HilRecording& recording, const Verification& v) {
+  std::vector<Remark> remarks = recording_remarks(recording);
+  remarks.insert(remarks.end(), v.remarks.begin(), v.remarks.end());
+  return remarks;
 }
 
 Verification verify(const HilRecording& recording, const VerifyOptions& options) {
@@ -149,7 +156,8 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
                                                           : verify_along_push(recording, options);
   const auto touches = [](const ServoRecord& row) { return (row.flags & kTouching) != 0; };
   if (std::ranges::none_of(recording.rows, touches)) {
-    v.notes.emplace_back("no contact: the tool never touched the tissue, nothing to compare");
+    v.remarks.push_back(
+        {"no_contact", "no contact: the tool never touched the tissue, nothing to compare"});
   }
   return v;
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/haptics/session/recording.hpp"
 
 namespace tpm::haptics {
@@ -75,7 +76,7 @@ struct Verification {
   double model_error_N = 0.0;      ///< largest estimate of the model itself, in any period
   /// Instants at which the reference finds no equilibrium: left out of everything, and counted.
   std::size_t without_equilibrium = 0;
-  std::vector<std::string> notes;  ///< what could not be compared, one line each
+  std::vector<Remark> remarks;  ///< what could not be compared
   /// At the instants compared; forces against the push.
   std::vector<double> time_s, reference_N, commanded_N, depth_m;
   /// Commanded less reference; of a tool that moves in space the length of the difference, all
@@ -103,12 +104,17 @@ struct Verification {
 /// One contact that answers by a law is compared with the law itself, asked along every sample of
 /// the motion (LawModel), and with another quadrature of it (law_forces_by_gauss).
 ///
-/// A session that never touched the tissue is verified, and a note says that nothing was compared.
+/// A session that never touched the tissue is verified, and a remark says that nothing was
+/// compared.
 ///
 /// Where the reference has no equilibrium the instant is left out, and it goes on with the next one
 /// that it has one for, on a straight line. Throws Error(bad_input) for an empty recording, or
 /// fewer than four instants to compare in space, Error(numerical) if less than half of the instants
 /// can be compared.
 [[nodiscard]] Verification verify(const HilRecording& recording, const VerifyOptions& options = {});
+
+/// Remarks on a recording and on its verification.
+[[nodiscard]] std::vector<Remark> all_remarks(const HilRecording& recording,
+                                              const Verification& verification);
 
 }  // namespace tpm::haptics

@@ -10,6 +10,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/element/validity_limits.hpp"
+#include "tpm/law/element/validity_remarks.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -24,21 +25,28 @@ Response Model::respond_along(const Protocol& protocol, std::span<const double> 
   return response;
 }
 
-std::vector<std::string> validity_flags(double spacing_m, double peak_depth_m) {
-  std::vector<std::string> flags;
+std::vector<Remark> law::validity_remarks(double spacing_m, double peak_depth_m) {
+  std::vector<Remark> remarks;
   if (peak_depth_m > kDamageIndentation_m) {
-    flags.push_back(fmt::format("indentation of {:.4g} mm is over 12 mm, where liver is damaged",
-                                peak_depth_m * 1e3));
+    remarks.push_back({"indentation_over_12_mm",
+                       fmt::format("indentation of {:.4g} mm is over 12 mm, where liver is damaged",
+                                   peak_depth_m * 1e3)});
   } else if (peak_depth_m > kValidIndentation_m) {
-    flags.push_back(fmt::format("indentation of {:.4g} mm is over the paper's validity of 10 mm",
-                                peak_depth_m * 1e3));
+    remarks.push_back({"indentation_over_10_mm",
+                       fmt::format("indentation of {:.4g} mm is over the paper's validity of 10 mm",
+                                   peak_depth_m * 1e3)});
   }
   const double angle = std::atan(peak_depth_m / spacing_m);
   if (angle > kValidTurning_rad) {
-    flags.push_back(fmt::format("bonds turn by {:.4g} degrees, over the paper's 30",
-                                angle * 180.0 / std::numbers::pi));
+    remarks.push_back({"lateral_bond_turned_over_30_degrees",
+                       fmt::format("bonds turn by {:.4g} degrees, over the paper's 30",
+                                   angle * 180.0 / std::numbers::pi)});
   }
-  return flags;
+  return remarks;
+}
+
+std::vector<std::string> validity_flags(double spacing_m, double peak_depth_m) {
+  return remark_texts(validity_remarks(spacing_m, peak_depth_m));
 }
 
 void require_times_within(const Protocol& protocol, std::span<const double> times_s) {

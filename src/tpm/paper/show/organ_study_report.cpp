@@ -265,7 +265,9 @@ std::vector<Cell> fit_words(const OrganStudy& study) {
     for (const ParameterResult& p : made.result->parameters) {
       items.push_back({name + p.summary, tone_of(p.verdict)});
     }
-    for (const std::string& flag : made.result->flags) items.push_back({name + flag, Tone::plain});
+    for (const Remark& remark : made.result->remarks) {
+      items.push_back({name + remark.text, Tone::plain});
+    }
   }
   return items;
 }

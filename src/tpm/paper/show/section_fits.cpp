@@ -45,7 +45,7 @@ std::vector<Cell> findings(const FitResult& fit) {
                                        significant(fit.chi_square, 4), fit.degrees_of_freedom);
   if (fit.chi_square_p) chi_square += fmt::format(", p = {}", probability(*fit.chi_square_p));
   items.push_back({std::move(chi_square)});
-  for (const std::string& flag : fit.flags) items.push_back({flag, Tone::fair});
+  for (const Remark& remark : fit.remarks) items.push_back({remark.text, Tone::fair});
   return items;
 }
 

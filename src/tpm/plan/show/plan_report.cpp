@@ -327,25 +327,29 @@ Json claim_json(const Plan& plan) {
   return {{"quantity", claim.quantity}, {"norm", claim.norm}, {"protocol", claim.protocol}};
 }
 
-std::vector<std::string> plan_warnings(const Plan& plan) {
-  std::vector<std::string> warnings;
+std::vector<Remark> plan_remarks(const Plan& plan) {
+  std::vector<Remark> remarks;
   if (plan.masses_left_out) {
-    warnings.push_back(fmt::format(
-        "inertia matters, and scene and reference leave it out: masses would change the "
-        "answer by {} of the peak{}, which exceeds the tolerance; all errors above count that. "
-        "{}",
-        share_text(*plan.masses_left_out), masses_note(plan),
-        plan.request.for_loop ? "Nothing that a loop steps has masses."
-                              : "For a model with masses, write \"formulation\": {\"kind\": "
-                                "\"inertial\"} in the scene."));
+    remarks.push_back(
+        {"masses_left_out",
+         fmt::format(
+             "inertia matters, and scene and reference leave it out: masses would change the "
+             "answer by {} of the peak{}, which exceeds the tolerance; all errors above count "
+             "that. "
+             "{}",
+             share_text(*plan.masses_left_out), masses_note(plan),
+             plan.request.for_loop ? "Nothing that a loop steps has masses."
+                                   : "For a model with masses, write \"formulation\": {\"kind\": "
+                                     "\"inertial\"} in the scene.")});
   }
   if (!plan.masses_unknown.empty()) {
-    warnings.push_back(
-        fmt::format("not known what masses would change, and no error above counts it: {}",
-                    plan.masses_unknown));
+    remarks.push_back(
+        {"masses_unknown",
+         fmt::format("not known what masses would change, and no error above counts it: {}",
+                     plan.masses_unknown)});
   }
-  warnings.insert(warnings.end(), plan.validity.begin(), plan.validity.end());
-  return warnings;
+  remarks.insert(remarks.end(), plan.validity.begin(), plan.validity.end());
+  return remarks;
 }
 
 Json plan_json(const Plan& plan) {
@@ -365,9 +369,9 @@ Json plan_json(const Plan& plan) {
             {"response", plan.by_depth ? "force_N" : "depth_m"}};
   json["claim"] = claim_json(plan);
   json["choice"] = plan.choice ? frontier(plan).object(plan.chosen()) : Json(nullptr);
-  json["margin"] = plan.choice ? or_null(margin(plan)) : Json(nullptr);
+  json["margin"] = plan.choice ? Json(rounded(margin(plan))) : Json(nullptr);
   const auto offline = run_offline(plan);
-  json["network_offline_s"] = offline ? or_null(offline->second) : Json(nullptr);
+  json["network_offline_s"] = offline ? Json(rounded(offline->second)) : Json(nullptr);
   json["without_budget"] = plan.without_budget
                                ? frontier(plan).object(plan.candidates[*plan.without_budget])
                                : Json(nullptr);
@@ -385,8 +389,8 @@ Json plan_json(const Plan& plan) {
   json["frontier"] = frontier(plan).list(plan.candidates);
   json["relevance"] = relevance_json(plan);
   json["changes"] = changes_json(plan);
-  json["validity_passed"] = plan.validity;
-  json["warnings"] = plan_warnings(plan);
+  json["validity_passed"] = remarks_json(plan.validity);
+  json["remarks"] = remarks_json(plan_remarks(plan));
   return json;
 }
 
@@ -411,7 +415,9 @@ std::string plan_text(const Plan& plan) {
   for (const PlanChange& c : plan.changes) {
     text += change_text(c);
   }
-  for (const std::string& words : plan_warnings(plan)) text += fmt::format("WARNING: {}\n", words);
+  for (const Remark& remark : plan_remarks(plan)) {
+    text += fmt::format("WARNING: {}\n", remark.text);
+  }
   return text;
 }
 
@@ -441,7 +447,7 @@ ShortAnswer short_answer(const Plan& plan) {
       answer.limits.push_back(c.factor ? "limit: " + line : line);
     }
   }
-  answer.warnings = plan_warnings(plan);
+  answer.warnings = remark_texts(plan_remarks(plan));
   return answer;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/plan/spheres_plan.hpp"
@@ -22,7 +23,7 @@ namespace tpm::plan {
 [[nodiscard]] ShortAnswer short_answer(const Plan& plan);
 /// Remarks that a user must know: masses that are left out, limits of validity that the scene
 /// passes.
-[[nodiscard]] std::vector<std::string> plan_warnings(const Plan& plan);
+[[nodiscard]] std::vector<Remark> plan_remarks(const Plan& plan);
 
 /// The choice of the number of spheres: the key `spheres_choice` of a plan.
 [[nodiscard]] Json spheres_json(const SpheresPlan& plan);

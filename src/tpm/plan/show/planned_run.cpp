@@ -43,7 +43,7 @@ void write_claim(const Plan& plan, Hdf5Writer& file) {
   }
   file.numbers("/claim/tolerance", {plan.request.tolerance});
   if (plan.masses_left_out) file.numbers("/claim/masses_left_out", {*plan.masses_left_out});
-  const std::vector<std::string> warnings = plan_warnings(plan);
+  const std::vector<std::string> warnings = remark_texts(plan_remarks(plan));
   if (!warnings.empty()) {
     file.attribute("/claim", "warnings", fmt::format("{}", fmt::join(warnings, "\n")));
   }
@@ -70,8 +70,8 @@ Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
       {"tolerance", plan.request.tolerance},
       {"masses_matter", masses_matter_json(plan)}};
   add_trajectory(json, scene, times_s, answer);
-  json["validity_passed"] = plan.validity;
-  json["warnings"] = plan_warnings(plan);
+  json["validity_passed"] = remarks_json(plan.validity);
+  json["remarks"] = remarks_json(plan_remarks(plan));
   return json;
 }
 
@@ -105,7 +105,7 @@ ShortAnswer short_answer(const Plan& plan, const std::vector<double>& times_s,
         "outputs: the response alone; --outputs field plans and stores the whole network");
   }
   add(short_one.limits, offline_text(plan));
-  short_one.warnings = plan_warnings(plan);
+  short_one.warnings = remark_texts(plan_remarks(plan));
   return short_one;
 }
 

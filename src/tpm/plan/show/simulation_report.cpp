@@ -6,17 +6,17 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include "tpm/base/sized_unit.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/organ/run/smoothness.hpp"
+#include "tpm/plan/show/simulation_remarks.hpp"
 #include "tpmkit/version.hpp"
 
 namespace tpm::plan {
 namespace {
-
-constexpr std::size_t kMostNamed = 12;
 
 double nine_digits(double value) {
   return rounded(value, 9);
@@ -260,30 +260,20 @@ std::string smoothness_text(const std::optional<Smoothness>& smoothness) {
                          : std::string());
 }
 
-/// "71, 72 and 3 others"
-std::string named(const std::vector<std::size_t>& spheres) {
+std::string warning_lines(std::span<const Remark> remarks) {
   std::string text;
-  for (std::size_t i = 0; i < std::min(spheres.size(), kMostNamed); ++i) {
-    text += fmt::format("{}{}", i == 0 ? "" : ", ", spheres[i] + 1);
-  }
-  if (spheres.size() > kMostNamed)
-    text += fmt::format(" and {} others", spheres.size() - kMostNamed);
+  for (const Remark& remark : remarks) text += fmt::format("WARNING: {}\n", remark.text);
   return text;
 }
 
-std::string validity_text(const Validity& validity, bool depth_limits) {
+/// @param warnings to be written after the first line
+std::string validity_text(const Validity& validity, bool depth_limits,
+                          const std::string& warnings = {}) {
   std::string text =
       fmt::format("deepest indentation of a sphere {}, most turned lateral bond {} degrees\n",
                   sized_text(Dimension::length, validity.deepest_m, 4),
-                  significant(validity.most_turned_rad * 180.0 / std::numbers::pi, 4));
-  for (std::size_t k = 0; k < kValidityLimits; ++k) {
-    const auto limit = static_cast<ValidityLimit>(k);
-    const ValidityBreach& breach = validity.of(limit);
-    if (!breach.first_time_s) continue;
-    text += fmt::format("WARNING: {}: from {} s on; sphere{} {}\n", words_of(limit),
-                        significant(*breach.first_time_s, 4), breach.spheres.size() == 1 ? "" : "s",
-                        named(breach.spheres));
-  }
+                  significant(validity.most_turned_rad * 180.0 / std::numbers::pi, 4)) +
+      warnings;
   if (validity.whole()) text += "no limit of validity is passed\n";
   if (!depth_limits) {
     text +=
@@ -320,12 +310,6 @@ std::string motion_text(const ExperimentScene& scene, const SimulationRun& run) 
                       pair(check.largest, check.largest_softer), pair(check.end, check.end_softer));
   text += fmt::format("; the curves differ by {} % of the largest at one time\n",
                       significant(100.0 * check.at_one_time, 3));
-  if (check.depends_on_stiffness()) {
-    text += fmt::format(
-        "WARNING: numbers of this run depend on the stiffness of its contacts, by {} % of the "
-        "largest; stiffen them\n",
-        significant(100.0 * check.difference, 3));
-  }
   return text;
 }
 
@@ -390,20 +374,19 @@ std::string response_text(const ExperimentScene& scene, const SimulationRecord& 
                      significant(record.curve.back().time_s, 4), response(record.curve.back()));
 }
 
-constexpr std::string_view kWarning = "WARNING: ";
+std::string resumed_text(const SimulationRun& run) {
+  if (!run.resumed_at_s) return "";
+  return fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));
+}
 
-/// Adds the lines of a text, warnings apart from the others.
-void add_lines(std::vector<std::string>& lines, std::vector<std::string>& warnings,
-               std::string_view text) {
+std::vector<std::string> separate_lines(std::string_view text) {
+  std::vector<std::string> lines;
   while (!text.empty()) {
     const std::string_view line = text.substr(0, text.find('\n'));
     text.remove_prefix(std::min(line.size() + 1, text.size()));
-    if (line.starts_with(kWarning)) {
-      warnings.emplace_back(line.substr(kWarning.size()));
-    } else {
-      lines.emplace_back(line);
-    }
+    lines.emplace_back(line);
   }
+  return lines;
 }
 
 }  // namespace
@@ -441,7 +424,7 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
       f.kind == "quasi_static" ? Json(rounded(record.error_estimate, 3)) : Json(nullptr);
   json["resumed_at_s"] = run.resumed_at_s ? Json(*run.resumed_at_s) : Json(nullptr);
   json["validity"] = validity_json(record.validity, depth_limits_apply(scene.tissue));
-  json["warnings"] = short_answer(scene, network, run).warnings;
+  json["remarks"] = remarks_json(simulation_remarks(run));
   return json;
 }
 
@@ -451,37 +434,33 @@ std::string simulation_text(const ExperimentScene& scene, const RunNetwork& netw
   std::string text = scene_text(scene);
   text += contacts_text(scene, network, run);
   text += equations_text(scene, run);
-  if (scene.formulation.masses) text += motion_text(scene, run);
-  if (run.solver && !run.solver->direct) text += solver_text(*run.solver);
-  if (run.resumed_at_s) {
-    text += fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));
+  if (scene.formulation.masses) {
+    text += motion_text(scene, run) + warning_lines(contact_remarks(run));
   }
-  text += response_text(scene, record);
+  if (run.solver && !run.solver->direct) text += solver_text(*run.solver);
+  text += resumed_text(run) + response_text(scene, record);
   text += smoothness_text(smoothness_of(scene, record.outputs.back().position));
-  return text + validity_text(record.validity, depth_limits_apply(scene.tissue));
+  return text + validity_text(record.validity, depth_limits_apply(scene.tissue),
+                              warning_lines(breach_remarks(record.validity)));
 }
 
 ShortAnswer short_answer(const ExperimentScene& scene, const RunNetwork& network,
                          const SimulationRun& run) {
   const SimulationRecord& record = run.record;
   ShortAnswer answer;
-  const auto add = [&](std::vector<std::string>& lines, const std::string& text) {
-    add_lines(lines, answer.warnings, text);
-  };
-  add(answer.conclusion, scene_text(scene) + response_text(scene, record));
-  add(answer.rows, contacts_text(scene, network, run));
+  answer.conclusion = separate_lines(scene_text(scene) + response_text(scene, record));
+  answer.rows = separate_lines(contacts_text(scene, network, run));
   answer.rest = [count = answer.rows.size()](std::size_t from) {
     return fmt::format("... and {} more lines on contacts", count - from);
   };
-  add(answer.limits, equations_text(scene, run));
-  if (scene.formulation.masses) add(answer.limits, motion_text(scene, run));
-  if (run.solver && !run.solver->direct) add(answer.limits, solver_text(*run.solver));
-  if (run.resumed_at_s) {
-    answer.limits.push_back(
-        fmt::format("resumed at {} s from a checkpoint", significant(*run.resumed_at_s, 4)));
-  }
-  add(answer.limits, smoothness_text(smoothness_of(scene, record.outputs.back().position)));
-  add(answer.limits, validity_text(record.validity, depth_limits_apply(scene.tissue)));
+  std::string limits = equations_text(scene, run);
+  if (scene.formulation.masses) limits += motion_text(scene, run);
+  if (run.solver && !run.solver->direct) limits += solver_text(*run.solver);
+  limits +=
+      resumed_text(run) + smoothness_text(smoothness_of(scene, record.outputs.back().position));
+  limits += validity_text(record.validity, depth_limits_apply(scene.tissue));
+  answer.limits = separate_lines(limits);
+  answer.warnings = remark_texts(simulation_remarks(run));
   return answer;
 }
 
