@@ -14,10 +14,11 @@ namespace {
 // Force and reach of the Omega.7: its data sheet. Stiffness and damping: CHAI3D 3.3. All other
 // devices have a file in configs/devices.
 const DeviceLimits kDeviceLimits[] = {
-    {"virtual", "simulated Omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0, 0.0,
-     true},
-    {"replay", "replay", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
-    {"omega7", "omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"virtual", "simulated Omega.7", true, 12.0, 0.075, kOmega7StopAlongX_m, 5000.0, 30.0, 2000.0,
+     0.1, 0.1, 0, 0.0, true},
+    {"replay", "replay", true, 12.0, 0.075, 0.0, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
+    {"omega7", "omega.7", true, 12.0, 0.075, kOmega7StopAlongX_m, 5000.0, 30.0, 2000.0, 0.1, 0.1,
+     1},
 };
 
 }  // namespace

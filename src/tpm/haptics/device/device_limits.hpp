@@ -11,6 +11,10 @@ namespace tpm::haptics {
 /// gate trusts it.
 inline constexpr double kMostHandleFriction_N_s_per_m = 10.0;
 
+/// Stop of the Omega.7 along x, from the centre: half of the 110 mm of its data sheet, as
+/// remembered; assumed.
+inline constexpr double kOmega7StopAlongX_m = 0.055;
+
 /// Limits of a kind of device. Numbers that nobody has measured here are marked.
 struct DeviceLimits {
   std::string kind;
@@ -18,6 +22,7 @@ struct DeviceLimits {
   bool tried = false;              ///< against the maker's library; none has been tried on hardware
   double force_N = 0.0;            ///< data sheet
   double reach_m = 0.0;            ///< radius of the workspace, as commonly used
+  double stop_along_x_m = 0.0;     ///< of the mechanism, from the centre; 0: none within reach_m
   double stiffness_N_per_m = 0.0;  ///< recommended maximum, CHAI3D 3.3's software limit
   double damping_N_s_per_m = 0.0;  ///< CHAI3D 3.3's software limit
   double slew_N_per_s = 0.0;       ///< assumed: full force within 6 ms
