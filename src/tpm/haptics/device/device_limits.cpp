@@ -14,11 +14,10 @@ namespace {
 // Force and reach of the Omega.7: its data sheet. Stiffness and damping: CHAI3D 3.3. All other
 // devices have a file in configs/devices.
 const DeviceLimits kDeviceLimits[] = {
-    {"virtual", "simulated Omega.7", true, 12.0, 0.075, kOmega7StopAlongX_m, 5000.0, 30.0, 2000.0,
-     0.1, 0.1, 0, 0.0, true},
-    {"replay", "replay", true, 12.0, 0.075, 0.0, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
-    {"omega7", "omega.7", true, 12.0, 0.075, kOmega7StopAlongX_m, 5000.0, 30.0, 2000.0, 0.1, 0.1,
-     1},
+    {"virtual", "simulated Omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0, 0.0,
+     true},
+    {"replay", "replay", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
+    {"omega7", "omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
 };
 
 }  // namespace
@@ -31,7 +30,11 @@ std::string_view DeviceLimits::known_by(std::string_view key) const {
 
 DeviceLimits limits_of(std::string_view kind) {
   for (const DeviceLimits& limits : kDeviceLimits) {
-    if (limits.kind == kind) return limits;
+    if (limits.kind != kind) continue;
+    DeviceLimits found = limits;
+    const bool omega = kind == "omega7" || kind == "virtual";
+    if (omega) found.stop_along_x_m = kOmega7StopAlongX_m;
+    return found;
   }
   if (const auto file = shipped_device_file(kind)) return limits_in(*file);
   throw Error(ExitCode::usage, "device", "'" + printable(kind) + "'",

@@ -22,7 +22,6 @@ struct DeviceLimits {
   bool tried = false;              ///< against the maker's library; none has been tried on hardware
   double force_N = 0.0;            ///< data sheet
   double reach_m = 0.0;            ///< radius of the workspace, as commonly used
-  double stop_along_x_m = 0.0;     ///< of the mechanism, from the centre; 0: none within reach_m
   double stiffness_N_per_m = 0.0;  ///< recommended maximum, CHAI3D 3.3's software limit
   double damping_N_s_per_m = 0.0;  ///< CHAI3D 3.3's software limit
   double slew_N_per_s = 0.0;       ///< assumed: full force within 6 ms
@@ -40,6 +39,7 @@ struct DeviceLimits {
   /// Where each limit comes from, by its key in a device file; of devices known by a shipped file.
   std::vector<std::pair<std::string, std::string>> provenance = {};
   double measured_period_s = 0.0;  ///< of the loop that measured the delay; 0: not known
+  double stop_along_x_m = 0.0;     ///< of the mechanism, from the centre; 0: none within reach_m
 
   /// Provenance of the limit with this key; "assumed" where nothing is said.
   [[nodiscard]] std::string_view known_by(std::string_view key) const;
