@@ -1,5 +1,5 @@
 // The hazards of --device inverse3 and of tpm hil serve: what ends them, and the largest force. How
-// soon is measured (measure_inverse_hazards, reports/inverse/hazards.md).
+// soon is measured (measure_inverse_hazards, reports/inverse/report.md).
 #include <catch2/catch.hpp>
 
 #include "inverse_hazards.hpp"

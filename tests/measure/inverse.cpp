@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/inverse/2026-11-28.md, as Markdown:
+// Prints the measured numbers of reports/inverse/report.md, as Markdown:
 //     measure_inverse SESSION [SECONDS]
 // The loopback round trip of a force and its state between the library's client and server, both
 // looking again and again, then both sleeping between messages; a loop of 2 kHz on --device

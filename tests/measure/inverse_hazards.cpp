@@ -1,5 +1,5 @@
 // Prints the hazards of --device inverse3 and tpm hil serve, measured on the stand-in service, as
-// the table of reports/inverse/2026-11-28.md:
+// the table of reports/inverse/report.md:
 //     measure_inverse_hazards
 #include <fmt/format.h>
 

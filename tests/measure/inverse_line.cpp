@@ -1,4 +1,4 @@
-// Prints the delays found of reports/inverse/2026-11-28.md, "Delays by the command line", as
+// Prints the delays found of reports/inverse/report.md, "Delays by the command line", as
 // Markdown:
 //     measure_inverse_line TPM [TRIES]
 // tpm hil identify, run and verify on tpm hil serve, programs of their own and the clock, with
