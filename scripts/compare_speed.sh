@@ -6,30 +6,15 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
+source scripts/build_commit.sh
 if [[ $# -lt 2 || $# -gt 3 ]]; then
   echo "usage: scripts/compare_speed.sh A B [ROUNDS]; expected two commits" >&2
   exit 2
 fi
 rounds=${3:-5}
 folder=${TPM_COMPARE_FOLDER:-build/compare_speed}
-mkdir -p "$folder"
 
-# program COMMIT: builds it in a work tree of its own, which is kept; prints the program's path.
-program() {
-  local commit tree
-  commit=$(git rev-parse --short=12 --verify "$1^{commit}")
-  tree=$(realpath -m "$folder/$commit")
-  if [[ ! -x $tree/build/release/tpm ]]; then
-    [[ -d $tree ]] || git worktree add --detach "$tree" "$commit" >&2
-    mkdir -p "$tree/build"
-    [[ -e build/packages && ! -e $tree/build/packages ]] && cp -r build/packages "$tree/build/packages"
-    (cd "$tree" && cmake --preset release -DTPM_BUILD_TESTS=OFF && cmake --build build/release --target tpm) \
-      > "$tree.log" 2>&1 || { echo "$commit does not build: $tree.log" >&2; exit 5; }
-  fi
-  echo "$tree/build/release/tpm"
-}
-
-a=$(program "$1")
-b=$(program "$2")
+a=$(build_commit "$1" "$folder" tpm tpm : -DTPM_BUILD_TESTS=OFF)
+b=$(build_commit "$2" "$folder" tpm tpm : -DTPM_BUILD_TESTS=OFF)
 find_python json
 exec "$TPMKIT_PYTHON" scripts/compare_speed.py "$a" "$b" --names "$1" "$2" --rounds "$rounds"

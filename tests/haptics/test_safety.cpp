@@ -18,6 +18,7 @@ namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 using test::element_of;
@@ -74,7 +75,8 @@ TEST_CASE("What would be unstable is refused before a device is opened, with the
              Contains("stability: unstable: stiffness 1.26e+07 N/m at 1000 Hz"));
   CHECK_THAT(refused(stiff_session("3 MPa")), Contains("unstable"));
   CHECK_THAT(refused(stiff_session("0.5 MPa")),
-             Contains("too stiff for the device") && Contains("at most 5e+03 N/m"));
+             StartsWith("stiffness limit of the device: too stiff for the device") &&
+                 Contains("at most 5e+03 N/m; expected a softer tissue"));
   CHECK_THAT(refused(stiff_session("1 MPa", 2)), Contains("1000 Hz, 2 ms of delay, friction"));
   CHECK_THAT(refused(stiff_session("12 kPa", 50)), Contains("50 ms of delay"));
   // Hardware is not for trying.
@@ -123,7 +125,9 @@ TEST_CASE("What --accept-unstable accepts is instability, and no other refusal")
   }
   // A force that is lost.
   const Json lost = test::with(stiff_session("12 kPa"), "/limits", {{"slew_N_per_s", 1.0}});
-  CHECK_THAT(refused(lost, {}, true), Contains("the rise of the force is limited too much"));
+  CHECK_THAT(refused(lost, {}, true),
+             StartsWith("slew limit: the rise of the force is limited too much") &&
+                 Contains("; expected a faster rise (limits/slew_N_per_s) or a softer tissue"));
   CHECK_THAT(refused(lost), !Contains("--accept-unstable"));
   // A depth outside the workspace.
   const Json far =
@@ -338,6 +342,34 @@ TEST_CASE("Limits have ceilings, and a session has to fit into the workspace") {
   CAPTURE(bad.pointer, bad.value.dump());
   CHECK_THROWS_WITH(test::parsed(test::with(test::short_session(), bad.pointer, bad.value)),
                     Contains(bad.message));
+}
+
+TEST_CASE("A session has to fit before the stop of the Omega.7 along x") {
+  const auto pushed = [](Json push, const char* x_mm) {
+    Json json = test::with(test::short_session(), "/surface", Json::array({x_mm, "0 mm", "0 mm"}));
+    json["push"] = std::move(push);
+    return json;
+  };
+  const Json along = Json::array({1, 0, 0}), across = Json::array({0, 0, -1});
+  const DeviceLimits omega = limits_of("omega7"), simulated = limits_of("virtual");
+  // 12 mm under loads, as deep as the tissue bears.
+  for (const DeviceLimits& limits : {omega, simulated}) {
+    CHECK_NOTHROW(require_within(test::parsed(pushed(along, "42 mm")), limits));
+    CHECK_THROWS_WITH(require_within(test::parsed(pushed(along, "44 mm")), limits),
+                      Contains("the session's furthest place is 0.056 m from the centre along x; "
+                               "expected at most 0.055 m, where the mechanism has its stop"));
+    CHECK_NOTHROW(require_within(test::parsed(pushed(across, "54 mm")), limits));
+    CHECK_THROWS_WITH(require_within(test::parsed(pushed(across, "-56 mm")), limits),
+                      Contains("0.056 m from the centre along x"));
+  }
+  // Of a device whose stop is not known the radius counts alone, which is 75 mm here too.
+  CHECK_NOTHROW(require_within(test::parsed(pushed(along, "44 mm")), limits_of("sigma7")));
+  CHECK_THAT(refused(pushed(along, "44 mm")), StartsWith("device 'virtual': the session's"));
+  // Wherever the hand is then, the way to the surface and 12 mm into it stay free along x.
+  Json before = test::with(test::short_session(), "/surface_before_hand", "20 mm");
+  CHECK_THAT(test::parsed(before).servo.gate->reach_m, WithinAbs(0.075 - 0.040, 1e-12));
+  before["push"] = along;
+  CHECK_THAT(test::parsed(before).servo.gate->reach_m, WithinAbs(0.055 - 0.032, 1e-12));
 }
 
 TEST_CASE("The device is asked for no more than the session's limit") {

@@ -14,6 +14,7 @@
 #include "tpm/haptics/session/session_run.hpp"
 #include "tpm/haptics/show/view_file.hpp"
 #include "tpm/organ/run/simulation_file.hpp"
+#include "tpm/plan/show/simulation_report.hpp"
 
 using namespace tpm;
 using namespace tpm::files;
@@ -108,6 +109,23 @@ TEST_CASE("the page of a result holds every state, to the precision of a float")
   CHECK(few.front() == times.front());
   CHECK(few.back() == times.back());
   CHECK_THAT(small.description.at("organ").at("shown").get<std::string>(), Contains("so that"));
+}
+
+TEST_CASE("the page of a result opens at the largest response that tpm simulate states") {
+  const TempFolder folder;
+  // The sphere flies off the ball and comes back: while the contact settles, its force is larger
+  // than any of the tissue.
+  const ExperimentScene scene = test::experiment(test::kStruckStar);
+  const RunNetwork network = network_to_run(scene);
+  const SimulationRun run = simulate(scene, network);
+  const auto force = [](const CurvePoint& p) { return std::abs(p.response); };
+  REQUIRE_FALSE(counts(*std::ranges::max_element(run.record.curve, {}, force)));
+  const std::string file = folder / "r.h5";
+  write_simulation(scene, network, run, file);
+  const Json stated = plan::simulation_json(scene, network, run).at("largest");
+  const double start_s = view_file(file).description.at("start_s").get<double>();
+  CHECK_THAT(start_s, Catch::Matchers::WithinRel(stated.at("time_s").get<double>(), 1e-8));
+  CHECK(start_s == largest_point(run.record.curve, scene.formulation.tolerance).time_s);
 }
 
 TEST_CASE("the page of a result on a smooth table says what slides in its plane") {

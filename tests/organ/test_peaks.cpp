@@ -8,6 +8,7 @@
 #include "loaded_oscillator.hpp"
 #include "simulated_scene.hpp"
 #include "star_network.hpp"
+#include "temp_folder.hpp"
 #include "tpm/organ/bonds/lowest_mode.hpp"
 #include "tpm/organ/run/curve_extremes.hpp"
 
@@ -149,6 +150,45 @@ TEST_CASE("what a contact does as it settles is no extreme") {
   const std::vector<CurvePoint> after = step(5.0, 1.2, false);
   REQUIRE(after.size() == 1);
   CHECK(after.front().response == 1.5);
+}
+
+TEST_CASE("a run that resumes while a contact settles goes on to the same curve and peak") {
+  const ExperimentScene scene = experiment(test::kStruckStar);
+  const RunNetwork network = network_to_run(scene);
+  const std::vector<CurvePoint> whole = simulate(scene, network).record.curve;
+  const auto stop_at = std::ranges::count_if(
+      whole, [](const CurvePoint& p) { return !p.between && p.time_s < 0.105; });
+  const test::TempFolder folder;
+  SimulationControls controls;
+  controls.checkpoint = folder / "c";
+  std::ptrdiff_t seen = 0;
+  controls.progress = [&](std::size_t done, std::size_t) {
+    seen = static_cast<std::ptrdiff_t>(done);
+  };
+  controls.interrupted = [&] { return seen == stop_at; };
+  CHECK_THROWS_AS(simulate(scene, network, controls), work::Interrupted);
+  controls.interrupted = {};
+  const SimulationRun rest = simulate(scene, network, controls);
+  REQUIRE(rest.resumed_at_s);
+  // The sphere has been struck before, and its contact settles after.
+  const auto next = std::ranges::find_if(
+      whole, [&](const CurvePoint& p) { return p.time_s > *rest.resumed_at_s; });
+  REQUIRE(next != whole.end());
+  REQUIRE(next->settling);
+  REQUIRE(std::prev(next)->settling);
+  const std::vector<CurvePoint>& curve = rest.record.curve;
+  REQUIRE(curve.size() == whole.size());
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    CAPTURE(whole[i].time_s);
+    CHECK(curve[i].time_s == whole[i].time_s);
+    CHECK(curve[i].response == whole[i].response);
+    CHECK(curve[i].overlap_m == whole[i].overlap_m);
+    CHECK(curve[i].touching == whole[i].touching);
+    CHECK(curve[i].between == whole[i].between);
+    CHECK(curve[i].settling == whole[i].settling);
+  }
+  CHECK(peaks_of(curve).response == peaks_of(whole).response);
+  CHECK(largest_point(curve, 0.0).time_s == largest_point(whole, 0.0).time_s);
 }
 
 TEST_CASE("the largest depth under a pulse of load is that of a Zener element") {

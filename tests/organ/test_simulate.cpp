@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <limits>
 #include <random>
+#include <sstream>
 
 #include "refusal.hpp"
 #include "simulated_scene.hpp"
@@ -375,6 +376,27 @@ TEST_CASE("a load that nothing carries is refused where the tissue gives way", "
                    R"("protocol": {"kind": "creep", "load": "1e6 N", "duration": "1 s"})"));
              }),
              Contains("at t = 0 s and a load of 0.93") && Contains("buckles around sphere "));
+  // The place is that of the sphere which is named: the pushed one, or a weak one beside it.
+  for (const auto& [formulation, named] :
+       {std::pair{"static", 13}, std::pair{"quasi_static", 20}}) {
+    const ExperimentScene scene = small_scene(fmt::format(
+        R"("formulation": {{"kind": "{}"}}, "contacts": [{{"kind": "sphere", "number": 20}}],
+           "protocol": {{"kind": "creep", "load": "1e6 N", "duration": "1 s"}})",
+        formulation));
+    const std::string refusal = refusal_of([&] { (void)run_of(scene); });
+    CAPTURE(refusal);
+    const std::string words = fmt::format("buckles around sphere {} at (", named);
+    const std::size_t at = refusal.find(words);
+    REQUIRE(at != std::string::npos);
+    std::istringstream numbers(refusal.substr(at + words.size()));
+    const Eigen::Vector3d rest_m = scene.tissue.network.organ.position.col(named - 1);
+    for (int axis = 0; axis < 3; ++axis) {
+      double place_mm = 0.0;
+      char separator = 0;
+      numbers >> place_mm >> separator;
+      CHECK_THAT(1e-3 * place_mm, WithinAbs(rest_m[axis], 0.02));  // it has moved
+    }
+  }
 }
 
 TEST_CASE("lists of a session and of a design's candidates are protocols of the one parser") {

@@ -111,6 +111,9 @@ def faults_of(answer, words, folder, exit_code):
         digest = hashlib.sha256((folder / one["file"]).read_bytes()).hexdigest()
         if digest != one["sha256"]:
             faults.append(f"SHA-256 of {one['file']} is not that of the file")
+    places = [(folder / one["file"]).parts for one in answer["inputs"]]
+    if places != sorted(places):
+        faults.append("inputs are not sorted by their whole paths")
     read = {Path(one["file"]).resolve() for one in answer["inputs"]} | {(folder / one["file"]).resolve() for one in answer["inputs"]}
     for word in words[1:]:
         given = folder / word
@@ -124,6 +127,22 @@ def faults_of(answer, words, folder, exit_code):
     if exit_code == 0 and any(not one["holds"] for one in answer["verdicts"]):
         faults.append("exit code 0, and a verdict says no")
     return faults
+
+
+def orders_of_shards(program, sweep, folder):
+    """Orders of shards in which `sweep merge` writes another result or another answer."""
+    names = [f"ordered.h5.shard-{k}-of-3" for k in (1, 2, 3)]
+    for k in (1, 2, 3):
+        subprocess.run([program, "sweep", sweep, "--shard", f"{k}/3", "-o", "ordered.h5"], cwd=folder, check=True, capture_output=True)
+
+    def merged(shards):
+        command = [program, "sweep", "merge", sweep, *shards, "-o", "ordered.h5", "--format", "json"]
+        answer = subprocess.run(command, cwd=folder, check=True, capture_output=True).stdout
+        return answer, (folder / "ordered.h5").read_bytes()
+
+    usual = merged(names)
+    orders = [[names[k] for k in order] for order in ((2, 1, 0), (1, 2, 0), (2, 0, 1))]
+    return [f"tpm sweep merge {' '.join(o)}: not the bytes of the usual order" for o in orders + [[]] if merged(o) != usual]
 
 
 def main():
@@ -156,6 +175,9 @@ def main():
             of_command = members.setdefault(answer["command"], ([], []))
             of_command[0].extend(v["code"] for v in answer["verdicts"] if v["code"] not in of_command[0])
             of_command[1].extend(m for m in answer if m not in ENVELOPE and m not in of_command[1])
+        for fault in orders_of_shards(program, root / "configs/sweep_x_depth_100.json", folder):
+            faults += 1
+            print(fault)
     for missing in sorted(wanted - met - SLOW):
         faults += 1
         print(f"tpm {missing} --format json is not asked")

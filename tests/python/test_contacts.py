@@ -172,7 +172,17 @@ class Contacts(unittest.TestCase):
 
     def test_hardware_that_nobody_measured_counts_as_late_and_free_of_friction(self):
         with self.assertRaisesRegex(tpmkit.Error, "not measured on this device: 20 ms and no friction count"):
-            tpmkit.Contact(self.file)
+            tpmkit.Contact(self.file, device="omega7")
+
+    def test_a_contact_without_a_device_is_opened_and_says_that_no_limit_of_a_device_was_checked(self):
+        contact, virtual = tpmkit.Contact(self.file), tpmkit.Contact(self.file, device="virtual")
+        self.assertEqual(contact.warnings, [tpmkit._contact.NO_DEVICE, *virtual.warnings])
+        self.assertEqual(contact.info["warnings"], contact.warnings)
+        self.assertIn("no limit of a device was checked", repr(contact))
+        self.assertNotIn("no limit of a device", repr(virtual))
+        self.assertEqual(contact.info["verdict"], virtual.info["verdict"])
+        with self.assertRaisesRegex(tpmkit.Error, "accept_unstable: is not for the device 'omega7'"):
+            tpmkit.Contact(self.file, accept_unstable=True)
 
     def test_errors(self):
         with self.assertRaisesRegex(tpmkit.Error, "none.json"):

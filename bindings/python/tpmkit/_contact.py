@@ -11,6 +11,10 @@ from . import _core, _kinds
 from ._run import shown
 
 MOST_MISSED = 2**20  # far above what stops a contact
+NO_DEVICE = (
+    "no device is named: stability is that of the simulated Omega.7, and no limit of a device was checked; "
+    "name device or device_file before the forces go to motors"
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -56,10 +60,12 @@ class Contact:
     longest_s
         Of a law file: for how long spring-pots keep their history.
     accept_unstable
-        Open what would be unstable on the device.
+        Open what would be unstable on the device. Only with device="virtual".
     device
         Whose limits apply, as `tpm hil run --device` takes it, but for "replay". Default: the device of
-        `device_file`, else omega7. "virtual" where nothing has motors: forces are computed, and nobody feels them.
+        `device_file`. "virtual" where nothing has motors: forces are computed, and nobody feels them. Without a device
+        and a `device_file` the contact is opened as that of "virtual", and a warning says that no limit of a device
+        was checked.
     device_file
         What is known of your device: limits, and the delay and friction that `tpm hil identify` measured
         (schemas/device.schema.json). Without a measured delay a device with motors counts as 20 ms late and free of
@@ -84,9 +90,11 @@ class Contact:
         device_file: str | os.PathLike[str] = "",
     ) -> None:
         rate, longest = _number("contact", "rate_Hz", rate_Hz), _number("contact", "longest_s", longest_s)
-        self._core = _core.Contact(
-            os.fspath(file), rate, start_gate, longest, accept_unstable, device, os.fspath(device_file)
-        )
+        device_path = os.fspath(device_file)
+        # What may be unstable is opened only for a caller who says that nothing has motors.
+        self._no_device = device == "" and device_path == "" and not accept_unstable
+        named = "virtual" if self._no_device else device
+        self._core = _core.Contact(os.fspath(file), rate, start_gate, longest, accept_unstable, named, device_path)
 
     def step(self, position_m: npt.ArrayLike, *, missed: int = 0) -> Array:
         """One period: position of the tool (m) to force on the hand (N), both in device coordinates.
@@ -140,7 +148,10 @@ class Contact:
     def info(self) -> dict[str, Any]:
         """What does not change: model, error_bound, period_s, stiffness and its borders of stability and passivity,
         verdict, warnings, surface_m, push, force_limit_N, spheres."""
-        return self._core.info
+        found = self._core.info
+        if self._no_device:
+            found["warnings"] = [NO_DEVICE, *found["warnings"]]
+        return found
 
     @property
     def adequacy(self) -> dict[str, Any]:

@@ -30,7 +30,11 @@ std::string_view DeviceLimits::known_by(std::string_view key) const {
 
 DeviceLimits limits_of(std::string_view kind) {
   for (const DeviceLimits& limits : kDeviceLimits) {
-    if (limits.kind == kind) return limits;
+    if (limits.kind != kind) continue;
+    DeviceLimits found = limits;
+    const bool omega = kind == "omega7" || kind == "virtual";
+    if (omega) found.stop_along_x_m = kOmega7StopAlongX_m;
+    return found;
   }
   if (const auto file = shipped_device_file(kind)) return limits_in(*file);
   throw Error(ExitCode::usage, "device", "'" + printable(kind) + "'",

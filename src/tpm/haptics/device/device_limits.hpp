@@ -11,6 +11,10 @@ namespace tpm::haptics {
 /// gate trusts it.
 inline constexpr double kMostHandleFriction_N_s_per_m = 10.0;
 
+/// Stop of the Omega.7 along x, from the centre: half of the 110 mm of its data sheet, as
+/// remembered; assumed.
+inline constexpr double kOmega7StopAlongX_m = 0.055;
+
 /// Limits of a kind of device. Numbers that nobody has measured here are marked.
 struct DeviceLimits {
   std::string kind;
@@ -35,6 +39,7 @@ struct DeviceLimits {
   /// Where each limit comes from, by its key in a device file; of devices known by a shipped file.
   std::vector<std::pair<std::string, std::string>> provenance = {};
   double measured_period_s = 0.0;  ///< of the loop that measured the delay; 0: not known
+  double stop_along_x_m = 0.0;     ///< of the mechanism, from the centre; 0: none within reach_m
 
   /// Provenance of the limit with this key; "assumed" where nothing is said.
   [[nodiscard]] std::string_view known_by(std::string_view key) const;

@@ -9,8 +9,9 @@
 namespace tpm::haptics {
 
 /// 160 mm diameter and 110 mm length: the maker's data sheet, as remembered; assumed. Wider across
-/// and shorter along than the sphere of DeviceLimits::reach_m, in which sessions have to fit.
-inline constexpr CylinderWorkspace kOmega7Workspace{0.080, 0.055};
+/// and shorter along than the sphere of DeviceLimits::reach_m. Sessions have to fit into both
+/// (require_within()).
+inline constexpr CylinderWorkspace kOmega7Workspace{0.080, kOmega7StopAlongX_m};
 
 /// A simulated Omega.7 held by a simulated arm, or another device of the list whose row says
 /// `plant`. Its time passes in advance() only; in real time its watchdog counts by the clock too,

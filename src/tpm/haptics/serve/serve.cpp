@@ -55,15 +55,16 @@ InverseServerSettings server_settings(const ServeOptions& options) {
 }  // namespace
 
 ServeRun serve_session(const HilSession& session, const ServeOptions& options) {
-  const DeviceLimits& limits = limits_of("virtual");
+  DeviceLimits limits = limits_of("virtual");
+  limits.stop_along_x_m = 0.0;  // the simulated hand of the service moves within a sphere
   require_within(session, limits);
   ServeRun run;
   LoopModel model = make_loop_model(session);
   const std::shared_ptr<ContactModel> stepped = std::move(model.model);
   run.rendering = check_rendering(session, *stepped, model, limits);
   if (!run.rendering.acceptable()) {
-    throw Error(ExitCode::answer_is_no, "stability", run.rendering.verdict(),
-                "a softer tissue, a higher rate or a faster rise");
+    throw Error(ExitCode::answer_is_no, std::string(run.rendering.unmet(false)),
+                run.rendering.verdict(), std::string(run.rendering.remedy(false)));
   }
   SimulatedHandSettings hand_settings;
   hand_settings.plant = session.plant;

@@ -199,6 +199,24 @@ std::string RenderingCheck::refusal(bool accept_unstable) const {
   return {};
 }
 
+std::string_view RenderingCheck::unmet(bool accept_unstable) const {
+  if (!stable() && !accept_unstable) return "stability";
+  if (!within_device()) return "stiffness limit of the device";
+  if (!follows_encoder()) return "slew limit";
+  if (!safe_in_hands() && !accept_unstable) return "stability";
+  return delay_is_guarded() ? "" : "delay";
+}
+
+std::string_view RenderingCheck::remedy(bool accept_unstable) const {
+  const std::string_view condition = unmet(accept_unstable);
+  if (condition == "stability") {
+    return "a softer tissue, a higher rate, a shorter delay or a faster rise";
+  }
+  if (condition == "slew limit") return "a faster rise (limits/slew_N_per_s) or a softer tissue";
+  if (condition == "delay") return "a device with a shorter delay";
+  return condition.empty() ? "" : "a softer tissue";
+}
+
 std::string RenderingCheck::verdict() const {
   if (std::string refused = refusal(false); !refused.empty()) return refused;
   const std::string what = what_counts(*this);

@@ -2,6 +2,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
@@ -65,6 +66,11 @@ struct RenderingCheck {
   /// @param accept_unstable instability is no reason, with the operator's arm or with six hands;
   ///        each other reason still is
   [[nodiscard]] std::string refusal(bool accept_unstable) const;
+  /// The condition that is not met, as a message begins: stability, stiffness limit of the device,
+  /// slew limit, delay. Empty: none.
+  [[nodiscard]] std::string_view unmet(bool accept_unstable) const;
+  /// What to change so that this condition is met; empty: nothing.
+  [[nodiscard]] std::string_view remedy(bool accept_unstable) const;
   static constexpr double kRoom = 0.8;  ///< share of stable_N_per_m that is allowed
   /// One line: passive, stable, too little margin, or why not.
   [[nodiscard]] std::string verdict() const;

@@ -63,10 +63,12 @@ void require_a_period(const LimitKeys& limits, double period_s, const DocumentPl
                   fmt::format("a period of the loop, {} s, or more", shortest(period_s)));
 }
 
-/// How far the tool goes beyond the place where the tissue begins, m: along the push and across.
-double furthest_of(const HilSession& session, const Eigen::Vector3d& surface_m) {
+/// The places farthest along the push and across, and that where the tissue begins.
+/// @param surface_m where it begins
+std::vector<Eigen::Vector3d> places_of(const HilSession& session,
+                                       const Eigen::Vector3d& surface_m) {
   constexpr double kUnderLoads_m = 0.012;  // where the tissue is damaged
-  double furthest = surface_m.norm();
+  std::vector<Eigen::Vector3d> places{surface_m};
   for (const SessionPhase& phase : session.phases) {
     const bool pushes =
         phase.kind == SessionPhaseKind::load || phase.kind == SessionPhaseKind::creep;
@@ -75,10 +77,25 @@ double furthest_of(const HilSession& session, const Eigen::Vector3d& surface_m) 
     if (phase.kind == SessionPhaseKind::motion) depths = {0.0, phase.depth_m};
     for (const double depth : {depths.first, depths.second}) {
       for (const double across : {phase.across_from_m, phase.across_to_m}) {
-        const Eigen::Vector3d at = surface_m + depth * session.servo.push + across * session.slide;
-        furthest = std::max(furthest, at.norm());
+        places.emplace_back(surface_m + depth * session.servo.push + across * session.slide);
       }
     }
+  }
+  return places;
+}
+
+/// Of those places the largest distance from the centre of the workspace, m.
+double furthest_of(const HilSession& session, const Eigen::Vector3d& surface_m) {
+  double furthest = 0.0;
+  for (const auto& at : places_of(session, surface_m)) furthest = std::max(furthest, at.norm());
+  return furthest;
+}
+
+/// The same along x.
+double furthest_along_x(const HilSession& session, const Eigen::Vector3d& surface_m) {
+  double furthest = 0.0;
+  for (const auto& at : places_of(session, surface_m)) {
+    furthest = std::max(furthest, std::abs(at.x()));
   }
   return furthest;
 }
@@ -95,7 +112,13 @@ void require_within_reach(HilSession& session, const DeviceLimits& device,
   }
   // Wherever the hand is then, the session has to fit in from there.
   if (before_hand) {
-    session.servo.gate->reach_m -= furthest + *session.servo.surface_before_hand_m;
+    const double before_m = *session.servo.surface_before_hand_m;
+    session.servo.gate->reach_m -= furthest + before_m;
+    const double along_x_m = furthest_along_x(session, before_m * session.servo.push);
+    if (device.stop_along_x_m > 0.0 && along_x_m > 0.0) {
+      session.servo.gate->reach_m =
+          std::min(session.servo.gate->reach_m, device.stop_along_x_m - along_x_m);
+    }
     if (!(session.servo.gate->reach_m > 0.0)) {
       throw bad_input(place.key("surface_before_hand").where, "leaves no room for the session",
                       "a nearer surface, or shorter ways");
@@ -329,10 +352,16 @@ void require_within(const HilSession& session, const DeviceLimits& limits) {
     refuse("limits/damping_N_s_per_m", shortest(servo.most_damping_N_s_per_m),
            shortest(limits.damping_N_s_per_m));
   }
-  const double furthest_m = furthest_of(session, session.servo.surface_m);
-  if (!servo.surface_before_hand_m && furthest_m > limits.reach_m) {
+  if (servo.surface_before_hand_m) return;  // the start gate keeps room for it
+  const double furthest_m = furthest_of(session, servo.surface_m);
+  if (furthest_m > limits.reach_m) {
     refuse("furthest place", fmt::format("{:.3g} m from the centre", furthest_m),
            shortest(limits.reach_m) + " m");
+  }
+  const double along_x_m = furthest_along_x(session, servo.surface_m);
+  if (limits.stop_along_x_m > 0.0 && along_x_m > limits.stop_along_x_m) {
+    refuse("furthest place", fmt::format("{:.3g} m from the centre along x", along_x_m),
+           shortest(limits.stop_along_x_m) + " m, where the mechanism has its stop");
   }
 }
 

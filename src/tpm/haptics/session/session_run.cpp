@@ -112,15 +112,17 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
   }
   const std::string refusal = rendering.refusal(options.accept_unstable);
   if (refusal.empty() || choice.kind == "replay") return;
-  std::string expected = "a softer tissue, a higher rate, a shorter delay or a faster rise";
-  if (!limits.plant) {
+  const std::string_view condition = rendering.unmet(options.accept_unstable);
+  std::string expected(rendering.remedy(options.accept_unstable));
+  const bool by_delay = condition == "stability" || condition == "delay";
+  if (!limits.plant && by_delay) {
     expected +=
         "; a device file with a measured delay (tpm hil identify); the device 'virtual', where "
         "nothing has motors";
-  } else if (rendering.acceptable_if_unstable()) {
+  } else if (limits.plant && rendering.acceptable_if_unstable()) {
     expected += "; --accept-unstable";
   }
-  throw Error(ExitCode::answer_is_no, "stability", refusal, expected);
+  throw Error(ExitCode::answer_is_no, std::string(condition), refusal, expected);
 }
 
 std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {

@@ -123,6 +123,14 @@ std::string sphere_list(const std::vector<std::size_t>& spheres) {
   return fmt::format("sphere{} {}", spheres.size() == 1 ? "" : "s", list);
 }
 
+std::string sphere_list(const std::vector<std::size_t>& spheres, const Positions& position) {
+  if (spheres.empty()) return sphere_list(spheres);
+  const Eigen::Vector3d place = 1e3 * position.col(static_cast<Index>(spheres.front()));
+  return fmt::format("{}{} at ({}, {}, {}) mm", sphere_list(spheres),
+                     spheres.size() == 1 ? "" : ", the first", significant(place.x(), 4),
+                     significant(place.y(), 4), significant(place.z(), 4));
+}
+
 void require_supported(const BondSystem& bonds, const Organ& organ, const Constraints& constraints,
                        std::string_view where) {
   const std::vector<double> support = local_support(bonds, organ, constraints);
@@ -133,7 +141,7 @@ void require_supported(const BondSystem& bonds, const Organ& organ, const Constr
       fmt::format("nearly a mechanism: {} loose: {}, held by their neighbours with "
                   "less than {} of their bonds' stiffness (least {})",
                   loose.size() == 1 ? "1 sphere is" : fmt::format("{} spheres are", loose.size()),
-                  sphere_list(loose), shortest(kLooseSupport),
+                  sphere_list(loose, organ.position), shortest(kLooseSupport),
                   significant(support[loose.front()], 2)),
       "diagonal bonds between the layers, or a wider support");
 }

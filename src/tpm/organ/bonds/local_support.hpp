@@ -28,5 +28,8 @@ void require_supported(const BondSystem& bonds, const Organ& organ, const Constr
 
 /// "sphere 7", "spheres 12, 14 and 5 more"; numbers from 1.
 [[nodiscard]] std::string sphere_list(const std::vector<std::size_t>& spheres);
+/// The same with the place of the first: "spheres 12, 14 and 5 more, the first at (1, 2, 3) mm".
+[[nodiscard]] std::string sphere_list(const std::vector<std::size_t>& spheres,
+                                      const Positions& position);
 
 }  // namespace tpm::organ

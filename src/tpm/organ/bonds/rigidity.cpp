@@ -73,6 +73,11 @@ std::vector<std::size_t> spheres_that_move(const Eigen::MatrixXd& modes, std::si
   return order;
 }
 
+std::string words_with(const ZeroEnergyModes& modes, const std::string& spheres) {
+  return fmt::format("{} zero-energy mode{}; loose: {}", modes.count, modes.count == 1 ? "" : "s",
+                     spheres);
+}
+
 }  // namespace
 
 ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,
@@ -99,15 +104,14 @@ ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest
 }
 
 std::string words(const ZeroEnergyModes& modes) {
-  return fmt::format("{} zero-energy mode{}; loose: {}", modes.count, modes.count == 1 ? "" : "s",
-                     sphere_list(modes.spheres));
+  return words_with(modes, sphere_list(modes.spheres));
 }
 
 void require_rigid(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                    std::string_view where) {
   const ZeroEnergyModes modes = zero_energy_modes(bonds, rest, constraints);
   if (modes.is_rigid()) return;
-  throw bad_input(where, words(modes),
+  throw bad_input(where, words_with(modes, sphere_list(modes.spheres, rest)),
                   "a network without mechanisms: more bonds (a wider support) or more anchors");
 }
 

@@ -1,5 +1,6 @@
 #include "tpm/organ/run/simulation.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "tpm/organ/bonds/lowest_mode.hpp"
@@ -82,6 +83,17 @@ Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& networ
     mass[column++] = *own;
   }
   return mass;
+}
+
+const CurvePoint& largest_point(const std::vector<CurvePoint>& curve, double tolerance) {
+  double most = std::abs(curve.back().response);
+  for (const CurvePoint& p : curve) {
+    if (counts(p)) most = std::max(most, std::abs(p.response));
+  }
+  const auto first = std::ranges::find_if(curve, [&](const CurvePoint& p) {
+    return counts(p) && std::abs(p.response) >= (1.0 - tolerance) * most;
+  });
+  return first == curve.end() ? curve.back() : *first;
 }
 
 SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,

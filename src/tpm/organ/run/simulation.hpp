@@ -52,6 +52,13 @@ struct CurvePoint {
   return !point.settling;
 }
 
+/// The first point of the largest response; responses that differ by less than the tolerance are
+/// the same. The end always counts.
+/// @param curve not empty
+/// @param tolerance relative
+[[nodiscard]] const CurvePoint& largest_point(const std::vector<CurvePoint>& curve,
+                                              double tolerance);
+
 /// Parts of a run; each begins afresh, and a checkpoint can be written after it.
 inline constexpr std::size_t kRunParts = 16;
 

@@ -49,11 +49,7 @@ SimulationRun run_with_mass(const ExperimentScene& scene, const RunNetwork& netw
 }
 
 double largest_response(const std::vector<CurvePoint>& curve) {
-  double largest = std::abs(curve.back().response);
-  for (const CurvePoint& p : curve) {
-    if (counts(p)) largest = std::max(largest, std::abs(p.response));
-  }
-  return largest;
+  return std::abs(largest_point(curve, 0.0).response);
 }
 
 /// Runs the scene with softer contacts and compares.

@@ -26,19 +26,6 @@ bool by_depth(const ExperimentScene& scene) {
   return scene.protocol.drive() == Drive::displacement;
 }
 
-/// The first point of the largest response; what differs by less than the tolerance is the same.
-/// The end counts always.
-const CurvePoint& largest(const SimulationRecord& record, double tolerance) {
-  double most = std::abs(record.curve.back().response);
-  for (const CurvePoint& p : record.curve) {
-    if (counts(p)) most = std::max(most, std::abs(p.response));
-  }
-  const auto first = std::ranges::find_if(record.curve, [&](const CurvePoint& p) {
-    return counts(p) && std::abs(p.response) >= (1.0 - tolerance) * most;
-  });
-  return first == record.curve.end() ? record.curve.back() : *first;
-}
-
 /// The impact that the tissue feels most; none if there is none.
 const ProbeImpact* largest_impact(const std::vector<ProbeImpact>& impacts) {
   const auto most = std::ranges::max_element(
@@ -368,7 +355,7 @@ std::string response_text(const ExperimentScene& scene, const SimulationRecord& 
                        depth ? "at a depth of" : "under a load of",
                        sized_text(depth ? Dimension::length : Dimension::force, p.imposed, 4));
   };
-  const CurvePoint& most = largest(record, scene.formulation.tolerance);
+  const CurvePoint& most = largest_point(record.curve, scene.formulation.tolerance);
   return fmt::format("largest {}: {}, at {} s\nat the end, {} s: {}\n", depth ? "force" : "depth",
                      response(most), significant(most.time_s, 4),
                      significant(record.curve.back().time_s, 4), response(record.curve.back()));
@@ -413,7 +400,7 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
                 {"imposed", nine_digits(p.imposed)},
                 {"response", nine_digits(p.response)}};
   };
-  json["largest"] = point(largest(record, f.tolerance));
+  json["largest"] = point(largest_point(record.curve, f.tolerance));
   json["last"] = point(record.curve.back());
   json["outputs"] = record.outputs.size();
   json["energy"] = energy_json(run);

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/organ/run/simulation.hpp"
 #include "tpm/show/view_parts.hpp"
 #include "tpmkit/error.hpp"
 
@@ -94,15 +94,25 @@ void add_tools(const Hdf5Reader& file, const std::filesystem::path& path,
   }
 }
 
-/// When the response is largest: the force, or the depth under a load.
-std::optional<double> time_of_peak(const Hdf5Reader& file) {
+/// When the response is largest, as tpm simulate says it: the force, or the depth under a load.
+std::optional<double> time_of_peak(const Hdf5Reader& file, const std::filesystem::path& path) {
   const char* const response = file.has("/curve/force_N") ? "/curve/force_N" : "/curve/depth_m";
   if (!file.has(response)) return std::nullopt;
   const std::vector<double> values = file.numbers(response);
   const std::vector<double> times = file.numbers("/curve/time_s");
   if (values.empty() || values.size() != times.size()) return std::nullopt;
-  const auto peak = std::ranges::max_element(values, {}, [](double v) { return std::abs(v); });
-  return times[static_cast<std::size_t>(peak - values.begin())];
+  std::vector<std::uint32_t> settling(values.size(), 0);
+  if (file.has("/curve/settling")) settling = whole_numbers(file, path, "/curve/settling", 2);
+  if (settling.size() != values.size()) return std::nullopt;
+  std::vector<CurvePoint> curve(values.size());
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    curve[i].time_s = times[i];
+    curve[i].response = values[i];
+    curve[i].settling = settling[i] != 0;
+  }
+  const bool known = file.has("/settings/tolerance");
+  const double tolerance = known ? file.numbers("/settings/tolerance").at(0) : 0.0;
+  return largest_point(curve, tolerance).time_s;
 }
 
 void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::size_t most,
@@ -209,7 +219,7 @@ ViewPage view_simulation(const std::filesystem::path& path, std::string_view byt
   } else {
     page.fact("organ", "this formulation does not show whole states: there is no organ to turn");
   }
-  if (const auto peak = time_of_peak(file)) page.description["start_s"] = *peak;
+  if (const auto peak = time_of_peak(file, path)) page.description["start_s"] = *peak;
   add_curves(file, page);
   return page;
 }
