@@ -183,7 +183,7 @@ struct Answer {
 
 Answer not_predicted(int parameters) {
   constexpr double kUnpredicted = std::numeric_limits<double>::quiet_NaN();
-  return {kUnpredicted, Slopes::Constant(parameters, kNothing)};
+  return {kUnpredicted, Slopes::Constant(parameters, kUnpredicted)};
 }
 
 /// The answer of a contact that stands at one of the stops.
