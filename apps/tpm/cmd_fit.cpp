@@ -147,7 +147,6 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
     for (const std::string& words : r.phases.summary) text += fmt::format("{}\n", words);
   }
   text += fmt::format("\n{}\n{}", to_terminal_text(selection), to_terminal_text(best));
-  for (const std::string& words : outside_words(best)) text += fmt::format("! {}\n", words);
   text = with_moduli(to_json(selection), std::move(text), moduli, session);
   const std::string folder = figure_folder(options, recordings.front().name);
   std::vector<std::string> files;

@@ -113,6 +113,7 @@ FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
         PreferredLaw{law_name(best.law), selection.candidates[selection.recommended].delta_bic,
                      best.reason, fitted_parameters(best.fit)};
   }
+  summary.flags.insert(summary.flags.begin(), selection.warnings.begin(), selection.warnings.end());
   summary.text = to_terminal_text(selection) + "\n" + summary.text;
   summary.json = to_text(to_json(selection));
   return summary;

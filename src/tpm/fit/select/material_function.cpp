@@ -166,7 +166,7 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
 /// What was assumed of small readings, and relaxation times that lie outside what was measured.
 std::vector<std::string> range_warnings(const FitResult& fit, const FunctionSizes& sizes) {
   std::vector<std::string> warnings;
-  if (fit.config.data.front().noise.kind == NoiseKind::combined) {
+  if (fit.config.data.front().noise.kind == NoiseKind::combined && sizes.beyond_instruments()) {
     warnings.push_back(fmt::format(
         "the readings span {} decades: those below {} of the largest are taken to scatter as if "
         "they "
@@ -207,6 +207,14 @@ std::vector<LawSpec> linear_family() {
 }
 
 }  // namespace
+
+std::vector<std::string> function_warnings(const FitResult& fit, const DataSet& data) {
+  if (const auto* spectrum = std::get_if<Spectrum>(&data))
+    return range_warnings(fit, sizes_of_spectrum(*spectrum));
+  const auto* step = std::get_if<Recording>(&data);
+  if (step == nullptr || !is_step_response(step->response_quantity)) return {};
+  return range_warnings(fit, sizes_of_step(*step));
+}
 
 std::string MaterialFunction::kind() const {
   if (std::holds_alternative<Spectrum>(data)) return "spectrum";

@@ -379,7 +379,12 @@ Selection select_law(std::span<const PreparedRecording> recordings,
     const auto both = give_both_drift_answers(preferred, recordings);
     if (both) preferred.flags.push_back(drift_words(*both, preferred));
   }
-  std::ranges::move(protocol_warnings(chosen.fit, recordings), std::back_inserter(s.warnings));
+  const auto warn = [&s](std::vector<std::string> words) {
+    std::ranges::move(words, std::back_inserter(s.warnings));
+  };
+  warn(recording_warnings(recordings));
+  warn(protocol_warnings(chosen.fit, recordings));
+  warn(outside_words(chosen.fit));
   state_adequacy(s, recordings);
   describe(s);
   for (const PreparedRecording& r : recordings) {

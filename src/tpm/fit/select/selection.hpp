@@ -70,7 +70,7 @@ struct Selection {
   Correlation correlation;            ///< of the residuals that the law of least deviance leaves
   std::optional<DriftAnswers> drift;  ///< of the recommended law, if not separable
   std::vector<std::string> summary;   ///< the recommendation and its reasons
-  std::vector<std::string> warnings;  ///< what the experiment cannot tell
+  std::vector<std::string> warnings;  ///< what the experiment cannot tell, and outside_words()
 };
 
 /// linear, hertz and power kernels with 0 to 3 branches; linear also with elastic and relaxing
@@ -169,6 +169,11 @@ struct ProtocolSpans {
 /// Looks again at a recommended law that was not identified, now that its fit has profiles: its
 /// note must not contradict its intervals.
 void reassess(Candidate& chosen, const ProtocolSpans& spans);
+
+/// What must be known of the recordings themselves: PreparedRecording::warnings, and depths in a
+/// unit that is not the file's.
+[[nodiscard]] std::vector<std::string> recording_warnings(
+    std::span<const PreparedRecording> recordings);
 
 /// Properties of a fitted law that the protocol of a recording cannot resolve: relaxation times
 /// shorter than the ramp or the sampling, or longer than the hold.

@@ -109,12 +109,17 @@ ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings) {
   return spans;
 }
 
-std::vector<std::string> protocol_warnings(const FitResult& fit,
-                                           std::span<const PreparedRecording> recordings) {
+std::vector<std::string> recording_warnings(std::span<const PreparedRecording> recordings) {
   std::vector<std::string> warnings = unit_warnings(recordings);
   for (const PreparedRecording& r : recordings) {
     warnings.insert(warnings.end(), r.warnings.begin(), r.warnings.end());
   }
+  return warnings;
+}
+
+std::vector<std::string> protocol_warnings(const FitResult& fit,
+                                           std::span<const PreparedRecording> recordings) {
+  std::vector<std::string> warnings;
   const auto [ramp_s, hold_s, step_s] = protocol_spans(recordings);
   if (hold_s == 0.0) {
     warnings.emplace_back("there is no hold: relaxation is seen only through the ramp");

@@ -193,8 +193,6 @@ ShortAnswer short_answer(const Selection& s) {
     answer.conclusion.insert(answer.conclusion.begin(), fit.adequacy->summary);
   }
   answer.warnings = s.warnings;
-  const std::vector<std::string> outside = outside_words(fit);
-  answer.warnings.insert(answer.warnings.end(), outside.begin(), outside.end());
   answer.warnings.insert(answer.warnings.end(), fit.flags.begin(), fit.flags.end());
   return answer;
 }
