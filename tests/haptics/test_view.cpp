@@ -262,6 +262,15 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   const ViewPage seen = view_file(shown_file(folder.path()));
   CHECK(seen.description.at("lead") == lead);
   CHECK(seen.description.at("plots").size() == 3);
+  // So is that of a configuration.
+  const TempFolder configured;
+  std::ofstream(configured / "answer.json") << fit.dump();
+  std::ofstream(configured / "figures.json") << figures.dump();
+  std::ofstream(configured / "law.json") << "{}";
+  const ViewPage told = view_file(shown_file(configured.path()));
+  CHECK(told.description.at("lead").at(0) == lead.at(0));
+  CHECK(told.description.at("table") == page.description.at("table"));
+  CHECK(told.description.at("plots").size() == 3);
   const TempFolder empty;
   CHECK_THROWS_WITH((void)shown_file(empty.path()), Contains("a folder without a result"));
 }

@@ -295,7 +295,9 @@ bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file
     } else if (is_answer(fit)) {
       add_conclusion(page, json, fit);
       const std::filesystem::path figures = file.parent_path() / "figures.json";
-      if (file.filename() == "selection.json" && std::filesystem::exists(figures)) {
+      const bool of_folder =
+          file.filename() == "selection.json" || file.filename() == "answer.json";
+      if (of_folder && std::filesystem::exists(figures)) {
         add_figures(page, read_json(figures), figures.string());
       }
       add_answer(page, fit);
