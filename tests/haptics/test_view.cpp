@@ -271,6 +271,13 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   CHECK(told.description.at("lead").at(0) == lead.at(0));
   CHECK(told.description.at("table") == page.description.at("table"));
   CHECK(told.description.at("plots").size() == 3);
+  // Several figures are called by their folder.
+  const TempFolder drawn;
+  Json two = figures;
+  two["figures"].push_back(figures.at("figures").at(0));
+  std::ofstream(drawn / "figures.json") << two.dump();
+  CHECK(view_file(shown_file(drawn.path())).description.at("title") ==
+        drawn.path().filename().string() + ": 2 figures");
   const TempFolder empty;
   CHECK_THROWS_WITH((void)shown_file(empty.path()), Contains("a folder without a result"));
 }

@@ -288,7 +288,12 @@ bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file
       page.description["kind"] = "figures";
       page.description["badge"] = "FIGURES";
       const Json& figures = json.at("figures");
-      if (figures.size() == 1) page.description["title"] = figures.at(0).at("title");
+      page.description["title"] =
+          figures.size() == 1
+              ? figures.at(0).at("title").get<std::string>()
+              : fmt::format("{}: {} figures",
+                            std::filesystem::absolute(file).parent_path().filename().string(),
+                            figures.size());
       add_figures(page, json, file.string());
     } else if (is_law(json)) {
       add_law_and_figures(page, file);
