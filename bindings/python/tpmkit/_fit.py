@@ -291,7 +291,8 @@ class Fit:
         if placement not in ("surface", "fitted"):
             raise _core.ArgumentError(f"predict: placement is {placement!r:.60}; expected 'surface' or 'fitted'")
         times = times_of(times_s)
-        place = 0 if dataset == 0 else _whole("predict", "dataset", dataset, 0, len(self._fitted["choices"]) - 1)
+        most = 0 if type(dataset) is int and dataset == 0 else len(self._fitted["choices"]) - 1
+        place = _whole("predict", "dataset", dataset, 0, most)
         value, error, warnings = self._core.predict(protocol, times, place, placement == "surface")
         table = Prediction({"value": value, "standard_error": error}, index=pd.Index(times, name="time_s"))
         table.attrs["warnings"] = warnings
