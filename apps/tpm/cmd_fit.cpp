@@ -78,14 +78,15 @@ bool is_configuration(const std::vector<std::string>& files) {
   return !document.contains("kind");
 }
 
-/// The page of what the run has written: a selection of laws, with intervals and verdicts, the law,
-/// or its figures.
+/// The page of what the run has written: a fit, with intervals and verdicts, the law, or its
+/// figures.
 std::string next_of_law(const std::string& folder, const std::vector<std::string>& files) {
   const auto wrote = [&files](const char* name) {
     return std::ranges::find(files, name) != files.end();
   };
   if (files.empty()) return {};
-  if (wrote("selection.json")) return fmt::format("tpm view {}", shell_word(folder));
+  if (wrote("selection.json") || wrote("answer.json"))
+    return fmt::format("tpm view {}", shell_word(folder));
   if (!wrote("law.json")) return next_of_figures(folder);
   return fmt::format("tpm view {}",
                      shell_word((std::filesystem::path(folder) / "law.json").string()));
@@ -103,7 +104,8 @@ void write_scene(const std::filesystem::path& folder, const FitResult& fit,
 
 int fit_configuration(const FitOptions& options, const Session& session) {
   const auto csv = csv_beside(options.output, session);
-  if (!options.no_draw) will_write_into(options.folder, {"figures.json", "law.json"});
+  if (!options.no_draw)
+    will_write_into(options.folder, {"figures.json", "law.json", "answer.json", "fit.html"});
   const FitResult result = fit_and_judge(configured(options));
   std::string text =
       session.json() ? answer_text(session, to_json(result)) : to_terminal_text(result);
@@ -147,7 +149,6 @@ int fit_recordings(const FitOptions& options, const std::vector<PreparedRecordin
     for (const std::string& words : r.phases.summary) text += fmt::format("{}\n", words);
   }
   text += fmt::format("\n{}\n{}", to_terminal_text(selection), to_terminal_text(best));
-  for (const std::string& words : outside_words(best)) text += fmt::format("! {}\n", words);
   text = with_moduli(to_json(selection), std::move(text), moduli, session);
   const std::string folder = figure_folder(options, recordings.front().name);
   std::vector<std::string> files;

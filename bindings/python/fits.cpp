@@ -1,4 +1,5 @@
 // Fits: of recordings and material functions by the simplest law, of configurations.
+#include <algorithm>
 #include <filesystem>
 #include <map>
 
@@ -10,6 +11,7 @@
 #include "tpm/files/json.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/petab.hpp"
+#include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/prediction.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/instrument_of_recording.hpp"
@@ -130,8 +132,33 @@ class Fit {
     }
     return fitted_law(fit_);
   }
-  /// The response of the fitted model and its standard error by the parameters' covariance (NaN
-  /// where that is not of full rank).
+  /// What a reader must know of a prediction, in the words of tpm predict.
+  [[nodiscard]] std::vector<std::string> flags_of(const Protocol& protocol,
+                                                  std::span<const double> times_s,
+                                                  const std::vector<double>& values,
+                                                  const Eigen::VectorXd& response) const {
+    LawPrediction p;
+    if (times_s.empty() || no_law_because(fit_.config)) return remark_texts(p.remarks);
+    const LawFile law = fitted_law(fit_);
+    p.spec = law.spec;
+    p.drive_kind = protocol.drive();
+    // The law's last parameters are contact and offset.
+    if (fit_.config.law) p.contact = values[values.size() - 2];
+    p.time_s.assign(times_s.begin(), times_s.end());
+    p.response.assign(response.begin(), response.end());
+    const double last = *std::ranges::max_element(times_s);
+    for (const double t : times_s) p.imposed.push_back(value_at(protocol, t));
+    // The motion before the first of these times counts, too.
+    for (const Knot& knot : protocol.knots()) {
+      if (knot.time_s > last) break;
+      p.time_s.push_back(knot.time_s);
+      p.imposed.push_back(knot.value);
+    }
+    add_range_remarks(p, law);
+    return remark_texts(p.remarks);
+  }
+  /// The response of the fitted model, its standard error by the parameters' covariance (NaN where
+  /// that is not of full rank), and flags_of() it.
   /// @param at_surface depths count from the surface, and the sensor has no zero error; else the
   ///   contact and the offset are those of `dataset`
   [[nodiscard]] py::tuple predict(const Protocol& protocol, const Numbers& times_s,
@@ -173,7 +200,9 @@ class Fit {
     if (error.size() == 0) {
       error.setConstant(response.value.size(), std::numeric_limits<double>::quiet_NaN());
     }
-    return py::make_tuple(py::cast(std::move(response.value)), py::cast(std::move(error)));
+    std::vector<std::string> flags = flags_of(protocol, span_of(times_s), values, response.value);
+    return py::make_tuple(py::cast(std::move(response.value)), py::cast(std::move(error)),
+                          std::move(flags));
   }
   [[nodiscard]] std::vector<std::string> write(const std::filesystem::path& folder) const {
     if (!selection_) return write_fit_report(folder, fit_);

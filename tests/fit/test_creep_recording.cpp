@@ -168,7 +168,10 @@ TEST_CASE("the written configuration of a creep fit is read as it was", "[creep]
   const Json written = config_json(config);
   CHECK(written.at("data").front().at("imposed") == "response");
   write_file(folder / "config.json", to_text(written));
-  const FitResult again = run_fit(read_fit_config(folder / "config.json"));
+  const FitResult again = fit_and_judge(read_fit_problem(folder / "config.json"));
+  REQUIRE(one.remarks.size() == 1);
+  CHECK(one.remarks.front().code == "load_imposed");
+  CHECK(again.remarks.front() == one.remarks.front());
   CHECK_THAT(estimate_of(again, "k1"),
              WithinRel(estimate_of(run_fit(config, data_sets(span)), "k1"), 1e-4));
 }

@@ -10,6 +10,10 @@
 #include "temp_folder.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/instrument_of_recording.hpp"
+#include "tpm/fit/select/rows_left_out.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpm/fit/select/specimens.hpp"
 #include "tpm/fit/show/fit_report.hpp"
@@ -115,6 +119,55 @@ TEST_CASE("the printed configuration gives the same fit again", "[select]") {
     CHECK(std::abs(again.best.natural[i] - direct.best.natural[i]) <=
           1e-5 * std::abs(direct.best.natural[i]) + 1e-9);
   }
+}
+
+TEST_CASE("a written configuration warns of what the direct fit warns of", "[select]") {
+  // A branch that relaxes within the ramp, one that outlasts the hold, an unloading that no law
+  // describes; and a row without a force, or a force cell of known gain.
+  Recording r = simulated_press("linear-2", {100.0, 120.0, 80.0, 0.4, 9.0, 0.0, 0.0}, 4);
+  for (int i = 0; i < 20; ++i) {
+    r.time_s.push_back(r.time_s.back() + 0.1);
+    r.drive.push_back(r.drive.back() - 2.5e-4);
+    r.response.push_back(0.9 * r.response.back());
+  }
+  const bool described = GENERATE(true, false);
+  const test::TempFolder folder;
+  std::string csv = "time [s],depth [mm],force [N]\n";
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    csv += i == 100 && !described
+               ? fmt::format("{},{},\n", r.time_s[i], 1e3 * r.drive[i])
+               : fmt::format("{},{},{}\n", r.time_s[i], 1e3 * r.drive[i], r.response[i]);
+  }
+  const std::string path = (folder.path() / "r.csv").string();
+  write_file(path, csv);
+  if (described) {
+    write_file(folder / "r.json", R"j({"id": "r", "title": "made", "kind": "recording",
+      "observable": "contact_force", "provenance": "assumed", "columns": {
+        "time [s]": {"quantity": "time", "unit": "s"},
+        "depth [mm]": {"quantity": "indentation_depth", "unit": "mm"},
+        "force [N]": {"quantity": "contact_force", "unit": "N"}},
+      "instrument": {"id": "cell", "force": "1 % of reading (standard)"}})j");
+  }
+  RecordingFile file = read_recording_file(path, {});
+  std::vector<PreparedRecording> one{prepare_recording(path, std::move(file.recording))};
+  warn_of_rows_left_out(one.front(), file.findings);
+  take_instrument(one.front(), path);
+  SelectionOptions options;
+  options.laws = {parse_law_name("linear-2", "test")};
+  options.only_listed = true;
+  options.held_out = false;
+  const Selection s = select_law(one, options);
+  const FitResult& direct = s.candidates[s.recommended].fit;
+  write_file(folder / "config.json", to_text(config_json(direct.config)));
+  const FitResult again = fit_and_judge(read_fit_problem(folder / "config.json"));
+  CAPTURE(remark_texts(s.remarks), remark_texts(again.remarks));
+  for (const char* code : {"shorter_than_ramp", "long_for_hold", "not_described_after_fit",
+                           described ? "gain_not_in_intervals" : "rows_left_out"}) {
+    CAPTURE(code);
+    CHECK(test::has_remark(s.remarks, code));
+  }
+  REQUIRE(again.remarks.size() >= s.remarks.size());
+  for (std::size_t i = 0; i < s.remarks.size(); ++i) CHECK(again.remarks[i] == s.remarks[i]);
 }
 
 TEST_CASE("one specimen's recording is told from the spread between specimens", "[select]") {
@@ -358,10 +411,11 @@ TEST_CASE("few samples are no prediction", "[select]") {
   setup.profiles = false;
   const FitResult fit =
       run_fit(recording_config(parse_law_name("linear-1", "test"), one, setup), data_sets(one));
-  const std::vector<std::string> words = outside_words(fit);
-  REQUIRE(words.size() == 1);
-  CHECK_THAT(words.front(), Catch::Contains("1 sample after the fitted part") &&
-                                Catch::Contains("too few to say") && !Catch::Contains("%"));
+  const std::vector<Remark> remarks = outside_remarks(fit);
+  REQUIRE(remarks.size() == 1);
+  CHECK(remarks.front().code == "few_samples_after_fit");
+  CHECK_THAT(remarks.front().text, Catch::Contains("1 sample after the fitted part") &&
+                                       Catch::Contains("too few to say") && !Catch::Contains("%"));
 }
 
 TEST_CASE("a stretched strip is offered no Hertz contact", "[select]") {

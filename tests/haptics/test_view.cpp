@@ -230,7 +230,7 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
     "parameters": [{"name": "k1", "estimate_SI": 45.0, "interval_SI": [44.0, null], "SI_unit": "N/m",
                     "verdict": "no upper limit", "profile_SI_and_deviance": [[44, 4], [45, 0]]},
                    {"name": "drift", "estimate_SI": -9.87e-7, "interval_SI": [-6.93e-6, 4.96e-6],
-                    "SI_unit": "N/s", "verdict": "identified",
+                    "SI_unit": "N/s", "verdict": "identified", "deviance_at_limit": 6.84,
                     "profile_SI_and_deviance": [[-7e-6, 7], [-9.87e-7, 3], [5e-6, null], [6e-6, 9]]}],
     "adequacy": {"verdict": "not_described", "summary": "no law tried describes this recording"},
     "remarks": []})");
@@ -267,6 +267,12 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   CHECK_THAT(of(profile.at("series")[2].at("x")),
              Catch::Matchers::Approx(std::vector<double>{-6930, 4960}));
   CHECK(of(page.description["plots"][1].at("series")[2].at("x")) == std::vector<double>{44});
+  // The line at which the interval ends, above the least deviance.
+  const Json& limit = profile.at("series")[3];
+  CHECK(limit.at("kind") == "line");
+  CHECK(limit.at("label") == "limit of the 95 % interval");
+  CHECK_THAT(of(limit.at("x")), Catch::Matchers::Approx(std::vector<double>{-7000, 6000}));
+  CHECK_THAT(of(limit.at("y")), Catch::Matchers::Approx(std::vector<double>{3.84, 3.84}));
   CHECK(html.find("<script>alert") == std::string::npos);
   CHECK(html.find("<b>") == std::string::npos);
 
@@ -276,6 +282,22 @@ TEST_CASE("the page of a fit says first whether the law describes the data, and 
   const ViewPage seen = view_file(shown_file(folder.path()));
   CHECK(seen.description.at("lead") == lead);
   CHECK(seen.description.at("plots").size() == 3);
+  // So is that of a configuration.
+  const TempFolder configured;
+  std::ofstream(configured / "answer.json") << fit.dump();
+  std::ofstream(configured / "figures.json") << figures.dump();
+  std::ofstream(configured / "law.json") << "{}";
+  const ViewPage told = view_file(shown_file(configured.path()));
+  CHECK(told.description.at("lead").at(0) == lead.at(0));
+  CHECK(told.description.at("table") == page.description.at("table"));
+  CHECK(told.description.at("plots").size() == 3);
+  // Several figures are called by their folder.
+  const TempFolder drawn;
+  Json two = figures;
+  two["figures"].push_back(figures.at("figures").at(0));
+  std::ofstream(drawn / "figures.json") << two.dump();
+  CHECK(view_file(shown_file(drawn.path())).description.at("title") ==
+        drawn.path().filename().string() + ": 2 figures");
   const TempFolder empty;
   CHECK_THROWS_WITH((void)shown_file(empty.path()), Contains("a folder without a result"));
 }

@@ -378,10 +378,11 @@ TEST_CASE("a fit predicts the unloading of a Hertz contact, and says where it pr
   CHECK(*fitted.rms_outside < test::allowed_error("retreat.predicted_unloading") * sigma);
   CHECK(to_json(fit)["recordings"][0]["samples_not_predicted"] == fitted.not_predicted);
   CHECK(test::has_remark(fit.remarks, "not_predicted"));
-  const auto words = outside_words(fit);
-  REQUIRE(words.size() == 2);
-  CHECK_THAT(words[0], Catch::Contains("the prediction is off") && !Catch::Contains("describe"));
-  CHECK_THAT(words[1], Catch::Contains("are not predicted"));
+  const auto outside = outside_remarks(fit);
+  REQUIRE(outside.size() == 2);
+  CHECK_THAT(outside[0].text,
+             Catch::Contains("the prediction is off") && !Catch::Contains("describe"));
+  CHECK(outside[1].code == "not_predicted_after_fit");
   const Figure figure = recording_figure(fit, 0);
   CHECK_NOTHROW(to_json(std::vector<Figure>{figure}));
   for (const Series& s : figure.panels.front().series) {

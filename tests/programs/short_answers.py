@@ -93,6 +93,7 @@ def main():
         checks.check(["fit", "healthy", "fibrotic", "--compare", "--laws", "linear-1", "--no-draw", "--punch-radius", "2 mm"],
                      lambda d: [])
         checks.check(["fit", "healthy/liver1.csv", "--laws", "linear-1", "--folder", "fitted"], remarks)
+        checks.check(["fit", "fitted/config.json"], remarks)
         checks.check(["budget", "fitted/law.json", "healthy/liver1.csv", "--folder", "budget"], remarks)
         checks.check(["budget", "fitted/law.json", "--depth", "4 mm", "--rate", "2 mm/s", "--hold", "5 s", "--scene",
                       root / "configs/budget_liver.json"], remarks)

@@ -77,6 +77,8 @@ class Fits(unittest.TestCase):
         self.assertGreater(placed["standard_error"].iloc[0], 0.0)
         with self.assertRaisesRegex(tpmkit.ArgumentError, "placement is 'own'; expected 'surface' or 'fitted'"):
             self.fit.predict(protocol, times, placement="own")
+        with self.assertRaisesRegex(tpmkit.ArgumentError, "dataset is 1; expected a whole number from 0 to 0"):
+            self.fit.predict(protocol, times, dataset=1)
         truth = tpmkit.Law("linear-1", made.LAW).respond(protocol, times)
         off = np.abs(predicted["value"] - truth)[1:] / predicted["standard_error"][1:]
         self.assertLess(off.max(), 4.0)  # standard errors
@@ -190,6 +192,9 @@ class Fits(unittest.TestCase):
             self.assertAlmostEqual(moduli.loc[modulus, "estimate"] / (stiffness * 0.75 / 4e-3), 1.0, places=4)
         self.assertEqual(moduli.loc["E1", "unit"], "Pa")
         self.assertEqual(moduli.attrs["poisson_ratio"], 0.5)
+        for size, words in ((-2e-3, "punch_radius_m is -0.002; expected a number above 0"), ("2 mm", "punch_radius_m is '2 mm'")):
+            with self.assertRaisesRegex(tpmkit.ArgumentError, "^young_moduli: " + words):
+                self.fit.young_moduli(punch_radius_m=size)
         for wrong in ({}, {"punch_radius_m": 2e-3, "sphere_radius_m": 1e-3}, {"punch_radius_m": "2 mm"}):
             with self.assertRaises(tpmkit.Error):
                 self.fit.young_moduli(**wrong)

@@ -53,7 +53,27 @@ class SameAnswer(unittest.TestCase):
             for name, key in (("value", "mean_N"), ("standard_error", "standard_error_N")):
                 difference = max(abs(a - b) for a, b in zip(here[name], answer[key]))
                 self.assertLess(difference, 1e-4 * max(answer[key]), f"{placement}: {name}")
+            self.assertEqual(here.warnings, [remark["text"] for remark in answer["remarks"]])
         self.assertEqual(fit.predict(protocol, [0.0])["value"].iloc[0], 0.0)
+        # Deeper and longer than what was fitted: the same words, which the table shows and keeps.
+        told = subprocess.run([PROGRAM, "predict", "law.json", "--depth", "9 mm", "--rate", "3 mm/s", "--hold", "500 s",
+                               "--format", "json"], cwd=self.folder, capture_output=True, text=True, check=True)
+        answer = json.loads(told.stdout)
+        beyond = fit.predict(tpmkit.Protocol.ramp_and_hold(9e-3, 3e-3, 500.0), answer["time_s"])
+        self.assertEqual(beyond.warnings, [remark["text"] for remark in answer["remarks"]])
+        self.assertEqual(sum(w.startswith("extrapolates: ") for w in beyond.warnings), 2)
+        for words in beyond.warnings:
+            self.assertIn("warning: " + words, repr(beyond))
+        self.assertEqual(beyond.iloc[:3].warnings, beyond.warnings)
+        # The motion before the first time that is asked for counts, too.
+        late = fit.predict(tpmkit.Protocol.ramp_and_hold(9e-3, 3e-3, 500.0), [503.0])
+        self.assertEqual(late.warnings, beyond.warnings)
+
+    def test_of_the_configuration_that_a_fit_writes(self):
+        fit = tpmkit.fit(tpmkit.example("recording.csv"), law="linear-1", starts=5)
+        fit.save(self.folder / "saved")
+        self.assertTrue(any("shorter than the shortest ramp" in w for w in fit.warnings), fit.warnings)
+        self.assertEqual(tpmkit.fit(self.folder / "saved" / "config.json").warnings, fit.warnings)
 
     def test_of_a_strip_whose_length_area_and_sign_are_told(self):
         with self.file.open(newline="") as file:

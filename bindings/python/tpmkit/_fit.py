@@ -14,7 +14,7 @@ import numpy as np
 from . import _core, _program
 from ._core import Protocol
 from ._kinds import shown, told
-from ._law import Law, times_of
+from ._law import Law, number_of, times_of
 from ._specimens import Specimens
 from ._tables import TABLE, by_file, csv_of, frame_of, is_table, options_of, reading_of, renamed
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
     from matplotlib.axes import Axes
+
+    from ._prediction import Prediction
 
 PathLike = Union[str, "os.PathLike[str]"]
 
@@ -268,7 +270,7 @@ class Fit:
     @told
     def predict(
         self, protocol: Protocol, times_s: npt.ArrayLike, *, placement: str = "surface", dataset: int = 0
-    ) -> pd.DataFrame:
+    ) -> Prediction:
         """What the fitted law answers to another protocol. The answer is that of `tpm predict`.
 
         Parameters
@@ -284,16 +286,22 @@ class Fit:
         Returns
         -------
         DataFrame by time_s: value, and standard_error from the parameters' covariance (delta method; NaN
-        where that is not of full rank).
+        where that is not of full rank). Its `warnings`, which its repr shows, say where it extrapolates, in the words
+        of `tpm predict`.
         """
         import pandas as pd
+
+        from ._prediction import Prediction
 
         if placement not in ("surface", "fitted"):
             raise _core.ArgumentError(f"predict: placement is {placement!r:.60}; expected 'surface' or 'fitted'")
         times = times_of(times_s)
-        place = _whole("predict", "dataset", dataset, 0, 2**31)
-        value, error = self._core.predict(protocol, times, place, placement == "surface")
-        return pd.DataFrame({"value": value, "standard_error": error}, index=pd.Index(times, name="time_s"))
+        most = 0 if type(dataset) is int and dataset == 0 else len(self._fitted["choices"]) - 1
+        place = _whole("predict", "dataset", dataset, 0, most)
+        value, error, warnings = self._core.predict(protocol, times, place, placement == "surface")
+        table = Prediction({"value": value, "standard_error": error}, index=pd.Index(times, name="time_s"))
+        table.attrs["warnings"] = warnings
+        return table
 
     @told
     def young_moduli(
@@ -311,6 +319,10 @@ class Fit:
         """
         import pandas as pd
 
+        sizes = {"sphere_radius_m": sphere_radius_m, "cone_half_angle_rad": cone_half_angle_rad, "punch_radius_m": punch_radius_m}
+        for name, value in sizes.items():
+            if value is not None and not number_of("young_moduli", name, value) > 0.0:
+                raise _core.ArgumentError(f"young_moduli: {name} is {value!r:.60}; expected a number above 0")
         said = json.loads(self._core.young_moduli(sphere_radius_m, cone_half_angle_rad, punch_radius_m, poisson_ratio))
         rows = []
         for m in said["moduli"]:
@@ -494,8 +506,14 @@ def fit(
     placement = {"reference": reference, "contact": contact, "contact_force": contact_force, "zero": zero}
     units_of = {"reference": "m", "contact": "m", "contact_force": "N", "zero": "N"}
     for name, value in placement.items():
-        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer))):
+        if value is None:
+            continue
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
             raise _core.ArgumentError(f"fit: {name} is {value!r:.60}; expected a number, in {units_of[name]}")
+        if not np.isfinite(value):
+            raise _core.ArgumentError(f"fit: {name} is {value!r:.60}; expected a finite number, in {units_of[name]}")
+    if reference is not None and not reference > 0.0:
+        raise _core.ArgumentError(f"fit: reference is {reference!r:.60}; expected a depth above 0, in m")
 
     reading = reading_of("fit", columns, None if arrays else units)
     options = (law, starts, seed, *placement.values(), reading)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import numbers
 import os
@@ -40,11 +41,28 @@ def number_of(where: str, name: str, value: Any) -> float:
     return float(value)
 
 
+def _of_arguments(function: Any) -> Any:
+    """A compiled function of nothing but arguments: what it refuses is an ArgumentError."""
+
+    @functools.wraps(function)
+    def call(*arguments: Any, **named: Any) -> Any:
+        try:
+            return function(*arguments, **named)
+        except _core.ArgumentError:
+            raise
+        except _core.Error as error:
+            refusal = _core.ArgumentError(str(error))
+            refusal.code = error.code
+            raise refusal from None
+
+    return call
+
+
 def _told_protocols() -> None:
     """Gives the ways to make a Protocol, which are compiled, messages without types of C++, and histories one dimension."""
     for name in ("step_and_hold", "ramp_and_hold", "creep"):
-        setattr(Protocol, name, staticmethod(told(getattr(Protocol, name), f"Protocol.{name}")))
-    compiled = Protocol.history
+        setattr(Protocol, name, staticmethod(told(_of_arguments(getattr(Protocol, name)), f"Protocol.{name}")))
+    compiled = _of_arguments(Protocol.history)
 
     def history(
         times_s: npt.ArrayLike, values: npt.ArrayLike, drive: str = "displacement", equilibrium_at_start: bool = False

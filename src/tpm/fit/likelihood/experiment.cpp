@@ -116,13 +116,6 @@ double sample_sigma(const DataChoice& data, double value, std::optional<double> 
                      fmt::format("recording '{}', sample {}", data.dataset, sample + 1));
 }
 
-std::string data_path(const FitConfig& config, const std::string& dataset) {
-  // Ids of shipped curves hold letters, digits and '_'; recordings end as their instruments like.
-  const bool is_file = dataset.find_first_of("./") != std::string::npos;
-  if (!is_file || std::filesystem::path(dataset).is_absolute()) return dataset;
-  return (config.folder / dataset).string();
-}
-
 void add_points(ExperimentSet& set, const FitConfig& config, std::size_t choice,
                 const PointSet& points) {
   const DataChoice& data = config.data[choice];
@@ -288,6 +281,13 @@ void add_spectrum(ExperimentSet& set, const FitConfig& config, std::size_t choic
 }
 
 }  // namespace
+
+std::string data_path(const FitConfig& config, const std::string& dataset) {
+  // Ids of shipped curves hold letters, digits and '_'; recordings end as their instruments like.
+  const bool is_file = dataset.find_first_of("./") != std::string::npos;
+  if (!is_file || std::filesystem::path(dataset).is_absolute()) return dataset;
+  return (config.folder / dataset).string();
+}
 
 std::vector<DataSet> load_data(const FitConfig& config) {
   return mapped<DataSet>(config.data, [&](const DataChoice& choice) -> DataSet {

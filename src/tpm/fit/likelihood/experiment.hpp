@@ -57,6 +57,9 @@ struct ExperimentSet {
   std::vector<Experiment> experiments;
 };
 
+/// The file of a data set, or the id of a shipped curve.
+[[nodiscard]] std::string data_path(const FitConfig& config, const std::string& dataset);
+
 /// The data sets that the configuration names, read. Throws Error(bad_input).
 [[nodiscard]] std::vector<DataSet> load_data(const FitConfig& config);
 

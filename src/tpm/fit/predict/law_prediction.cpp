@@ -169,7 +169,16 @@ void set_sampled_mean_band(LawPrediction& p, const Model& model, const Protocol&
   }
 }
 
-void add_range_flags(LawPrediction& p, const LawFile& law) {
+void require_known_drive(const LawFile& law, const Protocol& protocol) {
+  const bool load = protocol.drive() == Drive::force;
+  if (law.spec.drive == Quantity::indentation_depth || !load) return;
+  throw bad_input(fmt::format("law {}", law_name(law.spec)), "of a strip under a load",
+                  "an imposed relative length");
+}
+
+}  // namespace
+
+void add_range_remarks(LawPrediction& p, const LawFile& law) {
   double deepest = 0.0;
   for (const double drive : p.imposed) deepest = std::max(deepest, drive - p.contact);
   if (p.drive_kind == Drive::force) {
@@ -187,8 +196,9 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
         {"deeper_than_fitted", fmt::format("extrapolates: {} deep, and the law was fitted to {}",
                                            text(deepest), text(*law.fitted_to))});
   }
-  const double duration = p.time_s.back() - p.time_s.front();
-  const double fitted = law.uncertainty->duration_s;
+  const auto [first, last] = std::ranges::minmax_element(p.time_s);
+  const double duration = p.time_s.empty() ? 0.0 : *last - *first;
+  const double fitted = law.uncertainty ? law.uncertainty->duration_s : 0.0;
   if (fitted > 0.0 && duration > 1.5 * fitted && std::isfinite(duration)) {
     p.remarks.push_back({"longer_than_fitted",
                          fmt::format("extrapolates: lasts {} s, and the law was fitted to {} s",
@@ -197,16 +207,19 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
   if (law.adequacy && !law.adequacy->is_adequate()) {
     p.remarks.insert(p.remarks.begin(), {"law_in_doubt", law.adequacy->summary});
   }
-  for (const std::string& name : law.uncertainty->at_bound) {
-    p.remarks.push_back(
-        {"parameter_at_bound",
-         fmt::format("{} stood on a bound of the fit: its uncertainty is not in the bands", name)});
-  }
-  for (const std::string& name : law.uncertainty->not_separable) {
-    p.remarks.push_back(
-        {"drift_not_separable", fmt::format("{} was not told from a drift or a slow branch: the "
-                                            "bands suppose that nothing drifted",
-                                            name)});
+  if (law.uncertainty) {
+    for (const std::string& name : law.uncertainty->at_bound) {
+      p.remarks.push_back(
+          {"parameter_at_bound",
+           fmt::format("{} stood on a bound of the fit: its uncertainty is not in the bands",
+                       name)});
+    }
+    for (const std::string& name : law.uncertainty->not_separable) {
+      p.remarks.push_back(
+          {"drift_not_separable", fmt::format("{} was not told from a drift or a slow branch: the "
+                                              "bands suppose that nothing drifted",
+                                              name)});
+    }
   }
   const auto missing = std::count_if(p.response.begin(), p.response.end(),
                                      [](double f) { return !std::isfinite(f); });
@@ -216,15 +229,6 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
                                       missing, p.response.size())});
   }
 }
-
-void require_known_drive(const LawFile& law, const Protocol& protocol) {
-  const bool load = protocol.drive() == Drive::force;
-  if (law.spec.drive == Quantity::indentation_depth || !load) return;
-  throw bad_input(fmt::format("law {}", law_name(law.spec)), "of a strip under a load",
-                  "an imposed relative length");
-}
-
-}  // namespace
 
 Eigen::MatrixXd covariance_root(const Eigen::MatrixXd& covariance) {
   // Scaled to correlations first: parameters differ by many orders of magnitude.
@@ -315,7 +319,7 @@ void fill_prediction(LawPrediction& p, const Model& model, const LawFile& law,
                           options.samples);
   }
   set_reading_band(p, *law.uncertainty, own_sd);
-  add_range_flags(p, law);
+  add_range_remarks(p, law);
 }
 
 std::string_view placement_name(Placement placement) noexcept {

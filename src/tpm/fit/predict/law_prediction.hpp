@@ -102,6 +102,11 @@ struct LawPrediction {
                                               const PreparedRecording& recording,
                                               const PredictionOptions& options);
 
+/// Adds to the remarks of a prediction where it goes beyond what the law was fitted to
+/// ("extrapolates: ..."), and what is known against the law or its bands. Reads drive_kind,
+/// contact, time_s, imposed and response.
+void add_range_remarks(LawPrediction& prediction, const LawFile& law);
+
 [[nodiscard]] Json to_json(const LawPrediction& prediction);
 [[nodiscard]] std::string to_terminal_text(const LawPrediction& prediction);
 /// Columns time_s, the drive, mean, standard error, both bands and what was observed, SI.

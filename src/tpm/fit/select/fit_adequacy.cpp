@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "tpm/base/distributions.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/select/configuration_remarks.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -378,6 +380,9 @@ FitResult fit_and_judge(const FitProblem& problem) {
   FitResult fit = run_fit(problem.config, data);
   give_both_drift_answers(fit, data);
   state_adequacy(fit, data);
+  std::vector<Remark> remarks = configuration_remarks(fit, data, problem.data.empty());
+  fit.remarks.insert(fit.remarks.begin(), std::make_move_iterator(remarks.begin()),
+                     std::make_move_iterator(remarks.end()));
   return fit;
 }
 

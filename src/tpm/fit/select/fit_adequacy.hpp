@@ -34,7 +34,8 @@ void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recording
 /// @param data what was fitted, one for each of the configuration's data sets
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data);
 
-/// run_fit() of the problem, with its adequacy stated.
+/// run_fit() of the problem, with its adequacy stated and what its data cannot tell among its flags
+/// (configuration_remarks).
 [[nodiscard]] FitResult fit_and_judge(const FitProblem& problem);
 
 }  // namespace tpm::fit

@@ -113,6 +113,8 @@ FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
         PreferredLaw{law_name(best.law), selection.candidates[selection.recommended].delta_bic,
                      best.reason, fitted_parameters(best.fit)};
   }
+  const std::vector<std::string> warnings = remark_texts(selection.remarks);
+  summary.flags.insert(summary.flags.begin(), warnings.begin(), warnings.end());
   summary.text = to_terminal_text(selection) + "\n" + summary.text;
   summary.json = to_text(to_json(selection));
   return summary;

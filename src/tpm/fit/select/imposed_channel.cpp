@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "tpm/base/median.hpp"
@@ -152,55 +155,83 @@ std::vector<std::vector<double>> creep_starts(const FitConfig& config,
   return starts;
 }
 
-void find_imposed_channel(PreparedRecording& recording) {
+namespace {
+
+/// Both channels of a recording of stress and strain, or of force and depth, until the load ends.
+struct Channels {
+  std::span<const double> time, answer, load;
+  double answer_noise = 0.0, load_noise = 0.0;
+  bool stretched = false;  ///< stress and strain
+
+  [[nodiscard]] double of_answer() const { return answer_noise / range_of(answer); }
+  [[nodiscard]] double of_load() const { return load_noise / range_of(load); }
+};
+
+/// Nothing of a recording of other quantities, or too short to tell its noise.
+std::optional<Channels> channels_of(const Recording& r) {
   constexpr std::size_t kFewest = 40;
-  constexpr double kMuchLess = 3.0;  // times less noise, in parts of the range
-  constexpr double kNoisy = 2e-3;    // of the range: a channel that is not exact
-  const Recording& r = recording.recording;
   const bool stretched =
       r.drive_quantity == Quantity::strain && r.response_quantity == Quantity::stress;
   const bool pressed = r.drive_quantity == Quantity::indentation_depth &&
                        r.response_quantity == Quantity::contact_force;
-  if (!stretched && !pressed) return;
-  if (r.drive.size() != r.response.size() || r.time_s.size() != r.drive.size()) return;
+  if (!stretched && !pressed) return std::nullopt;
+  if (r.drive.size() != r.response.size() || r.time_s.size() != r.drive.size()) return std::nullopt;
   const std::size_t end = end_of_load(r.response);
-  if (end < kFewest) return;
-  const auto time = std::span(r.time_s).first(end);
-  const auto strain = std::span(r.drive).first(end);
-  const auto stress = std::span(r.response).first(end);
-  if (!(range_of(strain) > 0.0 && range_of(stress) > 0.0)) return;
-  const double strain_noise = noise_of_channel(time, strain);
-  const double stress_noise = noise_of_channel(time, stress);
-  const double of_strain = strain_noise / range_of(strain);
-  const double of_stress = stress_noise / range_of(stress);
-  require_no_recession(recording, stress, stress_noise, strain, strain_noise);
+  if (end < kFewest) return std::nullopt;
+  Channels c{std::span(r.time_s).first(end), std::span(r.drive).first(end),
+             std::span(r.response).first(end)};
+  c.stretched = stretched;
+  if (!(range_of(c.answer) > 0.0 && range_of(c.load) > 0.0)) return std::nullopt;
+  c.answer_noise = noise_of_channel(c.time, c.answer);
+  c.load_noise = noise_of_channel(c.time, c.load);
+  return c;
+}
+
+}  // namespace
+
+std::optional<Remark> imposed_channel_remark(const std::string& name, const Recording& as_read,
+                                             bool load_imposed) {
+  constexpr double kNoisy = 2e-3;  // of the range: a channel that is not exact
+  const std::optional<Channels> c = channels_of(as_read);
+  if (!c) return std::nullopt;
+  const bool both_noisy = std::min(c->of_answer(), c->of_load()) > kNoisy;
+  if (!load_imposed && !both_noisy) return std::nullopt;
+  const std::string load(load_word(as_read));
+  const std::string answer(answer_word(as_read));
+  const std::string& taken = load_imposed ? load : answer;
+  return Remark{
+      load_imposed ? "load_imposed" : "both_channels_noisy",
+      fmt::format(
+          "{}: {}; noise is {} % of the range of the {} and {} % of that of the {}. The fit "
+          "takes the {} as exact{}",
+          name,
+          load_imposed ? fmt::format("the {} was imposed (it was held while the {} went on: creep)",
+                                     load, answer)
+                       : "both channels are noisy",
+          significant(100.0 * c->of_answer(), 2), answer, significant(100.0 * c->of_load(), 2),
+          load, taken,
+          both_noisy
+              ? fmt::format(": the noise of the {} makes fast branches look weaker and intervals "
+                            "too narrow",
+                            taken)
+              : fmt::format(" and compares the {}", answer))};
+}
+
+void find_imposed_channel(PreparedRecording& recording) {
+  constexpr double kMuchLess = 3.0;  // times less noise, in parts of the range
+  const Recording& r = recording.recording;
+  const std::optional<Channels> c = channels_of(r);
+  if (!c) return;
+  require_no_recession(recording, c->load, c->load_noise, c->answer, c->answer_noise);
   // Not of a contact: with a noisy force imposed, 500 rows were not answered within a minute.
-  const bool slower = stretched && crept(stress, strain, strain_noise);
-  const bool imposed = was_held(stress, stress_noise, strain, strain_noise) &&
-                       (of_strain > kMuchLess * of_stress || slower);
-  const bool both_noisy = std::min(of_strain, of_stress) > kNoisy;
+  const bool slower = c->stretched && crept(c->load, c->answer, c->answer_noise);
+  const bool imposed = was_held(c->load, c->load_noise, c->answer, c->answer_noise) &&
+                       (c->of_answer() > kMuchLess * c->of_load() || slower);
+  if (auto remark = imposed_channel_remark(recording.name, r, imposed)) {
+    recording.remarks.push_back(*std::move(remark));
+  }
   recording.load_imposed = imposed;
   if (imposed) recording.recording = with_imposed_load(std::move(recording.recording));
-  if (!imposed && !both_noisy) return;
-  const std::string load(load_word(recording.recording));
-  const std::string answer(answer_word(recording.recording));
-  const std::string& taken = imposed ? load : answer;
-  recording.remarks.push_back(
-      {imposed ? "load_imposed" : "both_channels_noisy",
-       fmt::format(
-           "{}: {}; noise is {} % of the range of the {} and {} % of that of the {}. The fit "
-           "takes the {} as exact{}",
-           recording.name,
-           imposed ? fmt::format("the {} was imposed (it was held while the {} went on: creep)",
-                                 load, answer)
-                   : "both channels are noisy",
-           significant(100.0 * of_strain, 2), answer, significant(100.0 * of_stress, 2), load,
-           taken,
-           both_noisy
-               ? fmt::format(": the noise of the {} makes fast branches look weaker and intervals "
-                             "too narrow",
-                             taken)
-               : fmt::format(" and compares the {}", answer))});
 }
 
 }  // namespace tpm::fit

@@ -11,6 +11,13 @@ namespace tpm::fit {
 /// strain or depth relaxes under a held load: their titles are swapped.
 void find_imposed_channel(PreparedRecording& recording);
 
+/// The warning of find_imposed_channel() for a recording whose imposed channel is known; empty if
+/// there is none.
+/// @param as_read before drive and response change places
+[[nodiscard]] std::optional<Remark> imposed_channel_remark(const std::string& name,
+                                                           const Recording& as_read,
+                                                           bool load_imposed);
+
 /// Where the search for a law of creep begins: what fits find that take the strain as exact. The
 /// stress is linear in the stiffnesses, so that those fits are quick and meet every minimum; the
 /// strain under a stress is linear in none.

@@ -166,7 +166,7 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
 /// What was assumed of small readings, and relaxation times that lie outside what was measured.
 std::vector<Remark> range_remarks(const FitResult& fit, const FunctionSizes& sizes) {
   std::vector<Remark> remarks;
-  if (fit.config.data.front().noise.kind == NoiseKind::combined) {
+  if (fit.config.data.front().noise.kind == NoiseKind::combined && sizes.beyond_instruments()) {
     remarks.push_back(
         {"scatter_of_small_readings_assumed",
          fmt::format(
@@ -211,6 +211,14 @@ std::vector<LawSpec> linear_family() {
 }
 
 }  // namespace
+
+std::vector<Remark> function_remarks(const FitResult& fit, const DataSet& data) {
+  if (const auto* spectrum = std::get_if<Spectrum>(&data))
+    return range_remarks(fit, sizes_of_spectrum(*spectrum));
+  const auto* step = std::get_if<Recording>(&data);
+  if (step == nullptr || !is_step_response(step->response_quantity)) return {};
+  return range_remarks(fit, sizes_of_step(*step));
+}
 
 std::string MaterialFunction::kind() const {
   if (std::holds_alternative<Spectrum>(data)) return "spectrum";

@@ -382,7 +382,12 @@ Selection select_law(std::span<const PreparedRecording> recordings,
     const auto both = give_both_drift_answers(preferred, recordings);
     if (both) preferred.remarks.push_back({"drift_not_separable", drift_words(*both, preferred)});
   }
-  std::ranges::move(protocol_remarks(chosen.fit, recordings), std::back_inserter(s.remarks));
+  const auto warn = [&s](std::vector<Remark> more) {
+    std::ranges::move(more, std::back_inserter(s.remarks));
+  };
+  warn(recording_remarks(recordings));
+  warn(protocol_remarks(chosen.fit, recordings));
+  warn(outside_remarks(chosen.fit));
   state_adequacy(s, recordings);
   describe(s);
   for (const PreparedRecording& r : recordings) {

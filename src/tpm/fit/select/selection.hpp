@@ -71,7 +71,7 @@ struct Selection {
   Correlation correlation;            ///< of the residuals that the law of least deviance leaves
   std::optional<DriftAnswers> drift;  ///< of the recommended law, if not separable
   std::vector<std::string> summary;   ///< the recommendation and its reasons
-  std::vector<Remark> remarks;        ///< what the experiment cannot tell
+  std::vector<Remark> remarks;        ///< what the experiment cannot tell, and outside_remarks()
 };
 
 /// linear, hertz and power kernels with 0 to 3 branches; linear also with elastic and relaxing
@@ -139,7 +139,7 @@ void rank_candidates(Selection& s, bool few_readings = false);
 /// Misfit of the fitted law outside the window: "unloading and after: rms 12 % of
 /// the peak; the law does not describe it", and which of them it does not predict. Empty if there
 /// are none.
-[[nodiscard]] std::vector<std::string> outside_words(const FitResult& fit);
+[[nodiscard]] std::vector<Remark> outside_remarks(const FitResult& fit);
 
 /// Fewer samples over a relaxation time than these cannot support it.
 inline constexpr int kLeastSamples = 3;
@@ -170,6 +170,10 @@ struct ProtocolSpans {
 /// Looks again at a recommended law that was not identified, now that its fit has profiles: its
 /// note must not contradict its intervals.
 void reassess(Candidate& chosen, const ProtocolSpans& spans);
+
+/// What must be known of the recordings themselves: PreparedRecording::remarks, and depths in a
+/// unit that is not the file's.
+[[nodiscard]] std::vector<Remark> recording_remarks(std::span<const PreparedRecording> recordings);
 
 /// Properties of a fitted law that the protocol of a recording cannot resolve: relaxation times
 /// shorter than the ramp or the sampling, or longer than the hold.

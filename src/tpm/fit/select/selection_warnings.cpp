@@ -59,36 +59,43 @@ std::vector<Remark> unit_remarks(std::span<const PreparedRecording> recordings) 
 
 }  // namespace
 
-std::vector<std::string> outside_words(const FitResult& fit) {
+std::vector<Remark> outside_remarks(const FitResult& fit) {
   constexpr double kDescribes = 3.0;  // times the residual inside the window
   constexpr std::size_t kFewestOutside = 5;
-  std::vector<std::string> words;
+  std::vector<Remark> remarks;
   for (const RecordingFit& r : fit.recordings) {
     const Outside o = outside_of(r);
     const std::string& name = fit.config.data[r.choice].dataset;
     if (o.predicted > 0 && o.predicted < kFewestOutside) {
-      words.push_back(fmt::format(
-          "{}: {} sample{} after the fitted part (from {} s): too few to say "
-          "how the law describes what follows",
-          name, o.predicted, o.predicted == 1 ? "" : "s", significant(o.last_fitted_s, 4)));
+      remarks.push_back(
+          {"few_samples_after_fit",
+           fmt::format("{}: {} sample{} after the fitted part (from {} s): too few to say "
+                       "how the law describes what follows",
+                       name, o.predicted, o.predicted == 1 ? "" : "s",
+                       significant(o.last_fitted_s, 4))});
     } else if (o.predicted > 0) {
       const double rms = std::sqrt(o.sum_of_squares / static_cast<double>(o.predicted));
       const bool describes = rms <= kDescribes * r.rms_residual;
-      words.push_back(fmt::format(
-          "{}: after the fitted part (from {} s, {} samples, to a drive of {}) the prediction is "
-          "off by {} % of the peak (rms){}",
-          name, significant(o.last_fitted_s, 4), o.predicted, significant(o.last_drive, 3),
-          significant(100.0 * rms / r.peak, 3),
-          describes ? "" : ": the law does not describe the unloading and what follows"));
+      remarks.push_back(
+          {describes ? "predicted_after_fit" : "not_described_after_fit",
+           fmt::format(
+               "{}: after the fitted part (from {} s, {} samples, to a drive of {}) the prediction "
+               "is "
+               "off by {} % of the peak (rms){}",
+               name, significant(o.last_fitted_s, 4), o.predicted, significant(o.last_drive, 3),
+               significant(100.0 * rms / r.peak, 3),
+               describes ? "" : ": the law does not describe the unloading and what follows")});
     }
     if (o.predicted < o.count) {
-      words.push_back(fmt::format(
-          "{}: from {} s on {} samples are not predicted: there the contact of a Hertz kernel "
-          "shrinks or grows again in a way that the law does not cover (docs/laws.md)",
-          name, significant(o.unknown_s, 4), o.count - o.predicted));
+      remarks.push_back(
+          {"not_predicted_after_fit",
+           fmt::format(
+               "{}: from {} s on {} samples are not predicted: there the contact of a Hertz kernel "
+               "shrinks or grows again in a way that the law does not cover (docs/laws.md)",
+               name, significant(o.unknown_s, 4), o.count - o.predicted)});
     }
   }
-  return words;
+  return remarks;
 }
 
 ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings) {
@@ -110,12 +117,17 @@ ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings) {
   return spans;
 }
 
-std::vector<Remark> protocol_remarks(const FitResult& fit,
-                                     std::span<const PreparedRecording> recordings) {
+std::vector<Remark> recording_remarks(std::span<const PreparedRecording> recordings) {
   std::vector<Remark> remarks = unit_remarks(recordings);
   for (const PreparedRecording& r : recordings) {
     remarks.insert(remarks.end(), r.remarks.begin(), r.remarks.end());
   }
+  return remarks;
+}
+
+std::vector<Remark> protocol_remarks(const FitResult& fit,
+                                     std::span<const PreparedRecording> recordings) {
+  std::vector<Remark> remarks;
   const auto [ramp_s, hold_s, step_s] = protocol_spans(recordings);
   if (hold_s == 0.0) {
     remarks.push_back({"no_hold", "there is no hold: relaxation is seen only through the ramp"});

@@ -193,8 +193,6 @@ ShortAnswer short_answer(const Selection& s) {
     answer.conclusion.insert(answer.conclusion.begin(), fit.adequacy->summary);
   }
   answer.warnings = remark_texts(s.remarks);
-  const std::vector<std::string> outside = outside_words(fit);
-  answer.warnings.insert(answer.warnings.end(), outside.begin(), outside.end());
   for (const Remark& remark : fit.remarks) answer.warnings.push_back(remark.text);
   return answer;
 }

@@ -76,7 +76,15 @@ Json conditions_json(const ParameterResult& p) {
   });
 }
 
-Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimated) {
+/// The deviance of a profile where the interval ends; nothing without a profile.
+std::optional<double> deviance_at_limit(const FitResult& result, std::size_t parameter) {
+  if (result.parameters[parameter].profile.points.empty()) return std::nullopt;
+  const double least = result.best.deviance;
+  return least + threshold_of(result).rise_of(parameter, least);
+}
+
+Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimated,
+                    std::optional<double> limit) {
   Json j{{"name", p.parameter.name}, {"SI_unit", si_unit(p.parameter)}};
   j["scale"] = scale_name(p.parameter.scale);
   j["bounds_SI"] = {rounded(p.parameter.lower), rounded(p.parameter.upper)};
@@ -84,6 +92,7 @@ Json parameter_json(const ParameterResult& p, const EstimatedParameter& estimate
   j["standard_error_SI"] = or_null(p.standard_error);
   j["interval_SI"] = {or_null(p.lower), or_null(p.upper)};
   j["interval_connected"] = p.profile.connected;
+  if (limit) j["deviance_at_limit"] = rounded(*limit);
   j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
   j["verdict"] = verdict_text(p);
   if (!p.not_separable.empty()) j["not_separable"] = p.not_separable;
@@ -308,7 +317,8 @@ Json to_json(const FitResult& result) {
   j["confidence_level"] = result.config.level;
   Json parameters = Json::array();
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
-    parameters.push_back(parameter_json(result.parameters[i], result.config.parameters[i]));
+    parameters.push_back(parameter_json(result.parameters[i], result.config.parameters[i],
+                                        deviance_at_limit(result, i)));
     if (result.bootstrap) {
       parameters.back()["bootstrap"] = bootstrap_json(result.bootstrap->parameters[i]);
     }

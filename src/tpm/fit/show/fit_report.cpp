@@ -14,6 +14,7 @@
 #include "tpm/fit/sample_digest.hpp"
 #include "tpm/fit/show/fit_csv.hpp"
 #include "tpm/fit/show/recording_report.hpp"
+#include "tpm/fit/show/view_fit.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpmkit/error.hpp"
 
@@ -215,8 +216,13 @@ std::vector<std::string> write_fit_report(const std::filesystem::path& folder,
     files.push_back("law.json");
     write_file(folder / files.back(), to_text(law_document(fit)));
   }
-  for (std::string& name : write_figures(folder, figures)) files.push_back(std::move(name));
-  return files;
+  const Json answer = to_json(fit);
+  files.emplace_back("answer.json");
+  write_file(folder / files.back(), to_text(answer));
+  const ViewPage page = fit_page(answer, to_json(figures), folder / files.back());
+  files.emplace_back("fit.html");
+  write_file(folder / files.back(), page.html());
+  return write_figures(folder, figures, std::move(files));
 }
 
 std::vector<std::string> write_specimen_report(const std::filesystem::path& folder,

@@ -21,9 +21,10 @@ namespace tpm::fit {
 [[nodiscard]] std::vector<Figure> specimen_figures(const SpecimenStudy& study);
 
 /// Writes the fit's tables as CSV (fit_csv.hpp), law.json (of a law or the element, for tpm predict
-/// and tpm hil), figures.json and, as SVG, PNG and PDF, a figure for each recording and each
-/// spectrum of a fit and its waterfall. Returns the names of the files. Throws Error(environment)
-/// if drawing is not possible; figures.json is then already there.
+/// and tpm hil), answer.json (to_json), fit.html (fit_page), figures.json and, as SVG, PNG and PDF,
+/// a figure for each recording and each spectrum of a fit and its waterfall. Returns the names of
+/// the files. Throws Error(environment) if drawing is not possible; figures.json is then already
+/// there.
 [[nodiscard]] std::vector<std::string> write_fit_report(const std::filesystem::path& folder,
                                                         const FitResult& fit);
 

@@ -180,6 +180,8 @@ void add_profile(ViewPage& page, const Json& parameter, const Unit& unit,
   if (x.size() < 2) return;
   const double least = *std::ranges::min_element(y);
   for (double& deviance : y) deviance -= least;
+  const auto [first, last] = std::ranges::minmax_element(x);
+  const std::vector<double> along{*first, *last};
   for (const Json& end : parameter.value("interval_SI", Json())) {
     if (end.is_number()) ends.push_back(end.get<double>() / unit.to_si);
   }
@@ -195,6 +197,13 @@ void add_profile(ViewPage& page, const Json& parameter, const Unit& unit,
                   {"y", page.put(std::vector<double>{0.0})}}};
   if (!ends.empty()) {
     series.push_back({{"kind", "upright"}, {"label", interval_name}, {"x", page.put(ends)}});
+  }
+  if (parameter.contains("deviance_at_limit")) {
+    const double rise = parameter.at("deviance_at_limit").get<double>() - least;
+    series.push_back({{"kind", "line"},
+                      {"label", "limit of the " + interval_name},
+                      {"x", page.put(along)},
+                      {"y", page.put(std::vector<double>{rise, rise})}});
   }
   page.description["plots"].push_back({{"title", "profile of " + name},
                                        {"x", {{"quantity", name}, {"unit", unit.symbol}}},
@@ -278,14 +287,21 @@ bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file
       page.description["kind"] = "figures";
       page.description["badge"] = "FIGURES";
       const Json& figures = json.at("figures");
-      if (figures.size() == 1) page.description["title"] = figures.at(0).at("title");
+      page.description["title"] =
+          figures.size() == 1
+              ? figures.at(0).at("title").get<std::string>()
+              : fmt::format("{}: {} figures",
+                            std::filesystem::absolute(file).parent_path().filename().string(),
+                            figures.size());
       add_figures(page, json, file.string());
     } else if (is_law(json)) {
       add_law_and_figures(page, file);
     } else if (is_answer(fit)) {
       add_conclusion(page, json, fit);
       const std::filesystem::path figures = file.parent_path() / "figures.json";
-      if (file.filename() == "selection.json" && std::filesystem::exists(figures)) {
+      const bool of_folder =
+          file.filename() == "selection.json" || file.filename() == "answer.json";
+      if (of_folder && std::filesystem::exists(figures)) {
         add_figures(page, read_json(figures), figures.string());
       }
       add_answer(page, fit);

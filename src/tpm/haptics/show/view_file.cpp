@@ -12,7 +12,8 @@ namespace tpm::haptics {
 
 std::filesystem::path shown_file(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(path)) return path;
-  constexpr const char* kShown[] = {"selection.json", "law.json", "figures.json", "simulation.h5"};
+  constexpr const char* kShown[] = {"selection.json", "answer.json", "law.json", "figures.json",
+                                    "simulation.h5"};
   for (const char* name : kShown) {
     if (std::filesystem::exists(path / name)) return path / name;
   }
