@@ -288,8 +288,7 @@ std::string spheres_words(const SpheresPlan& plan) {
 }
 
 std::string spheres_text(const SpheresPlan& plan) {
-  std::string text = spheres_words(plan) + "\n";
-  text += "\n" + tried_spheres().text(plan.tried);
+  std::string text = fmt::format("{}\n\n{}", spheres_words(plan), tried_spheres().text(plan.tried));
   return text + fmt::format("{:>9} {:>11} {:>10} {:>12} {:>10}  a line in the spacing, 95 %\n\n",
                             "limit", 0, plan.tried.front().area_ratio ? "1" : "-",
                             significant(plan.limit_peak, 5), share_text(plan.limit_uncertainty));
@@ -395,8 +394,8 @@ Json plan_json(const Plan& plan) {
 }
 
 std::string plan_text(const Plan& plan) {
-  std::string text = subject_text(plan) + choice_text(plan);
-  text += "\n" + frontier(plan).text(plan.candidates);
+  std::string text = fmt::format("{}{}\n{}", subject_text(plan), choice_text(plan),
+                                 frontier(plan).text(plan.candidates));
   text +=
       fmt::format("\nreference: {}; peak {} {}; differs from its cross-check ({}) by {}\n",
                   plan.reference.method,
