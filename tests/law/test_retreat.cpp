@@ -378,9 +378,11 @@ TEST_CASE("a fit predicts the unloading of a Hertz contact, and says where it pr
   CHECK(to_json(fit)["recordings"][0]["samples_not_predicted"] == fitted.not_predicted);
   CHECK(to_json(fit)["flags"].dump().find("not predicted") != std::string::npos);
   const auto words = outside_words(fit);
-  REQUIRE(words.size() == 2);
+  REQUIRE(words.size() == 3);
   CHECK_THAT(words[0], Catch::Contains("the prediction is off") && !Catch::Contains("describe"));
-  CHECK_THAT(words[1], Catch::Contains("are not predicted"));
+  CHECK_THAT(words[1], Catch::Contains("the fit ends where the drive first falls back") &&
+                           Catch::Contains("--until"));
+  CHECK_THAT(words[2], Catch::Contains("are not predicted"));
   const Figure figure = recording_figure(fit, 0);
   CHECK_NOTHROW(to_json(std::vector<Figure>{figure}));
   for (const Series& s : figure.panels.front().series) {
