@@ -5,6 +5,7 @@
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/import/column_title.hpp"
 #include "tpm/files/import/header_words.hpp"
 #include "tpm/files/import/import.hpp"
 #include "tpm/files/import/recording_file.hpp"
@@ -172,7 +173,7 @@ TEST_CASE("stress over relative length: what the file does not say has to be sai
   check_values(recording.response_sd, {100, 200, 300});
   options.units["Time"] = "mm";
   CHECK_THROWS_WITH(import_curves(fixture("strip_no_units.csv"), options),
-                    Catch::Contains("'mm' is a unit of length; expected a unit of time"));
+                    Catch::Contains("'mm' is a unit of length; expected --unit \"Time=UNIT\""));
   options.drive_column = "M";
   CHECK_THROWS_WITH(import_curves(fixture("strip_no_units.csv"), options),
                     Catch::Contains("no column 'M'; expected column 1 'Time'"));

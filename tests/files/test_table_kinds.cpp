@@ -9,6 +9,7 @@
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/clock_text.hpp"
+#include "tpm/files/import/column_title.hpp"
 #include "tpm/files/import/file_kind.hpp"
 #include "tpm/files/import/header_words.hpp"
 #include "tpm/files/import/reading_options.hpp"

@@ -379,10 +379,13 @@ TEST_CASE("a fit predicts the unloading of a Hertz contact, and says where it pr
   CHECK(to_json(fit)["recordings"][0]["samples_not_predicted"] == fitted.not_predicted);
   CHECK(test::has_remark(fit.remarks, "not_predicted"));
   const auto outside = outside_remarks(fit);
-  REQUIRE(outside.size() == 2);
+  REQUIRE(outside.size() == 3);
   CHECK_THAT(outside[0].text,
              Catch::Contains("the prediction is off") && !Catch::Contains("describe"));
-  CHECK(outside[1].code == "not_predicted_after_fit");
+  CHECK(outside[1].code == "fitted_part");
+  CHECK_THAT(outside[1].text, Catch::Contains("the fit ends where the drive first falls back") &&
+                                  Catch::Contains("--until"));
+  CHECK(outside[2].code == "not_predicted_after_fit");
   const Figure figure = recording_figure(fit, 0);
   CHECK_NOTHROW(to_json(std::vector<Figure>{figure}));
   for (const Series& s : figure.panels.front().series) {

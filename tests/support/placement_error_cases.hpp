@@ -95,6 +95,10 @@ inline std::vector<ErrorCase> placement_error_cases() {
            {{"g.csv", "time [s],gap [mm],force [N],sensor [mm]\n0,0,0,0\n1,1,1,2\n2,2,2,3\n"}})},
       {type, "force in grams", "fit {}/g.csv --no-draw -o {}/out",
        with_files({{"g.csv", "time [s],depth [mm],force [g]\n0,0,0\n1,1,1\n2,2,2\n"}})},
+      {type, "a unit that may be two", "fit {}/g.csv --no-draw -o {}/out",
+       with_files({{"g.csv", "time [s],depth [mm],force [MN]\n0,0,0\n1,1,1\n2,2,2\n"}})},
+      {type, "minutes as metres", "fit {}/g.csv --no-draw -o {}/out",
+       with_files({{"g.csv", "time [m],depth [mm],force [N]\n0,0,0\n1,1,1\n2,2,2\n"}})},
       {type, "the same readings twice", "fit {}/r.csv {}/q.csv --no-draw -o {}/out",
        with_files({{"r.csv", ramp_recording()}, {"q.csv", ramp_recording()}})},
   };

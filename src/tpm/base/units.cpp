@@ -31,8 +31,7 @@ struct ListedUnit {
 constexpr double kPerTurn = 0.15915494309189535;  // 1/(2 pi)
 constexpr double kDegree = 0.017453292519943295;  // pi/180
 constexpr double kMercury = 133.322387415;        // Pa in 1 mmHg
-constexpr double kGram = 9.80665e-3, kMinute = 60.0, kHour = 3600.0;
-constexpr double kInch = 0.0254, kFoot = 0.3048;
+constexpr double kGram = 9.80665e-3, kMinute = 60.0, kHour = 3600.0, kInch = 0.0254, kFoot = 0.3048;
 constexpr double kPoundForce = 4.4482216152605;  // N, exactly
 constexpr double kPsi = kPoundForce / (kInch * kInch);
 
@@ -124,6 +123,8 @@ constexpr auto kBases = std::to_array<BaseUnit>({
     {"m", {1, 0, 0, 0}, 1.0, true},
     {"N", kForcePowers, 1.0, true},
     {"newton", kForcePowers, 1.0, false},
+    {"daN", kForcePowers, 10.0, false},
+    {"dyn", kForcePowers, 1e-5, false},
     {"gf", kForcePowers, kGram, true},
     {"Pa", kStressPowers, 1.0, true},
     {"bar", kStressPowers, 1e5, true},
@@ -133,6 +134,7 @@ constexpr auto kBases = std::to_array<BaseUnit>({
     {"inches", {1, 0, 0, 0}, kInch, false},
     {"\"", {1, 0, 0, 0}, kInch, false},
     {"ft", {1, 0, 0, 0}, kFoot, false},
+    {"mil", {1, 0, 0, 0}, 1e-3 * kInch, false},
     {"micron", {1, 0, 0, 0}, 1e-6, false},
     {"microns", {1, 0, 0, 0}, 1e-6, false},
     {"lbf", kForcePowers, kPoundForce, false},

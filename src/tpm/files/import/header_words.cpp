@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "tpm/files/import/refused_words.hpp"
-#include "tpm/files/unit_words.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::files {
@@ -42,6 +41,21 @@ char folded(char32_t c) {
   const auto letter = std::find_if(kLetters.begin(), kLetters.end(),
                                    [c](const Letter& l) { return l.accented == c; });
   return letter == kLetters.end() ? ' ' : letter->plain;
+}
+
+/// "BaseDisp" and "XForce" as "Base Disp" and "X Force".
+std::string parted_at_capitals(std::string_view name) {
+  const auto is_small = [](char c) { return c >= 'a' && c <= 'z'; };
+  const auto is_capital = [](char c) { return c >= 'A' && c <= 'Z'; };
+  std::string text;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const bool begins = i > 0 && is_capital(name[i]) &&
+                        (is_small(name[i - 1]) ||
+                         (is_capital(name[i - 1]) && i + 1 < name.size() && is_small(name[i + 1])));
+    if (begins) text += ' ';
+    text += name[i];
+  }
+  return text;
 }
 
 std::vector<std::string> words_of(std::string_view name) {
@@ -97,6 +111,7 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"testzeit", kTime},
     {"tiempo", kTime},
     {"tempo", kTime},
+    {"tijd", kTime},
     {"schrittzeit", kStepTime},
     {"intervallzeit", kStepTime},
     {"segmentzeit", kStepTime},
@@ -111,6 +126,9 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"f", kForce},
     {"normalkraft", kForce},
     {"fz", kForce},
+    {"fn", kForce},
+    {"forca", kForce},
+    {"kracht", kForce},
     {"effort", kForce},
     {"carga", kForce},
     {"carico", kForce},
@@ -130,6 +148,7 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"indentation", kDepth},
     {"penetration", kDepth},
     {"eindringtiefe", kDepth},
+    {"pd", kDepth},
     {"profondeur", kDepth},
     {"enfoncement", kDepth},
     {"indentacion", kDepth},
@@ -152,6 +171,8 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"verschiebung", kDisplacement},
     {"desplazamiento", kDisplacement},
     {"spostamento", kDisplacement},
+    {"deslocamento", kDisplacement},
+    {"verplaatsing", kDisplacement},
     {"standardweg", kTravel},
     {"weg", kTravel},
     {"course", kTravel},
@@ -309,22 +330,6 @@ std::string_view without_number(std::string_view word) {
   return last == std::string_view::npos ? word : word.substr(0, last + 1);
 }
 
-bool is_plain_number(std::string_view text) {
-  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
-}
-
-/// Units of what no recording of a force holds: in brackets they tell that a title means that.
-bool is_foreign_unit(std::string_view text) {
-  constexpr auto kForeign = std::to_array<std::string_view>(
-      {"\xC2\xB0"
-       "C",
-       "degC", "deg C",
-       "\xC2\xB0"
-       "F",
-       "degF", "V", "mV", "mA", "W", "J", "mJ", "Nm", "N m", "N.m", "mNm", "rpm", "1/min"});
-  return std::find(kForeign.begin(), kForeign.end(), text) != kForeign.end();
-}
-
 /// "Step time", "temps de l'intervalle".
 bool is_of_a_step(const std::vector<std::string>& words) {
   constexpr auto kSteps = std::to_array<std::string_view>(
@@ -369,64 +374,16 @@ std::optional<Recognized> recognize_words(const std::vector<std::string>& words)
   return found;
 }
 
-/// The text before and after the last separator, if a unit stands after it.
-std::optional<ColumnTitle> split_at(std::string_view title, std::string_view separator) {
-  const auto cut = title.rfind(separator);
-  if (cut == std::string_view::npos || cut == 0) return std::nullopt;
-  const std::string unit = written_unit(trimmed(title.substr(cut + separator.size())));
-  const bool known = is_unit(unit) || is_foreign_unit(unit);
-  if (unit.empty() || !known || is_plain_number(unit)) return std::nullopt;
-  return ColumnTitle{std::string(trimmed(title.substr(0, cut))), unit};
-}
-
-/// A unit behind a mark that also stands inside names ("Force N", "Force/N", "step-1"): taken only
-/// if the rest is a known title of that dimension.
-std::optional<ColumnTitle> split_known(std::string_view title, std::string_view separator) {
-  auto split = split_at(title, separator);
-  if (!split) return std::nullopt;
-  const auto meaning = recognize_title(split->name);
-  if (!meaning) return std::nullopt;
-  const bool fits =
-      is_unit(split->unit) && is_dimension_of(*meaning, parse_unit(split->unit, {}).dimension);
-  return fits || is_foreign_unit(split->unit) ? split : std::nullopt;
+/// The words of a title. Where none is known, capitals inside them begin new ones: "BaseDisp" but
+/// not "zSensor" or "vDeflection", which are known as they stand.
+std::vector<std::string> title_words(std::string_view name) {
+  std::vector<std::string> words = words_of(spelled_out(name));
+  if (recognize_words(words)) return words;
+  std::vector<std::string> parts = words_of(spelled_out(parted_at_capitals(name)));
+  return recognize_words(parts) ? parts : words;
 }
 
 }  // namespace
-
-std::string_view without_brackets(std::string_view cell) noexcept {
-  const std::string_view text = trimmed(cell);
-  const bool bracketed = text.size() > 1 && ((text.front() == '(' && text.back() == ')') ||
-                                             (text.front() == '[' && text.back() == ']'));
-  return bracketed ? trimmed(text.substr(1, text.size() - 2)) : text;
-}
-
-ColumnTitle split_title(std::string_view title) {
-  std::string_view text = trimmed(title);
-  while (text.starts_with('#') || text.starts_with('%')) text = trimmed(text.substr(1));
-  const auto open = text.find_last_of("([");
-  if (open != std::string_view::npos && open > 0) {
-    // "Load (N) Ch. 1": the unit may stand inside the title.
-    const auto close = text.find(text[open] == '[' ? ']' : ')', open);
-    const std::string unit = close == std::string_view::npos
-                                 ? std::string()
-                                 : written_unit(trimmed(text.substr(open + 1, close - open - 1)));
-    const bool square = text[open] == '[';
-    const bool number = is_plain_number(unit) && !(square && unit == "1");
-    if (!unit.empty() && !number &&
-        (square || is_unit(unit) || is_foreign_unit(unit) || force_of_weight(unit))) {
-      const std::string_view before = trimmed(text.substr(0, open));
-      const std::string_view after = trimmed(text.substr(close + 1));
-      return {fmt::format("{}{}{}", before, after.empty() ? "" : " ", after), unit};
-    }
-  }
-  for (const std::string_view separator : {" / ", ", ", " in ", " en ", "_"}) {
-    if (auto split = split_at(text, separator)) return *split;
-  }
-  for (const std::string_view separator : {"/", ",", ":", " ", "-"}) {
-    if (auto split = split_known(text, separator)) return *split;
-  }
-  return {std::string(text), {}};
-}
 
 bool is_dimension_of(const Recognized& meaning, Dimension dimension) {
   const auto is_one_of = [dimension](std::initializer_list<Dimension> known) {
@@ -467,7 +424,7 @@ std::optional<Recognized> recognize_title(std::string_view name) {
   if (const auto primes = recognize_primes(name)) return primes;
   if (const auto function = recognize_step_response(name)) return function;
   if (is_ratio_of_lengths(name)) return kStretch;
-  const std::vector<std::string> words = words_of(spelled_out(name));
+  const std::vector<std::string> words = title_words(name);
   const auto known = recognize_words(words);
   // The standard deviation of a force is no deviation from what was asked for.
   const bool sd = known && known->role == ColumnRole::sd;
@@ -476,7 +433,7 @@ std::optional<Recognized> recognize_title(std::string_view name) {
 
 std::optional<RefusedTitle> refused_title(std::string_view name) {
   if (recognize_primes(name) || recognize_step_response(name)) return std::nullopt;
-  const std::vector<std::string> words = words_of(spelled_out(name));
+  const std::vector<std::string> words = title_words(name);
   const auto refused = find_refused_word(words);
   const auto known = recognize_words(with_parts_of_joined(words));
   if (!known || known->role == ColumnRole::sd) return std::nullopt;

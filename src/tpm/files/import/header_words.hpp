@@ -8,21 +8,6 @@
 
 namespace tpm::files {
 
-/// A column title taken apart: "Force [N]", "Force (N)", "Force / N", "Force, N", "Kraft in N",
-/// "Force N" and "force_N" all give {"Force", "N"}. The unit is empty if there is none that
-/// parse_unit knows, except in square brackets: "Force [foo]" gives "foo", for whoever reads the
-/// column to refuse. A number is no unit: "Strain_1" and "Strain (1)" are the first of several, and
-/// only "Strain [1]" is a plain number.
-struct ColumnTitle {
-  std::string name;
-  std::string unit;
-};
-
-[[nodiscard]] ColumnTitle split_title(std::string_view title);
-
-/// A cell of a unit row without its brackets: "[mm]" -> "mm".
-[[nodiscard]] std::string_view without_brackets(std::string_view cell) noexcept;
-
 /// Uses of a testing machine's column.
 enum class ColumnRole {
   time,

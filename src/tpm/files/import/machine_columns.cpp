@@ -29,11 +29,26 @@ std::string unit_option(const MachineColumn& column, Dimension dimension) {
 
 Unit unit_of(const MachineColumn& column, Dimension dimension, const std::string& file) {
   const std::string where = fmt::format("{}: {}", file, column.label());
-  if (is_unit(column.unit) || column.unit.empty()) return parse_unit(column.unit, dimension, where);
+  const std::string name =
+      column.name.empty() ? std::to_string(column.index + 1) : printable(column.name);
+  if (!column.unit_readings.empty()) {
+    throw bad_input(where,
+                    fmt::format("unit '{}' may be {}", printable(column.unit),
+                                fmt::join(column.unit_readings, " or ")),
+                    fmt::format("--unit \"{0}={1}\" or --unit \"{0}={2}\"", name,
+                                column.unit_readings.front(), column.unit_readings.back()));
+  }
+  const bool known = is_unit(column.unit);
+  const bool fits = known && parse_unit(column.unit, where).dimension == dimension;
+  if (fits || column.unit.empty()) return parse_unit(column.unit, dimension, where);
+  if (known) {
+    const Dimension other = parse_unit(column.unit, where).dimension;
+    throw bad_input(
+        where, fmt::format("'{}' is a unit of {}", printable(column.unit), dimension_name(other)),
+        unit_option(column, dimension));
+  }
   const auto force = dimension == Dimension::force ? force_of_weight(column.unit) : std::nullopt;
   if (force) {
-    const std::string name =
-        column.name.empty() ? std::to_string(column.index + 1) : printable(column.name);
     throw bad_input(where, fmt::format("unknown unit '{}' of a force", printable(column.unit)),
                     fmt::format("--unit \"{}={}\" for the weight of such a mass, or another unit "
                                 "of force: {}",

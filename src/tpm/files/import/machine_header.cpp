@@ -6,6 +6,8 @@
 #include <array>
 #include <cctype>
 
+#include "tpm/files/import/column_meaning.hpp"
+#include "tpm/files/import/column_title.hpp"
 #include "tpm/files/unit_words.hpp"
 #include "tpmkit/error.hpp"
 
@@ -38,7 +40,9 @@ bool is_unit_row(const HeaderRow& row) {
     ++filled;
     const std::string cell = written_unit(without_brackets(field));
     const bool number = cell.find_first_not_of("0123456789") == std::string_view::npos;
-    const bool unit = is_unit(cell) && !number;
+    const bool capitals =
+        cell.size() > 1 && !units_in_any_case(cell, [](Dimension) { return true; }).empty();
+    const bool unit = (is_unit(cell) || capitals) && !number;
     if (unit) ++units;
     if (is_bracketed(field)) ++brackets;
     if (!unit && recognize_title(split_title(field).name)) ++titles;
@@ -183,98 +187,14 @@ std::vector<HeaderRow> rows_above(const DelimitedTable& table, const SampleBlock
   return rows;
 }
 
-/// What the unit says of a column whose title says nothing or something else: "f [Hz]", "w
-/// [rad/s]", "J [1/Pa]"; with a time beside it "G [Pa]" and "E [Pa]" are relaxation moduli.
-void recognize_by_unit(MachineColumn& column, bool timed) {
-  if (!is_unit(column.unit)) return;
-  const Dimension dimension = parse_unit(column.unit, {}).dimension;
-  const bool letter = column.name.size() == 1;
-  const bool named = column.unit.find("Hz") != std::string::npos ||
-                     column.unit.find("rad") != std::string::npos;  // 1/s may be a shear rate
-  if (dimension == Dimension::frequency && named && (!column.meaning || letter)) {
-    column.meaning = Recognized{ColumnRole::frequency, Quantity::frequency, 1};
-  }
-  if (column.meaning) return;
-  if (dimension == Dimension::compliance) {
-    column.meaning = Recognized{ColumnRole::response, Quantity::creep_compliance, 3};
-  }
-  const bool modulus = column.name == "G" || column.name == "E";
-  if (timed && modulus && dimension == Dimension::stress) {
-    column.meaning = Recognized{ColumnRole::response, Quantity::relaxation_modulus, 3};
-  }
-}
-
-/// Sizes of the specimen, which no machine moves.
-bool is_size_of_specimen(std::string_view name) {
-  constexpr auto kSizes = std::to_array<std::string_view>(
-      {"thick", "width", "diameter", "radius", "gauge", "gage", "dicke", "breite", "durchmesser",
-       "radio", "rayon", "epaisseur", "largeur"});
-  std::string small(name);
-  std::ranges::transform(small, small.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::ranges::any_of(
-      kSizes, [&small](std::string_view size) { return small.find(size) != std::string::npos; });
-}
-
-/// Of time, drive and response two are known by their titles: the only other column in a unit of
-/// the third is that, whatever its title.
-void recognize_lone_column(std::vector<MachineColumn>& columns) {
-  constexpr int kLast = 9;  // behind every title
-  constexpr Recognized kLoneTime{ColumnRole::time, Quantity::time, kLast};
-  constexpr Recognized kLoneDrive{ColumnRole::drive, Quantity::indentation_depth, kLast};
-  constexpr Recognized kLoneForce{ColumnRole::response, Quantity::contact_force, kLast};
-  const auto has = [&columns](std::initializer_list<ColumnRole> roles) {
-    return std::ranges::any_of(columns, [roles](const MachineColumn& column) {
-      return column.meaning && std::ranges::find(roles, column.meaning->role) != roles.end();
-    });
-  };
-  const bool timed = has({ColumnRole::time});
-  const bool driven = has({ColumnRole::drive, ColumnRole::height});
-  const bool answered = has({ColumnRole::response, ColumnRole::deflection});
-  if (timed + driven + answered != 2) return;
-  const Recognized& third = !timed ? kLoneTime : !driven ? kLoneDrive : kLoneForce;
-  const Dimension dimension = !timed    ? Dimension::time
-                              : !driven ? Dimension::length
-                                        : Dimension::force;
-  MachineColumn* lone = nullptr;
-  for (MachineColumn& column : columns) {
-    if (column.meaning || column.refused || is_size_of_specimen(column.name)) continue;
-    if (!is_unit(column.unit) || parse_unit(column.unit, {}).dimension != dimension) continue;
-    if (lone != nullptr) return;
-    lone = &column;
-  }
-  if (lone != nullptr) lone->meaning = third;
-}
-
-/// "T" is a time only where its unit says so or where nothing contradicts: it may be a temperature.
-void doubt_capital_t(MachineColumn& column) {
-  const std::string name = column.name.substr(0, column.name.find_first_of(" ([0123456789"));
-  if (name != "T" || !column.meaning || column.meaning->role != ColumnRole::time) return;
-  if (is_unit(column.unit) && parse_unit(column.unit, {}).dimension == Dimension::time) return;
-  if (column.unit.empty() && column.name.find('(') == std::string::npos) {
-    column.meaning->rank = 1;
-    return;
-  }
-  column.refused = RefusedTitle{*column.meaning, "'T' may be a temperature"};
-  column.meaning.reset();
-}
-
-/// A title whose unit is none of what it says.
-void doubt_unit(MachineColumn& column) {
-  if (!column.meaning || column.unit.empty()) return;
-  const bool fits = is_unit(column.unit) &&
-                    is_dimension_of(*column.meaning, parse_unit(column.unit, {}).dimension);
-  column.misfit = !fits && column.meaning->role != ColumnRole::deflection;
-}
-
 MachineColumn described_column(std::size_t index, const HeaderRows& rows,
                                const ImportOptions& options) {
   const ColumnTitle title = split_title(cell_or_empty(rows.titles, index));
   const std::string cell = cell_or_empty(rows.units, index);
   const std::string unit = written_unit(without_brackets(cell));
   MachineColumn column{
-      index, title.name, unit.empty() ? title.unit : unit, recognize_title(title.name), {},
-      false, false};
+      index, title.name, unit.empty() ? title.unit : unit, recognize_title(title.name), {}, false,
+      false, {}};
   column.refused = refused_title(title.name);
   const std::string chosen = chosen_unit(column, options);
   column.unit_is_chosen = chosen != column.unit;
@@ -309,9 +229,10 @@ void describe_columns(const DelimitedTable& table, const SampleBlock& block, Mac
       });
   for (MachineColumn& column : header.columns) {
     recognize_by_unit(column, timed);
+    read_capitals_of_unit(column);
     doubt_unit(column);
   }
-  recognize_lone_column(header.columns);
+  recognize_lone_columns(header.columns);
   header.rows = block.first;
   header.block = block;
 }

@@ -19,7 +19,8 @@ struct MachineColumn {
   std::optional<Recognized> meaning;
   std::optional<RefusedTitle> refused;  ///< its meaning but for a word or its unit
   bool misfit = false;  ///< the unit is none of what the title says: taken if no other column fits
-  bool unit_is_chosen = false;  ///< by the options, not by the file
+  bool unit_is_chosen = false;                  ///< by the options, not by the file
+  std::vector<std::string> unit_readings = {};  ///< of a unit that is two: "MPA" is mPa or MPa
 
   /// "column 2 'Force'"
   [[nodiscard]] std::string label() const;

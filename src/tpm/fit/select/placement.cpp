@@ -46,6 +46,24 @@ Clear clear_of(const PreparedRecording& r) {
           r.phases.contact_drive - kFar * travel};
 }
 
+/// Samples after the deepest one in which the drive stays withdrawn. Where cycles turn, or the
+/// recording ends, before that is a rest, the tissue need not have left the probe.
+std::vector<std::size_t> withdrawn_samples(const PreparedRecording& r, double back, bool rested) {
+  const std::vector<double>& drive = r.recording.drive;
+  std::vector<std::size_t> withdrawn;
+  std::size_t begin = 0;  // of the run
+  for (std::size_t i = peak_drive_index(r); i <= drive.size(); ++i) {
+    if (i < drive.size() && drive[i] <= back) {
+      withdrawn.push_back(i);
+      continue;
+    }
+    const bool turns = i < drive.size() || rested;
+    if (turns && withdrawn.size() - begin < kFewestForSlope) withdrawn.resize(begin);
+    begin = withdrawn.size();
+  }
+  return withdrawn;
+}
+
 RestSamples rest_samples(const PreparedRecording& r) {
   constexpr double kRecoil = 0.1;  // of the rest after withdrawal, which is left out
   RestSamples rest;
@@ -63,11 +81,9 @@ RestSamples rest_samples(const PreparedRecording& r) {
     take(i);
     ++rest.before;
   }
-  std::vector<std::size_t> withdrawn;
   const double back = touched ? std::max(clear.far, drive.front() + clear.tolerance) : clear.far;
-  for (std::size_t i = peak_drive_index(r); i < drive.size(); ++i) {
-    if (drive[i] <= back) withdrawn.push_back(i);
-  }
+  const std::vector<std::size_t> withdrawn =
+      withdrawn_samples(r, back, rest.before >= kFewestForSlope);
   const auto recoil = static_cast<std::size_t>(kRecoil * static_cast<double>(withdrawn.size()));
   for (std::size_t k = recoil; k < withdrawn.size(); ++k) take(withdrawn[k]);
   rest.after = withdrawn.size() - recoil;

@@ -10,6 +10,8 @@
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
+#include "tpm/fit/select/channel_cause.hpp"
+#include "tpm/fit/select/contact_in_jump.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/placement.hpp"
@@ -389,10 +391,14 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   warn(protocol_remarks(chosen.fit, recordings));
   warn(outside_remarks(chosen.fit));
   state_adequacy(s, recordings);
+  name_channel_cause(s, recordings, options.setup);
   describe(s);
   for (const PreparedRecording& r : recordings) {
     if (!r.start_up.empty()) s.summary.push_back(r.start_up);
     if (std::string rises = unseen_rise_words(r); !rises.empty()) s.summary.push_back(rises);
+    if (options.setup.contact) continue;
+    std::string jump = contact_in_jump_words(r, s.candidates[s.recommended].fit.config);
+    if (!jump.empty()) s.summary.push_back(std::move(jump));
   }
   return s;
 }

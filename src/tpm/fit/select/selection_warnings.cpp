@@ -41,6 +41,17 @@ Outside outside_of(const RecordingFit& r) {
   return o;
 }
 
+/// Which part was fitted, why it ends there, and how another one is.
+std::string window_words(const std::string& name, const RecordingFit& r, const Outside& o) {
+  const auto first = std::ranges::find(r.fitted, true);
+  const auto begin = static_cast<std::size_t>(first - r.fitted.begin());
+  return fmt::format(
+      "{}: fitted from {} to {} s: the fit ends where the drive first falls back, because contact "
+      "may shrink from there on; to fit more, give the recording a later \"to\" in config.json "
+      "and fit that file; --from-time and --until fit less",
+      name, significant(r.time_s[begin], 4), significant(o.last_fitted_s, 4));
+}
+
 /// Depths of soft tissue are millimetres: metres come from a unit that is not the file's.
 std::vector<Remark> unit_remarks(std::span<const PreparedRecording> recordings) {
   constexpr double kDeepest_m = 0.5;
@@ -85,6 +96,9 @@ std::vector<Remark> outside_remarks(const FitResult& fit) {
                name, significant(o.last_fitted_s, 4), o.predicted, significant(o.last_drive, 3),
                significant(100.0 * rms / r.peak, 3),
                describes ? "" : ": the law does not describe the unloading and what follows")});
+    }
+    if (o.count >= kFewestOutside) {
+      remarks.push_back({"fitted_part", window_words(name, r, o)});
     }
     if (o.predicted < o.count) {
       remarks.push_back(

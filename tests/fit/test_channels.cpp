@@ -1,0 +1,151 @@
+// Recordings whose channels do not belong together, whose contact lies in a jump, and cycles.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+
+#include "tpm/base/random.hpp"
+#include "tpm/fit/select/channel_cause.hpp"
+#include "tpm/fit/select/contact_in_jump.hpp"
+#include "tpm/fit/select/placement.hpp"
+#include "tpm/fit/select/selection.hpp"
+
+using namespace tpm;
+using namespace tpm::base;
+using namespace tpm::fit;
+using Catch::Contains;
+using Catch::Matchers::WithinAbs;
+
+namespace {
+
+constexpr double kSampling_s = 0.05;
+
+/// Depth in m over the time in s, at rest until 2 s; force of k_inf 60 N/m with branches, exactly.
+Recording pressed_at_steps(const std::function<double(double)>& depth, double end_s, double noise_N,
+                           const std::vector<std::pair<double, double>>& branches = {{45.0, 2.0}}) {
+  Recording r;
+  r.drive_quantity = Quantity::indentation_depth;
+  r.response_quantity = Quantity::contact_force;
+  Random random(7);
+  std::vector<double> memory(branches.size(), 0.0);
+  for (double t = 0.0; t <= end_s + 1e-9; t += kSampling_s) {
+    const double before = r.drive.empty() ? 0.0 : r.drive.back();
+    const double now = depth(t);
+    double force = 60.0 * now;
+    for (std::size_t i = 0; i < branches.size(); ++i) {
+      const auto [k, tau] = branches[i];
+      const double left = std::exp(-kSampling_s / tau);
+      memory[i] = memory[i] * left + k * (now - before) * tau / kSampling_s * (1.0 - left);
+      force += memory[i];
+    }
+    r.time_s.push_back(t);
+    r.drive.push_back(now);
+    r.response.push_back(force + noise_N * random.normal());
+  }
+  return r;
+}
+
+double ramp_of_two_seconds(double t) {
+  return 2e-3 * std::clamp(t - 2.0, 0.0, 2.0);
+}
+
+Selection selected_of_channels(const PreparedRecording& recording) {
+  SelectionOptions options;
+  options.laws = {parse_law_name("linear-1", "test")};
+  options.only_listed = true;
+  options.held_out = false;
+  options.setup.starts = 8;
+  options.setup.profiles = false;
+  return select_law(std::span(&recording, 1), options);
+}
+
+LawAdequacy adequacy_with(ChannelFault fault, double time_s) {
+  // What one channel suffered is what the other one is given.
+  Recording r = pressed_at_steps(ramp_of_two_seconds, 30.0, 0.0);
+  const ChannelFault given = fault == ChannelFault::response_delayed ? ChannelFault::drive_delayed
+                             : fault == ChannelFault::drive_delayed ? ChannelFault::response_delayed
+                             : fault == ChannelFault::response_filtered
+                                 ? ChannelFault::drive_filtered
+                                 : ChannelFault::response_filtered;
+  if (time_s > 0.0) r = with_same_fault(std::move(r), given, time_s);
+  Random random(3);
+  for (double& force : r.response) force += 2e-4 * random.normal();
+  const Selection s = selected_of_channels(prepare_recording("made.csv", std::move(r)));
+  return s.candidates[s.recommended].fit.adequacy.value();
+}
+
+}  // namespace
+
+TEST_CASE("a channel that is late is named, with its time", "[channels]") {
+  CHECK_THAT(adequacy_with(ChannelFault::response_delayed, 0.2).summary,
+             Contains("likely cause: the force is recorded 0.2 s later than the depth"));
+  CHECK_THAT(adequacy_with(ChannelFault::drive_delayed, 0.3).summary,
+             Contains("likely cause: the depth is recorded 0.3 s later than the force"));
+  const LawAdequacy filtered = adequacy_with(ChannelFault::response_filtered, 0.3);
+  CHECK(filtered.is_rejected());
+  REQUIRE(filtered.causes.size() == 1);
+  CHECK_THAT(filtered.causes.front(),
+             Contains("the force follows late, as behind a filter with a time constant of 0.3 s"));
+}
+
+TEST_CASE("no channel is called late where the tissue has another branch", "[channels]") {
+  CHECK(adequacy_with(ChannelFault::response_delayed, 0.0).is_adequate());
+  const Selection s = selected_of_channels(prepare_recording(
+      "made.csv",
+      pressed_at_steps(ramp_of_two_seconds, 30.0, 1e-4, {{45.0, 2.0}, {40.0, 0.2}, {20.0, 9.0}})));
+  const LawAdequacy adequacy = s.candidates[s.recommended].fit.adequacy.value();
+  CHECK(adequacy.is_rejected());
+  CHECK_THAT(adequacy.summary, !Contains("late"));
+}
+
+TEST_CASE("delays and filters keep levels, and a ramp late by their time", "[channels]") {
+  const Recording r = pressed_at_steps(ramp_of_two_seconds, 30.0, 0.0);
+  for (const ChannelFault fault :
+       {ChannelFault::response_delayed, ChannelFault::response_filtered}) {
+    const Recording late = with_same_fault(r, fault, 0.2);
+    CHECK(late.response == r.response);
+    CHECK_THAT(late.drive.back(), WithinAbs(4e-3, 1e-12));
+    const auto at = static_cast<std::size_t>(std::lround(3.5 / kSampling_s));  // within the ramp
+    CHECK_THAT(late.drive[at], WithinAbs(2e-3 * 1.3, 1e-3 * 2.0 * std::exp(-1.5 / 0.2)));
+  }
+}
+
+TEST_CASE("contact within a jump is said with the option that states it", "[channels]") {
+  const auto jump = [](double t) { return t < 2.0 - 1e-9 ? 0.0 : 4e-3; };
+  const PreparedRecording jumped =
+      prepare_recording("jump.csv", pressed_at_steps(jump, 30.0, 2e-4));
+  const Selection s = selected_of_channels(jumped);
+  const bool said = std::ranges::any_of(s.summary, [](const std::string& sentence) {
+    return sentence.find(
+               "contact lies within a jump of the drive, from 0 mm at 1.95 s to 4 mm "
+               "at 2 s") != std::string::npos &&
+           sentence.find("--contact \"0 mm\"") != std::string::npos;
+  });
+  CHECK(said);
+  const PreparedRecording ramped =
+      prepare_recording("ramp.csv", pressed_at_steps(ramp_of_two_seconds, 30.0, 2e-4));
+  const FitConfig config = selected_of_channels(ramped).candidates.front().fit.config;
+  CHECK(contact_in_jump_words(ramped, config).empty());
+}
+
+TEST_CASE("where cycles turn is no rest", "[channels]") {
+  const auto triangle = [](double t) {
+    return t < 2.0 ? 0.0 : 4e-3 * (1.0 - std::abs(std::fmod((t - 2.0) / 4.0, 2.0) - 1.0));
+  };
+  const PreparedRecording cycles =
+      prepare_recording("cycles.csv", pressed_at_steps(triangle, 42.0, 2e-4));
+  const RestReadings rests = read_rests(cycles);
+  CHECK(rests.before >= 40);
+  CHECK(rests.after == 0);
+  REQUIRE(rests.zero);
+  CHECK_THAT(rests.zero->value, WithinAbs(0.0, 4.0 * rests.zero->sd));
+  CHECK(rests.zero->sd < 1e-4);
+  // The answer says which part was fitted and how to fit more.
+  const Selection s = selected_of_channels(cycles);
+  const std::vector<std::string> words = outside_words(s.candidates.front().fit);
+  REQUIRE_FALSE(words.empty());
+  CHECK_THAT(words.back(), Contains("fitted from 2 to 6 s") && Contains("\"to\" in config.json") &&
+                               Contains("--until"));
+}
