@@ -47,10 +47,10 @@ struct Referee {
   double worst_floor;
 };
 
-BenchmarkProblem massless_problem(std::string name, std::string title, std::string text,
-                                  const Tissue& tissue, const Protocol& protocol,
-                                  const std::vector<double>& times_s, const RuleSettings& rules,
-                                  const Referee& referee) {
+BenchmarkProblem massless_organ_problem(std::string name, std::string title, std::string text,
+                                        const Tissue& tissue, const Protocol& protocol,
+                                        const std::vector<double>& times_s,
+                                        const RuleSettings& rules, const Referee& referee) {
   const std::shared_ptr<const PosedNetwork> posed = posed_liver(tissue, protocol, times_s);
   const std::shared_ptr<const MethodProblem> rule_problem = rules_on(posed);
   BenchmarkProblem problem;
@@ -100,7 +100,7 @@ std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue, bool guid
 }  // namespace
 
 BenchmarkProblem organ_hold_problem() {
-  return massless_problem(
+  return massless_organ_problem(
       "organ_hold", "Organ, ramp and hold",
       "The liver of 424 spheres (configs/liver_scene.json) with eta1 = 257.3 kPa s, pushed 8 mm "
       "deep at sphere 71 at 4 mm/s and held to 31 s.",
@@ -115,7 +115,7 @@ BenchmarkProblem organ_hold_problem() {
 BenchmarkProblem organ_poke_problem() {
   const Protocol protocol(Drive::displacement, {{0.0, 0.0}, {0.08, 8e-3}, {0.12, 8e-3}, {0.2, 0.0}},
                           "poke");
-  return massless_problem(
+  return massless_organ_problem(
       "organ_poke", "Organ, poked at 100 mm/s",
       "The same liver with the paper's eta1 = 5 Pa s (relaxation time 0.208 ms): 8 mm in at 100 "
       "mm/s, held for 40 ms, and out again, 0.2 s in all.",
@@ -128,7 +128,7 @@ BenchmarkProblem organ_poke_problem() {
 }
 
 BenchmarkProblem organ_creep_problem() {
-  return massless_problem(
+  return massless_organ_problem(
       "organ_creep", "Organ, 300 s of creep",
       "The same liver with eta1 = 257.3 kPa s under the smaller of the paper's loads, 0.196 N, "
       "applied in a step and kept for 300 s.",

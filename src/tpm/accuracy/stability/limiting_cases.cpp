@@ -14,7 +14,7 @@ namespace tpm::accuracy {
 namespace {
 
 using Expect = std::function<StabilityClass(StepRule)>;
-constexpr double kStep_s = 1e-3;
+constexpr double kCaseStep_s = 1e-3;
 constexpr double kLimitingDepth_m = 0.004;
 
 bool same_kind(StabilityClass a, StabilityClass b) {
@@ -83,7 +83,7 @@ constexpr double kPaperSum_Pa = 24e3;  // E1 + E2
 void add_relaxation_times(std::vector<LimitingCase>& limiting_cases) {
   BondElement p = paper_element(1e-9 / kPaperSum_Pa);
   limiting_cases.push_back(instantaneous_depth(
-      "eta1 -> 0 (1e-9 Pa s)", p, kLimitingDepth_m, kStep_s,
+      "eta1 -> 0 (1e-9 Pa s)", p, kLimitingDepth_m, kCaseStep_s,
       "explicit rules diverge, Adams too or is too much work, midpoint and Newmark "
       "ring, all else holds"));
   // Functional iteration follows the relaxation time for as long as it runs.
@@ -95,11 +95,11 @@ void add_relaxation_times(std::vector<LimitingCase>& limiting_cases) {
   }
   p = paper_element(1e15 / kPaperSum_Pa);
   limiting_cases.push_back(instantaneous_depth("eta1 -> infinity (1e15 Pa s)", p, kLimitingDepth_m,
-                                               kStep_s, "an elastic element: all hold"));
+                                               kCaseStep_s, "an elastic element: all hold"));
   for (const double ratio : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
     LimitingCase limiting_case =
-        instantaneous_depth("h/tau = " + significant(ratio, 2), paper_element(kStep_s / ratio),
-                            kLimitingDepth_m, kStep_s, kByTheory);
+        instantaneous_depth("h/tau = " + significant(ratio, 2), paper_element(kCaseStep_s / ratio),
+                            kLimitingDepth_m, kCaseStep_s, kByTheory);
     for (LimitingCell& cell : limiting_case.cells) {
       if (cell.rule != StepRule::cvode_adams || ratio < 1e4) continue;
       cell.expected = StabilityClass::too_much_work;
@@ -115,14 +115,14 @@ void add_moduli(std::vector<LimitingCase>& limiting_cases) {
   maxwell.branches.front().modulus_Pa = maxwell.instantaneous_Pa();
   maxwell.equilibrium_Pa = 0.0;
   limiting_cases.push_back(instantaneous_depth("E1 = 0, a depth", maxwell, kLimitingDepth_m,
-                                               kStep_s,
+                                               kCaseStep_s,
                                                "a Maxwell fluid: all hold, down to the tension"));
   maxwell.lateral_Pa = 0.0;
-  const double end = kStudySteps * kStep_s;
+  const double end = kStudySteps * kCaseStep_s;
   CheckedProblem flow;
   constexpr double kLoad_N = 0.05;
   flow.problem = element_problem(maxwell, creep(kLoad_N, end));
-  flow.times_s = last_steps(end, kStep_s, kComparedSteps);
+  flow.times_s = last_steps(end, kCaseStep_s, kComparedSteps);
   flow.reference.resize(kComparedSteps);
   for (int i = 0; i < kComparedSteps; ++i) {
     const double t = flow.times_s[static_cast<std::size_t>(i)];
@@ -134,42 +134,43 @@ void add_moduli(std::vector<LimitingCase>& limiting_cases) {
       tried("E1 = 0, a load", "0.05 N in a step and held; no tension",
             "it flows for as long as it is pushed: semi-implicit Euler and XPBD too "
             "slowly by h/tau = 5 %, all else holds",
-            flow, kStep_s, [](StepRule rule) {
+            flow, kCaseStep_s, [](StepRule rule) {
               return rule == StepRule::semi_implicit_euler || rule == StepRule::xpbd
                          ? StabilityClass::wrong_steady_state
                          : StabilityClass::holds;
             }));
   BondElement loose = paper_element(kTau_s);
   loose.equilibrium_Pa = loose.branches.front().modulus_Pa = 0.0;
-  limiting_cases.push_back(instantaneous_depth("E2 = 0, a depth", loose, kLimitingDepth_m, kStep_s,
-                                               "tension only: all hold"));
+  limiting_cases.push_back(instantaneous_depth("E2 = 0, a depth", loose, kLimitingDepth_m,
+                                               kCaseStep_s, "tension only: all hold"));
   limiting_cases.push_back(
       tried("E2 = 0, a load", "0.05 N in a step and held",
             "tension carries it: all hold but XPBD, whose made-up mass is that of the "
             "stiffness at rest, 0",
-            massless_problem(loose, creep(0.05, end), kStep_s), kStep_s, [](StepRule rule) {
+            massless_problem(loose, creep(0.05, end), kCaseStep_s), kCaseStep_s, [](StepRule rule) {
               return rule == StepRule::xpbd ? StabilityClass::diverged : StabilityClass::holds;
             }));
   loose.lateral_Pa = 0.0;
   CheckedProblem nothing;
-  nothing.times_s = last_steps(end, kStep_s, kComparedSteps);
+  nothing.times_s = last_steps(end, kCaseStep_s, kComparedSteps);
   nothing.reference.setZero(kComparedSteps);
   nothing.peak = 1.0;
   nothing.problem = element_problem(loose, creep(0.05, end));
-  limiting_cases.push_back(tried(
-      "E2 = E' = 0, a load", "0.05 N in a step and held",
-      "nothing carries it: Newton fails, and XPBD diverges", nothing, kStep_s, [](StepRule rule) {
-        return rule == StepRule::xpbd ? StabilityClass::diverged : StabilityClass::newton_failed;
-      }));
+  limiting_cases.push_back(tried("E2 = E' = 0, a load", "0.05 N in a step and held",
+                                 "nothing carries it: Newton fails, and XPBD diverges", nothing,
+                                 kCaseStep_s, [](StepRule rule) {
+                                   return rule == StepRule::xpbd ? StabilityClass::diverged
+                                                                 : StabilityClass::newton_failed;
+                                 }));
 }
 
 void add_depths(std::vector<LimitingCase>& limiting_cases) {
   const BondElement p = paper_element(0.02);
   limiting_cases.push_back(instantaneous_depth(
-      "beyond 12 mm", p, 0.015, kStep_s,
+      "beyond 12 mm", p, 0.015, kCaseStep_s,
       "all hold: no rule fails at the depth where liver is damaged, results carry a flag"));
   limiting_cases.push_back(
-      instantaneous_depth("theta over pi/6", p, 0.020, kStep_s,
+      instantaneous_depth("theta over pi/6", p, 0.020, kCaseStep_s,
                           "all hold: 33.7 degrees at x = 30 mm, results carry a flag"));
 }
 
@@ -225,7 +226,7 @@ double star_force_N(const BondElement& p, double rate, double time_s) {
 
 /// What the straight path of a star answers in its last steps.
 void set_star_reference(const BondElement& p, double rate, double end_s, CheckedProblem& checked) {
-  checked.times_s = last_steps(end_s, kStep_s, kComparedSteps);
+  checked.times_s = last_steps(end_s, kCaseStep_s, kComparedSteps);
   checked.reference.resize(kComparedSteps);
   for (int i = 0; i < kComparedSteps; ++i) {
     checked.reference[i] = star_force_N(p, rate, checked.times_s[static_cast<std::size_t>(i)]);
@@ -237,12 +238,13 @@ LimitingCase pushed_star(std::string name, std::string setup, std::string expect
                          const Expect& expect) {
   const BondElement p = paper_element(0.02);
   const CornerStar star(p, true);
-  const double end = kStudySteps * kStep_s;
+  const double end = kStudySteps * kCaseStep_s;
   CheckedProblem checked;
   checked.problem =
       network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, depth_m}}));
   set_star_reference(p, depth_m / end, end, checked);
-  return tried(std::move(name), std::move(setup), std::move(expected), checked, kStep_s, expect);
+  return tried(std::move(name), std::move(setup), std::move(expected), checked, kCaseStep_s,
+               expect);
 }
 
 void add_stars(std::vector<LimitingCase>& limiting_cases) {
@@ -263,7 +265,7 @@ void add_stars(std::vector<LimitingCase>& limiting_cases) {
       0.02504, all_hold));
   const BondElement p = paper_element(0.02);
   const CornerStar star(p, false);
-  const double end = kStudySteps * kStep_s;
+  const double end = kStudySteps * kCaseStep_s;
   CheckedProblem checked;
   checked.problem =
       network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, 0.004}}));
@@ -272,7 +274,7 @@ void add_stars(std::vector<LimitingCase>& limiting_cases) {
       tried("buckling", "star, B not guided, 0 to 4 mm in 300 steps",
             "its stiffness across the plane is negative from the start: buckled; XPBD "
             "does not look and follows the straight path",
-            checked, kStep_s, [](StepRule rule) {
+            checked, kCaseStep_s, [](StepRule rule) {
               return rule == StepRule::xpbd ? StabilityClass::holds : StabilityClass::buckled;
             }));
 }
@@ -286,15 +288,15 @@ void add_masses(std::vector<LimitingCase>& limiting_cases) {
     linear.mass_kg = mass;
     linear.drag_per_s = kDrag_per_s;
     const CheckedProblem checked =
-        problem_with_mass(p, mass, kDrag_per_s, 0.05, kStudySteps * kStep_s, kStep_s);
+        problem_with_mass(p, mass, kDrag_per_s, 0.05, kStudySteps * kCaseStep_s, kCaseStep_s);
     limiting_cases.push_back(
         tried("mass " + significant(mass, 2) + " kg", "0.05 N in a step and held, drag 20 1/s",
               mass < 1.0 ? "far above 2/omega: explicit rules grow, midpoint, Newmark and the "
                            "exponential rule on them ring, damped rules hold"
                          : "hardly moves: all hold",
-              checked, kStep_s, [&](StepRule rule) {
+              checked, kCaseStep_s, [&](StepRule rule) {
                 const auto limit = stable_step_s(rule, linear);
-                if (limit && kStep_s > *limit) return StabilityClass::diverged;
+                if (limit && kCaseStep_s > *limit) return StabilityClass::diverged;
                 const bool rings = rule == StepRule::implicit_midpoint ||
                                    rule == StepRule::newmark || rule == StepRule::exponential;
                 return rings && mass < 1.0 ? StabilityClass::oscillates : StabilityClass::holds;

@@ -41,7 +41,9 @@ double ramp_hold_force(double depth, double rate, double time_after_ramp, double
   const Protocol protocol = ramp_and_hold(depth, rate, time_after_ramp);
   const TpmVector parameters = to_vector({E1, E2, Eprime, eta1, spacing, A0, l0});
   const std::array times{protocol.end_s()};
-  return make_model("closed_form")->respond(protocol, times, parameters, Want::values).value[0];
+  return tpm::make_model("closed_form")
+      ->respond(protocol, times, parameters, Want::values)
+      .value[0];
 }
 
 double creep_depth(double load, double time, double lambda1, double E1, double E2, double eta1,
