@@ -22,7 +22,7 @@ struct MapPlan {
 
 constexpr double kMapDepth_m = 0.004;
 constexpr double kMapTau_s = 0.1;
-constexpr double kDrag_per_s = 20.0;
+constexpr double kMapDrag_per_s = 20.0;
 
 MapPlan over_relaxation_time(int along) {
   return {"relaxation_time",
@@ -122,7 +122,7 @@ MapPlan over_stiffness(int along) {
       "stiffness", "E1 = E2", "Pa",
       "sphere of 4.4 g, drag 20 1/s, tau = 0.1 s, a load in a step and held that leads to 4 mm",
       evenly_in_log(1e2, 1e8, along),
-      [material](double x) { return sphere(material(x), kSphereMass_kg, kDrag_per_s); }, material);
+      [material](double x) { return sphere(material(x), kSphereMass_kg, kMapDrag_per_s); }, material);
 }
 
 MapPlan over_mass(int along) {
@@ -130,7 +130,7 @@ MapPlan over_mass(int along) {
       "mass", "mass", "kg",
       "E1 = E2 = 12 kPa, drag 20 1/s, tau = 0.1 s, a load in a step and held that leads to 4 mm",
       evenly_in_log(1e-8, 1e1, along),
-      [](double x) { return sphere(without_tension(kMapTau_s), x, kDrag_per_s); },
+      [](double x) { return sphere(without_tension(kMapTau_s), x, kMapDrag_per_s); },
       [](double) { return without_tension(kMapTau_s); });
 }
 

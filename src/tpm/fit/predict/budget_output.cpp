@@ -118,10 +118,10 @@ std::string to_csv(const ErrorBudget& b) {
   for (std::size_t i = 0; i < b.time_s.size(); ++i) {
     text += significant(b.time_s[i], kDigits);
     for (const BudgetStage& stage : b.stages) {
-      text += "," + significant(stage.force_N[i], kDigits);
+      text += fmt::format(",{}", significant(stage.force_N[i], kDigits));
     }
     for (const BudgetLine& line : b.lines) {
-      text += "," + significant(line.difference_N[i], kDigits);
+      text += fmt::format(",{}", significant(line.difference_N[i], kDigits));
     }
     text += "\n";
   }

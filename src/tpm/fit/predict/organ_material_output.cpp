@@ -420,9 +420,9 @@ std::string to_csv(const OrganMaterial& m) {
     for (std::size_t i = 0; i < c.time_s.size(); ++i) {
       text += fmt::format("{},{}", k + 1, significant(c.time_s[i], kDigits));
       for (const auto* column : {&c.depth_m, &c.law_N, &c.correspondence_N, &c.organ_N}) {
-        text += "," + significant((*column)[i], kDigits);
+        text += fmt::format(",{}", significant((*column)[i], kDigits));
       }
-      if (measured) text += "," + significant(c.measured_N[i], kDigits);
+      if (measured) text += fmt::format(",{}", significant(c.measured_N[i], kDigits));
       text += "\n";
     }
   }
