@@ -12,12 +12,12 @@ std::size_t quantities(const CurvePoint& point) {
   return 2 + point.beside.size();
 }
 
-double& quantity(CurvePoint& point, std::size_t index) {
+double& response_of(CurvePoint& point, std::size_t index) {
   if (index == 0) return point.response;
   return index == 1 ? point.force_on_tissue_N : point.beside[index - 2];
 }
 
-double quantity(const CurvePoint& point, std::size_t index) {
+double response_of(const CurvePoint& point, std::size_t index) {
   if (index == 0) return point.response;
   return index == 1 ? point.force_on_tissue_N : point.beside[index - 2];
 }
@@ -48,12 +48,12 @@ CurvePoint vertex(const CurvePoint& before, const CurvePoint& middle, const Curv
   };
   CurvePoint point = middle;
   point.time_s =
-      std::clamp(parabola([&](const CurvePoint& p) { return quantity(p, index); }).vertex_s(),
+      std::clamp(parabola([&](const CurvePoint& p) { return response_of(p, index); }).vertex_s(),
                  times[0], times[2]);
   point.imposed = parabola([](const CurvePoint& p) { return p.imposed; }).at(point.time_s);
   for (std::size_t i = 0; i < quantities(point); ++i) {
-    quantity(point, i) =
-        parabola([&](const CurvePoint& p) { return quantity(p, i); }).at(point.time_s);
+    response_of(point, i) =
+        parabola([&](const CurvePoint& p) { return response_of(p, i); }).at(point.time_s);
   }
   return point;
 }
@@ -64,7 +64,7 @@ void CurveExtremes::see(const CurvePoint& point) {
   if (!counts(point)) return;
   largest_.resize(quantities(point), 0.0);
   for (std::size_t i = 0; i < largest_.size(); ++i) {
-    largest_[i] = std::max(largest_[i], std::abs(quantity(point, i)));
+    largest_[i] = std::max(largest_[i], std::abs(response_of(point, i)));
   }
 }
 
@@ -75,7 +75,7 @@ bool CurveExtremes::exceeds(double value, std::size_t quantity) const {
 bool CurveExtremes::exceeded_by(const CurvePoint& point) const {
   if (!counts(point)) return false;
   for (std::size_t i = 0; i < quantities(point); ++i) {
-    if (exceeds(quantity(point, i), i)) return true;
+    if (exceeds(response_of(point, i), i)) return true;
   }
   return false;
 }
@@ -85,17 +85,17 @@ std::vector<CurvePoint> CurveExtremes::step(const CurvePoint& point) {
   std::vector<CurvePoint> found;
   for (std::size_t i = 0; i < quantities(point) && !steps_.empty(); ++i) {
     const CurvePoint& middle = steps_.back();
-    const double size = std::abs(quantity(middle, i));
-    if (size < std::abs(quantity(point, i))) continue;
+    const double size = std::abs(response_of(middle, i));
+    if (size < std::abs(response_of(point, i))) continue;
     if (steps_.size() == 1) {
       if (exceeds(size, i)) found.push_back(middle);
       continue;
     }
     const CurvePoint& before = steps_.front();
-    const double size_before = std::abs(quantity(before, i));
-    if (size < size_before || size == std::abs(quantity(point, i))) continue;
+    const double size_before = std::abs(response_of(before, i));
+    if (size < size_before || size == std::abs(response_of(point, i))) continue;
     CurvePoint extreme = vertex(before, middle, point, i);
-    if (exceeds(quantity(extreme, i), i)) found.push_back(std::move(extreme));
+    if (exceeds(response_of(extreme, i), i)) found.push_back(std::move(extreme));
   }
   if (steps_.size() == 2) steps_.erase(steps_.begin());
   steps_.push_back(point);

@@ -9,14 +9,14 @@ namespace {
 
 constexpr std::uint8_t kVtkLine = 3;
 
-std::int64_t whole(std::size_t size) {
+std::int64_t as_int64(std::size_t size) {
   return static_cast<std::int64_t>(size);
 }
 
 /// k times `rows` for each output k: where its rows begin in a list of all outputs.
 std::vector<std::int64_t> offsets(std::size_t outputs, std::size_t rows) {
   std::vector<std::int64_t> list;
-  for (std::size_t k = 0; k < outputs; ++k) list.push_back(whole(k * rows));
+  for (std::size_t k = 0; k < outputs; ++k) list.push_back(as_int64(k * rows));
   return list;
 }
 
@@ -26,14 +26,14 @@ void write_topology(const Network& network, Hdf5Writer& file) {
   std::vector<std::int64_t> begins{0};
   std::vector<std::int32_t> kind;
   for (const Bond& bond : network.bonds) {
-    ends.push_back(whole(bond.a));
-    ends.push_back(whole(bond.b));
-    begins.push_back(whole(ends.size()));
+    ends.push_back(as_int64(bond.a));
+    ends.push_back(as_int64(bond.b));
+    begins.push_back(as_int64(ends.size()));
     kind.push_back(bond.kind == BondKind::radial ? 0 : 1);
   }
-  file.long_integers("/VTKHDF/NumberOfPoints", {whole(network.organ.size())});
-  file.long_integers("/VTKHDF/NumberOfCells", {whole(network.bonds.size())});
-  file.long_integers("/VTKHDF/NumberOfConnectivityIds", {whole(ends.size())});
+  file.long_integers("/VTKHDF/NumberOfPoints", {as_int64(network.organ.size())});
+  file.long_integers("/VTKHDF/NumberOfCells", {as_int64(network.bonds.size())});
+  file.long_integers("/VTKHDF/NumberOfConnectivityIds", {as_int64(ends.size())});
   file.long_integers("/VTKHDF/Connectivity", ends);
   file.long_integers("/VTKHDF/Offsets", begins);
   file.bytes("/VTKHDF/Types", std::vector<std::uint8_t>(network.bonds.size(), kVtkLine));
@@ -117,7 +117,7 @@ void write_steps(const Network& network, const std::vector<QuasiStaticState>& ou
   file.long_integers("/VTKHDF/Steps/PointOffsets", offsets(outputs.size(), network.organ.size()));
   file.long_integers("/VTKHDF/Steps/CellOffsets", still);
   file.long_integers("/VTKHDF/Steps/ConnectivityIdOffsets", still);
-  file.attribute("/VTKHDF/Steps", "NSteps", std::vector{whole(outputs.size())});
+  file.attribute("/VTKHDF/Steps", "NSteps", std::vector{as_int64(outputs.size())});
 }
 
 }  // namespace
