@@ -128,6 +128,12 @@ TEST_CASE("contact within a jump is said with the option that states it", "[chan
       prepare_recording("ramp.csv", pressed_at_steps(ramp_of_two_seconds, 30.0, 2e-4));
   const FitConfig config = selected_of_channels(ramped).candidates.front().fit.config;
   CHECK(contact_in_jump_words(ramped, config).empty());
+  // A ramp of few samples is no jump, though each of them is more than a tenth of the travel.
+  const auto coarse = [](double t) {
+    return 4e-3 * std::clamp((t - 2.0) / (8.0 * kSampling_s), 0.0, 1.0);
+  };
+  const PreparedRecording few = prepare_recording("few.csv", pressed_at_steps(coarse, 30.0, 2e-4));
+  CHECK(contact_in_jump_words(few, config).empty());
 }
 
 TEST_CASE("where cycles turn is no rest", "[channels]") {

@@ -15,16 +15,21 @@ struct JumpIntoContact {
   std::size_t before = 0, after = 0;
 };
 
-/// None if the drive goes on beyond contact by small steps.
+/// None if the drive goes on beyond contact by small steps, or as in a ramp of few samples.
 std::optional<JumpIntoContact> jump_into_contact(const PreparedRecording& r) {
-  constexpr double kJump = 0.1;  // of the travel: coefficients are as uncertain
+  constexpr double kJump = 0.1;      // of the travel: coefficients are as uncertain
+  constexpr double kMuchOfIt = 0.3;  // of the travel: a jump, whatever follows
+  constexpr double kLikeARamp = 0.5;
   const std::vector<double>& drive = r.recording.drive;
   const std::size_t contact = r.phases.contact_index;
   if (contact + 1 >= drive.size()) return std::nullopt;
   const double begin =
       *std::min_element(drive.begin(), drive.begin() + static_cast<std::ptrdiff_t>(contact) + 1);
   const double travel = r.phases.peak_drive - begin;
-  if (!(drive[contact + 1] - drive[contact] > kJump * travel)) return std::nullopt;
+  const double jump = drive[contact + 1] - drive[contact];
+  const double next = contact + 2 < drive.size() ? drive[contact + 2] - drive[contact + 1] : 0.0;
+  const bool of_a_ramp = jump <= kMuchOfIt * travel && next > kLikeARamp * jump;
+  if (!(jump > kJump * travel) || of_a_ramp) return std::nullopt;
   return JumpIntoContact{contact, contact + 1};
 }
 
