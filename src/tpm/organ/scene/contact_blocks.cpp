@@ -99,8 +99,9 @@ const Kinds<ContactKeys, ContactKind>& contact_kinds() {
   patch.push_back(radius);
   std::vector<Key<K>> tool = common({.least = 0.0, .most = 1e3});
   tool.push_back(radius);
-  tool.push_back(key("stiffness", &K::stiffness_N_per_m, quantity(Dimension::stiffness, kAboveZero),
-                     "of each contact; default: 10000 times the stiffest bond"));
+  tool.push_back(
+      key("stiffness", &K::stiffness_N_per_m, quantity(Dimension::stiffness, kAboveZero),
+          "of each contact; default: 10000 times the stiffest bond, inertial 1000000 times"));
   tool.push_back(key("mass_kg", &K::mass_kg, number(kAboveZero),
                      "of the tool, where the formulation has mass"));
   const auto word = [](ContactKind kind) { return std::string(to_string(kind)); };
