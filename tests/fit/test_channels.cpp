@@ -150,8 +150,9 @@ TEST_CASE("where cycles turn is no rest", "[channels]") {
   CHECK(rests.zero->sd < 1e-4);
   // The answer says which part was fitted and how to fit more.
   const Selection s = selected_of_channels(cycles);
-  const std::vector<std::string> words = outside_words(s.candidates.front().fit);
-  REQUIRE_FALSE(words.empty());
-  CHECK_THAT(words.back(), Contains("fitted from 2 to 6 s") && Contains("\"to\" in config.json") &&
-                               Contains("--until"));
+  const std::vector<Remark> remarks = outside_remarks(s.candidates.front().fit);
+  REQUIRE_FALSE(remarks.empty());
+  CHECK(remarks.back().code == "fitted_part");
+  CHECK_THAT(remarks.back().text, Contains("fitted from 2 to 6 s") &&
+                                      Contains("\"to\" in config.json") && Contains("--until"));
 }
