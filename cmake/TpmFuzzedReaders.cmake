@@ -5,8 +5,8 @@ set(readers_files check_sum checksum contained delimited document_place file fil
     other_kind row_log separator unit_words zip_archive)
 set(readers_files_keys file_kind form types)
 set(readers_files_hdf5 hdf5_contents hdf5_driver hdf5_handle hdf5_reader)
-set(readers_files_import assemble cantilever clock_text column_choice column_meaning column_title contact description
-    file_kind header_words import import_digitizer import_jpk import_machine import_wpd_json jpk_channel jpk_properties machine_columns machine_header
+set(readers_files_import assemble cantilever clock_text column_choice column_title contact description
+    file_kind header_words import import_digitizer import_jpk import_machine import_wpd_json jpk_segment machine_columns machine_header
     reading_options recording_file rows step_clock table_block)
 set(readers_data drive_pieces)
 set(readers_files_blocks law_file)

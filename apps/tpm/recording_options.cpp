@@ -9,9 +9,8 @@
 #include "tpm/files/import/reading_options.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
-#include "tpm/fit/select/instrument_of_recording.hpp"
+#include "tpm/fit/select/file_remarks.hpp"
 #include "tpm/fit/select/placement_parameters.hpp"
-#include "tpm/fit/select/rows_left_out.hpp"
 #include "tpm/fit/select/selection.hpp"
 #include "tpmkit/error.hpp"
 

@@ -13,7 +13,7 @@
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/description.hpp"
 #include "tpm/files/import/import.hpp"
-#include "tpm/files/import/jpk_properties.hpp"
+#include "tpm/files/import/jpk_segment.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/files/zip_archive.hpp"

@@ -8,9 +8,9 @@
 
 #include "tpm/base/random.hpp"
 #include "tpm/fit/select/channel_cause.hpp"
-#include "tpm/fit/select/contact_in_jump.hpp"
 #include "tpm/fit/select/placement.hpp"
 #include "tpm/fit/select/selection.hpp"
+#include "tpm/fit/select/unseen_rises.hpp"
 
 using namespace tpm;
 using namespace tpm::base;

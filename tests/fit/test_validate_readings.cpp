@@ -8,7 +8,7 @@
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/predict/error_budget.hpp"
-#include "tpm/fit/select/instrument_of_recording.hpp"
+#include "tpm/fit/select/file_remarks.hpp"
 
 namespace tpm::fit {
 

@@ -12,8 +12,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/contact.hpp"
-#include "tpm/files/import/jpk_channel.hpp"
-#include "tpm/files/import/jpk_properties.hpp"
+#include "tpm/files/import/jpk_segment.hpp"
 #include "tpm/files/zip_archive.hpp"
 #include "tpmkit/error.hpp"
 

@@ -6,8 +6,8 @@
 #include <array>
 #include <cctype>
 
-#include "tpm/files/import/column_meaning.hpp"
 #include "tpm/files/import/column_title.hpp"
+#include "tpm/files/import/machine_columns.hpp"
 #include "tpm/files/unit_words.hpp"
 #include "tpmkit/error.hpp"
 

@@ -5,11 +5,10 @@
 #include <utility>
 
 #include "tpm/files/import/recording_file.hpp"
+#include "tpm/fit/select/file_remarks.hpp"
 #include "tpm/fit/select/imposed_channel.hpp"
-#include "tpm/fit/select/instrument_of_recording.hpp"
 #include "tpm/fit/select/material_function.hpp"
 #include "tpm/fit/select/recording_setup.hpp"
-#include "tpm/fit/select/rows_left_out.hpp"
 #include "tpm/fit/select/selection.hpp"
 
 namespace tpm::fit {

@@ -11,7 +11,6 @@
 #include "tpm/base/text.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
 #include "tpm/fit/select/channel_cause.hpp"
-#include "tpm/fit/select/contact_in_jump.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/select/gate.hpp"
 #include "tpm/fit/select/placement.hpp"

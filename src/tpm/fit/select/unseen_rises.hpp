@@ -38,4 +38,11 @@ void add_rise_delays(FitConfig& config, const PreparedRecording& recording, std:
 /// without such a rise.
 [[nodiscard]] std::string unseen_rise_words(const PreparedRecording& recording);
 
+/// Where a probe met the tissue within a jump of the drive, so that no sample tells at which depth:
+/// says so, what the fit supposes, and the option that states it. Empty if the onset is sampled, if
+/// contact is stated, and for recordings that are no indentations.
+/// @param config that was fitted
+[[nodiscard]] std::string contact_in_jump_words(const PreparedRecording& recording,
+                                                const FitConfig& config);
+
 }  // namespace tpm::fit

@@ -1,10 +1,20 @@
-#include "tpm/fit/select/instrument_of_recording.hpp"
+#include "tpm/fit/select/file_remarks.hpp"
 
 #include <fmt/format.h>
+
 
 #include "tpm/base/text.hpp"
 
 namespace tpm::fit {
+
+void warn_of_rows_left_out(PreparedRecording& recording,
+                           const std::vector<ImportFinding>& findings) {
+  for (const ImportFinding& finding : findings) {
+    if (finding.what != "missing") continue;
+    recording.remarks.push_back(
+        {"rows_left_out", fmt::format("{}: {}", recording.name, finding.value)});
+  }
+}
 
 void take_instrument(PreparedRecording& recording, const std::filesystem::path& file) {
   const auto block = instrument_beside(file);
