@@ -158,8 +158,8 @@ class AxisReader {
   std::set<std::string> names_, targets_;
 };
 
-void add_formulas(const std::vector<OutputKeys>& outputs, Sweep& sweep) {
-  for (const OutputKeys& output : outputs) {
+void add_formulas(const std::vector<SweepOutputKeys>& outputs, Sweep& sweep) {
+  for (const SweepOutputKeys& output : outputs) {
     if (output.kind) continue;
     sweep.formulas.push_back({output.name, output.formula});
     sweep.variables.push_back({output.name, "", output.formula, {}});

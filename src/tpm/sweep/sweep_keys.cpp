@@ -85,37 +85,38 @@ const Block<ValueKeys>& times_block() {
 }
 
 /// Those that stand in an object, with a name.
-const Kinds<OutputKeys, std::optional<SweepOutput::Kind>>& named_outputs() {
-  using Named = files::Kind<OutputKeys, std::optional<SweepOutput::Kind>>;
+const Kinds<SweepOutputKeys, std::optional<SweepOutput::Kind>>& named_outputs() {
+  using Named = files::Kind<SweepOutputKeys, std::optional<SweepOutput::Kind>>;
   const auto made = [] {
-    const Key<OutputKeys> name =
-        required(key("name", &OutputKeys::name, name_type(), "in results and formulas"));
+    const Key<SweepOutputKeys> name =
+        required(key("name", &SweepOutputKeys::name, name_type(), "in results and formulas"));
     std::vector<Named> kinds;
     for (const OutputForm& output : output_forms()) {
       if (output.when == OutputForm::When::fixed) continue;
       const std::string word(output.text);
-      Key<OutputKeys> when =
+      Key<SweepOutputKeys> when =
           output.when == OutputForm::When::at
-              ? key(word, &OutputKeys::time_s, quantity(Dimension::time, kZeroOrMore), "when")
-              : key(word, &OutputKeys::times, times_block().type(), "when");
+              ? key(word, &SweepOutputKeys::time_s, quantity(Dimension::time, kZeroOrMore), "when")
+              : key(word, &SweepOutputKeys::times, times_block().type(), "when");
       kinds.push_back(
           {output.meaning, word, std::string(output.words), {required(std::move(when)), name}});
     }
-    const Key<OutputKeys> formula = key("formula", &OutputKeys::formula, text(1), "an expression");
+    const Key<SweepOutputKeys> formula =
+        key("formula", &SweepOutputKeys::formula, text(1), "an expression");
     kinds.push_back({std::nullopt,
                      "formula",
                      "of parameters and outputs before it, SI",
                      {required(formula), name}});
-    return Kinds<OutputKeys, std::optional<SweepOutput::Kind>>(
-        {.name = "named_output", .sentence = "an output with a name", .by = ""}, &OutputKeys::kind,
-        std::move(kinds));
+    return Kinds<SweepOutputKeys, std::optional<SweepOutput::Kind>>(
+        {.name = "named_output", .sentence = "an output with a name", .by = ""},
+        &SweepOutputKeys::kind, std::move(kinds));
   };
   static const auto kinds = made();
   return kinds;
 }
 
 /// A word, whose name is the word, or an object with a name.
-ValueType<OutputKeys> output_type() {
+ValueType<SweepOutputKeys> output_type() {
   std::vector<std::string> words;
   for (const OutputForm& output : output_forms()) {
     if (output.when == OutputForm::When::fixed) words.emplace_back(output.text);
@@ -123,12 +124,12 @@ ValueType<OutputKeys> output_type() {
   return {either_form({one_of(std::move(words)).form, named_outputs().form()}),
           [](const Json& value, const DocumentPlace& place) {
             if (!value.is_string()) return named_outputs().made(value, place);
-            OutputKeys plain;
+            SweepOutputKeys plain;
             plain.name = value.get<std::string>();
             plain.kind = find_entry(output_forms(), plain.name)->meaning;
             return plain;
           },
-          [](const OutputKeys& output) {
+          [](const SweepOutputKeys& output) {
             const auto of_name = output_forms();
             const auto* plain = find_entry(of_name, output.name);
             return plain != nullptr && plain->meaning == output.kind

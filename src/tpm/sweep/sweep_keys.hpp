@@ -43,7 +43,7 @@ struct SweepKeys {
   SweepSubject subject = SweepSubject::single_contact;
   std::string title, description;
   std::vector<AxisKeys> axes;
-  std::vector<OutputKeys> outputs;
+  std::vector<SweepOutputKeys> outputs;
   std::vector<SkipCondition> skip;
   std::optional<std::uint64_t> block;
   // of a single contact

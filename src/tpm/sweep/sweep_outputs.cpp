@@ -58,11 +58,11 @@ std::span<const OutputForm> output_forms() {
   return kOutputWords;
 }
 
-std::vector<SweepOutput> outputs_of(const std::vector<OutputKeys>& outputs,
+std::vector<SweepOutput> outputs_of(const std::vector<SweepOutputKeys>& outputs,
                                     const DocumentPlace& place) {
   std::vector<SweepOutput> found;
   for (std::size_t i = 0; i < outputs.size(); ++i) {
-    const OutputKeys& said = outputs[i];
+    const SweepOutputKeys& said = outputs[i];
     if (!said.kind) continue;
     const OutputForm& form = entry_of(kOutputWords, *said.kind);
     SweepOutput output{

@@ -55,7 +55,7 @@ struct ValueKeys {
 };
 
 /// An output as a file says it.
-struct OutputKeys {
+struct SweepOutputKeys {
   std::optional<SweepOutput::Kind> kind;  ///< none: a formula
   std::string name;
   double time_s = 0.0;  ///< of one at a time
@@ -64,7 +64,7 @@ struct OutputKeys {
 };
 
 /// Those of the model, without formulas. Throws Error(bad_input).
-[[nodiscard]] std::vector<SweepOutput> outputs_of(const std::vector<OutputKeys>& outputs,
+[[nodiscard]] std::vector<SweepOutput> outputs_of(const std::vector<SweepOutputKeys>& outputs,
                                                   const DocumentPlace& place);
 
 /// Two ends and how what lies between is spread. Throws Error(bad_input).

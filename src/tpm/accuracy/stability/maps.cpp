@@ -122,7 +122,8 @@ MapPlan over_stiffness(int along) {
       "stiffness", "E1 = E2", "Pa",
       "sphere of 4.4 g, drag 20 1/s, tau = 0.1 s, a load in a step and held that leads to 4 mm",
       evenly_in_log(1e2, 1e8, along),
-      [material](double x) { return sphere(material(x), kSphereMass_kg, kMapDrag_per_s); }, material);
+      [material](double x) { return sphere(material(x), kSphereMass_kg, kMapDrag_per_s); },
+      material);
 }
 
 MapPlan over_mass(int along) {
