@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-
 #include "tpm/base/text.hpp"
 
 namespace tpm::fit {

@@ -101,7 +101,8 @@ std::vector<double> local_spacings(const Organ& organ, std::span<const Neighbour
     std::vector<double>& d = distances[i];
     if (d.size() < kLatticeNeighbours) continue;
     std::sort(d.begin(), d.end());
-    const double mean = std::accumulate(d.begin(), d.begin() + kLatticeNeighbours, 0.0) / kLatticeNeighbours;
+    const double mean =
+        std::accumulate(d.begin(), d.begin() + kLatticeNeighbours, 0.0) / kLatticeNeighbours;
     spacing[i] = std::min(mean, organ.spacing);
   }
   return spacing;
