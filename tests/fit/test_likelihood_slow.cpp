@@ -252,7 +252,7 @@ TEST_CASE("correlated noise widens the intervals, and ignoring it is a choice") 
   CHECK(wider > 1.5);
   CHECK(wider < 1.5 * std::sqrt(adjusted.inflation));
   CHECK(*find(adjusted, "k1").standard_error > *find(ignored, "k1").standard_error);
-  CHECK(test::has_remark(adjusted.remarks, "correlated_residuals"));
+  CHECK(test::has_remark(adjusted.remarks, "correlated_noise"));
   CHECK_THAT(to_terminal_text(adjusted), Contains("a: 400 of 400 samples fitted, rms residual"));
 }
 
