@@ -177,7 +177,7 @@ def check_served(chromium, address, folder):
 def check_client(hand, client, tpm, served, name, folder):
     """Whether a session of a client was there to be looked at: a machine that stalls ends it."""
     run = Program(tpm, "hil", "run", name / "run.json", "--device", "inverse3", "--inverse-port", served[0],
-                  "--inverse-events-port", served[1], "--page", "0", "--page-wait", "120 s", "-o", name / "r.tpmrec")
+                  "--inverse-events-port", served[1], "--page", "0", "--page-wait", "120 s", "-o", name / "r.tpmrec", "--overwrite")
     try:
         client.open(run.told(r"page: (http://\S+)")[0])
         # The hand rises into the air, and goes down when the session has begun.
