@@ -199,7 +199,22 @@ double rise_s(const PreparedRecording& r) {
 
 /// True if the preferred law gains by a branch that is a dashpot: a filter looks the same.
 bool prefers_a_dashpot(const Selection& s) {
-  return s.preferred && s.candidates[*s.preferred].reason.find("a dashpot") != std::string::npos;
+  if (!s.preferred) return false;
+  return std::ranges::any_of(
+      s.candidates[*s.preferred].fit.parameters, [](const ParameterResult& p) {
+        return !p.nuisance && p.at_lower_bound && p.parameter.unit.dimension == Dimension::time;
+      });
+}
+
+/// True if a law that was fitted describes the recording, by its rests.
+bool one_describes(const Selection& s, std::span<const PreparedRecording> recordings) {
+  return std::ranges::any_of(s.candidates, [&](const Candidate& c) {
+    if (c.failed) return false;
+    FitResult fit = c.fit;
+    fit.adequacy.reset();
+    state_adequacy(fit, recordings);
+    return fit.adequacy && fit.adequacy->is_adequate();
+  });
 }
 
 }  // namespace
@@ -228,8 +243,7 @@ void name_channel_cause(Selection& s, std::span<const PreparedRecording> recordi
       r.clipped_above || r.clipped_below || r.recording.time_s.size() > kMost) {
     return;
   }
-  const bool none_tried = fit.adequacy->summary.starts_with("no law tried");
-  if (!none_tried && !prefers_a_dashpot(s)) return;
+  if (one_describes(s, recordings) && !prefers_a_dashpot(s)) return;
   SetupOptions quick = setup;
   quick.profiles = false;
   quick.placements = nullptr;
