@@ -7,8 +7,7 @@
 #   scripts/fuzz.sh 60             a minute each
 #   scripts/fuzz.sh 300 scene stl  five minutes for two of them
 #   scripts/fuzz.sh --readers 3    only what reads is instrumented, the rest is that of build/release, which has to be
-#                                  there: built in a minute; scripts/check.sh runs it. Below a minute each it is one
-#                                  run without coverage
+#                                  there; scripts/check.sh runs it. Below a minute each it is one run without coverage
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
