@@ -5,6 +5,7 @@
 
 #include "hil_scenes.hpp"
 #include "run_in.hpp"
+#include "support/remarks.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
@@ -68,7 +69,7 @@ SaidOfRecording everything_said_of(const HilRecording& recording, const test::Te
           view_recording(folder / "viewed.tpmrec", "", plain).description.dump(),
           verification_json(recording, v),
           read_json(folder / "page/report.json"),
-          file.has("/remarks") ? file.texts("/remarks") : std::vector<std::string>()};
+          file.has("/remarks/text") ? file.texts("/remarks/text") : std::vector<std::string>()};
 }
 
 bool is_among(const std::vector<std::string>& lines, const std::string& words) {
@@ -110,7 +111,7 @@ TEST_CASE("A recording that was cut off is verified as far as it goes, and is no
   put_recording(recording, folder / "cut.tpmrec");
   const SessionCheck check = verify_session(folder / "cut.tpmrec");
   CHECK_FALSE(check.whole);
-  CHECK(is_among(check.notes, "cut off"));
+  CHECK(test::has_remark(check.remarks, "cut_off"));
   for (const char* const command : {"hil verify cut.tpmrec", "hil export cut.tpmrec -o cut.h5"}) {
     CAPTURE(command);
     const test::ProgramRun run = test::run_in(folder, command);
