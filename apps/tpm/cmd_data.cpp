@@ -11,6 +11,7 @@
 #include "tpm/files/import/pack.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/files/require_exists.hpp"
+#include "tpm/show/table_document.hpp"
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 

@@ -12,11 +12,11 @@
 #include "answer.hpp"
 #include "command.hpp"
 #include "common_options.hpp"
-#include "data_text.hpp"
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/show/short_answer.hpp"
+#include "tpm/show/table_document.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::app {

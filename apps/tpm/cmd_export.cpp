@@ -89,8 +89,8 @@ int export_scene(const ExportTexts& texts, OrganTarget target) {
   const Tissue tissue =
       parse_tissue(scene, texts.law, std::filesystem::path(texts.law).parent_path());
   const std::string text = export_organ(tissue, options);
-  for (const std::string& warning : organ_export_warnings(tissue, options)) {
-    tell_user("tpm: warning: {} does not express {}\n", texts.to, warning);
+  for (const Remark& remark : organ_export_remarks(tissue, options)) {
+    tell_user("tpm: warning: {} does not express {}\n", texts.to, remark.text);
   }
   deliver(text, texts.output);
   return 0;

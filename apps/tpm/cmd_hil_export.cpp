@@ -26,7 +26,7 @@ int export_hil(const ExportChoice& choice, const Session& session) {
                                {"rows", recording.rows.size()},
                                {"whole", recording.whole()},
                                {"damaged_rows", recording.damaged},
-                               {"end", recording.cause()},
+                               {"cause", recording.cause()},
                                {"remarks", remarks_json(recording_remarks(recording))},
                                {"simulated_device", recording.simulated()}},
                           {{"recording_whole", recording.whole()}}));

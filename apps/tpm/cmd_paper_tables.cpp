@@ -51,10 +51,7 @@ std::vector<double> lengths(const std::string& text, std::string_view option) {
   std::size_t from = 0;
   for (std::size_t comma = text.find(','); from <= text.size(); comma = text.find(',', from)) {
     const std::size_t end = std::min(comma, text.size());
-    std::string part = text.substr(from, end - from);
-    part.erase(0, part.find_first_not_of(' '));
-    part.erase(part.find_last_not_of(' ') + 1);
-    parts.push_back(std::move(part));
+    parts.emplace_back(trimmed(std::string_view(text).substr(from, end - from)));
     from = end + 1;
   }
   const std::string_view last = split_quantity(parts.back()).unit;

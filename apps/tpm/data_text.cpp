@@ -1,18 +1,18 @@
 #include "data_text.hpp"
 
 #include <fmt/format.h>
-#include <utf8.h>
 
 #include <algorithm>
 
 #include "tpm/base/quantity_text.hpp"
 #include "tpm/base/text.hpp"
+#include "tpm/show/table_document.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {
 
-using Table = std::vector<std::vector<std::string>>;
+using TextTable = std::vector<std::vector<std::string>>;
 
 Unit shown_unit_of(Quantity quantity) {
   return shown_unit(quantity_dimension(quantity));
@@ -37,8 +37,8 @@ std::string reading(const std::optional<double>& value, const std::optional<doub
 }
 
 /// Columns without any entry say nothing.
-Table without_empty_columns(const Table& rows) {
-  Table kept(rows.size());
+TextTable without_empty_columns(const TextTable& rows) {
+  TextTable kept(rows.size());
   for (std::size_t c = 0; c < rows.front().size(); ++c) {
     const bool filled =
         std::any_of(rows.begin() + 1, rows.end(), [c](const auto& row) { return !row[c].empty(); });
@@ -53,9 +53,9 @@ std::string points_text(const PointSet& points) {
   const bool force = points.observable == Observable::contact_force;
   const double to_si = shown_unit_of(observed).to_si;
   const std::string band = " (or band)";
-  Table table{{force ? title(Quantity::indentation_depth) : title(Quantity::load), "label",
-               title(Quantity::time), title(observed, band), title(observed, " sd"), "provenance",
-               "where", "note"}};
+  TextTable table{{force ? title(Quantity::indentation_depth) : title(Quantity::load), "label",
+                   title(Quantity::time), title(observed, band), title(observed, " sd"),
+                   "provenance", "where", "note"}};
   for (const Datum& datum : points.data) {
     table.push_back({force ? cell(datum.depth_m, 1e-3) : cell(datum.load_N, 1.0), datum.label,
                      cell(datum.time_s, 1.0), reading(datum.value, datum.lower, datum.upper, to_si),
@@ -75,9 +75,9 @@ std::string points_text(const PointSet& points) {
 std::string recording_text(const Recording& recording, bool all_rows) {
   constexpr std::size_t kEnds = 5;  // samples shown at either end of a long recording
   const std::size_t size = recording.response.size();
-  Table table{{title(Quantity::time), title(recording.drive_quantity),
-               title(recording.response_quantity), title(recording.response_quantity, " sd"),
-               "provenance"}};
+  TextTable table{{title(Quantity::time), title(recording.drive_quantity),
+                   title(recording.response_quantity), title(recording.response_quantity, " sd"),
+                   "provenance"}};
   const auto at = [](const std::vector<double>& values, std::size_t i, double to_si) {
     return values.empty() ? std::string() : significant(values[i] / to_si, 6);
   };
@@ -99,9 +99,9 @@ std::string recording_text(const Recording& recording, bool all_rows) {
 std::string spectrum_text(const Spectrum& spectrum) {
   const SpectrumQuantities quantities = spectrum_quantities(spectrum.dimension);
   const double to_si = shown_unit(spectrum.dimension).to_si;
-  Table table{{title(Quantity::frequency), title(quantities.storage),
-               title(quantities.storage, " sd"), title(quantities.loss),
-               title(quantities.loss, " sd"), "provenance"}};
+  TextTable table{{title(Quantity::frequency), title(quantities.storage),
+                   title(quantities.storage, " sd"), title(quantities.loss),
+                   title(quantities.loss, " sd"), "provenance"}};
   const auto at = [to_si](const std::vector<double>& values, std::size_t i) {
     return values.empty() ? std::string() : significant(values[i] / to_si, 6);
   };
@@ -114,7 +114,7 @@ std::string spectrum_text(const Spectrum& spectrum) {
 }
 
 std::string values_text(const ValueSet& set) {
-  Table table{{"name", "quantity", "value", "unit", "provenance", "where", "formula", "note"}};
+  TextTable table{{"name", "quantity", "value", "unit", "provenance", "where", "formula", "note"}};
   for (const NamedValue& value : set.values) {
     std::string number = reading(value.value, value.lower, value.upper, value.unit.to_si);
     if (value.plus_minus) number += " +- " + cell(value.plus_minus, value.unit.to_si);
@@ -236,28 +236,7 @@ void add_json(Json& json, const ValueSet& set) {
   });
 }
 
-std::size_t width_of(const std::string& text) {
-  return static_cast<std::size_t>(utf8::distance(text.begin(), text.end()));
-}
-
 }  // namespace
-
-std::string aligned(const std::vector<std::vector<std::string>>& rows) {
-  std::vector<std::size_t> widths(rows.front().size(), 0);
-  for (const auto& row : rows) {
-    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], width_of(row[c]));
-  }
-  std::string text;
-  for (const auto& row : rows) {
-    std::string line;
-    for (std::size_t c = 0; c < row.size(); ++c) {
-      line += row[c] + std::string(widths[c] + 2 - width_of(row[c]), ' ');
-    }
-    line.erase(line.find_last_not_of(' ') + 1);
-    text += line + "\n";
-  }
-  return text;
-}
 
 std::string curve_text(const Curve& curve, bool all_rows) {
   std::string text = header_text(curve_header(curve));

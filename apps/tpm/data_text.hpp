@@ -1,15 +1,11 @@
 #pragma once
 #include <string>
-#include <vector>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
 #include "tpmkit/curve_file.hpp"
 
 namespace tpm::app {
-
-/// A table with its columns lined up, two spaces between them, the first row its titles.
-[[nodiscard]] std::string aligned(const std::vector<std::vector<std::string>>& rows);
 
 /// A curve as a person reads it: mm, N, s, kPa, bands as "0.07 - 0.18", provenance in each row.
 /// Of a long recording only the beginning and the end, unless `all_rows`.

@@ -11,7 +11,7 @@
 #include "tpm/base/rising_values.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
-#include "tpm/show/table_document.hpp"
+#include "tpm/show/result_table.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_file.hpp"
@@ -34,38 +34,35 @@ std::optional<double> operating_depth(const SpectrumTexts& texts, const LawSpec&
                          "--depth");
 }
 
-std::string text_of(const LawFile& law, const std::vector<double>& frequency_Hz,
-                    const SpectrumResponse& r) {
-  const bool strip = law.spec.response == Quantity::stress;
-  const std::string unit = strip ? "Pa" : "N/m";
-  std::string text = fmt::format("{}: {}\n\n{:>12} {:>14} {:>14} {:>16} {:>10}\n",
-                                 law_name(law.spec), law_words(law.spec), "f [Hz]",
-                                 fmt::format("storage [{}]", unit), fmt::format("loss [{}]", unit),
-                                 strip ? "|eta*| [Pa s]" : "|eta*| [N s/m]", "tan delta");
+struct SpectrumRow {
+  double frequency_Hz, storage, loss, viscosity, loss_tangent;
+};
+
+std::vector<SpectrumRow> rows_of(const std::vector<double>& frequency_Hz,
+                                 const SpectrumResponse& r) {
   const Eigen::VectorXd viscosity = r.complex_viscosity(frequency_Hz);
   const Eigen::VectorXd tangent = r.loss_tangent();
+  std::vector<SpectrumRow> rows;
   for (std::size_t i = 0; i < frequency_Hz.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    text += fmt::format("{:>12} {:>14} {:>14} {:>16} {:>10}\n", significant(frequency_Hz[i], 4),
-                        significant(r.storage[row], 5), significant(r.loss[row], 5),
-                        significant(viscosity[row], 5), significant(tangent[row], 4));
+    const auto k = static_cast<Eigen::Index>(i);
+    rows.push_back({frequency_Hz[i], r.storage[k], r.loss[k], viscosity[k], tangent[k]});
   }
-  return text;
+  return rows;
 }
 
-Json json_of(const LawFile& law, const std::vector<double>& frequency_Hz,
-             const SpectrumResponse& r) {
-  constexpr int kDigits = 10;
-  const bool strip = law.spec.response == Quantity::stress;
-  const auto list = [&](const auto& values) {
-    return array_json(values, [](double v) { return rounded(v, kDigits); });
-  };
-  Json json{{"law", to_json(law)}, {"frequency_Hz", list(frequency_Hz)}};
-  json[strip ? "storage_Pa" : "storage_N_per_m"] = list(r.storage);
-  json[strip ? "loss_Pa" : "loss_N_per_m"] = list(r.loss);
-  json[strip ? "complex_viscosity_Pa_s" : "complex_viscosity_N_s_per_m"] =
-      list(r.complex_viscosity(frequency_Hz));
-  return json;
+/// @param strip the law answers with a stress, else with a force
+ResultTable<SpectrumRow> spectrum_table(bool strip) {
+  using Row = SpectrumRow;
+  using Of = ResultColumn<Row>;
+  constexpr int kDigits = 10, kShown = 5;
+  const std::string per = strip ? "_Pa" : "_N_per_m", unit = strip ? "[Pa]" : "[N/m]";
+  return {{Of("frequency_Hz", &Row::frequency_Hz, kDigits).shown("f [Hz]", 12),
+           Of("storage" + per, &Row::storage, kDigits).shown("storage " + unit, 14, 1.0, kShown),
+           Of("loss" + per, &Row::loss, kDigits).shown("loss " + unit, 14, 1.0, kShown),
+           Of(strip ? "complex_viscosity_Pa_s" : "complex_viscosity_N_s_per_m", &Row::viscosity,
+              kDigits)
+               .shown(strip ? "|eta*| [Pa s]" : "|eta*| [N s/m]", 16, 1.0, kShown),
+           Of("", &Row::loss_tangent).shown("tan delta", 10)}};
 }
 
 void require_finite(const std::vector<double>& frequency_Hz, const SpectrumResponse& r) {
@@ -79,22 +76,6 @@ void require_finite(const std::vector<double>& frequency_Hz, const SpectrumRespo
   }
 }
 
-std::string csv_of(const LawFile& law, const std::vector<double>& frequency_Hz,
-                   const SpectrumResponse& r) {
-  constexpr int kDigits = 10;
-  const bool strip = law.spec.response == Quantity::stress;
-  std::string text = csv_line({"frequency_Hz", strip ? "storage_Pa" : "storage_N_per_m",
-                               strip ? "loss_Pa" : "loss_N_per_m",
-                               strip ? "complex_viscosity_Pa_s" : "complex_viscosity_N_s_per_m"});
-  const Eigen::VectorXd viscosity = r.complex_viscosity(frequency_Hz);
-  for (std::size_t i = 0; i < frequency_Hz.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    text += csv_line({significant(frequency_Hz[i], kDigits), significant(r.storage[row], kDigits),
-                      significant(r.loss[row], kDigits), significant(viscosity[row], kDigits)});
-  }
-  return text;
-}
-
 }  // namespace
 
 int write_spectrum(const SpectrumTexts& texts, const Session& session) {
@@ -104,10 +85,15 @@ int write_spectrum(const SpectrumTexts& texts, const Session& session) {
   const SpectrumResponse r = respond_spectrum(law.spec, law.values, frequency_Hz,
                                               operating_depth(texts, law.spec), Want::values);
   require_finite(frequency_Hz, r);
-  deliver(session.json() ? answer_text(session, json_of(law, frequency_Hz, r))
-                         : text_of(law, frequency_Hz, r),
+  const std::vector<SpectrumRow> rows = rows_of(frequency_Hz, r);
+  const ResultTable<SpectrumRow> table = spectrum_table(law.spec.response == Quantity::stress);
+  Json json{{"law", to_json(law)}};
+  json.update(table.lists(rows));
+  deliver(session.json() ? answer_text(session, json)
+                         : fmt::format("{}: {}\n\n{}", law_name(law.spec), law_words(law.spec),
+                                       table.text(rows)),
           texts.output);
-  deliver_csv(csv_of(law, frequency_Hz, r), csv);
+  deliver_csv(table.csv(rows), csv);
   return 0;
 }
 

@@ -131,9 +131,8 @@ py::dict session_of(const std::filesystem::path& file) {
   column("busy_s", [](const ServoRecord& r) { return r.busy_s; });
   column("flags", [](const ServoRecord& r) { return r.flags; });
   std::vector<std::string> warnings = remark_texts(recording_remarks(recording));
-  const Json rendering = recording.header.value("rendering", Json());
-  if (rendering.is_object()) {
-    for (const Json& words : rendering.at("warnings")) warnings.push_back(words);
+  if (const auto& rendering = recording.opened.rendering) {
+    for (std::string& text : rendering->texts()) warnings.push_back(std::move(text));
   }
   py::list phases;
   double start_s = 0.0;

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tpmkit/error.hpp"
+
 namespace tpm::haptics {
 
 /// Why a device switched its forces off. Values are those of the Force Dimension status.
@@ -94,12 +96,7 @@ struct DeviceStatus {
 };
 
 /// Something about a device that did not end the session and that a reader of it should know.
-struct DeviceFinding {
-  std::string code;  ///< its kind, a word that stays while the numbers in `text` change
-  std::string text;  ///< one line
-
-  [[nodiscard]] bool operator==(const DeviceFinding&) const = default;
-};
+using DeviceFinding = Remark;
 
 /// Input of the hand besides the motion of the tool.
 struct HandState {

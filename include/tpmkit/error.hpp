@@ -59,4 +59,14 @@ class Error : public std::runtime_error {
 /// UTF-8 become '?'. Text longer than `limit` characters is cut with "...".
 [[nodiscard]] std::string printable(std::string_view text, std::size_t limit = 60);
 
+/// A message about a result that does not change it: a warning, an assumption, a limit that was
+/// passed. Programs read the code, people the text. The code is written where the remark is made,
+/// in lower case with underscores ("outliers"); it stays when the text or its numbers change.
+struct Remark {
+  std::string code;
+  std::string text;  ///< one sentence
+
+  [[nodiscard]] bool operator==(const Remark&) const = default;
+};
+
 }  // namespace tpm

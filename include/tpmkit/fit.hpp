@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
 
 namespace tpm::fit {
@@ -71,7 +72,7 @@ struct FitSummary {
   std::vector<FittedParameter> parameters;
   std::optional<PreferredLaw> preferred;  ///< see there; none: the result's law stands alone
   std::optional<LawAdequacy> adequacy;    ///< whether the law describes the data, if it was tested
-  std::vector<std::string> flags;         ///< warnings and assumptions, one sentence each
+  std::vector<Remark> remarks;            ///< warnings and assumptions
   std::string text;                       ///< for a terminal
   std::string json;                       ///< everything, keys in docs/fit_files.md
 };

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "tpmkit/error.hpp"
 #include "tpmkit/protocol.hpp"
 #include "tpmkit/tpm_element.hpp"
 
@@ -108,10 +109,11 @@ class ModelMaker {
 /// between knots and for a constant load. It needs only the component `core`.
 [[nodiscard]] std::unique_ptr<Model> make_closed_form(const TensionRule& tension = {});
 
-/// Limits of the paper's model that a run has passed, one line of text each: indentation above 10
-/// mm (validity) or 12 mm (damage), a lateral bond turned by more than pi/6.
+/// Limits of the paper's model that a run has passed, their codes in brackets: indentation above 10
+/// mm, its validity (indentation_over_10_mm), or 12 mm, damage (indentation_over_12_mm), a lateral
+/// bond turned by more than pi/6 (lateral_bond_turned_over_30_degrees).
 /// @param spacing_m of lateral neighbours, > 0
-[[nodiscard]] std::vector<std::string> validity_flags(double spacing_m, double peak_depth_m);
+[[nodiscard]] std::vector<Remark> validity_remarks(double spacing_m, double peak_depth_m);
 
 /// Throws Error(bad_input) unless every time lies in the protocol.
 void require_times_within(const Protocol& protocol, std::span<const double> times_s);

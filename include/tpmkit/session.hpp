@@ -53,9 +53,8 @@ struct SessionCheck {
   double peak_N = 0.0;              ///< largest force of the reference
   double reference_error_N = 0.0;   ///< error estimate of the reference
   bool whole = true;                ///< neither the end of the recording nor a row is missing
-  /// Parts that were not compared, the cause of an early end, findings of the device; one line
-  /// each.
-  std::vector<std::string> notes;
+  /// Parts that were not compared, the cause of an early end, findings of the device.
+  std::vector<Remark> remarks;
 };
 
 /// A session with a haptic device: tissue, loop and phases (schemas/hil.schema.json,

@@ -119,6 +119,13 @@ TEST_CASE("remarks are written as a list of code and text, an empty one where th
   CHECK(remark_texts(remarks) == std::vector<std::string>{"3 samples", "there is no hold"});
 }
 
+TEST_CASE("blanks before and behind a text are cut off") {
+  CHECK(trimmed(" \t a b\t") == "a b");
+  CHECK(trimmed(" \t ").empty());
+  CHECK(trimmed("\n a \n") == "\n a \n");
+  CHECK(trimmed("\n a \n", " \n") == "a");
+}
+
 TEST_CASE("SHA-256 matches the published test vector") {
   // FIPS 180-2, appendix B.1
   CHECK(sha256_hex("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");

@@ -78,7 +78,6 @@ TEST_CASE("a stress that was held is imposed, and the strain compared", "[creep]
   REQUIRE(recording.load_imposed);
   CHECK(recording.recording.drive_quantity == Quantity::stress);
   CHECK(recording.remarks.front().code == "load_imposed");
-  CHECK_THAT(recording.remarks.front().text, Contains("the stress was imposed"));
   const FitResult fit = creep_fit(std::span(&recording, 1));
   CHECK_THAT(estimate_of(fit, "k_inf"), WithinRel(2000.0, 0.02));
   CHECK_THAT(estimate_of(fit, "k1"), WithinRel(3000.0, 0.06));
@@ -212,10 +211,6 @@ TEST_CASE("a force that was held on an indentation is imposed, and the depth com
       REQUIRE(recording.load_imposed);
       CHECK(recording.recording.drive_quantity == Quantity::contact_force);
       CHECK(recording.remarks.front().code == "load_imposed");
-      CHECK_THAT(
-          recording.remarks.front().text,
-          Contains("the force was imposed") && Contains("takes the force as exact and compares "
-                                                        "the depth"));
       SetupOptions setup;
       setup.starts = 4;
       setup.reference = trial.reference_m;

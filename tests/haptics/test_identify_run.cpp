@@ -253,7 +253,7 @@ TEST_CASE("Findings of a device are in its file, and void what follows from its 
   CHECK_THAT(run.found.not_identified.back(),
              StartsWith("friction, mass: the device noticed: the service reported 0.1 N"));
   const Json file = device_file_json(run, "");
-  CHECK(file.at("measurement").at("device_findings") == to_json(run.findings));
+  CHECK(file.at("measurement").at("device_findings") == remarks_json(run.findings));
   (void)parse_device_file(file, "device.json");
 }
 

@@ -5,6 +5,7 @@
 
 #include "hil_scenes.hpp"
 #include "run_in.hpp"
+#include "support/remarks.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
@@ -68,7 +69,7 @@ SaidOfRecording everything_said_of(const HilRecording& recording, const test::Te
           view_recording(folder / "viewed.tpmrec", "", plain).description.dump(),
           verification_json(recording, v),
           read_json(folder / "page/report.json"),
-          file.has("/remarks") ? file.texts("/remarks") : std::vector<std::string>()};
+          file.has("/remarks/text") ? file.texts("/remarks/text") : std::vector<std::string>()};
 }
 
 bool is_among(const std::vector<std::string>& lines, const std::string& words) {
@@ -103,14 +104,14 @@ TEST_CASE("A recording that was cut off is verified as far as it goes, and is no
   const SaidOfRecording said = everything_said_of(recording, folder);
   check_that_all_say(said, "the recording is cut off at 2.499 s of ");
   CHECK(said.json.at("whole") == false);
-  CHECK(said.json.at("end") == "cut off");
+  CHECK(said.json.at("cause") == "cut off");
   CHECK(said.json.at("all").at("peak_N") > 0.3);
   CHECK_THAT(said.brief, Contains("2.499 s of 10.5 s"));
 
   put_recording(recording, folder / "cut.tpmrec");
   const SessionCheck check = verify_session(folder / "cut.tpmrec");
   CHECK_FALSE(check.whole);
-  CHECK(is_among(check.notes, "cut off"));
+  CHECK(test::has_remark(check.remarks, "cut_off"));
   for (const char* const command : {"hil verify cut.tpmrec", "hil export cut.tpmrec -o cut.h5"}) {
     CAPTURE(command);
     const test::ProgramRun run = test::run_in(folder, command);
@@ -145,10 +146,10 @@ TEST_CASE("A session that a fault ended is recorded as a whole, and everything s
                      "the device noticed: the service reported 0.5 N where 1 N was commanded");
   check_that_all_say(said, "3 rows found no room");
   CHECK(said.json.at("whole") == true);
-  CHECK(said.json.at("end") == "watchdog of the device");
-  CHECK(said.json.at("end_detail") == "no command for 8 ms");
+  CHECK(said.json.at("cause") == "watchdog of the device");
+  CHECK(said.json.at("detail") == "no command for 8 ms");
   CHECK(said.json.at("device_findings") == recording.closing.at("device_findings"));
-  CHECK(said.report.at("end") == "watchdog of the device");
+  CHECK(said.report.at("cause") == "watchdog of the device");
 
   put_recording(recording, folder / "ended.tpmrec");
   for (const char* const command :

@@ -54,7 +54,7 @@ Json whole_header(const Json& of = test::short_session()) {
     "candidates": [{"name": "element", "period_s": 1e-6, "claimed_error": null,
                     "verified_error": 0.001, "feasible": true, "reason": ""}]})");
   const Json rendering = Json::parse(R"({"verdict": "passive", "stable": true, "passive": true,
-    "warnings": ["none"], "stiffness_N_per_m": 150.0})");
+    "remarks": [{"code": "none", "text": "nothing"}], "stiffness_N_per_m": 150.0})");
   DeviceIdentity device;
   device.kind = "virtual";
   device.name = "simulated Omega.7";
@@ -181,6 +181,18 @@ TEST_CASE("schema and reader of a recording's header and closing record agree on
   test::compare_schema_and_form(recording_header_kind(),
                                 {whole_header(), whole_header(law_session())}, 300);
   test::compare_schema_and_form(recording_closing_kind(), {whole_closing()}, 200);
+}
+
+TEST_CASE("remarks of a rendering are read with their codes, and those of earlier recordings") {
+  const DocumentPlace place{"header"};
+  Json header = whole_header();
+  const auto read = [&] { return recording_header_block().read(header, place).rendering.value(); };
+  CHECK(read().remarks == std::vector<Remark>{{"none", "nothing"}});
+  CHECK(read().texts() == std::vector<std::string>{"nothing"});
+  header["rendering"].erase("remarks");
+  header["rendering"]["warnings"] = Json::array({"something"});
+  CHECK(read().remarks.empty());
+  CHECK(read().texts() == std::vector<std::string>{"something"});
 }
 
 TEST_CASE("a whole recording is read, its header that of the writer") {

@@ -237,7 +237,6 @@ TEST_CASE("A rest in which the tissue cannot recover is warned of") {
   };
   REQUIRE(remarks("1 s").size() == 1);  // the surface recovers in 2 s
   CHECK(remarks("1 s").front().code == "rest_too_short");
-  CHECK_THAT(remarks("1 s").front().text, Contains("a rest of 1 s is too short"));
   CHECK(remarks("9.3 s").empty());
 }
 

@@ -254,16 +254,18 @@ TEST_CASE("what an engine cannot say of an organ is said in the text and beside 
   const Tissue tissue = exported_tissue(scene);
   for (const OrganTarget target : {OrganTarget::sofa, OrganTarget::mjcf}) {
     const OrganExportOptions options{.target = target, .source = "a--b.json"};
-    const auto warnings = organ_export_warnings(tissue, options);
-    REQUIRE(warnings.size() == 2);
-    CHECK_THAT(warnings[0], Contains("relaxation branches"));
-    CHECK_THAT(warnings[0], Contains("2 times this one"));
-    CHECK_THAT(warnings[1], Contains("stiffening"));
+    const std::vector<Remark> remarks = organ_export_remarks(tissue, options);
+    REQUIRE(remarks.size() == 2);
+    CHECK(remarks[0].code == "relaxation_branches_as_damper");
+    CHECK_THAT(remarks[0].text, Contains("2 times this one"));
+    CHECK(remarks[1].code == "stiffening_left_out");
     const std::string text = export_organ(tissue, options);
     CHECK_NOTHROW(tags_of(text));
-    for (const std::string& warning : warnings) CHECK_THAT(text, Contains(warning));
+    for (const Remark& remark : remarks) CHECK_THAT(text, Contains(remark.text));
   }
-  CHECK(organ_export_warnings(tissue, {.instantaneous = true}).size() == 2);
+  const std::vector<Remark> springs = organ_export_remarks(tissue, {.instantaneous = true});
+  REQUIRE(springs.size() == 2);
+  CHECK(springs[0].code == "relaxation_left_out");
 }
 
 TEST_CASE("ropes and sliders reach the engines that know them") {
@@ -276,10 +278,10 @@ TEST_CASE("ropes and sliders reach the engines that know them") {
   const Built mjcf = built_from(tissue, {.target = OrganTarget::mjcf});
   const BondSystem bonds = tissue.bonds();
   for (std::size_t i = 0; i < bonds.size(); ++i) CHECK(mjcf.springs[i].rope == bonds.is_rope(i));
-  CHECK(organ_export_warnings(tissue, {.target = OrganTarget::mjcf}).empty());
-  const auto of_sofa = organ_export_warnings(tissue, {.target = OrganTarget::sofa});
+  CHECK(organ_export_remarks(tissue, {.target = OrganTarget::mjcf}).empty());
+  const auto of_sofa = organ_export_remarks(tissue, {.target = OrganTarget::sofa});
   REQUIRE(of_sofa.size() == 1);
-  CHECK_THAT(of_sofa[0], Contains("only pull push here"));
+  CHECK(of_sofa[0].code == "ropes_push");
   CHECK_THAT(export_organ(tissue, {.target = OrganTarget::sofa}),
              Contains("DirectionProjectiveConstraint indices=\"" + std::to_string(contact)));
   int slides = 0;

@@ -332,6 +332,9 @@ TEST_CASE("of masses that scene and reference leave out there is one number and 
   write_planned_run(plan, scene, times, run_planned(plan, scene, times), folder / "p.h5");
   CHECK(Hdf5Reader(folder / "p.h5").numbers("/claim/masses_left_out").at(0) ==
         *plan.masses_left_out);
+  const Json remarks = Json::parse(Hdf5Reader(folder / "p.h5").attribute("/claim", "remarks"));
+  CHECK(remarks == remarks_json(plan_remarks(plan)));
+  CHECK(remarks.at(0).at("code") == "masses_left_out");
   const std::string page =
       view_simulation(folder / "p.h5", read_file(folder / "p.h5"), {}).description["facts"].dump();
   CHECK_THAT(page, Contains(words) && Contains("error at most"));

@@ -146,7 +146,7 @@ class Contacts(unittest.TestCase):
         self.assertIn("SIMULATED DEVICE", data.attrs["device"])
         self.assertIn("tpm hil verify", data.attrs["adequacy"])
         rendering = json.loads(data.attrs["header"])["rendering"]
-        self.assertEqual(data.attrs["warnings"], rendering["warnings"])
+        self.assertEqual(data.attrs["warnings"], [remark["text"] for remark in rendering["remarks"]])
         cut = Path(self.folder.name) / "cut.tpmrec"
         cut.write_bytes(output.read_bytes()[:-3000])
         self.assertRegex(" ".join(tpmkit.open(cut).attrs["warnings"]), "cut off at .* s of 6.5 s: no closing record")

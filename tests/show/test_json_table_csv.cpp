@@ -31,3 +31,9 @@ TEST_CASE("The limits of an interval are two columns, of which one may be empty"
         "k1,,2.5,1 2\n"
         "k2,1.5,,\n");
 }
+
+TEST_CASE("A table without rows has its header", "[csv]") {
+  CHECK(json_table_csv(Json::array(), {}, {"fit", "name"}) == "fit,name\n");
+  const Json rows = Json::parse(R"([{"value": 2, "name": "k1"}])");
+  CHECK(json_table_csv(rows, {}, {"fit", "name"}) == "fit,name,value\n,k1,2\n");
+}

@@ -54,6 +54,9 @@ TEST_CASE("A table that is declared once is the same in JSON, CSV, text and on p
         "reading   depth, mm  force, N  verdict\n"
         "a, b            1.2    0.3266  holds\n"
         "η                10         -  FAILS\n");
+  CHECK(table.lists(kReadings).dump() ==
+        R"({"name":["a, b","η"],"depth_m":[0.001235,0.01],"force_N":[0.3266,null],)"
+        R"("samples":[12,0],"holds":[true,false],"reason":["","no contact"]})");
   Document document;
   document.table(table.page("Readings", kReadings));
   CHECK(to_markdown(document) ==
@@ -86,4 +89,10 @@ TEST_CASE("Items of rows are lines of CSV behind the columns of their row", "[ta
   const std::vector<Group> rows{{"first", kReadings}, {"empty", {}}};
   CHECK(nested_csv(groups, rows, &Group::readings, names) ==
         "group,name\nfirst,\"a, b\"\nfirst,η\n");
+}
+
+TEST_CASE("Columns of texts are lined up, each as wide as its widest cell", "[table]") {
+  CHECK(aligned({{"name", "x"}, {"η", "10"}, {"long one", ""}}, {false, true}) ==
+        "name       x\nη         10\nlong one\n");
+  CHECK(aligned({{"a", "b"}, {"cc", "d"}}) == "a   b\ncc  d\n");
 }

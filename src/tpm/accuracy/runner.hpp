@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <limits>
 
 #include "tpm/accuracy/problem.hpp"
 
@@ -35,9 +36,10 @@ struct BenchmarkPoint {
   std::string method, variant, parameter;
   double value = 0.0;
   std::optional<double> step_s;
-  std::string end;           ///< "completed", a word of MethodEnd, or "error_above_peak"
-  std::string reason;        ///< in words, where it is no point of a curve
-  double error = 0.0;        ///< in parts of the peak; NaN unless the run completed
+  std::string end;     ///< "completed", a word of MethodEnd, or "error_above_peak"
+  std::string reason;  ///< in words, where it is no point of a curve
+  /// In parts of the peak; NaN unless the run completed.
+  double error = std::numeric_limits<double>::quiet_NaN();
   bool below_floor = false;  ///< the error is not larger than this; `error` is the floor
   double end_time_s = 0.0;
   MethodWork work;

@@ -22,6 +22,10 @@ inline constexpr int kResultDigits = 6;
 /// `decimals` digits after the point.
 [[nodiscard]] std::string fixed(double value, int decimals);
 
+/// Text without the blanks before and behind it.
+[[nodiscard]] std::string_view trimmed(std::string_view text,
+                                       std::string_view blanks = " \t") noexcept;
+
 enum class LineEnds { kept, escaped };
 
 /// Text as a terminal may show it: what would move its cursor, change its colours or turn the

@@ -13,6 +13,7 @@
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/quantity_pattern.hpp"
 #include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -188,12 +189,7 @@ constexpr auto kDimensions = std::to_array<PhysicalDimension>({
     {{1, -1, 2, 0}, Dimension::compliance, 1.0},
 });
 
-std::string_view trimmed(std::string_view text) noexcept {
-  constexpr std::string_view kSpace = " \t\r\n";
-  const auto first = text.find_first_not_of(kSpace);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kSpace) - first + 1);
-}
+constexpr std::string_view kAnyBlank = " \t\r\n";
 
 /// What people write beside plain letters, as plain letters: "\u00B5m" is "um", "s\u207B\u00B9" is
 /// "s^-1".
@@ -286,7 +282,7 @@ std::optional<Product> product_unit(std::string_view text) {
 }
 
 std::optional<Unit> find_unit(std::string_view text) {
-  const std::string plain = plain_letters(trimmed(text));
+  const std::string plain = plain_letters(trimmed(text, kAnyBlank));
   if (plain.empty()) return Unit{"", Dimension::dimensionless, 1.0};
   const auto product = product_unit(plain);
   if (!product) return std::nullopt;
@@ -431,7 +427,7 @@ Unit parse_unit(std::string_view text, Dimension expected, std::string_view wher
 }
 
 bool is_unit(std::string_view text) {
-  return !trimmed(text).empty() && find_unit(text).has_value();
+  return !trimmed(text, kAnyBlank).empty() && find_unit(text).has_value();
 }
 
 std::string units_of(Dimension dimension) {
@@ -439,7 +435,7 @@ std::string units_of(Dimension dimension) {
 }
 
 std::optional<double> find_number(std::string_view text) noexcept {
-  const std::string_view t = trimmed(text);
+  const std::string_view t = trimmed(text, kAnyBlank);
   double value = 0.0;
   const char* begin = t.data();
   const char* end = begin + t.size();
@@ -451,7 +447,7 @@ std::optional<double> find_number(std::string_view text) noexcept {
 
 double parse_number(std::string_view text, std::string_view where) {
   if (const auto value = find_number(text)) return *value;
-  const std::string_view t = trimmed(text);
+  const std::string_view t = trimmed(text, kAnyBlank);
   throw bad_input(where,
                   t.empty() ? std::string("empty where a number belongs")
                             : fmt::format("'{}' is not a finite number", printable(t)),
@@ -473,27 +469,27 @@ std::string base::with_unit(std::string_view number, const Unit& unit) {
 }
 
 QuantityText base::split_quantity(std::string_view text) {
-  const std::string_view t = trimmed(text);
+  const std::string_view t = trimmed(text, kAnyBlank);
   std::size_t split = std::min(t.find_first_of(" \t"), t.size());
   if (split == t.size()) {  // "4mm": the unit begins where the number ends
     double number = 0.0;
     const auto end = std::from_chars(t.data(), t.data() + t.size(), number).ptr;
     if (end != t.data()) split = static_cast<std::size_t>(end - t.data());
   }
-  return {t.substr(0, split), trimmed(t.substr(split))};
+  return {t.substr(0, split), trimmed(t.substr(split), kAnyBlank)};
 }
 
 double parse_quantity(std::string_view text, Dimension expected, std::string_view where) {
   const auto [number, unit] = split_quantity(text);
   if (unit.empty() && expected != Dimension::dimensionless) {
-    throw bad_input(where, fmt::format("'{}' has no unit", printable(trimmed(text))),
+    throw bad_input(where, fmt::format("'{}' has no unit", printable(trimmed(text, kAnyBlank))),
                     fmt::format("a number and a unit of {}: {}", dimension_name(expected),
                                 known_units(expected)));
   }
   const double value = parse_number(number, where);
   const double si = value * parse_unit(unit, expected, where).to_si;
   if (!std::isfinite(si))
-    throw bad_input(where, fmt::format("'{}' overflows", printable(trimmed(text))));
+    throw bad_input(where, fmt::format("'{}' overflows", printable(trimmed(text, kAnyBlank))));
   return si;
 }
 

@@ -11,6 +11,7 @@
 
 #include "tpm/base/enum_names.hpp"
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/separator.hpp"
 #include "tpmkit/error.hpp"
@@ -140,12 +141,6 @@ bool is_blank(std::string_view line) {
   return line.find_first_not_of(" \t") == std::string_view::npos;
 }
 
-std::string_view without_blanks(std::string_view field) noexcept {
-  const auto first = field.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return field.substr(first, field.find_last_not_of(" \t") - first + 1);
-}
-
 /// True if a field of the line begins with a quote. Quotes elsewhere are letters: G", or inches.
 bool has_quoted_field(std::string_view line, char separator) {
   bool begins = true;
@@ -247,7 +242,7 @@ class RowParser {
   }
   /// Blanks in a row count once; a field in quotes keeps its own.
   void cut_at_blanks(std::string_view line) {
-    for (line = without_blanks(line); !line.empty(); line = without_blanks(line)) {
+    for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
       const auto close = line.front() == '"' ? line.find('"', 1) : std::string_view::npos;
       if (close != std::string_view::npos) {
         text_.fields.push_back(line.substr(1, close - 1));

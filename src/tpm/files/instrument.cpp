@@ -10,6 +10,7 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/nearest_word.hpp"
 #include "tpm/base/quantity_text.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::files {
@@ -20,12 +21,6 @@ std::string limit_expected(std::string_view own) {
       "a limit such as \"0.5 % of {}\"{} or an amount with its unit, and \"(standard)\" or \"(k = "
       "2)\" if it is an uncertainty",
       own, own == "reading" ? ", \"0.1 % of range\"" : "");
-}
-
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
-  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
-  return text;
 }
 
 /// What the limit is divided by, and the text without saying so.

@@ -4,6 +4,8 @@
 #include <array>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/number_style.hpp"
 
 namespace tpm::files {
@@ -16,12 +18,6 @@ bool holds_outside_quotes(std::string_view line, char wanted) {
     if (c == wanted && !quoted) return true;
   }
   return false;
-}
-
-std::string_view without_outer_blanks(std::string_view field) noexcept {
-  const auto first = field.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return field.substr(first, field.find_last_not_of(" \t") - first + 1);
 }
 
 /// Lines from all over a text: a preamble may be longer than the samples that a start would show.
@@ -52,7 +48,7 @@ std::vector<std::string_view> sampled_lines(std::string_view text) {
 /// What stands between quotes, or the field itself.
 std::string_view without_quotes(std::string_view field) noexcept {
   const bool quoted = field.size() > 1 && field.front() == '"' && field.back() == '"';
-  return quoted ? without_outer_blanks(field.substr(1, field.size() - 2)) : field;
+  return quoted ? trimmed(field.substr(1, field.size() - 2)) : field;
 }
 
 /// The fields of a line as far as a separator can be told from them: quotes keep their content.
@@ -65,8 +61,7 @@ std::vector<std::string_view> rough_fields(std::string_view line, char separator
     if (!end && line[i] == '"') quoted = !quoted;
     const bool blank = separator == ' ' && !end && line[i] == '\t';
     if (!end && (quoted || (line[i] != separator && !blank))) continue;
-    const std::string_view field =
-        without_quotes(without_outer_blanks(line.substr(begin, i - begin)));
+    const std::string_view field = without_quotes(trimmed(line.substr(begin, i - begin)));
     if (separator != ' ' || !field.empty()) fields.push_back(field);
     begin = i + 1;
   }

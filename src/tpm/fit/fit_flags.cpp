@@ -8,7 +8,6 @@
 #include "tpm/base/text.hpp"
 #include "tpm/data/straight_pieces.hpp"
 #include "tpm/fit/verdict.hpp"
-#include "tpm/law/element/validity_remarks.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::fit {

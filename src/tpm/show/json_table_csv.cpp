@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <vector>
+#include <utility>
 
 #include "tpm/show/result_table.hpp"
 
@@ -23,6 +23,7 @@ bool is_interval(std::string_view key, const Json& value) {
 /// Flat rows and their columns in the order in which these were first met.
 class FlatTable {
  public:
+  explicit FlatTable(std::vector<std::string> columns) : columns_(std::move(columns)) {}
   void add(const Json& row, std::string_view spread) {
     FlatRow flat;
     flatten(row, "", flat);
@@ -85,8 +86,9 @@ class FlatTable {
 
 }  // namespace
 
-std::string json_table_csv(const Json& rows, std::string_view spread) {
-  FlatTable table;
+std::string json_table_csv(const Json& rows, std::string_view spread,
+                           std::vector<std::string> columns) {
+  FlatTable table(std::move(columns));
   for (const Json& row : rows) table.add(row, spread);
   return table.text();
 }

@@ -1,6 +1,7 @@
 #pragma once
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/json.hpp"
@@ -16,6 +17,8 @@ namespace tpm::show {
 /// @param rows a list of objects
 /// @param spread JSON pointer to a list of objects within each row, such as "/parameters"; empty
 /// for none
-[[nodiscard]] std::string json_table_csv(const Json& rows, std::string_view spread = {});
+/// @param columns the first ones, which stand in the header of a table without rows, too
+[[nodiscard]] std::string json_table_csv(const Json& rows, std::string_view spread = {},
+                                         std::vector<std::string> columns = {});
 
 }  // namespace tpm::show

@@ -120,6 +120,17 @@ class ResultTable {
   [[nodiscard]] Json list(const Rows& rows) const {
     return array_json(rows, [this](const Row& row) { return object(row); });
   }
+  /// A list for each column, of one value a row.
+  template <class Rows>
+  [[nodiscard]] Json lists(const Rows& rows) const {
+    Json json = Json::object();
+    for (const ResultColumn<Row>& c : columns_) {
+      if (c.key.empty()) continue;
+      json[c.key] =
+          array_json(rows, [&c](const Row& row) { return with_digits(c.member(row), c.digits); });
+    }
+    return json;
+  }
   template <class Rows>
   [[nodiscard]] std::string csv(const Rows& rows) const {
     std::string text = csv_line(keys());

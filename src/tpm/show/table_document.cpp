@@ -4,6 +4,7 @@
 #include <utf8.h>
 
 #include <algorithm>
+#include <numeric>
 
 namespace tpm::show {
 namespace {
@@ -19,36 +20,26 @@ std::string padded(const std::string& cell, std::size_t width, bool right) {
   return right ? space + cell : cell + space;
 }
 
-bool right_aligned(const TableSection& section, std::size_t column) {
-  return column < section.right_aligned.size() && section.right_aligned[column];
+bool is_right(const std::vector<bool>& right, std::size_t column) {
+  return column < right.size() && right[column];
 }
 
-std::vector<std::size_t> column_widths(const TableSection& section) {
-  std::vector<std::size_t> widths;
-  for (const std::string& head : section.columns) widths.push_back(width_of(head));
-  for (const auto& row : section.rows) {
+std::vector<std::size_t> column_widths(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths(rows.front().size(), 0);
+  for (const auto& row : rows) {
     for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], width_of(row[c]));
   }
   return widths;
 }
 
 std::string text_section(const TableSection& section) {
-  const auto widths = column_widths(section);
-  const auto line = [&](const std::vector<std::string>& cells) {
-    std::string joined;
-    for (std::size_t c = 0; c < cells.size(); ++c) {
-      if (c > 0) joined += "  ";
-      joined += padded(cells[c], widths[c], right_aligned(section, c));
-    }
-    joined.erase(joined.find_last_not_of(' ') + 1);
-    return joined + "\n";
-  };
-  std::string out = section.title + "\n" + line(section.columns);
-  std::size_t total = 2 * (widths.size() - 1);
-  for (const std::size_t w : widths) total += w;
-  out += std::string(total, '-') + "\n";
-  for (const auto& row : section.rows) out += line(row);
-  return out + "\n";
+  std::vector<std::vector<std::string>> rows{section.columns};
+  rows.insert(rows.end(), section.rows.begin(), section.rows.end());
+  const auto widths = column_widths(rows);
+  const std::size_t total = std::accumulate(widths.begin(), widths.end(), 2 * (widths.size() - 1));
+  std::string lines = aligned(rows, section.right_aligned);
+  lines.insert(lines.find('\n') + 1, std::string(total, '-') + "\n");
+  return section.title + "\n" + lines + "\n";
 }
 
 std::string escaped(std::string_view text, TableStyle style) {
@@ -83,7 +74,7 @@ std::string markdown_section(const TableSection& section) {
   std::string out = fmt::format("### {}\n\n| {} |\n|", escaped(section.title, TableStyle::markdown),
                                 joined(section.columns, " | ", TableStyle::markdown));
   for (std::size_t c = 0; c < section.columns.size(); ++c) {
-    out += right_aligned(section, c) ? " ---: |" : " --- |";
+    out += is_right(section.right_aligned, c) ? " ---: |" : " --- |";
   }
   out += "\n";
   for (const auto& row : section.rows) {
@@ -95,7 +86,7 @@ std::string markdown_section(const TableSection& section) {
 std::string latex_section(const TableSection& section) {
   std::string alignment;
   for (std::size_t c = 0; c < section.columns.size(); ++c) {
-    alignment += right_aligned(section, c) ? 'r' : 'l';
+    alignment += is_right(section.right_aligned, c) ? 'r' : 'l';
   }
   std::string out = fmt::format(
       "\\begin{{table}}\n\\caption{{{}}}\n\\begin{{tabular}}{{{}}}\n\\toprule\n{} "
@@ -150,6 +141,22 @@ std::string render(const TableDocument& document, TableStyle style) {
   out += remarks(document.conclusion, style);
   while (out.ends_with("\n\n")) out.pop_back();
   return out;
+}
+
+std::string aligned(const std::vector<std::vector<std::string>>& rows,
+                    const std::vector<bool>& right) {
+  const auto widths = column_widths(rows);
+  std::string text;
+  for (const auto& row : rows) {
+    std::string line;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      if (c > 0) line += "  ";
+      line += padded(row[c], widths[c], is_right(right, c));
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
 }
 
 std::string csv_line(const std::vector<std::string>& cells) {

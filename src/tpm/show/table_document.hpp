@@ -27,6 +27,12 @@ enum class TableStyle { text, markdown, latex };
 /// Text from outside is escaped as the style needs. Ends with a line feed.
 [[nodiscard]] std::string render(const TableDocument& document, TableStyle style);
 
+/// A line for each row, its columns lined up with two blanks between them.
+/// @param rows at least one, all of the same length
+/// @param right columns aligned to the right; missing ones are left-aligned
+[[nodiscard]] std::string aligned(const std::vector<std::vector<std::string>>& rows,
+                                  const std::vector<bool>& right = {});
+
 /// One CSV line (RFC 4180 quoting) with a line feed.
 [[nodiscard]] std::string csv_line(const std::vector<std::string>& cells);
 

@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <type_traits>
+#include <utility>
 
 #include "tpm/accuracy/show/benchmark_report.hpp"
 #include "tpm/base/text.hpp"
@@ -18,167 +16,215 @@ namespace tpm::accuracy {
 namespace {
 
 constexpr int kBenchmarkDigits = 5;
+constexpr double kMostCounted = 9007199254740991.0;  // 2^53 - 1
 
-/// What a setting's value can be, by its key.
-constexpr std::array<const char*, 3> kParameters{"relaxation_time_s", "tolerance", "step_s"};
+/// A number; not written where it is not finite.
+ValueType<double> measured_number(Range range = kZeroOrMore) {
+  ValueType<double> type = number(range);
+  type.write = [](const double& value) {
+    return std::isfinite(value) ? Json(rounded(value, kBenchmarkDigits)) : Json();
+  };
+  return type;
+}
 
-/// Led over the fields of a record, writes them into an object or, if that is constant, reads them
-/// from one that the schema has let pass.
-template <class Object>
-class RecordFields {
-  static constexpr bool kReads = std::is_const_v<Object>;
+/// A number; not written where it is 0.
+ValueType<double> number_if_any() {
+  ValueType<double> type = measured_number();
+  type.write = [write = type.write](const double& value) {
+    return value == 0.0 ? Json() : write(value);
+  };
+  return type;
+}
 
- public:
-  explicit RecordFields(Object& json) : json_(json) {}
+template <class T>
+Key<T> number_key(const char* name, double T::*member, const char* sentence) {
+  return required(key(name, member, measured_number(), sentence));
+}
 
-  /// True if a field is there: by the file, or as it is to be written.
-  bool known(const char* key, bool to_write) const {
-    return kReads ? json_.contains(key) : to_write;
-  }
-  template <class Value>
-  void field(const char* key, Value& value) {
-    if constexpr (kReads) {
-      json_.at(key).get_to(value);
-    } else if constexpr (std::is_same_v<Value, const double>) {
-      json_[key] = rounded(value, kBenchmarkDigits);
-    } else {
-      json_[key] = value;
-    }
-  }
-  /// Left out where it is empty or 0.
-  template <class Value>
-  void optional_field(const char* key, Value& value) {
-    if (known(key, value != std::remove_const_t<Value>{})) field(key, value);
-  }
-  /// True if there is such a part; what is read is made.
-  template <class Part>
-  bool has(const char* key, Part& part) {
-    const bool there = known(key, part.has_value());
-    if constexpr (kReads) {
-      if (there) part.emplace();
-    }
-    return there;
-  }
-  template <class Value, class Fields>
-  void object(const char* key, Value& value, const Fields& fields) {
-    RecordFields inner(json_[key]);
-    fields(inner, value);
-  }
-  template <class Items, class Fields>
-  void list(const char* key, Items& items, const Fields& fields) {
-    if constexpr (kReads) {
-      items.resize(json_.at(key).size());
-    } else {
-      json_[key] = Json(items.size(), nullptr);
-    }
-    for (std::size_t i = 0; i < items.size(); ++i) {
-      RecordFields inner(json_[key][i]);
-      fields(inner, items[i]);
-    }
-  }
-  /// A setting has its value under the name of what changes.
-  template <class Text, class Value>
-  void parameter(Text& name, Value& value) {
-    if constexpr (kReads) {
-      const auto found = std::find_if(kParameters.begin(), kParameters.end(),
-                                      [&](const char* key) { return json_.contains(key); });
-      if (found != kParameters.end()) name = *found;
-    }
-    if (!name.empty()) field(name.c_str(), value);
-  }
-  /// NaN where there is none; whether there is one.
-  template <class Value>
-  bool finite_field(const char* key, Value& value) {
-    const bool there = known(key, std::isfinite(value));
-    if (there) {
-      field(key, value);
-    } else if constexpr (kReads) {
-      value = std::numeric_limits<double>::quiet_NaN();
-    }
-    return there;
-  }
+template <class T>
+Key<T> text_key(const char* name, std::string T::*member, const char* sentence) {
+  return required(key(name, member, text(), sentence));
+}
 
- private:
-  Object& json_;
-};
+/// An object with some keys of the same T.
+template <class T>
+Key<T> grouped(const char* name, const Block<T>& block, const char* sentence) {
+  return {{.name = name, .form = block.form(), .sentence = sentence},
+          [&block](T& into, const Json& value, const DocumentPlace& place) {
+            read_keys(block.keys(), value, place, into);
+          },
+          [&block](const T& from) { return block.write(from); }};
+}
 
-// The fields of the file in their order, each said once for both ways.
+/// A key of the times of a point, which may have none.
+Key<BenchmarkPoint> time_key(const Key<BenchmarkTimes>& key) {
+  KeyForm form = key.form;
+  form.usual = nullptr;
+  return {std::move(form),
+          [read = key.read](BenchmarkPoint& into, const Json& value, const DocumentPlace& place) {
+            if (!into.times) into.times.emplace();
+            read(*into.times, value, place);
+          },
+          [write = key.write](const BenchmarkPoint& from) {
+            return from.times ? write(*from.times) : Json();
+          }};
+}
 
-constexpr auto kClaimFields = [](auto& in, auto& claims) {
-  in.field("largest_error", claims.largest);
-  in.field("median_over_true", claims.median);
-  in.field("share_covered", claims.covered);
-};
+/// A setting has its value under the name of what changes.
+Key<BenchmarkPoint> setting_key(const char* name) {
+  return {{.name = name, .form = measured_number().form, .sentence = "the setting"},
+          [name](BenchmarkPoint& into, const Json& value, const DocumentPlace&) {
+            into.parameter = name;
+            into.value = value.get<double>();
+          },
+          [name](const BenchmarkPoint& from) {
+            return from.parameter == name ? measured_number().write(from.value) : Json();
+          }};
+}
 
-constexpr auto kWallFields = [](auto& in, auto& times) {
-  in.field("median", times.median_s);
-  in.field("lower_quartile", times.lower_quartile_s);
-  in.field("upper_quartile", times.upper_quartile_s);
-  in.field("least", times.least_s);
-};
+/// A setting, or of a method with another setting.
+Key<BenchmarkPoint> step_key() {
+  Key<BenchmarkPoint> key = setting_key("step_s");
+  key.form.sentence = "of the method";
+  key.read = [set = key.read](BenchmarkPoint& into, const Json& value, const DocumentPlace& place) {
+    if (into.parameter.empty()) set(into, value, place);
+    into.step_s = value.get<double>();
+  };
+  key.write = [setting = key.write](const BenchmarkPoint& from) {
+    return from.step_s ? measured_number().write(*from.step_s) : setting(from);
+  };
+  return key;
+}
 
-constexpr auto kStepWallFields = [](auto& in, auto& times) {
-  in.field("median", times.median_s);
-  in.field("p99", times.p99_s);
-  in.field("largest", times.largest_s);
-};
+/// The same key, written where a condition holds.
+template <class T, class Holds>
+Key<T> written_if(Key<T> key, Holds holds) {
+  key.form.usual = nullptr;
+  key.write = [write = key.write, holds](const T& from) {
+    return holds(from) ? write(from) : Json();
+  };
+  return key;
+}
 
-constexpr auto kPointFields = [](auto& in, auto& point) {
-  in.field("method", point.method);
-  in.optional_field("variant", point.variant);
-  in.parameter(point.parameter, point.value);
-  if (in.has("step_s", point.step_s)) in.field("step_s", *point.step_s);
-  in.field("end", point.end);
-  in.optional_field("reason", point.reason);
-  if (in.finite_field("error", point.error)) in.field("below_floor", point.below_floor);
-  in.field("end_time_s", point.end_time_s);
-  in.field("steps", point.work.steps);
-  in.field("rates", point.work.rates);
-  in.field("factorisations", point.work.factorisations);
-  in.field("solves", point.work.solves);
-  if (in.has("claims", point.claims)) in.object("claims", *point.claims, kClaimFields);
-  if (!in.has("wall_s", point.times)) return;
-  in.field("repeats", point.times->repeats);
-  in.field("runs_per_repeat", point.times->runs_per_repeat);
-  in.object("wall_s", *point.times, kWallFields);
-  if (in.has("step_wall_s", point.step_times)) {
-    in.object("step_wall_s", *point.step_times, kStepWallFields);
-  }
-  in.optional_field("build_s", point.build_s);
-};
+Key<BenchmarkPoint> count_key(const char* name, long MethodWork::*of, const char* sentence) {
+  return required(
+      within(&BenchmarkPoint::work, key(name, of, whole<long>(0.0, kMostCounted), sentence)));
+}
 
-constexpr auto kTargetFields = [](auto& in, auto& target) {
-  in.field("curve", target.curve);
-  in.field("error", target.error);
-  in.field("step_median_s", target.step_median_s);
-  in.optional_field("step_p99_s", target.step_p99_s);
-  in.optional_field("build_s", target.build_s);
-};
+const Block<BenchmarkClaims>& claims_block() {
+  using C = BenchmarkClaims;
+  static const Block<C> block(
+      "claimed", "what a method claimed of its error",
+      {number_key("largest_error", &C::largest, "claimed"),
+       number_key("median_over_true", &C::median, "claimed over true error"),
+       number_key("share_covered", &C::covered, "of instants")});
+  return block;
+}
 
-constexpr auto kReferenceFields = [](auto& in, auto& result) {
-  in.field("first", result.reference.first.words);
-  in.field("first_method", result.reference.first.method);
-  in.field("second", result.reference.second.words);
-  in.field("second_method", result.reference.second.method);
-  in.field("exact", result.reference.exact);
-  in.field("peak", result.reference.peak);
-  in.field("peak_unit", result.unit);
-  in.field("agreement", result.reference.agreement);
-  in.field("floor", result.reference.floor);
-};
+const Block<BenchmarkTimes>& wall_block() {
+  using T = BenchmarkTimes;
+  static const Block<T> block("wall", "wall time of a run",
+                              {number_key("median", &T::median_s, "s"),
+                               number_key("lower_quartile", &T::lower_quartile_s, "s"),
+                               number_key("upper_quartile", &T::upper_quartile_s, "s"),
+                               number_key("least", &T::least_s, "s")});
+  return block;
+}
 
-constexpr auto kResultFields = [](auto& in, auto& result) {
-  in.field("name", result.name);
-  in.field("title", result.title);
-  in.field("text", result.text);
-  in.field("response", result.response);
-  in.field("simulated_s", result.simulated_s);
-  in.optional_field("relaxation_time_s", result.relaxation_time_s);
-  if (in.known("targets", !result.targets.empty()))
-    in.list("targets", result.targets, kTargetFields);
-  in.object("reference", result, kReferenceFields);
-  in.list("points", result.points, kPointFields);
-};
+const Block<BenchmarkStepTimes>& step_wall_block() {
+  using T = BenchmarkStepTimes;
+  static const Block<T> block(
+      "step_wall", "wall time of a step",
+      {number_key("median", &T::median_s, "s"), number_key("p99", &T::p99_s, "s"),
+       number_key("largest", &T::largest_s, "s")});
+  return block;
+}
+
+const Block<BenchmarkPoint>& point_block() {
+  using P = BenchmarkPoint;
+  using T = BenchmarkTimes;
+  const auto with_error = [](const P& p) { return std::isfinite(p.error); };
+  const auto timed = [](const P& p) { return p.times.has_value(); };
+  static const Block<P> block(
+      "point", "a method at a setting",
+      {text_key("method", &P::method, "its name"),
+       key("variant", &P::variant, text_if_any(), "of the method"),
+       setting_key("tolerance"),
+       setting_key("relaxation_time_s"),
+       step_key(),
+       text_key("end", &P::end, "how the run ended"),
+       key("reason", &P::reason, text_if_any(), "why it ended early"),
+       key("error", &P::error, measured_number(), "against the reference"),
+       written_if(key("below_floor", &P::below_floor, flag(), "the reference is no better"),
+                  with_error),
+       required(key("end_time_s", &P::end_time_s, measured_number(kAnyNumber), "that was reached")),
+       count_key("steps", &MethodWork::steps, "taken"),
+       count_key("rates", &MethodWork::rates, "evaluations"),
+       count_key("factorisations", &MethodWork::factorisations, "of matrices"),
+       count_key("solves", &MethodWork::solves, "of linear systems"),
+       key("claims", &P::claims, claims_block().type(), "of its own error"),
+       time_key(key("repeats", &T::repeats, whole<int>(1, 1e6), "measurements")),
+       time_key(
+           key("runs_per_repeat", &T::runs_per_repeat, whole<long>(1, kMostCounted), "in each")),
+       time_key(grouped("wall_s", wall_block(), "wall time of a run")),
+       key("step_wall_s", &P::step_times, step_wall_block().type(), "wall time of a step"),
+       written_if(key("build_s", &P::build_s, number_if_any(), "before the first step"), timed)});
+  return block;
+}
+
+const Block<BenchmarkTarget>& target_block() {
+  using T = BenchmarkTarget;
+  static const Block<T> block(
+      "target", "a point of a curve",
+      {text_key("curve", &T::curve, "which"), number_key("error", &T::error, "of it"),
+       number_key("step_median_s", &T::step_median_s, "wall time"),
+       key("step_p99_s", &T::step_p99_s, number_if_any(), "wall time"),
+       key("build_s", &T::build_s, number_if_any(), "before the first step")});
+  return block;
+}
+
+const Block<BenchmarkResult>& reference_block() {
+  using R = BenchmarkReference;
+  const auto of = [](const Key<R>& key) {
+    return required(within(&BenchmarkResult::reference, key));
+  };
+  const auto answer = [&](const char* name, BenchmarkAnswer R::*which,
+                          std::string BenchmarkAnswer::*member, const char* sentence) {
+    return of(within(which, text_key(name, member, sentence)));
+  };
+  static const Block<BenchmarkResult> block(
+      "benchmark_reference", "what errors are relative to",
+      {answer("first", &R::first, &BenchmarkAnswer::words, "in words"),
+       answer("first_method", &R::first, &BenchmarkAnswer::method, "of the first"),
+       answer("second", &R::second, &BenchmarkAnswer::words, "in words"),
+       answer("second_method", &R::second, &BenchmarkAnswer::method, "of the second"),
+       of(key("exact", &R::exact, flag(), "a closed form")),
+       of(number_key("peak", &R::peak, "of the response")),
+       text_key("peak_unit", &BenchmarkResult::unit, "its unit"),
+       of(number_key("agreement", &R::agreement, "of the two")),
+       of(number_key("floor", &R::floor, "below which errors say nothing"))});
+  return block;
+}
+
+const Block<BenchmarkResult>& result_block() {
+  using R = BenchmarkResult;
+  static const Block<R> block(
+      "problem", "a named problem",
+      {required(
+           key("name", &R::name,
+               text_like("^[a-z0-9_]+$", "a name of small letters, digits and _", "bond_paper"),
+               "of the problem")),
+       text_key("title", &R::title, "in a line"), text_key("text", &R::text, "in words"),
+       text_key("response", &R::response, "what is compared"),
+       number_key("simulated_s", &R::simulated_s, "time"),
+       key("relaxation_time_s", &R::relaxation_time_s, number_if_any(), "of the tissue"),
+       written_if(key("targets", &R::targets, list(target_block().type()), "other points"),
+                  [](const R& r) { return !r.targets.empty(); }),
+       required(grouped("reference", reference_block(), "what errors are relative to")),
+       required(key("points", &R::points, list(point_block().type()), "methods at their settings")),
+       unread<R>("run", map_form(any("").form), "when and where it was measured")});
+  return block;
+}
 
 std::size_t place_in_list(std::string_view name) {
   const auto entries = benchmark_entries();
@@ -196,93 +242,10 @@ BenchmarkRecord read_record(const Json& json) {
   record.options.timing = json.at("timing").get<bool>();
   if (record.options.timing) record.options.repeats = json.at("repeats").get<int>();
   for (const Json& problem : json.at("problems")) {
-    RecordFields reader(problem);
-    kResultFields(reader, record.results.emplace_back());
+    record.results.push_back(result_block().made(problem, DocumentPlace{"problems"}));
     if (problem.contains("run")) record.runs[record.results.back().name] = problem.at("run");
   }
   return record;
-}
-
-FormPtr positive_form() {
-  return number(kZeroOrMore).form;
-}
-
-FormPtr counted_form(double least = 0.0) {
-  return whole<std::int64_t>(least, 9007199254740991.0).form;
-}
-
-KeyForm number_key(const char* name, const char* sentence) {
-  return required_key(name, positive_form(), sentence);
-}
-
-KeyForm maybe_number_key(const char* name, const char* sentence) {
-  return optional_key(name, positive_form(), sentence);
-}
-
-KeyForm text_key(const char* name, const char* sentence) {
-  return required_key(name, text().form, sentence);
-}
-
-FormPtr point_form() {
-  const FormPtr claims = object_form("claimed", "what a method claimed of its error",
-                                     {number_key("largest_error", "claimed"),
-                                      number_key("median_over_true", "claimed over true error"),
-                                      number_key("share_covered", "of instants")});
-  const FormPtr wall = object_form("wall", "wall time of a run",
-                                   {number_key("median", "s"), number_key("lower_quartile", "s"),
-                                    number_key("upper_quartile", "s"), number_key("least", "s")});
-  const FormPtr step_wall =
-      object_form("step_wall", "wall time of a step",
-                  {number_key("median", "s"), number_key("p99", "s"), number_key("largest", "s")});
-  return object_form("point", "a method at a setting",
-                     {text_key("method", "its name"),
-                      optional_key("variant", text().form, "of the method"),
-                      maybe_number_key("step_s", "of the method"),
-                      maybe_number_key("tolerance", "the setting"),
-                      maybe_number_key("relaxation_time_s", "the setting"),
-                      text_key("end", "how the run ended"),
-                      optional_key("reason", text().form, "why it ended early"),
-                      maybe_number_key("error", "against the reference"),
-                      optional_key("below_floor", flag().form, "the reference is no better"),
-                      required_key("end_time_s", number().form, "that was reached"),
-                      required_key("steps", counted_form(), "taken"),
-                      required_key("rates", counted_form(), "evaluations"),
-                      required_key("factorisations", counted_form(), "of matrices"),
-                      required_key("solves", counted_form(), "of linear systems"),
-                      optional_key("claims", claims, "of its own error"),
-                      optional_key("repeats", whole<int>(1, 1e6).form, "measurements"),
-                      optional_key("runs_per_repeat", counted_form(1), "in each"),
-                      optional_key("wall_s", wall, "wall time of a run"),
-                      optional_key("step_wall_s", step_wall, "wall time of a step"),
-                      maybe_number_key("build_s", "before the first step")});
-}
-
-FormPtr problem_form() {
-  const FormPtr target = object_form(
-      "target", "a point of a curve",
-      {text_key("curve", "which"), number_key("error", "of it"),
-       number_key("step_median_s", "wall time"), maybe_number_key("step_p99_s", "wall time"),
-       maybe_number_key("build_s", "before the first step")});
-  const FormPtr reference = object_form(
-      "benchmark_reference", "what errors are relative to",
-      {text_key("first", "in words"), text_key("first_method", "of the first"),
-       text_key("second", "in words"), text_key("second_method", "of the second"),
-       required_key("exact", flag().form, "a closed form"), number_key("peak", "of the response"),
-       text_key("peak_unit", "its unit"), number_key("agreement", "of the two"),
-       number_key("floor", "below which errors say nothing")});
-  return object_form(
-      "problem", "a named problem",
-      {required_key(
-           "name",
-           text_like("^[a-z0-9_]+$", "a name of small letters, digits and _", "bond_paper").form,
-           "of the problem"),
-       text_key("title", "in a line"), text_key("text", "in words"),
-       text_key("response", "what is compared"), number_key("simulated_s", "time"),
-       maybe_number_key("relaxation_time_s", "of the tissue"),
-       optional_key("targets", list_form(target, 0), "other points"),
-       required_key("reference", reference, "what errors are relative to"),
-       required_key("points", list_form(point_form(), 0), "methods at their settings"),
-       optional_key("run", map_form(any("").form), "when and where it was measured")});
 }
 
 /// Reads what to_json wrote, for a run that goes on from it: of references only words and numbers
@@ -298,10 +261,11 @@ const FileKind& benchmark_kind() {
   static const FileKind kind{
       "benchmark", "What tpm accuracy benchmark measured",
       "Written by tpm accuracy benchmark, read by --keep",
-      object_form("benchmark", "",
-                  {required_key("timing", flag().form, "times were measured"),
-                   optional_key("repeats", whole<int>(1, 1e6).form, "measurements of each run"),
-                   required_key("problems", list_form(problem_form(), 0), "in their order")})};
+      object_form(
+          "benchmark", "",
+          {required_key("timing", flag().form, "times were measured"),
+           optional_key("repeats", whole<int>(1, 1e6).form, "measurements of each run"),
+           required_key("problems", list_form(result_block().form(), 0), "in their order")})};
   return kind;
 }
 
@@ -309,9 +273,7 @@ Json to_json(const BenchmarkRecord& record) {
   Json json{{"timing", record.options.timing}};
   if (record.options.timing) json["repeats"] = record.options.repeats;
   json["problems"] = array_json(record.results, [&](const BenchmarkResult& result) {
-    Json problem;
-    RecordFields writer(problem);
-    kResultFields(writer, result);
+    Json problem = result_block().write(result);
     const auto run = record.runs.find(result.name);
     if (run != record.runs.end()) problem["run"] = run->second;
     return problem;

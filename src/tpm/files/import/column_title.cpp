@@ -6,18 +6,14 @@
 #include <array>
 #include <optional>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/import/header_words.hpp"
 #include "tpm/files/unit_words.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::files {
 namespace {
-
-std::string_view stripped(std::string_view text) noexcept {
-  const auto first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
 
 bool is_plain_number(std::string_view text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
@@ -54,8 +50,8 @@ bool is_bare_unit_in_other_capitals(std::string_view name, std::string_view unit
 
 std::optional<ColumnTitle> split_before(std::string_view title, std::size_t end,
                                         std::size_t begin) {
-  const std::string unit = written_unit(stripped(title.substr(begin)));
-  const std::string_view name = stripped(title.substr(0, end));
+  const std::string unit = written_unit(trimmed(title.substr(begin)));
+  const std::string_view name = trimmed(title.substr(0, end));
   if (unit.empty() || is_plain_number(unit)) return std::nullopt;
   const bool known =
       is_unit(unit) || is_foreign_unit(unit) || is_bare_unit_in_other_capitals(name, unit);
@@ -102,7 +98,7 @@ std::optional<ColumnTitle> split_symbol(std::string_view title) {
   }
   const char symbol = title.front();
   const bool letter = (symbol >= 'a' && symbol <= 'z') || (symbol >= 'A' && symbol <= 'Z');
-  const std::string unit = written_unit(stripped(title.substr(2)));
+  const std::string unit = written_unit(trimmed(title.substr(2)));
   if (!letter || recognize_title(title.substr(0, 1)) || !is_unit(unit)) return std::nullopt;
   if (is_plain_number(unit)) return std::nullopt;
   return ColumnTitle{std::string(1, symbol), unit};
@@ -111,29 +107,29 @@ std::optional<ColumnTitle> split_symbol(std::string_view title) {
 }  // namespace
 
 std::string_view without_brackets(std::string_view cell) noexcept {
-  const std::string_view text = stripped(cell);
+  const std::string_view text = trimmed(cell);
   const bool bracketed = text.size() > 1 && ((text.front() == '(' && text.back() == ')') ||
                                              (text.front() == '[' && text.back() == ']'));
-  return bracketed ? stripped(text.substr(1, text.size() - 2)) : text;
+  return bracketed ? trimmed(text.substr(1, text.size() - 2)) : text;
 }
 
 ColumnTitle split_title(std::string_view title) {
-  std::string_view text = stripped(title);
-  while (text.starts_with('#') || text.starts_with('%')) text = stripped(text.substr(1));
+  std::string_view text = trimmed(title);
+  while (text.starts_with('#') || text.starts_with('%')) text = trimmed(text.substr(1));
   const auto open = text.find_last_of("([");
   if (open != std::string_view::npos && open > 0) {
     // "Load (N) Ch. 1": the unit may stand inside the title.
     const auto close = text.find(text[open] == '[' ? ']' : ')', open);
     const std::string unit = close == std::string_view::npos
                                  ? std::string()
-                                 : written_unit(stripped(text.substr(open + 1, close - open - 1)));
+                                 : written_unit(trimmed(text.substr(open + 1, close - open - 1)));
     const bool square = text[open] == '[';
-    const std::string_view before = stripped(text.substr(0, open));
+    const std::string_view before = trimmed(text.substr(0, open));
     const bool number = is_plain_number(unit) && !(square && unit == "1");
     if (!unit.empty() && !number &&
         (square || is_unit(unit) || is_foreign_unit(unit) || force_of_weight(unit) ||
          is_unit_in_other_capitals(before, unit))) {
-      const std::string_view after = stripped(text.substr(close + 1));
+      const std::string_view after = trimmed(text.substr(close + 1));
       return {fmt::format("{}{}{}", before, after.empty() ? "" : " ", after), unit};
     }
   }

@@ -7,17 +7,13 @@
 #include <array>
 #include <vector>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/import/refused_words.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::files {
 namespace {
-
-std::string_view trimmed(std::string_view text) noexcept {
-  const auto first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
 
 struct Letter {
   char32_t accented;

@@ -43,7 +43,7 @@ FitSummary summary_of(const FitResult& fit) {
   summary.starts_agreeing = fit.starts_agreeing;
   summary.parameters = fitted_parameters(fit);
   summary.adequacy = fit.adequacy;
-  summary.flags = remark_texts(fit.remarks);
+  summary.remarks = fit.remarks;
   summary.text = to_terminal_text(fit);
   summary.json = to_text(to_json(fit));
   return summary;
@@ -112,8 +112,8 @@ FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
         PreferredLaw{law_name(best.law), selection.candidates[selection.recommended].delta_bic,
                      best.reason, fitted_parameters(best.fit)};
   }
-  const std::vector<std::string> warnings = remark_texts(selection.remarks);
-  summary.flags.insert(summary.flags.begin(), warnings.begin(), warnings.end());
+  summary.remarks.insert(summary.remarks.begin(), selection.remarks.begin(),
+                         selection.remarks.end());
   summary.text = to_terminal_text(selection) + "\n" + summary.text;
   summary.json = to_text(to_json(selection));
   return summary;

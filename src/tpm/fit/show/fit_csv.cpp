@@ -112,7 +112,7 @@ std::string specimens_csv(const SpecimenStudy& study, const std::optional<Contac
       add(modulus);
     }
   }
-  return json_table_csv(rows);
+  return json_table_csv(rows, {}, {"recording", "specimen", "name", "SI_unit"});
 }
 
 std::string pooled_csv(const SpecimenStudy& study) {

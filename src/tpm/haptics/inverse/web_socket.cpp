@@ -8,6 +8,8 @@
 #include <cctype>
 #include <charconv>
 
+#include "tpm/base/namespaces.hpp"
+#include "tpm/base/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
@@ -44,13 +46,6 @@ std::string lower(std::string_view text) {
   std::string all(text);
   std::ranges::transform(all, all.begin(), [](unsigned char c) { return std::tolower(c); });
   return all;
-}
-
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  return text;
 }
 
 template <std::size_t N>

@@ -452,7 +452,7 @@ Json device_file_json(const IdentifyRun& run, const std::string& date) {
                    {"ended", to_string(run.outcome.cause)},
                    {"stroke_m", rounded(f.stroke_m, kDigits)}};
   if (!run.ended_by.empty()) measurement["ended_by"] = run.ended_by;
-  if (!run.findings.empty()) measurement["device_findings"] = to_json(run.findings);
+  if (!run.findings.empty()) measurement["device_findings"] = remarks_json(run.findings);
   if (!date.empty()) measurement["date"] = date;
   if (run.real_time) {
     measurement["host"] = host_line();

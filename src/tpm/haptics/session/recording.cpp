@@ -111,14 +111,6 @@ Json to_json(const DeviceIdentity& device) {
           {"assumptions", device.assumptions}};
 }
 
-Json to_json(const std::vector<DeviceFinding>& findings) {
-  Json list = Json::array();
-  for (const DeviceFinding& finding : findings) {
-    list.push_back({{"code", finding.code}, {"text", finding.text}});
-  }
-  return list;
-}
-
 Json recording_header(const HilSession& session, const DeviceIdentity& device,
                       const LoopModel& model, bool real_time, const SessionNotes& notes,
                       const Json& rendering) {

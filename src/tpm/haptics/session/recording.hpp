@@ -23,7 +23,6 @@ namespace tpm::haptics {
 
 [[nodiscard]] Json to_json(const DeviceIdentity& device);
 [[nodiscard]] Json to_json(const ServoCounts& counts);
-[[nodiscard]] Json to_json(const std::vector<DeviceFinding>& findings);
 
 /// A recorded session.
 struct HilRecording {

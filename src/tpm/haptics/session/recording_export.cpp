@@ -192,7 +192,10 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
   }
   writer.texts("/causes", causes);
   if (const auto remarks = recording_remarks(recording); !remarks.empty()) {
-    writer.texts("/remarks", remark_texts(remarks));
+    std::vector<std::string> codes;
+    for (const Remark& remark : remarks) codes.push_back(remark.code);
+    writer.texts("/remarks/code", codes);
+    writer.texts("/remarks/text", remark_texts(remarks));
   }
   // Texts of any length: an attribute holds 64 KB at most.
   writer.texts("/header_json", {to_text(recording.header)});

@@ -82,6 +82,14 @@ const Block<RecordedModel>& recorded_model_block() {
   return block;
 }
 
+const Block<Remark>& remark_block() {
+  static const Block<Remark> block(
+      "remark", "that ended nothing",
+      {required(text_key("code", &Remark::code, "its kind, which stays when the text changes")),
+       required(text_key("text", &Remark::text, "in words, with its numbers"))});
+  return block;
+}
+
 /// Null where nothing was known.
 ValueType<std::optional<RecordedRendering>> rendering_type() {
   using R = RecordedRendering;
@@ -91,7 +99,9 @@ ValueType<std::optional<RecordedRendering>> rendering_type() {
       {required(text_key("verdict", &R::verdict, "in a word")),
        required(key("passive", &R::passive, flag(), "the contact")),
        required(key("stable", &R::stable, flag(), "the contact")),
-       required(key("warnings", &R::warnings, list(text()), "that were given"))});
+       key("remarks", &R::remarks, list(remark_block().type()), "that were made"),
+       key("warnings", &R::warnings, list(text()),
+           "their texts, in recordings of an earlier tpm")});
   return {or_null(with_others(block.form())),
           [](const Json& value, const DocumentPlace& place) {
             return value.is_null() ? std::nullopt : std::optional(block.made(value, place));
@@ -115,16 +125,6 @@ const Block<RecordedTimes>& times_block() {
        required(key("p99_s", &RecordedTimes::p99_s, number(), "of 99 %")),
        required(key("p999_s", &RecordedTimes::p999_s, number(), "of 99.9 %")),
        required(key("max_s", &RecordedTimes::max_s, number(), "largest"))});
-  return block;
-}
-
-const Block<DeviceFinding>& finding_block() {
-  static const Block<DeviceFinding> block(
-      "device_finding", "of the device, that ended nothing",
-      {required(text_key("code", &DeviceFinding::code,
-                         "its kind, as docs/haptics.md lists them; a device of a caller's own may "
-                         "have others")),
-       required(text_key("text", &DeviceFinding::text, "in words, with its numbers"))});
   return block;
 }
 
@@ -196,8 +196,9 @@ const Block<RecordingClosing>& recording_closing_block() {
        unread<C>("stop_took_s", number().form, "until forces were off"),
        unread<C>("clock", clock, "in real time"),
        unread<C>("markers", list_form(marker, 0), "set by the operator"),
-       key("device_findings", &C::device_findings, list(finding_block().type()),
-           "what the device noticed and that ended nothing")});
+       key("device_findings", &C::device_findings, list(remark_block().type()),
+           "what the device noticed and that ended nothing; docs/haptics.md lists the codes, a "
+           "device of a caller's own may have others")});
   return block;
 }
 

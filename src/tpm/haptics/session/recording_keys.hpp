@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/base/namespaces.hpp"
+#include "tpm/base/remark.hpp"
 #include "tpm/files/keys/block.hpp"
 #include "tpm/files/keys/file_kind.hpp"
 #include "tpmkit/device.hpp"
@@ -32,7 +33,15 @@ struct RecordedModel {
 struct RecordedRendering {
   std::string verdict;
   bool passive = false, stable = false;
-  std::vector<std::string> warnings;
+  std::vector<Remark> remarks;
+  std::vector<std::string> warnings;  ///< of recordings whose remarks had no codes
+
+  /// Texts of both.
+  [[nodiscard]] std::vector<std::string> texts() const {
+    std::vector<std::string> all = remark_texts(remarks);
+    all.insert(all.end(), warnings.begin(), warnings.end());
+    return all;
+  }
 };
 
 /// Before the rows.

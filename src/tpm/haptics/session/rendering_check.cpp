@@ -309,11 +309,4 @@ Json to_json(const RenderingCheck& check) {
   return json;
 }
 
-Json recorded_json(const RenderingCheck& check) {
-  Json json = to_json(check);
-  json.erase("remarks");
-  json["warnings"] = remark_texts(check.remarks);
-  return json;
-}
-
 }  // namespace tpm::haptics

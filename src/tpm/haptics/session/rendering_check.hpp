@@ -97,7 +97,5 @@ struct RenderingCheck {
                                              const LoopModel& loop, std::string_view kind);
 
 [[nodiscard]] Json to_json(const RenderingCheck& check);
-/// The same for the header of a recording, whose key `warnings` has the texts of the remarks.
-[[nodiscard]] Json recorded_json(const RenderingCheck& check);
 
 }  // namespace tpm::haptics

@@ -220,7 +220,7 @@ SessionRun run_admitted(AdmittedSession admitted, const HilSession& session,
     notices.look();
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time,
-                                              options.notes, recorded_json(run.rendering))),
+                                              options.notes, to_json(run.rendering))),
                      sizeof(ServoRecord), RowLogWriter::Name::later);
     const ServoSettings servo =
         loop_settings(session, run.model, run.rendering, choice.kind != "replay");
@@ -233,7 +233,7 @@ SessionRun run_admitted(AdmittedSession admitted, const HilSession& session,
     run.findings = device->findings();
     notices.look();
     Json closing = recording_closing(run.outcome);
-    if (!run.findings.empty()) closing["device_findings"] = to_json(run.findings);
+    if (!run.findings.empty()) closing["device_findings"] = remarks_json(run.findings);
     if (!markers.list().empty()) closing["markers"] = markers.list();
     log.close(to_text(closing));
   } catch (...) {

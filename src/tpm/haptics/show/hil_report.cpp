@@ -161,7 +161,7 @@ void add_glance(Document& d, const HilRecording& r, const Verification& v,
     lines.push_back({rendering->verdict, rendering->passive  ? Tone::good
                                          : rendering->stable ? Tone::plain
                                                              : Tone::bad});
-    for (const std::string& warning : rendering->warnings) lines.push_back({warning, Tone::bad});
+    for (std::string& text : rendering->texts()) lines.push_back({std::move(text), Tone::bad});
   }
   lines.push_back({fmt::format("the force commanded is within {} of the reference, in parts of the "
                                "session's peak of {} N",

@@ -212,7 +212,7 @@ Json check_json(const JitterCheck& check) {
           {"detail", o.detail},
           {"device_error", o.device.error},
           {"device_error_text", std::string(o.device.error_text)},
-          {"device_findings", to_json(check.findings)},
+          {"device_findings", remarks_json(check.findings)},
           {"most_consecutive_missed", o.counts.most_consecutive_missed},
           {"most_late_of_1000", o.counts.most_late},
           {"watchdog_s", rounded(check.watchdog_s)},
@@ -252,7 +252,7 @@ std::string check_text(const JitterCheck& check) {
 Json run_json(const HilSession& session, const SessionRun& run) {
   const bool tested = session.law && session.law->adequacy;
   Json outcome = recording_closing(run.outcome);
-  if (!run.findings.empty()) outcome["device_findings"] = to_json(run.findings);
+  if (!run.findings.empty()) outcome["device_findings"] = remarks_json(run.findings);
   return {{"simulated_device", !run.device.hardware},
           {"title", session.title},
           {"device", to_json(run.device)},
@@ -319,9 +319,9 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
           {"reference", v.reference},
           {"whole", v.whole},
           {"damaged_rows", recording.damaged},
-          {"end", recording.cause()},
-          {"end_detail", recording.ended.detail},
-          {"device_findings", to_json(recording.ended.device_findings)},
+          {"cause", recording.cause()},
+          {"detail", recording.ended.detail},
+          {"device_findings", remarks_json(recording.ended.device_findings)},
           {"without_equilibrium", v.without_equilibrium},
           {"remarks", remarks_json(all_remarks(recording, v))},
           {"end_s", rounded(v.end_s)},

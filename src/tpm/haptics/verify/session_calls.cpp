@@ -65,7 +65,7 @@ SessionCheck verify_session(const std::filesystem::path& recording) {
           .peak_N = check.all.peak_N,
           .reference_error_N = check.reference_error_N,
           .whole = check.whole,
-          .notes = remark_texts(all_remarks(read, check))};
+          .remarks = all_remarks(read, check)};
 }
 
 }  // namespace tpm::haptics

@@ -10,7 +10,6 @@
 #include "tpm/base/namespaces.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/law/element/validity_limits.hpp"
-#include "tpm/law/element/validity_remarks.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -25,7 +24,7 @@ Response Model::respond_along(const Protocol& protocol, std::span<const double> 
   return response;
 }
 
-std::vector<Remark> law::validity_remarks(double spacing_m, double peak_depth_m) {
+std::vector<Remark> validity_remarks(double spacing_m, double peak_depth_m) {
   std::vector<Remark> remarks;
   if (peak_depth_m > kDamageIndentation_m) {
     remarks.push_back({"indentation_over_12_mm",
@@ -43,10 +42,6 @@ std::vector<Remark> law::validity_remarks(double spacing_m, double peak_depth_m)
                                    angle * 180.0 / std::numbers::pi)});
   }
   return remarks;
-}
-
-std::vector<std::string> validity_flags(double spacing_m, double peak_depth_m) {
-  return remark_texts(validity_remarks(spacing_m, peak_depth_m));
 }
 
 void require_times_within(const Protocol& protocol, std::span<const double> times_s) {

@@ -69,8 +69,8 @@ std::string opening_comments(const Tissue& tissue, const OrganExportOptions& opt
                        : "springs of the equilibrium stiffness, dampers of the sum of g_j tau_j"));
   text += xml_comment(fmt::format("masses: spheres of {} kg/m3; no gravity, probe or protocol",
                                   shortest(options.density_kg_m3)));
-  for (const std::string& warning : organ_export_warnings(tissue, options)) {
-    text += xml_comment("not expressed: " + warning);
+  for (const Remark& remark : organ_export_remarks(tissue, options)) {
+    text += xml_comment("not expressed: " + remark.text);
   }
   if (const auto contact = network.organ.contact) {
     text += xml_comment(
@@ -219,36 +219,41 @@ std::vector<ExportedBond> exported_bonds(const Tissue& tissue, bool instantaneou
   return bonds;
 }
 
-std::vector<std::string> organ_export_warnings(const Tissue& tissue,
-                                               const OrganExportOptions& options) {
-  std::vector<std::string> warnings;
+std::vector<Remark> organ_export_remarks(const Tissue& tissue, const OrganExportOptions& options) {
+  std::vector<Remark> remarks;
+  const auto add = [&remarks](const char* code, std::string text) {
+    remarks.push_back({code, std::move(text)});
+  };
   const BondSystem system = tissue.bonds();
   const double whole = system.stiffness().sum(), relaxing = system.relaxing().sum();
   if (relaxing > 0.0 && options.instantaneous) {
-    warnings.push_back(fmt::format(
-        "relaxation: {} % of the bonds' stiffness relaxes within {} s, and here nothing does",
-        significant(100.0 * relaxing / whole, 3),
-        significant(system.longest_relaxation_time_s(), 3)));
+    add("relaxation_left_out",
+        fmt::format(
+            "relaxation: {} % of the bonds' stiffness relaxes within {} s, and here nothing does",
+            significant(100.0 * relaxing / whole, 3),
+            significant(system.longest_relaxation_time_s(), 3)));
   } else if (relaxing > 0.0) {
-    warnings.push_back(fmt::format(
-        "relaxation branches: bonds are a spring with a damper beside it, right for motions slow "
-        "against {} s; in faster ones its force grows without limit, but the tissue's stiffness to "
-        "{} times this one only",
-        significant(system.shortest_relaxation_time_s(), 3),
-        significant(whole / (whole - relaxing), 3)));
+    add("relaxation_branches_as_damper",
+        fmt::format("relaxation branches: bonds are a spring with a damper beside it, right for "
+                    "motions slow "
+                    "against {} s; in faster ones its force grows without limit, but the tissue's "
+                    "stiffness to "
+                    "{} times this one only",
+                    significant(system.shortest_relaxation_time_s(), 3),
+                    significant(whole / (whole - relaxing), 3)));
   }
   if (!system.is_linear()) {
-    warnings.emplace_back("stiffening with elongation: bonds keep their stiffness at rest");
+    add("stiffening_left_out", "stiffening with elongation: bonds keep their stiffness at rest");
   }
   const std::vector<std::string>& unused = tissue.unused_blocks;
   if (std::find(unused.begin(), unused.end(), "loads") != unused.end()) {
-    warnings.emplace_back("loads: gravity and pressures of the scene are left out");
+    add("loads_left_out", "loads: gravity and pressures of the scene are left out");
   }
   const auto bonds = exported_bonds(tissue, options.instantaneous);
   constexpr double kMuch_GB = 2.0;
   const double stack_GB = 1e-9 * sizeof(double) * mjcf_stack_numbers(tissue, bonds.size());
   if (options.target == OrganTarget::mjcf && stack_GB > kMuch_GB) {
-    warnings.push_back(
+    add("memory_of_tendons",
         fmt::format("tendons that know their two ends alone: MuJoCo takes about {} GB for the {} "
                     "dense rows of this organ, and time with them",
                     significant(stack_GB, 2), bonds.size()));
@@ -256,15 +261,15 @@ std::vector<std::string> organ_export_warnings(const Tissue& tissue,
   const auto ropes =
       std::count_if(bonds.begin(), bonds.end(), [](const ExportedBond& bond) { return bond.rope; });
   if (ropes > 0 && options.target == OrganTarget::sofa) {
-    warnings.push_back(fmt::format("{} bonds that only pull push here, too", ropes));
+    add("ropes_push", fmt::format("{} bonds that only pull push here, too", ropes));
   }
   if (ropes > 0 && options.target == OrganTarget::mjcf && !options.instantaneous) {
     const bool damped = std::any_of(bonds.begin(), bonds.end(), [](const ExportedBond& bond) {
       return bond.rope && bond.damping_N_s_per_m > 0.0;
     });
-    if (damped) warnings.emplace_back("dampers of slack ropes still act");
+    if (damped) add("slack_ropes_damped", "dampers of slack ropes still act");
   }
-  return warnings;
+  return remarks;
 }
 
 std::string export_organ(const Tissue& tissue, const OrganExportOptions& options) {

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/base/remark.hpp"
 #include "tpm/organ/scene/scene.hpp"
 
 namespace tpm::organ {
@@ -45,7 +46,7 @@ struct ExportedBond {
 
 /// Properties of this organ that have no counterpart in the format; each stands among the comments,
 /// too.
-[[nodiscard]] std::vector<std::string> organ_export_warnings(const Tissue& tissue,
-                                                             const OrganExportOptions& options);
+[[nodiscard]] std::vector<Remark> organ_export_remarks(const Tissue& tissue,
+                                                       const OrganExportOptions& options);
 
 }  // namespace tpm::organ

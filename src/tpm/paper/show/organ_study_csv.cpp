@@ -21,7 +21,7 @@ Json answer_rows(const OrganStudy& study) {
 }  // namespace
 
 std::string readings_csv(const OrganStudy& study) {
-  return json_table_csv(answer_rows(study), "/readings");
+  return json_table_csv(answer_rows(study), "/readings", {"material", "experiment"});
 }
 
 std::string curves_csv(const OrganStudy& study) {
@@ -37,7 +37,7 @@ std::string curves_csv(const OrganStudy& study) {
       }
     }
   }
-  return json_table_csv(rows, "/points");
+  return json_table_csv(rows, "/points", {"material", "experiment"});
 }
 
 std::string fits_csv(const OrganStudy& study) {
@@ -52,7 +52,7 @@ std::string fits_csv(const OrganStudy& study) {
         row[key] = fit.at(key);
     }
   }
-  return json_table_csv(rows);
+  return json_table_csv(rows, {}, {"fit", "tissue", "name", "SI_unit"});
 }
 
 }  // namespace tpm::paper

@@ -97,11 +97,11 @@ void add_validity(Document& document, const PaperReport& report) {
       "its bonds turn by less than 30 degrees.");
   Table table{"", {{"case"}, {"depth", true}, {"limits passed"}}};
   for (const ValidityCase& c : reached_depths(report)) {
-    const auto flags = validity_flags(c.spacing_m, c.depth_m);
+    const auto passed = remark_texts(validity_remarks(c.spacing_m, c.depth_m));
     table.rows.push_back({{c.name},
                           {fmt::format("{:.2f} mm", c.depth_m * 1e3)},
-                          {flags.empty() ? "none" : fmt::format("{}", fmt::join(flags, "; ")),
-                           flags.empty() ? Tone::good : Tone::bad}});
+                          {passed.empty() ? "none" : fmt::format("{}", fmt::join(passed, "; ")),
+                           passed.empty() ? Tone::good : Tone::bad}});
   }
   document.table(std::move(table));
 }

@@ -1,7 +1,6 @@
 // Declared in tpm/plan/show/plan_report.hpp.
 // What a planned model answered.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
@@ -43,10 +42,8 @@ void write_claim(const Plan& plan, Hdf5Writer& file) {
   }
   file.numbers("/claim/tolerance", {plan.request.tolerance});
   if (plan.masses_left_out) file.numbers("/claim/masses_left_out", {*plan.masses_left_out});
-  const std::vector<std::string> warnings = remark_texts(plan_remarks(plan));
-  if (!warnings.empty()) {
-    file.attribute("/claim", "warnings", fmt::format("{}", fmt::join(warnings, "\n")));
-  }
+  const std::vector<Remark> remarks = plan_remarks(plan);
+  if (!remarks.empty()) file.attribute("/claim", "remarks", to_text(remarks_json(remarks)));
 }
 
 }  // namespace

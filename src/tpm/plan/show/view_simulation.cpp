@@ -177,8 +177,9 @@ void add_claim(const Hdf5Reader& file, ViewPage& page) {
                                  file.attribute("/claim", "quantity"), share("claimed_error"),
                                  share("verified_error"), file.attribute("/claim", "norm"),
                                  share("tolerance")));
-  if (file.has_attribute("/claim", "warnings")) {
-    page.fact("warning", file.attribute("/claim", "warnings"));
+  if (!file.has_attribute("/claim", "remarks")) return;
+  for (const Json& remark : parse_json(file.attribute("/claim", "remarks"), "/claim: remarks")) {
+    page.fact("warning", remark.at("text").get<std::string>());
   }
 }
 
