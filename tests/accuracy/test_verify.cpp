@@ -1,4 +1,5 @@
 // tpm accuracy verify: every check holds, and every check fails when a coefficient is wrong.
+#include <fmt/format.h>
 #include <pty.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -152,7 +153,37 @@ TEST_CASE("verification: of rows that hold and rows that fail, only the latter a
   CHECK_THAT(page, Contains("bad\">1.2<") && Contains("bad\">made: gave up") &&
                        Contains("bad\">4 checks: 2 FAILED.") &&
                        Contains("bad\">stand-in: 2 of 4 hold"));
-  CHECK(occurrences(read_file(folder / "page/report.md"), "FAILS") == 2);
+  const std::string text = read_file(folder / "page/report.md");
+  CHECK(occurrences(text, "FAILS") == 2);
+  // What all rows share stands once, above them.
+  CHECK(occurrences(text, "Reference: this test.") == 1);
+  CHECK(occurrences(text, "| this test") == 0);
+}
+
+TEST_CASE("verification: a problem has a table, whose rows name the method alone") {
+  VerificationRun run;
+  for (const char* method : {"one", "two"}) {
+    for (const char* problem : {"a bar", "a beam"}) {
+      VerificationRow row;
+      row.group = "orders";
+      row.what = fmt::format("{}, {}", method, problem);
+      row.problem = problem;
+      row.quantity = "order";
+      row.source = fmt::format("closed form of {}", problem);
+      row.measured = row.expected = 2.0;
+      row.tolerance = 0.1;
+      run.rows.push_back(std::move(row));
+    }
+  }
+  const test::TempFolder folder;
+  write_verification(run, folder / "page", 1.0);
+  const std::string text = read_file(folder / "page/report.md");
+  for (const char* problem : {"a bar", "a beam"}) {
+    CHECK(occurrences(text, fmt::format("{0}. Reference: closed form of {0}.", problem)) == 1);
+    CHECK(occurrences(text, std::string(", ") + problem) == 0);
+  }
+  CHECK(occurrences(text, "| one |") == 2);
+  CHECK(to_json(run).at("rows")[0].at("what") == "one, a bar");
 }
 
 TEST_CASE("verification: names of groups") {

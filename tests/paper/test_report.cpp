@@ -42,6 +42,12 @@ TEST_CASE("Markdown escapes what would be read as markup") {
   CHECK_THAT(text, Contains("| a\\|b | 1.3e-16 |"));
   CHECK_THAT(text, Contains("| --- | ---: |"));
   CHECK_THAT(text, Contains("![Figure](figures/fig.svg)"));
+  // Without a caption the drawing stands alone; the text above it says what it shows.
+  Document pictures;
+  pictures.picture({"fig", "Figure", ""});
+  const std::string alone = to_markdown(pictures);
+  CHECK_THAT(alone, Contains("![Figure](figures/fig.svg)"));
+  CHECK_THAT(alone, !Contains("**"));
   CHECK(text.back() == '\n');
   CHECK(text[text.size() - 2] != '\n');
 }

@@ -80,9 +80,8 @@ void judge_printed(PrintedComparison& c, double share) {
     c.verdict = ModelVerdict::undetermined;
     const double limit = share * nearest;
     if (c.is_range() && 0.5 * (c.high - c.low) > limit) {
-      c.remark = fmt::format(
-          "D is only known to lie in a range of {}; the readings behind it would decide",
-          in_unit_of(c.high - c.low, c.unit));
+      c.remark = fmt::format("{}{}; the readings behind it would decide", kOnlyARange,
+                             in_unit_of(c.high - c.low, c.unit));
     } else {
       c.remark = fit::what_must_shrink(
           c.e, limit, {{"u_input (parameters)", c.u_input}, {"u_D (printed digits)", c.u_D}},

@@ -1,6 +1,7 @@
 #pragma once
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tpm/files/json.hpp"
@@ -37,6 +38,9 @@ struct PrintedComparison {
 
   [[nodiscard]] bool is_range() const { return high > low; }
 };
+
+/// Begins the remark on a range that is wider than the requirement.
+inline constexpr std::string_view kOnlyARange = "D is only known to lie in a range of ";
 
 /// Fills e, verdict, remark and the two limits from S, D and the uncertainties. The model error S -
 /// D is compared with R for every D that the range allows: adequate, or not adequate, only if it is

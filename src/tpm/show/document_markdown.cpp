@@ -60,9 +60,10 @@ struct MarkdownBlock {
   }
 
   std::string operator()(const Picture& picture) const {
-    return fmt::format("**{0}.** {1}\n\n![{0}](figures/{2}.svg)\n\n",
-                       markdown_escaped(picture.title), markdown_escaped(picture.caption),
-                       picture.id);
+    const std::string title = markdown_escaped(picture.title);
+    const std::string image = fmt::format("![{}](figures/{}.svg)\n\n", title, picture.id);
+    if (picture.caption.empty()) return image;
+    return fmt::format("**{}.** {}\n\n{}", title, markdown_escaped(picture.caption), image);
   }
 };
 

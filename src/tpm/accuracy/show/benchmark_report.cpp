@@ -50,15 +50,18 @@ std::string reference_words(const BenchmarkResult& result) {
       r.first.words, r.second.words, significant(r.agreement, 2), peak, significant(r.floor, 2));
 }
 
-/// What a cell says of the cheapest point within an error.
+/// What a cell says of the cheapest point within an error: "36.7 us/s (400 us)".
 std::string cheapest_words(const BenchmarkResult& result, const BenchmarkPoint& point) {
   const std::string cost =
       point.times ? fmt::format("{}/s", seconds_words(point.times->median_s / result.simulated_s))
-                  : fmt::format("{} evaluations", point.work.rates);
-  const std::string setting = setting_words(point);
-  return setting.empty() ? cost : fmt::format("{} ({})", cost, setting);
+                  : std::to_string(point.work.rates);
+  if (point.parameter.empty()) return cost;
+  return fmt::format(
+      "{} ({})", cost,
+      point.parameter == "step_s" ? seconds_words(point.value) : significant(point.value, 3));
 }
 
+/// Curves of which some setting completed; failure_table names the others.
 Table aims_table(const BenchmarkResult& result, bool timing) {
   Table table{timing ? "Wall time per simulated second of the cheapest setting within an error"
                      : "Evaluations of the cheapest setting within an error",
@@ -66,23 +69,24 @@ Table aims_table(const BenchmarkResult& result, bool timing) {
   for (const double aim : kAims) table.columns.push_back({percent_words(aim), true});
   table.columns.push_back({"least error", true});
   for (const std::string& curve : curves_of(result)) {
-    std::vector<Cell> row{{curve}};
-    for (const double aim : kAims) {
-      const BenchmarkPoint* point = cheapest_within(result, curve, aim);
-      row.push_back(point != nullptr ? Cell{cheapest_words(result, *point)}
-                                     : Cell{"-", Tone::fair});
-    }
     const BenchmarkPoint* best = nullptr;
-    std::string otherwise = "not applicable";
     for (const BenchmarkPoint& p : result.points) {
-      if (p.curve() != curve) continue;
-      if (p.end != "not_applicable") otherwise = "fails";
-      if (p.failed()) continue;
+      if (p.curve() != curve || p.failed()) continue;
       if (best == nullptr || p.error < best->error) best = &p;
     }
-    row.push_back(best == nullptr ? Cell{otherwise, otherwise == "fails" ? Tone::bad : Tone::fair}
-                                  : Cell{fmt::format("{}{}", best->below_floor ? "< " : "",
-                                                     significant(best->error, 2))});
+    if (best == nullptr) continue;
+    std::vector<Cell> row{{curve}};
+    const BenchmarkPoint* before = nullptr;
+    for (const double aim : kAims) {
+      const BenchmarkPoint* point = cheapest_within(result, curve, aim);
+      if (point == nullptr) {
+        row.push_back({"-", Tone::fair});
+      } else {
+        row.push_back({point == before ? "same" : cheapest_words(result, *point)});
+      }
+      before = point;
+    }
+    row.push_back({(best->below_floor ? "< " : "") + significant(best->error, 2)});
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -137,7 +141,7 @@ Table servo_table(const BenchmarkResult& result) {
 }
 
 Table failure_table(const BenchmarkResult& result) {
-  Table table{"What failed", {{"method"}, {"how"}, {"settings"}, {"reason (of the first)"}}};
+  Table table{"What failed", {{"method"}, {"how"}, {"settings"}, {"reason of the first"}}};
   for (const std::string& curve : curves_of(result)) {
     std::vector<std::string> ends;
     for (const BenchmarkPoint& p : result.points) {
@@ -152,10 +156,11 @@ Table failure_table(const BenchmarkResult& result) {
         if (settings.empty()) reason = p.reason;
         settings.push_back(p.parameter.empty() ? "all" : setting_words(p));
       }
-      table.rows.push_back({{curve},
-                            {spaced(end), Tone::bad},
-                            {fmt::format("{}", fmt::join(settings, "; "))},
-                            {reason}});
+      const std::string from_to =
+          settings.size() == 1
+              ? settings.front()
+              : fmt::format("{}: {} to {}", settings.size(), settings.front(), settings.back());
+      table.rows.push_back({{curve}, {spaced(end), Tone::bad}, {from_to}, {reason}});
     }
   }
   return table;
@@ -267,10 +272,27 @@ void add_model_tables(Document& document, const BenchmarkResult& result, bool ti
       }));
 }
 
+/// How the figures of all problems read, once: their captions, without those of what is missing.
+void add_captions(Document& document, const std::vector<Figure>& figures) {
+  std::vector<Cell> items;
+  for (const bool counts : {false, true}) {
+    const Figure* longest = nullptr;
+    for (const Figure& figure : figures) {
+      if (figure.id.ends_with("_counts") != counts) continue;
+      if (longest == nullptr || figure.caption.size() > longest->caption.size()) longest = &figure;
+    }
+    if (longest != nullptr) {
+      items.push_back(
+          {fmt::format("Error against {}. {}", counts ? "work" : "wall time", longest->caption)});
+    }
+  }
+  if (!items.empty()) document.bullets(std::move(items));
+}
+
 void add_pictures(Document& document, const std::vector<Figure>& figures, const std::string& id) {
   for (const Figure& figure : figures) {
     if (figure.id == id || figure.id == id + "_counts") {
-      document.picture({figure.id, figure.title, figure.caption});
+      document.picture({figure.id, figure.title, ""});
     }
   }
 }
@@ -280,7 +302,10 @@ std::string introduction(const BenchmarkOptions& options) {
       "Every method at many settings on named problems. The error is the largest absolute "
       "difference "
       "of the response to the reference over the protocol, divided by the largest response; 1 % is "
-      "1e-2 in the charts. No method is its own reference.";
+      "1e-2 in the charts. No method is its own reference. In a table the step or the tolerance of "
+      "a "
+      "setting stands in parentheses; 'same': the setting to the left meets this error, too. Every "
+      "setting of a problem stands in the CSV file of its name.";
   if (!options.timing) return text + " Made with `--no-timing`: counts, and no clock.";
   return text + fmt::format(
                     " Wall times are medians of {} repeats of each setting that completes, on one "
@@ -295,6 +320,7 @@ std::string introduction(const BenchmarkOptions& options) {
 Document benchmark_document(const BenchmarkRecord& record, const std::vector<Figure>& figures) {
   Document document{"Speed against accuracy", "What `tpm accuracy benchmark` measured"};
   document.paragraph(introduction(record.options));
+  add_captions(document, figures);
   for (const BenchmarkResult& result : record.results) {
     document.heading(2, fmt::format("{} (`{}`)", result.title, result.name));
     document.paragraph(result.text);
@@ -309,7 +335,6 @@ Document benchmark_document(const BenchmarkRecord& record, const std::vector<Fig
     }
     Table failures = failure_table(result);
     if (!failures.rows.empty()) document.table(std::move(failures));
-    document.paragraph(fmt::format("Every setting: `{}.csv`.", result.name));
   }
   typeset(document);
   return document;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
@@ -32,6 +33,19 @@ std::string verdict_words(const StabilityVerdict& v) {
   if (!std::isfinite(v.error)) return name;
   return name + ", " + (v.error < kRounding ? "exact" : percent(v.error));
 }
+
+/// The same in a table of a page, whose introduction says that a number alone means "holds" and
+/// that its unit is %: "0.012", "exact", "diverged".
+std::string short_words(const StabilityVerdict& v) {
+  std::string words = verdict_words(v);
+  const std::string holds = fmt::format("{}, ", stability_class_name(StabilityClass::holds));
+  if (words.starts_with(holds)) words.erase(0, holds.size());
+  if (words.ends_with(" %")) words.erase(words.size() - 2);
+  return words;
+}
+
+constexpr const char* kShortWords =
+    "Numbers are errors in % of the peak; a number or 'exact' alone: the rule holds.";
 
 const ResultTable<StabilityLimit>& limits_table() {
   using Row = StabilityLimit;
@@ -82,12 +96,7 @@ const ResultTable<LimitingCase> kLimitingCases({{"case", &LimitingCase::name}});
 const ResultTable<LimitingCell> kLimitingCells(limiting_columns());
 
 Table servo_table(const StabilityStudy& study, const std::string& problem) {
-  Table table{
-      fmt::format(
-          "{}, the paper's eta1 = 5 Pa s (tau = 0.208 ms), 4 mm at 90 mm/s and "
-          "held, as a servo samples it at its ticks: largest force error there, of the peak.",
-          problem),
-      {{"rate, Hz", true}}};
+  Table table{problem, {{"rate, Hz", true}}};
   for (const ServoRow& row : study.servo) {
     if (row.problem != problem) continue;
     if (table.columns.size() == 1) {
@@ -97,21 +106,37 @@ Table servo_table(const StabilityStudy& study, const std::string& problem) {
     std::vector<Cell> cells{{significant(row.rate_Hz, 4)}};
     for (const ServoCell& cell : row.cells) {
       const bool holds = cell.verdict.found == StabilityClass::holds;
-      cells.push_back({verdict_words(cell.verdict), holds ? Tone::good : Tone::bad});
+      cells.push_back({short_words(cell.verdict), holds ? Tone::good : Tone::bad});
     }
     table.rows.push_back(std::move(cells));
   }
   return table;
 }
 
-Table limiting_cases_table(const StabilityStudy& study) {
-  Table table{"Limiting cases, step 1 ms. An answer that is not the expected one is marked.",
+/// What is done and what is right, once for all cases that share both.
+Table expectations_table(const StabilityStudy& study) {
+  using Shared = std::pair<std::string, std::string>;
+  const auto shared = [](const LimitingCase& c) { return Shared{c.setup, c.expected}; };
+  Table table{"What is done in each case, and what is right.",
               {{"case"}, {"what is done"}, {"what is right"}}};
+  for (const Shared& both : each_once(study.limiting_cases, shared)) {
+    std::vector<LimitingCase> cases = study.limiting_cases;
+    std::erase_if(cases, [&](const LimitingCase& c) { return shared(c) != both; });
+    table.rows.push_back({{listed(cases, &LimitingCase::name, "; ")}, {both.first}, {both.second}});
+  }
+  return table;
+}
+
+Table limiting_cases_table(const StabilityStudy& study) {
+  Table table{fmt::format("What the rules did, steps of 1 ms. {} An answer that is not the "
+                          "expected one is marked.",
+                          kShortWords),
+              {{"case"}}};
   for (const StepRuleEntry& entry : kStepRules) table.columns.push_back({std::string(entry.text)});
   for (const LimitingCase& limiting_case : study.limiting_cases) {
-    std::vector<Cell> row{{limiting_case.name}, {limiting_case.setup}, {limiting_case.expected}};
+    std::vector<Cell> row{{limiting_case.name}};
     for (const LimitingCell& cell : limiting_case.cells) {
-      std::string words = verdict_words(cell.verdict);
+      std::string words = short_words(cell.verdict);
       if (!cell.right) {
         words += fmt::format(" (not as expected: {})", stability_class_name(cell.expected));
       }
@@ -149,21 +174,35 @@ Disagreement disagreement(const StabilityMap& map) {
   return d;
 }
 
-Table maps_table(const StabilityStudy& study) {
-  Table table{
-      "Runs of the maps by class, and against the limit of linear theory: above it without "
-      "growth, below it with growth (5 % around it left out).",
-      {{"map"}, {"rule"}}};
+/// Classes that some run of a map ended in.
+std::vector<StabilityClassEntry> classes_found(const StabilityStudy& study) {
+  std::vector<StabilityClassEntry> found;
   for (const StabilityClassEntry& entry : kStabilityClasses) {
-    if (entry.meaning == StabilityClass::not_applicable) continue;
+    const auto in_map = [&](const StabilityMap& map) {
+      return std::ranges::any_of(map.points,
+                                 [&](const auto& p) { return p.verdict.found == entry.meaning; });
+    };
+    if (std::ranges::any_of(study.maps, in_map)) found.push_back(entry);
+  }
+  return found;
+}
+
+Table maps_table(const StabilityStudy& study) {
+  const std::vector<StabilityClassEntry> classes = classes_found(study);
+  Table table{
+      "Runs of the maps by class; a class without a column has no run. The last two columns "
+      "compare "
+      "with the limit of linear theory (5 % around it left out), '-' where a rule has none: runs "
+      "above it that did not grow, and runs below it that grew.",
+      {{"map"}, {"rule"}}};
+  for (const StabilityClassEntry& entry : classes) {
     table.columns.push_back({std::string(entry.text), true});
   }
   table.columns.push_back({"above, no growth", true});
   table.columns.push_back({"below, growth", true});
   for (const StabilityMap& map : study.maps) {
     std::vector<Cell> row{{map.quantity}, {step_rule_name(map.rule)}};
-    for (const StabilityClassEntry& entry : kStabilityClasses) {
-      if (entry.meaning == StabilityClass::not_applicable) continue;
+    for (const StabilityClassEntry& entry : classes) {
       const auto count = std::ranges::count_if(
           map.points, [&](const auto& p) { return p.verdict.found == entry.meaning; });
       row.push_back({std::to_string(count)});
@@ -176,21 +215,34 @@ Table maps_table(const StabilityStudy& study) {
   return table;
 }
 
+/// The problem of each map, once for all rules.
+Table problems_table(const StabilityStudy& study) {
+  using Posed = std::pair<std::string, std::string>;
+  const auto posed = [](const StabilityMap& map) { return Posed{map.quantity, map.problem}; };
+  Table table{"", {{"map of the step against"}, {"problem"}}};
+  for (const Posed& both : each_once(study.maps, posed)) {
+    table.rows.push_back({{both.first}, {both.second}});
+  }
+  return table;
+}
+
+/// "rk4: mass, drag"
+std::string figure_title(const Figure& figure) {
+  return figure.panels.empty() ? figure.title : listed(figure.panels, &Panel::title, "; ");
+}
+
 void add_maps(Document& document, const StabilityStudy& study, const std::vector<Figure>& figures) {
   document.heading(2, "Maps");
   document.paragraph(fmt::format(
-      "A run holds if it is within {} of the reference at its end, in parts of the peak; the "
-      "reference is "
-      "a "
-      "closed form, or the modes of the linear motion. It diverged if a value is not finite or "
-      "beyond 1000 times its scale, or if its distance from the reference still grows; with masses "
-      "that "
-      "is called growing energy.",
+      "A run of 300 steps (with a rising load: 300 after it) is compared with the reference over "
+      "its last 32. It holds if it is within {} of the peak; the reference is a closed form, or "
+      "the modes of the linear motion. It diverged if a value is not finite or beyond 1000 times "
+      "its scale, or if its distance from the reference still grows; with masses that is called "
+      "growing energy.",
       percent(kHoldsWithin)));
+  document.table(problems_table(study));
   document.table(maps_table(study));
-  for (const Figure& figure : figures) {
-    document.picture({figure.id, figure.title, figure.caption});
-  }
+  for (const Figure& figure : figures) document.picture({figure.id, figure_title(figure), ""});
 }
 
 /// @param figures of stability_figures
@@ -210,12 +262,19 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
     document.table(
         limits_table().page("Limits found by bisection to 1 % and those of theory.", study.limits));
   }
-  if (!study.servo.empty()) document.heading(2, "At servo rate");
+  if (!study.servo.empty()) {
+    document.heading(2, "At servo rate");
+    document.paragraph(
+        fmt::format("The paper's eta1 = 5 Pa s (tau = 0.208 ms), 4 mm at 90 mm/s and "
+                    "held, as a servo samples it at its ticks. {}",
+                    kShortWords));
+  }
   for (const std::string& problem : each_once(study.servo, &ServoRow::problem)) {
     document.table(servo_table(study, problem));
   }
   if (!study.limiting_cases.empty()) {
     document.heading(2, "Limiting cases");
+    document.table(expectations_table(study));
     document.table(limiting_cases_table(study));
   }
   if (!study.maps.empty()) add_maps(document, study, figures);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 
 #include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
@@ -39,20 +40,53 @@ Tone tone_of(const VerificationRow& row) {
   return row.holds() ? Tone::good : Tone::bad;
 }
 
+/// The method alone where the caption of its table names the problem.
+std::string method_words(const VerificationRow& row) {
+  const std::string end = ", " + row.problem;
+  if (row.problem.empty() || !row.what.ends_with(end)) return row.what;
+  return row.what.substr(0, row.what.size() - end.size());
+}
+
 const ResultTable<VerificationRow>& verification_table() {
   using Row = VerificationRow;
   using Of = ResultColumn<Row>;
   const auto measured = [](const Row& row) { return Cell{measured_words(row), tone_of(row)}; };
   const auto required = [](const Row& row) { return Cell{expected_words(row)}; };
   const auto verdict = [](const Row& row) { return Cell{verdict_of(row), tone_of(row)}; };
+  const auto method = [](const Row& row) { return Cell{method_words(row)}; };
   static const ResultTable<Row> table(
-      {Of("group", &Row::group), Of("what", &Row::what).shown("what is verified"),
+      {Of("group", &Row::group), Of("what", &Row::what).shown("method").in_words(method),
        Of("quantity", &Row::quantity).shown("quantity"),
        Of("measured", &Row::measured).or_left_out().shown("measured", 1).in_words(measured),
        Of("expected", &Row::expected, 0).shown("required", 1).in_words(required),
        Of("tolerance", &Row::tolerance, 0), Of("failure", &Row::failure).or_left_out(),
        Of("holds", &Row::holds).shown("verdict").in_words(verdict),
        Of("reference", &Row::source).shown("reference")});
+  return table;
+}
+
+/// Moves a column whose cells are all the same from a table of several rows into its caption.
+void lift_column(Table& table, const std::string& title) {
+  const auto found = std::ranges::find(table.columns, title, &Column::title);
+  if (table.rows.size() < 2 || found == table.columns.end()) return;
+  const auto at = found - table.columns.begin();
+  const std::string& text = table.rows.front()[static_cast<std::size_t>(at)].text;
+  const auto same = [&](const std::vector<Cell>& row) {
+    return row[static_cast<std::size_t>(at)].text == text;
+  };
+  if (!std::ranges::all_of(table.rows, same)) return;
+  std::string label = title;
+  label.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(label.front())));
+  table.caption += fmt::format("{}{}: {}.", table.caption.empty() ? "" : " ", label, text);
+  table.columns.erase(found);
+  for (std::vector<Cell>& row : table.rows) row.erase(row.begin() + at);
+}
+
+/// The checks of one problem, or those of a group that share none.
+Table problem_table(const std::string& problem, const std::vector<VerificationRow>& rows) {
+  Table table = verification_table().page(problem.empty() ? "" : problem + ".", rows);
+  if (problem.empty()) table.columns.front().title = "what is verified";
+  for (const char* title : {"reference", "quantity", "required"}) lift_column(table, title);
   return table;
 }
 
@@ -91,7 +125,11 @@ Document verification_document(const VerificationRun& verification) {
     document.heading(2, fmt::format("{}: {}", name, summary));
     std::vector<VerificationRow> rows = verification.rows;
     std::erase_if(rows, [&](const VerificationRow& row) { return row.group != name; });
-    document.table(verification_table().page("", rows));
+    for (const std::string& problem : each_once(rows, &VerificationRow::problem)) {
+      std::vector<VerificationRow> shared = rows;
+      std::erase_if(shared, [&](const VerificationRow& row) { return row.problem != problem; });
+      document.table(problem_table(problem, shared));
+    }
   }
   typeset(document);
   return document;

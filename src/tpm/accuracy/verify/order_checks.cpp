@@ -151,6 +151,7 @@ VerificationCheck rule_check(const KnownProblemPtr& known, const StepRuleEntry& 
   VerificationCheck check;
   check.what = fmt::format("{}, {}", rule.text, known->name);
   check.source = known->source;
+  check.problem = known->name;
   MethodSettings settings;
   settings.rule = rule.meaning;
   if (rule.adaptive) {

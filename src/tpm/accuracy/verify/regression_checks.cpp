@@ -48,7 +48,8 @@ std::vector<VerificationCheck> regression_checks() {
            fmt::format("NIST StRD, {}.dat, certified values", problem.name), 0.0, kDigits,
            [&problem, start](double flaw) {
              return off_certified(problem, fit_certified(problem, problem.starts[start], flaw));
-           }});
+           },
+           problem.noise_free() ? "data without noise" : "data with noise"});
     }
   }
   return checks;

@@ -27,6 +27,7 @@ VerificationRow run_check(const VerificationGroup& group, const VerificationChec
   row.what = check.what;
   row.quantity = check.quantity;
   row.source = check.source;
+  row.problem = check.problem;
   row.expected = check.expected;
   row.tolerance = check.tolerance;
   try {

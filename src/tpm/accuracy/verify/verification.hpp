@@ -25,11 +25,12 @@ struct VerificationCheck {
   /// @param flaw one coefficient of what is verified is wrong by this share, its reference is not:
   ///   the check must then fail
   std::function<double(double flaw)> measure;
+  std::string problem{};  ///< that several checks share, and a table of the page is of; or empty
 };
 
 /// A check with its result.
 struct VerificationRow {
-  std::string group, what, quantity, source;
+  std::string group, what, quantity, source, problem;
   double expected = 0.0, tolerance = 0.0;
   double measured = std::numeric_limits<double>::quiet_NaN();
   std::string failure;  ///< why there is no number

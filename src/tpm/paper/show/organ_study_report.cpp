@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/lists.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/fit/show/fit_cells.hpp"
@@ -27,8 +28,12 @@ std::string element_words(const TpmVector& p) {
                      significant(1e3 * p[kSpacing], 4));
 }
 
+std::string percent_number(double share) {
+  return fmt::format("{}{}", share < 0.0 ? "" : "+", significant(100.0 * share, 3));
+}
+
 std::string percent(double share) {
-  return fmt::format("{}{} %", share < 0.0 ? "" : "+", significant(100.0 * share, 3));
+  return percent_number(share) + " %";
 }
 
 /// What was imposed: "4 mm at 2 mm/s", "0.98 N", "static".
@@ -44,9 +49,9 @@ std::string condition_words(const StudyCondition& c) {
   }
 }
 
-std::string response_words(Kind kind, double response) {
-  return kind == Kind::creep ? millimetres(response)
-                             : fmt::format("{} N", significant(response, 4));
+/// Without its unit, which the caption of the table names: mm of creep, else N.
+std::string response_number(Kind kind, double response) {
+  return significant(kind == Kind::creep ? 1e3 * response : response, 4);
 }
 
 /// Least and most of what a tissue's readings of one kind differ from the first tissue's.
@@ -97,7 +102,7 @@ Table readings_table(const OrganStudy& study, const StudyCurves& set, Kind kind,
   const bool compared = set.parameters.has_value();
   for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
     table.columns.push_back({study.config.tissues[t].name, true});
-    if (compared && t > 0) table.columns.push_back({"difference", true});
+    if (compared && t > 0) table.columns.push_back({"difference, %", true});
   }
   for (std::size_t c = 0; c < study.config.conditions.size(); ++c) {
     if (study.config.conditions[c].kind != kind) continue;
@@ -110,11 +115,11 @@ Table readings_table(const OrganStudy& study, const StudyCurves& set, Kind kind,
       for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
         const StudyCurve& curve = set.at(c, t);
         const bool failed = curve.readings.empty();
-        row.push_back({failed ? "none" : response_words(kind, curve.readings[i].response),
+        row.push_back({failed ? "none" : response_number(kind, curve.readings[i].response),
                        failed ? Tone::bad : Tone::plain});
         if (!compared || t == 0) continue;
         const bool known = !failed && curve.readings[i].against_first;
-        row.push_back({known ? percent(*curve.readings[i].against_first) : "-"});
+        row.push_back({known ? percent_number(*curve.readings[i].against_first) : "-"});
       }
       table.rows.push_back(std::move(row));
     }
@@ -123,32 +128,26 @@ Table readings_table(const OrganStudy& study, const StudyCurves& set, Kind kind,
 }
 
 /// The largest depth that any tissue creeps to, m.
-double deepest_m(const OrganStudy& study, const StudyCurves& set) {
+double deepest_m(const OrganStudy& study) {
   double deepest = 0.0;
-  for (const StudyCurve& curve : set.curves) {
-    if (study.config.conditions[curve.condition].kind != Kind::creep) continue;
-    for (const StudyReading& r : curve.readings) deepest = std::max(deepest, r.response);
+  for (const StudyCurves& set : study.curves) {
+    for (const StudyCurve& curve : set.curves) {
+      if (study.config.conditions[curve.condition].kind != Kind::creep) continue;
+      for (const StudyReading& r : curve.readings) deepest = std::max(deepest, r.response);
+    }
   }
   return deepest;
 }
 
 void add_readings(Document& document, const OrganStudy& study, const StudyCurves& set) {
   for (const auto& [kind, caption] :
-       {std::pair{Kind::static_, "Static force, at equilibrium."},
-        std::pair{Kind::ramp_hold,
-                  "Force of ramp and hold, at the end of the ramp and of the hold."},
-        std::pair{Kind::creep, "Depth of creep, instantaneous and at the end."}}) {
+       {std::pair{Kind::static_, "Static force, at equilibrium, N."},
+        std::pair{Kind::ramp_hold, "Force at the end of the ramp (peak) and of the hold (end), N."},
+        std::pair{Kind::creep, "Depth of creep, mm."}}) {
     Table table = readings_table(study, set, kind, caption);
     if (!table.rows.empty()) document.table(std::move(table));
   }
   std::vector<Cell> remarks;
-  if (const double deepest = deepest_m(study, set); deepest > kValidIndentation_m) {
-    remarks.push_back({fmt::format("Creep goes as deep as {}: over {} is outside the paper's "
-                                   "validity, and liver is damaged over {}.",
-                                   millimetres(deepest), millimetres(kValidIndentation_m),
-                                   millimetres(kDamageIndentation_m)),
-                       Tone::fair});
-  }
   for (const StudyCurve& curve : set.curves) {
     if (curve.failure.empty()) continue;
     remarks.push_back(
@@ -226,9 +225,7 @@ Table fits_table(const OrganStudy& study) {
 
 /// Every reading of a fit and what each tissue makes of it.
 Table answers_table(const OrganStudy& study, std::size_t fit) {
-  Table table{fmt::format("Fit '{}': readings, and the answers of the fitted tissues. z is the "
-                          "difference in standard deviations; 0 within a band.",
-                          study.config.fits[fit].name),
+  Table table{fmt::format("Fit '{}'.", study.config.fits[fit].name),
               {{"data set"}, {"reading"}, {"provenance"}, {"observed", true}}};
   const FitResult* first = nullptr;
   for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
@@ -255,40 +252,89 @@ Table answers_table(const OrganStudy& study, std::size_t fit) {
   return table;
 }
 
-/// What the fits say about their parameters, and what a reader must know, each sentence once.
-std::vector<Cell> fit_words(const OrganStudy& study) {
-  std::vector<Cell> items;
+/// What a reader must know of the fits: each remark once, with the fits that carry it.
+Table remarks_table(const OrganStudy& study) {
+  Table table{"Remarks of the fits.", {{"remark"}, {"fits"}}};
   for (const TissueFit& made : study.fits) {
     if (!made.result) continue;
-    const std::string name = fmt::format("{}, {}: ", study.config.fits[made.fit].name,
+    const std::string name = fmt::format("{} on {}", study.config.fits[made.fit].name,
                                          study.config.tissues[made.tissue].name);
-    for (const ParameterResult& p : made.result->parameters) {
-      items.push_back({name + p.summary, tone_of(p.verdict)});
-    }
     for (const Remark& remark : made.result->remarks) {
-      items.push_back({name + remark.text, Tone::plain});
+      const auto known = std::ranges::find_if(
+          table.rows, [&](const std::vector<Cell>& row) { return row[0].text == remark.text; });
+      if (known == table.rows.end()) {
+        table.rows.push_back({{remark.text}, {name}});
+      } else {
+        (*known)[1].text += "; " + name;
+      }
     }
   }
-  return items;
+  return table;
+}
+
+/// "Searched: E 2 to 100 kPa; ..."
+std::string searched_words(const OrganStudy& study) {
+  const auto range = [](const EstimatedParameter& p) {
+    const double unit = p.fit.unit.to_si;
+    return fmt::format("{} {} to {} {}", p.fit.name, significant(p.fit.lower / unit, 4),
+                       significant(p.fit.upper / unit, 4), p.fit.unit.symbol);
+  };
+  return fmt::format(
+      "Searched: {}. 'undetermined': every value searched fits. 'best' is left out where all bands "
+      "are met.",
+      listed(study.config.fits.front().configs.front().parameters, range, "; "));
+}
+
+/// How much each tissue differs from the first at one material.
+Table costs_table(const OrganStudy& study) {
+  Table table{fmt::format("Least and largest difference from '{}' at one material.",
+                          study.config.tissues.front().name),
+              {{"material"},
+               {"tissue"},
+               {"static force", true},
+               {"force of ramp and hold", true},
+               {"depth of creep", true}}};
+  for (const StudyCurves& set : study.curves) {
+    if (!set.parameters) continue;
+    for (std::size_t t = 1; t < study.config.tissues.size(); ++t) {
+      std::vector<Cell> row{{set.material}, {study.config.tissues[t].name}};
+      for (const Kind kind : {Kind::static_, Kind::ramp_hold, Kind::creep}) {
+        const CostRange range = cost_range(study, set, t, kind);
+        row.push_back({range.any ? range.words() : "-"});
+      }
+      table.rows.push_back(std::move(row));
+    }
+  }
+  return table;
+}
+
+/// Chi-square of each fit on each tissue.
+Table chi_squares_table(const OrganStudy& study) {
+  Table table{"Chi-square.", {{"fit"}, {"parameters", true}}};
+  for (const auto& tissue : study.config.tissues) table.columns.push_back({tissue.name, true});
+  for (std::size_t f = 0; f < study.config.fits.size(); ++f) {
+    const FitConfig& config = study.config.fits[f].configs.front();
+    std::vector<Cell> row{{study.config.fits[f].name}, {std::to_string(config.parameters.size())}};
+    for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
+      const auto& result = study.fit(f, t).result;
+      row.push_back(result ? Cell{significant(result->chi_square, 4)} : Cell{"failed", Tone::bad});
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
 }
 
 void add_summary(Document& document, const OrganStudy& study) {
   document.heading(2, "Summary");
-  std::vector<Cell> items;
-  for (const std::string& sentence : cost_sentences(study)) items.push_back({sentence});
-  for (std::size_t f = 0; f < study.config.fits.size(); ++f) {
-    std::vector<std::string> parts;
-    for (std::size_t t = 0; t < study.config.tissues.size(); ++t) {
-      const auto& result = study.fit(f, t).result;
-      parts.push_back(fmt::format("{} {}", study.config.tissues[t].name,
-                                  result ? significant(result->chi_square, 4) : "failed"));
-    }
-    const FitConfig& config = study.config.fits[f].configs.front();
-    items.push_back(
-        {fmt::format("Fit '{}', {} parameters: chi-square {}.", study.config.fits[f].name,
-                     config.parameters.size(), fmt::join(parts, ", "))});
+  document.table(costs_table(study));
+  document.table(chi_squares_table(study));
+  if (const double deepest = deepest_m(study); deepest > kValidIndentation_m) {
+    document.bullets({{fmt::format("Creep goes as deep as {}: over {} is outside the paper's "
+                                   "validity, and liver is damaged over {}.",
+                                   millimetres(deepest), millimetres(kValidIndentation_m),
+                                   millimetres(kDamageIndentation_m)),
+                       Tone::fair}});
   }
-  document.bullets(std::move(items));
 }
 
 void add_costs(Document& document, const OrganStudy& study) {
@@ -325,11 +371,16 @@ Document organ_study_document(const OrganStudy& study, const std::vector<Figure>
   add_costs(document, study);
   document.heading(2, "Fits");
   document.table(fits_table(study));
+  document.paragraph(searched_words(study));
+  document.paragraph(
+      "The readings of each fit, and the answers of the fitted tissues. z is the difference in "
+      "standard deviations; 0 within a band.");
   for (std::size_t f = 0; f < study.config.fits.size(); ++f) {
     document.table(answers_table(study, f));
   }
-  document.heading(3, "In words");
-  document.bullets(fit_words(study));
+  if (Table remarks = remarks_table(study); !remarks.rows.empty()) {
+    document.table(std::move(remarks));
+  }
   document.heading(2, "The experiments, each tissue at its own fit");
   add_readings(document, study, study.curves.back());
   document.heading(2, "Figures");

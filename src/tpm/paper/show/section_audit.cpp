@@ -45,31 +45,30 @@ std::string counts(const AuditReport& audit) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-/// "2 Eq. 18" -> "Claims: Eq. 18"; the number only orders the claims file.
-std::string heading_of(const std::string& topic) {
-  return "Claims: " + topic.substr(std::min(topic.find_first_not_of("0123456789 "), topic.size()));
+/// What stands in print, or what one printed equation gives.
+std::string compared_words(const Finding& finding) {
+  return finding.printed.empty() ? fmt::format("({})", finding.derived) : finding.printed;
 }
 
-/// The claims of a topic, with columns for numbers that stand in print and for those that follow
-/// from it, as far as there are any.
-Table table_of_topic(const AuditReport& audit, const std::string& topic) {
-  bool printed = false, derived = false;
-  for (const Finding& f : audit.findings) {
-    if (f.topic == topic) (f.printed.empty() ? derived : printed) = true;
-  }
-  Table table{"", {{"where"}, {"claim"}}};
-  if (printed) table.columns.push_back({"printed", true});
-  if (derived) table.columns.push_back({"derived from print", true});
-  table.columns.insert(table.columns.end(), {{"recomputed", true}, {"verdict"}, {"what follows"}});
-  for (const Finding& f : audit.findings) {
-    if (f.topic != topic) continue;
-    std::vector<Cell> row{{f.where}, {f.claim}};
-    if (printed) row.push_back({f.printed.empty() ? "-" : f.printed});
-    if (derived) row.push_back({f.derived.empty() ? "-" : f.derived});
-    row.insert(row.end(), {{f.recomputed_words()},
-                           {f.verdict_words(), tone_of_finding(f.verdict)},
-                           {consequence(f)}});
-    table.rows.push_back(std::move(row));
+/// The claims by topic, as the claims file orders them.
+Table claims_table(const AuditReport& audit) {
+  Table table{"",
+              {{"where"},
+               {"claim"},
+               {"printed", true},
+               {"recomputed", true},
+               {"verdict"},
+               {"what follows"}}};
+  for (const std::string& topic : each_once(audit.findings, &Finding::topic)) {
+    for (const Finding& f : audit.findings) {
+      if (f.topic != topic) continue;
+      table.rows.push_back({{f.where},
+                            {f.claim},
+                            {compared_words(f)},
+                            {f.recomputed_words()},
+                            {f.verdict_words(), tone_of_finding(f.verdict)},
+                            {consequence(f)}});
+    }
   }
   return table;
 }
@@ -81,13 +80,10 @@ void add_audit(Document& document, const PaperReport& report) {
   document.heading(2, "Audit");
   document.paragraph(
       fmt::format("{} claims of the paper, each recomputed from its own equations and numbers: {}. "
-                  "'Derived from print' is what one printed equation gives, or a bound, where no "
-                  "number is printed; 'recomputed' is what the other side gives.",
+                  "In parentheses: what one printed equation gives, or a bound, where no number is "
+                  "printed.",
                   audit.findings.size(), counts(audit)));
-  for (const std::string& topic : each_once(audit.findings, &Finding::topic)) {
-    document.heading(3, heading_of(topic));
-    document.table(table_of_topic(audit, topic));
-  }
+  document.table(claims_table(audit));
 }
 
 }  // namespace tpm::paper

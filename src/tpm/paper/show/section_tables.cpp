@@ -25,14 +25,16 @@ Tone tone_of_digits(DigitVerdict verdict) {
   return Tone::bad;
 }
 
-/// "0.304 · 0.30436 · exact by rounding"; forces from the printed lambda1, as the paper did.
+/// "0.304 · 0.30436", and the verdict if it is not exact by rounding; forces from the printed
+/// lambda1, as the paper did.
 Cell printed_cell(const TableCell& cell, double unit) {
   if (!cell.printed) return {significant(cell.value / unit, 5)};
   const PrintedCell& printed = *cell.printed;
   const DigitCheck& check = printed.from_printed_lambda1.value_or(printed.from_computed_lambda1);
-  return {fmt::format("{} · {} · {}", check.printed.text, significant(check.computed, 5),
-                      check.words()),
-          tone_of_digits(check.verdict)};
+  std::string words = fmt::format("{} · {}", check.printed.text, significant(check.computed, 5));
+  if (check.verdict == DigitVerdict::by_truncation) words += " · cut";
+  if (!check.explained()) words += " · " + check.words();
+  return {std::move(words), tone_of_digits(check.verdict)};
 }
 
 Cell measured_cell(const TableCell& cell) {
@@ -102,7 +104,8 @@ Table consistent_table(const TablesResult& consistent) {
 void add_tables(Document& document, const PaperReport& report) {
   document.heading(2, "Tables 1 to 5");
   document.paragraph(
-      "In each cell: printed · recomputed · verdict. Forces are recomputed from the printed λ₁, "
+      "In each cell: printed · recomputed, and the verdict unless rounding explains the printed "
+      "digits; 'cut': cutting digits off does. Forces are recomputed from the printed λ₁, "
       "as the paper did; a number printed with few digits is explained by a wide range of values, "
       "so `tables.json` holds the width of that range too. Behind the liver's values stands the "
       "model's misfit.");

@@ -27,11 +27,11 @@ Tone tone_of_model_verdict(ModelVerdict verdict) {
   return verdict == ModelVerdict::not_adequate ? Tone::bad : Tone::fair;
 }
 
-/// "adequate from 33 %", "not adequate below 24 %, adequate from 35 %".
-std::string limits_of(const PrintedComparison& c) {
-  const std::string from = fmt::format("adequate from {}", share_text(c.adequate_from));
-  if (c.not_adequate_below <= 0.0) return from;
-  return fmt::format("not adequate below {}, {}", share_text(c.not_adequate_below), from);
+/// Only what the other columns and the list above them do not say: of a calibration residual, and
+/// of a range that is wider than the requirement, they say it.
+std::string remark_of(const PrintedComparison& c) {
+  if (c.verdict == ModelVerdict::residual) return "-";
+  return c.remark.starts_with(kOnlyARange) ? "D" : c.remark;
 }
 
 Table comparisons_table(const std::vector<PrintedComparison>& all, const std::string& experiment) {
@@ -45,7 +45,8 @@ Table comparisons_table(const std::vector<PrintedComparison>& all, const std::st
                {"u_D, digits", true},
                {"U", true},
                {"verdict"},
-               {"at other R"},
+               {"not adequate below R", true},
+               {"adequate from R", true},
                {"what would change it"}}};
   for (const PrintedComparison& c : all) {
     if (c.experiment != experiment) continue;
@@ -58,8 +59,9 @@ Table comparisons_table(const std::vector<PrintedComparison>& all, const std::st
                           {shown(c.u_D, c, 2)},
                           {shown(c.e.expanded(), c, 2)},
                           {std::string(verdict_words(c.verdict)), tone_of_model_verdict(c.verdict)},
-                          {limits_of(c)},
-                          {c.remark}});
+                          {c.not_adequate_below > 0.0 ? share_text(c.not_adequate_below) : "-"},
+                          {share_text(c.adequate_from)},
+                          {remark_of(c)}});
   }
   return table;
 }
@@ -168,15 +170,15 @@ void add_validation(Document& document, const PaperReport& report) {
       "In the words of ASME V&V 20: S is simulated, D is measured, E = S - D, u_val² = u_num² + "
       "u_input² + u_D², and the model error lies in [E - U, E + U] with 95 %, U = k u_val. The "
       "paper calls its results close and states no requirement, so R = {} of D is ours "
-      "(`tpm paper report --require`). Adequate: |E| + U ≤ R. Not adequate: |E| - U > R. The "
-      "column 'at other R' says what any other requirement would give.",
+      "(`tpm paper report --require`). Adequate: |E| + U ≤ R. Not adequate: |E| - U > R. Two "
+      "columns say what any other requirement would give.",
       share_text(report.requirement)));
   document.bullets(
-      {{counted("Printed", counts_of(report.comparisons, true))},
-       {counted("Fitted", counts_of(report.comparisons, false))},
-       {"D of a range is every number in it: 'adequate' and 'not adequate' hold for all of them. A "
+      {{"D of a range is every number in it: 'adequate' and 'not adequate' hold for all of them. A "
         "range over three animals or over a band of curves has no mean and no distribution here, "
-        "so a number inside it is not confirmed by it; only a number well outside is refuted."},
+        "so a number inside it is not confirmed by it; only a number well outside is refuted. "
+        "Where the last column says 'D', the range "
+        "alone is wider than the requirement: the readings behind it would decide."},
        {"u_D holds the printed digits alone. The scatter of the readings, the force cell, the zero "
         "and, for relaxation, the animal are not stated; the last column says how large that "
         "unstated part must be to change the verdict."},
