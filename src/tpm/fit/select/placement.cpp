@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/base/distributions.hpp"
 #include "tpm/base/median.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/fit/adequacy.hpp"
@@ -169,11 +170,19 @@ double middle_of_rest(std::span<const double> values) {
   return sum / static_cast<double>(values.size());
 }
 
+constexpr double kFewestDegrees = 2.5;
+
 /// Standard deviation of a normal distribution as wide as Student's t.
 double students(double sd, double degrees) {
-  constexpr double kFewest = 2.5;
-  const double f = std::max(degrees, kFewest);
+  const double f = std::max(degrees, kFewestDegrees);
   return sd * std::sqrt(f / (f - 2.0));
+}
+
+/// Upper end of the 95 % interval of an estimated standard deviation.
+double upper_end(double sd, double degrees) {
+  constexpr double kBeyond = 0.025;
+  const double f = std::max(degrees, kFewestDegrees);
+  return sd * std::sqrt(f / chi_squared_quantile(kBeyond, f));
 }
 
 /// Rounding hides what is smaller than a step.
@@ -184,16 +193,17 @@ double rounding_sd(const PreparedRecording& r) {
   return std::max({quantum / std::sqrt(12.0), stated, kLeast * std::abs(r.phases.peak_response)});
 }
 
-/// The noise of the longest hold, about a straight line and four exponentials: a short rest does
-/// not tell how its readings are correlated.
-struct HoldNoise {
-  AutoregressionEstimate noise;
-  double step_s = 0.0;  ///< of samples, which phi belongs to
-  std::size_t samples = 0;
-  double freedom = 1.0;  ///< degrees of freedom of the variance for a known phi
+/// The longest hold, about a straight line and four exponentials: a short rest does not tell how
+/// its readings are correlated.
+struct HoldSamples {
+  std::vector<double> time_s;
+  Eigen::VectorXd reading;
+  Eigen::MatrixXd curve;
+  double step_s = 0.0;    ///< of samples, which phi belongs to
+  double variance = 0.0;  ///< of the noise
 };
 
-std::optional<HoldNoise> hold_noise(const PreparedRecording& r) {
+std::optional<HoldSamples> hold_samples(const PreparedRecording& r) {
   constexpr std::size_t kFewest = 50, kMost = 1000;
   const Phase* longest = nullptr;
   for (const Phase& phase : r.phases.phases) {
@@ -239,14 +249,40 @@ std::optional<HoldNoise> hold_noise(const PreparedRecording& r) {
   if (qr.rank() < curve.cols() || !((reading - curve * qr.solve(reading)).norm() > 0.0)) {
     return std::nullopt;
   }
-  return HoldNoise{estimate_autoregression(kept_time, reading, curve, step_s), step_s, kept.size(),
-                   static_cast<double>(kept.size()) - static_cast<double>(j.cols())};
+  const double variance = estimate_autoregression(kept_time, reading, curve, step_s).variance;
+  return HoldSamples{std::move(kept_time), reading, curve, step_s, variance};
 }
 
+/// The noise of the rests and the hold together, each about its own curve.
+/// @param line of the rests: the first columns of the estimate
+AutoregressionEstimate common_noise(const RestSamples& rest, const Eigen::VectorXd& reading,
+                                    const Eigen::MatrixXd& line, const HoldSamples& hold) {
+  const auto before = std::ranges::lower_bound(rest.time_s, hold.time_s.front());
+  std::vector<double> time_s(rest.time_s.begin(), before);
+  time_s.insert(time_s.end(), hold.time_s.begin(), hold.time_s.end());
+  time_s.insert(time_s.end(), before, rest.time_s.end());
+  const auto first = static_cast<Eigen::Index>(before - rest.time_s.begin());
+  const Eigen::Index held = hold.reading.size(), last = reading.size() - first, p = line.cols();
+  Eigen::VectorXd y(first + held + last);
+  y << reading.head(first), hold.reading, reading.tail(last);
+  Eigen::MatrixXd j = Eigen::MatrixXd::Zero(y.size(), p + hold.curve.cols());
+  j.topLeftCorner(first, p) = line.topRows(first);
+  j.block(first, p, held, hold.curve.cols()) = hold.curve;
+  j.bottomLeftCorner(last, p) = line.bottomRows(last);
+  return estimate_autoregression(time_s, y, j, hold.step_s);
+}
+
+/// What rests say, and the standard deviations of zero and drift at the upper end of the 95 %
+/// interval of the noise.
+struct RestEstimate {
+  RestReadings readings;
+  double zero_limit = 0.0, drift_limit = 0.0;
+};
+
 /// Generalised least squares of a line (or a level) through readings at rest.
-/// @param hold noise to be taken in place of the rest's own
-void fit_rests(const RestSamples& rest, double rounding, const std::optional<HoldNoise>& hold,
-               RestReadings& result) {
+/// @param hold whose noise is that of the rests
+void fit_rests(const RestSamples& rest, double rounding, const std::optional<HoldSamples>& hold,
+               RestEstimate& estimate) {
   const auto n = static_cast<Eigen::Index>(rest.reading.size());
   const Eigen::Index p = rest.reading.size() >= kFewestForSlope ? 2 : 1;
   const double middle = middle_of_rest(rest.time_s);
@@ -262,82 +298,74 @@ void fit_rests(const RestSamples& rest, double rounding, const std::optional<Hol
   }
   const double step_s = hold ? hold->step_s : median_step(rest.time_s);
   const AutoregressionEstimate noise =
-      hold ? hold->noise : estimate_autoregression(rest.time_s, y, j, step_s);
-  Eigen::MatrixXd both(n, p + 1);
-  both << j, y;
-  const auto inverse_at = [&](double phi, Eigen::MatrixXd& rows) -> Eigen::MatrixXd {
-    AutoregressiveNoise(phi, step_s).whiten(rest.time_s, rows);
-    const Eigen::MatrixXd gram = rows.leftCols(p).transpose() * rows.leftCols(p);
-    return gram.llt().solve(Eigen::MatrixXd::Identity(p, p));
-  };
-  // Of the noise of a hold: how far phi, which is estimated, moves the variance of each column
-  // (satterthwaite_degrees, whose columns are those of the hold).
-  const auto degrees_of_hold = [&](Eigen::Index column) {
-    const double step = 0.02 * (1.0 - noise.phi) + 1e-6;
-    const double below = std::max(noise.phi - step, 0.0), above = noise.phi + step;
-    Eigen::MatrixXd low = both, high = both;
-    const double slope =
-        noise.log_squares_slope +
-        std::log(inverse_at(above, high)(column, column) / inverse_at(below, low)(column, column)) /
-            (above - below);
-    const double variance = slope * slope * noise.phi_variance + 2.0 / hold->freedom;
-    return std::max(2.0 / variance, 1.0);
-  };
-  Eigen::MatrixXd whitened = both;
-  const Eigen::MatrixXd inverse = inverse_at(noise.phi, whitened);
+      hold ? common_noise(rest, y, j, *hold) : estimate_autoregression(rest.time_s, y, j, step_s);
+  const Eigen::Index samples = n + (hold ? hold->reading.size() : 0);
+  const Eigen::Index columns = p + (hold ? hold->curve.cols() : 0);
+  Eigen::MatrixXd whitened(n, p + 1);
+  whitened << j, y;
+  AutoregressiveNoise(noise.phi, step_s).whiten(rest.time_s, whitened);
+  const Eigen::MatrixXd gram = whitened.leftCols(p).transpose() * whitened.leftCols(p);
+  const Eigen::MatrixXd inverse = gram.llt().solve(Eigen::MatrixXd::Identity(p, p));
   const Eigen::VectorXd x = inverse * (whitened.leftCols(p).transpose() * whitened.col(p));
   const Eigen::MatrixXd covariance = noise.variance * inverse;
+  RestReadings& result = estimate.readings;
   result.phi = noise.phi;
   result.noise_sd = std::sqrt(noise.variance);
+  const auto degrees = [&](Eigen::Index column) {
+    return satterthwaite_degrees(noise, column, samples, columns);
+  };
   const auto sd = [&](Eigen::Index column, double variance) {
-    const double degrees =
-        hold ? degrees_of_hold(column) : satterthwaite_degrees(noise, column, n, p);
-    return students(std::sqrt(variance), degrees);
+    return std::hypot(students(std::sqrt(variance), degrees(column)), rounding);
+  };
+  const auto limit = [&](Eigen::Index column, double variance) {
+    return std::hypot(upper_end(std::sqrt(variance), degrees(column)), rounding);
   };
   if (p == 1) {
     result.origin_s = middle;
-    result.zero = Measured{level + x[0], std::hypot(sd(0, covariance(0, 0)), rounding)};
+    result.zero = Measured{level + x[0], sd(0, covariance(0, 0))};
+    estimate.zero_limit = limit(0, covariance(0, 0));
     return;
   }
   const double shift = -covariance(0, 1) / covariance(1, 1);  // of the origin, in lengths
   result.origin_s = middle + shift * length;
   const double at_origin =
       covariance(0, 0) - covariance(0, 1) * covariance(0, 1) / covariance(1, 1);
-  result.zero = Measured{level + x[0] + shift * x[1], std::hypot(sd(0, at_origin), rounding)};
-  result.drift = Measured{x[1] / length, std::hypot(sd(1, covariance(1, 1)), rounding) / length};
+  result.zero = Measured{level + x[0] + shift * x[1], sd(0, at_origin)};
+  result.drift = Measured{x[1] / length, sd(1, covariance(1, 1)) / length};
+  estimate.zero_limit = limit(0, at_origin);
+  estimate.drift_limit = limit(1, covariance(1, 1)) / length;
 }
 
-}  // namespace
-
-std::size_t samples_before_contact(const PreparedRecording& recording) {
-  return rest_samples(recording).before;
-}
-
-RestReadings read_rests(const PreparedRecording& recording) {
+RestEstimate estimate_rests(const PreparedRecording& recording) {
   constexpr double kShort = 100.0;  // samples, below which a longer hold tells the noise
-  RestReadings result;
+  RestEstimate estimate;
+  RestReadings& result = estimate.readings;
   const double rounding = rounding_sd(recording);
   const RestSamples all = without_recovery(rest_samples(recording), rounding);
   result.before = all.before;
   result.after = all.after;
-  if (all.reading.empty() || (all.before == 0 && all.after < kFewestForSlope)) return result;
+  if (all.reading.empty() || (all.before == 0 && all.after < kFewestForSlope)) return estimate;
   const RestSamples rest = averaged(without_outliers(all));
   const auto n = static_cast<double>(rest.reading.size());
   const double level = middle_of_rest(rest.reading);
   double squares = 0.0;
   for (const double v : rest.reading) squares += (v - level) * (v - level);
   const bool constant = rest.reading.size() > 2 && squares <= n * rounding * rounding * 1e-6;
-  const std::optional<HoldNoise> hold =
-      n < kShort && !constant ? hold_noise(recording) : std::nullopt;
+  const std::optional<HoldSamples> hold =
+      n < kShort && !constant ? hold_samples(recording) : std::nullopt;
   // A hold that no such curve describes has no noise to be read.
   constexpr double kAlike = 16.0;  // in variance
   const bool alike = rest.reading.size() < kFewestForNoise ||
-                     (hold && hold->noise.variance * (n - 1.0) <= kAlike * squares);
-  const bool longer = hold && alike && hold->samples > rest.reading.size();
+                     (hold && hold->variance * (n - 1.0) <= kAlike * squares);
+  const auto within = [&](double t) {
+    return t >= hold->time_s.front() && t <= hold->time_s.back();
+  };
+  const bool longer = hold && alike && hold->time_s.size() > rest.reading.size() &&
+                      std::ranges::none_of(rest.time_s, within);  // a rest may be held, too
   if ((longer || rest.reading.size() >= kFewestForNoise) && !constant) {
     fit_rests(rest, squares < n * 4.0 * rounding * rounding ? rounding : 0.0,
-              longer ? hold : std::nullopt, result);
-    return result;
+              longer ? hold : std::nullopt, estimate);
+    return estimate;
   }
   const double noise = std::max(recording.phases.noise_sd_estimate, rounding);
   const double length = rest.time_s.back() - rest.time_s.front();
@@ -347,7 +375,41 @@ RestReadings read_rests(const PreparedRecording& recording) {
   if (constant && rest.reading.size() >= kFewestForSlope) {
     result.drift = Measured{0.0, std::sqrt(12.0) * rounding / length};
   }
-  return result;
+  return estimate;
+}
+
+/// The largest standard deviation of a drift that rests tell; 0 if they have none, nothing where
+/// nothing is held.
+std::optional<double> most_drift_sd(const PreparedRecording& r, const RestReadings& rests) {
+  constexpr double kShare = 0.02;  // of the relaxed force
+  const std::vector<double>& time = r.recording.time_s;
+  double hold_s = 0.0;
+  std::size_t end = 0;
+  for (const Phase& phase : r.phases.phases) {
+    const bool fitted = time[phase.last] > r.from_s && time[phase.first] < r.to_s;
+    const bool loaded = phase.first >= r.phases.contact_index;
+    if (phase.kind != PhaseKind::hold || !fitted || !loaded) continue;
+    if (phase.first == 0 && r.phases.phases.size() > 1) continue;  // a preload at rest
+    const double length = time[phase.last] - time[phase.first];
+    if (length > hold_s) end = phase.last;
+    hold_s = std::max(hold_s, length);
+  }
+  // The drift acts from contact on.
+  const double loaded_s = time[end] - time[r.phases.contact_index];
+  if (hold_s == 0.0) return std::nullopt;
+  if (!rests.drift || !rests.zero) return 0.0;
+  const double zero = rests.zero->value + rests.drift->value * (time[end] - rests.origin_s);
+  return kShare * std::abs(r.recording.response[end] - zero) / loaded_s;
+}
+
+}  // namespace
+
+std::size_t samples_before_contact(const PreparedRecording& recording) {
+  return rest_samples(recording).before;
+}
+
+RestReadings read_rests(const PreparedRecording& recording) {
+  return estimate_rests(recording).readings;
 }
 
 std::optional<LevelBeforeLoad> level_before_load(const PreparedRecording& r) {
@@ -372,42 +434,33 @@ std::optional<LevelBeforeLoad> level_before_load(const PreparedRecording& r) {
   for (const double v : rest.reading) squares += (v - level) * (v - level);
   const auto n = static_cast<double>(count);
   if (squares <= n * rounding * rounding * 1e-6) return LevelBeforeLoad{{level, rounding}, count};
-  RestReadings readings;
+  RestEstimate estimate;
   fit_rests(averaged(without_outliers(rest)),
-            squares < n * 4.0 * rounding * rounding ? rounding : 0.0, std::nullopt, readings);
-  return LevelBeforeLoad{readings.zero.value(), count};
+            squares < n * 4.0 * rounding * rounding ? rounding : 0.0, std::nullopt, estimate);
+  return LevelBeforeLoad{estimate.readings.zero.value(), count};
 }
 
 DriftFinding drift_finding(const PreparedRecording& r, const RestReadings& rests) {
-  constexpr double kShare = 0.02;  // of the relaxed force
-  const std::vector<double>& time = r.recording.time_s;
-  double hold_s = 0.0;
-  std::size_t end = 0;
-  for (const Phase& phase : r.phases.phases) {
-    const bool fitted = time[phase.last] > r.from_s && time[phase.first] < r.to_s;
-    const bool loaded = phase.first >= r.phases.contact_index;
-    if (phase.kind != PhaseKind::hold || !fitted || !loaded) continue;
-    if (phase.first == 0 && r.phases.phases.size() > 1) continue;  // a preload at rest
-    const double length = time[phase.last] - time[phase.first];
-    if (length > hold_s) end = phase.last;
-    hold_s = std::max(hold_s, length);
-  }
-  // The drift acts from contact on.
-  const double loaded_s = time[end] - time[r.phases.contact_index];
-  if (hold_s == 0.0) return DriftFinding::no_hold;
-  if (!rests.drift || !rests.zero) return DriftFinding::not_separable;
-  const double zero = rests.zero->value + rests.drift->value * (time[end] - rests.origin_s);
-  const double relaxed = std::abs(r.recording.response[end] - zero);
-  return rests.drift->sd * loaded_s <= kShare * relaxed ? DriftFinding::told
-                                                        : DriftFinding::not_separable;
+  const auto most = most_drift_sd(r, rests);
+  if (!most) return DriftFinding::no_hold;
+  return rests.drift && rests.drift->sd <= *most ? DriftFinding::told : DriftFinding::not_separable;
 }
 
 MeasuredPlacement measure_placement(const PreparedRecording& recording, const LawSpec& law,
                                     std::optional<double> exponent) {
   MeasuredPlacement placement;
-  placement.rests = read_rests(recording);
-  placement.onset = find_onset(recording, placement.rests, first_loading_exponent(law, exponent));
-  placement.drift = drift_finding(recording, placement.rests);
+  const RestEstimate estimate = estimate_rests(recording);
+  RestReadings& rests = placement.rests;
+  rests = estimate.readings;
+  placement.onset = find_onset(recording, rests, first_loading_exponent(law, exponent));
+  placement.drift = drift_finding(recording, rests);
+  // An estimate of the noise that is small by chance makes a drift told, too: where a larger one,
+  // which the readings do not exclude, would not, what was chosen by it is stated with that one.
+  if (placement.drift == DriftFinding::told &&
+      estimate.drift_limit > most_drift_sd(recording, rests).value_or(0.0)) {
+    rests.drift->sd = std::max(rests.drift->sd, estimate.drift_limit);
+    rests.zero->sd = std::max(rests.zero->sd, estimate.zero_limit);
+  }
   return placement;
 }
 
