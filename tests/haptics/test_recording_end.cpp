@@ -135,8 +135,8 @@ TEST_CASE("A session that a fault ended is recorded as a whole, and everything s
   recording.closing["device_error"] = 7;
   recording.closing["device_error_text"] = "timeout";
   recording.closing["dropped_records"] = 3;
-  recording.closing["device_findings"] = to_json(std::vector<DeviceFinding>{
-      {"force_differs", "the service reported 0.5 N where 1 N was commanded"}});
+  recording.closing["device_findings"] = remarks_json(
+      std::vector<Remark>{{"force_differs", "the service reported 0.5 N where 1 N was commanded"}});
   recording = read_again(recording, folder);
   const SaidOfRecording said = everything_said_of(recording, folder);
   check_that_all_say(said,
