@@ -253,11 +253,12 @@ int exit_code_of(const ServoOutcome& outcome) {
 
 int run_hil(const RunChoice& choice, const Session& session) {
   require_new(choice.output, session);
-  HilSession hil = read_session(choice.session, choice.changes);
   DeviceChoice device = chosen_device(choice.device);
   if (!choice.changes.motion.empty() && device.kind == "virtual") device.kind = "replay";
+  const DeviceLimits limits = limits_of(device);
+  HilSession hil = read_session(choice.session, choice.changes, limits);
   SessionRunOptions options;
-  const bool hardware = limits_of(device).hardware();
+  const bool hardware = limits.hardware();
   // A page is for somebody who watches.
   options.real_time =
       choice.time.empty() ? hardware || !choice.page.port.empty() : choice.time == "real";

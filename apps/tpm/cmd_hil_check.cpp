@@ -78,7 +78,7 @@ int check_hil(const CheckChoice& choice, const Session& session) {
   const DeviceChoice device = chosen_device(choice.device);
   require_used(choice, device);
   HilSession hil;
-  if (!choice.session.empty()) hil = read_session(choice.session);
+  if (!choice.session.empty()) hil = read_session(choice.session, {}, limits_of(device));
   if (!choice.rate.empty()) {
     hil.servo.period_s =
         1.0 / within(choice.rate, Dimension::frequency, "--loop-rate", kLeast_Hz, kMost_Hz);

@@ -118,14 +118,14 @@ class StartWords {
 int identify_hil(const IdentifyChoice& choice, const Session& session) {
   constexpr double kSlowest_Hz = 500.0, kFastest_Hz = 4000.0, kLeast_s = 5.0, kMost_s = 600.0;
   require_new(choice.output, session);
+  const DeviceChoice device = chosen_device(choice.device);
+  const DeviceLimits limits = limits_of(device);
   HilSession hil;
-  if (!choice.session.empty()) hil = read_session(choice.session);
+  if (!choice.session.empty()) hil = read_session(choice.session, {}, limits);
   if (!choice.rate.empty()) {
     hil.servo.period_s =
         1.0 / between(choice.rate, Dimension::frequency, "--loop-rate", kSlowest_Hz, kFastest_Hz);
   }
-  const DeviceChoice device = chosen_device(choice.device);
-  const DeviceLimits limits = limits_of(device);
   const bool hardware = limits.hardware();
   DeviceIdentifyOptions options;
   options.duration_s = between(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);

@@ -1,6 +1,8 @@
 // tpm hil verify, tpm hil report: was what the operator felt the model?
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "answer.hpp"
 #include "command.hpp"
@@ -70,13 +72,13 @@ int report_hil(const VerifyChoice& choice, const Session& session) {
     say("{}", answer_text(session, verification_json(recording, v),
                           {{"recording_whole", recording.whole()}}));
   } else {
+    std::vector<std::string> files{"report.html", "report.md", "report.json", "figures.json"};
+    if (!python.empty()) files.emplace_back("figures");  // else none were drawn
     ShortAnswer answer = short_answer(recording, v);
-    end_answer(answer, choice.output, {"report.html", "report.md", "report.json"},
-               "tpm view " + shell_word(choice.recording));
-    say("{}", choice.verbose ? verification_text(recording, v) +
-                                   fmt::format("wrote {}/report.html, report.md and report.json\n",
-                                               choice.output)
-                             : to_text(answer));
+    end_answer(answer, choice.output, files, "tpm view " + shell_word(choice.recording));
+    say("{}", choice.verbose
+                  ? verification_text(recording, v) + written(session, choice.output, files)
+                  : to_text(answer));
   }
   return exit_code(recording.whole());
 }

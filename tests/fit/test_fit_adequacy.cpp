@@ -1,4 +1,5 @@
 // What a fit says of its own adequacy, and who repeats it: JSON, law files, predictions, exports.
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "adequacy_studies.hpp"
@@ -9,6 +10,7 @@
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/select/clipping.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -182,6 +184,23 @@ TEST_CASE("a law that another beats decisively holds nothing for identified", "[
   CHECK_THAT(s.summary.front(), StartsWith("linear-1 does not describe "));
   for (const ParameterResult& p : fit.parameters) CHECK(p.only_if_described);
   CHECK(fitted_law(fit).adequacy.value().is_rejected());
+  // The written configuration says the same when it is run, unless something else is fitted.
+  Json written = config_json(fit.config);
+  const auto rerun = [&] {
+    return fit_and_judge({parse_fit_config(written, "test"), {recording.recording}});
+  };
+  const FitResult again = rerun();
+  CHECK(again.adequacy.value().summary == fit.adequacy.value().summary);
+  CHECK(again.adequacy.value().is_rejected());
+  for (const ParameterResult& p : again.parameters) CHECK(p.only_if_described);
+  CHECK(std::ranges::any_of(again.remarks, [](const Remark& remark) {
+    return remark.code == "condition_of_choice" &&
+           remark.text.find("the data prefer ") != std::string::npos;
+  }));
+  written.at("choice").at("samples") = fit.value_count + 1;
+  const FitResult other = rerun();
+  CHECK(test::has_remark(other.remarks, "another_choice"));
+  CHECK_FALSE(test::has_remark(other.remarks, "condition_of_choice"));
 }
 
 TEST_CASE("without a rest adequacy cannot be judged", "[adequacy][wired]") {

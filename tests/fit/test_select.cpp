@@ -169,6 +169,31 @@ TEST_CASE("a written configuration warns of what the direct fit warns of", "[sel
   for (std::size_t i = 0; i < s.remarks.size(); ++i) CHECK(again.remarks[i] == s.remarks[i]);
 }
 
+TEST_CASE("a written configuration keeps the force at which contact was said to begin",
+          "[select]") {
+  const Recording r = simulated_press("linear-1", {100.0, 120.0, 0.4, 0.0, 0.0}, 4);
+  PhaseOptions phases;
+  phases.contact_response = 0.2 * *std::ranges::max_element(r.response);
+  const PreparedRecording one = prepare_recording("r.csv", r, phases);
+  REQUIRE(one.contact_held);
+  SelectionOptions options;
+  options.laws = {parse_law_name("linear-1", "test")};
+  options.only_listed = true;
+  options.held_out = false;
+  const Selection s = select_law(std::span(&one, 1), options);
+  const FitConfig read =
+      parse_fit_config(config_json(s.candidates[s.recommended].fit.config), "test");
+  CHECK_THAT(read.data.front().contact_response.value(),
+             WithinRel(phases.contact_response.value(), 1e-12));
+  const FitResult again = fit_and_judge({read, {r}});
+  // The ramp begins at that force in both.
+  REQUIRE(test::has_remark(s.remarks, "shorter_than_ramp"));
+  const auto ramp = [](const std::vector<Remark>& remarks) {
+    return *std::ranges::find(remarks, std::string("shorter_than_ramp"), &Remark::code);
+  };
+  CHECK(ramp(again.remarks) == ramp(s.remarks));
+}
+
 TEST_CASE("one specimen's recording is told from the spread between specimens", "[select]") {
   std::vector<PreparedRecording> specimens;
   for (const double stiffness : {80.0, 100.0, 125.0, 110.0}) {

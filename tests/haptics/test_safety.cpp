@@ -371,6 +371,29 @@ TEST_CASE("A session has to fit before the stop of the Omega.7 along x") {
   CHECK_THAT(test::parsed(before).servo.gate->reach_m, WithinAbs(0.055 - 0.032, 1e-12));
 }
 
+TEST_CASE("The room before a session is that of its device, not that of the Omega.7") {
+  const auto before = [](const char* way) {
+    return test::parsed(test::with(test::short_session(), "/surface_before_hand", way));
+  };
+  const DeviceLimits falcon = limits_of("falcon"), inverse3 = limits_of("inverse3");
+  REQUIRE(falcon.reach_m < inverse3.reach_m);
+  // 10 mm to the surface and 12 mm into it.
+  for (const DeviceLimits& limits : {falcon, inverse3}) {
+    CHECK_NOTHROW(require_within(before("10 mm"), limits));
+    CHECK_THAT(on_device(before("10 mm"), limits).servo.gate->reach_m,
+               WithinAbs(limits.reach_m - 0.022, 1e-12));
+  }
+  // As far back again.
+  CHECK_THROWS_WITH(require_within(before("22 mm"), falcon),
+                    Contains("the session's furthest place is 0.044 m from the hand at the start; "
+                             "expected at most 0.04 m from the centre"));
+  const Json far =
+      test::with(test::short_session(), "/surface", Json::array({"0 m", "0 m", "-66 mm"}));
+  CHECK_THROWS_WITH(parse_session(far, "session", {}),
+                    Contains("0.078 m from the centre of the workspace; expected 0.075 m"));
+  CHECK_NOTHROW(require_within(parse_session(far, "session", {}, inverse3), inverse3));
+}
+
 TEST_CASE("The device is asked for no more than the session's limit") {
   Json json = test::with(test::short_session(), "/limits/force", "3 N");
   CHECK(test::parsed(json).preparation.max_force_N == 3.0);

@@ -91,6 +91,11 @@ def main():
         subprocess.run([program, "hil", "run", root / "configs/hil_liver.json", "-o", "session.tpmrec"], cwd=folder, check=True,
                        capture_output=True)
         checks.check(["hil", "verify", "session.tpmrec"], remarks)
+        for more in ([], ["--verbose"]):
+            told = checks.run("hil", "report", "session.tpmrec", "--folder", "page", "--overwrite", *more).stdout
+            line = next((one for one in told.splitlines() if one.startswith("written to page: ")), ": ")
+            if set(line.split(": ")[1].split(", ")) != {one.name for one in (Path(folder) / "page").iterdir()}:
+                checks.faults.append(f"hil report: '{line}' is not what stands in the folder")
         make_group(folder / "healthy", (0.9, 1.0, 1.1))
         make_group(folder / "fibrotic", (1.8, 2.0, 2.2))
         checks.check(["fit", "healthy", "fibrotic", "--compare", "--laws", "linear-1", "--no-draw", "--punch-radius", "2 mm"],

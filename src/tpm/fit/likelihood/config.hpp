@@ -64,6 +64,8 @@ struct DataChoice {
   /// Limits of the force cell, SI: samples of a recording that stand at them or beyond are censored
   /// (censored_residual).
   std::optional<double> clipped_above, clipped_below;
+  /// Of a recording: response at which contact begins (PhaseOptions::contact_response), SI.
+  std::optional<double> contact_response;
   /// Of a recording of stress over strain: the stress was imposed and the strain answers (creep).
   bool load_imposed = false;
   /// A0/l0 of a contact, m, > 0: its stiffness over the modulus that a spectrum states.
@@ -137,6 +139,15 @@ struct Hypothesis {
   std::vector<std::pair<std::string, double>> values;  ///< estimated parameter, SI value
 };
 
+/// Conditions under which a law was chosen among others, for the fits of its configuration.
+struct LawChoice {
+  std::string law;                           ///< that was chosen
+  int samples = 0;                           ///< fitted
+  std::string better = {};                   ///< law that the data prefer decisively; empty: none
+  double better_by = 0.0;                    ///< in BIC
+  std::vector<std::string> conditions = {};  ///< sentences of the choice
+};
+
 /// Everything that decides the result of a fit (schemas/fit.schema.json).
 struct FitConfig {
   std::string title;
@@ -161,7 +172,8 @@ struct FitConfig {
   bool profiles = true;
   std::optional<BootstrapOptions> bootstrap;
   std::vector<Hypothesis> hypotheses;
-  std::filesystem::path folder;  ///< where relative paths of data sets are looked up
+  std::optional<LawChoice> choice;  ///< decides nothing: the fit says it again (state_choice)
+  std::filesystem::path folder;     ///< where relative paths of data sets are looked up
   /// Asked before each evaluation; true ends the fit with Interrupted. Not part of the result.
   std::function<bool()> interrupted;
 

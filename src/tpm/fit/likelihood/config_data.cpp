@@ -96,6 +96,7 @@ DataChoice choice_of(const StatedData& stated, const FitConfig& config) {
   const Dimension readings = reading_dimension(config, data);
   data.noise = noise_of(stated.noise, readings);
   if (stated.clipped_above) data.clipped_above = stated.clipped_above->in(readings);
+  if (stated.contact_response) data.contact_response = stated.contact_response->in(readings);
   if (stated.clipped_below) data.clipped_below = stated.clipped_below->in(readings);
   return data;
 }

@@ -210,6 +210,10 @@ std::vector<Rule<StatedData>> data_rules() {
        [=](const D& d) {
          return without_recording(d, "clipped_above", d.clipped_above.has_value());
        }},
+      {"'contact_force' only with the protocol 'measured'",
+       [=](const D& d) {
+         return without_recording(d, "contact_force", d.contact_response.has_value());
+       }},
       {"'clipped_below' only with the protocol 'measured'", [=](const D& d) {
          return without_recording(d, "clipped_below", d.clipped_below.has_value());
        }}};
@@ -248,6 +252,10 @@ const Block<StatedData>& data_block() {
            "recordings of stress over strain or force over depth: response where the load was "
            "imposed and the strain or depth answers (creep); its noise is then one of what "
            "answers"),
+       key("contact_force", &D::contact_response, stated_quantity(),
+           "recordings: force at which contact begins, as --contact-force; it tells the rest "
+           "before "
+           "and the length of the ramp, and 'from' what is fitted"),
        key("clipped_above", &D::clipped_above, stated_quantity(),
            "recordings: limit of the force cell; readings from here on are censored: of each it "
            "counts only that it lay at the limit or beyond"),

@@ -182,6 +182,20 @@ const Block<StatedHypothesis>& hypothesis_block() {
   return block;
 }
 
+const Block<LawChoice>& choice_block() {
+  using C = LawChoice;
+  static const Block<C> block(
+      "fit_choice",
+      "conditions under which the law was chosen among others, which a fit of the same law to as "
+      "many samples says again",
+      {required(key("law", &C::law, text(1), "that was chosen")),
+       required(key("samples", &C::samples, whole<int>(0, 1e9), "that were fitted")),
+       key("better", &C::better, text(1), "law that the data prefer decisively"),
+       key("better_by", &C::better_by, number({.least = 0.0}), "in BIC"),
+       key("conditions", &C::conditions, list(text(1)), "in sentences")});
+  return block;
+}
+
 /// The keys that stand behind the data.
 std::vector<Key<StatedFit>> keys_of_statistics() {
   using F = StatedFit;
@@ -194,7 +208,9 @@ std::vector<Key<StatedFit>> keys_of_statistics() {
               members("profile", profile_block(), "intervals from the profile of the likelihood")),
           key("bootstrap", &F::bootstrap, bootstrap_block().type(),
               "refits to resampled data, beside the profiles"),
-          key("hypotheses", &F::hypotheses, list(hypothesis_block().type()), "what is tested")};
+          key("hypotheses", &F::hypotheses, list(hypothesis_block().type()), "what is tested"),
+          of_config(key("choice", &FitConfig::choice, choice_block().type(),
+                        "how the law was chosen, as tpm fit RECORDING writes it"))};
 }
 
 template <class T>

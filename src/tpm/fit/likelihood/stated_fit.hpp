@@ -75,7 +75,7 @@ struct StatedData {
   std::optional<ImportOptions> import;
   std::optional<Placed<double>> stiffness_per_modulus_m;
   std::optional<Placed<bool>> load_imposed;
-  std::optional<StatedQuantity> clipped_above, clipped_below;
+  std::optional<StatedQuantity> clipped_above, clipped_below, contact_response;
 };
 
 struct StatedPrior {

@@ -16,7 +16,10 @@ namespace {
 
 /// The recording of a motion with the window that the configuration states.
 PreparedRecording windowed(const DataChoice& choice, const Recording& recording) {
-  PreparedRecording r{choice.dataset, recording, find_phases(recording), 0.0, 0.0, choice.import};
+  PhaseOptions options;
+  options.contact_response = choice.contact_response;
+  PreparedRecording r{choice.dataset, recording, find_phases(recording, options), 0.0, 0.0,
+                      choice.import};
   r.from_s = std::max(choice.from_s, recording.time_s.front());
   r.to_s = std::min(choice.to_s, recording.time_s.back());
   r.load_imposed = choice.load_imposed;

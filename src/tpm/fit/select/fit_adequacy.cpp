@@ -323,6 +323,37 @@ void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings)
   chosen.reason = "does not describe the data";
 }
 
+/// That another law does better decisively.
+void state_better(FitResult& fit, const std::string& law, const std::string& better, double by) {
+  LawAdequacy adequacy = fit.adequacy.value_or(LawAdequacy{});
+  adequacy.verdict = described_name(Described::not_described);
+  adequacy.summary = fmt::format("{} does not describe these data: {} does better, by {} in BIC",
+                                 law, better, significant(by, 3));
+  state(fit, std::move(adequacy));
+}
+
+/// What was known when the law of the configuration was chosen, unless the law or the number of
+/// samples is another one since.
+void state_choice(FitResult& fit) {
+  if (!fit.config.choice) return;
+  const LawChoice& choice = *fit.config.choice;
+  const std::string law = fit.config.law ? law_name(*fit.config.law) : fit.config.model;
+  if (law != choice.law || fit.value_count != choice.samples) {
+    fit.remarks.push_back(
+        {"another_choice",
+         fmt::format("the choice of {} from {} samples, which the configuration holds, is not "
+                     "repeated: this is {} with {} samples",
+                     choice.law, choice.samples, law, fit.value_count)});
+    return;
+  }
+  if (!choice.better.empty() && !(fit.adequacy && fit.adequacy->is_rejected())) {
+    state_better(fit, law, choice.better, choice.better_by);
+  }
+  for (const std::string& words : choice.conditions) {
+    fit.remarks.push_back({"condition_of_choice", words});
+  }
+}
+
 }  // namespace
 
 std::size_t samples_at_rest(const RecordingPhases& phases) {
@@ -346,14 +377,30 @@ void state_preferred(Selection& s) {
   if (!s.preferred) return;
   Candidate& chosen = s.candidates[s.recommended];
   if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
-  LawAdequacy adequacy = chosen.fit.adequacy.value_or(LawAdequacy{});
-  adequacy.verdict = described_name(Described::not_described);
-  adequacy.summary = fmt::format("{} does not describe these data: {} does better, by {} in BIC",
-                                 law_name(chosen.law), law_name(s.candidates[*s.preferred].law),
-                                 significant(chosen.delta_bic, 3));
-  state(chosen.fit, std::move(adequacy));
+  state_better(chosen.fit, law_name(chosen.law), law_name(s.candidates[*s.preferred].law),
+               chosen.delta_bic);
   chosen.identified = false;
   chosen.reason = "does not describe the data";
+}
+
+void keep_choice(Selection& s) {
+  Candidate& chosen = s.candidates[s.recommended];
+  LawChoice choice{.law = law_name(chosen.law), .samples = chosen.fit.value_count};
+  if (s.preferred) {
+    choice.better = law_name(s.candidates[*s.preferred].law);
+    choice.better_by = chosen.delta_bic;
+  }
+  const std::string adequacy = chosen.fit.adequacy ? chosen.fit.adequacy->summary : std::string();
+  // The sentence that recommends the law is a condition only where it says more than that.
+  const bool plain = s.candidates.size() == 1 || (chosen.identified && !s.preferred);
+  const std::string recommended =
+      fmt::format("{} ({}):", law_name(chosen.law), law_words(chosen.law));
+  for (const std::string& words : s.summary) {
+    const bool recommends = words.find(recommended) != std::string::npos;
+    if (words == adequacy || (plain && recommends)) continue;
+    choice.conditions.push_back(words);
+  }
+  chosen.fit.config.choice = std::move(choice);
 }
 
 void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
@@ -368,7 +415,9 @@ void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {
     for (const RecordingFit& r : fit.recordings) {
       const auto* recording = std::get_if<Recording>(&data[r.choice]);
       if (recording == nullptr || is_step_response(recording->response_quantity)) continue;
-      rests[r.choice] = {recording, told_at_rest(*recording, find_phases(*recording))};
+      PhaseOptions options;
+      options.contact_response = fit.config.data[r.choice].contact_response;
+      rests[r.choice] = {recording, told_at_rest(*recording, find_phases(*recording, options))};
     }
     judged = worst_of(fit, rests);
   }
@@ -380,6 +429,7 @@ FitResult fit_and_judge(const FitProblem& problem) {
   FitResult fit = run_fit(problem.config, data);
   give_both_drift_answers(fit, data);
   state_adequacy(fit, data);
+  state_choice(fit);
   std::vector<Remark> remarks = configuration_remarks(fit, data, problem.data.empty());
   fit.remarks.insert(fit.remarks.begin(), std::make_move_iterator(remarks.begin()),
                      std::make_move_iterator(remarks.end()));

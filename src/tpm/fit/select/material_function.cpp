@@ -338,6 +338,7 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
                                     significant(chosen.delta_bic, 3), best.identified ? "" : "; ",
                                     best.reason));
   }
+  keep_choice(s);
   return s;
 }
 

@@ -249,6 +249,7 @@ PreparedRecording prepare_recording(std::string name, Recording recording,
   const std::vector<double>& time = r.recording.time_s;
   const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;
   r.contact_held = options.contact_response && r.phases.contact_found;
+  r.contact_response = options.contact_response;
   // Samples that measure the zero are not fitted once more.
   if (samples_before_contact(r) >= kFewestBeforeContact) {
     r.from_s = time[contact];
@@ -329,6 +330,7 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
     data.to_s = r.to_s;
     data.load_imposed = r.load_imposed;
     data.clipped_above = r.clipped_above;
+    data.contact_response = r.contact_response;
     data.clipped_below = r.clipped_below;
     data.import = r.import;
     config.data.push_back(std::move(data));
@@ -420,6 +422,7 @@ Json config_json(const FitConfig& config) {
       if (!limit) return;
       entry[key] = text(*limit, shown_unit(quantity_dimension(config.law->response)));
     };
+    set_limit("contact_force", d.contact_response);
     set_limit("clipped_above", d.clipped_above);
     set_limit("clipped_below", d.clipped_below);
     if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, shown_unit(Dimension::time));
@@ -429,6 +432,14 @@ Json config_json(const FitConfig& config) {
   j["data"] = std::move(data);
   j["starts"] = {{"count", config.starts}, {"seed", config.seed}};
   j["profile"] = {{"level", config.level}, {"enabled", config.profiles}};
+  if (!config.choice) return j;
+  const LawChoice& choice = *config.choice;
+  j["choice"] = {{"law", choice.law}, {"samples", choice.samples}};
+  if (!choice.better.empty()) {
+    j["choice"]["better"] = choice.better;
+    j["choice"]["better_by"] = choice.better_by;
+  }
+  if (!choice.conditions.empty()) j["choice"]["conditions"] = choice.conditions;
   return j;
 }
 

@@ -29,6 +29,7 @@ struct PreparedRecording {
   bool load_imposed = false;  ///< creep: drive and response of `recording` have changed places
   std::vector<Remark> remarks = {};  ///< what the recording cannot tell
   std::string read_as = {};          ///< how its columns and units were understood, in one sentence
+  std::optional<double> contact_response = std::nullopt;  ///< at which contact was said to begin
   bool contact_held = false;  ///< contact is where a stated force is passed: it is not fitted
   std::string start_up = {};  ///< what is left out after a step, in one sentence; empty: nothing
   std::optional<Instrument> instrument = std::nullopt;  ///< if it is stated (take_instrument)

@@ -399,6 +399,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
     std::string jump = contact_in_jump_words(r, s.candidates[s.recommended].fit.config);
     if (!jump.empty()) s.summary.push_back(std::move(jump));
   }
+  keep_choice(s);
   return s;
 }
 

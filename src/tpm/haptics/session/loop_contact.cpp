@@ -75,20 +75,6 @@ void require_options(const LoopContactOptions& options) {
   }
 }
 
-HilSession session_of(const std::filesystem::path& file, const LoopContactOptions& options) {
-  require_options(options);
-  Json json = read_json(file);
-  if (!json.is_object() || (!json.contains("model") && !json.contains("law"))) {
-    throw bad_input(file.string(), "is neither a session nor a law",
-                    "a key 'model' (schemas/hil.schema.json) or 'law' (schemas/law.schema.json)");
-  }
-  if (!json.contains("model")) json = session_around(json, options, file.string());
-  if (options.rate_Hz != 0.0) json["rate"] = fmt::format("{} Hz", options.rate_Hz);
-  HilSession session = parse_session(json, file.string(), file.parent_path());
-  follow_surface(session);
-  return session;
-}
-
 /// Throws Error(usage) for a device that cannot be that of a loop of the caller's own, or that only
 /// a file could describe.
 void require_device(const LoopContactOptions& options) {
@@ -112,6 +98,21 @@ DeviceLimits limits_that_apply(const LoopContactOptions& options) {
   DeviceLimits limits = limits_of_motors(file, options.device);
   if (file.simulated && limits.hardware()) limits.measured_delay_s.reset();
   return limits;
+}
+
+HilSession session_of(const std::filesystem::path& file, const LoopContactOptions& options) {
+  require_options(options);
+  Json json = read_json(file);
+  if (!json.is_object() || (!json.contains("model") && !json.contains("law"))) {
+    throw bad_input(file.string(), "is neither a session nor a law",
+                    "a key 'model' (schemas/hil.schema.json) or 'law' (schemas/law.schema.json)");
+  }
+  if (!json.contains("model")) json = session_around(json, options, file.string());
+  if (options.rate_Hz != 0.0) json["rate"] = fmt::format("{} Hz", options.rate_Hz);
+  HilSession session =
+      parse_session(json, file.string(), file.parent_path(), limits_that_apply(options));
+  follow_surface(session);
+  return session;
 }
 
 /// The session without its end, and without its start if nobody waits for one.
@@ -196,7 +197,7 @@ LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOpt
     throw Error(ExitCode::answer_is_no, fmt::format("{}: {}", file.string(), condition), refusal,
                 expected);
   }
-  settings_ = loop_settings(endless(session_, options), loop_, rendering_, true);
+  settings_ = loop_settings(endless(on_device(session_, limits), options), loop_, rendering_, true);
   displacement_m_ = Eigen::Matrix3Xd::Zero(3, spheres());
   reset();
 }

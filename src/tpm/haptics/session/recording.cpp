@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstring>
+#include <limits>
 
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
@@ -196,7 +197,11 @@ HilRecording read_recording(const std::filesystem::path& file) {
   recording.opened = recording_header_block().made(recording.header, at_header);
   const std::string at_session = at_header.where + ": session";
   require_written_out(recording.opened.session, DocumentPlace{at_session});
-  recording.session = parse_session(recording.opened.session, at_session, {});
+  // What has been recorded fitted into its device.
+  DeviceLimits boundless = limits_of("omega7");
+  boundless.reach_m = std::numeric_limits<double>::infinity();
+  boundless.stop_along_x_m = 0.0;
+  recording.session = parse_session(recording.opened.session, at_session, {}, boundless);
   if (recording.opened.surface_by_phase_m) {
     set_surface(recording.session, *recording.opened.surface_by_phase_m,
                 at_header.key("surface_by_phase_m").where);

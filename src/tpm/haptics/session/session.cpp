@@ -100,9 +100,21 @@ double furthest_along_x(const HilSession& session, const Eigen::Vector3d& surfac
   return furthest;
 }
 
-void require_within_reach(HilSession& session, const DeviceLimits& device,
+/// How far from the centre of the workspace the hand may be before the session, m. Without a
+/// surface of its own the session has to fit in from wherever the hand is then.
+double start_room_m(const HilSession& session, const DeviceLimits& device) {
+  if (!session.servo.surface_before_hand_m) return device.reach_m;
+  const double before_m = *session.servo.surface_before_hand_m;
+  double room_m = device.reach_m - (furthest_of(session, session.servo.surface_m) + before_m);
+  const double along_x_m = furthest_along_x(session, before_m * session.servo.push);
+  if (device.stop_along_x_m > 0.0 && along_x_m > 0.0) {
+    room_m = std::min(room_m, device.stop_along_x_m - along_x_m);
+  }
+  return room_m;
+}
+
+void require_within_reach(const HilSession& session, const DeviceLimits& device,
                           const DocumentPlace& place) {
-  const bool before_hand = session.servo.surface_before_hand_m.has_value();
   const double furthest = furthest_of(session, session.servo.surface_m);
   if (furthest > device.reach_m) {
     throw bad_input(place.where,
@@ -110,20 +122,9 @@ void require_within_reach(HilSession& session, const DeviceLimits& device,
                                 significant(furthest, 4)),
                     fmt::format("{} m at most ({})", shortest(device.reach_m), device.kind));
   }
-  // Wherever the hand is then, the session has to fit in from there.
-  if (before_hand) {
-    const double before_m = *session.servo.surface_before_hand_m;
-    session.servo.gate->reach_m -= furthest + before_m;
-    const double along_x_m = furthest_along_x(session, before_m * session.servo.push);
-    if (device.stop_along_x_m > 0.0 && along_x_m > 0.0) {
-      session.servo.gate->reach_m =
-          std::min(session.servo.gate->reach_m, device.stop_along_x_m - along_x_m);
-    }
-    if (!(session.servo.gate->reach_m > 0.0)) {
-      throw bad_input(place.key("surface_before_hand").where, "leaves no room for the session",
-                      "a nearer surface, or shorter ways");
-    }
-  }
+  if (start_room_m(session, device) > 0.0) return;
+  throw bad_input(place.key("surface_before_hand").where, "leaves no room for the session",
+                  "a nearer surface, or shorter ways");
 }
 
 /// Refuses what else than the hand would press on the tissue.
@@ -279,11 +280,10 @@ OperatorScript HilSession::operator_script() const {
 }
 
 HilSession parse_session(const Json& written, std::string_view where,
-                         const std::filesystem::path& folder) {
+                         const std::filesystem::path& folder, const DeviceLimits& device) {
   const Json json = checked_session(written, where);
   const DocumentPlace place{std::string(where)};
   SessionKeys keys = session_block().made(json, place);
-  const DeviceLimits device = limits_of("omega7");  // the simulated one has the same
   HilSession session;
   session.title = keys.title;
   set_model(session, keys.model, place.key("model"), folder);
@@ -317,7 +317,6 @@ HilSession parse_session(const Json& written, std::string_view where,
   session.preparation.max_force_N = session.servo.force_limit_N;
   session.cycle_timeout_s = keys.limits.cycle_timeout_s;
   session.servo.gate = keys.start;
-  session.servo.gate->reach_m = device.reach_m;
   session.preparation.mounting = keys.mounting;
   session.phases = phases_of(keys, place);
   if (keys.motion) session.measured_N = keys.motion->measured_N;
@@ -325,6 +324,7 @@ HilSession parse_session(const Json& written, std::string_view where,
     session.phases.front().from = -*session.servo.surface_before_hand_m;
   }
   require_within_reach(session, device, place);
+  session.servo.gate->reach_m = start_room_m(session, device);
   session.servo.phase_ends = ends_of(session.phases, session.servo.period_s);
   session.plant = keys.virtual_device.plant;
   session.plant.period_s = session.servo.period_s;
@@ -352,7 +352,12 @@ void require_within(const HilSession& session, const DeviceLimits& limits) {
     refuse("limits/damping_N_s_per_m", shortest(servo.most_damping_N_s_per_m),
            shortest(limits.damping_N_s_per_m));
   }
-  if (servo.surface_before_hand_m) return;  // the start gate keeps room for it
+  if (servo.surface_before_hand_m) {  // the start gate keeps room for it, if there is any
+    if (start_room_m(session, limits) > 0.0) return;
+    const double from_hand_m = furthest_of(session, servo.surface_m) + *servo.surface_before_hand_m;
+    refuse("furthest place", fmt::format("{:.3g} m from the hand at the start", from_hand_m),
+           shortest(limits.reach_m) + " m from the centre");
+  }
   const double furthest_m = furthest_of(session, servo.surface_m);
   if (furthest_m > limits.reach_m) {
     refuse("furthest place", fmt::format("{:.3g} m from the centre", furthest_m),
@@ -365,7 +370,13 @@ void require_within(const HilSession& session, const DeviceLimits& limits) {
   }
 }
 
-HilSession read_session(const std::filesystem::path& file, const SessionChanges& changes) {
+HilSession on_device(HilSession session, const DeviceLimits& limits) {
+  if (session.servo.gate) session.servo.gate->reach_m = start_room_m(session, limits);
+  return session;
+}
+
+HilSession read_session(const std::filesystem::path& file, const SessionChanges& changes,
+                        const DeviceLimits& device) {
   Json json = checked_session(read_json(file), file.string());
   if (!changes.law.empty()) {
     json["model"] = {{"kind", "law"}, {"law", files::to_json(read_law(changes.law))}};
@@ -380,7 +391,7 @@ HilSession read_session(const std::filesystem::path& file, const SessionChanges&
     // Named on a command line: beside the caller, not beside the session.
     json["motion"] = {{"recording", std::filesystem::absolute(changes.motion).string()}};
   }
-  HilSession session = parse_session(json, file.string(), file.parent_path());
+  HilSession session = parse_session(json, file.string(), file.parent_path(), device);
   follow_surface(session);
   return session;
 }

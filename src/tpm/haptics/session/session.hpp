@@ -86,8 +86,13 @@ struct HilSession {
 
 /// Reads a session (schemas/hil.schema.json). Throws Error(bad_input) with the key.
 /// @param folder that paths in the session are relative to
+/// @param device into whose workspace it has to fit; the simulated one has that of the Omega.7
 [[nodiscard]] HilSession parse_session(const Json& json, std::string_view where,
-                                       const std::filesystem::path& folder);
+                                       const std::filesystem::path& folder,
+                                       const DeviceLimits& device = limits_of("omega7"));
+/// The session with a start gate that keeps the hand where the session fits into the workspace of
+/// this device.
+[[nodiscard]] HilSession on_device(HilSession session, const DeviceLimits& limits);
 /// Throws Error(answer_is_no) if the session asks for more than a device can take.
 void require_within(const HilSession& session, const DeviceLimits& limits);
 
@@ -99,7 +104,8 @@ struct SessionChanges {
 /// The same of a file, slides following the surface (follow_surface).
 /// Throws Error(bad_input) for a motion without a law: the depth that it counts from is the law's.
 [[nodiscard]] HilSession read_session(const std::filesystem::path& file,
-                                      const SessionChanges& changes = {});
+                                      const SessionChanges& changes = {},
+                                      const DeviceLimits& device = limits_of("omega7"));
 
 /// The tissue of a session as it is drawn, in the coordinates of its scene.
 struct TissueShape {

@@ -358,7 +358,8 @@ AdmittedSession admit_session(const HilSession& session, const DeviceChoice& cho
 SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
                        const SessionRunOptions& options) {
   AdmittedSession admitted = admit_session(session, choice, options);
-  return run_admitted(std::move(admitted), session, choice, options, make_device(choice, session));
+  return run_admitted(std::move(admitted), on_device(session, limits_of(choice)), choice, options,
+                      make_device(choice, session));
 }
 
 SessionRun run_session_on(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
@@ -369,7 +370,8 @@ SessionRun run_session_on(const HilSession& session, const std::shared_ptr<Hapti
   choice.file = permissions.file;
   choice.may_move = permissions.may_move;
   choice.take_as_ready = permissions.take_as_ready;
-  return run_admitted(admit_to(session, choice, limits, options), session, choice, options, device);
+  return run_admitted(admit_to(session, choice, limits, options), on_device(session, limits),
+                      choice, options, device);
 }
 
 }  // namespace tpm::haptics
