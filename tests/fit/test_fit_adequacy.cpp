@@ -1,4 +1,6 @@
 // What a fit says of its own adequacy, and who repeats it: JSON, law files, predictions, exports.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 
@@ -11,6 +13,8 @@
 #include "tpm/fit/predict/law_prediction.hpp"
 #include "tpm/fit/select/clipping.hpp"
 #include "tpm/fit/select/fit_adequacy.hpp"
+#include "tpm/fit/select/specimens.hpp"
+#include "tpm/fit/select/young_moduli.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -287,4 +291,52 @@ TEST_CASE("a stated size of the noise is what residuals are compared with", "[ad
   CHECK(wrong.is_rejected());
   CHECK_THAT(wrong.summary, Contains("times the noise that is stated"));
   CHECK(wrong.residual_over_noise.value() == Approx(3.0).epsilon(0.15));
+}
+
+TEST_CASE("what is pooled over a recording that the law does not describe is not called identified",
+          "[adequacy][specimens]") {
+  const auto study_of = [](Defect third) {
+    std::vector<PreparedRecording> recordings;
+    for (std::uint64_t i = 1; i <= 3; ++i) {
+      AdequacyTrial trial;
+      trial.at_rest = 60;
+      trial.seed = i;
+      if (i == 3) trial.defect = third;
+      trial.defect_N = 0.1;
+      recordings.push_back(prepare_recording(fmt::format("{}.csv", i), test::simulated(trial)));
+    }
+    SelectionOptions options;
+    options.setup.starts = 4;
+    options.setup.profiles = false;
+    return study_specimens(recordings, parse_law_name("linear-1", "test"), options);
+  };
+  constexpr const char* kCondition = "only if the law described the data";
+  ContactGeometry punch;
+  punch.punch_radius_m = 2e-3;
+  const SpecimenStudy spoilt = study_of(Defect::ringing);
+  REQUIRE(is_not_described(*spoilt.rows[2].fit));
+  REQUIRE_FALSE(spoilt.pooled.empty());
+  for (const PooledParameter& p : spoilt.pooled) {
+    CAPTURE(p.parameter.name);
+    CHECK_FALSE(p.identified());
+    CHECK(p.not_described == 1);
+    CHECK_THAT(p.effects.summary, Contains("1 of 3 it does not"));
+  }
+  for (const Json& p : to_json(spoilt).at("pooled")) {
+    CHECK(p.at("identified") == false);
+    CHECK(p.at("only_if_described") == true);
+  }
+  for (const YoungModulus& m : pooled_moduli(spoilt, punch, false).moduli) {
+    CAPTURE(m.name);
+    CHECK_THAT(m.verdict, Contains(kCondition));
+  }
+  const YoungModuli own = young_moduli(*spoilt.rows[2].fit, punch, false);
+  CHECK(own.moduli.back().name == "E_instantaneous");
+  CHECK_THAT(own.moduli.back().verdict, Contains(kCondition));
+
+  const SpecimenStudy healthy = study_of(Defect::none);
+  for (const Json& p : to_json(healthy).at("pooled")) CHECK_FALSE(p.contains("only_if_described"));
+  for (const YoungModulus& m : pooled_moduli(healthy, punch, false).moduli) {
+    CHECK_THAT(m.verdict, !Contains(kCondition));
+  }
 }

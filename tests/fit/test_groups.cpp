@@ -31,14 +31,16 @@ std::vector<SpecimenEstimate> estimates(const std::vector<double>& values, doubl
 
 /// A rest of 2 s, a ramp and a hold: a stiffness of 60 N/m times a factor with a branch of 45 N/m
 /// that relaxes in 2 s.
-std::string recording(double factor, double depth_mm, std::uint64_t seed) {
+/// @param bend a force that grows with the square of the depth, which linear-1 does not have,
+/// N/mm^2
+std::string recording(double factor, double depth_mm, std::uint64_t seed, double bend = 0.0) {
   Random random(seed);
   std::string csv = "time [s],depth [mm],force [N]\n";
   for (int i = 0; i < 440; ++i) {
     const double t = std::max(0.05 * i - 2.0, 0.0), ramp = std::min(t, 2.0);
     const double v = depth_mm / 2.0;
-    const double force =
-        0.060 * v * ramp + 0.045 * v * 2.0 * (std::exp((ramp - t) / 2.0) - std::exp(-t / 2.0));
+    const double force = bend * std::pow(v * ramp, 2) + 0.060 * v * ramp +
+                         0.045 * v * 2.0 * (std::exp((ramp - t) / 2.0) - std::exp(-t / 2.0));
     csv += fmt::format("{:.2f},{:.5f},{:.7f}\n", 0.05 * i, v * ramp,
                        factor * force + 2e-4 * random.normal());
   }
@@ -156,4 +158,28 @@ TEST_CASE("Groups that differ by their depths are refused, copies are no second 
              Contains("has the readings of 'a/liver1.csv'"));
   CHECK_THAT(test::run_in(folder, "fit a b").said, Contains("--compare"));
   CHECK_THAT(test::run_in(folder, "fit a --compare").said, Contains("two folders of recordings"));
+}
+
+TEST_CASE(
+    "A difference between groups that the law does not describe is stated with that condition",
+    "[groups]") {
+  const test::TempFolder folder;
+  write_group(folder, "a", {0.9, 1.0, 1.1}, 4.0, 1);
+  write_group(folder, "b", {1.8, 2.0, 2.2}, 4.0, 11);
+  write_file(folder.path() / "b" / "bent.csv", recording(2.1, 4.0, 21, 2e-3));
+  const test::ProgramRun run = test::run_in(
+      folder,
+      "fit a b --compare --laws linear-1 --no-draw --punch-radius '2 mm' --format json -o c.json");
+  INFO(run.said);
+  REQUIRE(run.code == 0);
+  const Json j = read_json(folder / "c.json");
+  CHECK_THAT(j["conclusion"].get<std::string>(), Contains("if the law described every recording"));
+  for (const char* list : {"parameters", "young_moduli"}) {
+    for (const Json& q : j[list]) {
+      CAPTURE(q.dump());
+      CHECK(q.at("only_if_described") == true);
+    }
+  }
+  CHECK_THAT(test::run_in(folder, "fit a b --compare --laws linear-1 --no-draw").said,
+             Contains("only if the law described the data"));
 }

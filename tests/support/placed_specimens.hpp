@@ -109,7 +109,7 @@ inline std::vector<CoefficientSpread> coefficient_spreads(const PlacedSpecimens&
       const double truth = p.parameter.theta(spread.truth);
       spread.distance = (e.mean - truth) / e.standard_error;
       spread.held = e.interval.lower <= truth && truth <= e.interval.upper;
-      spread.pooled_identified = p.only_without.empty();
+      spread.pooled_identified = p.identified();
     }
     spreads.push_back(spread);
   }

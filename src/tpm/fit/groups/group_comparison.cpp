@@ -45,6 +45,7 @@ ComparedQuantity compared(const TwoGroups& groups, const std::array<std::string,
   std::array<SpecimenMeans, 2> means;
   for (std::size_t g = 0; g < 2; ++g) {
     q.left_out[g] = groups[g].left_out;
+    q.not_described[g] = groups[g].not_described;
     if (!groups[g].only_without.empty()) {
       q.only_without = groups[g].only_without;
     } else {
@@ -110,6 +111,7 @@ ParameterEstimates sum_estimates(std::span<const SpecimenRow> rows, const std::s
     }
     found.estimates.push_back(
         {row.name, std::log(m->estimate), *m->standard_error / m->estimate, row.specimen});
+    found.not_described += is_not_described(*row.fit);
   }
   return found;
 }
@@ -156,6 +158,10 @@ void adjust_by_holm(std::vector<ComparedQuantity>& all) {
 }
 
 }  // namespace
+
+std::string doubt_of(const ComparedQuantity& q) {
+  return pooled_doubt(q.only_without, q.not_described[0] + q.not_described[1]);
+}
 
 void require_comparable_depths(const RecordingGroup& first, const RecordingGroup& second) {
   const std::vector<double> a = log_depths(first), b = log_depths(second);

@@ -28,7 +28,13 @@ struct ComparedQuantity {
   /// A group's recordings do not tell it from this ("drift or a slow branch"): the difference holds
   /// only without it. Empty: they do.
   std::string only_without;
+  /// Recordings among those compared that the law does not describe: the difference holds only if
+  /// it did.
+  std::array<int, 2> not_described{};
 };
+
+/// Why a compared quantity is not identified, in words; empty if it is.
+[[nodiscard]] std::string doubt_of(const ComparedQuantity& quantity);
 
 struct GroupComparison {
   std::array<std::string, 2> names;

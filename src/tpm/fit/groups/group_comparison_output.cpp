@@ -37,6 +37,7 @@ Json quantity_json(const GroupComparison& c, const ComparedQuantity& q) {
   Json j{{"name", q.parameter.name}, {"unit", q.si_unit}};
   j["groups"] = Json::array({typical_json(q, 0, c.names[0]), typical_json(q, 1, c.names[1])});
   if (!q.only_without.empty()) j["not_separable"] = q.only_without;
+  if (q.not_described[0] + q.not_described[1] > 0) j["only_if_described"] = true;
   if (!q.difference) {
     j["reason"] = q.reason;
     return j;
@@ -90,9 +91,7 @@ std::string line_of(const ComparedQuantity& q, bool tested) {
                       p_text(d.p_value), tested ? p_text(q.p_holm) : std::string("as its parts"));
   const int left_out = q.left_out[0] + q.left_out[1];
   if (left_out > 0) text += fmt::format("  left out: {}", left_out);
-  if (!q.only_without.empty()) {
-    text += fmt::format("  ! not identified: {}: not separable", q.only_without);
-  }
+  if (const std::string doubt = doubt_of(q); !doubt.empty()) text += "  ! " + doubt;
   return text + "\n";
 }
 
@@ -100,15 +99,20 @@ std::string line_of(const ComparedQuantity& q, bool tested) {
 
 std::string conclusion(const GroupComparison& c) {
   std::vector<std::string> differ, open;
+  bool described = true;
   const double alpha = 1.0 - c.study.level;
   for (const ComparedQuantity& q : c.parameters) {
     if (!q.difference || !q.only_without.empty()) continue;
     (q.p_holm < alpha ? differ : open).push_back(q.parameter.name);
+    described = described && q.not_described[0] + q.not_described[1] == 0;
   }
   if (differ.empty() && open.empty()) {
     return "the groups cannot be compared: no parameter is determined by two specimens of each";
   }
-  const std::string against = fmt::format("{} against {}", c.names[1], c.names[0]);
+  const std::string against = fmt::format(
+      "{}{} against {}",
+      described ? "" : "if the law described every recording, which it does not: ", c.names[1],
+      c.names[0]);
   if (differ.empty()) {
     return fmt::format(
         "{}: no difference is shown in {} (Holm, {:.4g} %); the intervals say how large one "

@@ -166,6 +166,22 @@ bool is_of_recording(const ParameterResult& p) {
   return p.nuisance && p.parameter.name != "slack_length";
 }
 
+bool is_not_described(const FitResult& fit) {
+  return fit.adequacy && fit.adequacy->is_rejected();
+}
+
+std::string pooled_doubt(const std::string& only_without, int not_described) {
+  std::string words;
+  if (!only_without.empty()) {
+    words = fmt::format("not identified: {}: not separable", only_without);
+  }
+  if (not_described > 0) {
+    words += words.empty() ? "" : "; ";
+    words += "only if the law described the data";
+  }
+  return words;
+}
+
 void require_distinct_readings(std::span<const PreparedRecording> recordings) {
   std::vector<std::string> seen;
   for (const PreparedRecording& r : recordings) {
@@ -187,6 +203,7 @@ ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows, const 
   // A stiffness varies between specimens by factors, not by differences.
   parameter.scale = parameter.lower < 0.0 ? Scale::linear : Scale::log;
   std::vector<SpecimenEstimate> doubtful;
+  int doubtful_not_described = 0;
   for (const SpecimenRow& row : rows) {
     if (!row.fit) continue;
     const ParameterResult& r = row.parameter(i);
@@ -203,6 +220,7 @@ ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows, const 
       found.doubt = r.not_separable;
       ++found.not_separable;
     }
+    if (r.only_if_described) ++(separable ? found.not_described : doubtful_not_described);
     (separable ? found.estimates : doubtful)
         .push_back(
             {row.name, parameter.theta(r.estimate), *r.standard_error / slope, row.specimen});
@@ -210,6 +228,7 @@ ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows, const 
   if (found.estimates.empty()) {
     found.estimates = std::move(doubtful);
     found.only_without = found.doubt;
+    found.not_described = doubtful_not_described;
   }
   return found;
 }
@@ -223,8 +242,9 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
     if (is_of_recording(first->fit->parameters[i])) continue;
     const ParameterEstimates found = parameter_estimates(rows, *first, i);
     if (found.estimates.empty()) continue;
-    PooledParameter p{found.parameter, random_effects_of_repeats(found.estimates, level),
-                      found.left_out, found.not_separable, found.only_without};
+    PooledParameter p{found.parameter,    random_effects_of_repeats(found.estimates, level),
+                      found.left_out,     found.not_separable,
+                      found.only_without, found.not_described};
     p.effects.summary = in_natural_words(p);
     if (!p.only_without.empty()) {
       p.effects.summary +=
@@ -232,6 +252,11 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
     } else if (p.not_separable > 0) {
       p.effects.summary +=
           fmt::format("; {} more left out: {}: not separable", p.not_separable, found.doubt);
+    }
+    if (p.not_described > 0) {
+      p.effects.summary += fmt::format(
+          "; this supposes that the law describes every recording: {} of {} it does not",
+          p.not_described, found.estimates.size());
     }
     pooled.push_back(std::move(p));
   }
@@ -292,9 +317,10 @@ Json to_json(const SpecimenStudy& study) {
                {"specimens", e.specimens},
                {"left_out", p.left_out},
                {"not_separable", p.not_separable},
-               {"identified", p.only_without.empty()},
+               {"identified", p.identified()},
                {"summary", e.summary}};
     if (!p.only_without.empty()) entry["only_without"] = p.only_without;
+    if (p.not_described > 0) entry["only_if_described"] = true;
     const char* of = p.parameter.scale == Scale::log ? "of_log" : "SI";
     const auto sd_key = [&](const char* between) {
       return fmt::format("between_{}_sd_{}", between, of);

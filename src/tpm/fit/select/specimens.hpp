@@ -37,6 +37,11 @@ struct PooledParameter {
   /// All of them are such, and this is what they do not tell it from ("drift or a slow branch"):
   /// what is pooled is not identified, and holds only without that.
   std::string only_without = {};
+  /// Recordings among those pooled that the law does not describe: what is pooled is not identified
+  /// without the condition that it did.
+  int not_described = 0;
+
+  [[nodiscard]] bool identified() const { return only_without.empty() && not_described == 0; }
 };
 
 struct SpecimenStudy {
@@ -72,10 +77,17 @@ struct ParameterEstimates {
   int not_separable = 0;     ///< as PooledParameter
   std::string only_without;  ///< as PooledParameter
   std::string doubt;         ///< what `not_separable` recordings do not tell it from
+  int not_described = 0;     ///< as PooledParameter
 };
 /// @param like a row that was fitted: what parameter i is
 [[nodiscard]] ParameterEstimates parameter_estimates(std::span<const SpecimenRow> rows,
                                                      const SpecimenRow& like, std::size_t i);
+
+/// Why what is pooled (or compared) is not identified, in words; empty if it is.
+[[nodiscard]] std::string pooled_doubt(const std::string& only_without, int not_described);
+
+/// True if the law does not describe the data of a fit.
+[[nodiscard]] bool is_not_described(const FitResult& fit);
 
 /// True if a fit's parameter belongs to the recording (contact, offset), not to the specimen.
 [[nodiscard]] bool is_of_recording(const ParameterResult& p);

@@ -58,7 +58,15 @@ double factor_of(const LawSpec& law, const ContactGeometry& geometry) {
 std::optional<YoungModulus> sum_of(const FitResult& fit, const std::vector<std::size_t>& places,
                                    double factor) {
   const Covariance& c = fit.covariance;
-  YoungModulus sum{"E_instantaneous", "", "Pa", 0.0, {}, {}, {}, "linearised", ""};
+  YoungModulus sum{"E_instantaneous",
+                   "",
+                   "Pa",
+                   0.0,
+                   {},
+                   {},
+                   {},
+                   "linearised",
+                   pooled_doubt("", is_not_described(fit))};
   Eigen::VectorXd direction = Eigen::VectorXd::Zero(std::ssize(c.free));
   for (const std::size_t i : places) {
     const ParameterResult& p = fit.parameters[i];
@@ -90,10 +98,16 @@ std::vector<std::size_t> modulus_places(const FitResult& fit) {
   return places;
 }
 
+std::string typical_words(std::size_t specimens, const std::string& doubt) {
+  return fmt::format("typical of {} specimen{}{}", specimens, specimens == 1 ? "" : "s",
+                     doubt.empty() ? "" : ", " + doubt);
+}
+
 /// The typical sum of all stiffnesses over the specimens, by the logarithm of each one's; none if
 /// no fit tells it.
 std::optional<YoungModulus> pooled_sum(const SpecimenStudy& study, double factor) {
   std::vector<SpecimenEstimate> estimates;
+  int not_described = 0;
   std::string of;
   for (const SpecimenRow& row : study.rows) {
     if (!row.fit) continue;
@@ -103,6 +117,7 @@ std::optional<YoungModulus> pooled_sum(const SpecimenStudy& study, double factor
     if (!sum || !sum->standard_error || !(sum->estimate > 0.0)) continue;
     if (!(*sum->standard_error > 0.0)) continue;
     of = sum->of;
+    not_described += is_not_described(*row.fit);
     estimates.push_back(
         {row.name, std::log(sum->estimate), *sum->standard_error / sum->estimate, row.specimen});
   }
@@ -116,8 +131,7 @@ std::optional<YoungModulus> pooled_sum(const SpecimenStudy& study, double factor
                       std::exp(effects.interval.lower),
                       std::exp(effects.interval.upper),
                       "pooled",
-                      fmt::format("typical of {} specimen{}", effects.specimens,
-                                  effects.specimens == 1 ? "" : "s")};
+                      typical_words(effects.specimens, pooled_doubt("", not_described))};
 }
 
 }  // namespace
@@ -179,11 +193,7 @@ YoungModuli pooled_moduli(const SpecimenStudy& study, const ContactGeometry& geo
         {modulus_name(p.parameter.name), p.parameter.name,
          modulus_unit(study.law, p.parameter.name), pascals(p.effects.mean), std::nullopt,
          pascals(p.effects.interval.lower), pascals(p.effects.interval.upper), "pooled",
-         fmt::format("typical of {} specimen{}{}", p.effects.specimens,
-                     p.effects.specimens == 1 ? "" : "s",
-                     p.only_without.empty()
-                         ? std::string()
-                         : fmt::format(", not identified: {}: not separable", p.only_without))});
+         typical_words(p.effects.specimens, pooled_doubt(p.only_without, p.not_described))});
   }
   if (adds_up(study.law)) {
     if (auto sum = pooled_sum(study, factor)) all.moduli.push_back(*std::move(sum));

@@ -216,9 +216,7 @@ ShortAnswer short_answer(const SpecimenStudy& study) {
                          shown(p.effects.new_specimen->upper));
     }
     if (p.left_out > 0) more += fmt::format("; {} left out", p.left_out);
-    if (!p.only_without.empty()) {
-      more += fmt::format("; not identified: {}: not separable", p.only_without);
-    }
+    if (!p.identified()) more += "; " + pooled_doubt(p.only_without, p.not_described);
     names.emplace_back(p.parameter.name, more);
     answer.rows.push_back(answer_row(
         p.parameter.name, shown(p.effects.mean),
@@ -268,10 +266,9 @@ ShortAnswer short_answer(const GroupComparison& c) {
     if (const int left_out = q.left_out[0] + q.left_out[1]; left_out > 0) {
       p += fmt::format("; left out: {}", left_out);
     }
-    if (!q.only_without.empty()) {
-      const std::string doubt = fmt::format("; not identified: {}: not separable", q.only_without);
-      p += doubt;
-      verdict += doubt;
+    if (const std::string doubt = doubt_of(q); !doubt.empty()) {
+      p += "; " + doubt;
+      verdict += "; " + doubt;
     }
     answer.rows.push_back(row(q.parameter.name, typical(0), typical(1), difference, p));
     verdicts.emplace_back(q.parameter.name, verdict);
