@@ -88,6 +88,7 @@ int export_scene(const ExportTexts& texts, OrganTarget target) {
   const Json scene = read_json(texts.law);
   const Tissue tissue =
       parse_tissue(scene, texts.law, std::filesystem::path(texts.law).parent_path());
+  require_sound(tissue, texts.law);
   const std::string text = export_organ(tissue, options);
   for (const Remark& remark : organ_export_remarks(tissue, options)) {
     tell_user("tpm: warning: {} does not express {}\n", texts.to, remark.text);

@@ -58,7 +58,7 @@ Tissue tissue_of(const NetworkChoice& choice) {
 int build(const NetworkChoice& choice, const Session& session) {
   will_write({fs::path(choice.output).replace_extension(".xdmf")});
   const Tissue tissue = tissue_of(choice);
-  require_outer_held(tissue, choice.scene.empty() ? "options" : choice.scene);
+  require_sound(tissue, choice.scene.empty() ? "options" : choice.scene);
   const fs::path xdmf = write_network(tissue, choice.output);
   const NetworkInspection inspection = inspect(tissue);
   if (session.json()) {

@@ -148,6 +148,7 @@ TEST_CASE("an organ that nothing holds has the six motions of a rigid body") {
   const Tissue tissue = tissue_of(R"({"organ": {"kind": "block", "cells": [3, 3, 3]}})");
   CHECK_THROWS_WITH(require_standing(tissue, "scene"),
                     StartsWith("scene: not anchored: 6 zero-energy modes"));
+  CHECK_NOTHROW(require_sound(tissue, "scene"));  // its bonds hold every sphere
 }
 
 TEST_CASE("a network in HDF5 holds its spheres and bonds, and the XDMF names only what is there") {

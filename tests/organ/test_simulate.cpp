@@ -373,14 +373,20 @@ TEST_CASE("roughness is stated where something has moved", "[heavy]") {
 TEST_CASE("a load that nothing carries is refused where the tissue gives way", "[heavy]") {
   CHECK_THAT(refusal_of([] {
                (void)run_of(small_scene(
+                   R"("formulation": {"kind": "static", "solver": "iterative"},
+                      "protocol": {"kind": "creep", "load": "1e6 N", "duration": "1 s"})"));
+             }),
+             Contains("buckles around sphere "));
+  CHECK_THAT(refusal_of([] {
+               (void)run_of(small_scene(
                    R"("protocol": {"kind": "creep", "load": "1e6 N", "duration": "1 s"})"));
              }),
              Contains("at t = 0 s and a load of 0.93") && Contains("buckles around sphere "));
   // The place is that of the sphere which is named: the pushed one, or a weak one beside it.
   for (const auto& [formulation, named] :
-       {std::pair{"static", 13}, std::pair{"quasi_static", 20}}) {
+       {std::pair{R"("static")", 13}, std::pair{R"("quasi_static")", 20}}) {
     const ExperimentScene scene = small_scene(fmt::format(
-        R"("formulation": {{"kind": "{}"}}, "contacts": [{{"kind": "sphere", "number": 20}}],
+        R"("formulation": {{"kind": {}}}, "contacts": [{{"kind": "sphere", "number": 20}}],
            "protocol": {{"kind": "creep", "load": "1e6 N", "duration": "1 s"}})",
         formulation));
     const std::string refusal = refusal_of([&] { (void)run_of(scene); });

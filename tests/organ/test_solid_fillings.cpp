@@ -13,7 +13,9 @@
 #include "tpm/organ/body/simple_organs.hpp"
 #include "tpm/organ/body/solid_support.hpp"
 #include "tpm/organ/bonds/outer_support.hpp"
+#include "tpm/organ/bonds/rigidity.hpp"
 #include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using namespace tpm::base;
@@ -152,6 +154,46 @@ TEST_CASE("an outer sphere that the inside does not hold is refused by number an
   continuum.spacing_law = SpacingLaw::continuum;
   CHECK(outer_support(build_network(organ, continuum, "block")).front() ==
         Approx(outer_support(network).front()));
+}
+
+TEST_CASE("the tip of a thin spike is refused by number and place, anchored or not") {
+  // A tower on the top of a block: an inner sphere, and 1.4 spacings above it a tip that nothing
+  // but this sphere holds. Its stiffness along its normal is sound, sideways it is free.
+  Organ organ = block(3, 3, 2, 0.01, Lattice::cubic);
+  const auto first = organ.position.cols();
+  const Vector3d top = organ.position.col(5);
+  organ.position.conservativeResize(3, first + 2);
+  organ.normal.conservativeResize(3, first + 2);
+  organ.position.col(first) = top + Vector3d(0.0, 0.0, 0.01);
+  organ.position.col(first + 1) = top + Vector3d(0.0, 0.0, 0.024);
+  organ.normal.rightCols<2>().colwise() = Vector3d::UnitZ();
+  organ.layer.push_back(1);
+  organ.layer.push_back(0);
+  const Network network = build_network(organ, NetworkOptions{}, "tower");
+  const auto tip = static_cast<std::size_t>(first + 1);
+  Constraints anchored(organ.size());
+  for (std::size_t i = 32; i < 48; ++i) anchored.fix(i);  // the plane at the bottom
+  const Constraints loose(organ.size());
+  for (const Constraints& constraints : {anchored, loose}) {
+    CHECK_NOTHROW(require_outer_support(network, constraints, "tower.json"));
+    const std::vector<double> hold = least_hold(network, constraints);
+    CHECK(hold[tip] < 1e-12);
+    CHECK(*std::min_element(hold.begin(), hold.end() - 1) > 5 * kLeastHold);
+    CHECK_THAT(
+        refusal_of([&] { require_hold(network, constraints, "tower.json"); }),
+        Contains("tower.json: 1 sphere is hardly held in some direction: sphere 50 at (10, 10, 44) "
+                 "mm"));
+    // The search for motions of the whole network names it, too, beside those of a rigid body.
+    const BondSystem bonds(network, TpmParameters{});
+    const Eigen::MatrixXd whole = whole_motions(organ.position, constraints);
+    CHECK(whole.cols() == (constraints.is_free(40) ? 6 : 0));
+    const ZeroEnergyModes modes = zero_energy_modes(bonds, organ.position, constraints, whole);
+    CHECK(modes.count == 2);
+    REQUIRE_FALSE(modes.spheres.empty());
+    CHECK(modes.spheres.front() == tip);
+  }
+  anchored.fix(tip);
+  CHECK_NOTHROW(require_hold(network, anchored, "tower.json"));
 }
 
 TEST_CASE("points that are pushed into one corner of a thin plate part again") {

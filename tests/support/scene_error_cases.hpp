@@ -106,6 +106,22 @@ inline std::string polygon(int corners) {
   return obj + face + "\n";
 }
 
+/// Spheres of a cube of 3 x 3 x 3, a column of two on it, and a tip out of reach of all but one.
+inline std::string tower_with_tip() {
+  std::string spheres;
+  const auto add = [&](int x, int y, int z, int layer) {
+    spheres += (spheres.empty() ? "" : ", ") + ("{\"at\": [" + std::to_string(x)) + ", " +
+               std::to_string(y) + ", " + std::to_string(z) +
+               "], \"layer\": " + std::to_string(layer) + ", \"normal\": [0, 0, 1]}";
+  };
+  for (int layer = 1; layer <= 3; ++layer) {
+    for (int i = 0; i < 9; ++i) add(20 * (i % 3), 20 * (i / 3), 60 - 20 * layer, layer);
+  }
+  add(20, 20, 60, 2);
+  add(20, 20, 88, 1);
+  return "[" + spheres + "]";
+}
+
 inline std::vector<ErrorCase> scene_cases() {
   const std::string type = "scene";
   const std::string check = "network check {}/s.json";
@@ -200,6 +216,10 @@ inline std::vector<ErrorCase> scene_cases() {
       {type, "one radial bond a sphere", check, liver(R"("bonds": {"diagonals": false})")},
       {type, "unguided star", check, scene(R"({"organ": {"kind": "star"}, "sliders": []})")},
       {type, "scene and options", check + " --spheres 424", liver(R"("title": "t")")},
+      {type, "tip of a spike that one sphere holds", "network build {}/s.json -o {}/out",
+       organ(listed + tower_with_tip())},
+      {type, "the same to MuJoCo", "export {}/s.json --to mjcf -o {}/out",
+       organ(listed + tower_with_tip())},
       {type, "bad count", "network build --spheres 1 -o {}/out", with_files({})},
   };
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/law/relaxation/relaxation_filter.hpp"
+#include "tpm/organ/balance/buckling.hpp"
 #include "tpm/organ/balance/quasistatic.hpp"
 #include "tpmkit/error.hpp"
 
@@ -90,7 +91,9 @@ Eigen::Vector3d BalancedContact::go_to(const Eigen::Vector3d& displacement_m,
     if (!factorised_ || iteration % kSlow == kSlow - 1) {
       factorised_ = equilibrium_.factorise(position_, viscous_state);
       if (!factorised_ || !equilibrium_.is_stable()) {
-        throw Error(ExitCode::numerical, ErrorCause::buckled, "contact", "the tissue buckles");
+        throw Error(ExitCode::numerical, ErrorCause::buckled, "contact",
+                    "the tissue buckles" +
+                        buckling_place(equilibrium_, position_, viscous_state, position_.cols()));
       }
     }
     equilibrium_.displace(left);

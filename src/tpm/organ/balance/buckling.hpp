@@ -7,12 +7,12 @@ namespace tpm::organ {
 
 /// That a tissue buckles and where, in words for a message: "buckles around sphere 12 at (1, 2, 3)
 /// mm: its stiffness is no longer positive". It is the sphere that moves most in the softest motion
-/// of the last state in balance, found by inverse iteration. Without a place where the stiffness
-/// there cannot be factorised directly.
+/// of the last state in balance, found by inverse iteration, or by least curvature where an
+/// iterative solver meets a stiffness that is not positive definite.
 /// @param state the last in balance; the factorisation of the tissue is lost
 [[nodiscard]] std::string buckling_words(DrivenTissue& tissue, const TissueState& state);
 
-/// The place of buckling_words: " around sphere 12 at (1, 2, 3) mm", or nothing.
+/// The place of buckling_words: " around sphere 12 at (1, 2, 3) mm".
 /// @param equilibrium its factorisation is lost
 /// @param position the last in balance, m
 /// @param spheres the first columns of it; tools follow

@@ -88,6 +88,7 @@ class Equilibrium {
   [[nodiscard]] const BlockLdlt* factor() const { return direct_ ? &direct_->factor : nullptr; }
   /// Of that. There is none where solutions iterate.
   [[nodiscard]] const BlockPattern& pattern() const { return direct_->blocks.pattern(); }
+  [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
 
  private:

@@ -18,6 +18,21 @@ inline constexpr double kLeastOuterSupport = 0.2;
 /// its neighbours hold each other. One entry a sphere of layer 0, by number.
 [[nodiscard]] std::vector<double> outer_support(const Network& network);
 
+/// Least stiffness that the bonds of a sphere give it in any direction in which it may move, in the
+/// same parts. Fillings of balls, plates and tubes have 0.4 and more, the tip of a thin spike 0.
+inline constexpr double kLeastHold = 0.02;
+
+/// Stiffness of each sphere in the direction in which its bonds hold it least, its neighbours
+/// fixed, in parts of the target: the least eigenvalue of the sum of factor times n n^T over its
+/// bonds, on the coordinates that are free. 1 for a fixed sphere. Unlike outer_support it finds a
+/// sphere that is held along its normal but not sideways.
+[[nodiscard]] std::vector<double> least_hold(const Network& network,
+                                             const Constraints& constraints);
+
+/// Throws Error(bad_input) that names number and place of spheres below kLeastHold, unless there
+/// are none. Networks of one layer are left out: nothing but their curvature holds them.
+void require_hold(const Network& network, const Constraints& constraints, std::string_view where);
+
 /// Throws Error(bad_input) that names number and place of outer spheres below kLeastOuterSupport,
 /// unless there are none. Spheres that may not move along their normal are left out, and networks
 /// of one layer, which have no inside.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <numeric>
 
@@ -15,10 +16,11 @@
 namespace tpm::organ {
 namespace {
 
-constexpr double kZeroMode = 1e-9;      // of the mean diagonal
-constexpr std::size_t kMostModes = 24;  // found one by one
-constexpr int kInverseIterations = 4;   // each gains about nine digits over what is stiff
-constexpr double kTakesPart = 0.01;     // of the largest motion in the modes
+constexpr double kZeroMode = 1e-9;        // of the mean diagonal
+constexpr std::size_t kMostModes = 24;    // found one by one
+constexpr int kInverseIterations = 4;     // each gains about nine digits over what is stiff
+constexpr double kTakesPart = 0.01;       // of the largest motion in the modes
+constexpr double kTakesPartInside = 0.1;  // where motions of the whole have been taken out
 
 /// The matrix at rest plus a multiple of 1 on what is free.
 BlockMatrix shifted(const BlockMatrix& stiffness, const Constraints& constraints, double shift) {
@@ -59,7 +61,8 @@ Eigen::MatrixXd softest(const BlockPattern& pattern, const BlockMatrix& matrix,
   return basis;
 }
 
-std::vector<std::size_t> spheres_that_move(const Eigen::MatrixXd& modes, std::size_t spheres) {
+std::vector<std::size_t> spheres_that_move(const Eigen::MatrixXd& modes, std::size_t spheres,
+                                           double takes_part) {
   std::vector<double> motion(spheres);
   for (std::size_t i = 0; i < spheres; ++i) {
     motion[i] = modes.middleRows(3 * static_cast<Eigen::Index>(i), 3).norm();
@@ -69,7 +72,7 @@ std::vector<std::size_t> spheres_that_move(const Eigen::MatrixXd& modes, std::si
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return motion[a] > motion[b]; });
-  std::erase_if(order, [&](std::size_t i) { return motion[i] < kTakesPart * most; });
+  std::erase_if(order, [&](std::size_t i) { return motion[i] < takes_part * most; });
   return order;
 }
 
@@ -80,8 +83,33 @@ std::string words_with(const ZeroEnergyModes& modes, const std::string& spheres)
 
 }  // namespace
 
+Eigen::MatrixXd whole_motions(const Positions& rest, const Constraints& constraints) {
+  constexpr double kNone = 1e-9;
+  const Eigen::Matrix3Xd from = rest.colwise() - rest.rowwise().mean().eval();
+  const double size = std::max(from.colwise().norm().maxCoeff(), 1e-300);
+  Eigen::MatrixXd motions(3 * rest.cols(), 6);
+  Eigen::Matrix<double, 6, 6> held = Eigen::Matrix<double, 6, 6>::Zero();
+  for (Eigen::Index i = 0; i < rest.cols(); ++i) {
+    const Eigen::Vector3d p = from.col(i) / size;
+    Eigen::Matrix<double, 3, 6> motion;
+    motion.leftCols<3>().setIdentity();
+    motion.rightCols<3>() << 0, p.z(), -p.y(), -p.z(), 0, p.x(), p.y(), -p.x(), 0;
+    motions.middleRows<3>(3 * i) = motion;
+    const auto sphere = static_cast<std::size_t>(i);
+    if (constraints.is_free(sphere)) continue;
+    const Eigen::Matrix<double, 3, 6> stopped =
+        motion - Eigen::Matrix<double, 3, 6>(constraints.projector(sphere) * motion);
+    held += stopped.transpose() * stopped;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(held);
+  const Eigen::Matrix<double, 6, 1> values = solver.eigenvalues();  // rising
+  const auto free = (values.array() <= kNone * std::max(values.maxCoeff(), 1.0)).count();
+  if (free == 0) return Eigen::MatrixXd(motions.rows(), 0);
+  return orthonormal_columns(motions * solver.eigenvectors().leftCols(free));
+}
+
 ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,
-                                  const Constraints& constraints) {
+                                  const Constraints& constraints, const Eigen::MatrixXd& whole) {
   const ViscousState none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
   StiffnessBlocks blocks(bonds, constraints);
   const BlockMatrix& stiffness = blocks.assemble(rest, none);
@@ -93,13 +121,16 @@ ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest
   if (!factor.factorise(shifted(stiffness, constraints, -kZeroMode * size))) {
     throw Error(ExitCode::numerical, "network", "the stiffness at rest cannot be factorised");
   }
-  modes.count = factor.negative_count();
+  const std::size_t free = factor.negative_count();
+  const auto of_whole = static_cast<std::size_t>(whole.cols());
+  modes.count = free > of_whole ? free - of_whole : 0;
   if (modes.count == 0) return modes;
-  const auto found = static_cast<Eigen::Index>(std::min(modes.count, kMostModes));
+  const auto found = static_cast<Eigen::Index>(std::min(free, kMostModes));
+  Eigen::MatrixXd motions = softest(
+      blocks.pattern(), shifted(stiffness, constraints, kZeroMode * size), constraints, found);
+  if (of_whole > 0) motions -= whole * (whole.transpose() * motions).eval();
   modes.spheres =
-      spheres_that_move(softest(blocks.pattern(), shifted(stiffness, constraints, kZeroMode * size),
-                                constraints, found),
-                        constraints.size());
+      spheres_that_move(motions, constraints.size(), of_whole > 0 ? kTakesPartInside : kTakesPart);
   return modes;
 }
 
@@ -108,8 +139,8 @@ std::string words(const ZeroEnergyModes& modes) {
 }
 
 void require_rigid(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
-                   std::string_view where) {
-  const ZeroEnergyModes modes = zero_energy_modes(bonds, rest, constraints);
+                   std::string_view where, const Eigen::MatrixXd& whole) {
+  const ZeroEnergyModes modes = zero_energy_modes(bonds, rest, constraints, whole);
   if (modes.is_rigid()) return;
   throw bad_input(where, words_with(modes, sphere_list(modes.spheres, rest)),
                   "a network without mechanisms: more bonds (a wider support) or more anchors");

@@ -16,18 +16,26 @@ struct ZeroEnergyModes {
   [[nodiscard]] bool is_rigid() const { return count == 0; }
 };
 
+/// Motions of the whole body that the constraints leave free, 0 to 6 orthonormal columns;
+/// coordinates of all spheres.
+[[nodiscard]] Eigen::MatrixXd whole_motions(const Positions& rest, const Constraints& constraints);
+
 /// Counts the eigenvalues of the stiffness matrix at rest that are 0 within 1e-9 of its mean
 /// diagonal, by the signs of the pivots of the shifted matrix, and finds the modes by inverse
 /// iteration.
 /// @param rest the positions at which every bond has its rest length
+/// @param whole motions that are not counted, as of whole_motions; the spheres are named that move
+///   in the others
 [[nodiscard]] ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,
-                                                const Constraints& constraints);
+                                                const Constraints& constraints,
+                                                const Eigen::MatrixXd& whole = {});
 
 /// "3 zero-energy modes; loose: spheres 12, 14 and 5 more": for messages.
 [[nodiscard]] std::string words(const ZeroEnergyModes& modes);
 
 /// Throws Error(bad_input) unless the network is rigid.
+/// @param whole as in zero_energy_modes
 void require_rigid(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
-                   std::string_view where);
+                   std::string_view where, const Eigen::MatrixXd& whole = {});
 
 }  // namespace tpm::organ

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "tpm/organ/bonds/outer_support.hpp"
-
 namespace tpm::organ {
 namespace {
 
@@ -65,11 +63,6 @@ NetworkInspection inspect(const Tissue& tissue) {
   if (star.equilibrium > 0.0)
     result.contact_over_star->equilibrium = held.equilibrium / star.equilibrium;
   return result;
-}
-
-void require_outer_held(const Tissue& tissue, std::string_view where) {
-  if (tissue.star) return;  // A and C have nothing below them, and are fixed
-  require_outer_support(tissue.network, tissue.constraints(), where);
 }
 
 }  // namespace tpm::organ

@@ -1,6 +1,5 @@
 #pragma once
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include "tpm/organ/balance/effective_moduli.hpp"
@@ -30,9 +29,5 @@ struct NetworkInspection {
 };
 
 [[nodiscard]] NetworkInspection inspect(const Tissue& tissue);
-
-/// Throws Error(bad_input) unless the inside holds the outer spheres (outer_support.hpp): what
-/// `tpm network build` asks, also of a network without anchors.
-void require_outer_held(const Tissue& tissue, std::string_view where);
 
 }  // namespace tpm::organ

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,8 +12,8 @@
 #include "tpm/organ/balance/effective_moduli.hpp"
 #include "tpm/organ/bonds/local_support.hpp"
 #include "tpm/organ/bonds/material_refusal.hpp"
+#include "tpm/organ/bonds/outer_support.hpp"
 #include "tpm/organ/bonds/rigidity.hpp"
-#include "tpm/organ/scene/inspection.hpp"
 #include "tpm/organ/scene/scene_keys.hpp"
 #include "tpmkit/error.hpp"
 
@@ -86,26 +85,19 @@ void add_sliders(const std::vector<std::size_t>& numbers, Tissue& tissue,
   }
 }
 
-/// How many of the 6 motions of a rigid body nothing holds.
-int rigid_motions(const Positions& position, const Constraints& constraints) {
-  const Eigen::Vector3d middle = position.rowwise().mean();
-  const Eigen::Matrix3Xd from = position.colwise() - middle;
-  const double size = from.colwise().norm().maxCoeff();
-  Eigen::Matrix<double, 6, 6> held = Eigen::Matrix<double, 6, 6>::Zero();
-  for (std::size_t i = 0; i < constraints.size(); ++i) {
-    if (constraints.is_free(i)) continue;
-    const Eigen::Vector3d p = from.col(static_cast<Eigen::Index>(i)) / size;
-    Eigen::Matrix<double, 3, 6> motion;
-    motion.leftCols<3>().setIdentity();
-    motion.rightCols<3>() << 0, p.z(), -p.y(), -p.z(), 0, p.x(), p.y(), -p.x(), 0;
-    const Eigen::Matrix<double, 3, 6> stopped =
-        motion - Eigen::Matrix<double, 3, 6>(constraints.projector(i) * motion);
-    held += stopped.transpose() * stopped;
+/// @param whole motions that may be free, as of whole_motions
+void require_sound(const Tissue& tissue, std::string_view where, const Eigen::MatrixXd& whole) {
+  const Organ& organ = tissue.network.organ;
+  const BondSystem bonds = tissue.bonds();
+  const Constraints constraints = tissue.constraints();
+  if (!tissue.star) {  // A and C of a star have nothing below them, and are fixed
+    require_outer_support(tissue.network, constraints, where);
+    require_hold(tissue.network, constraints, where);
   }
-  constexpr double kNone = 1e-9;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(held);
-  const Eigen::Matrix<double, 6, 1> values = solver.eigenvalues();
-  return static_cast<int>((values.array() <= kNone * std::max(values.maxCoeff(), 1.0)).count());
+  if (organ.size() <= kMostSpheresForModes) {
+    require_rigid(bonds, organ.position, constraints, where, whole);
+  }
+  require_supported(bonds, organ, constraints, where);
 }
 
 }  // namespace
@@ -272,7 +264,7 @@ void require_standing(const Tissue& tissue, std::string_view where) {
   const Organ& organ = tissue.network.organ;
   const BondSystem bonds = tissue.bonds();
   const Constraints constraints = tissue.constraints();
-  if (tissue.anchors.empty() && rigid_motions(organ.position, constraints) > 0) {
+  if (tissue.anchors.empty() && whole_motions(organ.position, constraints).cols() > 0) {
     const std::string modes = organ.size() > kMostSpheresForModes
                                   ? std::string("the 6 motions of a rigid body")
                                   : words(zero_energy_modes(bonds, organ.position, constraints));
@@ -283,10 +275,11 @@ void require_standing(const Tissue& tissue, std::string_view where) {
     throw bad_input(where, fmt::format("the contact sphere {} is anchored", *organ.contact + 1),
                     "anchors that leave it free");
   }
-  require_outer_held(tissue, where);
-  if (organ.size() <= kMostSpheresForModes)
-    require_rigid(bonds, organ.position, constraints, where);
-  require_supported(bonds, organ, constraints, where);
+  require_sound(tissue, where, {});
+}
+
+void require_sound(const Tissue& tissue, std::string_view where) {
+  require_sound(tissue, where, whole_motions(tissue.network.organ.position, tissue.constraints()));
 }
 
 void require_loadable(const Tissue& tissue, std::size_t sphere, const Eigen::Vector3d& direction,

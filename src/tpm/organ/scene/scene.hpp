@@ -65,9 +65,14 @@ struct Tissue {
 [[nodiscard]] Tissue read_tissue(const std::filesystem::path& scene);
 
 /// Throws Error(bad_input) unless the network stands: something is anchored, the contact sphere is
-/// not, no motion is free of energy (not looked for above kMostSpheresForModes spheres), no sphere
-/// is loose (local_support.hpp).
+/// not, and the network is sound.
 void require_standing(const Tissue& tissue, std::string_view where);
+
+/// Throws Error(bad_input) unless bonds hold every sphere (outer_support.hpp), no motion but those
+/// of the whole body is free of energy (not looked for above kMostSpheresForModes spheres), and no
+/// sphere is loose (local_support.hpp). What is written for others to compute with is asked this
+/// much, also without anchors.
+void require_sound(const Tissue& tissue, std::string_view where);
 
 /// Above this a scene's modes are not counted: the factorisation would take too long.
 inline constexpr std::size_t kMostSpheresForModes = 20'000;
