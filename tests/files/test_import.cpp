@@ -285,6 +285,15 @@ TEST_CASE("a time stamp with its date is a time") {
   CHECK_THAT(r.time_s[2] - r.time_s[1], WithinRel(1.0, 1e-9));
 }
 
+TEST_CASE("a compliance beside the stress that was held is the response") {
+  const TempFolder folder;
+  write_file(folder / "f.csv",
+             "Time [s],Shear stress [Pa],Compliance [1/Pa]\n0.1,100,2e-4\n0.2,100,3e-4\n");
+  const Recording r = read_recording_file(folder / "f.csv", {}).recording;
+  CHECK(r.response_quantity == Quantity::creep_compliance);
+  CHECK(r.response == std::vector<double>{2e-4, 3e-4});
+}
+
 TEST_CASE("rows of a sample that was lost are left out, and it is said") {
   const TempFolder folder;
   write_file(folder / "f.csv",

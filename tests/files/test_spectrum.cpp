@@ -140,6 +140,10 @@ TEST_CASE("exports that hold no whole spectrum are refused") {
   CHECK_THAT(import_fault(head + "1,1,1\n2,-2,2\n"), Catch::Contains("storage -2 is negative"));
   CHECK_THAT(import_fault("Frequency (Hz),G' (Pa)\n1,1\n2,2\n"),
              Catch::Contains("no column is recognised as a loss modulus; expected --loss"));
+  CHECK_THAT(import_fault("Shear strain (%),G' (Pa),G'' (Pa)\n0.1,9,1\n1,8,2\n"),
+             Catch::Contains("column 2 'G'': a storage or loss modulus without a frequency, as of "
+                             "a sweep of the amplitude, the temperature or the time; expected a "
+                             "sweep of the frequency, or --frequency with one of column 1"));
   CHECK_THAT(import_fault("Frequency,G',G''\n1,1,1\n2,2,2\n"),
              Catch::Contains("--unit \"Frequency=UNIT\" with a unit of frequency: Hz, kHz, rad/s; "
                              "--unit \"G'=UNIT\" with a unit of stress"));

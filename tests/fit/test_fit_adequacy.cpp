@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "adequacy_studies.hpp"
+#include "placed_recordings.hpp"
 #include "support/remarks.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/blocks/law_export.hpp"
@@ -339,4 +340,37 @@ TEST_CASE("what is pooled over a recording that the law does not describe is not
   for (const YoungModulus& m : pooled_moduli(healthy, punch, false).moduli) {
     CHECK_THAT(m.verdict, !Contains(kCondition));
   }
+}
+
+TEST_CASE("an unloading with hysteresis contradicts a law without memory", "[adequacy]") {
+  // The loading alone is a power of the depth within its noise, with or without relaxation.
+  const auto selected = [](const char* made, std::vector<double> material) {
+    test::PlacedTest placed;
+    placed.law = made;
+    placed.material = std::move(material);
+    placed.reference_m = placed.depth_m = 3e-3;
+    placed.rest_s = 3.0;
+    placed.ramp_s = 1.5;
+    placed.hold_s = 0.0;
+    placed.after_s = 1.0;
+    placed.step_s = 0.02;
+    placed.noise_N = 4e-4;
+    const PreparedRecording recording = test::prepared(placed, 5);
+    SelectionOptions options;
+    options.laws = {parse_law_name("power", "test")};
+    options.only_listed = true;
+    options.held_out = false;
+    options.setup.starts = 4;
+    options.setup.profiles = false;
+    return select_law(std::span(&recording, 1), options);
+  };
+  const Selection relaxing = selected("power-1", {60.0, 45.0, 2.0, 1.5});
+  CHECK_THAT(hysteresis_of(best_of(relaxing)), StartsWith("the unloading is off by "));
+  CHECK(best_of(relaxing).adequacy.value().is_rejected());
+  CHECK_FALSE(relaxing.candidates.front().identified);
+  CHECK(relaxing.candidates.front().contradicted);
+  for (const ParameterResult& p : best_of(relaxing).parameters) CHECK(p.only_if_described);
+  const Selection elastic = selected("power", {60.0, 1.5});
+  CHECK(hysteresis_of(best_of(elastic)).empty());
+  CHECK_FALSE(best_of(elastic).adequacy.value().is_rejected());
 }

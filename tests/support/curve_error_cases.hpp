@@ -177,6 +177,8 @@ inline std::vector<ErrorCase> spectrum_cases() {
       {type, "another quantity", show,
        described("\"loss_modulus\", \"unit\": \"Pa\"", "\"stress\", \"unit\": \"Pa\"")},
       {type, "export without loss", import, machine("Frequency (Hz),G' (Pa)\n1,1\n2,2\n")},
+      {type, "export of a sweep of the amplitude", import,
+       machine("Strain (%),G' (Pa),G'' (Pa)\n0.1,9,1\n1,8,2\n")},
       {type, "export without units", import, machine("Frequency,G',G''\n1,1,1\n2,2,2\n")},
       {type, "export with a frequency twice", import,
        machine("Frequency (Hz),G' (Pa),G'' (Pa)\n1,1,1\n1,2,2\n")},

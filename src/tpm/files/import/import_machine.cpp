@@ -264,10 +264,17 @@ void resolve_phase(ImportedSeries& series, const std::vector<Use>& uses) {
                                                 : "storage and loss tangent to loss"));
 }
 
-/// The response of a strain is a stress, if there is one beside a force.
+/// The response of a strain is a stress, if there is one beside a force. Without a drive only the
+/// answer to a unit step can be fitted.
 const MachineColumn* response_column(const ColumnChoice& choice, const MachineColumn* drive,
                                      const ImportOptions& options) {
   const bool chosen = !options.response_column.empty() || options.response_quantity;
+  if (!chosen && drive == nullptr) {
+    const auto* step = choice.by_title(
+        ColumnRole::response, "--response",
+        [](const MachineColumn& column) { return is_step_response(column.meaning->quantity); });
+    if (step != nullptr) return step;
+  }
   if (!chosen && drive != nullptr && is_answered_by_stress(drive_quantity(*drive, options))) {
     const auto* stress = choice.by_title(
         ColumnRole::response, "--response",
@@ -285,6 +292,19 @@ void require_not_refused(const ColumnChoice& choice, ColumnRole role, const std:
   throw bad_input(fmt::format("{}: {}", file, column->label()), column->refused->why,
                   fmt::format("a column of what was measured, or {} {} to take this one", option,
                               column->index + 1));
+}
+
+/// Refuses storage or loss over something else than the frequency.
+void require_no_other_sweep(const ColumnChoice& choice, const std::string& file) {
+  for (const ColumnRole role : {ColumnRole::storage, ColumnRole::loss}) {
+    const MachineColumn* part = choice.by_title(role, "--storage");
+    if (part == nullptr) continue;
+    throw bad_input(
+        fmt::format("{}: {}", file, part->label()),
+        "a storage or loss modulus without a frequency, as of a sweep of the "
+        "amplitude, the temperature or the time",
+        fmt::format("a sweep of the frequency, or --frequency with one of {}", choice.list()));
+  }
 }
 
 bool is_clock(const DelimitedTable& table, const MachineHeader& header,
@@ -309,6 +329,7 @@ std::vector<Use> recording_uses(const DelimitedTable& table, const MachineHeader
   const MachineColumn* sd = choice.find(ColumnRole::sd, options.sd_column, "--sd");
   if (response == nullptr) {
     require_not_refused(choice, ColumnRole::response, file, "--response");
+    require_no_other_sweep(choice, file);
     throw bad_input(file, "no column is recognised as a force, stress, modulus or compliance",
                     fmt::format("--response with one of {}", choice.list()));
   }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "tpm/base/distributions.hpp"
+#include "tpm/base/median.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/fit/adequacy.hpp"
 #include "tpm/fit/likelihood/load_imposed.hpp"
@@ -323,6 +324,7 @@ void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings)
   chosen.reason = "does not describe the data";
 }
 
+<<<<<<< HEAD
 /// That another law does better decisively.
 void state_better(FitResult& fit, const std::string& law, const std::string& better, double by) {
   LawAdequacy adequacy = fit.adequacy.value_or(LawAdequacy{});
@@ -352,9 +354,66 @@ void state_choice(FitResult& fit) {
   for (const std::string& words : choice.conditions) {
     fit.remarks.push_back({"condition_of_choice", words});
   }
+=======
+/// Sizes of the residuals of the first unloading behind the fitted part, down to the drive at which
+/// that part begins.
+std::vector<double> unloading_of(const RecordingFit& r) {
+  std::vector<double> sizes;
+  const auto first = std::ranges::find(r.fitted, true);
+  const auto last = std::find(r.fitted.rbegin(), r.fitted.rend(), true);
+  if (first == r.fitted.end()) return sizes;
+  const auto begin = static_cast<std::size_t>(first - r.fitted.begin());
+  const auto end = static_cast<std::size_t>(r.fitted.rend() - last);
+  double deepest = r.drive[begin];
+  for (std::size_t i = begin; i < end; ++i) deepest = std::max(deepest, r.drive[i]);
+  for (std::size_t i = end; i < r.time_s.size() && r.drive[i] > r.drive[begin]; ++i) {
+    if (r.drive[i] > deepest || r.is_censored(i) || !std::isfinite(r.predicted[i])) continue;
+    sizes.push_back(std::abs(r.observed[i] - r.predicted[i]));
+  }
+  return sizes;
+}
+
+void state_hysteresis(Selection& s) {
+  Candidate& chosen = s.candidates[s.recommended];
+  if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) return;
+  const std::string seen = hysteresis_of(chosen.fit);
+  if (seen.empty()) return;
+  LawAdequacy adequacy = chosen.fit.adequacy.value_or(LawAdequacy{});
+  adequacy.verdict = described_name(Described::not_described);
+  adequacy.summary = fmt::format(
+      "{} does not describe this recording: {}, and a law without memory has no hysteresis; hold "
+      "the depth, to see what relaxes",
+      law_name(chosen.law), seen);
+  state(chosen.fit, std::move(adequacy));
+  chosen.identified = false;
+  chosen.reason = "does not describe the unloading";
+>>>>>>> x_1
 }
 
 }  // namespace
+
+std::string hysteresis_of(const FitResult& fit) {
+  constexpr std::size_t kFewest = 8;
+  constexpr double kOfMedian = 1.4826, kEfficiency = 0.37;  // of a normal distribution's median
+  const auto& law = fit.config.law;
+  if (!law || law->branches > 0 || law->fractional != Fractional::none) return {};
+  for (const RecordingFit& r : fit.recordings) {
+    if (fit.config.data[r.choice].load_imposed) continue;
+    const std::vector<double> unloading = unloading_of(r);
+    const auto n = static_cast<double>(std::ranges::count(r.fitted, true));
+    const double parameters = parameters_each(fit);
+    const double independent = degrees_of(r);
+    const bool enough = unloading.size() >= kFewest && independent > parameters + 1.0;
+    if (!enough || !(r.rms_residual > 0.0)) continue;
+    const double loading = r.rms_residual * std::sqrt(n / (n - parameters));
+    const double times = kOfMedian * median(unloading) / loading;  // single ones may lie far off
+    const double degrees = kEfficiency * static_cast<double>(unloading.size()) * independent / n;
+    if (!(fisher_tail(times * times, degrees, independent - parameters) < kLevel)) continue;
+    return fmt::format("the unloading is off by {} times the residual of the loading",
+                       times_text(times));
+  }
+  return {};
+}
 
 std::size_t samples_at_rest(const RecordingPhases& phases) {
   std::size_t end = 0;
@@ -406,6 +465,7 @@ void keep_choice(Selection& s) {
 void state_adequacy(Selection& s, std::span<const PreparedRecording> recordings) {
   state_of_rests(s, recordings);
   state_preferred(s);
+  state_hysteresis(s);
 }
 
 void state_adequacy(FitResult& fit, const std::vector<DataSet>& data) {

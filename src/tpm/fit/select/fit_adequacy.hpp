@@ -42,4 +42,11 @@ void state_adequacy(FitResult& fit, const std::vector<DataSet>& data);
 /// (configuration_remarks).
 [[nodiscard]] FitResult fit_and_judge(const FitProblem& problem);
 
+/// A law without memory answers each depth with one force, in unloading as in loading: a hysteresis
+/// behind the fitted part contradicts it, whatever makes it (relaxation, adhesion), and what it
+/// calls the equilibrium.
+/// @return what is seen (F test at 1 %); empty if nothing speaks against the law, or it has a
+/// memory
+[[nodiscard]] std::string hysteresis_of(const FitResult& fit);
+
 }  // namespace tpm::fit

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tpm/base/text.hpp"
+#include "tpm/fit/select/fit_adequacy.hpp"
 #include "tpm/fit/verdict.hpp"
 
 namespace tpm::fit {
@@ -34,6 +35,7 @@ bool may_vanish(const LawSpec& law, const std::string& parameter) {
 
 /// See Candidate::contradicted.
 bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
+  if (!hysteresis_of(candidate.fit).empty()) return true;
   double longest_s = 0.0;
   const auto table = law_parameters(candidate.fit.config.law.value());
   for (const ParameterResult& p : candidate.fit.parameters) {
@@ -63,6 +65,7 @@ std::string dashpot_words(const FitResult& fit, const std::string& time_name) {
 
 Refusal refusal_of(const Candidate& candidate, const ProtocolSpans& spans) {
   constexpr int kLeastStandardErrors = 2;
+  if (const std::string seen = hysteresis_of(candidate.fit); !seen.empty()) return {seen};
   double longest_s = 0.0;
   Refusal first;  // of a standard error: other reasons go before it
   const auto keep = [&](Refusal refusal) {
