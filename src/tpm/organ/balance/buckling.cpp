@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <optional>
 
 #include "tpm/base/dense_algebra.hpp"
 #include "tpm/base/random.hpp"
@@ -48,8 +50,8 @@ std::optional<Eigen::Matrix3Xd> by_inverse_iteration(Equilibrium& equilibrium,
 /// not preconditioned).
 Eigen::Matrix3Xd by_least_curvature(const Equilibrium& equilibrium, const Positions& position,
                                     const ViscousState& viscous) {
-  constexpr int kMostIterations = 500;
-  constexpr double kConverged = 1e-6;  // of the largest curvature met
+  constexpr int kMostDescents = 500;
+  constexpr double kNoDescent = 1e-6;  // of the largest curvature met
   const Constraints& constraints = equilibrium.constraints();
   const auto times = [&](const Eigen::VectorXd& motion) {
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, position.cols());
@@ -62,12 +64,12 @@ Eigen::Matrix3Xd by_least_curvature(const Equilibrium& equilibrium, const Positi
   mode.normalize();
   Eigen::VectorXd step;
   double largest = 0.0;
-  for (int i = 0; i < kMostIterations; ++i) {
+  for (int i = 0; i < kMostDescents; ++i) {
     const Eigen::VectorXd force = times(mode);
     const double curvature = mode.dot(force);
     const Eigen::VectorXd gradient = force - curvature * mode;
     largest = std::max(largest, force.norm());
-    if (!(gradient.norm() > kConverged * largest)) break;
+    if (!(gradient.norm() > kNoDescent * largest)) break;
     Eigen::MatrixXd span(mode.size(), step.size() > 0 ? 3 : 2);
     span.col(0) = mode;
     span.col(1) = gradient.normalized();

@@ -17,7 +17,7 @@ using Eigen::Index;
 
 const double kSameFace = std::sqrt(3.0) / 2.0;  // cosine of 30 degrees
 constexpr std::size_t kMostPlaces = 5;
-constexpr double kRounding = 1e-12;  // of the target: a stiffness below is none
+constexpr double kNoHold = 1e-12;  // of the target: a stiffness below is none
 
 /// What the spacing law multiplies every factor by.
 double spacing_scale(const Network& network) {
@@ -118,7 +118,7 @@ std::vector<double> least_hold(const Network& network, const Constraints& constr
     const Eigen::Matrix3d own = p * (held[i] / scale) * p + Eigen::Matrix3d::Identity() - p;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(own, Eigen::EigenvaluesOnly);
     const double found = solver.eigenvalues().minCoeff();
-    least[i] = found > kRounding ? found : 0.0;
+    least[i] = found > kNoHold ? found : 0.0;
   }
   return least;
 }

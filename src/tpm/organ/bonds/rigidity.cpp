@@ -84,7 +84,7 @@ std::string words_with(const ZeroEnergyModes& modes, const std::string& spheres)
 }  // namespace
 
 Eigen::MatrixXd whole_motions(const Positions& rest, const Constraints& constraints) {
-  constexpr double kNone = 1e-9;
+  constexpr double kNotStopped = 1e-9;
   const Eigen::Matrix3Xd from = rest.colwise() - rest.rowwise().mean().eval();
   const double size = std::max(from.colwise().norm().maxCoeff(), 1e-300);
   Eigen::MatrixXd motions(3 * rest.cols(), 6);
@@ -103,7 +103,7 @@ Eigen::MatrixXd whole_motions(const Positions& rest, const Constraints& constrai
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(held);
   const Eigen::Matrix<double, 6, 1> values = solver.eigenvalues();  // rising
-  const auto free = (values.array() <= kNone * std::max(values.maxCoeff(), 1.0)).count();
+  const auto free = (values.array() <= kNotStopped * std::max(values.maxCoeff(), 1.0)).count();
   if (free == 0) return Eigen::MatrixXd(motions.rows(), 0);
   return orthonormal_columns(motions * solver.eigenvectors().leftCols(free));
 }
