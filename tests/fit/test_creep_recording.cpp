@@ -235,6 +235,26 @@ TEST_CASE("a force that was held on an indentation is imposed, and the depth com
   }
 }
 
+TEST_CASE("laws that take longer than all others together are left out of the family, and said",
+          "[creep]") {
+  const PreparedRecording one = prepare_recording("press.csv", test::press_recording_of({}));
+  REQUIRE(one.recording.time_s.size() > 100);
+  SelectionOptions options;
+  options.held_out = false;
+  options.setup.starts = 1;
+  options.setup.profiles = false;
+  const Selection s = select_law(std::span(&one, 1), options);
+  const auto said = std::ranges::find(s.remarks, "laws_not_tried", &Remark::code);
+  REQUIRE(said != s.remarks.end());
+  for (const LawSpec& law : classical_family()) {
+    const bool tried = std::ranges::any_of(
+        s.candidates, [&](const Candidate& c) { return law_name(c.law) == law_name(law); });
+    CAPTURE(law_name(law));
+    CHECK(tried == (law.tension == Tension::none || law.branches == 0));
+    if (!tried) CHECK_THAT(said->text, Contains(law_name(law)));
+  }
+}
+
 TEST_CASE("an indentation whose depth was held is no creep, however noisy it is", "[creep]") {
   test::PressTrial trial;
   Recording r = test::press_recording_of(trial);
