@@ -124,6 +124,8 @@ inline std::vector<ErrorCase> oscillation_cases() {
        with("\"relative_to_datum\", \"relative\": 0.1", "\"absolute\", \"absolute\": \"1 N/m\"")},
       {type, "operating depth of a recording", fit, with("oscillation", "measured")},
       {type, "a window of time", fit, with("\"stiffness_per", "\"to\": \"3 s\", \"stiffness_per")},
+      {type, "a force of contact", fit,
+       with("\"stiffness_per", "\"contact_force\": \"1 mN\", \"stiffness_per")},
       {type, "loss of 0 under relative noise", fit, fitted(kOscillationConfig, "1,1000,0\n")},
       {type, "a spectrum of a relaxation", fit,
        with("\"oscillation\", \"operating_depth\": \"2 mm\"", "\"step_hold\"")},
