@@ -324,7 +324,6 @@ void state_of_rests(Selection& s, std::span<const PreparedRecording> recordings)
   chosen.reason = "does not describe the data";
 }
 
-<<<<<<< HEAD
 /// That another law does better decisively.
 void state_better(FitResult& fit, const std::string& law, const std::string& better, double by) {
   LawAdequacy adequacy = fit.adequacy.value_or(LawAdequacy{});
@@ -354,7 +353,8 @@ void state_choice(FitResult& fit) {
   for (const std::string& words : choice.conditions) {
     fit.remarks.push_back({"condition_of_choice", words});
   }
-=======
+}
+
 /// Sizes of the residuals of the first unloading behind the fitted part, down to the drive at which
 /// that part begins.
 std::vector<double> unloading_of(const RecordingFit& r) {
@@ -387,7 +387,6 @@ void state_hysteresis(Selection& s) {
   state(chosen.fit, std::move(adequacy));
   chosen.identified = false;
   chosen.reason = "does not describe the unloading";
->>>>>>> x_1
 }
 
 }  // namespace
@@ -452,12 +451,9 @@ void keep_choice(Selection& s) {
   const std::string adequacy = chosen.fit.adequacy ? chosen.fit.adequacy->summary : std::string();
   // The sentence that recommends the law is a condition only where it says more than that.
   const bool plain = s.candidates.size() == 1 || (chosen.identified && !s.preferred);
-  const std::string recommended =
-      fmt::format("{} ({}):", law_name(chosen.law), law_words(chosen.law));
-  for (const std::string& words : s.summary) {
-    const bool recommends = words.find(recommended) != std::string::npos;
-    if (words == adequacy || (plain && recommends)) continue;
-    choice.conditions.push_back(words);
+  for (std::size_t i = 0; i < s.summary.size(); ++i) {
+    if (s.summary[i] == adequacy || (plain && i == s.recommendation)) continue;
+    choice.conditions.push_back(s.summary[i]);
   }
   chosen.fit.config.choice = std::move(choice);
 }

@@ -227,6 +227,7 @@ void describe(Selection& s) {
   const Candidate& best = s.candidates[s.best_bic];
   const std::optional<LawAdequacy>& adequacy = chosen.fit.adequacy;
   if (adequacy && adequacy->is_rejected()) s.summary.push_back(adequacy->summary);
+  s.recommendation = s.summary.size();
   s.summary.push_back(fmt::format("{} {} ({}): {} parameters, rms residual {} % of the peak",
                                   least_law_words(s, "the data"), law_name(chosen.law),
                                   law_words(chosen.law), chosen.parameters - 1,

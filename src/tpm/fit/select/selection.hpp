@@ -71,6 +71,7 @@ struct Selection {
   Correlation correlation;            ///< of the residuals that the law of least deviance leaves
   std::optional<DriftAnswers> drift;  ///< of the recommended law, if not separable
   std::vector<std::string> summary;   ///< the recommendation and its reasons
+  std::size_t recommendation = 0;     ///< place in the summary of the sentence that recommends
   std::vector<Remark> remarks;        ///< what the experiment cannot tell, and outside_remarks()
 };
 
