@@ -372,8 +372,9 @@ TEST_CASE("A session has to fit before the stop of the Omega.7 along x") {
 }
 
 TEST_CASE("The room before a session is that of its device, not that of the Omega.7") {
-  const auto before = [](const char* way) {
-    return test::parsed(test::with(test::short_session(), "/surface_before_hand", way));
+  const Json weak = test::with(test::short_session(), "/limits/force", "3 N");
+  const auto before = [&](const char* way) {
+    return test::parsed(test::with(weak, "/surface_before_hand", way));
   };
   const DeviceLimits falcon = limits_of("falcon"), inverse3 = limits_of("inverse3");
   REQUIRE(falcon.reach_m < inverse3.reach_m);
@@ -387,8 +388,7 @@ TEST_CASE("The room before a session is that of its device, not that of the Omeg
   CHECK_THROWS_WITH(require_within(before("22 mm"), falcon),
                     Contains("the session's furthest place is 0.044 m from the hand at the start; "
                              "expected at most 0.04 m from the centre"));
-  const Json far =
-      test::with(test::short_session(), "/surface", Json::array({"0 m", "0 m", "-66 mm"}));
+  const Json far = test::with(weak, "/surface", Json::array({"0 m", "0 m", "-66 mm"}));
   CHECK_THROWS_WITH(parse_session(far, "session", {}),
                     Contains("0.078 m from the centre of the workspace; expected 0.075 m"));
   CHECK_NOTHROW(require_within(parse_session(far, "session", {}, inverse3), inverse3));

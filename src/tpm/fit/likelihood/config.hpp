@@ -145,6 +145,7 @@ struct LawChoice {
   int samples = 0;                           ///< fitted
   std::string better = {};                   ///< law that the data prefer decisively; empty: none
   double better_by = 0.0;                    ///< in BIC
+  std::string not_described = {};            ///< what was said where it does not describe the data
   std::vector<std::string> conditions = {};  ///< sentences of the choice
 };
 

@@ -192,6 +192,8 @@ const Block<LawChoice>& choice_block() {
        required(key("samples", &C::samples, whole<int>(0, 1e9), "that were fitted")),
        key("better", &C::better, text(1), "law that the data prefer decisively"),
        key("better_by", &C::better_by, number({.least = 0.0}), "in BIC"),
+       key("not_described", &C::not_described, text(1),
+           "what was said of the law where it does not describe the data"),
        key("conditions", &C::conditions, list(text(1)), "in sentences")});
   return block;
 }

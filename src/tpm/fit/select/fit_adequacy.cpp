@@ -156,11 +156,12 @@ int parameters_each(const FitResult& fit) {
   return (static_cast<int>(fit.parameters.size()) + count - 1) / count;
 }
 
-/// The recording that the law describes worst.
-std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecording> rested) {
+/// The recording that the law describes worst; so many fits share the level.
+std::optional<Judged> worst_of(const FitResult& fit, std::span<const RestedRecording> rested,
+                               std::size_t fits = 1) {
   std::optional<Judged> worst;
   const double level =
-      kLevel / static_cast<double>(std::max<std::size_t>(fit.recordings.size(), 1));
+      kLevel / static_cast<double>(std::max<std::size_t>(fit.recordings.size(), 1) * fits);
   for (const RecordingFit& r : fit.recordings) {
     if (rested[r.choice].recording == nullptr) continue;
     // Two tests share the level where a drift was measured.
@@ -347,7 +348,9 @@ void state_choice(FitResult& fit) {
                      choice.law, choice.samples, law, fit.value_count)});
     return;
   }
-  if (!choice.better.empty() && !(fit.adequacy && fit.adequacy->is_rejected())) {
+  const bool rejected = fit.adequacy && fit.adequacy->is_rejected();
+  if (rejected && !choice.not_described.empty()) fit.adequacy->summary = choice.not_described;
+  if (!choice.better.empty() && !rejected) {
     state_better(fit, law, choice.better, choice.better_by);
   }
   for (const std::string& words : choice.conditions) {
@@ -425,9 +428,10 @@ std::size_t samples_at_rest(const RecordingPhases& phases) {
   return end > late ? end - late : 0;
 }
 
-void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings) {
+void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings,
+                    std::size_t fits) {
   const std::vector<RestedRecording> rests = rested(recordings);
-  const auto worst = worst_of(fit, rests);
+  const auto worst = worst_of(fit, rests, fits);
   if (worst) state(fit, stated(fit, *worst, 1, {}));
 }
 
@@ -449,6 +453,7 @@ void keep_choice(Selection& s) {
     choice.better_by = chosen.delta_bic;
   }
   const std::string adequacy = chosen.fit.adequacy ? chosen.fit.adequacy->summary : std::string();
+  if (chosen.fit.adequacy && chosen.fit.adequacy->is_rejected()) choice.not_described = adequacy;
   // The sentence that recommends the law is a condition only where it says more than that.
   const bool plain = s.candidates.size() == 1 || (chosen.identified && !s.preferred);
   for (std::size_t i = 0; i < s.summary.size(); ++i) {

@@ -30,7 +30,9 @@ void keep_choice(Selection& s);
 
 /// The same as state_adequacy() for one fit.
 /// @param recordings those that were fitted, in the order of the fit's data
-void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings);
+/// @param fits how many fits share the level of 1 %: of a folder, one of each of its specimens
+void state_adequacy(FitResult& fit, std::span<const PreparedRecording> recordings,
+                    std::size_t fits = 1);
 
 /// The same for a fit whose configuration states the size of the noise, which is then what the
 /// residuals are compared with; for recordings without, by their samples at rest. Says nothing of

@@ -439,6 +439,7 @@ Json config_json(const FitConfig& config) {
     j["choice"]["better"] = choice.better;
     j["choice"]["better_by"] = choice.better_by;
   }
+  if (!choice.not_described.empty()) j["choice"]["not_described"] = choice.not_described;
   if (!choice.conditions.empty()) j["choice"]["conditions"] = choice.conditions;
   return j;
 }

@@ -120,8 +120,9 @@ std::vector<std::size_t> branches_by_time(const LawSpec& law, const FitResult& f
   return place;
 }
 
+/// @param rows how many specimens share the level of the test of adequacy
 SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> one,
-                         const SetupOptions& setup) {
+                         std::size_t rows, const SetupOptions& setup) {
   SpecimenRow row;
   row.name = one.front().name;
   row.specimen = one.front().specimen;
@@ -129,7 +130,7 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
     row.fit = run_fit(recording_config(law, one, setup), data_sets(one));
     const auto both = give_both_drift_answers(*row.fit, one);
     if (both) row.fit->remarks.push_back({"drift_not_separable", drift_words(*both, *row.fit)});
-    state_adequacy(*row.fit, one);
+    state_adequacy(*row.fit, one, rows);
     row.place = branches_by_time(law, *row.fit);
   });
   return row;
@@ -275,7 +276,8 @@ SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
     std::tie(study.law, study.why) = common_law(recordings, options);
   }
   for (std::size_t i = 0; i < recordings.size(); ++i) {
-    study.rows.push_back(fit_specimen(study.law, recordings.subspan(i, 1), options.setup));
+    study.rows.push_back(
+        fit_specimen(study.law, recordings.subspan(i, 1), recordings.size(), options.setup));
   }
   study.law.drive = law_drive(recordings.front().recording);
   study.law.response = law_response(recordings.front().recording);
