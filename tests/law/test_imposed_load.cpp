@@ -327,6 +327,30 @@ TEST_CASE("A probe that leaves the surface under a load is stepped", "[law][heav
   CHECK((a - b).cwiseAbs().maxCoeff() <= 1e-8 * b.maxCoeff());
 }
 
+TEST_CASE("Under a load that a soft law hardly carries a step ends at rounding", "[law]") {
+  // V is 1e10 times that of the reference, so its rounding exceeds a tolerance of the reference.
+  LawSpec spec = parse_law_name("linear-1-elastic", "test");
+  spec.reference = 4e-3;
+  const LawModel law(spec);
+  std::vector<double> values;
+  for (const LawParameter& p : law.law_parameters()) {
+    values.push_back(p.name == "tau1" ? 1.0 : p.name == "spacing" ? 1e-2 : 0.0);
+    if (p.name == "k_inf" || p.name == "k1") values.back() = 1e-8;
+  }
+  const Protocol ramp(Drive::force, {{0.0, 0.0}, {1.0, 0.0}, {1.1, 2.0}, {2.0, 2.0}});
+  const std::vector<double> times_s{1.05, 1.1, 1.5, 2.0};
+  const Eigen::VectorXd depth = law.respond(ramp, times_s, values, Want::values).value;
+  // The Kelvin chain under a ramp and a hold: J(t) = (1 - exp(-t/T)/2)/1e-8 with T = 2 s.
+  const auto ramped = [](double t) {
+    return t <= 0.0 ? 0.0 : (t - 1.0 * (1.0 - std::exp(-0.5 * t))) / 1e-8;
+  };
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    const double since = times_s[i] - 1.0;
+    CHECK_THAT(depth[static_cast<Eigen::Index>(i)],
+               WithinRel(20.0 * (ramped(since) - ramped(since - 0.1)), 1e-9));
+  }
+}
+
 TEST_CASE("What answers a load is not linear in a stiffness", "[law]") {
   PointSet points;
   points.header.id = "creep";

@@ -92,7 +92,8 @@ double ContactHistory::distance(const Loaded& a, const Loaded& b) const {
 
 void ContactHistory::move_load_adaptive(double from, double to, double h, double time_scale,
                                         int level) {
-  const double allowed = 30.0 * v_tolerance_;
+  constexpr double kRounding = 1e-13;  // of V: no step is so short that it falls below
+  double allowed = 30.0 * v_tolerance_;
   const Loaded begin{w_, w_by_, now_};
   const auto stand_at = [&](const Loaded& place) {
     w_ = place.w;
@@ -111,6 +112,7 @@ void ContactHistory::move_load_adaptive(double from, double to, double h, double
     Loaded better = extrapolated(ends);
     const double change = steps > 1 ? distance(better, best) : off;
     best = std::move(better);
+    allowed = std::max(allowed, kRounding * std::abs(best.now.v));
     const bool slow = steps > 2 && change > 0.5 * off;  // shorter steps gain more
     off = change;
     if (off <= allowed || slow) break;
