@@ -231,8 +231,9 @@ Recording with_same_fault(Recording r, ChannelFault fault, double time_s) {
 
 void name_channel_cause(Selection& s, std::span<const PreparedRecording> recordings,
                         const SetupOptions& setup) {
-  constexpr std::size_t kMost = 5000;                             // samples
-  constexpr std::array kSteps{1.0, 2.0, 4.0, 8.0, 16.0, 32.0};    // of the sampling
+  constexpr std::size_t kMost = 5000;  // samples
+  constexpr std::array kSteps{1.0, 1.5,  2.0,  3.0,  4.0, 6.0,
+                              8.0, 12.0, 16.0, 24.0, 32.0};       // samplings
   constexpr double kOfRamp = 0.5, kFewSteps = 16.0, kLeft = 1.5;  // noises
   constexpr double kFactor = 2.0, kLongest = 0.1;                 // of the recording
   FitResult& fit = s.candidates[s.recommended].fit;
