@@ -323,7 +323,8 @@ TEST_CASE("what is pooled over a recording that the law does not describe is not
     CHECK(p.not_described == 1);
     CHECK_THAT(p.effects.summary, Contains("1 of 3 it does not"));
   }
-  for (const Json& p : to_json(spoilt).at("pooled")) {
+  const Json spoilt_json = to_json(spoilt);
+  for (const Json& p : spoilt_json.at("pooled")) {
     CHECK(p.at("identified") == false);
     CHECK(p.at("only_if_described") == true);
   }
@@ -336,7 +337,8 @@ TEST_CASE("what is pooled over a recording that the law does not describe is not
   CHECK_THAT(own.moduli.back().verdict, Contains(kCondition));
 
   const SpecimenStudy healthy = study_of(Defect::none);
-  for (const Json& p : to_json(healthy).at("pooled")) CHECK_FALSE(p.contains("only_if_described"));
+  const Json healthy_json = to_json(healthy);
+  for (const Json& p : healthy_json.at("pooled")) CHECK_FALSE(p.contains("only_if_described"));
   for (const YoungModulus& m : pooled_moduli(healthy, punch, false).moduli) {
     CHECK_THAT(m.verdict, !Contains(kCondition));
   }
