@@ -331,7 +331,7 @@ void materials(const Formulation& f, Broken& broken) {
     other.formulation.masses = false;
     other.formulation.tolerance = 1e-10;
     const Eigen::VectorXd expected = run_scene(other, times, false).response;
-    constexpr int kSweeps = 300;
+    constexpr int kSweeps = 100;
     scene.formulation.sweeps = kSweeps;
     const auto error = [&](double step_s) {
       scene.formulation.step_s = step_s;
