@@ -53,7 +53,10 @@ void add_reading_options(CLI::App& command, ReadingArguments& arguments, const c
 ImportOptions reading_of(const ReadingArguments& arguments) {
   ImportOptions import;
   for (const auto& [key, text] : arguments.texts) {
-    if (!text.empty()) of_option([&] { set_reading_option(import, key, text, option_name(key)); });
+    if (text.empty()) continue;
+    of_option([&, &name = key, &value = text] {
+      set_reading_option(import, name, value, option_name(name));
+    });
   }
   for (const std::string& pair : arguments.units) {
     const auto equals = pair.rfind('=');

@@ -30,7 +30,7 @@ DrivenNetwork driven_star(const BondElement& material) {
   const Eigen::Vector3d into = -organ.normal.col(kB);
   Constraints constraints(organ.size());
   constraints.slide(kB, into);
-  for (const std::size_t held : {0, 2, 3}) constraints.fix(held);
+  for (const std::size_t held : {0u, 2u, 3u}) constraints.fix(held);
   return driven_network(BondSystem(network, material), organ, constraints, {{kB, into, 1.0}}, {});
 }
 

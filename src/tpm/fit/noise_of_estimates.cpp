@@ -55,8 +55,10 @@ bool repeats_itself(std::vector<double> readings) {
   constexpr double kShare = 0.2;
   const auto n = static_cast<double>(readings.size());
   std::ranges::sort(readings);
-  const auto repeated = std::ranges::unique(readings);
-  return static_cast<double>(repeated.size()) > kShare * n;
+  // clang 14 cannot read std::ranges::unique of libstdc++ 12.
+  const auto repeated =
+      std::distance(std::unique(readings.begin(), readings.end()), readings.end());
+  return static_cast<double>(repeated) > kShare * n;
 }
 
 /// Half the step that the readings of a recording are rounded to, on the scale of the noise.

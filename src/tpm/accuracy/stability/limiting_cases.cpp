@@ -192,7 +192,7 @@ struct CornerStar {
   static Constraints freedom_of(bool guided) {
     Constraints constraints(4);
     if (guided) constraints.slide(1, Eigen::Vector3d::UnitZ());
-    for (const std::size_t i : {0, 2, 3}) constraints.fix(i);
+    for (const std::size_t i : {0u, 2u, 3u}) constraints.fix(i);
     return constraints;
   }
 

@@ -35,9 +35,9 @@ std::optional<Fault> stray_provenance(const DeviceLimitKeys& limits) {
       {"least_ramp_in_s", limits.least_ramp_in_s.has_value()}};
   if (!limits.provenance) return std::nullopt;
   for (const auto& [name, words] : *limits.provenance) {
-    const bool there = std::any_of(std::begin(stated), std::end(stated), [&](const auto& one) {
-      return one.first == name && one.second;
-    });
+    const bool there =
+        std::any_of(std::begin(stated), std::end(stated),
+                    [&, &key = name](const auto& one) { return one.first == key && one.second; });
     if (!there) return Fault{"provenance", "of '" + printable(name) + "', which is not stated"};
   }
   return std::nullopt;

@@ -41,10 +41,12 @@ std::vector<double> times_within(const FractionalWindow& window, double per_deca
 std::vector<double> candidates(double tau_s, const FractionalWindow& window, int per_decade) {
   const double low = std::log10(window.shortest_s / kBeyond / tau_s) * per_decade;
   const double high = std::log10(window.longest_s * kBeyond / tau_s) * per_decade;
+  const auto first = static_cast<int>(std::ceil(std::min(low, 0.0)));
+  const auto last = static_cast<int>(std::floor(std::max(high, 0.0)));
   std::vector<double> times;
-  for (double k = std::ceil(std::min(low, 0.0)); k <= std::max(high, 0.0); k += 1.0) {
-    if (k != 0.0 && (k < low || k > high)) continue;
-    times.push_back(tau_s * std::pow(10.0, k / per_decade));
+  for (int k = first; k <= last; ++k) {
+    if (k != 0 && (k < low || k > high)) continue;
+    times.push_back(tau_s * std::pow(10.0, static_cast<double>(k) / per_decade));
   }
   return times;
 }

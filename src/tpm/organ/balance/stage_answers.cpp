@@ -249,12 +249,14 @@ StepEnergy::Extreme StepEnergy::largest_response(std::size_t group) const {
     if (const double size = at(fraction); size > largest.size) largest = {fraction, size};
   }
   // Halves the distance to its neighbours while the middle of the three is the largest.
-  for (double apart = 0.5 / kParts; apart > 1e-9; apart *= 0.5) {
+  double apart = 0.5 / kParts;
+  while (apart > 1e-9) {
     const double middle = largest.fraction;
     for (const double fraction : {middle - apart, middle + apart}) {
       if (fraction < 0.0 || fraction > 1.0) continue;
       if (const double size = at(fraction); size > largest.size) largest = {fraction, size};
     }
+    apart *= 0.5;
   }
   return largest;
 }
