@@ -224,7 +224,8 @@ TEST_CASE("a force that was held on an indentation is imposed, and the depth com
                                         {"contact", 1e-3}}) {
         CAPTURE(name);
         const auto p = std::ranges::find_if(
-            fit.parameters, [&](const ParameterResult& q) { return q.parameter.name == name; });
+            fit.parameters,
+            [&, &key = name](const ParameterResult& q) { return q.parameter.name == key; });
         REQUIRE(p != fit.parameters.end());
         REQUIRE(p->standard_error);
         CHECK_THAT(p->estimate, WithinAbs(truth, 3.0 * *p->standard_error));

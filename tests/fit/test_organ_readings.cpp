@@ -74,7 +74,7 @@ OrganReadings recorded(const OrganModel& model, const FittedBonds& bonds,
   const double ramp_s = kDeepest / made.rate_m_per_s;
   const Protocol drive(Drive::displacement, {{0.0, 0.0}, {ramp_s, kDeepest}, {kEnd_s, kDeepest}});
   OrganReadings r{drive, {}, {}, made.contact_m + 0.2e-3, 0.0};  // begins beside the true value
-  for (double t = 0.0; t < kEnd_s; t += kStep_s) r.time_s.push_back(t);
+  for (int i = 0; i * kStep_s < kEnd_s; ++i) r.time_s.push_back(i * kStep_s);
   const Response response =
       model.respond(beyond_contact(drive, made.contact_m), r.time_s,
                     FittedBonds::values(model, bonds.material(true_values)), Want::values);

@@ -171,12 +171,12 @@ TEST_CASE("What is wrong with a file is a code and one line in C") {
 
   write_file(folder / "good.json", to_text(test::short_session()));
   tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
-  std::strcpy(options.device, "gloves");
+  std::snprintf(options.device, sizeof options.device, "gloves");
   CHECK_THAT(refused(folder / "good.json", TPM_HAPTICS_USAGE, options),
              StartsWith("device: 'gloves'; expected one of virtual, omega7, "));
   // Nothing is replayed in a loop of one's own, and a plugin's limits are those of a file.
   for (const char* const kind : {"replay", "plugin"}) {
-    std::strcpy(options.device, kind);
+    std::snprintf(options.device, sizeof options.device, "%s", kind);
     CHECK_THAT(
         refused(folder / "good.json", TPM_HAPTICS_USAGE, options),
         StartsWith(std::string("device: '") + kind + "'; expected one of virtual, omega7, ") &&
@@ -413,7 +413,7 @@ TEST_CASE("A device that only its file knows, and one of a plugin, are opened in
   write_file(file, to_text(device));
   CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_BAD_INPUT, options),
              Contains("device.json: key /limits: states no force_N"));
-  std::strcpy(options.device, "gloves");
+  std::snprintf(options.device, sizeof options.device, "gloves");
   CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_USAGE, options), Contains("gloves"));
 }
 
