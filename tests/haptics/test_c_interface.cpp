@@ -26,7 +26,7 @@ using Catch::Matchers::StartsWith;
 /// Of a loop that moves nothing.
 tpm_haptics_options without_motors() {
   tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
-  std::strcpy(options.device, "virtual");
+  std::snprintf(options.device, sizeof options.device, "virtual");
   return options;
 }
 
@@ -351,7 +351,7 @@ TEST_CASE("A device file in C brings the measured delay, and what it allows") {
              R"({"device": "falcon", "limits": {"stiffness_N_per_m": 100}})");
   CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_REFUSED, options),
              Contains("too stiff for the device") && Contains("at most 100 N/m"));
-  std::strcpy(options.device, "omega7");
+  std::snprintf(options.device, sizeof options.device, "omega7");
   CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_BAD_INPUT, options),
              Contains("is of 'falcon', not of 'omega7'"));
 }
@@ -380,7 +380,7 @@ TEST_CASE("Hardware in C that nobody has measured counts as 20 ms late and free 
              R"({"device": "virtual", "delay": {"provenance": "measured", "largest_s": 0.0}})");
   CHECK_THAT(refused(folder / "session.json", TPM_HAPTICS_BAD_INPUT, options),
              Contains("is 'virtual', without motors") && Contains("--device KIND"));
-  std::strcpy(options.device, "virtual");
+  std::snprintf(options.device, sizeof options.device, "virtual");
   const Opened named(test::short_session(), options);
   CHECK(named.info().delay_s < 0.020);
 }
