@@ -217,10 +217,12 @@ Table maps_table(const StabilityStudy& study) {
 
 /// The problem of each map, once for all rules.
 Table problems_table(const StabilityStudy& study) {
-  using Posed = std::pair<std::string, std::string>;
-  const auto posed = [](const StabilityMap& map) { return Posed{map.quantity, map.problem}; };
+  using MapProblem = std::pair<std::string, std::string>;
+  const auto problem_of = [](const StabilityMap& map) {
+    return MapProblem{map.quantity, map.problem};
+  };
   Table table{"", {{"map of the step against"}, {"problem"}}};
-  for (const Posed& both : each_once(study.maps, posed)) {
+  for (const MapProblem& both : each_once(study.maps, problem_of)) {
     table.rows.push_back({{both.first}, {both.second}});
   }
   return table;
