@@ -25,7 +25,11 @@ const Block<StatedPrior>& prior_block() {
       "prior", "a normal distribution, whose residual (value - mean) / sd is added to the fit",
       {required(key("mean", &P::mean, stated_quantity(), "its mean")),
        required(key("sd", &P::sd, stated_quantity(), "its standard deviation")),
-       key("from", &P::from, text_if_any(), "what measured it")});
+       key("from", &P::from, text_if_any(), "what measured it"),
+       with_default(key("measured", &P::measured, flag(),
+                        "a measurement tells it; false: a limit of what is known, of which every "
+                        "fit says how far it was followed"),
+                    true)});
   return block;
 }
 
