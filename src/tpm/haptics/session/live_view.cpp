@@ -279,13 +279,7 @@ std::string LiveView::scene_json() const {
   return scene_;
 }
 
-std::string LiveView::state_json(std::uint64_t after) const {
-  watched_ = true;
-  State s;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    s = state_;
-  }
+Json LiveView::trace_json(const State& s, std::uint64_t after) {
   const std::uint64_t end = s.first_point + s.points.size();
   const std::uint64_t first = std::clamp(after, s.first_point, end);
   Json trace{{"first", first}};
@@ -304,6 +298,16 @@ std::string LiveView::state_json(std::uint64_t after) const {
   column("commanded_N", &Point::commanded_N);
   column("least_commanded_N", &Point::least_N);
   column("most_commanded_N", &Point::most_N);
+  return trace;
+}
+
+std::string LiveView::state_json(std::uint64_t after) const {
+  watched_ = true;
+  State s;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    s = state_;
+  }
   const ServoRecord& row = s.last;
   const Json json{
       {"begun", s.begun},
@@ -342,7 +346,7 @@ std::string LiveView::state_json(std::uint64_t after) const {
         {"lost_records", s.lost}}},
       {"counts", to_json(s.counts)},
       {"displacement_um", s.displacement_um},
-      {"trace", std::move(trace)}};
+      {"trace", trace_json(s, after)}};
   return json.dump();
 }
 

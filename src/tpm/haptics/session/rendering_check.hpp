@@ -47,9 +47,9 @@ struct RenderingCheck {
     return !unstable() && stiffness_N_per_m <= kRoom * stable_N_per_m;
   }
   [[nodiscard]] bool within_device() const { return stiffness_N_per_m <= largest_N_per_m; }
-  /// A step of the encoder is felt as it is. Where it makes a larger force than may come within a
-  /// period, the model's tool slips back at every step towards the tissue and does not come forward
-  /// again at those away from it: the force that is felt is too small, and never at rest.
+  /// A step of the encoder changes the force by less than the force may rise within a period. Else
+  /// the model's tool slips back at every step towards the tissue and does not come forward again
+  /// at those away from it: the force rendered is too small, and never at rest.
   [[nodiscard]] bool follows_encoder() const {
     return stiffness_N_per_m * encoder_step_m <= rise_N * (1.0 + 1e-12);
   }
