@@ -253,12 +253,9 @@ class Planning {
     if (inertia.matters) plan_.masses_left_out = inertia.error;
   }
 
-  /// All that take less than the reference, so that the frontier shows how far claims are off.
   void verify_cheap() {
     for (PlannedCandidate& candidate : plan_.candidates) {
-      const bool reduced =
-          candidate.reach == ModelReach::reduced && candidate.formulation != "network_step";
-      if (candidate.claimed_error && (reduced || candidate.formulation == "collocation"))
+      if (candidate.claimed_error && model_of(candidate).cheaper_than_reference())
         verify(candidate);
     }
   }

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tpm/base/text.hpp"
+#include "tpm/haptics/loop/servo_counts.hpp"
 #include "tpm/haptics/session/recording.hpp"
 
 namespace tpm::haptics {
@@ -136,20 +137,8 @@ void LiveView::opened(const DeviceIdentity& device, const LoopModel& model) {
 }
 
 void LiveView::count(const ServoRecord& row) {
-  ServoCounts& counts = state_.counts;
-  const auto flagged = [&row](ServoFlag flag) {
-    return static_cast<std::uint64_t>((row.flags & flag) != 0);
-  };
-  counts.time_guards += flagged(kTimeGuarded);
-  counts.saturations += flagged(kSaturated);
-  counts.force_limited += flagged(kForceLimited);
-  counts.slipped += flagged(kSlipping);
-  counts.ramping_in += flagged(kRampingIn);
-  counts.damped += flagged(kDamped);
-  counts.beyond_model += flagged(kBeyondModel);
-  counts.late += flagged(kLate);
+  add_to(state_.counts, row);
   const auto missed = static_cast<std::uint64_t>(row.missed);
-  counts.missed += missed;
   if (row.stop != StopCause::finished) count_late(row.missed);
   const std::uint64_t expected = state_.begun ? state_.last.cycle + 1 + missed : missed;
   if (row.cycle > expected) state_.lost += row.cycle - expected;

@@ -119,11 +119,11 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
     throw Error(ExitCode::usage, "--accept-unstable", "is not for the device '" + choice.kind + "'",
                 "--device virtual");
   }
-  const std::string refusal = rendering.refusal(options.accept_unstable);
-  if (refusal.empty() || choice.kind == "replay") return;
-  const std::string_view condition = rendering.unmet(options.accept_unstable);
-  std::string expected(rendering.remedy(options.accept_unstable));
-  const bool by_delay = condition == "stability" || condition == "delay";
+  const auto unmet = rendering.unmet(options.accept_unstable);
+  if (!unmet || choice.kind == "replay") return;
+  std::string expected(remedy(*unmet));
+  const bool by_delay =
+      *unmet == RenderingCondition::stability || *unmet == RenderingCondition::delay;
   if (!limits.plant && by_delay) {
     expected +=
         "; a device file with a measured delay (tpm hil identify); the device 'virtual', where "
@@ -131,7 +131,8 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
   } else if (limits.plant && rendering.acceptable_if_unstable()) {
     expected += "; --accept-unstable";
   }
-  throw Error(ExitCode::answer_is_no, std::string(condition), refusal, expected);
+  throw Error(ExitCode::answer_is_no, to_string(*unmet), rendering.refusal(options.accept_unstable),
+              expected);
 }
 
 std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
