@@ -193,7 +193,7 @@ TEST_CASE("a requirement is a share, an amount or what a hand can tell", "[valid
                Contains("as large as the quantity") && Contains("below 100 %"));
   }
   for (const char* none : {"0", "0%", "-5%", "-3 mN", "20 kg", "nan", "nan%", "inf%", "%", ""}) {
-    CHECK_THROWS(parse_requirement(none, "--require"));
+    CHECK_THROWS_AS(parse_requirement(none, "--require"), Error);
   }
   CHECK_THAT(test::refusal_of([] { (void)parse_requirement("big", "--require"); }),
              Contains("10%"));

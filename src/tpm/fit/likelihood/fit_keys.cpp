@@ -27,8 +27,8 @@ const Block<StatedPrior>& prior_block() {
        required(key("sd", &P::sd, stated_quantity(), "its standard deviation")),
        key("from", &P::from, text_if_any(), "what measured it"),
        with_default(key("measured", &P::measured, flag(),
-                        "a measurement tells it; false: a limit of what is known, of which every "
-                        "fit says how far it was followed"),
+                        "a measurement found it; false: a limit of what is known, and every fit "
+                        "reports how far the estimate moved from it"),
                     true)});
   return block;
 }
