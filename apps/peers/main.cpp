@@ -42,12 +42,12 @@ const char* const kText =
     "model is not.";
 
 BenchmarkProblem peer_problem() {
-  const auto posed = posed_elastic_poke();
-  BenchmarkProblem problem = poke_with_mass_problem(posed);
+  const auto benchmark = elastic_poke_case();
+  BenchmarkProblem problem = poke_with_mass_problem(benchmark);
   problem.name = "organ_peers";
   problem.title = "Organ with elastic bonds and masses, poked: tpm, MuJoCo and Bullet";
   problem.text = kText;
-  const auto network = std::make_shared<peers::SpringNetwork>(*posed);
+  const auto network = std::make_shared<peers::SpringNetwork>(*benchmark);
   const std::vector<double> steps_s{1e-2, 2.5e-3, 1e-3, 5e-4, 2.5e-4, 1e-4};
   add(problem.settings, peers::mujoco_settings(network, steps_s));
   add(problem.settings, peers::bullet_settings(network, steps_s));

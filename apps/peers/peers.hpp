@@ -2,7 +2,7 @@
 // Other engines on the network with masses and elastic bonds: settings for tpm's own benchmark.
 #include <vector>
 
-#include "tpm/accuracy/posed.hpp"
+#include "tpm/accuracy/benchmark_case.hpp"
 
 namespace tpm::peers {
 using namespace organ;
@@ -11,7 +11,7 @@ using namespace accuracy;
 /// Network as an engine takes it: springs that pull along themselves, spheres with mass and drag,
 /// some fixed, one driven.
 struct SpringNetwork {
-  explicit SpringNetwork(const PosedNetwork& posed);
+  explicit SpringNetwork(const BenchmarkCase& benchmark);
 
   struct Spring {
     int a = 0, b = 0;

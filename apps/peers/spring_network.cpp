@@ -7,13 +7,13 @@ namespace tpm::peers {
 using namespace organ;
 using namespace accuracy;
 
-SpringNetwork::SpringNetwork(const PosedNetwork& posed)
-    : rest(posed.network.rest),
-      mass_kg(posed.mass.value().mass_kg),
-      drag_per_s(posed.mass->drag_per_s),
-      protocol(posed.protocol),
-      times_s(posed.times_s) {
-  const BondSystem& bonds = posed.network.bonds;
+SpringNetwork::SpringNetwork(const BenchmarkCase& benchmark)
+    : rest(benchmark.network.rest),
+      mass_kg(benchmark.mass.value().mass_kg),
+      drag_per_s(benchmark.mass->drag_per_s),
+      protocol(benchmark.protocol),
+      times_s(benchmark.times_s) {
+  const BondSystem& bonds = benchmark.network.bonds;
   constexpr double kForEver_s = 1e6;  // beside fractions of a second of a poke
   if (bonds.relaxation_time_s() < kForEver_s) {
     throw Error(ExitCode::bad_input, "peers", "the bonds relax", "elastic bonds");
@@ -23,11 +23,12 @@ SpringNetwork::SpringNetwork(const PosedNetwork& posed)
     springs.push_back({static_cast<int>(bonds.end_a()[i]), static_cast<int>(bonds.end_b()[i]),
                        bonds.rest_length_m()[row], bonds.stiffness()[row]});
   }
-  const Probe& probe = posed.network.probes.front();
+  const Probe& probe = benchmark.network.probes.front();
   driven = static_cast<int>(probe.sphere);
   direction = probe.direction;
   for (Eigen::Index i = 0; i < rest.cols(); ++i) {
-    const Eigen::Matrix3d& free = posed.network.constraints.projector(static_cast<std::size_t>(i));
+    const Eigen::Matrix3d& free =
+        benchmark.network.constraints.projector(static_cast<std::size_t>(i));
     held.push_back(free.isZero() ? 1 : 0);
   }
 }

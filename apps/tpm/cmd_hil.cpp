@@ -251,18 +251,11 @@ int exit_code_of(const ServoOutcome& outcome) {
   return static_cast<int>(ExitCode::environment);
 }
 
-int run_hil(const RunChoice& choice, const Session& session) {
-  require_new(choice.output, session);
-  DeviceChoice device = chosen_device(choice.device);
-  if (!choice.changes.motion.empty() && device.kind == "virtual") device.kind = "replay";
-  const DeviceLimits limits = limits_of(device);
-  HilSession hil = read_session(choice.session, choice.changes, limits);
+SessionRunOptions run_options(const RunChoice& choice, bool hardware) {
   SessionRunOptions options;
-  const bool hardware = limits.hardware();
   // A page is for somebody who watches.
   options.real_time =
       choice.time.empty() ? hardware || !choice.page.port.empty() : choice.time == "real";
-  if (device.kind == "virtual" && options.real_time) forgive_stalls(hil);
   options.notes = choice.notes;
   require_short(choice.notes.date, "--date");
   require_short(choice.notes.operator_code, "--operator");
@@ -272,6 +265,17 @@ int run_hil(const RunChoice& choice, const Session& session) {
   options.wish = chosen_wish(choice.device);
   options.recording = choice.output;
   options.accept_unstable = choice.accept_unstable;
+  return options;
+}
+
+int run_hil(const RunChoice& choice, const Session& session) {
+  require_new(choice.output, session);
+  DeviceChoice device = chosen_device(choice.device);
+  if (!choice.changes.motion.empty() && device.kind == "virtual") device.kind = "replay";
+  const DeviceLimits limits = limits_of(device);
+  HilSession hil = read_session(choice.session, choice.changes, limits);
+  SessionRunOptions options = run_options(choice, limits.hardware());
+  if (device.kind == "virtual" && options.real_time) forgive_stalls(hil);
   const InterruptWatch interrupts(InterruptWatch::Of::motors);
   options.interrupted = watched_keys(hil, options);
   std::optional<HilPage> page;
@@ -323,16 +327,8 @@ int run_hil(const RunChoice& choice, const Session& session) {
   return exit_code_of(run.outcome);
 }
 
-}  // namespace
-
-void add_hil_command(CLI::App& app, Session& session) {
-  CLI::App* hil = app.add_subcommand("hil", "A tissue rendered on a haptic device");
-  hil->require_subcommand(1);
-  hil->footer(
-      "Example:\n  tpm hil devices\n  tpm hil run configs/hil_liver.json -o liver.tpmrec\n"
-      "  tpm hil verify liver.tpmrec");
-
-  CLI::App* devices = hil->add_subcommand("devices", "What devices are there, and why one is not");
+void add_devices_command(CLI::App& hil, Session& session) {
+  CLI::App* devices = hil.add_subcommand("devices", "What devices are there, and why one is not");
   auto listed = std::make_shared<DeviceOptions>();
   add_dhd_library(*devices, *listed);
   devices->add_option("--plugin", listed->plugin,
@@ -341,8 +337,10 @@ void add_hil_command(CLI::App& app, Session& session) {
   add_format_option(*devices, session);
   devices->footer("Examples:\n  tpm hil devices\n  tpm hil devices --plugin ./my_device.so");
   set_run(*devices, session, [listed, &session] { return list_devices(*listed, session); });
+}
 
-  CLI::App* run = hil->add_subcommand("run", "Run a session and record it");
+void add_run_command(CLI::App& hil, Session& session) {
+  CLI::App* run = hil.add_subcommand("run", "Run a session and record it");
   auto choice = std::make_shared<RunChoice>();
   add_session_argument(*run, choice->session);
   add_device_options(*run, choice->device);
@@ -382,7 +380,18 @@ void add_hil_command(CLI::App& app, Session& session) {
       "fitted/law.json\n"
       "  tpm hil run configs/hil_inverse3.json --device inverse3 --device-file inverse.json");
   set_run(*run, session, [choice, &session] { return run_hil(*choice, session); });
+}
 
+}  // namespace
+
+void add_hil_command(CLI::App& app, Session& session) {
+  CLI::App* hil = app.add_subcommand("hil", "A tissue rendered on a haptic device");
+  hil->require_subcommand(1);
+  hil->footer(
+      "Example:\n  tpm hil devices\n  tpm hil run configs/hil_liver.json -o liver.tpmrec\n"
+      "  tpm hil verify liver.tpmrec");
+  add_devices_command(*hil, session);
+  add_run_command(*hil, session);
   add_hil_serve_command(*hil, session);
   add_hil_check_command(*hil, session);
   add_hil_identify_command(*hil, session);

@@ -80,9 +80,8 @@ int sensitivity(const SweepViewChoice& choice, const Session& session) {
   for (const std::string& text : choice.at) fixed.push_back(parse_fixed(text, sweep));
   std::vector<SweepSensitivity> all;
   for (const ReadVariable& v : sweep.variables()) {
-    const bool wished = choice.variables.empty()
-                            ? v.times_s.empty() && !v.name.starts_with("count_")
-                            : std::ranges::count(choice.variables, v.name) > 0;
+    const bool wished = choice.variables.empty() ? v.times_s.empty() && !v.counts
+                                                 : std::ranges::count(choice.variables, v.name) > 0;
     if (wished) all.push_back(sensitivity_of(sweep, v.name, fixed));
   }
   for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
@@ -100,7 +99,7 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
   if (!choice.axis.empty()) axis = choice.axis;
   std::vector<std::string> names = choice.variables;
   for (const ReadVariable& v : sweep.variables()) {
-    if (!choice.variables.empty() || !v.times_s.empty() || v.name.starts_with("count_")) continue;
+    if (!choice.variables.empty() || !v.times_s.empty() || v.counts) continue;
     names.push_back(v.name);
   }
   const auto all = mapped<SweepConvergence>(names, [&](const std::string& name) {

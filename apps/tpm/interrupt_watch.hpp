@@ -4,7 +4,7 @@
 
 namespace tpm::app {
 
-/// While this lives, the first SIGINT or SIGTERM is remembered and a second one kills. With
+/// While this lives, the first SIGINT or SIGTERM is recorded and a second one kills. With
 /// `motors`, every signal that ends a process (haptics::ending_signals()), and only one kills that
 /// comes two seconds after the first: until then the program is stopping them, and must not be
 /// killed in the middle of it.

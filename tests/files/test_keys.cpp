@@ -155,7 +155,7 @@ TEST_CASE("the schema of a file may be named in it, by a text", "[keys]") {
 
 TEST_CASE("programs may put numbers in SI where files have quantities", "[keys]") {
   const Json filled{{"radius", 0.003}};
-  CHECK_THROWS(needle_block().read(filled, DocumentPlace{"n"}));
+  CHECK_THROWS_AS(needle_block().read(filled, DocumentPlace{"n"}), Error);
   CHECK(needle_block().read(filled, DocumentPlace{"n"}, Numbers::also_si).radius_m == 0.003);
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/files/file.hpp"
 #include "tpm/files/import/column_title.hpp"
@@ -36,12 +37,7 @@ RecordingFile read_titled(const std::string& titles, const ImportOptions& option
 }
 
 std::string refusal_of_titles(const std::string& titles) {
-  try {
-    require_time_and_drive(read_titled(titles), "t.csv");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "read";
+  return test::refusal_of([&] { require_time_and_drive(read_titled(titles), "t.csv"); });
 }
 
 struct TitledTable {
@@ -85,7 +81,7 @@ TEST_CASE("titles of machines are read where their meaning is beyond doubt") {
            TitledTable{"[s],[mm],[N]", 1.0, 1e-3, 1.0},
        }) {
     INFO(titles);
-    REQUIRE(refusal_of_titles(titles) == "read");
+    REQUIRE(refusal_of_titles(titles).empty());
     const RecordingFile file = read_titled(titles);
     CHECK_THAT(file.recording.time_s.back(), WithinRel(20.0 * time_s, 1e-12));
     REQUIRE_FALSE(file.recording.drive.empty());
@@ -107,7 +103,7 @@ TEST_CASE("a unit that may be two is refused with what to type") {
   }
   CHECK_THAT(refusal_of_titles("Time [s],Strain [%],Stress [Mpa]"),
              Contains("'Mpa' may be mPa or MPa"));
-  CHECK(refusal_of_titles("Time [s],Strain [%],Stress [MPa]") == "read");
+  CHECK(refusal_of_titles("Time [s],Strain [%],Stress [MPa]").empty());
   // What the user says counts.
   ImportOptions options;
   set_reading_unit(options, "Force", "MN", "test");
@@ -134,7 +130,7 @@ TEST_CASE("a column is not taken by its unit where two may be meant") {
   CHECK(recognize_title("zSensor")->role == ColumnRole::height);
   CHECK(recognize_title("vDeflection")->role == ColumnRole::deflection);
   // Titles and units that contradict each other are not exchanged.
-  CHECK(refusal_of_titles("Time [s],Force [mm],Depth [N]") != "read");
+  CHECK_FALSE(refusal_of_titles("Time [s],Force [mm],Depth [N]").empty());
   CHECK(split_title("N/m").unit.empty());
   CHECK(split_title("d/mm").name == "d");
 }

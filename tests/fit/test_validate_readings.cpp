@@ -118,17 +118,7 @@ TEST_CASE("an instrument is stated once, and fits and budgets take it", "[valida
 
 TEST_CASE("without readings before contact a fit's zero is what the instrument states",
           "[validate]") {
-  Random random(11);
-  test::StudyNoise noise;
-  noise.sigma_N = 2e-4;
-  test::StudyTest slow;
-  slow.rate_mm_per_s = 0.5;
-  Recording cut = test::study_recording(slow, noise, random);
-  constexpr std::ptrdiff_t kGone = 42;
-  for (auto* column : {&cut.time_s, &cut.drive, &cut.response}) {
-    column->erase(column->begin(), column->begin() + kGone);
-  }
-  PreparedRecording recording = prepare_recording("cut", cut);
+  PreparedRecording recording = prepare_recording("cut", test::study_recording_without_rest());
   recording.instrument = Instrument{};
   recording.instrument->id = "cell";
   recording.instrument->zero = 1.5e-3;
@@ -138,7 +128,8 @@ TEST_CASE("without readings before contact a fit's zero is what the instrument s
   REQUIRE(zero != config.parameters.end());
   REQUIRE(zero->prior);
   CHECK(zero->prior->sd == 1.5e-3);
-  CHECK_THAT(zero->prior->from, Contains("stated by instrument cell"));
+  CHECK_FALSE(zero->prior->measured);
+  CHECK_THAT(zero->prior->from, Contains("instrument cell"));
 }
 
 }  // namespace tpm::fit

@@ -202,17 +202,8 @@ TEST_CASE(
     "without a rest the text names what the zero leaves undetermined and the verdict on the rest",
     "[validate]") {
   const LawFile law = quiet_law();
-  Random random(11);
-  test::StudyNoise noise;
-  noise.sigma_N = 2e-4;
-  test::StudyTest slow;
-  slow.rate_mm_per_s = 0.5;
-  Recording cut = test::study_recording(slow, noise, random);
-  constexpr std::ptrdiff_t kGone = 42;  // the rest and the first steps of the ramp
-  for (auto* column : {&cut.time_s, &cut.drive, &cut.response}) {
-    column->erase(column->begin(), column->begin() + kGone);
-  }
-  ValidationRequest request = request_for(law, prepare_recording("cut", cut));
+  ValidationRequest request =
+      request_for(law, prepare_recording("cut", test::study_recording_without_rest()));
   request.requirement = parse_requirement("10%", "test");
   const Validation v = validate(request);
   const std::string text = to_terminal_text(v);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "inverse_clients.hpp"
 #include "inverse_sessions.hpp"
 #include "tpm/haptics/serve/inverse_server.hpp"
 #include "tpm/haptics/session/finding_notices.hpp"
@@ -68,20 +69,6 @@ class PushedByAnother final : public ServedHand {
   void let_go() noexcept override {}
 };
 
-/// Settings of a server whose device is simulated and has neutral settings.
-InverseServerSettings neutral_server() {
-  InverseServerSettings settings;
-  settings.events_port = 0;
-  settings.device.id = "SIMULATED";
-  settings.device.simulated = true;
-  settings.device.settings.handedness = "right";
-  settings.device.settings.preset = "defaults";
-  settings.device.settings.filters_named = settings.device.settings.damping_named = true;
-  settings.device.settings.gravity_named = settings.device.settings.gravity_compensation = true;
-  settings.device.settings.gravity_scaling = 1.0;
-  return settings;
-}
-
 DeviceChoice device_of(const InverseServer& server) {
   DeviceChoice choice;
   choice.kind = "inverse3";
@@ -100,7 +87,7 @@ HilSession waiting_session() {
 
 TEST_CASE("A check tells of another client while it runs, as a session does") {
   PushedByAnother hand;
-  const InverseServer server(hand, neutral_server());
+  const InverseServer server(hand, test::neutral_server());
   const DeviceChoice choice = device_of(server);
   const HilSession session = waiting_session();
   std::vector<std::string> told;  // by the thread that writes records
@@ -124,7 +111,7 @@ TEST_CASE("A check tells of another client while it runs, as a session does") {
 
 TEST_CASE("An identification tells of another client while it runs, and once") {
   PushedByAnother hand;
-  const InverseServer server(hand, neutral_server());
+  const InverseServer server(hand, test::neutral_server());
   std::vector<std::string> told;  // by the thread that writes records
   std::atomic<bool> heard{false};
   DeviceIdentifyOptions options;

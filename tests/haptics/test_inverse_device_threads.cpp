@@ -127,7 +127,7 @@ TEST_CASE("A service that is not what it should be is refused with the reason") 
   f.no_events = true;
   CHECK_THAT(refusal(f), Contains("no WebSocket"));
   InverseDevice nobody({1, 1, 1, ""}, limits_of("inverse3"));
-  CHECK_THAT(error_of([&] { (void)nobody.open(); }),
+  CHECK_THAT(refusal_of([&] { (void)nobody.open(); }),
              Contains("port 1 of this machine: nobody answers"));
 }
 
@@ -165,7 +165,7 @@ TEST_CASE("The first position is one of now, not one that was waiting") {
     std::this_thread::sleep_for(50ms);
     DevicePreparation preparation = in_real_time(0.016);
     preparation.real_time = real_time;
-    CHECK_THAT(error_of([&] { opened.prepare(preparation); }), Contains("sends no state"));
+    CHECK_THAT(refusal_of([&] { opened.prepare(preparation); }), Contains("sends no state"));
   }
 }
 
@@ -214,7 +214,7 @@ TEST_CASE("A device that keeps the clock has no virtual time") {
   InverseDevice device({service.port(), service.events_port(), service.port(), ""},
                        limits_of("inverse3"));
   CHECK(device.open().hardware);
-  CHECK_THAT(error_of([&] { device.prepare({}); }), Contains("expected --clock real"));
+  CHECK_THAT(refusal_of([&] { device.prepare({}); }), Contains("expected --clock real"));
 }
 
 TEST_CASE("Delays of 0, 2 and 5 ms are found, and the session is verified as any other",

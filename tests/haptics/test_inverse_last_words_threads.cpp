@@ -148,7 +148,7 @@ TEST_CASE("A service that falls silent while it is opened is quoted with its eve
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
   });
-  const std::string said = error_of([&] { (void)device.open(); });
+  const std::string said = refusal_of([&] { (void)device.open(); });
   opened = true;
   talking.join();
   CHECK_THAT(said, Contains("the service says device-busy"));

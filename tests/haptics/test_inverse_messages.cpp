@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "grip_presses.hpp"
+#include "refusal.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/haptics/inverse/messages.hpp"
 #include "tpmkit/error.hpp"
@@ -14,6 +15,7 @@ namespace {
 
 using Catch::Matchers::Contains;
 using files::Json;
+using test::refusal_of;
 
 /// An inventory as the public description shows it, written here by hand.
 constexpr const char* kInventory = R"({
@@ -39,15 +41,6 @@ constexpr const char* kInventory = R"({
     "orientation": {"w": 0.0, "x": 1.0, "y": 0.0, "z": 0.0},
     "buttons": {"a": true, "b": false, "c": true}}}]
 })";
-
-std::string error_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
-}
 
 TEST_CASE("An inventory of the public description is read") {
   const InverseInventory all = parse_inventory(kInventory);
@@ -82,7 +75,7 @@ TEST_CASE("A force is written and read in both formats, told by the version") {
   CHECK(format_of_version("3.12") == InverseFormat::vector);
   CHECK(format_of_version("3.1.1.0") == InverseFormat::values);
   for (const char* other : {"3.0.7", "2.9", "4.0", "", "3", "three.five"}) {
-    CHECK_THAT(error_of([&] { (void)format_of_version(other); }), Contains("3.1 or later"));
+    CHECK_THAT(refusal_of([&] { (void)format_of_version(other); }), Contains("3.1 or later"));
   }
   CHECK(parse_version(R"({"project_version": "3.5.0.0"})") == "3.5.0.0");
   CHECK(parse_version(R"({"ok": true, "data": {"project_version": "3.5.1"}})") == "3.5.1");
@@ -159,7 +152,7 @@ TEST_CASE("What a server writes, a client reads as it was") {
 
 TEST_CASE("A message that is none is refused with the place in it") {
   const auto command = [](const std::string& text) {
-    return error_of([&] { (void)parse_command(text, "a"); });
+    return refusal_of([&] { (void)parse_command(text, "a"); });
   };
   CHECK_THAT(command(R"({"inverse3": [)"), Contains("message"));
   CHECK_THAT(command("[]"), Contains("command: is no object"));
@@ -174,9 +167,9 @@ TEST_CASE("A message that is none is refused with the place in it") {
   CHECK_THAT(command(force + R"({"x":1,"y":0}}}}]})"), Contains("has no z"));
   CHECK_THAT(command(std::string(kMostMessageBytes + 1, ' ')), Contains("too long"));
   CHECK_THAT(command(std::string(60'000, '[')), Contains("message"));
-  CHECK_THAT(error_of([] { (void)parse_state(R"({"inverse3": []})", "a"); }),
+  CHECK_THAT(refusal_of([] { (void)parse_state(R"({"inverse3": []})", "a"); }),
              Contains("not that of device 'a'"));
-  CHECK_THAT(error_of([] {
+  CHECK_THAT(refusal_of([] {
                (void)parse_inventory(R"({"inverse3": [{"device_id": "a", "config":
                            {"handedness": "both"}, "state": {}}]})");
              }),
@@ -239,7 +232,7 @@ TEST_CASE("What an inventory leaves out, or says to be null, is as if it had no 
 TEST_CASE("An inventory whose values are of another kind is refused with their place") {
   const auto refusal = [](const std::string& before, const std::string& after) {
     const std::string text = inventory_with(before, after);
-    return error_of([&] { (void)parse_inventory(text); });
+    return refusal_of([&] { (void)parse_inventory(text); });
   };
   const std::string config = "inventory/inverse3/0/config/";
   CHECK_THAT(refusal(R"("049D")", R"("")"), Contains("inverse3/0/device_id: is empty"));
@@ -260,10 +253,10 @@ TEST_CASE("An inventory whose values are of another kind is refused with their p
   CHECK_THAT(refusal("cursor_position", "position"), Contains("state: has no cursor_position"));
   CHECK_THAT(refusal(R"("a": true)", R"("a": "down")"), Contains("neither true nor false"));
   CHECK_THAT(refusal(R"({"w": 0.0, "x": 1.0,)", R"({"w": 0.0,)"), Contains("has no x"));
-  CHECK_THAT(error_of([] { (void)parse_inventory(std::string(kMostInventoryBytes + 1, ' ')); }),
+  CHECK_THAT(refusal_of([] { (void)parse_inventory(std::string(kMostInventoryBytes + 1, ' ')); }),
              Contains("too long"));
-  CHECK_THAT(error_of([] { (void)parse_inventory("7"); }), Contains("inventory: is no object"));
-  CHECK_THAT(error_of([] { (void)parse_inventory(R"({"data": []})"); }),
+  CHECK_THAT(refusal_of([] { (void)parse_inventory("7"); }), Contains("inventory: is no object"));
+  CHECK_THAT(refusal_of([] { (void)parse_inventory(R"({"data": []})"); }),
              Contains("inventory/data: is no object"));
   // The largest number that is one, and a rotation that is not quite of length 1.
   CHECK(only(parse_inventory(inventory_with(R"("x": 0.01)", R"("x": -1000000)")))
@@ -282,7 +275,7 @@ TEST_CASE("Sixteen devices are read and no more; an answer over HTTP has its dat
     return parse_inventory(R"({"ok": true, "data": {"inverse3": [)" + all + "]}}").devices.size();
   };
   CHECK(of(16) == 16);
-  CHECK_THAT(error_of([&] { (void)of(17); }), Contains("no list of at most 16 devices"));
+  CHECK_THAT(refusal_of([&] { (void)of(17); }), Contains("no list of at most 16 devices"));
 }
 
 TEST_CASE("The first grip of a message counts, of any kind, with buttons by either name") {
@@ -308,8 +301,9 @@ TEST_CASE("The first grip of a message counts, of any kind, with buttons by eith
       R"(, "custom_verse_grip": [{"state": {"orientation": {"w": 0, "x": 0, "y": 0, "z": -0.9}}}])");
   CHECK(turned.grip.z() == -1.0);
   CHECK(turned.buttons == 0);
-  CHECK_THAT(error_of([&] { (void)state(R"(, "verse_grip": 1)"); }), Contains("state/verse_grip"));
-  CHECK_THAT(error_of([] { (void)parse_state("{}", "a"); }), Contains("state: has no inverse3"));
+  CHECK_THAT(refusal_of([&] { (void)state(R"(, "verse_grip": 1)"); }),
+             Contains("state/verse_grip"));
+  CHECK_THAT(refusal_of([] { (void)parse_state("{}", "a"); }), Contains("state: has no inverse3"));
 }
 
 TEST_CASE("A place is read in each form; what a client may not say is refused with its place") {
@@ -317,7 +311,7 @@ TEST_CASE("A place is read in each form; what a client may not say is refused wi
     return parse_command(R"({"inverse3": [{"device_id": "a", )" + entry + "}]}", "a");
   };
   const auto refusal = [&](const std::string& entry) {
-    return error_of([&] { (void)said(entry); });
+    return refusal_of([&] { (void)said(entry); });
   };
   for (const char* form : {"position", "vector", "values"}) {
     const InverseCommand command = said(std::string(R"("commands": {"set_cursor_position": {")") +
@@ -359,7 +353,7 @@ TEST_CASE("A place is read in each form; what a client may not say is refused wi
   CHECK(session("{}").empty());
   CHECK(session(R"({"configure": {}})").empty());
   CHECK(session(R"({"configure": {"profile": {"name": "a"}}})") == "a");
-  CHECK_THAT(error_of([&] { (void)session(R"({"configure": {"profile": {}}})"); }),
+  CHECK_THAT(refusal_of([&] { (void)session(R"({"configure": {"profile": {}}})"); }),
              Contains("session/configure/profile: has no name"));
 }
 
@@ -382,7 +376,7 @@ TEST_CASE("Only a device that says SIMULATED DEVICE is simulated") {
 
 TEST_CASE("Versions and events are read with what they leave out") {
   const auto no_version = [](const std::string& text) {
-    return error_of([&] { (void)parse_version(text); });
+    return refusal_of([&] { (void)parse_version(text); });
   };
   CHECK_THAT(no_version("{}"), Contains("version: has no project_version"));
   CHECK_THAT(no_version(R"({"project_version": 3.5})"), Contains("project_version: is no text"));
@@ -414,7 +408,7 @@ TEST_CASE("Versions and events are read with what they leave out") {
   CHECK_FALSE(odd.message.empty());
   CHECK(odd.device_id.empty());
   CHECK(odd.safety_type.empty());
-  CHECK_THAT(error_of([] { (void)parse_event(R"({"level": "error"})"); }),
+  CHECK_THAT(refusal_of([] { (void)parse_event(R"({"level": "error"})"); }),
              Contains("event: has no name"));
   // Quotes do not end a text.
   CHECK(parse_event(event_message({"n", "l", R"(a"b\c)", "s", "m"})).device_id == R"(a"b\c)");

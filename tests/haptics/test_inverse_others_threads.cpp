@@ -40,7 +40,7 @@ TEST_CASE("A device is chosen by its id or place; a wrong one is refused with th
     InverseAddress address{service.port(), service.events_port(), service.port(), ""};
     address.index = index;
     InverseDevice device(address, limits_of("inverse3"));
-    return error_of([&] { (void)device.open(); });
+    return refusal_of([&] { (void)device.open(); });
   };
   CHECK(at(0).empty());
   CHECK_THAT(at(1), Contains("is not that of device '0A14'"));  // the stand-in has states of one
@@ -73,16 +73,7 @@ struct ServedBeside {
     (void)hand.open();
     hand.prepare({});
     hand.enable_forces();
-    InverseServerSettings settings;
-    settings.events_port = 0;
-    settings.device.id = "SIMULATED";
-    settings.device.simulated = true;
-    settings.device.settings.handedness = "right";
-    settings.device.settings.preset = "defaults";
-    settings.device.settings.filters_named = settings.device.settings.damping_named = true;
-    settings.device.settings.gravity_named = settings.device.settings.gravity_compensation = true;
-    settings.device.settings.gravity_scaling = 1.0;
-    server = std::make_unique<InverseServer>(hand, std::move(settings));
+    server = std::make_unique<InverseServer>(hand, test::neutral_server());
   }
   [[nodiscard]] InverseAddress address() const {
     return {server->port(), server->events_port(), server->port(), ""};
@@ -111,13 +102,13 @@ TEST_CASE(
     std::this_thread::sleep_for(5ms);
   }
   InverseDevice refused(served.address(), limits_of("inverse3"));
-  const std::string said = error_of([&] { (void)refused.open(); });
+  const std::string said = refusal_of([&] { (void)refused.open(); });
   done = true;
   drives.join();
   CHECK_THAT(said, Contains("another client drives the device SIMULATED"));
   first.reset();
   InverseDevice device(served.address(), limits_of("inverse3"));
-  CHECK(error_of([&] { (void)device.open(); }).empty());
+  CHECK(refusal_of([&] { (void)device.open(); }).empty());
 }
 
 TEST_CASE("A client that pushes while the session commands nothing is told") {
@@ -265,7 +256,7 @@ TEST_CASE("Before the check of a second pushes, the session says so, and then wh
       sent = service.forces();
     };
     options.interrupted = [&] { return interrupted && told > 0; };
-    const std::string said = error_of([&] { (void)run_session(session, choice, options); });
+    const std::string said = refusal_of([&] { (void)run_session(session, choice, options); });
     CAPTURE(said);
     CHECK(told == 1);
     CHECK(sent == 0);  // not even a force of zero

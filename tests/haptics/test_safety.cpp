@@ -1,10 +1,8 @@
-// What must not reach the hand: instability, a start inside the tissue, forces in doubt, limits
-// without ceilings.
+// What must not reach the hand: instability, a start inside the tissue, limits without ceilings.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <memory>
 
-#include "counted_allocations.hpp"
 #include "hil_scenes.hpp"
 #include "shaken_contact.hpp"
 #include "temp_folder.hpp"
@@ -398,122 +396,6 @@ TEST_CASE("The device is asked for no more than the session's limit") {
   Json json = test::with(test::short_session(), "/limits/force", "3 N");
   CHECK(test::parsed(json).preparation.max_force_N == 3.0);
   CHECK(test::parsed(test::short_session()).preparation.max_force_N == 8.0);
-}
-
-// --- validity -------------------------------------------------------------------------------
-
-/// A spring of which every second answer, or none after a while, is valid.
-class Doubtful final : public ContactModel {
- public:
-  enum class Way { alternating, for_good };
-  explicit Doubtful(Way way) : way_(way) {}
-  void reset() noexcept override { steps_ = 0; }
-  ContactAnswer step(const ToolPose& tool) noexcept override {
-    ++steps_;
-    ContactAnswer answer;
-    answer.valid = way_ == Way::alternating ? steps_ < 500 || steps_ % 2 == 0 : steps_ < 500;
-    answer.force_N = (answer.valid ? -200.0 : -600.0) * tool.displacement_m;
-    return answer;
-  }
-  [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
-  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return 200.0 * Eigen::Matrix3d::Identity();
-  }
-  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
-    return instantaneous_stiffness();
-  }
-
- private:
-  Way way_;
-  int steps_ = 0;
-};
-
-struct Doubted {
-  double largest_N = 0.0, largest_jump_N = 0.0, last_N = 0.0, energy_J = 0.0;
-  StopCause cause = StopCause::none;
-  int cycles_after = 0;
-};
-
-/// To 2 mm in 0.4 s, held, and slowly on: 0.4 N are valid.
-Doubted doubted(Doubtful::Way way, bool in_space) {
-  Doubtful model(way);
-  Puppet device;
-  ServoSettings settings = guarded();
-  if (in_space) settings.to_model = Eigen::Matrix3d::Identity();
-  ServoStep step(device, model, settings);
-  ServoRecord row;
-  Doubted result;
-  double before_N = 0.0;
-  for (int i = 1; i <= 5000 && result.cause == StopCause::none; ++i) {
-    const double before_m = device.at.z();
-    device.at.z() = i <= 400 ? 5e-6 * i : 2e-3 + 2e-7 * (i - 400);
-    result.cause = step.cycle(0, row);
-    if (result.cause != StopCause::none) break;
-    const double force = -device.force.z();
-    result.energy_J += before_N * (device.at.z() - before_m);
-    result.largest_N = std::max(result.largest_N, force);
-    result.largest_jump_N = std::max(result.largest_jump_N, std::abs(force - before_N));
-    result.last_N = before_N = force;
-    result.cycles_after = i - 500;
-  }
-  return result;
-}
-
-TEST_CASE("A force outside validity is not sent: the last valid one fades, and the session ends") {
-  for (const bool in_space : {false, true}) {
-    CAPTURE(in_space);
-    const Doubted result = doubted(Doubtful::Way::for_good, in_space);
-    CHECK(result.cause == StopCause::outside_validity);
-    CHECK(result.largest_N < 0.41);  // the model answers 1.2 N
-    CHECK(result.largest_jump_N < 0.005);
-    CHECK(result.cycles_after <= 501);
-    CHECK(result.last_N < 0.41 * std::exp(-4.9));
-    const Doubted wave = doubted(Doubtful::Way::alternating, in_space);
-    CHECK(wave.largest_N < 0.45);  // the wave was one of 0.8 N at 500 Hz
-    CHECK(wave.largest_jump_N < 0.02);
-    CHECK(wave.cause == StopCause::outside_validity);
-  }
-}
-
-TEST_CASE("A force in doubt gives back no more than its stiffness stored") {
-  Doubtful model(Doubtful::Way::for_good);
-  Puppet device;
-  ServoStep step(device, model, guarded());
-  ServoRecord row;
-  for (int i = 1; i <= 510; ++i) {
-    device.at.z() = std::min(2e-3, 5e-6 * i);
-    REQUIRE(step.cycle(0, row) == StopCause::none);
-  }
-  const double held_N = -device.force.z();
-  CHECK((row.flags & kBeyondModel) != 0);
-  double delivered_J = 0.0;
-  for (int i = 1; i <= 40; ++i) {
-    const double force = -device.force.z(), before = device.at.z();
-    device.at.z() -= 5e-5;
-    REQUIRE(step.cycle(0, row) == StopCause::none);
-    delivered_J += 0.5 * (force - device.force.z()) * (before - device.at.z());
-  }
-  CHECK(device.force.z() == 0.0);
-  CHECK(delivered_J <= 1.001 * held_N * held_N / (2.0 * 200.0));
-}
-
-TEST_CASE("No part of the watch allocates, also when it acts") {
-  Doubtful model(Doubtful::Way::alternating);
-  Puppet device;
-  ServoSettings settings = guarded();
-  settings.gate = StartGateSettings{};
-  ServoStep step(device, model, settings);
-  ServoRecord row;
-  StopCause cause = StopCause::none;
-  device.at.z() = -2e-3;
-  const testing::HeapWatch heap;
-  for (int i = 0; i < 5000 && cause == StopCause::none; ++i) {
-    if (i > 300) device.at.z() = -2e-3 + 8e-3 * (i % 2);
-    cause = step.cycle(i % 7 == 0 ? 3 : 0, row);
-  }
-  const long calls = heap.calls();
-  CHECK(cause != StopCause::none);
-  CHECK(calls == 0);
 }
 
 }  // namespace

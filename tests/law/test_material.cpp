@@ -4,6 +4,7 @@
 #include <complex>
 
 #include "organ_scene.hpp"
+#include "refusal.hpp"
 #include "shape_suite.hpp"
 #include "tpm/base/random.hpp"
 #include "tpm/law/relaxation/fractional_branches.hpp"
@@ -48,12 +49,8 @@ BondLaw linear_law(double equilibrium, std::vector<BondLaw::Branch> branches) {
 }
 
 std::string refusal_of(const std::string& scene) {
-  try {
-    static_cast<void>(parse_tissue(Json::parse(scene), "s.json", {}));
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "accepted";
+  return test::refusal_of(
+      [&] { static_cast<void>(parse_tissue(Json::parse(scene), "s.json", {})); });
 }
 
 std::string block_scene(const std::string& material) {

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "expected_values.hpp"
+#include "refusal.hpp"
 #include "tpm/fit/expression/expression.hpp"
 #include "tpm/paper/claims/audit.hpp"
 #include "tpm/paper/show/study_report.hpp"
@@ -71,12 +72,7 @@ Finding one(Json claim) {
 }
 
 std::string refusal(Json claim) {
-  try {
-    static_cast<void>(one(std::move(claim)));
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "accepted";
+  return test::refusal_of([&] { static_cast<void>(one(std::move(claim))); });
 }
 
 /// The paper's file with the printed value of one claim replaced.

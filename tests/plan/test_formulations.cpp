@@ -147,6 +147,6 @@ TEST_CASE("settings of a formulation reach it, those of others are refused") {
         R"("kind": "rk4", "masses": false, "damping_ratio": 0.1)",
         R"("kind": "curves", "exponentials": 4)", R"("kind": "rk4", "step": "0 s")"}) {
     CAPTURE(keys);
-    CHECK_THROWS(parsed(keys));
+    CHECK_THROWS_AS(parsed(keys), Error);
   }
 }

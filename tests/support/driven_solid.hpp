@@ -43,23 +43,52 @@ inline std::vector<Knot> steps(const std::vector<double>& begins_s, double each_
   return knots;
 }
 
-inline void check_truth(const FitResult& fit, double widest_k1) {
+/// An adequate fit whose intervals contain the solid's coefficients.
+/// @param widest_k1 upper limit of the width of the interval of k1, N/m
+inline void check_intervals(const FitResult& fit, double widest_k1) {
   REQUIRE(fit.adequacy);
   CHECK(fit.adequacy->verdict == "adequate");
+  int seen = 0;
   for (const ParameterResult& p : fit.parameters) {
-    const double truth = p.parameter.name == "k_inf"  ? 60.0
-                         : p.parameter.name == "k1"   ? 45.0
-                         : p.parameter.name == "tau1" ? 2.0
-                                                      : 0.0;
-    if (truth == 0.0) continue;
+    const double expected = p.parameter.name == "k_inf"  ? 60.0
+                            : p.parameter.name == "k1"   ? 45.0
+                            : p.parameter.name == "tau1" ? 2.0
+                                                         : 0.0;
+    if (expected == 0.0) continue;
+    ++seen;
     INFO(p.summary);
-    REQUIRE(p.lower);
-    REQUIRE(p.upper);
-    CHECK(*p.lower < truth);
-    CHECK(*p.upper > truth);
+    CHECK(p.lower.value() < expected);
+    CHECK(p.upper.value() > expected);
     if (p.parameter.name == "k1") CHECK(*p.upper - *p.lower < widest_k1);
     CHECK(p.conditional_on.empty());
   }
+  CHECK(seen == 3);
+}
+
+/// Fits a step of 4 mm that begins between two samples, at `begin_s`.
+inline Selection check_step_between_samples(double begin_s) {
+  const PreparedRecording one =
+      prepare_recording("step.csv", driven(steps({begin_s}, 4e-3, 40.0), 35.0, 5));
+  const std::vector<UnseenRise> rises = unseen_rises(one);
+  REQUIRE(rises.size() == 1);
+  CHECK(std::abs(rises.front().begin_s - 5.0) < 1e-11);
+  Selection s = select_law(std::span(&one, 1), {});
+  const FitResult& fit = s.candidates[s.recommended].fit;
+  CHECK(law_name(fit.config.law.value()) == "linear-1");
+  check_intervals(fit, 1.4);
+  return s;
+}
+
+/// Fits four steps of 1 mm that begin between two samples.
+inline void check_stairs_between_samples(std::uint64_t seed) {
+  Random random(seed);
+  std::vector<double> begins;
+  for (int i = 0; i < 4; ++i) begins.push_back(5.0 + 8.0 * i + 0.03 * random.uniform());
+  const PreparedRecording one =
+      prepare_recording("stairs.csv", driven(steps(begins, 1e-3, 60.0), 45.0, seed));
+  CHECK(unseen_rises(one).size() == 4);
+  const Selection s = select_law(std::span(&one, 1), {});
+  check_intervals(s.candidates[s.recommended].fit, 1.4);
 }
 
 }  // namespace tpm::test

@@ -1,15 +1,16 @@
 #pragma once
-#include <functional>
 #include <string>
 
 #include "hil_scenes.hpp"
+#include "refusal.hpp"
 #include "stand_in_inverse.hpp"
 #include "tpm/haptics/inverse/inverse_device.hpp"
 #include "tpm/haptics/session/session_run.hpp"
-#include "tpmkit/error.hpp"
 
 /// Sessions with --device inverse3 on the stand-in service.
 namespace tpm::test::inverse_sessions {
+
+using test::refusal_of;
 
 /// The short session within the limits of the device, on a tissue of half the stiffness.
 inline Json inverse_session() {
@@ -40,21 +41,12 @@ inline DeviceChoice choice_of(const StandInInverse& service) {
   return choice;
 }
 
-inline std::string error_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
-}
-
 /// Message with which a device on such a service cannot be opened.
 inline std::string refusal(const StandInFaults& faults, const std::string& id = {}) {
   StandInInverse service(PlantSettings{}, {}, false, faults);
   InverseAddress address{service.port(), service.events_port(), service.port(), id};
   InverseDevice device(address, limits_of("inverse3"));
-  return error_of([&] { (void)device.open(); });
+  return refusal_of([&] { (void)device.open(); });
 }
 
 }  // namespace tpm::test::inverse_sessions

@@ -108,6 +108,21 @@ inline StudyTest study_validation(int rest, double contact_mm) {
   return test;
 }
 
+/// A slow test without its rest and the first steps of its ramp.
+inline Recording study_recording_without_rest() {
+  Random random(11);
+  StudyNoise noise;
+  noise.sigma_N = 2e-4;
+  StudyTest slow;
+  slow.rate_mm_per_s = 0.5;
+  Recording cut = study_recording(slow, noise, random);
+  constexpr std::ptrdiff_t kGone = 42;
+  for (auto* column : {&cut.time_s, &cut.drive, &cut.response}) {
+    column->erase(column->begin(), column->begin() + kGone);
+  }
+  return cut;
+}
+
 /// A law from recordings of specimens whose forces differ by these factors, as a request that has
 /// found them.
 inline ValidationRequest study_of_specimens(const std::vector<double>& stiffer,

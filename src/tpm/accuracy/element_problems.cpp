@@ -3,8 +3,8 @@
 #include <boost/numeric/odeint.hpp>
 #include <cmath>
 
+#include "tpm/accuracy/benchmark_case.hpp"
 #include "tpm/accuracy/element_problems.hpp"
-#include "tpm/accuracy/posed.hpp"
 #include "tpm/organ/bonds/lowest_mode.hpp"
 #include "tpmkit/model.hpp"
 
@@ -12,9 +12,9 @@ namespace tpm::accuracy {
 namespace {
 
 /// One bond under a protocol, and the star of four spheres, which is the same thing.
-struct PosedBond {
+struct BondCase {
   BondElement material;
-  std::shared_ptr<const PosedNetwork> star;
+  std::shared_ptr<const BenchmarkCase> star;
   std::shared_ptr<const MethodProblem> element;
 };
 
@@ -23,10 +23,10 @@ BondElement material_of(double eta1_Pa_s) {
   return paper_element(eta1_Pa_s / kPaperSprings_Pa);
 }
 
-PosedBond posed_bond(double eta1_Pa_s, const Protocol& protocol, std::vector<double> times_s) {
+BondCase bond_case(double eta1_Pa_s, const Protocol& protocol, std::vector<double> times_s) {
   const BondElement material = material_of(eta1_Pa_s);
   return {material,
-          std::make_shared<PosedNetwork>(driven_star(material), protocol, std::move(times_s)),
+          std::make_shared<BenchmarkCase>(driven_star(material), protocol, std::move(times_s)),
           element_problem(material, protocol)};
 }
 
@@ -40,7 +40,7 @@ MethodRun run_closed_form(const BondElement& material, const Protocol& protocol,
   return run;
 }
 
-BenchmarkSetting closed_form(const PosedBond& bond) {
+BenchmarkSetting closed_form(const BondCase& bond) {
   return {"closed_form", "", "", 0.0, {}, [bond](bool) -> BenchmarkRun {
             return {run_closed_form(bond.material, bond.star->protocol, bond.star->times_s), {}};
           }};
@@ -49,7 +49,7 @@ BenchmarkSetting closed_form(const PosedBond& bond) {
 const char* const kNoMass = "the problem has no masses";
 
 /// Everything that solves a bond without mass.
-std::vector<BenchmarkSetting> massless_settings(const PosedBond& bond, const RuleSettings& rules) {
+std::vector<BenchmarkSetting> massless_settings(const BondCase& bond, const RuleSettings& rules) {
   std::vector<BenchmarkSetting> all = rule_settings(bond.element, bond.star->times_s, rules);
   add(all, collocation_settings(bond.star, {1e-2, 1e-4, 1e-6, 1e-8, 1e-10}));
   all.push_back(not_applicable("inertial", kNoMass));
@@ -57,14 +57,14 @@ std::vector<BenchmarkSetting> massless_settings(const PosedBond& bond, const Rul
   return all;
 }
 
-BenchmarkReference exact_reference(const PosedBond& bond, const std::string& name) {
+BenchmarkReference exact_reference(const BondCase& bond, const std::string& name) {
   return checked_reference(answer_of(closed_form(bond), "the closed form"),
                            answer_of(collocation_settings(bond.star, {1e-12}).front(),
                                      "collocation on the star of four spheres at 1e-12"),
                            true, 1e-8, name);
 }
 
-BenchmarkProblem exact_problem(const PosedBond& bond, std::string name, std::string title,
+BenchmarkProblem exact_problem(const BondCase& bond, std::string name, std::string title,
                                std::string text, const RuleSettings& rules) {
   const bool depth = bond.star->protocol.drive() == Drive::force;
   BenchmarkProblem problem;
@@ -80,15 +80,14 @@ BenchmarkProblem exact_problem(const PosedBond& bond, std::string name, std::str
   return problem;
 }
 
-PosedBond ramped_bond(double eta1_Pa_s) {
+BondCase ramped_bond(double eta1_Pa_s) {
   const Protocol protocol = ramp_and_hold(8e-3, 4e-3, 29.0);
-  return posed_bond(eta1_Pa_s, protocol,
-                    with_moments_after_kinks(times_every(0.5, 31.0), protocol));
+  return bond_case(eta1_Pa_s, protocol, with_moments_after_kinks(times_every(0.5, 31.0), protocol));
 }
 
 /// The bond with mass under a suddenly applied load: depth, speed, and y, which follows the depth.
 /// Written down once more here, away from the methods that it checks.
-Eigen::VectorXd integrated_depth(const PosedBond& bond, double load_N) {
+Eigen::VectorXd integrated_depth(const BondCase& bond, double load_N) {
   using State = std::array<double, 3>;
   const BondElement& p = bond.material;
   const TensionLaw tension = p.tension();
@@ -141,7 +140,7 @@ BenchmarkProblem bond_fitted_problem() {
 }
 
 BenchmarkProblem star_creep_problem() {
-  const PosedBond bond = posed_bond(kFittedEta1_Pa_s, creep(0.98, 60.0), times_every(1.0, 60.0));
+  const BondCase bond = bond_case(kFittedEta1_Pa_s, creep(0.98, 60.0), times_every(1.0, 60.0));
   return exact_problem(bond, "star_creep", "Creep of the star under 0.98 N",
                        "The larger of the paper's loads, applied in a step and kept for 60 s; eta1 "
                        "= 257.3 kPa s, the "
@@ -154,9 +153,9 @@ BenchmarkProblem bond_mass_problem() {
   constexpr double kLoad_N = 0.5;
   constexpr double kEnd_s = 0.5;
   constexpr double kDampingRatio = 0.1;
-  PosedBond bond;
+  BondCase bond;
   bond.material = material_of(kPaperEta1_Pa_s);
-  const auto posed = std::make_shared<PosedNetwork>(
+  const auto benchmark = std::make_shared<BenchmarkCase>(
       driven_star(bond.material), creep(kLoad_N, kEnd_s), times_every(0.01, kEnd_s));
   const Organ sphere = [] {
     Organ organ;
@@ -164,10 +163,10 @@ BenchmarkProblem bond_mass_problem() {
     organ.radius = 0.01;
     return organ;
   }();
-  posed->set_masses(sphere_masses_kg(sphere), kDampingRatio);
-  const MethodMasses one{posed->mass->mass_kg.head(1), posed->mass->drag_per_s};
-  bond.star = posed;
-  bond.element = element_problem(bond.material, posed->protocol, one);
+  benchmark->set_masses(sphere_masses_kg(sphere), kDampingRatio);
+  const MethodMasses one{benchmark->mass->mass_kg.head(1), benchmark->mass->drag_per_s};
+  bond.star = benchmark;
+  bond.element = element_problem(bond.material, benchmark->protocol, one);
   RuleSettings rules;
   rules.steps_s = {1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1e-4, 1e-5};
   rules.tolerances = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10};

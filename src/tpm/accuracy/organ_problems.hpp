@@ -1,5 +1,5 @@
 #pragma once
-#include "tpm/accuracy/posed.hpp"
+#include "tpm/accuracy/benchmark_case.hpp"
 
 namespace tpm::accuracy {
 
@@ -16,9 +16,9 @@ namespace tpm::accuracy {
 
 /// The same network with masses and bonds that do not relax: what other engines can be asked as
 /// well. Sampled between the kinks of the protocol.
-[[nodiscard]] std::shared_ptr<const PosedNetwork> posed_elastic_poke();
+[[nodiscard]] std::shared_ptr<const BenchmarkCase> elastic_poke_case();
 /// Every method on a poke of a network with masses; to be given name, title and text.
 [[nodiscard]] BenchmarkProblem poke_with_mass_problem(
-    const std::shared_ptr<const PosedNetwork>& posed);
+    const std::shared_ptr<const BenchmarkCase>& benchmark);
 
 }  // namespace tpm::accuracy

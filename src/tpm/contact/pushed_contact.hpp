@@ -38,8 +38,8 @@ class PushedContact {
   /// @param relaxed how far the viscous elongations have caught up: 0 instantaneous, 1 equilibrium
   /// Throws Error(numerical) where the tissue buckles or none is found.
   [[nodiscard]] Positions at(const Eigen::Vector3d& displacement_m, double relaxed);
-  /// The viscous elongations at such an equilibrium, told so that changes are felt with a given
-  /// stiffness: 0 the instantaneous one, 1 that of equilibrium.
+  /// The viscous elongations at such an equilibrium.
+  /// @param relaxation_factor stiffness of changes about it: 0 instantaneous, 1 equilibrium
   [[nodiscard]] ViscousState viscous_state(const Positions& position, double relaxed,
                                            double relaxation_factor) const;
   /// About such an equilibrium. Throws Error(numerical) if the tissue is not stiff there.

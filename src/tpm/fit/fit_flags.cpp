@@ -139,8 +139,7 @@ std::vector<std::string> prior_words(const FitResult& result, bool flagged) {
     if (!prior) continue;
     const ParameterResult& p = result.parameters[i];
     const double away = std::abs(p.estimate - prior->mean) / prior->sd;
-    const bool measured = !prior->from.starts_with("stated");  // else a limit of what is known
-    if ((!measured || away > kFar) != flagged) continue;
+    if ((!prior->measured || away > kFar) != flagged) continue;
     words.push_back(fmt::format(
         "{} = {} beside {} +- {}{}: {} of this uncertainty away", p.parameter.name,
         in_sized_unit(p, p.estimate), in_sized_unit(p, prior->mean), in_sized_unit(p, prior->sd),

@@ -62,7 +62,7 @@ class OperationalStiffness {
   /// As at() of a fractional law. Allocates only if `out` has another size.
   void fractional(const Powers& powers, ComplexStiffness& out) const;
 
-  /// The stiffness of a fractional law against what happens at once (s = infinity): nothing where a
+  /// The instantaneous stiffness of a fractional law (s = infinity): nothing where a
   /// spring-pot stands in no spring's series, which is then infinitely stiff. The orders have no
   /// part in it: their derivatives are 0.
   [[nodiscard]] std::optional<ComplexStiffness> instant() const;

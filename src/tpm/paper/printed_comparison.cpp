@@ -137,6 +137,7 @@ void add_printed(std::vector<PrintedComparison>& all, const TpmParameters& p, co
   for (const Datum& datum : set.data) {
     PrintedComparison c = printed_datum(datum, set.observable);
     c.parameters = words;
+    c.printed_parameters = true;
     c.simulated = response_of(p, datum, rate);
     c.u_num = kRounding * std::abs(c.simulated);
     c.e.degrees = kInfinity;

@@ -15,13 +15,14 @@ namespace tpm::paper {
 /// The paper's model against one printed number or range, in the words of ASME V&V 20: S, D,
 /// E = S - D, and what is known of u_val^2 = u_num^2 + u_input^2 + u_D^2. SI.
 struct PrintedComparison {
-  std::string experiment;  ///< "relaxation", "static", "creep"
-  std::string parameters;  ///< "printed, step", "fitted to the other depths", ...
-  std::string quantity;    ///< "peak force at 4 mm"
-  double imposed = 0.0;    ///< depth, m, or load, N
-  Unit unit;               ///< in which it is shown
-  double simulated = 0.0;  ///< S
-  double low = 0.0;        ///< D is in [low, high]; a value: both are it
+  std::string experiment;           ///< "relaxation", "static", "creep"
+  std::string parameters;           ///< "printed, step", "fitted to the other depths", ...
+  bool printed_parameters = false;  ///< else fitted ones
+  std::string quantity;             ///< "peak force at 4 mm"
+  double imposed = 0.0;             ///< depth, m, or load, N
+  Unit unit;                        ///< in which it is shown
+  double simulated = 0.0;           ///< S
+  double low = 0.0;                 ///< D is in [low, high]; a value: both are it
   double high = 0.0;
   double u_num = 0.0, u_input = 0.0;
   double u_D = 0.0;             ///< of the printed digits: scatter and instrument are not stated

@@ -116,7 +116,7 @@ BranchFit fit_shares(const ContactSpectrum& spectrum, const std::vector<double>&
 
 int times_tried(const ContactSpectrum& spectrum) {
   const double count = kPerDecade * decades(spectrum.shortest_s, spectrum.longest_s);
-  return std::clamp(static_cast<int>(std::ceil(count)), kTimes, kMostTried);
+  return static_cast<int>(std::clamp<double>(std::ceil(count), kTimes, kMostTried));
 }
 
 void search(const ContactSpectrum& spectrum, std::vector<double>& times_s, int first, int left,

@@ -54,6 +54,7 @@ class CollocationCandidate final : public LayeredCandidate {
     return fmt::format("collocation_{}{}", shortest(tolerance_), suffix());
   }
   [[nodiscard]] std::string formulation() const override { return "collocation"; }
+  [[nodiscard]] bool cheaper_than_reference() const override { return true; }
   [[nodiscard]] std::string settings() const override {
     return fmt::format("tolerance {}{}", shortest(tolerance_), words());
   }
@@ -117,6 +118,7 @@ class NetworkStepCandidate final : public LayeredCandidate {
   explicit NetworkStepCandidate(int layers) : LayeredCandidate(layers) {}
   [[nodiscard]] std::string name() const override { return "network_step" + suffix(); }
   [[nodiscard]] std::string formulation() const override { return "network_step"; }
+  [[nodiscard]] bool cheaper_than_reference() const override { return false; }
   [[nodiscard]] std::string settings() const override {
     return fmt::format("a step a period, {} stages{}", kStages, words());
   }

@@ -253,12 +253,9 @@ class Planning {
     if (inertia.matters) plan_.masses_left_out = inertia.error;
   }
 
-  /// All that take less than the reference, so that the frontier shows how far claims are off.
   void verify_cheap() {
     for (PlannedCandidate& candidate : plan_.candidates) {
-      const bool reduced =
-          candidate.reach == ModelReach::reduced && candidate.formulation != "network_step";
-      if (candidate.claimed_error && (reduced || candidate.formulation == "collocation"))
+      if (candidate.claimed_error && model_of(candidate).cheaper_than_reference())
         verify(candidate);
     }
   }
@@ -295,21 +292,25 @@ class Planning {
 
 }  // namespace
 
-void set_tolerance(PlanRequest& request, const std::string& text) {
+bool try_set_tolerance(PlanRequest& request, const std::string& text) {
   if (text == "jnd") {
     request.tolerance = kForceJnd;
     request.measure.relative_weight = kForceJnd / kStiffnessJnd;
     request.tolerance_source =
         fmt::format("just noticeable differences: force {} %, stiffness {} %",
                     significant(100.0 * kForceJnd, 3), significant(100.0 * kStiffnessJnd, 3));
-    return;
+    return true;
   }
-  const double value = find_share(text).value_or(0.0);
-  if (!(value >= kLeastTolerance && value <= kMostTolerance)) {
-    throw Error(ExitCode::usage, "--tolerance", fmt::format("'{}'", printable(text)),
-                "a share of the peak such as 1% or 0.01, 1e-6 to 0.5, or jnd");
-  }
-  request.tolerance = value;
+  const std::optional<double> value = find_share(text);
+  if (!value || *value < kLeastTolerance || *value > kMostTolerance) return false;
+  request.tolerance = *value;
+  return true;
+}
+
+void set_tolerance(PlanRequest& request, const std::string& text) {
+  if (try_set_tolerance(request, text)) return;
+  throw Error(ExitCode::usage, "--tolerance", fmt::format("'{}'", printable(text)),
+              "a share of the peak such as 1% or 0.01, 1e-6 to 0.5, or jnd");
 }
 
 double parse_wall_budget(const std::string& text) {

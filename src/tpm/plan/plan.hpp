@@ -52,6 +52,8 @@ struct PlanRequest {
 /// 1e-6 to 0.5, or a threshold of perception: what `--tolerance` means. "1%", "0.01", "jnd".
 /// Throws Error(usage).
 void set_tolerance(PlanRequest& request, const std::string& text);
+/// The same without an error: false if `text` is no tolerance, and the request stays.
+[[nodiscard]] bool try_set_tolerance(PlanRequest& request, const std::string& text);
 /// "0.1 s per s". Throws Error(usage).
 [[nodiscard]] double parse_wall_budget(const std::string& text);
 

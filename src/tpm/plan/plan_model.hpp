@@ -49,6 +49,11 @@ class PlanModel {
   [[nodiscard]] virtual ModelReach reach() const { return ModelReach::reduced; }
   /// It has masses.
   [[nodiscard]] virtual bool has_masses() const { return false; }
+  /// Takes less than the reference: verified even if it is not picked, so that the frontier shows
+  /// how far claims are off.
+  [[nodiscard]] virtual bool cheaper_than_reference() const {
+    return reach() == ModelReach::reduced;
+  }
   /// Tried only if no coarser network meets the tolerance: nearly as dear as the reference.
   [[nodiscard]] virtual bool last_resort() const { return false; }
 

@@ -30,14 +30,14 @@ ExperimentScene plannable(ExperimentScene scene) {
 
 double trajectory_error(const Trajectory& model, const Trajectory& reference,
                         const PlanMeasure& measure) {
-  constexpr double kFelt = 0.1;  // of the peak: less is no stiffness to be felt
+  constexpr double kPerceived = 0.1;  // of the peak: below, no stiffness is perceived
   if (measure.output == PlanOutput::force) {
     const double peak = reference.response.cwiseAbs().maxCoeff();
     const Eigen::VectorXd difference = (model.response - reference.response).cwiseAbs();
     double error = difference.maxCoeff() / peak;
     for (Eigen::Index i = 0; i < difference.size() && measure.relative_weight > 0.0; ++i) {
       const double size = std::abs(reference.response[i]);
-      if (size > kFelt * peak)
+      if (size > kPerceived * peak)
         error = std::max(error, measure.relative_weight * difference[i] / size);
     }
     return error;

@@ -103,9 +103,9 @@ class PlanScene {
   [[nodiscard]] PlanScene deeper(double factor) const;   ///< what is imposed times a factor
   [[nodiscard]] PlanScene faster(double factor) const;   ///< the protocol in less time
   [[nodiscard]] PlanScene stiffer(double factor) const;  ///< E1, E2, E' times a factor
-  [[nodiscard]] PlanScene nothing_relaxing() const;      ///< bonds as stiff as at once, for ever
-  /// Bonds as stiff as when all has relaxed, from the first instant on. An elastic network like the
-  /// other, not one that relaxes fast: following that takes steps without end where E2 >> E1.
+  [[nodiscard]] PlanScene nothing_relaxing() const;  ///< bonds keep their instantaneous stiffness
+  /// Bonds have their equilibrium stiffness from the first instant on. An elastic network like the
+  /// other: one that relaxes fast takes too many steps where E2 >> E1.
   [[nodiscard]] PlanScene all_relaxed() const;
   /// Another protocol of the scene; those of contacts stay.
   [[nodiscard]] PlanScene with_protocol(Protocol protocol) const;

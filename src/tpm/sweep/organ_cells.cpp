@@ -84,11 +84,11 @@ std::vector<std::string> names_of_models(double tolerance) {
   return names;
 }
 
-/// Whether a grid of claims for the cells that share organ and moduli costs less than running them.
+/// Cost of a grid of claims for the cells that share organ and moduli, against running them.
 struct SharedCost {
   double cells = 1.0;  ///< that share them
   double runs = 0.0;   ///< of the network, for the grid
-  [[nodiscard]] bool pays() const { return runs < cells; }
+  [[nodiscard]] bool grid_is_cheaper() const { return runs < cells; }
 };
 
 /// Least and largest of a quantity of the scene over the sweep, SI.
@@ -201,7 +201,7 @@ class OrganCell final : public CellModel {
       }
       fields_.emplace_back(setup.scene, setup.material, s.target, "sweep");
     }
-    if (setup.tolerance && !cost_of_sharing(setup, swept).pays()) plans_ = nullptr;
+    if (setup.tolerance && !cost_of_sharing(setup, swept).grid_is_cheaper()) plans_ = nullptr;
   }
 
   CellAnswer run(std::span<const double> swept, std::span<double> values,
@@ -391,8 +391,8 @@ class OrganSweepModel final : public SweepModel {
         "{} cells share organ and moduli; claims of reduced models for them cost {} "
         "runs of the network: {}",
         significant(cost.cells, 6), significant(cost.runs, 3),
-        cost.pays() ? "the cheapest model that claims to be within the tolerance"
-                    : "the network, at the coarsest tolerance that is enough");
+        cost.grid_is_cheaper() ? "the cheapest model that claims to be within the tolerance"
+                               : "the network, at the coarsest tolerance that is enough");
   }
 
  private:

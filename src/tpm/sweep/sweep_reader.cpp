@@ -32,15 +32,13 @@ SweepReader::SweepReader(const std::filesystem::path& file) : file_(file) {
   for (const std::string& name : file_.texts("/sweep/parameters")) {
     axes_[axis(file_.attribute(path_of(name), "axis"))].parameters.push_back(name);
   }
-  std::vector<std::string> names = file_.texts("/sweep/variables");
-  for (const std::string& name : file_.texts("/sweep/counted")) {
-    names.push_back(fmt::format("count_{}", name));
-  }
-  for (const std::string& name : names) {
+  const auto add = [this](const std::string& name, bool counts) {
     const std::string path = path_of(name), time = fmt::format("/{}_time", name);
     variables_.push_back({name, file_.attribute(path, "units"), file_.attribute(path, "long_name"),
-                          file_.has(time) ? file_.numbers(time) : std::vector<double>{}});
-  }
+                          file_.has(time) ? file_.numbers(time) : std::vector<double>{}, counts});
+  };
+  for (const std::string& name : file_.texts("/sweep/variables")) add(name, false);
+  for (const std::string& name : file_.texts("/sweep/counted")) add("count_" + name, true);
 }
 
 const ReadVariable& SweepReader::variable(const std::string& name) const {

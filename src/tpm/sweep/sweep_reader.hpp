@@ -25,6 +25,7 @@ struct ReadAxis {
 struct ReadVariable {
   std::string name, unit, meaning;
   std::vector<double> times_s;  ///< of a curve
+  bool counts = false;          ///< operations, not a variable
 };
 
 /// Where another axis is fixed.

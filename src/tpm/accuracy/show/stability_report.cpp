@@ -25,23 +25,22 @@ std::string percent(double share) {
   return fmt::format("{} %", significant(100.0 * share, 2));
 }
 
+constexpr double kOnlyRounding = 1e-12;  // an error below it is only rounding
+
 /// "holds, 0.012 %", "diverged".
 std::string verdict_words(const StabilityVerdict& v) {
   std::string name(stability_class_name(v.found));
-  // What is left of rounding is no error to speak of.
-  constexpr double kRounding = 1e-12;
   if (!std::isfinite(v.error)) return name;
-  return name + ", " + (v.error < kRounding ? "exact" : percent(v.error));
+  return name + ", " + (v.error < kOnlyRounding ? "exact" : percent(v.error));
 }
 
 /// The same in a table of a page, whose introduction says that a number alone means "holds" and
 /// that its unit is %: "0.012", "exact", "diverged".
 std::string short_words(const StabilityVerdict& v) {
-  std::string words = verdict_words(v);
-  const std::string holds = fmt::format("{}, ", stability_class_name(StabilityClass::holds));
-  if (words.starts_with(holds)) words.erase(0, holds.size());
-  if (words.ends_with(" %")) words.erase(words.size() - 2);
-  return words;
+  std::string name(stability_class_name(v.found));
+  if (!std::isfinite(v.error)) return name;
+  const std::string error = v.error < kOnlyRounding ? "exact" : significant(100.0 * v.error, 2);
+  return v.found == StabilityClass::holds ? error : name + ", " + error;
 }
 
 constexpr const char* kShortWords =
@@ -217,10 +216,12 @@ Table maps_table(const StabilityStudy& study) {
 
 /// The problem of each map, once for all rules.
 Table problems_table(const StabilityStudy& study) {
-  using Posed = std::pair<std::string, std::string>;
-  const auto posed = [](const StabilityMap& map) { return Posed{map.quantity, map.problem}; };
+  using MapProblem = std::pair<std::string, std::string>;
+  const auto problem_of = [](const StabilityMap& map) {
+    return MapProblem{map.quantity, map.problem};
+  };
   Table table{"", {{"map of the step against"}, {"problem"}}};
-  for (const Posed& both : each_once(study.maps, posed)) {
+  for (const MapProblem& both : each_once(study.maps, problem_of)) {
     table.rows.push_back({{both.first}, {both.second}});
   }
   return table;

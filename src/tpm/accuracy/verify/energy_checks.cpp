@@ -3,7 +3,7 @@
 #include <cmath>
 #include <memory>
 
-#include "tpm/accuracy/posed.hpp"
+#include "tpm/accuracy/benchmark_case.hpp"
 #include "tpm/accuracy/stability/checked_problem.hpp"
 #include "tpm/accuracy/stability/theory.hpp"
 #include "tpm/accuracy/verify/flawed.hpp"
@@ -99,12 +99,12 @@ VerificationCheck organ_balance_check() {
             const BondElement p = paper_element(kStarTau_s);
             const Protocol protocol = pushed_and_held();
             const double work = work_of_push([&](const std::vector<double>& times) {
-              const auto posed =
-                  std::make_shared<PosedNetwork>(StudyOrgan(p, 24).driven, protocol, times);
+              const auto benchmark =
+                  std::make_shared<BenchmarkCase>(StudyOrgan(p, 24).driven, protocol, times);
               MethodSettings settings;
               settings.rule = StepRule::cvode_bdf;
               settings.tolerance = 1e-8;
-              MethodRun run = rules_on(posed)->run(settings, times);
+              MethodRun run = rules_on(benchmark)->run(settings, times);
               if (run.end != MethodEnd::completed) {
                 throw Error(ExitCode::numerical, "work", run.reason);
               }

@@ -7,8 +7,8 @@
 #include <mutex>
 #include <optional>
 
+#include "tpm/accuracy/benchmark_case.hpp"
 #include "tpm/accuracy/contact_reference.hpp"
-#include "tpm/accuracy/posed.hpp"
 #include "tpm/accuracy/stability/checked_problem.hpp"
 #include "tpm/accuracy/stability/theory.hpp"
 #include "tpm/accuracy/verify/flawed.hpp"
@@ -27,7 +27,7 @@ struct KnownProblem {
   std::vector<double> times_s;
   Eigen::VectorXd reference;
   /// With one coefficient wrong by a share.
-  std::function<std::shared_ptr<const MethodProblem>(double flaw)> posed;
+  std::function<std::shared_ptr<const MethodProblem>(double flaw)> with_flaw;
   double step_s = 0.0;  ///< at which a rule of first order shows its order
 
   /// Largest error in parts of the peak.
@@ -64,7 +64,7 @@ KnownProblemPtr element_known(std::string name, const Protocol& protocol) {
   known->source = kClosedForm;
   known->times_s = eighths(0.4);
   known->reference = closed_form_response(p, protocol, known->times_s);
-  known->posed = [p, protocol](double flaw) -> std::shared_ptr<const MethodProblem> {
+  known->with_flaw = [p, protocol](double flaw) -> std::shared_ptr<const MethodProblem> {
     return element_problem(flawed(p, flaw), protocol);
   };
   known->step_s = 1.25e-3;
@@ -84,7 +84,7 @@ KnownProblemPtr moving_known() {
   known->source = "modes of the equation of motion (eigenvectors of a 3 by 3 matrix)";
   known->times_s = eighths(0.2);
   known->reference = linear_motion_m(linear, kLoad_N, known->times_s);
-  known->posed = [=](double flaw) -> std::shared_ptr<const MethodProblem> {
+  known->with_flaw = [=](double flaw) -> std::shared_ptr<const MethodProblem> {
     return element_problem(flawed(p, flaw), creep(kLoad_N, 0.2),
                            MethodMasses{Eigen::VectorXd::Constant(1, kMass_kg), kDrag_per_s});
   };
@@ -101,9 +101,9 @@ KnownProblemPtr star_known() {
   known->source = kClosedForm;
   known->times_s = eighths(0.4);
   known->reference = closed_form_response(p, protocol, known->times_s);
-  known->posed = [p, protocol](double flaw) {
+  known->with_flaw = [p, protocol](double flaw) {
     return rules_on(
-        std::make_shared<PosedNetwork>(driven_star(flawed(p, flaw)), protocol, eighths(0.4)));
+        std::make_shared<BenchmarkCase>(driven_star(flawed(p, flaw)), protocol, eighths(0.4)));
   };
   known->step_s = 1.25e-3;
   return known;
@@ -128,9 +128,9 @@ KnownProblemPtr organ_known() {
   known->times_s = eighths(0.4);
   known->reference = quasi_static_response(StudyOrgan(p, kSpheres).driven, protocol, known->times_s,
                                            {.tolerance = 1e-11});
-  known->posed = [p, protocol](double flaw) {
-    return rules_on(std::make_shared<PosedNetwork>(StudyOrgan(flawed(p, flaw), kSpheres).driven,
-                                                   protocol, eighths(0.4)));
+  known->with_flaw = [p, protocol](double flaw) {
+    return rules_on(std::make_shared<BenchmarkCase>(StudyOrgan(flawed(p, flaw), kSpheres).driven,
+                                                    protocol, eighths(0.4)));
   };
   known->step_s = 1.25e-3;
   return known;
@@ -165,7 +165,7 @@ VerificationCheck rule_check(const KnownProblemPtr& known, const StepRuleEntry& 
   }
   if (rule.adaptive || exact) {
     check.measure = [known, settings](double flaw) {
-      return known->error(*known->posed(flaw), settings);
+      return known->error(*known->with_flaw(flaw), settings);
     };
     return check;
   }
@@ -175,7 +175,7 @@ VerificationCheck rule_check(const KnownProblemPtr& known, const StepRuleEntry& 
   check.expected = rule.order;
   check.tolerance = kOrderTolerance;
   check.measure = [known, settings](double flaw) {
-    const auto problem = known->posed(flaw);
+    const auto problem = known->with_flaw(flaw);
     MethodSettings half = settings;
     half.step_s *= 0.5;
     return std::log2(known->error(*problem, settings) / known->error(*problem, half));
@@ -230,17 +230,17 @@ VerificationCheck inertial_check(std::size_t highest_order) {
           [p, highest_order](double flaw) {
             constexpr double kMass_kg = 0.03, kLoad_N = 0.1, kDampingRatio = 0.5;
             const std::vector<double> times = eighths(0.2);
-            const auto posed_with = [&](const BondElement& material) {
-              auto posed =
-                  std::make_shared<PosedNetwork>(driven_star(material), creep(kLoad_N, 0.2), times);
-              posed->set_masses(Eigen::VectorXd::Constant(4, kMass_kg), kDampingRatio);
-              return posed;
+            const auto case_with = [&](const BondElement& material) {
+              auto benchmark = std::make_shared<BenchmarkCase>(driven_star(material),
+                                                               creep(kLoad_N, 0.2), times);
+              benchmark->set_masses(Eigen::VectorXd::Constant(4, kMass_kg), kDampingRatio);
+              return benchmark;
             };
             LinearElement linear = linear_element(p, 0.0);
             linear.mass_kg = kMass_kg;
-            linear.drag_per_s = posed_with(p)->mass->drag_per_s;
+            linear.drag_per_s = case_with(p)->mass->drag_per_s;
             const std::vector<BenchmarkSetting> settings =
-                inertial_settings(posed_with(flawed(p, flaw)), {1e-9});
+                inertial_settings(case_with(flawed(p, flaw)), {1e-9});
             const BenchmarkAnswer answer =
                 answer_of(settings[highest_order == 2 ? 0 : 1], "inertial");
             return relative_difference(answer.response, linear_motion_m(linear, kLoad_N, times));

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kSampleBalance = 1e-9;  // of stiffness at the contact times the stride
 constexpr double kLeastStride = 1e-3;    // of the longest
-constexpr double kSlow = 0.3;            // of the force left before: a new factorisation pays
+constexpr double kSlow = 0.3;            // of the force left before: a new factorisation is cheaper
 constexpr int kMostIterations = 40;
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/blocks/law_json.hpp"
 #include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm::files {
 namespace {
@@ -68,13 +69,8 @@ void require_terms(const PronyTable& table, ExportTarget target) {
 /// What --relaxation-only drops, and how much of the force that is.
 void add_left_out(const LawFile& law, std::vector<Remark>& remarks) {
   const LawSpec& spec = law.spec;
-  const auto parameters = law_parameters(spec);
-  const auto value_of = [&](std::string_view name) {
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      if (parameters[i].name == name) return law.values[i];
-    }
-    return 0.0;
-  };
+  const LawModel model(spec);
+  const auto value_of = [&](std::string_view name) { return law.values[model.index(name)]; };
   if (spec.kernel == Kernel::power) {
     remarks.push_back({"kernel_left_out",
                        fmt::format("left out: the power kernel (exponent {}); the stiffnesses are "

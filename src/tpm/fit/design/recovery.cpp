@@ -104,11 +104,9 @@ ExperimentResiduals generating_residuals(const PreparedRecording& recording, con
 /// test, are 0 there.
 std::vector<double> true_estimates(const FitResult& fit, const Trials& trials) {
   const LawModel model(trials.law);
-  return mapped<double>(fit.parameters, [&](const ParameterResult& p) {
+  return mapped<double>(fit.config.parameters, [&](const EstimatedParameter& p) {
     // A drift of the zero and a delayed rise belong to the test, too, and are none of the law.
-    const bool of_test =
-        p.nuisance && (p.parameter.name == "drift" || p.parameter.name.starts_with("rise_delay"));
-    return of_test ? 0.0 : trials.true_values[model.index(p.parameter.name)];
+    return p.drift || p.rise ? 0.0 : trials.true_values[model.index(p.fit.name)];
   });
 }
 

@@ -98,6 +98,7 @@ struct Prior {
   double mean = 0.0;
   double sd = 1.0;        ///< > 0
   std::string from = {};  ///< what measured it, in words
+  bool measured = true;   ///< else a limit of what is known, which remarks name
 };
 
 /// A change of the zero of a recording that is linear in time: slope (t - origin) is added to the

@@ -44,7 +44,8 @@ std::vector<std::size_t> scope_of(const std::vector<Placed<std::string>>& names,
 
 std::optional<Prior> prior_of(const std::optional<StatedPrior>& stated, Dimension dimension) {
   if (!stated) return std::nullopt;
-  const Prior prior{stated->mean.in(dimension), stated->sd.in(dimension), stated->from};
+  const Prior prior{stated->mean.in(dimension), stated->sd.in(dimension), stated->from,
+                    stated->measured};
   if (prior.sd > 0.0) return prior;
   throw bad_input(stated->sd.place.where, "not above 0", "a standard deviation above 0");
 }

@@ -25,7 +25,11 @@ const Block<StatedPrior>& prior_block() {
       "prior", "a normal distribution, whose residual (value - mean) / sd is added to the fit",
       {required(key("mean", &P::mean, stated_quantity(), "its mean")),
        required(key("sd", &P::sd, stated_quantity(), "its standard deviation")),
-       key("from", &P::from, text_if_any(), "what measured it")});
+       key("from", &P::from, text_if_any(), "what measured it"),
+       with_default(key("measured", &P::measured, flag(),
+                        "a measurement found it; false: a limit of what is known, and every fit "
+                        "reports how far the estimate moved from it"),
+                    true)});
   return block;
 }
 

@@ -81,6 +81,7 @@ struct StatedData {
 struct StatedPrior {
   StatedQuantity mean, sd;
   std::string from;
+  bool measured = true;
 };
 
 /// A recording and times of it.

@@ -114,11 +114,12 @@ Prior zero_prior(const PreparedRecording& r, const RestReadings& rests) {
   if (r.instrument && r.instrument->zero && *r.instrument->zero > 0.0) {
     return {0.0, *r.instrument->zero,
             fmt::format("stated by instrument {}: no samples before contact tell the zero",
-                        r.instrument->id)};
+                        r.instrument->id),
+            false};
   }
   const double floor = std::abs(r.phases.floor_response);
   return {0.0, std::max(floor, kStated * std::abs(r.phases.peak_response)),
-          "stated: no samples before contact tell the zero"};
+          "stated: no samples before contact tell the zero", false};
 }
 
 Prior contact_prior(const Onset& onset) {
@@ -131,7 +132,7 @@ Prior contact_prior(const Onset& onset) {
     from = fmt::format("onset extrapolated from {} samples, the first {} % of the ramp",
                        onset.samples, significant(100.0 * onset.part, 2));
   }
-  return {onset.drive.value, onset.drive.sd, std::move(from)};
+  return {onset.drive.value, onset.drive.sd, std::move(from), onset.from_rest};
 }
 
 /// "mN/s": drifts of a force are small.

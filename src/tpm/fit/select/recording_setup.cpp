@@ -384,6 +384,7 @@ Json config_json(const FitConfig& config) {
       entry["prior"] = {{"mean", text(p.prior->mean, p.fit.unit)},
                         {"sd", text(p.prior->sd, p.fit.unit)}};
       if (!p.prior->from.empty()) entry["prior"]["from"] = p.prior->from;
+      if (!p.prior->measured) entry["prior"]["measured"] = false;
     }
     if (p.drift) {
       entry["drift"] = {{"of", config.data[p.drift->choice].dataset},

@@ -167,7 +167,7 @@ ReadingScatter scatter_of(const PreparedRecording& recording, const RecordingPar
   ReadingScatter scatter;
   std::size_t first = parts.ramp_first, last = parts.ramp_last;
   const std::size_t before = parts.ramp_first + 1;
-  bool hold = false;
+  bool hold = false, rest = false;
   const auto at_limit = [&](std::size_t i) { return clipped[static_cast<Eigen::Index>(i)]; };
   std::size_t held = parts.has_hold() ? *parts.hold_first : 0;  // after the last clipped reading
   for (std::size_t i = held; parts.has_hold() && i <= *parts.hold_last; ++i) {
@@ -185,6 +185,7 @@ ReadingScatter scatter_of(const PreparedRecording& recording, const RecordingPar
     first = 0;
     last = parts.ramp_first;
     scatter.told_by = "before contact";
+    rest = true;
   } else {
     scatter.told_by = "the ramp";
   }
@@ -201,7 +202,6 @@ ReadingScatter scatter_of(const PreparedRecording& recording, const RecordingPar
   for (std::size_t i = 0; i < n; ++i) x[i] = (t[i] - t[0]) / (t[n - 1] - t[0]);
   scatter.step_s = median_step(t);
   scatter.count = n;
-  const bool rest = scatter.told_by == "before contact";
   constexpr Eigen::Index kMostShapes = 5, kMostAnswers = 6;
   Eigen::MatrixXd shapes = rest ? Eigen::MatrixXd(y.size(), 0) : smooth_shapes(x, hold);
   Eigen::Index most = kMostShapes;

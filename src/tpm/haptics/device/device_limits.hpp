@@ -11,8 +11,8 @@ namespace tpm::haptics {
 /// gate trusts it.
 inline constexpr double kMostHandleFriction_N_s_per_m = 10.0;
 
-/// Stop of the Omega.7 along x, from the centre: half of the 110 mm of its data sheet, as
-/// remembered; assumed.
+/// Stop of the Omega.7 along x, from the centre: half of the 110 mm of its data sheet,
+/// which was not looked up; assumed.
 inline constexpr double kOmega7StopAlongX_m = 0.055;
 
 /// Limits of a kind of device. Numbers that nobody has measured here are marked.

@@ -8,7 +8,7 @@
 
 namespace tpm::haptics {
 
-/// 160 mm diameter and 110 mm length: the maker's data sheet, as remembered; assumed. Wider across
+/// 160 mm diameter and 110 mm length: the maker's data sheet, not looked up; assumed. Wider across
 /// and shorter along than the sphere of DeviceLimits::reach_m. Sessions have to fit into both
 /// (require_within()).
 inline constexpr CylinderWorkspace kOmega7Workspace{0.080, kOmega7StopAlongX_m};

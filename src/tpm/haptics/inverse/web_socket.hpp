@@ -38,7 +38,7 @@ using FrameMask = std::array<std::uint8_t, 4>;
                                       bool final_frame = true);
 /// Payload of a close frame.
 [[nodiscard]] std::string close_payload(std::uint16_t code, std::string_view reason);
-/// Four bytes that nobody can foretell, from the system.
+/// Four unpredictable bytes of the system's random source.
 [[nodiscard]] FrameMask fresh_mask();
 
 [[nodiscard]] bool is_utf8(std::string_view text) noexcept;

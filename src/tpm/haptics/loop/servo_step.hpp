@@ -23,11 +23,11 @@ namespace tpm::haptics {
 ///
 ///     C = min(limit, F_before + s T),   limit = ramp-in's part of force_limit_N,
 ///
-/// the model's tool is set back by d >= 0 along the push so that F <= C as far as the stiffness
-/// foretells; what is sent is min(F, C). The work of the hand is that of the model's tool plus
-/// F d >= 0: a slip takes energy and never gives any (exact where F <= C; where the tissue is
-/// stiffer than predicted, F - C lasts one period). While the force is zero the model's tool
-/// recovers towards the hand, which costs nothing.
+/// the model's tool is set back by d >= 0 along the push so that the force predicted from
+/// the stiffness is <= C; what is sent is min(F, C). The work of the hand is that of the model's
+/// tool plus F d >= 0: a slip takes energy and never gives any (exact where F <= C; where the
+/// tissue is stiffer than predicted, F - C lasts one period). While the force is zero the model's
+/// tool recovers towards the hand, which costs nothing.
 ///
 /// **Damping.** Once the rendering has given energy away, the passivity controller adds damping.
 /// The sum never pulls the hand towards the tissue, rises no faster than the limit of the rise
@@ -50,7 +50,7 @@ class ServoStep {
   ///        cycle and the next ones, at most kMostSteps periods in each
   /// @return none to go on; the row is filled either way, and the device is stopped if not none
   StopCause cycle(int missed, ServoRecord& row) noexcept;
-  /// Zero force, forces off. Bounded. Remembers the first cause.
+  /// Zero force, forces off. Bounded. Keeps the first cause.
   void stop(StopCause cause) noexcept;
   /// After the loop: completes the cause of a lost connection with what the device has learned.
   void complete_cause() noexcept {
@@ -75,9 +75,9 @@ class ServoStep {
   static constexpr double kMostDamped = 0.05, kDampedWindow_s = 5.0;
 
  private:
-  /// A force of the model and how it came about.
-  struct Felt {
-    double model_N = 0.0, withdrawn_m = 0.0;
+  /// A force of the model, and the motion and the periods that led to it.
+  struct ModelForce {
+    double force_N = 0.0, withdrawn_m = 0.0;
     int steps = 1;
     bool touching = false, valid = true;
   };
@@ -95,7 +95,8 @@ class ServoStep {
   [[nodiscard]] Cap cap() const noexcept;
   [[nodiscard]] double recovery_m() const noexcept;
   void learn_stiffness(double rise_N, double moved_m) noexcept;
-  [[nodiscard]] double rendered_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept;
+  [[nodiscard]] double rendered_N(const ModelForce& model, const Cap& cap,
+                                  ServoRecord& row) noexcept;
   void count_limits(std::uint32_t flags) noexcept;
   [[nodiscard]] Eigen::Vector3d with_damping(ServoRecord& row) noexcept;
   [[nodiscard]] StopCause check_rendering(int periods) noexcept;

@@ -37,7 +37,7 @@ ServoStep::Cap ServoStep::cap() const noexcept {
   return {limit, ramp < 1.0 ? kRampingIn : kForceLimited};
 }
 
-/// How far the model's tool comes back to the hand in a cycle in which nothing is felt: no faster
+/// How far the model's tool comes back to the hand in a cycle without force: no faster
 /// than a force may rise.
 double ServoStep::recovery_m() const noexcept {
   return settings_.slew_limit_N_per_s * settings_.period_s / stiffness_N_per_m_;
@@ -52,22 +52,22 @@ void ServoStep::learn_stiffness(double rise_N, double moved_m) noexcept {
 }
 
 /// What is sent of a force that the model answers.
-double ServoStep::rendered_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept {
+double ServoStep::rendered_N(const ModelForce& model, const Cap& cap, ServoRecord& row) noexcept {
   constexpr double kForgetting = 0.1;
-  was_outside_validity_ = !felt.valid;
-  if (felt.valid) {
+  was_outside_validity_ = !model.valid;
+  if (model.valid) {
     outside_validity_steps_ =
-        std::max(0.0, outside_validity_steps_ - kForgetting * static_cast<double>(felt.steps));
-    if (felt.model_N > cap.force_N) row.flags |= cap.flag;
-    return std::min(felt.model_N, cap.force_N);
+        std::max(0.0, outside_validity_steps_ - kForgetting * static_cast<double>(model.steps));
+    if (model.force_N > cap.force_N) row.flags |= cap.flag;
+    return std::min(model.force_N, cap.force_N);
   }
-  outside_validity_steps_ += static_cast<double>(felt.steps);
+  outside_validity_steps_ += static_cast<double>(model.steps);
   row.flags |= kBeyondModel;
-  if (!felt.touching) return 0.0;
+  if (!model.touching) return 0.0;
   const double before_N = tissue_size_N_;
-  const double fallen = before_N - stiffness_N_per_m_ * std::max(0.0, felt.withdrawn_m);
-  const double faded =
-      before_N * std::exp(-static_cast<double>(felt.steps) * settings_.period_s / settings_.fade_s);
+  const double fallen = before_N - stiffness_N_per_m_ * std::max(0.0, model.withdrawn_m);
+  const double faded = before_N * std::exp(-static_cast<double>(model.steps) * settings_.period_s /
+                                           settings_.fade_s);
   return std::max(0.0, std::min(fallen, faded));
 }
 

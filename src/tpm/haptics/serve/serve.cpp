@@ -62,9 +62,8 @@ ServeRun serve_session(const HilSession& session, const ServeOptions& options) {
   LoopModel model = make_loop_model(session);
   const std::shared_ptr<ContactModel> stepped = std::move(model.model);
   run.rendering = check_rendering(session, *stepped, model, limits);
-  if (!run.rendering.acceptable()) {
-    throw Error(ExitCode::answer_is_no, std::string(run.rendering.unmet(false)),
-                run.rendering.verdict(), std::string(run.rendering.remedy(false)));
+  if (const auto unmet = run.rendering.unmet(false)) {
+    throw Error(ExitCode::answer_is_no, to_string(*unmet), run.rendering.verdict(), remedy(*unmet));
   }
   SimulatedHandSettings hand_settings;
   hand_settings.plant = session.plant;

@@ -154,6 +154,25 @@ double IdentifyingForce::next_N(double at_m) noexcept {
                     kMostIdentifyingForce_N);
 }
 
+namespace {
+
+/// Why forces and motion tell nothing of the handle; empty if they do.
+std::string unusable_motion(const std::vector<IdentificationSample>& samples, double stroke_m,
+                            double step_m) {
+  const auto saturated = std::ranges::count_if(samples, &IdentificationSample::saturated);
+  if (saturated > 0) {
+    return fmt::format(
+        "the motors were saturated in {} of {} cycles, so that the force on the handle is not "
+        "known",
+        saturated, samples.size());
+  }
+  if (stroke_m >= kFewestSteps * step_m && stroke_m > 0.0) return {};
+  return fmt::format("the stroke of {} mm is below {} steps of the encoder",
+                     significant(1e3 * stroke_m, 3), kFewestSteps);
+}
+
+}  // namespace
+
 DeviceIdentification identify_device(const std::vector<IdentificationSample>& samples,
                                      double period_s) {
   DeviceIdentification found;
@@ -173,19 +192,8 @@ DeviceIdentification identify_device(const std::vector<IdentificationSample>& sa
   if (!found.encoder_step_m) {
     found.not_identified.emplace_back("encoder step: changes of the position have no common step");
   }
-  const auto saturated = std::count_if(samples.begin(), samples.end(),
-                                       [](const auto& sample) { return sample.saturated; });
-  if (saturated > 0) {
-    found.not_identified.push_back(
-        fmt::format("delay, friction, mass: the motors were saturated in {} of {} cycles, so that "
-                    "the force on the handle is not known",
-                    saturated, samples.size()));
-    return found;
-  }
-  if (!(found.stroke_m >= kFewestSteps * step_m) || found.stroke_m <= 0.0) {
-    found.not_identified.push_back(
-        fmt::format("delay, friction, mass: the stroke of {} mm is below {} steps of the encoder",
-                    significant(1e3 * found.stroke_m, 3), kFewestSteps));
+  if (std::string why = unusable_motion(samples, found.stroke_m, step_m); !why.empty()) {
+    found.not_identified.push_back("delay, friction, mass: " + why);
     return found;
   }
   const double least_m = 2.0 * step_m;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tpm/base/text.hpp"
+#include "tpm/haptics/loop/servo_counts.hpp"
 #include "tpm/haptics/session/recording.hpp"
 
 namespace tpm::haptics {
@@ -136,20 +137,8 @@ void LiveView::opened(const DeviceIdentity& device, const LoopModel& model) {
 }
 
 void LiveView::count(const ServoRecord& row) {
-  ServoCounts& counts = state_.counts;
-  const auto flagged = [&row](ServoFlag flag) {
-    return static_cast<std::uint64_t>((row.flags & flag) != 0);
-  };
-  counts.time_guards += flagged(kTimeGuarded);
-  counts.saturations += flagged(kSaturated);
-  counts.force_limited += flagged(kForceLimited);
-  counts.slipped += flagged(kSlipping);
-  counts.ramping_in += flagged(kRampingIn);
-  counts.damped += flagged(kDamped);
-  counts.beyond_model += flagged(kBeyondModel);
-  counts.late += flagged(kLate);
+  add_to(state_.counts, row);
   const auto missed = static_cast<std::uint64_t>(row.missed);
-  counts.missed += missed;
   if (row.stop != StopCause::finished) count_late(row.missed);
   const std::uint64_t expected = state_.begun ? state_.last.cycle + 1 + missed : missed;
   if (row.cycle > expected) state_.lost += row.cycle - expected;
@@ -279,13 +268,7 @@ std::string LiveView::scene_json() const {
   return scene_;
 }
 
-std::string LiveView::state_json(std::uint64_t after) const {
-  watched_ = true;
-  State s;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    s = state_;
-  }
+Json LiveView::trace_json(const State& s, std::uint64_t after) {
   const std::uint64_t end = s.first_point + s.points.size();
   const std::uint64_t first = std::clamp(after, s.first_point, end);
   Json trace{{"first", first}};
@@ -304,6 +287,16 @@ std::string LiveView::state_json(std::uint64_t after) const {
   column("commanded_N", &Point::commanded_N);
   column("least_commanded_N", &Point::least_N);
   column("most_commanded_N", &Point::most_N);
+  return trace;
+}
+
+std::string LiveView::state_json(std::uint64_t after) const {
+  watched_ = true;
+  State s;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    s = state_;
+  }
   const ServoRecord& row = s.last;
   const Json json{
       {"begun", s.begun},
@@ -342,7 +335,7 @@ std::string LiveView::state_json(std::uint64_t after) const {
         {"lost_records", s.lost}}},
       {"counts", to_json(s.counts)},
       {"displacement_um", s.displacement_um},
-      {"trace", std::move(trace)}};
+      {"trace", trace_json(s, after)}};
   return json.dump();
 }
 

@@ -51,6 +51,8 @@ class LiveView {
     StopCause cause = StopCause::none;
     std::string detail;
   };
+  /// The points from the one numbered `after` on.
+  [[nodiscard]] static Json trace_json(const State& s, std::uint64_t after);
   void count(const ServoRecord& row);
   void count_late(int missed);
   [[nodiscard]] Eigen::Vector3d tool_of(const ServoRecord& row) const;

@@ -185,17 +185,15 @@ LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOpt
   }
   require_within(session_, limits);
   rendering_ = check_rendering(session_, *loop_.model, loop_, limits);
-  const std::string refusal = rendering_.refusal(options.accept_unstable);
-  if (!refusal.empty()) {
-    const std::string_view condition = rendering_.unmet(options.accept_unstable);
-    std::string expected(rendering_.remedy(options.accept_unstable));
-    if (condition == "stability" || condition == "delay") {
+  if (const auto unmet = rendering_.unmet(options.accept_unstable)) {
+    std::string expected(remedy(*unmet));
+    if (*unmet == RenderingCondition::stability || *unmet == RenderingCondition::delay) {
       expected =
           "a device file with a measured delay (tpm hil identify), a softer tissue or a higher "
           "rate; the device 'virtual' where nothing has motors";
     }
-    throw Error(ExitCode::answer_is_no, fmt::format("{}: {}", file.string(), condition), refusal,
-                expected);
+    throw Error(ExitCode::answer_is_no, fmt::format("{}: {}", file.string(), to_string(*unmet)),
+                rendering_.refusal(options.accept_unstable), expected);
   }
   settings_ = loop_settings(endless(on_device(session_, limits), options), loop_, rendering_, true);
   displacement_m_ = Eigen::Matrix3Xd::Zero(3, spheres());

@@ -163,12 +163,12 @@ int outside_validity_on_push(ContactModel& model, const HilSession& session,
   constexpr double kMostSteps = 2e4;  // slower pushes are looked at as one of so many periods
   const double periods = depth_m / (slowest_m_per_s * session.servo.period_s);
   const int steps = static_cast<int>(std::clamp(std::ceil(periods), 1.0, kMostSteps));
-  int doubted = 0;
+  int outside = 0;
   for (int i = 1; i <= steps; ++i) {
-    if (!model.step(static_cast<double>(i) / steps * depth_m * push).valid) ++doubted;
+    if (!model.step(static_cast<double>(i) / steps * depth_m * push).valid) ++outside;
   }
   model.reset();
-  return doubted;
+  return outside;
 }
 
 }  // namespace
@@ -181,7 +181,7 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
   budget.rate_Hz = 1.0 / session.servo.period_s;
   std::string reason = "no candidate that a loop steps";
   std::optional<LoopModel> found;
-  int least_doubted = std::numeric_limits<int>::max();
+  int fewest_outside = std::numeric_limits<int>::max();
   for (const auto& candidate : formulation.as<PlanOffer>()->candidates(surrogate.scene())) {
     if (!candidate->for_loop()) continue;
     if (const auto why = candidate->why_not(surrogate, budget)) {
@@ -193,12 +193,12 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
     auto models = candidate->contacts(surrogate, std::array{session.servo.period_s, kDrawnEvery_s});
     loop.model = std::move(models.front());
     if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());
-    const int doubted =
+    const int outside =
         outside_validity_on_push(*loop.model, session, pushed.probe().direction, pushed.deepest_m);
-    if (doubted >= least_doubted) continue;
-    least_doubted = doubted;
+    if (outside >= fewest_outside) continue;
+    fewest_outside = outside;
     found = std::move(loop);
-    if (doubted == 0) break;
+    if (outside == 0) break;
   }
   if (found) return std::move(*found);
   throw bad_input(session.scene_place,

@@ -199,22 +199,41 @@ std::string RenderingCheck::refusal(bool accept_unstable) const {
   return {};
 }
 
-std::string_view RenderingCheck::unmet(bool accept_unstable) const {
-  if (!stable() && !accept_unstable) return "stability";
-  if (!within_device()) return "stiffness limit of the device";
-  if (!follows_encoder()) return "slew limit";
-  if (!safe_in_hands() && !accept_unstable) return "stability";
-  return delay_is_guarded() ? "" : "delay";
+std::optional<RenderingCondition> RenderingCheck::unmet(bool accept_unstable) const {
+  if (!stable() && !accept_unstable) return RenderingCondition::stability;
+  if (!within_device()) return RenderingCondition::device_stiffness;
+  if (!follows_encoder()) return RenderingCondition::slew_limit;
+  if (!safe_in_hands() && !accept_unstable) return RenderingCondition::stability;
+  if (!delay_is_guarded()) return RenderingCondition::delay;
+  return std::nullopt;
 }
 
-std::string_view RenderingCheck::remedy(bool accept_unstable) const {
-  const std::string_view condition = unmet(accept_unstable);
-  if (condition == "stability") {
-    return "a softer tissue, a higher rate, a shorter delay or a faster rise";
+std::string_view to_string(RenderingCondition condition) {
+  switch (condition) {
+    case RenderingCondition::stability:
+      return "stability";
+    case RenderingCondition::device_stiffness:
+      return "stiffness limit of the device";
+    case RenderingCondition::slew_limit:
+      return "slew limit";
+    case RenderingCondition::delay:
+      break;
   }
-  if (condition == "slew limit") return "a faster rise (limits/slew_N_per_s) or a softer tissue";
-  if (condition == "delay") return "a device with a shorter delay";
-  return condition.empty() ? "" : "a softer tissue";
+  return "delay";
+}
+
+std::string_view remedy(RenderingCondition condition) {
+  switch (condition) {
+    case RenderingCondition::stability:
+      return "a softer tissue, a higher rate, a shorter delay or a faster rise";
+    case RenderingCondition::device_stiffness:
+      return "a softer tissue";
+    case RenderingCondition::slew_limit:
+      return "a faster rise (limits/slew_N_per_s) or a softer tissue";
+    case RenderingCondition::delay:
+      break;
+  }
+  return "a device with a shorter delay";
 }
 
 std::string RenderingCheck::verdict() const {

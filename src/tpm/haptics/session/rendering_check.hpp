@@ -11,6 +11,11 @@
 
 namespace tpm::haptics {
 
+/// A condition of a rendering that is checked before a session.
+enum class RenderingCondition { stability, device_stiffness, slew_limit, delay };
+/// As a message begins: "stability", "stiffness limit of the device", "slew limit", "delay".
+[[nodiscard]] std::string_view to_string(RenderingCondition condition);
+
 /// Can this tissue be rendered on this device? Found before a session begins.
 struct RenderingCheck {
   double rate_Hz = 0.0;
@@ -47,9 +52,9 @@ struct RenderingCheck {
     return !unstable() && stiffness_N_per_m <= kRoom * stable_N_per_m;
   }
   [[nodiscard]] bool within_device() const { return stiffness_N_per_m <= largest_N_per_m; }
-  /// A step of the encoder is felt as it is. Where it makes a larger force than may come within a
-  /// period, the model's tool slips back at every step towards the tissue and does not come forward
-  /// again at those away from it: the force that is felt is too small, and never at rest.
+  /// A step of the encoder changes the force by less than the force may rise within a period. Else
+  /// the model's tool slips back at every step towards the tissue and does not come forward again
+  /// at those away from it: the force rendered is too small, and never at rest.
   [[nodiscard]] bool follows_encoder() const {
     return stiffness_N_per_m * encoder_step_m <= rise_N * (1.0 + 1e-12);
   }
@@ -66,15 +71,15 @@ struct RenderingCheck {
   /// @param accept_unstable instability is no reason, with the operator's arm or with six hands;
   ///        each other reason still is
   [[nodiscard]] std::string refusal(bool accept_unstable) const;
-  /// The condition that is not met, as a message begins: stability, stiffness limit of the device,
-  /// slew limit, delay. Empty: none.
-  [[nodiscard]] std::string_view unmet(bool accept_unstable) const;
-  /// What to change so that this condition is met; empty: nothing.
-  [[nodiscard]] std::string_view remedy(bool accept_unstable) const;
+  /// The condition that is not met; empty: none.
+  [[nodiscard]] std::optional<RenderingCondition> unmet(bool accept_unstable) const;
   static constexpr double kRoom = 0.8;  ///< share of stable_N_per_m that is allowed
   /// One line: passive, stable, too little margin, or why not.
   [[nodiscard]] std::string verdict() const;
 };
+
+/// What to change so that a condition is met.
+[[nodiscard]] std::string_view remedy(RenderingCondition condition);
 
 /// The stiffness is that of the model's own steps: pushed to four depths up to the session's
 /// deepest, then a little further within one period; of a tool that moves in space the largest of

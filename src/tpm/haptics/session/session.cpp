@@ -190,10 +190,8 @@ void set_tolerance_of(HilSession& session, const SessionModelKeys& model,
   if (session.model != kPlannedModel) {
     throw bad_input(at.where, printable(*model.tolerance), "none but with the kind 'planned'");
   }
-  try {
-    PlanRequest request;
-    set_tolerance(request, *model.tolerance);
-  } catch (const Error&) {
+  PlanRequest unused;
+  if (!try_set_tolerance(unused, *model.tolerance)) {
     throw bad_input(at.where, "'" + printable(*model.tolerance) + "'",
                     "a share of the peak such as 1% or 0.01, 1e-6 to 0.5, or jnd");
   }

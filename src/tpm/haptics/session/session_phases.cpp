@@ -8,6 +8,7 @@
 #include "tpm/base/text.hpp"
 #include "tpm/files/import/recording_file.hpp"
 #include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm::haptics {
 namespace {
@@ -139,21 +140,14 @@ double longest_time_s(const LawFile& law) {
   return longest;
 }
 
-/// 0 if the law has no such parameter.
-double parameter_of(const LawFile& law, std::string_view name) {
-  const std::vector<LawParameter> parameters = law_parameters(law.spec);
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (parameters[i].name == name) return law.values[i];
-  }
-  return 0.0;
-}
-
 }  // namespace
 
 Json embedded_motion(const std::filesystem::path& file, const LawFile& law, double period_s,
                      const DocumentPlace& place) {
   constexpr double kMostSamples = 20000.0, kRelaxed = 10.0, kLongestWait_s = 600.0;
-  const double contact_m = parameter_of(law, "contact"), offset_N = parameter_of(law, "offset");
+  const LawModel model(law.spec);
+  const double contact_m = law.values[model.index("contact")];
+  const double offset_N = law.values[model.index("offset")];
   const Recording recording = read_recording_file(file, {}).recording;
   if (recording.drive_quantity != Quantity::indentation_depth) {
     throw bad_input(place.where,

@@ -69,13 +69,14 @@ class Markers {
   Json list_ = Json::array();
 };
 
-/// @param prepare prepares the device and lets the recording appear
-ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
-                      const std::shared_ptr<ContactModel>& stepped, const ServoSettings& servo,
-                      const SessionRunOptions& options, RowLogWriter& log, Markers& markers,
-                      double& largest_force_N, FindingNotices& notices,
-                      const std::function<void()>& prepare) {
-  const RecordSink sink = [&](const ServoRecord& written) {
+/// What a session writes while its loop runs.
+struct SessionLog {
+  RowLogWriter& rows;
+  Markers& markers;
+  FindingNotices& notices;
+  double& largest_force_N;
+
+  void take(const ServoRecord& written, const std::function<void(const ServoRecord&)>& watcher) {
     ServoRecord row = written;
     const bool waits = row.phase < 0 && row.stop == StopCause::none;
     if (waits) {
@@ -84,10 +85,18 @@ ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDev
       markers.see(row);
       const Eigen::Map<const Eigen::Vector3d> force_N(row.commanded_N);
       largest_force_N = std::max(largest_force_N, force_N.norm());
-      log.append(&row);
+      rows.append(&row);
     }
-    if (options.watcher) options.watcher(row);
-  };
+    if (watcher) watcher(row);
+  }
+};
+
+/// @param prepare prepares the device and lets the recording appear
+ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
+                      const std::shared_ptr<ContactModel>& stepped, const ServoSettings& servo,
+                      const SessionRunOptions& options, SessionLog log,
+                      const std::function<void()>& prepare) {
+  const RecordSink sink = [&](const ServoRecord& row) { log.take(row, options.watcher); };
   if (!options.real_time) {
     prepare();
     return run_in_virtual_time(*device, *stepped, servo, sink, options.interrupted);
@@ -95,10 +104,10 @@ ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDev
   RealTimeOptions real = real_time_options(session, options.wish, options.interrupted);
   real.prepare = prepare;
   std::int64_t passed_on_ns = now_ns();
-  real.idle = [&log, &notices, &passed_on_ns] {
+  real.idle = [&log, &passed_on_ns] {
     if (now_ns() - passed_on_ns < kPassOnEvery_ns) return;
-    log.flush();
-    notices.look();
+    log.rows.flush();
+    log.notices.look();
     passed_on_ns = now_ns();
   };
   return run_in_real_time(device, stepped, servo, sink, real);
@@ -110,11 +119,11 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
     throw Error(ExitCode::usage, "--accept-unstable", "is not for the device '" + choice.kind + "'",
                 "--device virtual");
   }
-  const std::string refusal = rendering.refusal(options.accept_unstable);
-  if (refusal.empty() || choice.kind == "replay") return;
-  const std::string_view condition = rendering.unmet(options.accept_unstable);
-  std::string expected(rendering.remedy(options.accept_unstable));
-  const bool by_delay = condition == "stability" || condition == "delay";
+  const auto unmet = rendering.unmet(options.accept_unstable);
+  if (!unmet || choice.kind == "replay") return;
+  std::string expected(remedy(*unmet));
+  const bool by_delay =
+      *unmet == RenderingCondition::stability || *unmet == RenderingCondition::delay;
   if (!limits.plant && by_delay) {
     expected +=
         "; a device file with a measured delay (tpm hil identify); the device 'virtual', where "
@@ -122,7 +131,8 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
   } else if (limits.plant && rendering.acceptable_if_unstable()) {
     expected += "; --accept-unstable";
   }
-  throw Error(ExitCode::answer_is_no, std::string(condition), refusal, expected);
+  throw Error(ExitCode::answer_is_no, to_string(*unmet), rendering.refusal(options.accept_unstable),
+              expected);
 }
 
 std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
@@ -225,8 +235,8 @@ SessionRun run_admitted(AdmittedSession admitted, const HilSession& session,
     const ServoSettings servo =
         loop_settings(session, run.model, run.rendering, choice.kind != "replay");
     Markers markers(options.markers);
-    run.outcome = run_loop(session, device, admitted.stepped, servo, options, log, markers,
-                           run.largest_force_N, notices, [&] {
+    run.outcome = run_loop(session, device, admitted.stepped, servo, options,
+                           {log, markers, notices, run.largest_force_N}, [&] {
                              device->prepare(preparation);
                              log.appear();
                            });

@@ -75,7 +75,7 @@ struct SessionRun {
   std::vector<DeviceFinding> findings;  ///< of the device
 };
 
-/// Forces below this are not felt through a handle, N; assumed.
+/// Smallest force perceived through a handle, N; assumed.
 inline constexpr double kLeastFeltForce_N = 0.01;
 
 /// In real time a machine that stalls ends no rehearsal, check or identification on the simulated

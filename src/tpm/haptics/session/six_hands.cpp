@@ -15,7 +15,7 @@ double largest_stiffness_for_hands(double delay_s, double friction_N_s_per_m, do
 
 PlantSettings plant_with_hand(const SafeHand& hand, double friction_N_s_per_m) {
   PlantSettings plant;
-  constexpr double kOfDevice = 0.5;  // of the mass: only the sum is felt
+  constexpr double kOfDevice = 0.5;  // of the mass: only the sum matters
   plant.mass_kg = kOfDevice * hand.mass_kg;
   plant.arm.mass_kg = hand.mass_kg - plant.mass_kg;
   plant.damping_N_s_per_m = friction_N_s_per_m;

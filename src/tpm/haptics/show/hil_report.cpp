@@ -7,6 +7,7 @@
 #include "tpm/base/printed_number.hpp"
 #include "tpm/base/text.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/haptics/loop/servo_counts.hpp"
 #include "tpm/show/draw.hpp"
 #include "tpm/show/run_record.hpp"
 
@@ -267,6 +268,7 @@ void add_experiment(Document& d, const Verification& v) {
 }
 
 void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
+  const ServoCounts& n = s.counts;
   d.heading(2, "Timing, limits, end");
   std::vector<Cell> lines;
   lines.push_back(
@@ -290,14 +292,14 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
   lines.push_back({fmt::format(
       "{} cycles; missed periods {}; time guards {}; saturations {}; limited by force {}, "
       "slipped {}, limited while ramping in {}; damped {}",
-      s.cycles, s.missed, s.time_guards, s.saturations, s.force_limited, s.slipped, s.ramping_in,
-      s.damped)});
-  if (s.beyond_model == 0) {
+      s.cycles, n.missed, n.time_guards, n.saturations, n.force_limited, n.slipped, n.ramping_in,
+      n.damped)});
+  if (n.beyond_model == 0) {
     lines.push_back({"within the range that the model is good for in every cycle"});
   } else {
     lines.push_back(
         {fmt::format("beyond the range that the model is good for in {} cycles, first at {} s",
-                     s.beyond_model, significant(s.first_beyond_s, 6)),
+                     n.beyond_model, significant(s.first_beyond_s, 6)),
          Tone::bad});
   }
   d.bullets(std::move(lines));
@@ -358,20 +360,11 @@ RecordingSummary summary_of(const HilRecording& recording) {
   RecordingSummary s;
   s.cause = recording.cause();
   for (const ServoRecord& row : recording.rows) {
-    const auto has = [&](ServoFlag flag) -> std::uint64_t {
-      return (row.flags & flag) != 0 ? 1 : 0;
-    };
     ++s.cycles;
-    s.missed += static_cast<std::uint64_t>(row.missed);
-    s.time_guards += has(kTimeGuarded);
-    s.saturations += has(kSaturated);
-    s.force_limited += has(kForceLimited);
-    s.slipped += has(kSlipping);
-    s.ramping_in += has(kRampingIn);
-    s.damped += has(kDamped);
-    if (has(kBeyondModel) != 0 && s.beyond_model++ == 0) {
+    if (s.counts.beyond_model == 0 && (row.flags & kBeyondModel) != 0) {
       s.first_beyond_s = static_cast<double>(row.cycle) * recording.session.servo.period_s;
     }
+    add_to(s.counts, row);
     if (row.stop != StopCause::none) continue;  // nothing was rendered in the last one
     s.observed_end_J = row.observed_J;
     s.observed_least_J = std::min(s.observed_least_J, row.observed_J);

@@ -35,8 +35,8 @@ namespace tpm::haptics {
 
 /// Energy and limits of a recording, from its rows.
 struct RecordingSummary {
-  std::uint64_t cycles = 0, missed = 0, time_guards = 0, saturations = 0, force_limited = 0,
-                slipped = 0, ramping_in = 0, damped = 0, beyond_model = 0;
+  std::uint64_t cycles = 0;
+  ServoCounts counts;  ///< without most_consecutive_missed and most_late
   double observed_end_J = 0.0, observed_least_J = 0.0, leak_J = 0.0;
   double first_beyond_s = 0.0;  ///< of the first cycle beyond the model; 0 if there is none
   std::string cause;            ///< of the end; "cut off" if the recording has no closing record

@@ -201,7 +201,7 @@ Protocol cut_across(const Protocol& motion, double from_s, double from, double t
 void run_reference(Verification& v, const QuasiStatic& network, const Protocol& motion) {
   Progress progress("the full network at the instants compared", v.time_s.size());
   try {
-    // Whoever watches pays a quarter more: the state of every instant is made for the observer.
+    // An observer makes a run a quarter longer: the state of every instant is computed for it.
     QuasiStaticObserver see;
     if (progress.is_shown()) see = [&](const QuasiStaticState&) { progress.advance(); };
     const QuasiStaticRun run = network.run(motion, v.time_s, see);

@@ -8,7 +8,7 @@
 namespace tpm::law {
 namespace {
 
-/// Above this z c the quadrature gives way to the asymptotic sum, which then is exact to rounding:
+/// Above this z c the asymptotic sum replaces the quadrature: it is then exact to rounding:
 /// exp(-60) times the largest of its terms is below 1e-17.
 constexpr double kForgotten = 60.0;
 

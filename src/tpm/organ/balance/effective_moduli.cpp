@@ -105,6 +105,44 @@ Eigen::Matrix3d unit_strain(Index component) {
   return strain;
 }
 
+/// Mean stress over the block, from the changes of its bonds' lengths: each bond counts with the
+/// share of its ends that lie in the block.
+Eigen::Matrix3d mean_stress(const Network& network, const InnerBlock& block,
+                            const Eigen::VectorXd& stiffness, const Eigen::VectorXd& change,
+                            double volume_of_sphere_m3) {
+  const Positions& position = network.organ.position;
+  Eigen::Matrix3d stress = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < network.bonds.size(); ++i) {
+    const Bond& bond = network.bonds[i];
+    const double share = 0.5 * ((block.free[bond.a] ? 1 : 0) + (block.free[bond.b] ? 1 : 0));
+    if (share == 0.0) continue;
+    const Eigen::Vector3d along = position.col(bond.b) - position.col(bond.a);
+    const auto row = static_cast<Index>(i);
+    stress +=
+        (share * stiffness[row] * change[row] / bond.rest_length_m) * along * along.transpose();
+  }
+  return stress / (volume_of_sphere_m3 * static_cast<double>(block.count));
+}
+
+/// None where the elasticity is not positive definite.
+std::optional<EffectiveModuli> moduli_of(const Eigen::Matrix<double, 6, 6>& elasticity) {
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(elasticity);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  const Eigen::Matrix<double, 6, 6> compliance =
+      factor.solve(Eigen::Matrix<double, 6, 6>::Identity());
+  EffectiveModuli moduli;
+  moduli.young_Pa = compliance.diagonal().head<3>().cwiseInverse();
+  for (Index i = 0; i < 3; ++i) {
+    for (Index j = 0; j < 3; ++j) {
+      if (i != j) moduli.poisson -= compliance(i, j) / compliance(i, i) / 6.0;
+    }
+  }
+  const double c11 = elasticity.diagonal().head<3>().mean();
+  const double c12 = (elasticity(0, 1) + elasticity(0, 2) + elasticity(1, 2)) / 3.0;
+  moduli.anisotropy = 2.0 * elasticity.diagonal().tail<3>().mean() / (c11 - c12);
+  return moduli;
+}
+
 }  // namespace
 
 std::optional<EffectiveModuli> effective_moduli(const Network& network, const BondSystem& bonds,
@@ -138,36 +176,12 @@ std::optional<EffectiveModuli> effective_moduli(const Network& network, const Bo
     moved += left;
     Eigen::VectorXd change;
     bonds.elongation_changes(organ.position, moved, change);
-    Eigen::Matrix3d stress = Eigen::Matrix3d::Zero();
-    for (std::size_t i = 0; i < network.bonds.size(); ++i) {
-      const Bond& bond = network.bonds[i];
-      const double share = 0.5 * ((block.free[bond.a] ? 1 : 0) + (block.free[bond.b] ? 1 : 0));
-      if (share == 0.0) continue;
-      const Eigen::Vector3d along = organ.position.col(bond.b) - organ.position.col(bond.a);
-      const auto row = static_cast<Index>(i);
-      stress +=
-          (share * stiffness[row] * change[row] / bond.rest_length_m) * along * along.transpose();
-    }
-    stress /= *volume_m3 * static_cast<double>(block.count);
+    const Eigen::Matrix3d stress = mean_stress(network, block, stiffness, change, *volume_m3);
     elasticity.col(component) << stress(0, 0), stress(1, 1), stress(2, 2), stress(1, 2),
         stress(0, 2), stress(0, 1);
   }
-  elasticity = (0.5 * (elasticity + elasticity.transpose())).eval();
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(elasticity);
-  if (factor.info() != Eigen::Success) return std::nullopt;
-  const Eigen::Matrix<double, 6, 6> compliance =
-      factor.solve(Eigen::Matrix<double, 6, 6>::Identity());
-  EffectiveModuli moduli;
-  moduli.spheres = block.count;
-  moduli.young_Pa = compliance.diagonal().head<3>().cwiseInverse();
-  for (Index i = 0; i < 3; ++i) {
-    for (Index j = 0; j < 3; ++j) {
-      if (i != j) moduli.poisson -= compliance(i, j) / compliance(i, i) / 6.0;
-    }
-  }
-  const double c11 = elasticity.diagonal().head<3>().mean();
-  const double c12 = (elasticity(0, 1) + elasticity(0, 2) + elasticity(1, 2)) / 3.0;
-  moduli.anisotropy = 2.0 * elasticity.diagonal().tail<3>().mean() / (c11 - c12);
+  std::optional<EffectiveModuli> moduli = moduli_of(0.5 * (elasticity + elasticity.transpose()));
+  if (moduli) moduli->spheres = block.count;
   return moduli;
 }
 

@@ -75,41 +75,56 @@ void require_no_jump_of_depth(const Protocol& protocol) {
                   "a ramp");
 }
 
+/// The network of an Inertial, what it is asked, and its observers (Inertial::run()).
+struct MotionInput {
+  const BondSystem& bonds;
+  const Positions& rest;
+  const Constraints& constraints;
+  const Probes& probes;
+  const InertialOptions& options;
+  double angular_frequency;  ///< of the lowest mode, rad/s
+  Inertia inertia;
+  const Protocol& protocol;
+  std::span<const double> times_s;
+  const InertialObserver& observer;
+  const InertialState* from;
+  const StepObserver& steps;
+};
+
 /// One run: the state and how it is carried through the protocol.
 class MotionRun {
  public:
-  MotionRun(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
-            const Probes& probes, const Inertia& inertia, const InertialOptions& options,
-            double omega, const Protocol& protocol, std::span<const double> times_s,
-            const InertialObserver& observer, const InertialState* from, const StepObserver& steps)
-      : options_(options),
-        protocol_(protocol),
-        observer_(observer),
-        steps_(steps),
-        times_s_(times_s),
-        order_(rising_order(times_s)),
-        tissue_(bonds, rest, constraints, probes, protocol),
-        knots_(finite_knots(protocol, tissue_.path(), times_s)),
-        equation_(tissue_, rest, inertia) {
+  /// @param in must live as long as this
+  explicit MotionRun(const MotionInput& in)
+      : options_(in.options),
+        protocol_(in.protocol),
+        observer_(in.observer),
+        steps_(in.steps),
+        times_s_(in.times_s),
+        order_(rising_order(in.times_s)),
+        tissue_(in.bonds, in.rest, in.constraints, in.probes, in.protocol),
+        knots_(finite_knots(in.protocol, tissue_.path(), in.times_s)),
+        equation_(tissue_, in.rest, in.inertia) {
     TissueState start = tissue_.at_rest(knots_.front().time_s);
-    const double response_scale = std::abs(tissue_.linear_response(start, protocol.peak()));
-    double depth = tissue_.depth_driven() ? protocol.peak() : response_scale;
+    const double response_scale = std::abs(tissue_.linear_response(start, protocol_.peak()));
+    double depth = tissue_.depth_driven() ? protocol_.peak() : response_scale;
     for (std::size_t g = 1; g < tissue_.groups(); ++g) {
       if (tissue_.depth_driven(g)) depth = std::max(depth, tissue_.path().peak(g));
     }
-    if (!from && protocol.equilibrium_at_start() && knots_.front().value != 0.0) {
-      preload(bonds, rest, constraints, probes, start);
+    const InertialState* from = in.from;
+    if (!from && protocol_.equilibrium_at_start() && knots_.front().value != 0.0) {
+      preload(in.bonds, in.rest, in.constraints, in.probes, start);
     }
     if (from && from->motion.size() != equation_.size()) {
       throw bad_input("state", fmt::format("{} numbers", from->motion.size()),
                       fmt::format("{}, as the network has", equation_.size()));
     }
-    integration_.emplace(equation_, options,
+    integration_.emplace(equation_, options_,
                          from ? from->motion : equation_.pack(start.position, start.viscous),
-                         step_error(depth, omega), energy_error(response_scale),
+                         step_error(depth, in.angular_frequency), energy_error(response_scale),
                          from ? from->spent_J : Eigen::Vector4d::Zero());
     if (from) go_on_from(*from);
-    result_.response.resize(static_cast<Eigen::Index>(times_s.size()));
+    result_.response.resize(static_cast<Eigen::Index>(times_s_.size()));
     result_.of_driven_sphere.resize(result_.response.size());
   }
 
@@ -364,10 +379,19 @@ InertialRun Inertial::run(const Protocol& protocol, std::span<const double> time
   require_no_jump_of_depth(protocol);
   for (const DriveGroup& group : probes_.loading().beside) require_no_jump_of_depth(group.protocol);
   if (from) require_later(times_s, from->time_s);
-  return MotionRun(bonds_, rest_, constraints_, probes_,
-                   inertia_of(bonds_, mass_kg_, lowest_, options_), options_,
-                   lowest_.angular_frequency(), protocol, times_s, observer, from, steps)
-      .go();
+  const MotionInput in{bonds_,
+                       rest_,
+                       constraints_,
+                       probes_,
+                       options_,
+                       lowest_.angular_frequency(),
+                       inertia_of(bonds_, mass_kg_, lowest_, options_),
+                       protocol,
+                       times_s,
+                       observer,
+                       from,
+                       steps};
+  return MotionRun(in).go();
 }
 
 }  // namespace tpm::organ

@@ -55,7 +55,7 @@ struct InertialWork {
   long factorisations = 0;
 };
 
-/// The account of a run, J. The probe pays for everything else.
+/// Energy balance of a run, J: the work of the probe is the sum of all else.
 struct InertialEnergy {
   double work = 0.0;          ///< of the probe
   double stored = 0.0;        ///< in the springs, change since the start

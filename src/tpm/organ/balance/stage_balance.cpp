@@ -10,7 +10,7 @@ namespace tpm::organ {
 namespace {
 
 constexpr int kMostIterations = 25;
-constexpr int kTooManyIterations = 8;  // a new factorisation pays
+constexpr int kTooManyIterations = 8;  // a new factorisation is cheaper
 // Times what a step may err, a tenth of the run's tolerance: a bound of what the last correction
 // mends; and where it leaves no more than that if it shrinks as much as before, which it need not.
 constexpr double kLeftToCorrect = 3.0, kLeftIfShrinking = 8.0;

@@ -35,7 +35,7 @@ struct SolidRequest {
 /// spread (relaxed by repulsion). Below each stands a column: its sphere in layer k lies k steps
 /// inwards along the normal. The step is the spacing, or less where the body has no room for the
 /// layers (0.8 of its inner radius over layers - 1); the organ's assumptions say so. Inner spheres
-/// that would come closer than 0.62 steps to another one give way to it.
+/// that would come closer than 0.62 steps to another one move aside.
 ///
 /// The count is split evenly; each of the first (count mod layers) layers has one more. Numbers run
 /// layer by layer, and within each from the smallest x to the largest (as they

@@ -94,7 +94,7 @@ ShellPlan planned(const Surface& surface, const ShellRequest& request) {
   return plan;
 }
 
-/// Inner spheres closer than the clearance give way, and stay at their depth or below it.
+/// Inner spheres closer than the clearance move aside, and stay at their depth or below it.
 class InnerLayers {
  public:
   InnerLayers(const Surface& surface, const ShellPlan& plan, Organ& organ)

@@ -29,8 +29,8 @@ struct ViscousWeights {
              Eigen::Ref<LaneMatrix> out) const;
 };
 
-/// out = weights in, lane by lane of all lanes, without the packing that Eigen's product does,
-/// which does not pay for so small a matrix. `in` is no part of `out`.
+/// out = weights in, lane by lane of all lanes, without the packing of Eigen's product,
+/// which takes longer than so small a product itself. `in` is no part of `out`.
 void mix_lanes(const LaneSquare& weights, const LaneMatrix& in, LaneMatrix& out);
 
 /// All numbers of all states as one vector.

@@ -73,7 +73,7 @@ struct VerdictCounts {
 VerdictCounts counts_of(const std::vector<PrintedComparison>& all, bool printed) {
   VerdictCounts counts;
   for (const PrintedComparison& c : all) {
-    if (c.parameters.starts_with("printed") != printed) continue;
+    if (c.printed_parameters != printed) continue;
     counts.adequate += c.verdict == ModelVerdict::adequate ? 1 : 0;
     counts.not_adequate += c.verdict == ModelVerdict::not_adequate ? 1 : 0;
     counts.undetermined += c.verdict == ModelVerdict::undetermined ? 1 : 0;

@@ -381,7 +381,7 @@ std::vector<Figure> sweep_figures(const SweepReader& sweep, const SweepFigures& 
   std::vector<Figure> figures;
   for (const ReadVariable& v : sweep.variables()) {
     const bool named = std::ranges::find(wished.variables, v.name) != wished.variables.end();
-    if (named || (wished.variables.empty() && !v.name.starts_with("count_"))) {
+    if (named || (wished.variables.empty() && !v.counts)) {
       figures.push_back(sweep_figure(sweep, v, wished));
     }
   }

@@ -1,5 +1,5 @@
 #pragma once
-// Problems as the formulations want them posed, and the settings of every method on them.
+// Benchmark cases: a driven network, and the settings of every method on them.
 #include <initializer_list>
 
 #include "tpm/accuracy/problem.hpp"
@@ -9,10 +9,10 @@
 namespace tpm::accuracy {
 
 /// A network with what is done to it; shared by the settings that run it.
-struct PosedNetwork {
-  PosedNetwork(DrivenNetwork driven, Protocol imposed, std::vector<double> asked_s);
-  PosedNetwork(const PosedNetwork&) = delete;
-  PosedNetwork& operator=(const PosedNetwork&) = delete;
+struct BenchmarkCase {
+  BenchmarkCase(DrivenNetwork driven, Protocol imposed, std::vector<double> asked_s);
+  BenchmarkCase(const BenchmarkCase&) = delete;
+  BenchmarkCase& operator=(const BenchmarkCase&) = delete;
 
   /// Gives every sphere its mass, and the drag that is `damping_ratio` of the lowest mode.
   void set_masses(Eigen::VectorXd mass_kg, double ratio);
@@ -37,9 +37,9 @@ struct PosedNetwork {
 [[nodiscard]] std::vector<double> with_moments_after_kinks(std::vector<double> times_s,
                                                            const Protocol& protocol);
 
-/// The rules of method.hpp on a posed network, which is kept alive.
+/// The rules of method.hpp on a benchmark case, which is kept alive.
 [[nodiscard]] std::shared_ptr<const MethodProblem> rules_on(
-    const std::shared_ptr<const PosedNetwork>& posed);
+    const std::shared_ptr<const BenchmarkCase>& benchmark);
 
 /// Settings of the rules of method.hpp.
 struct RuleSettings {
@@ -58,12 +58,14 @@ struct RuleSettings {
 /// The network in balance at each instant (`collocation`, QuasiStatic) at tolerances. Of a network
 /// with masses it leaves the masses out.
 [[nodiscard]] std::vector<BenchmarkSetting> collocation_settings(
-    const std::shared_ptr<const PosedNetwork>& posed, std::initializer_list<double> tolerances);
+    const std::shared_ptr<const BenchmarkCase>& benchmark,
+    std::initializer_list<double> tolerances);
 
 /// The network with masses under CVODES (`inertial`, Inertial) at tolerances, at highest orders 2
 /// and 5.
 [[nodiscard]] std::vector<BenchmarkSetting> inertial_settings(
-    const std::shared_ptr<const PosedNetwork>& posed, std::initializer_list<double> tolerances);
+    const std::shared_ptr<const BenchmarkCase>& benchmark,
+    std::initializer_list<double> tolerances);
 
 /// One setting of every formulation of this program that the library does not ship
 /// (tpmkit/formulation.hpp), as it runs the scene at its defaults. One whose capabilities the scene

@@ -1,4 +1,4 @@
-#include "tpm/accuracy/posed.hpp"
+#include "tpm/accuracy/benchmark_case.hpp"
 
 #include <fmt/format.h>
 
@@ -12,10 +12,10 @@
 
 namespace tpm::accuracy {
 
-PosedNetwork::PosedNetwork(DrivenNetwork driven, Protocol imposed, std::vector<double> asked_s)
+BenchmarkCase::BenchmarkCase(DrivenNetwork driven, Protocol imposed, std::vector<double> asked_s)
     : network(std::move(driven)), protocol(std::move(imposed)), times_s(std::move(asked_s)) {}
 
-void PosedNetwork::set_masses(Eigen::VectorXd mass_kg, double ratio) {
+void BenchmarkCase::set_masses(Eigen::VectorXd mass_kg, double ratio) {
   damping_ratio = ratio;
   const LowestMode lowest = lowest_mode(network.bonds, network.rest, network.constraints, mass_kg);
   mass = MethodMasses{std::move(mass_kg), 2.0 * ratio * lowest.angular_frequency()};
@@ -57,13 +57,14 @@ std::vector<double> with_moments_after_kinks(std::vector<double> times_s,
   return times_s;
 }
 
-std::shared_ptr<const MethodProblem> rules_on(const std::shared_ptr<const PosedNetwork>& posed) {
+std::shared_ptr<const MethodProblem> rules_on(
+    const std::shared_ptr<const BenchmarkCase>& benchmark) {
   struct Kept {
-    std::shared_ptr<const PosedNetwork> posed;
+    std::shared_ptr<const BenchmarkCase> benchmark;
     std::unique_ptr<MethodProblem> problem;
   };
   const auto kept = std::make_shared<Kept>(
-      Kept{posed, network_problem(posed->network, posed->protocol, posed->mass)});
+      Kept{benchmark, network_problem(benchmark->network, benchmark->protocol, benchmark->mass)});
   return {kept, kept->problem.get()};
 }
 
@@ -138,29 +139,29 @@ BenchmarkRun outcome_of(Run&& run) {
   }
 }
 
-MethodRun run_collocation(const PosedNetwork& posed, double tolerance) {
-  const DrivenNetwork& n = posed.network;
+MethodRun run_collocation(const BenchmarkCase& benchmark, double tolerance) {
+  const DrivenNetwork& n = benchmark.network;
   const QuasiStatic solver(n.bonds, n.rest, n.constraints, n.probes, {.tolerance = tolerance});
-  QuasiStaticRun run = solver.run(posed.protocol, posed.times_s);
+  QuasiStaticRun run = solver.run(benchmark.protocol, benchmark.times_s);
   MethodRun outcome;
   outcome.response = std::move(run.response);
-  outcome.end_time_s = posed.times_s.back();
+  outcome.end_time_s = benchmark.times_s.back();
   outcome.work = {run.work.steps + run.work.rejected, run.work.iterations, run.work.factorisations,
                   run.work.back_solves};
   return outcome;
 }
 
-MethodRun run_inertial(const PosedNetwork& posed, double tolerance, int order) {
-  const DrivenNetwork& n = posed.network;
+MethodRun run_inertial(const BenchmarkCase& benchmark, double tolerance, int order) {
+  const DrivenNetwork& n = benchmark.network;
   InertialOptions options;
   options.tolerance = tolerance;
   options.highest_order = order;
-  options.damping_ratio = posed.damping_ratio;
-  const Inertial solver(n.bonds, n.rest, n.constraints, n.probes, posed.mass->mass_kg, options);
-  InertialRun run = solver.run(posed.protocol, posed.times_s);
+  options.damping_ratio = benchmark.damping_ratio;
+  const Inertial solver(n.bonds, n.rest, n.constraints, n.probes, benchmark.mass->mass_kg, options);
+  InertialRun run = solver.run(benchmark.protocol, benchmark.times_s);
   MethodRun outcome;
   outcome.response = std::move(run.response);
-  outcome.end_time_s = posed.times_s.back();
+  outcome.end_time_s = benchmark.times_s.back();
   outcome.work = {run.work.steps + run.work.rejected, run.work.rates, run.work.factorisations,
                   run.work.newton_iterations};
   return outcome;
@@ -168,19 +169,21 @@ MethodRun run_inertial(const PosedNetwork& posed, double tolerance, int order) {
 
 }  // namespace
 
-std::vector<BenchmarkSetting> collocation_settings(const std::shared_ptr<const PosedNetwork>& posed,
-                                                   std::initializer_list<double> tolerances) {
+std::vector<BenchmarkSetting> collocation_settings(
+    const std::shared_ptr<const BenchmarkCase>& benchmark,
+    std::initializer_list<double> tolerances) {
   std::vector<BenchmarkSetting> all;
   for (const double tolerance : tolerances) {
-    all.push_back({"collocation", "", "tolerance", tolerance, {}, [posed, tolerance](bool) {
-                     return outcome_of([&] { return run_collocation(*posed, tolerance); });
+    all.push_back({"collocation", "", "tolerance", tolerance, {}, [benchmark, tolerance](bool) {
+                     return outcome_of([&] { return run_collocation(*benchmark, tolerance); });
                    }});
   }
   return all;
 }
 
-std::vector<BenchmarkSetting> inertial_settings(const std::shared_ptr<const PosedNetwork>& posed,
-                                                std::initializer_list<double> tolerances) {
+std::vector<BenchmarkSetting> inertial_settings(
+    const std::shared_ptr<const BenchmarkCase>& benchmark,
+    std::initializer_list<double> tolerances) {
   std::vector<BenchmarkSetting> all;
   for (const int order : {2, 5}) {
     for (const double tolerance : tolerances) {
@@ -189,8 +192,9 @@ std::vector<BenchmarkSetting> inertial_settings(const std::shared_ptr<const Pose
                      "tolerance",
                      tolerance,
                      {},
-                     [posed, tolerance, order](bool) {
-                       return outcome_of([&] { return run_inertial(*posed, tolerance, order); });
+                     [benchmark, tolerance, order](bool) {
+                       return outcome_of(
+                           [&] { return run_inertial(*benchmark, tolerance, order); });
                      }});
     }
   }
@@ -203,20 +207,20 @@ std::vector<BenchmarkSetting> own_formulation_settings(
   std::vector<BenchmarkSetting> all;
   for (const Formulation* f : linked_formulations()) {
     if (std::find(shipped.begin(), shipped.end(), f) != shipped.end()) continue;
-    const auto posed = std::make_shared<ExperimentScene>(*scene);
-    posed->formulation = {};
-    posed->formulation.kind = f->name();
-    posed->formulation.where = "problem";
+    const auto own = std::make_shared<ExperimentScene>(*scene);
+    own->formulation = {};
+    own->formulation.kind = f->name();
+    own->formulation.where = "problem";
     try {
-      require_runnable(*posed);
+      require_runnable(*own);
     } catch (const Error& error) {
       if (error.code() != ExitCode::bad_input) throw;
-      all.push_back(not_applicable(posed->formulation.kind, error.what()));
+      all.push_back(not_applicable(own->formulation.kind, error.what()));
       continue;
     }
-    all.push_back({posed->formulation.kind, "", "", 0.0, {}, [posed, times_s](bool) {
+    all.push_back({own->formulation.kind, "", "", 0.0, {}, [own, times_s](bool) {
                      return outcome_of([&] {
-                       Trajectory answer = run_scene(*posed, times_s, false);
+                       Trajectory answer = run_scene(*own, times_s, false);
                        MethodRun run;
                        run.response = std::move(answer.response);
                        run.end_time_s = times_s.back();
