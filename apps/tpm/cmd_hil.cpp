@@ -18,6 +18,7 @@
 #include "interrupt_watch.hpp"
 #include "option_kinds.hpp"
 #include "out_of_memory.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/device/plugin_device.hpp"
 #include "tpm/haptics/session/enter_key.hpp"
@@ -314,6 +315,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
     say("{}", answer_text(session, json));
   } else {
     say("{}wrote {}\n", run_text(hil, run), choice.output);
+    if (exit_code_of(run.outcome) == 0) say("next: tpm hil verify {}\n", shell_word(choice.output));
   }
   for (const Remark& remark : run.rendering.remarks) {
     tell_user("tpm: warning: {}\n", remark.text);
