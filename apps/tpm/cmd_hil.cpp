@@ -380,8 +380,8 @@ void add_hil_command(CLI::App& app, Session& session) {
   add_format_option(*run, session);
   run->footer(
       "Examples:\n  tpm hil run configs/hil_omega7.json --device virtual -o session.tpmrec\n"
-      "  tpm fit recording.csv --folder fitted && tpm hil run configs/hil_omega7.json --law "
-      "fitted/law.json\n"
+      "  tpm fit recording.csv --folder fitted && tpm hil run configs/hil_law.json --law "
+      "fitted/law.json -o law.tpmrec\n"
       "  tpm hil run configs/hil_inverse3.json --device inverse3 --device-file inverse.json");
   set_run(*run, session, [choice, &session] { return run_hil(*choice, session); });
 
