@@ -97,6 +97,24 @@ RecordingGroup group_in(const FitOptions& options, const std::string& folder) {
   return group;
 }
 
+/// Throws Error(usage) if the inputs are not two folders, naming the one that is none.
+void require_two_folders(const std::vector<std::string>& inputs) {
+  constexpr const char* kExpected =
+      "two folders of recordings, such as: tpm fit healthy/ fibrotic/ --compare";
+  if (inputs.size() != 2) {
+    throw Error(ExitCode::usage, "--compare",
+                fmt::format("with {} input{}", inputs.size(), inputs.size() == 1 ? "" : "s"),
+                kExpected);
+  }
+  for (const std::string& input : inputs) {
+    if (std::filesystem::is_directory(input)) continue;
+    const bool file = std::filesystem::exists(input);
+    throw Error(ExitCode::usage, "--compare",
+                fmt::format("'{}' {}", printable(input), file ? "is a file" : "is no folder"),
+                kExpected);
+  }
+}
+
 }  // namespace
 
 int fit_folder(const FitOptions& options, const Session& session) {
@@ -131,24 +149,6 @@ int fit_folder(const FitOptions& options, const Session& session) {
   deliver(text, options.output);
   deliver_csv(pooled_csv(study), csv);
   return 0;
-}
-
-/// Throws Error(usage) if the inputs are not two folders, naming the one that is none.
-void require_two_folders(const std::vector<std::string>& inputs) {
-  constexpr const char* kExpected =
-      "two folders of recordings, such as: tpm fit healthy/ fibrotic/ --compare";
-  if (inputs.size() != 2) {
-    throw Error(ExitCode::usage, "--compare",
-                fmt::format("with {} input{}", inputs.size(), inputs.size() == 1 ? "" : "s"),
-                kExpected);
-  }
-  for (const std::string& input : inputs) {
-    if (std::filesystem::is_directory(input)) continue;
-    const bool file = std::filesystem::exists(input);
-    throw Error(ExitCode::usage, "--compare",
-                fmt::format("'{}' {}", printable(input), file ? "is a file" : "is no folder"),
-                kExpected);
-  }
 }
 
 int compare_folders(const FitOptions& options, const Session& session) {

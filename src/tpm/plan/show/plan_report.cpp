@@ -263,6 +263,15 @@ std::vector<const PlannedCandidate*> run_candidates(const Plan& plan) {
   return run;
 }
 
+/// What masses would change, where no error that is shown counts it.
+std::optional<double> masses_uncounted(const Plan& plan) {
+  if (plan.inertial || plan.masses_left_out) return std::nullopt;
+  for (const PlanRelevance& r : plan.relevance) {
+    if (r.part == "inertia") return r.error;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 Json spheres_json(const SpheresPlan& plan) {
@@ -324,15 +333,6 @@ Json masses_matter_json(const Plan& plan) {
 Json claim_json(const Plan& plan) {
   const PlanClaim claim = claim_of(plan);
   return {{"quantity", claim.quantity}, {"norm", claim.norm}, {"protocol", claim.protocol}};
-}
-
-/// What masses would change, where no error that is shown counts it.
-std::optional<double> masses_uncounted(const Plan& plan) {
-  if (plan.inertial || plan.masses_left_out) return std::nullopt;
-  for (const PlanRelevance& r : plan.relevance) {
-    if (r.part == "inertia") return r.error;
-  }
-  return std::nullopt;
 }
 
 std::vector<Remark> plan_remarks(const Plan& plan) {
