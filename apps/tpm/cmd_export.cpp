@@ -75,8 +75,9 @@ int export_scene(const ExportTexts& texts, OrganTarget target) {
   for (const auto* given : {&texts.radius, &texts.cone, &texts.punch, &texts.area, &texts.length,
                             &texts.poisson, &texts.from, &texts.until, &texts.terms}) {
     if (!*given && !texts.relaxation_only) continue;
-    throw Error(ExitCode::usage, "--to " + texts.to, "with an option of laws",
-                "--density and --instantaneous alone");
+    throw Error(ExitCode::usage, "--to " + texts.to, "exports a scene with an organ, not a law",
+                "for a law --to abaqus, ansys, febio or json; for a scene no other option than "
+                "--density and --instantaneous");
   }
   OrganExportOptions options;
   options.target = target;

@@ -18,6 +18,7 @@
 #include "interrupt_watch.hpp"
 #include "option_kinds.hpp"
 #include "out_of_memory.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/haptics/device/force_dimension.hpp"
 #include "tpm/haptics/device/plugin_device.hpp"
 #include "tpm/haptics/session/enter_key.hpp"
@@ -318,6 +319,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
     say("{}", answer_text(session, json));
   } else {
     say("{}wrote {}\n", run_text(hil, run), choice.output);
+    if (exit_code_of(run.outcome) == 0) say("next: tpm hil verify {}\n", shell_word(choice.output));
   }
   for (const Remark& remark : run.rendering.remarks) {
     tell_user("tpm: warning: {}\n", remark.text);
@@ -376,8 +378,8 @@ void add_run_command(CLI::App& hil, Session& session) {
   add_format_option(*run, session);
   run->footer(
       "Examples:\n  tpm hil run configs/hil_omega7.json --device virtual -o session.tpmrec\n"
-      "  tpm fit recording.csv --folder fitted && tpm hil run configs/hil_omega7.json --law "
-      "fitted/law.json\n"
+      "  tpm fit recording.csv --folder fitted && tpm hil run configs/hil_law.json --law "
+      "fitted/law.json -o law.tpmrec\n"
       "  tpm hil run configs/hil_inverse3.json --device inverse3 --device-file inverse.json");
   set_run(*run, session, [choice, &session] { return run_hil(*choice, session); });
 }

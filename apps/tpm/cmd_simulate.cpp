@@ -1,8 +1,11 @@
 // tpm simulate: run what a scene says is done to its tissue.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
+#include <string_view>
 
 #include "answer.hpp"
 #include "command.hpp"
@@ -110,6 +113,15 @@ Simulated simulated(ExperimentScene scene, fs::path file, double checkpoint_ever
   SimulationRun run = run_watched(scene, network, checkpoint_every_s, checkpoint);
   return {std::move(scene), std::move(network), std::move(run), std::move(file),
           std::move(checkpoint)};
+}
+
+/// A result is HDF5 whatever its name is: a name that promises another kind of file is refused.
+void require_result_name(const std::string& output) {
+  constexpr auto kOthers = std::to_array<std::string_view>(
+      {".csv", ".json", ".txt", ".html", ".png", ".svg", ".vtk", ".vtu", ".mat", ".xlsx"});
+  if (std::ranges::find(kOthers, fs::path(output).extension().string()) == kOthers.end()) return;
+  throw Error(ExitCode::usage, "-o " + output, "the result is HDF5, another kind of file",
+              "a name such as results.h5");
 }
 
 /// "results.h5" becomes "results-mass_spring.h5".
@@ -300,6 +312,7 @@ int run_command(const SimulateChoice& choice, const Session& session) {
     if (choice.scene.empty()) {
       throw Error(ExitCode::usage, "SCENE", "is missing", "a JSON scene, or --list-formulations");
     }
+    if (choice.output != choice.scene) require_result_name(choice.output);
     if (choice.planned) return simulate_planned(choice, session);
     return simulate_and_report(choice, session);
   } catch (const Interrupted& stop) {

@@ -8,6 +8,7 @@
 
 #include "answer.hpp"
 #include "fit_options.hpp"
+#include "tpm/base/text.hpp"
 #include "tpm/files/json.hpp"
 #include "tpm/fit/groups/group_comparison.hpp"
 #include "tpm/fit/select/specimens.hpp"
@@ -57,6 +58,12 @@ void set_specimens(const FitOptions& options, std::vector<PreparedRecording>& re
 
 /// Recordings in a folder, in alphabetical order.
 std::vector<std::string> recordings_in(const std::filesystem::path& folder) {
+  if (std::filesystem::exists(folder / "selection.json")) {
+    throw bad_input(
+        folder.string(), "this folder was written by tpm fit",
+        fmt::format("a folder of recordings; tpm fit {} fits again, tpm view {} shows it",
+                    shell_word((folder / "config.json").string()), shell_word(folder.string())));
+  }
   std::vector<std::string> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string ending = entry.path().extension().string();
@@ -88,6 +95,24 @@ RecordingGroup group_in(const FitOptions& options, const std::string& folder) {
   require_indentation(options, group.recordings);
   set_specimens(options, group.recordings);
   return group;
+}
+
+/// Throws Error(usage) if the inputs are not two folders, naming the one that is none.
+void require_two_folders(const std::vector<std::string>& inputs) {
+  constexpr const char* kExpected =
+      "two folders of recordings, such as: tpm fit healthy/ fibrotic/ --compare";
+  if (inputs.size() != 2) {
+    throw Error(ExitCode::usage, "--compare",
+                fmt::format("with {} input{}", inputs.size(), inputs.size() == 1 ? "" : "s"),
+                kExpected);
+  }
+  for (const std::string& input : inputs) {
+    if (std::filesystem::is_directory(input)) continue;
+    const bool file = std::filesystem::exists(input);
+    throw Error(ExitCode::usage, "--compare",
+                fmt::format("'{}' {}", printable(input), file ? "is a file" : "is no folder"),
+                kExpected);
+  }
 }
 
 }  // namespace
@@ -128,12 +153,7 @@ int fit_folder(const FitOptions& options, const Session& session) {
 
 int compare_folders(const FitOptions& options, const Session& session) {
   const std::vector<std::string>& folders = options.recordings.files;
-  if (folders.size() != 2 || !std::filesystem::is_directory(folders[0]) ||
-      !std::filesystem::is_directory(folders[1])) {
-    throw Error(ExitCode::usage, "--compare",
-                fmt::format("with {} input{}", folders.size(), folders.size() == 1 ? "" : "s"),
-                "two folders of recordings, such as: tpm fit healthy/ fibrotic/ --compare");
-  }
+  require_two_folders(folders);
   const auto csv = csv_beside(options.output, session);
   RecordingGroup first = group_in(options, folders[0]);
   RecordingGroup second = group_in(options, folders[1]);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "command.hpp"
 #include "tpm/files/import/reading_options.hpp"
@@ -143,6 +144,10 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
     if (twice) {
       throw Error(ExitCode::usage, "FILE", fmt::format("'{}' is given twice", file),
                   "each recording once");
+    }
+    if (std::filesystem::is_directory(file)) {
+      throw bad_input(file, "is a folder",
+                      fmt::format("its recordings, such as {}/*.csv", printable(file)));
     }
     recordings.push_back(prepared(file, read_recording_file(file, import), options));
   }

@@ -179,6 +179,22 @@ TEST_CASE("stress over relative length: what the file does not say has to be sai
                     Catch::Contains("no column 'M'; expected column 1 'Time'"));
 }
 
+TEST_CASE("a column without a title is chosen by the name that messages give it") {
+  const TempFolder folder;
+  write_file(folder / "f.csv", "0,0,0\n1,1,10\n2,2,20\n3,2,15\n");
+  ImportOptions options;
+  options.time_column = "column 1";
+  options.drive_column = "column 2";
+  options.response_column = "column 3";
+  options.units = {{"column 1", "s"}, {"2", "mm"}, {"column 3", "mN"}};
+  const Recording recording = import_recording(folder / "f.csv", options);
+  check_values(recording.drive, {0, 1e-3, 2e-3, 2e-3});
+  check_values(recording.response, {0, 10e-3, 20e-3, 15e-3});
+  options.response_column = "column 4";
+  CHECK_THROWS_WITH(import_curves(folder / "f.csv", options),
+                    Catch::Contains("no column 'column 4'; expected column 1, column 2, column 3"));
+}
+
 TEST_CASE("plain x and y are a recording without time") {
   const Recording recording = import_recording(fixture("plain_xy.csv"));
   CHECK(recording.time_s.empty());

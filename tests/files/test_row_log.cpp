@@ -10,7 +10,9 @@
 #include "temp_folder.hpp"
 #include "tpm/base/namespaces.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
 #include "tpm/files/hdf5/hdf5.hpp"
+#include "tpm/files/origin_mark.hpp"
 #include "tpm/files/row_log.hpp"
 #include "tpmkit/error.hpp"
 
@@ -50,6 +52,20 @@ TEST_CASE("A closed log gives back header, rows and closing") {
   CHECK(log.closing == "{\"end\": true}");
   REQUIRE(log.rows == 10'000);
   CHECK(row_of(log, 9'999).a == 0.1 * 9'999);
+}
+
+TEST_CASE("A closed log does not look as if it was changed since it was written") {
+  const test::TempFolder folder;
+  FileRoles roles;
+  roles.mark_results("tpm hil run /data/session.json", false);
+  const std::string path = written(folder, 10'000, true);
+  const auto mark = origin_mark(path);
+  if (!mark) {
+    WARN("this file system has no extended attributes");
+    return;
+  }
+  CHECK(mark->origin == "tpm hil run /data/session.json");
+  CHECK_FALSE(mark->changed);
 }
 
 TEST_CASE("A log cut at any byte gives all rows before the cut, and is not whole") {

@@ -173,6 +173,7 @@ TEST_CASE("a stiffening kernel is linear within a period only to second order") 
   const ErrorBudget budget = contact_budget(law, motion, times, options);
   CHECK_FALSE(budget.random);
   CHECK(budget.remarks.front().code == "no_random_part");
+  CHECK_THAT(budget.sentences[2], Contains("would not be felt, if the law is right: no recording"));
   CHECK(line_named(budget, "quantisation").largest == 0.0);
   CHECK(line_named(budget, "delay").largest == 0.0);
 }

@@ -158,6 +158,13 @@ TEST_CASE("Groups that differ by their depths are refused, copies are no second 
              Contains("has the readings of 'a/liver1.csv'"));
   CHECK_THAT(test::run_in(folder, "fit a b").said, Contains("--compare"));
   CHECK_THAT(test::run_in(folder, "fit a --compare").said, Contains("two folders of recordings"));
+  CHECK_THAT(test::run_in(folder, "fit a gone --compare").said,
+             Contains("'gone' is no folder; expected two folders of recordings"));
+  std::filesystem::create_directories(folder.path() / "fitted");
+  write_file(folder.path() / "fitted" / "selection.json", "{}");
+  CHECK_THAT(test::run_in(folder, "fit fitted").said,
+             Contains("this folder was written by tpm fit") &&
+                 Contains("tpm fit fitted/config.json fits again"));
 }
 
 TEST_CASE(

@@ -123,6 +123,18 @@ TEST_CASE("what a hand can tell is asked of forces alone", "[validate]") {
     if (force) CHECK_THAT(*q.limit, WithinRel(0.07 * q.measured, 1e-12));
   }
   CHECK(v.verdict == ModelVerdict::adequate);
+  CHECK(conclusion_words(v) ==
+        "adequate for jnd, 7 %; nothing is required of relaxation ratio, half time");
+}
+
+TEST_CASE("an adequate law outside its calibration is stated with that condition", "[validate]") {
+  Validation v;
+  v.verdict = ModelVerdict::adequate;
+  v.requirement = "5%";
+  v.applicability.resize(2);
+  CHECK(conclusion_words(v) == "adequate for 5%");
+  v.applicability[1].outside = {"ramp of 2 mm/s, 2 times the fastest of the calibration"};
+  CHECK(conclusion_words(v) == "adequate for 5%; outside the calibration");
 }
 
 TEST_CASE("a verdict on several recordings counts what only one of them has", "[validate]") {

@@ -29,6 +29,19 @@ TEST_CASE("A port that cannot be had is refused with the range of ports") {
   }
 }
 
+TEST_CASE("A session that has ended names the command that verifies it") {
+  const test::TempFolder folder;
+  write_file(folder / "session.json", to_text(test::short_session()));
+  const test::ProgramRun run = test::run_in(folder, "hil run session.json -o 's 1.tpmrec'");
+  CHECK(run.code == 0);
+  CHECK_THAT(run.said, Contains("wrote s 1.tpmrec\nnext: tpm hil verify 's 1.tpmrec'\n"));
+  // No recording is replaced, also not by the same session under the default name.
+  CHECK(test::run_in(folder, "hil run session.json").code == 0);
+  const test::ProgramRun again = test::run_in(folder, "hil run session.json");
+  CHECK(again.code == 2);
+  CHECK_THAT(again.said, Contains("-o session.tpmrec: the file exists; expected another"));
+}
+
 TEST_CASE("An option of a verification that is out of range is named") {
   const test::TempFolder folder;
   write_file(folder / "session.json", to_text(test::short_session()));

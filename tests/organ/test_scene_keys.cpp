@@ -228,6 +228,13 @@ TEST_CASE("a file of another kind is called by its name", "[keys]") {
              Contains("this is a sweep; use tpm sweep"));
   CHECK_THAT(test::refusal_of([] { require_not_other_kind(poke(), "hil", "s.json"); }),
              StartsWith("s.json: this is a scene; use tpm simulate"));
+  const Json law = Json::parse(R"({"law": "linear-1", "response": "contact_force"})");
+  CHECK_THAT(test::refusal_of([&] { require_not_other_kind(law, "scene", "a b.json"); }),
+             Contains("use tpm material 'a b.json' SCENE --folder on_organ, which writes"));
+  CHECK_THAT(test::refusal_of([&] { require_not_other_kind(law, "hil", "l.json"); }),
+             Contains("use tpm hil run SESSION --law l.json;"));
+  CHECK_THAT(test::refusal_of([&] { require_not_other_kind(law, "sweep", "l.json"); }),
+             Contains("this is a fitted law; use tpm predict;"));
 }
 
 TEST_CASE("what is no JSON is called by what it is", "[keys]") {

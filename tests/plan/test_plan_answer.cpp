@@ -100,3 +100,26 @@ TEST_CASE("the short answer of a plan counts the candidates that it does not sho
   CHECK(text.find("\nmodel_0 ") > first);
   CHECK_THAT(text, Contains("more candidates") && !Contains("\nmodel_20 "));
 }
+
+TEST_CASE("masses that no error counts are a warning where they and the claim exceed the tolerance",
+          "[plan][answer]") {
+  Plan plan = full_plan(true);
+  plan.masses_left_out.reset();
+  plan.validity.clear();
+  plan.relevance = {{"inertia", 0.0378, true, false, ""}};
+  plan.request.tolerance = 0.04;  // the claim is 0.01
+  const std::vector<Remark> remarks = plan_remarks(plan);
+  REQUIRE(remarks.size() == 1);
+  CHECK(remarks.front().code == "masses_uncounted");
+  CHECK_THAT(remarks.front().text,
+             Contains("by 3.78 % of the peak: with the claimed error 4.78 %, which exceeds"));
+  CHECK_THAT(show::to_text(short_answer(plan)), Contains("! no error above counts masses"));
+  plan.request.tolerance = 0.05;
+  CHECK(plan_remarks(plan).empty());
+  plan.request.tolerance = 0.04;
+  plan.relevance.front().error.reset();
+  CHECK(plan_remarks(plan).empty());
+  plan.relevance.front().error = 0.0378;
+  plan.inertial = true;
+  CHECK(plan_remarks(plan).empty());
+}

@@ -12,6 +12,7 @@ something of the reader's own.
 
 import argparse
 import os
+import re
 import resource
 import shutil
 import signal
@@ -109,7 +110,8 @@ def fault_of(line, code, said, stopped):
     """What is wrong with the end of an example; empty if nothing. `stopped`: one before it did not get to its end."""
     if code in (None, 0, 1) or (code == 5 and any(device in line for device in DEVICES)):
         return ""
-    if stopped and (code == 3 or (code == 2 and said.strip().endswith("--overwrite"))):
+    missing = re.search(r"no such file|\.tpmrec|\.h5", said)
+    if stopped and ((code == 3 and missing) or (code == 2 and said.strip().endswith("--overwrite"))):
         return ""
     return f"ended with {code}: {said.strip().splitlines()[-1] if said.strip() else ''}"
 
@@ -141,13 +143,17 @@ def main():
                     (folder / "session.tpmrec").unlink()
             if line in BEFORE:
                 run(BEFORE[line], folder, environment, None)
-            code, said, took = run(line, folder, environment, options.seconds)
-            if options.times:
-                print(f"{took:6.2f} s  {line}")
-            fault = fault_of(line, code, said, command in [c for c, _ in stopped])
+            cut, fault = command in [c for c, _ in stopped], ""
+            # Each command has time of its own: one that is stopped must not hide what is wrong with the next.
+            for part in line.split(" && "):
+                code, said, took = run(part, folder, environment, options.seconds)
+                if options.times:
+                    print(f"{took:6.2f} s  {part}")
+                fault = fault or fault_of(part, code, said, cut)
+                cut = cut or code is None
             if fault:
                 faults.append(f"{command} --help: {line}: {fault}")
-            elif code is None:
+            elif cut and command not in [c for c, _ in stopped]:
                 stopped.append((command, line))
             else:
                 ended += 1

@@ -125,6 +125,8 @@ inline std::vector<ErrorCase> simulation_error_cases() {
        pushed(R"("title": "t")")},
       {type, "tolerance of a plan that is not asked for",
        "simulate {}/s.json --tolerance 1e-3 -o {}/out.h5", pushed(R"("title": "t")")},
+      {type, "output of another kind", "simulate {}/s.json -o {}/out.csv",
+       pushed(R"("title": "t")")},
       {type, "output cannot be written", "simulate {}/s.json -o /proc/none/out.h5",
        pushed(R"("title": "t")")},
       {type, "garbage as checkpoint", simulate,

@@ -76,6 +76,8 @@ inline std::vector<ErrorCase> validation_error_cases() {
       {type, "recording in the law's place of tpm budget", "budget {}/r.csv {}/r.csv",
        files(validated_recording())},
       {type, "folder in the law's place", "validate {}/.. {}/r.csv", files(validated_recording())},
+      {type, "folder in a recording's place", "validate {}/l.json {}/..",
+       files(validated_recording())},
       {type, "protocol in the law's place", command,
        with_files({{"l.json", R"({"protocol": {"kind": "ramp_hold", "depth": "1 mm",
 "rate": "1 mm/s", "hold": "1 s"}})"},

@@ -90,6 +90,19 @@ const KindMarks* marks_of(std::string_view kind) {
   return found == kKindMarks.end() ? nullptr : &*found;
 }
 
+/// The command to use instead. A law is put on an organ, or felt, by a command of its own.
+std::string command_instead(const KindMarks& found, std::string_view wanted,
+                            std::string_view where) {
+  if (found.kind != "law") return std::string(found.command);
+  const std::string law = shell_word(std::string(where));
+  if (wanted == "scene") {
+    return fmt::format("tpm material {} SCENE --folder on_organ, which writes on_organ/scene.json",
+                       law);
+  }
+  if (wanted == "hil") return fmt::format("tpm hil run SESSION --law {}", law);
+  return std::string(found.command);
+}
+
 }  // namespace
 
 void require_not_other_kind(const Json& document, std::string_view kind, std::string_view where) {
@@ -108,8 +121,9 @@ void require_not_other_kind(const Json& document, std::string_view kind, std::st
     // One key of its own is enough: the other may be misspelt.
     if (is_wanted(marks) && (own(marks.keys[0]) || own(marks.keys[1]))) return;
   }
-  throw bad_input(where, fmt::format("this is {}; use {}", found->called, found->command),
-                  fmt::format("{}, for {}", wanted->called, wanted->command));
+  throw bad_input(
+      where, fmt::format("this is {}; use {}", found->called, command_instead(*found, kind, where)),
+      fmt::format("{}, for {}", wanted->called, wanted->command));
 }
 
 std::optional<std::string_view> kind_without_json(std::string_view bytes) {

@@ -11,6 +11,7 @@
 
 #include "tpm/files/check_sum.hpp"
 #include "tpm/files/file.hpp"
+#include "tpm/files/file_roles.hpp"
 #include "tpm/files/replacement.hpp"
 #include "tpmkit/error.hpp"
 
@@ -128,6 +129,7 @@ void RowLogWriter::close(std::string_view closing) {
   if (::fsync(file_.get()) != 0 && errno != EINVAL) {  // EINVAL: a device or pipe, without a disk
     throw cannot_write_rows(path_, "cannot be brought to the disk");
   }
+  mark_result(file_.get());  // the mark that its name came with tells of the header alone
   (void)file_.close();
 }
 

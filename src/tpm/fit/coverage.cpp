@@ -109,14 +109,16 @@ Json to_json(const CoverageResult& result) {
 }
 
 std::string to_terminal_text(const CoverageResult& result) {
-  std::string text = fmt::format("{} simulated data sets, seed {}, {} could not be fitted\n",
-                                 result.sets, result.seed, result.failed);
+  std::string text = fmt::format(
+      "{} simulated data sets, seed {}, {} could not be fitted; true values: the start values of "
+      "the configuration\n",
+      result.sets, result.seed, result.failed);
   for (const ParameterCoverage& p : result.parameters) {
     text += fmt::format(
-        "{:<12} {:.2f} % of the {:.4g} % intervals hold the true value (exact binomial "
-        "p = {}; {} intervals open)\n",
-        p.name, 100.0 * p.covered / result.sets, 100.0 * result.level, significant(p.p_value, 2),
-        p.one_sided);
+        "{:<12} {} of {} intervals at {:.4g} % contain the true value ({} %; exact binomial p = "
+        "{}; {} intervals open)\n",
+        p.name, p.covered, result.sets, 100.0 * result.level,
+        significant(100.0 * p.covered / result.sets, 4), significant(p.p_value, 2), p.one_sided);
   }
   return text;
 }

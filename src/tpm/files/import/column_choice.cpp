@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -93,12 +92,8 @@ const MachineColumn& ColumnChoice::by_selector(const std::string& selector) cons
   for (const MachineColumn& column : header_.columns) {
     if (column.name == selector) return column;
   }
-  std::size_t number = 0;
-  const char* end = selector.data() + selector.size();
-  const auto parsed = std::from_chars(selector.data(), end, number);
-  if (parsed.ec == std::errc{} && parsed.ptr == end && number >= 1 &&
-      number <= header_.columns.size()) {
-    return header_.columns[number - 1];
+  for (const MachineColumn& column : header_.columns) {
+    if (column.has_number(selector)) return column;
   }
   const auto names = mapped<std::string>(header_.columns, &MachineColumn::name);
   throw bad_input(

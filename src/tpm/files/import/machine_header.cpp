@@ -18,6 +18,12 @@ std::string MachineColumn::label() const {
                       : fmt::format("column {} '{}'", index + 1, printable(name));
 }
 
+bool MachineColumn::has_number(std::string_view selector) const {
+  constexpr std::string_view kWord = "column ";
+  if (selector.starts_with(kWord)) selector.remove_prefix(kWord.size());
+  return selector == std::to_string(index + 1);
+}
+
 namespace {
 
 /// A row above the samples, from the table or from a comment.
@@ -83,7 +89,7 @@ std::string sheet_name(const HeaderRow& row) {
 /// Units given by name or number go before those of the file.
 std::string chosen_unit(const MachineColumn& column, const ImportOptions& options) {
   for (const auto& [selector, unit] : options.units) {
-    if (selector == column.name || selector == std::to_string(column.index + 1)) return unit;
+    if (selector == column.name || column.has_number(selector)) return unit;
   }
   return column.unit;
 }
@@ -199,7 +205,7 @@ MachineColumn described_column(std::size_t index, const HeaderRows& rows,
   const std::string chosen = chosen_unit(column, options);
   column.unit_is_chosen = chosen != column.unit;
   for (const auto& [selector, said] : options.units) {
-    column.unit_is_chosen |= selector == column.name || selector == std::to_string(index + 1);
+    column.unit_is_chosen |= selector == column.name || column.has_number(selector);
   }
   column.unit = written_unit(chosen);
   const bool per_second = is_unit(column.unit) && parse_unit(column.unit, {}).symbol == "Hz" &&

@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tpm/files/import/header_words.hpp"
@@ -24,6 +25,8 @@ struct MachineColumn {
 
   /// "column 2 'Force'"
   [[nodiscard]] std::string label() const;
+  /// By its place from 1, as users may write it: "2", or "column 2" as messages do.
+  [[nodiscard]] bool has_number(std::string_view selector) const;
 };
 
 struct MachineHeader {

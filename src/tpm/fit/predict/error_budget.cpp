@@ -57,11 +57,14 @@ std::string part_text(double part) {
 std::string hand_sentence(const ErrorBudget& budget) {
   const double all = budget.combined;
   if (all < kForceJnd) {
+    // Without a recording the chain begins with the law: its own error is in no line.
+    const bool compared = std::ranges::any_of(
+        budget.lines, [](const BudgetLine& line) { return line.name == "law"; });
     return fmt::format(
         "the whole chain ({}) stays below the just noticeable difference of a force ({}): "
-        "measuring "
-        "or computing finer would not be felt",
-        part_text(all), part_text(kForceJnd));
+        "measuring or computing finer would not be felt{}",
+        part_text(all), part_text(kForceJnd),
+        compared ? "" : ", if the law is right: no recording is compared with it");
   }
   if (all < kStiffnessThroughTool) {
     return fmt::format(

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "tpm/base/lists.hpp"
@@ -424,9 +425,10 @@ std::string conclusion_words(const Validation& v) {
   if (v.verdict == ModelVerdict::residual) {
     return "calibration residual: the law was fitted to these data, so this validates nothing";
   }
-  std::vector<std::string> named, alone;
+  std::vector<std::string> named, alone, without;
   const auto add = [&](const std::string& name, const ErrorWithUncertainty& e, const Unit& unit,
                        bool rejected, ModelVerdict verdict) {
+    if (verdict == ModelVerdict::no_requirement) without.push_back(name);
     const bool wanted =
         v.verdict == ModelVerdict::undetermined ? verdict == ModelVerdict::undetermined : rejected;
     const bool beyond = verdict == ModelVerdict::not_adequate || verdict == ModelVerdict::seen;
@@ -443,6 +445,9 @@ std::string conclusion_words(const Validation& v) {
       }
     }
   }
+  const bool outside =
+      std::ranges::any_of(v.applicability, [](const auto& a) { return !a.outside.empty(); });
+  const auto unasked = fmt::format("{}", fmt::join(each_once(without, std::identity{}), ", "));
   const std::string list = fmt::format("{}", fmt::join(named, ", "));
   const std::string before_holm =
       alone.empty()
@@ -450,7 +455,9 @@ std::string conclusion_words(const Validation& v) {
           : fmt::format("; beyond it before Holm's correction only: {}", fmt::join(alone, ", "));
   switch (v.verdict) {
     case ModelVerdict::adequate:
-      return fmt::format("adequate for {}", v.requirement);
+      return fmt::format("adequate for {}{}{}", v.requirement,
+                         unasked.empty() ? "" : "; nothing is required of " + unasked,
+                         outside ? "; outside the calibration" : "");
     case ModelVerdict::not_adequate:
       return fmt::format("not adequate for {}: model error {}", v.requirement, list);
     case ModelVerdict::undetermined:

@@ -77,7 +77,7 @@ LoopModel condensed_model(const HilSession& session) {
   LoopModel loop = scene.begun("condensed", "seen from");
   loop.model = std::make_unique<CondensedContact>(condensed);
   loop.shape.field = std::make_shared<CondensedContact>(condensed.with_period(kDrawnEvery_s));
-  loop.error_bound = fmt::format("fitted to {} mm of depth; what tpm hil verify measures",
+  loop.error_bound = fmt::format("fitted to {} mm of depth; tpm hil verify measures it",
                                  significant(1e3 * options.depth_m, 4));
   return loop;
 }
@@ -87,7 +87,7 @@ LoopModel network_model(const HilSession& session) {
   LoopModel loop = scene.begun("network", "stepped every period, pushed at");
   loop.model = scene.network(session.servo.period_s);
   loop.shape.field = scene.network(kDrawnEvery_s);
-  loop.error_bound = "its own estimate, row by row; what tpm hil verify measures";
+  loop.error_bound = "its own estimate, row by row; tpm hil verify measures it";
   return loop;
 }
 

@@ -130,7 +130,7 @@ LoopModel planned_model(const HilSession& session, const PlanningTold& told) {
       significant(1e3 * range.depth_m, 4), significant(1e3 * range.speed_m_per_s, 4));
   loop.error_bound = fmt::format(
       "at most {} of the peak of {} N on the planned motion, {} verified against the nonlinear "
-      "network; on others what tpm hil verify measures",
+      "network; on others tpm hil verify measures it",
       percent(chosen.claimed_error.value()), significant(plan.reference.peak, 3),
       percent(chosen.verified_error.value()));
   if (plan.masses_left_out) {
@@ -189,7 +189,7 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
       continue;
     }
     LoopModel loop = pushed.begun(candidate->name(), "seen from");
-    loop.error_bound = "not verified beforehand; what tpm hil verify measures";
+    loop.error_bound = "not verified beforehand; tpm hil verify measures it";
     auto models = candidate->contacts(surrogate, std::array{session.servo.period_s, kDrawnEvery_s});
     loop.model = std::move(models.front());
     if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());

@@ -107,7 +107,7 @@ LoopModel surface_model(const HilSession& session) {
   loop.shape.tool_radius_m = session.tool_radius_m;
   loop.shape.tool_start_m = surface.ball.start_m;
   loop.error_bound = fmt::format(
-      "its own estimate, row by row; what tpm hil verify measures; ball and sphere overlap by "
+      "its own estimate, row by row; tpm hil verify measures it; ball and sphere overlap by "
       "1 mm under {} N, in the reference too",
       significant(1e-3 * session.contact_stiffness_N_per_m, 4));
   return loop;

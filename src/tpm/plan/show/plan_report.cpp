@@ -263,6 +263,15 @@ std::vector<const PlannedCandidate*> run_candidates(const Plan& plan) {
   return run;
 }
 
+/// What masses would change, where no error that is shown counts it.
+std::optional<double> masses_uncounted(const Plan& plan) {
+  if (plan.inertial || plan.masses_left_out) return std::nullopt;
+  for (const PlanRelevance& r : plan.relevance) {
+    if (r.part == "inertia") return r.error;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 Json spheres_json(const SpheresPlan& plan) {
@@ -328,6 +337,16 @@ Json claim_json(const Plan& plan) {
 
 std::vector<Remark> plan_remarks(const Plan& plan) {
   std::vector<Remark> remarks;
+  if (const auto masses = masses_uncounted(plan); masses && plan.choice) {
+    const double together = *masses + plan.chosen().claimed_error.value_or(0.0);
+    if (together > plan.request.tolerance) {
+      remarks.push_back(
+          {"masses_uncounted",
+           fmt::format("no error above counts masses, which would change the answer by {} of the "
+                       "peak: with the claimed error {}, which exceeds the tolerance",
+                       share_text(*masses), share_text(together))});
+    }
+  }
   if (plan.masses_left_out) {
     remarks.push_back(
         {"masses_left_out",
