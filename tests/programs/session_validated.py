@@ -253,6 +253,9 @@ def main():
                                     "--format", "json", code=code))
             compare(answer, presses, means, share)
             assert answer["verdict"] == expected, answer["verdict"]
+            # Forces that a model answered validate no law.
+            assert "forces_rendered" in [remark["code"] for remark in answer["remarks"]]
+            assert answer["summary"].startswith("of the rendering: "), answer["summary"]
             print(f"{len(answer['recordings'])} presses, requirement {share:g}: {answer['verdict']}")
 
 

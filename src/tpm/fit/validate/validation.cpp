@@ -354,6 +354,11 @@ Validation validate(const ValidationRequest& request) {
   v.remarks = request.remarks;
   v.remarks.insert(v.remarks.end(), request.calibration.remarks.begin(),
                    request.calibration.remarks.end());
+  if (!request.presses.empty()) {
+    v.remarks.push_back({"forces_rendered",
+                         "the forces of a session are what its model answered, not measured ones: "
+                         "they tell how well it was rendered, and nothing of the law"});
+  }
   add_unseen_spread(v);
   if (const std::string words = threshold_words(request); !words.empty())
     v.remarks.push_back({"contact_by_threshold", words});

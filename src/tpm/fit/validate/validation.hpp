@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -82,6 +83,11 @@ struct Validation {
   /// Exit code of a program that asked: no only where a requirement is not shown to be met.
   [[nodiscard]] bool answers_yes() const {
     return requirement.empty() || verdict == ModelVerdict::adequate;
+  }
+  /// The recordings are presses of a session: forces that its model answered, none measured.
+  [[nodiscard]] bool of_session() const {
+    return std::ranges::all_of(
+        recordings, [](const RecordingComparison& r) { return r.part.hold_asked_s.has_value(); });
   }
 };
 

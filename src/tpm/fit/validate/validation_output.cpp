@@ -204,8 +204,7 @@ Unit response_unit(const RecordingComparison& r) {
 
 /// "a, b, c", or the first of them and how many more there are.
 std::string first_names(std::vector<std::string> names) {
-  constexpr std::size_t kMost = 6;
-  if (names.size() > kMost) {
+  if (constexpr std::size_t kMost = 6; names.size() > kMost) {
     const std::size_t more = names.size() - kMost + 1;
     names.resize(kMost - 1);
     names.push_back(fmt::format("{} more", more));
@@ -222,9 +221,7 @@ struct RecordingNames {
 RecordingNames names_of(const Validation& v) {
   RecordingNames all{{}, mapped<std::string>(v.recordings, &RecordingComparison::name)};
   const std::size_t colon = all.names.front().find(": ");
-  const bool of_session = std::ranges::all_of(
-      v.recordings, [](const RecordingComparison& r) { return r.part.hold_asked_s.has_value(); });
-  if (all.names.size() < 2 || !of_session || colon == std::string::npos) return all;
+  if (all.names.size() < 2 || !v.of_session() || colon == std::string::npos) return all;
   const std::string file = all.names.front().substr(0, colon + 2);
   for (const std::string& name : all.names) {
     if (!name.starts_with(file)) return all;
@@ -244,7 +241,9 @@ void add_header(BriefText& text, const Validation& v) {
   const RecordingNames names = names_of(v);
   text.add_words(fmt::format(
       "{} with {}{}{}, fitted to {}; {}",
-      residual ? "compared (calibration residual, no validation)" : "validated",
+      residual         ? "compared (calibration residual, no validation)"
+      : v.of_session() ? "compared (rendered forces, no validation)"
+                       : "validated",
       v.new_specimen ? "new specimens: " : "", names.file, first_names(names.names), fitted,
       v.requirement.empty() ? std::string("no requirement")
                             : fmt::format("requirement: {}", v.requirement)));
@@ -453,28 +452,29 @@ std::string conclusion_words(const Validation& v) {
       alone.empty()
           ? ""
           : fmt::format("; beyond it before Holm's correction only: {}", fmt::join(alone, ", "));
+  const std::string of = v.of_session() ? "of the rendering: " : "";
   switch (v.verdict) {
     case ModelVerdict::adequate:
-      return fmt::format("adequate for {}{}{}", v.requirement,
+      return fmt::format("{}adequate for {}{}{}", of, v.requirement,
                          unasked.empty() ? "" : "; nothing is required of " + unasked,
                          outside ? "; outside the calibration" : "");
     case ModelVerdict::not_adequate:
-      return fmt::format("not adequate for {}: model error {}", v.requirement, list);
+      return fmt::format("{}not adequate for {}: model error {}", of, v.requirement, list);
     case ModelVerdict::undetermined:
       return list.empty()
-                 ? fmt::format("undetermined for {}: beyond it before Holm's correction only",
+                 ? fmt::format("{}undetermined for {}: beyond it before Holm's correction only", of,
                                v.requirement)
-                 : fmt::format("undetermined{}: {}{}",
+                 : fmt::format("{}undetermined{}: {}{}", of,
                                v.requirement.empty() ? "" : " for " + v.requirement, list,
                                before_holm);
     case ModelVerdict::seen:
-      return fmt::format("a model error of E +- U: {}", list);
+      return fmt::format("{}a model error of E +- U: {}", of, list);
     case ModelVerdict::no_requirement:
       return "the requirement has the unit of no quantity that was compared";
     default:
       break;
   }
-  return std::string(verdict_words(ModelVerdict::not_seen)) + before_holm;
+  return of + std::string(verdict_words(ModelVerdict::not_seen)) + before_holm;
 }
 
 std::string to_terminal_text(const Validation& v) {
