@@ -313,7 +313,8 @@ int run_hil(const RunChoice& choice, const Session& session) {
     json["recording"] = choice.output;
     say("{}", answer_text(session, json));
   } else {
-    say("{}wrote {}\n", run_text(hil, run), choice.output);
+    say("{}wrote {}\nnext: tpm hil verify {}\n", run_text(hil, run), choice.output,
+        shell_word(choice.output));
   }
   for (const Remark& remark : run.rendering.remarks) {
     tell_user("tpm: warning: {}\n", remark.text);

@@ -3,10 +3,10 @@
 import copy
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
-import pickle
 import tempfile
 import textwrap
 import time
