@@ -46,7 +46,7 @@ class Tables(unittest.TestCase):
 
     def test_what_follows_from_a_fit_shows_its_adequacy_and_warnings(self):
         protocol = tpmkit.Protocol.ramp_and_hold(9e-3, 1e-3, 10.0)  # deeper than what was fitted
-        for table in (self.fit.predict(protocol, [0.0, 1.0]), self.fit.young_moduli(sphere_radius_m=1e-3)):
+        for table in (self.fit.predict(protocol, [0.0, 9.0]), self.fit.young_moduli(sphere_radius_m=1e-3)):
             self.assertEqual(table.adequacy, self.fit.adequacy)
             self.assertTrue(table.warnings)
             for words in (table.adequacy["summary"], *table.warnings):
